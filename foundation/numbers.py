@@ -1,0 +1,103 @@
+"""Numbers as the robot's processors see them: float32, 32-bit words and 16.16 fixed point.
+
+Interpreted Python has neither 32-bit floats nor wrapping integers, compiled code has both; every
+rounding and every wrap therefore goes through this file, which gives the same bits either way.
+"""
+
+import cython
+
+if not cython.compiled:
+    from math import isinf, isnan
+    from struct import pack, unpack
+
+WORD_MASK = 0xFFFFFFFF
+
+
+def float32(value: cython.double) -> cython.double:
+    """`value` rounded to the nearest IEEE single; beyond the largest single it becomes infinite."""
+    if cython.compiled:
+        return cython.cast(cython.double, cython.cast(cython.float, value))
+    else:
+        return float_of_word(word_of_float(value))
+
+
+def word_of_float(value: cython.double) -> cython.longlong:
+    """The 32 bits of `value` as a single-precision float, 0 ... 2^32-1."""
+    if cython.compiled:
+        single: cython.float = cython.cast(cython.float, value)
+        return cython.cast(
+            cython.longlong, cython.cast(cython.pointer(cython.uint), cython.address(single))[0]
+        )
+    else:
+        if isnan(value):
+            return 0x7FC00000
+        try:
+            return unpack("<I", pack("<f", value))[0]
+        except OverflowError:
+            return 0xFF800000 if value < 0 else 0x7F800000
+
+
+def float_of_word(word: cython.longlong) -> cython.double:
+    """The single-precision float whose 32 bits are `word` (only the low 32 bits count)."""
+    if cython.compiled:
+        bits: cython.uint = cython.cast(cython.uint, word & 0xFFFFFFFF)
+        return cython.cast(
+            cython.double, cython.cast(cython.pointer(cython.float), cython.address(bits))[0]
+        )
+    else:
+        return unpack("<f", pack("<I", word & 0xFFFFFFFF))[0]
+
+
+def wrap_u32(value: cython.longlong) -> cython.longlong:
+    """`value` modulo 2^32, 0 ... 2^32-1."""
+    return value & 0xFFFFFFFF
+
+
+def wrap_i32(value: cython.longlong) -> cython.longlong:
+    """`value` modulo 2^32 as a signed 32-bit integer, -2^31 ... 2^31-1."""
+    return ((value + 0x80000000) & 0xFFFFFFFF) - 0x80000000
+
+
+def word_of_i32(value: cython.longlong) -> cython.longlong:
+    """The 32-bit pattern of a signed integer, 0 ... 2^32-1."""
+    return value & 0xFFFFFFFF
+
+
+def elapsed_u32(now: cython.longlong, then: cython.longlong) -> cython.longlong:
+    """Ticks from `then` to `now` on a counter of 32 bits that may have wrapped once."""
+    return (now - then) & 0xFFFFFFFF
+
+
+def fixed_of_float(value: cython.double) -> cython.longlong:
+    """16.16 fixed point of `value`, truncated toward zero, saturated at the 32-bit limits.
+
+    The firmware truncates (facts network-and-boards 4); NaN becomes 0.
+    """
+    scaled: cython.double = value * 65536.0
+    if scaled != scaled:
+        return 0
+    if scaled >= 2147483647.0:
+        return 2147483647
+    if scaled <= -2147483648.0:
+        return -2147483648
+    return cython.cast(cython.longlong, scaled) if cython.compiled else int(scaled)
+
+
+def float_of_fixed(value: cython.longlong) -> cython.double:
+    """The real number of a 16.16 fixed-point value (exact)."""
+    return value / 65536.0
+
+
+def fixed_multiply(a: cython.longlong, b: cython.longlong) -> cython.longlong:
+    """Product of two 16.16 numbers, floored, wrapped to 32 bits as the firmware's arithmetic does."""
+    return ((((a * b) >> 16) + 0x80000000) & 0xFFFFFFFF) - 0x80000000
+
+
+def divide_toward_zero(numerator: cython.longlong, denominator: cython.longlong) -> cython.longlong:
+    """Integer quotient as C gives it: truncated toward zero. ZeroDivisionError for denominator 0."""
+    quotient: cython.longlong
+    if (numerator < 0) == (denominator < 0):
+        quotient = abs(numerator) // abs(denominator)
+        return quotient
+    quotient = abs(numerator) // abs(denominator)
+    return -quotient
