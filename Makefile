@@ -1,0 +1,47 @@
+# make walk: set up everything, then let Ranger walk 100 steps.   make test: set up everything, then run all tests.
+PYTHON ?= python3
+VENV   ?= .venv
+STEPS  ?= 100
+RUN    := $(VENV)/bin/python
+SOURCES := $(shell find foundation datatable can_bus plant firmware_sim boards harness sysid tools \( -name '*.py' -o -name '*.pxd' \) -not -name '_*' 2>/dev/null)
+
+.PHONY: walk test lint setup bench lock clean
+
+walk: $(VENV)/.built
+	$(RUN) -m tools.cli walk --steps $(STEPS) --out runs/walk
+
+test: $(VENV)/.built
+	$(RUN) -m pytest -q
+
+lint: $(VENV)/.built
+	$(RUN) -m ruff check .
+	$(RUN) -m mypy
+
+bench: $(VENV)/.built
+	$(RUN) -m tools.cli bench
+
+setup: $(VENV)/.built
+
+# Dependencies are locked with hashes and without index addresses: the machine's own pip settings say where from.
+$(VENV)/.installed: requirements.lock
+	@$(PYTHON) -c 'import sys; sys.exit(0 if sys.version_info >= (3, 11) else "ranger-sim needs Python 3.11 or newer, this is " + sys.version.split()[0] + "; try make PYTHON=python3.12")'
+	@echo "Setting up $(VENV) (once) ..."
+	$(PYTHON) -m venv $(VENV)
+	$(RUN) -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
+	@touch $@
+
+# Compiled where a C compiler is found, interpreted otherwise; only changed modules are rebuilt.
+$(VENV)/.built: $(VENV)/.installed pyproject.toml setup.py $(SOURCES)
+	@echo "Building (compiled where a C compiler is found) ..."
+	@test -f $(VENV)/.linked || $(RUN) -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
+	@touch $(VENV)/.linked
+	@$(RUN) setup.py -q build_ext --inplace
+	@touch $@
+
+lock:
+	uv pip compile pyproject.toml --extra dev --universal --generate-hashes --no-emit-index-url --no-header --python-version 3.11 -o requirements.lock
+
+clean:
+	rm -rf $(VENV) build *.egg-info
+	find . -name '*.so' -not -path './$(VENV)/*' -delete
+	find . -name '*.c' -not -path './$(VENV)/*' -not -path './datatable/generated/*' -delete
