@@ -1,0 +1,148 @@
+"""The piezo buzzer on PWM5 (P0.21): tones, one short tune, and beeps on errors.
+
+Period 60e6 / Hz counts in MR0, half of it in MR5. A non-zero UI_SET_BUZZER_AMPL or UI_EMPTY_TX2 starts the
+tune. The firmware of 2016 then never stops it, and silences the buzzer in every millisecond without a tune,
+so that a frequency alone is not heard (facts network-and-boards 4.11). Appendix 3.8 has beeps on errors and
+own sounds for the common ones; `beeps` and `repeats` are the switches buzzer_beeps, song_repeats_for_ever.
+"""
+
+import array
+
+import cython
+
+# Our own tune, a rising and falling fifth: the robot played a song that belongs to others. (Hz, ms)
+TUNE = ((523, 200), (784, 200), (659, 200), (988, 200), (784, 400), (587, 200), (523, 400), (0, 200))
+# Beeps are chosen by us, because the appendix says only that there were some: short enough to count, far
+# enough apart to tell, and at most eight wait (a robot with a lasting fault need not beep for minutes).
+BEEP_MS = 60
+PAUSE_MS = 60
+MOST_WAITING = 8
+# an error's code modulo 4 chooses its pitch, so different errors sound different
+PITCHES_HZ = (1047, 1319, 1568, 2093)
+PWM_CLOCK_HZ = 60_000_000
+
+
+class Buzzer:
+    """`update` runs once per slot of 1 ms; `hertz` is what is heard now, 0 for silence."""
+
+    def __init__(self, beeps=True, repeats=False) -> None:
+        self.beeps = beeps
+        self.repeats = repeats
+        self.hertz = 0
+        self.mr0 = 0
+        self.mr5 = 0
+        self.frequency_command = 0
+        self.amplitude_command = 0
+        self.song_command = 0
+        self.playing = False
+        self.note = 0
+        self.note_left_ms = 0
+        self.beep_left_ms = 0
+        self.beep_hertz = 0
+        self.beep_queue = array.array("q", [0]) * 8
+        self.beep_next = 0
+        self.beeps_waiting = 0
+        self.silence_left_ms = 0
+        self.tune_hertz = array.array("q", [note[0] for note in TUNE])
+        self.pitches = array.array("q", PITCHES_HZ)
+        self.tune_ms = array.array("q", [note[1] for note in TUNE])
+        self.tunes_started = 0
+        self.beeps_made = 0
+
+    def tone(self, hertz: cython.longlong) -> cython.void:
+        """Sound `hertz` (1-30 000; anything else is silence) by writing MR0 and MR5."""
+        if hertz < 1 or hertz > 30000:
+            hertz = 0
+        if hertz == self.hertz:
+            return
+        self.hertz = hertz
+        if hertz == 0:
+            self.mr5 = 0
+            return
+        self.mr0 = 60000000 // hertz
+        self.mr5 = self.mr0 // 2
+
+    def set_frequency(self, word0: cython.longlong, word1: cython.longlong) -> cython.longlong:
+        """Setter of UI_SET_BUZZER_FREQ (Hz, 32-bit two's complement); the time word is not looked at."""
+        self.frequency_command = word0
+        return 1
+
+    def set_amplitude(self, word0: cython.longlong, word1: cython.longlong) -> cython.longlong:
+        """Setter of UI_SET_BUZZER_AMPL: non-zero starts the tune."""
+        self.amplitude_command = word0
+        if word0 != 0:
+            self.start_tune()
+        return 1
+
+    def set_song(self, word0: cython.longlong, word1: cython.longlong) -> cython.longlong:
+        """Setter of UI_EMPTY_TX2: non-zero starts the tune."""
+        self.song_command = word0
+        if word0 != 0:
+            self.start_tune()
+        return 1
+
+    def set_error_frame(self, word0: cython.longlong, word1: cython.longlong) -> cython.longlong:
+        """Setter of ERROR_LCD: an error of any board, code in bits 0-15; 0 is no error."""
+        if word0 & 0xFFFF:
+            self.error_sound(word0 & 0xFFFF)
+        return 1
+
+    def start_tune(self) -> cython.void:
+        """From the first note; a tune that plays goes on."""
+        if self.playing:
+            return
+        self.playing = True
+        self.tunes_started += 1
+        self.note = 0
+        self.note_left_ms = self.tune_ms[0]
+
+    def stop_tune(self) -> cython.void:
+        """Silence from the next update on."""
+        self.playing = False
+
+    def error_sound(self, code: cython.longlong) -> cython.void:
+        """Queue a beep for an error code, if beeps are switched on."""
+        if not self.beeps or self.beeps_waiting >= 8:
+            return
+        self.beep_queue[(self.beep_next + self.beeps_waiting) % 8] = self.pitches[code % 4]
+        self.beeps_waiting += 1
+
+    def update(self) -> cython.longlong:
+        """One millisecond: a beep goes before the tune, and without either the buzzer is silent.
+
+        With beeps switched on a frequency command alone is heard as well. Returns 1 while something sounds.
+        """
+        if self.silence_left_ms > 0:
+            self.silence_left_ms -= 1
+        elif self.beep_left_ms > 0:
+            self.beep_left_ms -= 1
+            if self.beep_left_ms == 0:
+                self.silence_left_ms = 60
+        elif self.beeps_waiting > 0:
+            self.beeps_waiting -= 1
+            self.beep_hertz = self.beep_queue[self.beep_next]
+            self.beep_next = (self.beep_next + 1) % 8
+            self.beeps_made += 1
+            self.beep_left_ms = 60
+        if self.beep_left_ms > 0:
+            self.tone(self.beep_hertz)
+            return 1
+        if self.silence_left_ms > 0:
+            self.tone(0)
+            return 0
+        if self.playing:
+            self.tone(self.tune_hertz[self.note])
+            self.note_left_ms -= 1
+            if self.note_left_ms <= 0:
+                self.note += 1
+                if self.note == len(self.tune_hertz):
+                    self.note = 0
+                    if not self.repeats:
+                        self.playing = False
+                self.note_left_ms = self.tune_ms[self.note]
+            return 1
+        if self.beeps:
+            self.tone(self.frequency_command)
+            return 0
+        self.tone(0)
+        return 0

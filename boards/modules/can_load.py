@@ -1,0 +1,35 @@
+"""Frames per millisecond on each bus, as the router counts them: sent and received, its own sync included."""
+
+import array
+
+import cython
+
+
+class CanLoad:
+    """Counters of the four buses, index 1-4; index 0 counts the SSP link and is not reported."""
+
+    def __init__(self) -> None:
+        self.counts = array.array("q", [0]) * 5
+        self.peaks = array.array("q", [0]) * 5
+        self.totals = array.array("q", [0]) * 5
+        self.last_counts = array.array("q", [0]) * 5
+
+    def count(self, channel: cython.longlong) -> cython.void:
+        """One frame more on `channel` in this millisecond."""
+        self.counts[channel] += 1
+        self.totals[channel] += 1
+
+    def end_of_millisecond(self) -> cython.void:
+        """Keep the largest count and start the next millisecond."""
+        i: cython.longlong
+        for i in range(5):
+            if self.counts[i] > self.peaks[i]:
+                self.peaks[i] = self.counts[i]
+            self.last_counts[i] = self.counts[i]
+            self.counts[i] = 0
+
+    def report_peak(self, channel: cython.longlong) -> cython.double:
+        """Largest frame count of one millisecond since the last report, as a float (facts 3.7)."""
+        peak: cython.double = self.peaks[channel]
+        self.peaks[channel] = 0
+        return peak

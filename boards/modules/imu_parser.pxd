@@ -1,0 +1,15 @@
+cdef class ImuParser:
+    cdef public object report
+    cdef public long long header, needed, code_ring_full
+    cdef public bint has_angles
+    cdef public long long[::1] ring
+    cdef public long long ring_write, ring_read
+    cdef public double roll, pitch, yaw
+    cdef public double rate_x, rate_y, rate_z
+    cdef public double acceleration_x, acceleration_y, acceleration_z
+    cdef public long long timer
+    cdef public long long packets, bad_checksums, skipped_bytes, bytes_lost
+    cpdef void push(self, long long byte)
+    cpdef long long waiting(self)
+    cpdef long long update(self)
+    cpdef double _float_at(self, long long index)

@@ -1,0 +1,127 @@
+"""The IMU's packets: a receive ring of 128 bytes and a parser that takes at most one packet per call.
+
+Both packets the board can ask for have 31 bytes: a header byte, six big-endian singles, a four-byte timer
+(1/62 500 s per tick in the data sheet of the 3DM-GX3-25; not used here) and a 16-bit big-endian checksum,
+the sum of the first 29 bytes.
+
+- 0xCF: roll, pitch, yaw (rad), then rates about x, y, z (rad/s). What the 2016 firmware asks for (facts
+  network-and-boards 4.10).
+- 0xC2: accelerations x, y, z (g), then rates. The device sends this one at 1 kHz, because nothing has to
+  be fused for it. ROBOT PARITY: appendix 3.8 says only that the record walk used rates alone at 1 kHz;
+  0xC2 is chosen by us, because it is the device's documented packet with scaled rates and no angles.
+"""
+
+import array
+
+import cython
+
+from datatable.generated import errors
+from foundation.numbers import float_of_word
+
+HEADER_ANGLES_AND_RATES = 0xCF
+HEADER_RATES_ONLY = 0xC2
+PACKET_BYTES = 31
+RING_BYTES = 128
+
+
+def start_command(header) -> bytes:
+    """The four bytes that put the device into continuous mode with packet `header` (facts 4.10)."""
+    return bytes((0xC4, 0xC1, 0x29, header))
+
+
+class ImuParser:
+    """Bytes in by `push`, one packet out per `update`; values stay until the next good packet.
+
+    `report(code)` hears MSIMU_RX_OF when the ring is full. `late_by_one_byte`: the firmware waits for
+    more than 31 bytes, so a packet is read only when the next one has begun.
+    """
+
+    def __init__(self, report, header=0xCF, late_by_one_byte=False) -> None:
+        self.report = report
+        self.header = header
+        self.has_angles = header == 0xCF
+        self.needed = 32 if late_by_one_byte else 31
+        self.code_ring_full = errors.MSIMU_RX_OF
+        self.ring = array.array("q", [0]) * 128
+        self.ring_write = 0
+        self.ring_read = 0
+        self.roll = 0.0
+        self.pitch = 0.0
+        self.yaw = 0.0
+        self.rate_x = 0.0
+        self.rate_y = 0.0
+        self.rate_z = 0.0
+        self.acceleration_x = 0.0
+        self.acceleration_y = 0.0
+        self.acceleration_z = 0.0
+        self.timer = 0
+        self.packets = 0
+        self.bad_checksums = 0
+        self.skipped_bytes = 0
+        self.bytes_lost = 0
+
+    def push(self, byte: cython.longlong) -> cython.void:
+        """Store a received byte; 127 fit, a byte more is lost and reported (MSIMU_RX_OF)."""
+        following: cython.longlong = (self.ring_write + 1) & 127
+        if following == self.ring_read:
+            self.bytes_lost += 1
+            self.report(self.code_ring_full)
+            return
+        self.ring[self.ring_write] = byte & 0xFF
+        self.ring_write = following
+
+    def waiting(self) -> cython.longlong:
+        """Bytes in the ring."""
+        return (self.ring_write - self.ring_read) & 127
+
+    def update(self) -> cython.longlong:
+        """Look for one packet; return the number of bytes examined (the cost depends on it).
+
+        Bytes before a header are skipped; a packet with a wrong sum costs one byte, and the search goes on
+        in the next call's 31 bytes.
+        """
+        examined: cython.longlong = 0
+        total: cython.longlong = 0
+        sent: cython.longlong
+        i: cython.longlong
+        read: cython.longlong
+        while self.waiting() >= self.needed and self.ring[self.ring_read] != self.header:
+            self.ring_read = (self.ring_read + 1) & 127
+            self.skipped_bytes += 1
+            examined += 1
+        if self.waiting() < self.needed:
+            return examined
+        read = self.ring_read
+        for i in range(29):
+            total += self.ring[(read + i) & 127]
+        sent = (self.ring[(read + 29) & 127] << 8) | self.ring[(read + 30) & 127]
+        examined += 31
+        if (total & 0xFFFF) != sent:
+            self.bad_checksums += 1
+            self.ring_read = (read + 1) & 127
+            return examined
+        if self.has_angles:
+            self.roll = self._float_at(read + 1)
+            self.pitch = self._float_at(read + 5)
+            self.yaw = self._float_at(read + 9)
+        else:
+            self.acceleration_x = self._float_at(read + 1)
+            self.acceleration_y = self._float_at(read + 5)
+            self.acceleration_z = self._float_at(read + 9)
+        self.rate_x = self._float_at(read + 13)
+        self.rate_y = self._float_at(read + 17)
+        self.rate_z = self._float_at(read + 21)
+        self.timer = 0
+        for i in range(4):
+            self.timer = (self.timer << 8) | self.ring[(read + 25 + i) & 127]
+        self.ring_read = (read + 31) & 127
+        self.packets += 1
+        return examined
+
+    def _float_at(self, index: cython.longlong) -> cython.double:
+        """The big-endian single whose first byte is at `index` of the ring."""
+        word: cython.longlong = 0
+        i: cython.longlong
+        for i in range(4):
+            word = (word << 8) | self.ring[(index + i) & 127]
+        return float_of_word(word)

@@ -1,0 +1,36 @@
+"""Six keys, active high, not debounced. Source: facts network-and-boards 4.11."""
+
+import array
+
+import cython
+
+from datatable.generated import errors
+
+# pin number = 32 x port + bit: P1.18, P0.12, P0.13, P0.28, P1.16, P0.30
+KEY_PINS = (50, 12, 13, 28, 48, 30)
+
+
+class Keypad:
+    """Levels of the keys through `gpio.level(pin)`; `report(code)` hears BUTTON_OOB."""
+
+    def __init__(self, gpio, report) -> None:
+        self.gpio = gpio
+        self.pins = array.array("q", KEY_PINS)
+        self.report = report
+        self.code_index = errors.BUTTON_OOB
+
+    def pressed(self, key: cython.longlong) -> cython.bint:
+        """True while key 0-5 is down; another number is an error and counts as up."""
+        if key < 0 or key > 5:
+            self.report(self.code_index)
+            return False
+        return self.gpio.level(self.pins[key]) != 0
+
+    def buttons(self) -> cython.longlong:
+        """Bit mask of UI_BUTTONS: bit i set while key i is down."""
+        mask: cython.longlong = 0
+        i: cython.longlong
+        for i in range(6):
+            if self.gpio.level(self.pins[i]):
+                mask |= 1 << i
+        return mask

@@ -1,0 +1,179 @@
+"""The display of two lines of eight characters: the device, and the queues that feed it slowly.
+
+The firmware keeps four queues of 100 characters, one per quarter of four places, and serves the lowest
+quarter first. Each character takes a cursor command, 50 ms, the data, 1 ms: about 20 characters a second.
+Place p has the device address 0x40 (p / 8) + p mod 8. Source: facts network-and-boards 4.11; the device is
+of the HD44780 type, commands as in its data sheet.
+"""
+
+import array
+
+import cython
+
+from datatable.generated import errors
+
+START_COMMANDS = (0x38, 0x0C, 0x06, 0x01, 0x02)  # 8 bits and 2 lines, on, move right, clear, home
+QUEUES = 4
+QUEUE_CHARACTERS = 100
+CURSOR_WAIT_MS = 50
+DATA_WAIT_MS = 1
+
+
+class CharacterDisplay:
+    """The device: 80 bytes of memory, an address, and what a person reads.
+
+    ROBOT PARITY: a byte goes over as one call; on the robot eight data pins, R/S, R/W and E make it.
+    """
+
+    def __init__(self) -> None:
+        self.memory = array.array("q", [0x20]) * 128
+        self.address = 0
+        self.commands = 0
+        self.characters = 0
+        self.on = False
+        self.two_lines = False
+        self.wide_bus = False
+        self.increment = 1
+
+    def command(self, byte: cython.longlong) -> cython.void:
+        """A byte with R/S low: the highest bit that is set says what it is."""
+        i: cython.longlong
+        self.commands += 1
+        if byte & 0x80:
+            self.address = byte & 0x7F
+        elif byte & 0x40:
+            pass  # character shapes: the firmware defines none
+        elif byte & 0x20:
+            self.wide_bus = (byte & 0x10) != 0
+            self.two_lines = (byte & 0x08) != 0
+        elif byte & 0x10:
+            pass  # shifting the whole display: not used
+        elif byte & 0x08:
+            self.on = (byte & 0x04) != 0
+        elif byte & 0x04:
+            self.increment = 1 if byte & 0x02 else -1
+        elif byte & 0x02:
+            self.address = 0
+        elif byte & 0x01:
+            for i in range(128):
+                self.memory[i] = 0x20
+            self.address = 0
+
+    def data(self, byte: cython.longlong) -> cython.void:
+        """A byte with R/S high: a character at the address, which then moves on."""
+        self.characters += 1
+        self.memory[self.address] = byte & 0xFF
+        self.address = (self.address + self.increment) & 0x7F
+
+    def lines(self):
+        """What a person reads, two strings of eight; a byte that is no printable ASCII shows as a space."""
+        if not self.on:
+            return (" " * 8, " " * 8)
+        shown = []
+        for start in (0x00, 0x40):
+            shown.append(
+                "".join(chr(b) if 0x20 <= b < 0x7F else " " for b in self.memory[start : start + 8])
+            )
+        return tuple(shown)
+
+
+class Lcd:
+    """The firmware's side. `tick` belongs into the millisecond interrupt; `set_quarter_n` are setters."""
+
+    def __init__(self, report) -> None:
+        self.report = report
+        self.display = CharacterDisplay()
+        for byte in START_COMMANDS:
+            self.display.command(byte)
+        self.positions = array.array("q", [0]) * 400
+        self.characters = array.array("q", [0]) * 400
+        self.reads = array.array("q", [0]) * 4
+        self.counts = array.array("q", [0]) * 4
+        self.state = 0  # 0 idle, 1 cursor is set, 2 character is written
+        self.countdown = 0
+        self.position = 0
+        self.character = 0
+        self.waiting = 0
+        self.code_full = errors.LCD_STR_OF
+        self.code_position = errors.LCD_POS_OOB
+        self.written = 0
+        self.lost = 0
+
+    def text(self) -> str:
+        """Both lines as a person reads them, joined by a line feed."""
+        return "\n".join(self.display.lines())
+
+    def put(self, position: cython.longlong, character: cython.longlong) -> cython.bint:
+        """Queue one character for place 0-15; False and an error when the place or the queue is wrong."""
+        queue: cython.longlong
+        slot: cython.longlong
+        if position < 0 or position > 15:
+            self.report(self.code_position)
+            return False
+        queue = position // 4
+        if self.counts[queue] >= 100:
+            self.lost += 1
+            self.report(self.code_full)
+            return False
+        slot = queue * 100 + (self.reads[queue] + self.counts[queue]) % 100
+        self.positions[slot] = position
+        self.characters[slot] = character & 0xFF
+        self.counts[queue] += 1
+        self.waiting += 1
+        return True
+
+    def set_quarter(self, quarter: cython.longlong, word: cython.longlong) -> cython.longlong:
+        """Queue the four characters of `word`, first in byte 0, for quarter 0-3; returns how many fit."""
+        i: cython.longlong
+        n: cython.longlong = 0
+        for i in range(4):
+            if self.put(quarter * 4 + i, (word >> (8 * i)) & 0xFF):
+                n += 1
+        return n
+
+    def set_quarter_1(self, word0: cython.longlong, word1: cython.longlong) -> cython.longlong:
+        """Setter of UI_SET_LCD_QUAD_1; the time word is not looked at."""
+        return self.set_quarter(0, word0)
+
+    def set_quarter_2(self, word0: cython.longlong, word1: cython.longlong) -> cython.longlong:
+        """Setter of UI_SET_LCD_QUAD_2."""
+        return self.set_quarter(1, word0)
+
+    def set_quarter_3(self, word0: cython.longlong, word1: cython.longlong) -> cython.longlong:
+        """Setter of UI_SET_LCD_QUAD_3."""
+        return self.set_quarter(2, word0)
+
+    def set_quarter_4(self, word0: cython.longlong, word1: cython.longlong) -> cython.longlong:
+        """Setter of UI_SET_LCD_QUAD_4."""
+        return self.set_quarter(3, word0)
+
+    def tick(self) -> cython.longlong:
+        """One millisecond: at most one byte to the device; returns the bytes written."""
+        queue: cython.longlong
+        slot: cython.longlong
+        if self.countdown > 0:
+            self.countdown -= 1
+            if self.countdown > 0:
+                return 0
+        if self.state == 1:
+            self.display.data(self.character)
+            self.written += 1
+            self.state = 2
+            self.countdown = 1
+            return 1
+        self.state = 0
+        if self.waiting == 0:
+            return 0
+        queue = 0
+        while self.counts[queue] == 0:
+            queue += 1
+        slot = queue * 100 + self.reads[queue]
+        self.position = self.positions[slot]
+        self.character = self.characters[slot]
+        self.reads[queue] = (self.reads[queue] + 1) % 100
+        self.counts[queue] -= 1
+        self.waiting -= 1
+        self.display.command(0x80 + 0x40 * (self.position // 8) + self.position % 8)
+        self.state = 1
+        self.countdown = 50
+        return 1

@@ -1,0 +1,246 @@
+"""Routing: a table of 2032 identifiers, the rings in front of it, and the order in which frames move.
+
+A table entry is a mask of destinations (bit 0 SSP, bits 1-4 CAN1-CAN4) and the source last seen (7: none
+yet). Frames go to every destination but the channel they came from, in the order SSP, CAN1 ... CAN4.
+Source: facts network-and-boards 1.5.
+"""
+
+import array
+
+import cython
+
+from boards.modules.can_load import CanLoad
+from boards.modules.ssp_link import RouterSspLink
+from datatable.generated import errors
+
+IDENTIFIERS = 2032  # 2032-2047 would begin with seven recessive bits, which CAN forbids
+CHANNEL_SSP = 0
+CHANNEL_OWN = 5
+SOURCE_UNKNOWN = 7
+RECEIVE_RING = 64
+TRANSMIT_RING = 8
+OWN_RING = 8
+
+
+class RoutingTable:
+    """Destinations and learned sources of every identifier. `routes`: pairs (identifier, mask)."""
+
+    def __init__(self, routes=()) -> None:
+        # every identifier that the table does not name goes to the main brain
+        self.destinations = array.array("q", [1]) * 2032
+        self.sources = array.array("q", [7]) * 2032
+        self.learned = 0
+        self.changed = 0
+        for identifier, mask in routes:
+            self.set_destinations(identifier, mask)
+
+    def set_destinations(self, identifier: cython.longlong, mask: cython.longlong) -> cython.void:
+        """Replace the destinations of `identifier`; IndexError above 2031."""
+        self.destinations[identifier] = mask & 0x1F
+
+    def learn(self, identifier: cython.longlong, channel: cython.longlong) -> cython.void:
+        """Note where `identifier` comes from; a source that changed is accepted without a word."""
+        before: cython.longlong = self.sources[identifier]
+        if before == channel:
+            return
+        if before == 7:
+            self.learned += 1
+        else:
+            self.changed += 1
+        self.sources[identifier] = channel
+
+    def subscribe(self, identifier: cython.longlong, channel: cython.longlong) -> cython.void:
+        """A remote frame came from `channel`: send `identifier` there too from now on."""
+        self.destinations[identifier] |= 1 << channel
+
+
+class Router:
+    """The rings and the moves. `report(code)` hears errors.
+
+    `one_frame_lag` is the firmware's quirk: its receive interrupt advances the write index before storing
+    and its reader takes before advancing, so a frame is read only when the next one has come.
+    """
+
+    def __init__(
+        self, table: RoutingTable, ssp: RouterSspLink, load: CanLoad, report, one_frame_lag=False
+    ) -> None:
+        self.table = table
+        self.ssp = ssp
+        self.load = load
+        self.report = report
+        self.one_frame_lag = one_frame_lag
+        self.rx_channel = array.array("q", [0]) * 64
+        self.rx_id = array.array("q", [0]) * 64
+        self.rx_flags = array.array("q", [0]) * 64
+        self.rx_word0 = array.array("q", [0]) * 64
+        self.rx_word1 = array.array("q", [0]) * 64
+        self.rx_write = 0
+        self.rx_read = 0
+        self.tx_id = array.array("q", [0]) * 40
+        self.tx_flags = array.array("q", [0]) * 40
+        self.tx_word0 = array.array("q", [0]) * 40
+        self.tx_word1 = array.array("q", [0]) * 40
+        self.tx_write = array.array("q", [0]) * 5
+        self.tx_read = array.array("q", [0]) * 5
+        self.own_id = array.array("q", [0]) * 8
+        self.own_flags = array.array("q", [0]) * 8
+        self.own_word0 = array.array("q", [0]) * 8
+        self.own_word1 = array.array("q", [0]) * 8
+        self.own_write = 0
+        self.own_read = 0
+        self.receive_full_codes = array.array(
+            "q",
+            [0, errors.CAN1_RX_BUF_OF, errors.CAN2_RX_BUF_OF, errors.CAN3_RX_BUF_OF, errors.CAN4_RX_BUF_OF],
+        )
+        self.routed = 0
+        self.copies = 0
+        self.receive_lost = 0
+        self.own_lost = 0
+        self.unroutable = 0
+        self.transmit_lost = array.array("q", [0]) * 5
+
+    def receive(
+        self,
+        channel: cython.longlong,
+        identifier: cython.longlong,
+        flags: cython.longlong,
+        word0: cython.longlong,
+        word1: cython.longlong,
+    ) -> cython.bint:
+        """What a CAN receive interrupt does: one frame into the ring that the four buses share.
+
+        63 frames fit; one more is lost, False, and CANn_RX_BUF_OF reported.
+        """
+        following: cython.longlong = (self.rx_write + 1) & 63
+        slot: cython.longlong = self.rx_write
+        self.load.count(channel)
+        if following == self.rx_read:
+            self.receive_lost += 1
+            self.report(self.receive_full_codes[channel])
+            return False
+        if self.one_frame_lag:
+            slot = following
+        self.rx_channel[slot] = channel
+        self.rx_id[slot] = identifier
+        self.rx_flags[slot] = flags
+        self.rx_word0[slot] = word0
+        self.rx_word1[slot] = word1
+        self.rx_write = following
+        return True
+
+    def send(
+        self, identifier: cython.longlong, word0: cython.longlong, word1: cython.longlong
+    ) -> cython.bint:
+        """A frame of the router itself into its own ring (7 fit); False when it is lost."""
+        following: cython.longlong = (self.own_write + 1) & 7
+        if following == self.own_read:
+            self.own_lost += 1
+            return False
+        self.own_id[self.own_write] = identifier
+        self.own_flags[self.own_write] = 8
+        self.own_word0[self.own_write] = word0
+        self.own_word1[self.own_write] = word1
+        self.own_write = following
+        return True
+
+    def has_work(self) -> cython.bint:
+        """True while a frame waits at any of the three sources."""
+        return (
+            self.rx_read != self.rx_write or self.own_read != self.own_write or self.ssp.has_segments()
+        )
+
+    def route_step(self, now: cython.longlong) -> cython.longlong:
+        """At most one frame from each of SSP, the CAN ring and the own ring; return frames moved."""
+        moved: cython.longlong = 0
+        read: cython.longlong
+        if self.ssp.has_segments() and self.ssp.take():
+            self.load.count(0)
+            self.route(0, self.ssp.rx_id, self.ssp.rx_flags, self.ssp.rx_word0, self.ssp.rx_word1, now)
+            moved += 1
+        read = self.rx_read
+        if read != self.rx_write:
+            self.rx_read = (read + 1) & 63
+            self.route(
+                self.rx_channel[read],
+                self.rx_id[read],
+                self.rx_flags[read],
+                self.rx_word0[read],
+                self.rx_word1[read],
+                now,
+            )
+            moved += 1
+        read = self.own_read
+        if read != self.own_write:
+            self.own_read = (read + 1) & 7
+            self.route(
+                5, self.own_id[read], self.own_flags[read], self.own_word0[read], self.own_word1[read], now
+            )
+            moved += 1
+        return moved
+
+    def route(
+        self,
+        source: cython.longlong,
+        identifier: cython.longlong,
+        flags: cython.longlong,
+        word0: cython.longlong,
+        word1: cython.longlong,
+        now: cython.longlong,
+    ) -> cython.longlong:
+        """Learn where the frame came from and copy it to its destinations; return the number of copies."""
+        mask: cython.longlong
+        channel: cython.longlong
+        n: cython.longlong = 0
+        if identifier > 2031:
+            self.unroutable += 1
+            return 0
+        self.routed += 1
+        if flags & 16 and 1 <= source <= 4:  # FLAG_REMOTE: somebody on that bus asks for the value
+            self.table.subscribe(identifier, source)
+            channel = self.table.sources[identifier]
+            if 1 <= channel <= 4 and channel != source:
+                self.queue(channel, identifier, flags, word0, word1)
+                n += 1
+            self.copies += n
+            return n
+        self.table.learn(identifier, source)
+        mask = self.table.destinations[identifier]
+        if mask & 1 and source != 0:
+            self.ssp.push(identifier, flags, word0, word1, now)
+            n += 1
+        for channel in range(1, 5):
+            if (mask >> channel) & 1 and channel != source:
+                self.queue(channel, identifier, flags, word0, word1)
+                n += 1
+        self.copies += n
+        return n
+
+    def queue(
+        self,
+        channel: cython.longlong,
+        identifier: cython.longlong,
+        flags: cython.longlong,
+        word0: cython.longlong,
+        word1: cython.longlong,
+    ) -> cython.bint:
+        """Into the transmit ring of a bus: 7 fit, one more is lost without an error, as on the robot."""
+        write: cython.longlong = self.tx_write[channel]
+        following: cython.longlong = (write + 1) & 7
+        slot: cython.longlong = channel * 8 + write
+        if following == self.tx_read[channel]:
+            self.transmit_lost[channel] += 1
+            return False
+        self.tx_id[slot] = identifier
+        self.tx_flags[slot] = flags
+        self.tx_word0[slot] = word0
+        self.tx_word1[slot] = word1
+        self.tx_write[channel] = following
+        return True
+
+    def has_frame_for(self, channel: cython.longlong) -> cython.bint:
+        """True while the transmit ring of `channel` holds a frame."""
+        return self.tx_read[channel] != self.tx_write[channel]
+
+    def frames_for(self, channel: cython.longlong) -> cython.longlong:
+        """Frames in the transmit ring of `channel`."""
+        return (self.tx_write[channel] - self.tx_read[channel]) & 7

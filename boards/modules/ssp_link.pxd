@@ -1,0 +1,50 @@
+from firmware_sim.peripherals.ssp cimport SspSegment
+
+cdef class MainBrainSspLink:
+    cdef public object report
+    cdef public long long last_id
+    cdef public long long[::1] received_words, received_used
+    cdef public long long received_read, received_count
+    cdef public list queue
+    cdef public SspSegment empty, packing
+    cdef public long long queue_read, queue_count
+    cdef public long long[::1] ids, words0, words1
+    cdef public long long frames
+    cdef public bint first_is_junk
+    cdef public long long segments_received, segments_sent, frames_received, frames_sent
+    cdef public long long checksum_errors, receive_full, transmit_full, ids_out_of_range
+    cdef public long long code_checksum, code_receive_full, code_transmit_full, code_id_out_of_range
+    cpdef SspSegment exchanged(self, SspSegment segment)
+    cpdef void receive(self, SspSegment segment)
+    cpdef SspSegment next_segment(self)
+    cpdef long long parse(self)
+    cpdef bint send(self, long long identifier, long long word0, long long word1)
+    cpdef long long flush(self)
+
+cdef class RouterSspLink:
+    cdef public object report
+    cdef public bint frames_may_straddle
+    cdef public long long[::1] ring
+    cdef public long long ring_write, ring_read, push_time, push_step_ns
+    cdef public list pool
+    cdef public SspSegment empty
+    cdef public long long pool_next
+    cdef public long long[::1] received_words, received_used
+    cdef public long long received_write, received_read, position
+    cdef public bint exchange_running, exchange_done, frame_waiting
+    cdef public long long rx_id, rx_flags, rx_word0, rx_word1
+    cdef public long long segments_sent, segments_received, frames_sent, frames_received
+    cdef public long long checksum_errors, receive_overwritten, transmit_lost, low_rate
+    cdef public long long code_receive_overwritten, code_low_rate, code_checksum, code_transmit_full
+    cpdef bint push(self, long long identifier, long long flags, long long word0, long long word1, long long now)
+    cpdef long long half_words_waiting(self)
+    cpdef SspSegment next_segment(self, long long now)
+    cpdef SspSegment tick(self, long long now)
+    cpdef void receive(self, SspSegment segment)
+    cpdef bint take(self)
+    cpdef bint has_segments(self)
+
+cpdef long long checksum(SspSegment segment)
+cpdef void finish(SspSegment segment, long long used)
+cpdef SspSegment empty_segment()
+cpdef SspSegment corrupted_copy(SspSegment segment, long long index, long long flipped_bits)

@@ -1,0 +1,12 @@
+from boards.modules.colour_leds cimport ColourLeds
+from boards.modules.keypad cimport Keypad
+
+cdef class SyncLight:
+    cdef public object gpio
+    cdef public Keypad keypad
+    cdef public ColourLeds leds
+    cdef public bint running, lit
+    cdef public long long held_slots, milliseconds, flashes, pin
+    cpdef long long watch_key(self)
+    cpdef long long update(self)
+    cpdef void _show(self, bint on)

@@ -1,0 +1,76 @@
+"""The light that lines up video with the log: a pattern of flashes, started and stopped by key 4.
+
+Key 4 down for 100 slots in all, also with pauses, toggles it. The time is cut into cells of 125 ms, a
+flash lasts 50 ms, and ten patterns follow each other. The light hangs on P0.16, active low, and light 2
+shows the same. Source: facts network-and-boards 4.11. The patterns are ours: pattern n is ten cells with
+flashes in the first n + 1, so the run of flashes tells where in the cycle a video frame lies.
+"""
+
+import cython
+
+from boards.modules.colour_leds import ColourLeds
+from boards.modules.keypad import Keypad
+
+SYNC_KEY = 4
+SYNC_PIN = 16  # P0.16
+SYNC_LED = 1  # light 2
+TOGGLE_SLOTS = 100
+CELL_MS = 125
+FLASH_MS = 50
+CELLS_PER_PATTERN = 10
+PATTERNS = 10
+
+
+class SyncLight:
+    """`watch_key` and `update` run once per slot of 1 ms, in this order."""
+
+    def __init__(self, gpio, keypad: Keypad, leds: ColourLeds) -> None:
+        self.gpio = gpio
+        self.keypad = keypad
+        self.leds = leds
+        self.running = False
+        self.lit = False
+        self.held_slots = 0
+        self.milliseconds = 0
+        self.flashes = 0
+        self.pin = 16
+        gpio.write(16, 1)
+
+    def watch_key(self) -> cython.longlong:
+        """Count the slots in which key 4 is down; at the hundredth start or stop the pattern."""
+        if not self.keypad.pressed(4):
+            return 0
+        self.held_slots += 1
+        if self.held_slots >= 100:
+            self.held_slots = 0
+            self.running = not self.running
+            self.milliseconds = 0
+            if not self.running:
+                self._show(False)
+        return 0
+
+    def update(self) -> cython.longlong:
+        """One millisecond of the pattern; returns how many light transfers it made."""
+        cell: cython.longlong
+        inside: cython.longlong
+        on: cython.bint
+        if not self.running:
+            return 0
+        cell = self.milliseconds // 125
+        inside = self.milliseconds % 125
+        on = inside < 50 and cell % 10 <= cell // 10
+        self.milliseconds += 1
+        if self.milliseconds >= 12500:
+            self.milliseconds = 0
+        if on == self.lit:
+            return 0
+        if on:
+            self.flashes += 1
+        self._show(on)
+        return 3
+
+    def _show(self, on: cython.bint) -> cython.void:
+        """Both lights on or off."""
+        self.lit = on
+        self.gpio.write(self.pin, 0 if on else 1)
+        self.leds.set_led(1, 0xFFFFFF if on else 0)
