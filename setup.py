@@ -8,7 +8,17 @@ from setuptools import Extension, setup
 from setuptools.command.build_ext import build_ext
 
 HERE = pathlib.Path(__file__).parent
-PACKAGES = ("foundation", "datatable", "can_bus", "plant", "firmware_sim", "boards", "harness", "sysid", "tools")
+PACKAGES = (
+    "foundation",
+    "datatable",
+    "can_bus",
+    "plant",
+    "firmware_sim",
+    "boards",
+    "harness",
+    "sysid",
+    "tools",
+)
 
 
 class OptionalBuild(build_ext):

@@ -7,7 +7,7 @@ rounding and every wrap therefore goes through this file, which gives the same b
 import cython
 
 if not cython.compiled:
-    from math import isinf, isnan
+    from math import isnan
     from struct import pack, unpack
 
 WORD_MASK = 0xFFFFFFFF
@@ -25,9 +25,7 @@ def word_of_float(value: cython.double) -> cython.longlong:
     """The 32 bits of `value` as a single-precision float, 0 ... 2^32-1."""
     if cython.compiled:
         single: cython.float = cython.cast(cython.float, value)
-        return cython.cast(
-            cython.longlong, cython.cast(cython.pointer(cython.uint), cython.address(single))[0]
-        )
+        return cython.cast(cython.longlong, cython.cast(cython.pointer(cython.uint), cython.address(single))[0])
     else:
         if isnan(value):
             return 0x7FC00000
@@ -41,9 +39,7 @@ def float_of_word(word: cython.longlong) -> cython.double:
     """The single-precision float whose 32 bits are `word` (only the low 32 bits count)."""
     if cython.compiled:
         bits: cython.uint = cython.cast(cython.uint, word & 0xFFFFFFFF)
-        return cython.cast(
-            cython.double, cython.cast(cython.pointer(cython.float), cython.address(bits))[0]
-        )
+        return cython.cast(cython.double, cython.cast(cython.pointer(cython.float), cython.address(bits))[0])
     else:
         return unpack("<f", pack("<I", word & 0xFFFFFFFF))[0]
 

@@ -54,8 +54,17 @@ def test_elapsed_time_crosses_the_wrap_of_the_counter():
 
 @pytest.mark.parametrize(
     ("value", "fixed"),
-    [(1.0, 65536), (-1.0, -65536), (1e-5, 0), (-1e-5, 0), (1.99999, 131071), (-1.99999, -131071), (1e9, 2**31 - 1),
-     (-1e9, -(2**31)), (math.nan, 0)],
+    [
+        (1.0, 65536),
+        (-1.0, -65536),
+        (1e-5, 0),
+        (-1e-5, 0),
+        (1.99999, 131071),
+        (-1.99999, -131071),
+        (1e9, 2**31 - 1),
+        (-1e9, -(2**31)),
+        (math.nan, 0),
+    ],
 )
 def test_fixed_point_truncates_toward_zero_and_saturates(value, fixed):
     assert numbers.fixed_of_float(value) == fixed

@@ -1,0 +1,27 @@
+"""Which of our modules run compiled."""
+
+import importlib
+import importlib.machinery
+import pathlib
+
+import foundation
+
+
+def compiled_modules() -> tuple[list[str], list[str]]:
+    """(compiled, interpreted): names of the modules that have a .pxd, by how they were loaded."""
+    root = pathlib.Path(foundation.__file__).resolve().parent.parent
+    compiled, interpreted = [], []
+    for package in foundation.OUR_PACKAGES:
+        for declaration in sorted((root / package).rglob("*.pxd")):
+            name = ".".join(declaration.relative_to(root).with_suffix("").parts)
+            module = importlib.import_module(name)
+            suffixes = tuple(importlib.machinery.EXTENSION_SUFFIXES)
+            (compiled if (module.__file__ or "").endswith(suffixes) else interpreted).append(name)
+    return compiled, interpreted
+
+
+def is_compiled() -> bool:
+    """True when the loop of the harness runs compiled."""
+    from harness import lockstep
+
+    return not (lockstep.__file__ or "").endswith(".py")

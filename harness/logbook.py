@@ -1,0 +1,105 @@
+"""What a run keeps for its files: nothing, the last seconds, or everything (spooled to disk)."""
+
+import collections
+import tempfile
+
+import numpy as np
+
+from foundation.user_error import UserError
+from harness.recorder import Recorder
+
+STREAMS = ("frames", "samples", "words")
+WINDOW_S = 10.0  # default window of the logs; the issue of the day asks for the last 10 s
+
+
+class Logbook:
+    """Blocks of the recorder's streams.
+
+    mode: "none" keeps nothing, "window" the last `window_s` seconds in memory, "full" everything in
+    unnamed temporary files (so that nothing is left behind whatever happens to the process).
+    """
+
+    def __init__(self, recorder: Recorder, mode: str, window_s: float = WINDOW_S) -> None:
+        if mode not in ("none", "window", "full"):
+            raise UserError(f"log mode is {mode!r}, allowed are full, window, none")
+        self.mode = mode
+        self.window_ns = int(window_s * 1e9)
+        self.blocks = {name: collections.deque() for name in STREAMS}
+        self.spools = {}
+        self.streams = {name: getattr(recorder, name) for name in STREAMS}
+        if mode == "none":
+            return
+        for name, stream in self.streams.items():
+            if mode == "full":
+                self.spools[name] = tempfile.TemporaryFile(prefix="ranger-sim-")  # noqa: SIM115
+                stream.sink = self._spooler(name)
+            else:
+                stream.sink = self._window(name)
+
+    def _window(self, name):
+        blocks = self.blocks[name]
+
+        def keep(last_time_ns, block):
+            blocks.append((last_time_ns, block))
+            while blocks[0][0] < last_time_ns - self.window_ns:
+                blocks.popleft()
+
+        return keep
+
+    def _spooler(self, name):
+        spool = self.spools[name]
+
+        def write(_last_time_ns, block):
+            spool.write(block)
+
+        return write
+
+    @property
+    def records_words(self) -> bool:
+        """True when the variables are kept (the recorder then samples the data table)."""
+        return self.mode != "none"
+
+    def _rows(self, name):
+        stream = self.streams[name]
+        stream.flush()
+        kind = np.float64 if stream.is_real else np.int64
+        if self.mode == "full":
+            spool = self.spools[name]
+            spool.flush()
+            spool.seek(0)
+            data = np.frombuffer(spool.read(), dtype=kind)
+            spool.seek(0, 2)
+        else:
+            data = np.frombuffer(b"".join(block for _, block in self.blocks[name]), dtype=kind)
+        rows = data.reshape(-1, stream.columns)
+        if self.mode == "window" and len(rows):
+            times_ns = rows[:, 0] * 1e9 if stream.is_real else rows[:, 0]
+            rows = rows[times_ns >= times_ns[-1] - self.window_ns]
+        return rows
+
+    def frames(self):
+        """Frames seen on the buses: dict of arrays time_ns, bus (0..3), identifier, flags, word0, word1."""
+        rows = self._rows("frames")
+        first, second, third = rows[:, 0], rows[:, 1], rows[:, 2]
+        return {
+            "time_ns": first,
+            "bus": second & 15,
+            "flags": (second >> 4) & 255,
+            "word0": second >> 12,
+            "identifier": third & 0x1FFFFFFF,
+            "word1": third >> 29,
+        }
+
+    def samples(self):
+        """Samples of the plant: array (rows, columns), time in s in column 0."""
+        return self._rows("samples")
+
+    def words(self):
+        """(time_ns, words): the main brain's table, int64 arrays (rows,) and (rows, variables)."""
+        rows = self._rows("words")
+        return rows[:, 0], rows[:, 1:]
+
+    def close(self) -> None:
+        """Give the spool files back."""
+        for spool in self.spools.values():
+            spool.close()

@@ -1,0 +1,54 @@
+"""What is to be run: one frozen record, checked when it is made."""
+
+import dataclasses
+import math
+
+from foundation.user_error import UserError
+
+DAY_MS = 24 * 3600 * 1000
+
+
+@dataclasses.dataclass(frozen=True)
+class Scenario:
+    """One run of the whole robot. The same scenario gives the same bytes.
+
+    controller: name of a parameter set in boards/main_brain/parameters, or the path of a .toml file.
+    seed: any integer; chooses every crystal, phase, noise and foothold.
+    slope_rad: positive downhill. floor_roughness_m: standard deviation of the height per foothold.
+    start_uptime_ms: network time at power-up, so that wraps and long runs can be tested.
+    """
+
+    controller: str = "record-2011"
+    seed: int = 1
+    slope_rad: float = 0.0
+    floor_roughness_m: float = 0.0
+    start_uptime_ms: int = 0
+    model_file: str | None = None  # additional named terms of motors, joints and sensors
+
+    def __post_init__(self) -> None:
+        limits = {
+            # beyond these the walking model itself means nothing: chosen by us
+            "slope_rad": (-0.5, 0.5, "rad"),
+            "floor_roughness_m": (0.0, 0.1, "m"),
+            "start_uptime_ms": (0, 2**32 - 1, "ms"),
+        }
+        for name, (low, high, unit) in limits.items():
+            value = getattr(self, name)
+            if not (isinstance(value, int | float) and math.isfinite(value) and low <= value <= high):
+                raise UserError(f"scenario: {name} is {value!r}, allowed are {low} to {high} {unit}")
+
+
+@dataclasses.dataclass(frozen=True)
+class StopRule:
+    """When a walk is done: after so many steps, so much time, or so much distance; whichever comes first."""
+
+    steps: int | None = None
+    time_s: float | None = None
+    distance_m: float | None = None
+
+    def __post_init__(self) -> None:
+        for name, value in dataclasses.asdict(self).items():
+            if value is not None and not (math.isfinite(value) and value > 0):
+                raise UserError(f"{name} is {value!r}, it must be above 0")
+        if self.steps is None and self.time_s is None and self.distance_m is None:
+            raise UserError("give steps, time or distance: a walk needs an end")

@@ -1,0 +1,170 @@
+"""The house keeps its plan: which room may import which, and what the compiled declarations promise."""
+
+import ast
+import pathlib
+import re
+
+import pytest
+
+import foundation
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+
+# A package may import the packages listed for it, itself, and what is installed. The order is the house from the
+# ground up. `foundation` is ours: numbers, events, seeded randomness and the wall clock, which every room needs.
+MAY_IMPORT = {
+    "foundation": set(),
+    "datatable": {"foundation"},
+    "can_bus": {"foundation"},
+    "plant": {"foundation"},
+    "firmware_sim": {"foundation", "can_bus"},
+    "boards": {"foundation", "firmware_sim", "datatable"},
+    "harness": {"foundation", "datatable", "can_bus", "plant", "firmware_sim", "boards"},
+    "sysid": {"foundation", "plant"},
+    "tools": {"foundation", "datatable", "can_bus", "plant", "firmware_sim", "boards", "harness", "sysid"},
+}
+# Libraries that belong to one place of the house.
+ONLY_IN = {
+    "can": ("can_bus/edge/",),
+    "serial": ("harness/", "tools/"),
+    "asammdf": ("tools/", "harness/"),
+    "plotly": ("tools/",),
+    "rich": ("tools/", "datatable/cli.py"),
+    "time": ("foundation/wallclock.py",),
+    "random": (),
+    "datetime": ("foundation/wallclock.py",),
+}
+
+
+def sources():
+    for package in MAY_IMPORT:
+        yield from sorted((ROOT / package).rglob("*.py"))
+
+
+def imported_packages(path):
+    """Top-level names a file imports, in .py by its syntax tree, in .pxd by its cimport lines."""
+    if path.suffix == ".pxd":
+        text = path.read_text(encoding="utf-8")
+        for match in re.finditer(r"^\s*(?:from\s+([\w.]+)\s+cimport|cimport\s+([\w.]+))", text, re.MULTILINE):
+            name = (match.group(1) or match.group(2)).partition(".")[0]
+            if name:
+                yield name, text[: match.start()].count("\n") + 1
+        return
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            for alias in node.names:
+                yield alias.name.partition(".")[0], node.lineno
+        elif isinstance(node, ast.ImportFrom) and node.level == 0 and node.module:
+            yield node.module.partition(".")[0], node.lineno
+
+
+@pytest.mark.parametrize("package", MAY_IMPORT)
+def test_a_package_imports_only_what_the_table_allows(package):
+    faults = []
+    for path in [*(ROOT / package).rglob("*.py"), *(ROOT / package).rglob("*.pxd")]:
+        for name, line in imported_packages(path):
+            if (name in MAY_IMPORT or name == "tests") and name != package and name not in MAY_IMPORT[package]:
+                faults.append(f"{path.relative_to(ROOT)}:{line} imports {name}")
+    assert not faults, "\n".join(faults)
+
+
+@pytest.mark.parametrize("library", ONLY_IN)
+def test_a_library_with_one_place_stays_there(library):
+    faults = []
+    for path in sources():
+        relative = path.relative_to(ROOT).as_posix()
+        for name, line in imported_packages(path):
+            if name == library and not relative.startswith(ONLY_IN[library]):
+                faults.append(f"{relative}:{line} imports {library}")
+    assert not faults, "\n".join(faults)
+
+
+def test_nobody_draws_from_a_global_random_generator():
+    pattern = re.compile(r"\b(?:np|numpy)\.random\b|\bdefault_rng\b")
+    faults = [str(p.relative_to(ROOT)) for p in sources() if pattern.search(p.read_text(encoding="utf-8"))]
+    assert not faults
+
+
+@pytest.mark.parametrize("package", [p for p in MAY_IMPORT if p != "foundation"])
+def test_a_package_chooses_compiled_or_interpreted_before_anything_else(package):
+    body = ast.parse((ROOT / package / "__init__.py").read_text(encoding="utf-8")).body
+    imports = [node for node in body if isinstance(node, ast.Import | ast.ImportFrom)]
+    assert isinstance(imports[0], ast.Import) and imports[0].names[0].name == "foundation"
+
+
+def test_the_finder_knows_every_package():
+    assert set(foundation.OUR_PACKAGES) == set(MAY_IMPORT)
+
+
+def declarations():
+    return sorted(path.relative_to(ROOT) for package in MAY_IMPORT for path in (ROOT / package).rglob("*.pxd"))
+
+
+def declared_classes(text):
+    """{class: (base, fields, methods)} of a .pxd in the style of this project."""
+    classes = {}
+    current = None
+    text = re.sub(r"#.*", "", text)
+    text = re.sub(r"\(([^()]*)\)", lambda m: "(" + m.group(1).replace("\n", " ") + ")", text)
+    for line in text.splitlines():
+        head = re.match(r"cdef\s+class\s+(\w+)(?:\((\w+)\))?\s*:", line)
+        if head:
+            current = classes.setdefault(head.group(1), (head.group(2), set(), set()))
+            continue
+        if not line.startswith((" ", "\t")):
+            if line.strip():
+                current = None
+            continue
+        if current is None:
+            continue
+        line = line.strip()
+        method = re.match(r"(?:cpdef|cdef)\s+(?:inline\s+)?.*?\b(\w+)\s*\(", line)
+        if method:
+            current[2].add(method.group(1))
+            continue
+        field = re.match(r"cdef\s+(?:public\s+|readonly\s+)?(.*)$", line)
+        if field:
+            without_type = re.sub(r"^(?:unsigned\s+)?(?:long\s+long|[\w.]+)(?:\[[^\]]*\])?\s+", "", field.group(1))
+            current[1].update(name.strip() for name in without_type.split(",") if name.strip())
+    return classes
+
+
+@pytest.mark.parametrize("declaration", declarations(), ids=str)
+def test_a_compiled_declaration_agrees_with_its_source(declaration):
+    """Fields and methods of the .pxd and of the .py are the same: what one mode has, the other has."""
+    source = (ROOT / declaration).with_suffix(".py")
+    assert source.exists(), f"{declaration} has no source"
+    tree = ast.parse(source.read_text(encoding="utf-8"))
+    in_source = {node.name: node for node in tree.body if isinstance(node, ast.ClassDef)}
+    declared = declared_classes((ROOT / declaration).read_text(encoding="utf-8"))
+    faults = []
+
+    def all_fields(name):
+        if name not in declared:
+            return None  # a base from another file: its fields are checked there
+        base, fields, _ = declared[name]
+        above = all_fields(base) if base else set()
+        return None if above is None else fields | above
+
+    for name, (_, fields, methods) in declared.items():
+        if name not in in_source:
+            faults.append(f"{declaration}: class {name} is not in {source.name}")
+            continue
+        defined = {n.name for n in ast.walk(in_source[name]) if isinstance(n, ast.FunctionDef)}
+        assigned = {
+            target.attr
+            for node in ast.walk(in_source[name])
+            for target in ast.walk(node)
+            if isinstance(target, ast.Attribute)
+            and isinstance(target.ctx, ast.Store)
+            and isinstance(target.value, ast.Name)
+            and target.value.id == "self"
+        }
+        faults += [f"{declaration}: {name}.{m}() is not in {source.name}" for m in sorted(methods - defined)]
+        known = all_fields(name)
+        if known is not None:
+            faults += [f"{source.name}: {name}.{f} is not declared" for f in sorted(assigned - known)]
+        setattr_used = "setattr(self" in ast.unparse(in_source[name])
+        if not setattr_used:
+            faults += [f"{declaration}: {name}.{f} is never set" for f in sorted(fields - assigned)]
+    assert not faults, "\n".join(faults)

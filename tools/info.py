@@ -1,0 +1,57 @@
+"""`ranger-sim info`: what is installed here, and how it runs."""
+
+import argparse
+import json
+import platform
+import sys
+from importlib import metadata
+
+from rich.console import Console
+from rich.table import Table
+
+import datatable
+from can_bus import edge
+from harness.build import compiled_modules, is_compiled
+
+
+def register(commands) -> None:
+    """Add the subcommand to the command line."""
+    command = commands.add_parser("info", help="version, compiled or not, CAN interfaces, data-table hash")
+    command.add_argument("--json", action="store_true", help="print JSON instead of a table")
+    command.set_defaults(run=run)
+
+
+def facts() -> dict:
+    """Everything the command tells, as plain data."""
+    compiled, interpreted = compiled_modules()
+    return {
+        "version": metadata.version("ranger-sim"),
+        "compiled": is_compiled(),
+        "compiled_modules": len(compiled),
+        "interpreted_modules": sorted(interpreted),
+        "python": sys.version.split()[0],
+        "implementation": platform.python_implementation(),
+        "platform": platform.platform(),
+        "can_interfaces": edge.available_interfaces(),
+        "data_table_hash": datatable.table_hash(),
+    }
+
+
+def run(options: argparse.Namespace) -> int:
+    """Print the facts."""
+    found = facts()
+    if options.json:
+        print(json.dumps(found, indent=2))
+        return 0
+    table = Table(show_header=False, box=None, pad_edge=False)
+    run_as = "compiled" if found["compiled"] else "interpreted"
+    if found["compiled"] and found["interpreted_modules"]:
+        run_as += f" (not compiled: {', '.join(found['interpreted_modules'])})"
+    table.add_row("ranger-sim", found["version"])
+    table.add_row("runs", run_as)
+    table.add_row("Python", f"{found['python']} ({found['implementation']})")
+    table.add_row("platform", found["platform"])
+    table.add_row("CAN interfaces", ", ".join(found["can_interfaces"]) or "none found (python-can's own still work)")
+    table.add_row("data table", found["data_table_hash"])
+    Console().print(table)
+    return 0

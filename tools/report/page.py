@@ -1,0 +1,129 @@
+"""Puts a walk's numbers, plots and animation into one self-contained page."""
+
+import json
+import pathlib
+import shlex
+
+import jinja2
+import numpy as np
+from markupsafe import Markup
+from plotly.offline import get_plotlyjs
+
+import datatable
+from tools.report import figures
+
+HERE = pathlib.Path(__file__).parent
+ANIMATION_HZ = 125  # frames kept per second: smooth at one eighth of real time on a 60 Hz screen
+ANIMATION_S = 8.0
+
+# What the robot itself did on 1-2 May 2011 (appendix 1, table of the ultra-marathon walk).
+ROBOT = {
+    "step": "0.35 m",
+    "time": "0.60 s",
+    "speed": "0.59 m/s",
+    "motors": "11.3 W",
+    "total": "16 W",
+    "tcot": "0.28",
+    "delay": "14 ± 3 ms",
+}
+
+
+def render(robot, summary: dict) -> str:
+    """The page as text. `robot`: a `harness.ranger.Ranger` that kept a log; `summary`: its summary."""
+    walk = robot.recorded()
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(HERE),
+        autoescape=jinja2.select_autoescape(["j2"]),
+        undefined=jinja2.StrictUndefined,
+    )
+    plots = [
+        make(walk)
+        for make in (
+            figures.phase_portraits,
+            figures.joint_angles,
+            figures.currents_and_power,
+            figures.steps,
+            figures.bus_load,
+            figures.slot_times,
+            figures.path,
+        )
+    ]
+    for plot in plots:
+        plot.html = Markup(plot.html)
+    return environment.get_template("template.html.j2").render(
+        summary=summary,
+        shown_s=float(walk.samples["time_s"][-1] - walk.samples["time_s"][0]),
+        tiles=tiles(summary),
+        figures=plots,
+        error_rows=[
+            {"board": board, "name": name, "meaning": robot.error_meaning(name), "count": count}
+            for board, names in summary["errors"].items()
+            for name, count in names.items()
+        ],
+        animation=Markup(json.dumps(animation(robot, walk), allow_nan=False).replace("</", "<\\/")),
+        walker_js=Markup((HERE / "walker.js").read_text(encoding="utf-8")),
+        plotly_js=Markup(get_plotlyjs()),
+        command=command(summary),
+        table_hash=datatable.table_hash(),
+    )
+
+
+def tiles(summary: dict) -> list[dict]:
+    """The key figures beside the real robot's."""
+    delay = summary["heel_strike_delay_ms"]
+    rows = (
+        ("steps", f"{summary['steps']}", None),
+        ("mean step length", f"{summary['mean_step_length_m']:.3f} m", ROBOT["step"]),
+        ("mean step time", f"{summary['mean_step_time_s']:.3f} s", ROBOT["time"]),
+        ("speed", f"{summary['speed_m_per_s']:.2f} m/s", ROBOT["speed"]),
+        ("motors", f"{summary['motor_power_W']:.1f} W", ROBOT["motors"]),
+        ("in all", f"{summary['total_power_W']:.1f} W", ROBOT["total"]),
+        ("cost of transport", f"{summary['tcot']:.3f}", ROBOT["tcot"]),
+        ("heel-strike delay", f"{delay['mean']:.1f} ± {delay['std']:.1f} ms", ROBOT["delay"]),
+    )
+    return [{"name": name, "value": value, "real": real} for name, value, real in rows]
+
+
+def animation(robot, walk) -> dict:
+    """Arrays for walker.js, thinned to ANIMATION_HZ over the last ANIMATION_S seconds."""
+    s = walk.samples
+    time = s["time_s"]
+    first = np.searchsorted(time, time[-1] - ANIMATION_S)
+    interval = float(np.median(np.diff(time))) if len(time) > 1 else 1.0
+    pick = slice(first, None, max(1, round(1 / (ANIMATION_HZ * interval))))
+    names = {
+        "hip_x": "hip_x_m",
+        "hip_y": "hip_y_m",
+        "foot_outer": "foot_outer_rad",
+        "leg_outer": "leg_outer_rad",
+        "leg_inner": "leg_inner_rad",
+        "foot_inner": "foot_inner_rad",
+        "hip_A": "hip_A",
+        "outer_A": "outer_A",
+        "inner_A": "inner_A",
+    }
+    data = {key: np.round(s[name][pick], 5).tolist() for key, name in names.items()}
+    data["t"] = np.round(time[pick], 4).tolist()
+    data["state"] = walk.state_text(time[pick])
+    data["geometry"] = robot.geometry()
+    data["footholds"] = walk.footholds
+    return data
+
+
+def command(summary: dict) -> str:
+    """The command line that repeats the run."""
+    parts = [
+        "ranger-sim",
+        "walk",
+        "--steps",
+        str(max(1, summary["steps"])),
+        "--controller",
+        summary["controller"],
+        "--seed",
+        str(summary["seed"]),
+    ]
+    if summary["floor_roughness_m"]:
+        parts += ["--floor-roughness", f"{summary['floor_roughness_m']:g}m"]
+    if summary["slope_rad"]:
+        parts += ["--slope", f"{summary['slope_rad']:g}"]
+    return shlex.join(parts)

@@ -1,0 +1,56 @@
+"""The variables of a walk as one ASAM MDF 4 file.
+
+MDF 4 is the measurement format of the CAN world: asammdf's viewer, CANape, INCA, PlotJuggler (with its
+plug-in) and MATLAB open it, and it keeps unit, description and a time base per channel. Each variable
+of the data table is one channel at the instants when its value or its stamp changed, so a variable sent
+at 45 Hz has 45 samples a second.
+"""
+
+import pathlib
+import tempfile
+import warnings
+
+import numpy as np
+
+
+def write(robot, path: pathlib.Path) -> None:
+    """Write `path` whole or not at all. `robot`: a `harness.ranger.Ranger` whose log was not "none"."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # asammdf's dependencies announce their own deprecations on import
+        from asammdf import MDF, Signal
+
+        with MDF(version="4.10") as file:
+            for group in groups(robot):
+                name, time_s, channels = group
+                file.append(
+                    [
+                        Signal(samples=values, timestamps=time_s, name=channel, unit=unit, comment=comment)
+                        for channel, unit, comment, values in channels
+                    ],
+                    comment=name,
+                    common_timebase=True,
+                )
+            with tempfile.TemporaryDirectory(dir=path.parent, prefix=".mdf") as folder:
+                saved = file.save(pathlib.Path(folder) / path.name, compression=2)
+                pathlib.Path(saved).replace(path)
+
+
+def groups(robot):
+    """(group name, time in s, [(channel, unit, description, samples)]) of everything that was kept."""
+    samples = robot.plant_samples()
+    time_s = samples.pop("time_s")
+    units = robot.plant_units()
+    yield (
+        "plant",
+        time_s,
+        [
+            (f"plant.{name}", units[name], "true state of the body", np.ascontiguousarray(values))
+            for name, values in samples.items()
+        ],
+    )
+    for variable in robot.variable_series():
+        yield (
+            variable.name,
+            variable.time_s,
+            [(variable.name, variable.unit, variable.description, variable.values)],
+        )

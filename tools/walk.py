@@ -1,0 +1,196 @@
+"""`ranger-sim walk`: let the robot walk, watch it, keep what it did."""
+
+import argparse
+import contextlib
+import json
+import pathlib
+import signal
+import tempfile
+
+from harness.ranger import Ranger
+from rich.console import Console
+from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeRemainingColumn
+
+from foundation import wallclock
+from foundation.user_error import UserError
+from harness.scenario import Scenario, StopRule
+from tools.units import LENGTHS, TIMES, quantity, whole_number
+
+DEFAULT_STEPS = 100
+SLICE_S = 0.05  # virtual seconds between two looks at the screen and at Ctrl-C
+
+
+def register(commands) -> None:
+    """Add the subcommand to the command line."""
+    command = commands.add_parser(
+        "walk",
+        help="let Ranger walk",
+        description="All seven boards, four buses and the body in virtual time. Without an end it walks 100 steps.",
+    )
+    command.add_argument("--steps", type=whole_number(1), help="stop after so many steps")
+    command.add_argument("--time", type=quantity(TIMES, "s", 0.0), metavar="60s", help="stop after so much time")
+    command.add_argument(
+        "--distance", type=quantity(LENGTHS, "m", 0.0), metavar="1km", help="stop after so much distance"
+    )
+    command.add_argument(
+        "--controller",
+        default=None,
+        metavar="NAME",
+        help="a parameter set by name, or the path of a .toml file",
+    )
+    command.add_argument("--seed", type=int, default=1, help="crystals, phases, noise and footholds (default 1)")
+    command.add_argument(
+        "--floor-roughness",
+        type=quantity(LENGTHS, "m"),
+        default=0.0,
+        metavar="1mm",
+        help="standard deviation of the height of each foothold",
+    )
+    command.add_argument("--slope", type=float, default=0.0, metavar="RAD", help="rad, positive downhill")
+    command.add_argument("--model", default=None, metavar="FILE", help="additional terms of motors, joints, sensors")
+    command.add_argument(
+        "--log",
+        choices=("full", "window", "none"),
+        default="window",
+        help="what the files keep: default the last 10 s",
+    )
+    command.add_argument("--out", metavar="DIR", help="folder for logs, summary and report (made if missing)")
+    command.add_argument("--json", metavar="FILE|-", help="the summary as JSON; - prints it and nothing else")
+    command.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Walk, write the files, print the summary; 0 done, 1 fell or a board failed, 130 interrupted."""
+    stop = (
+        StopRule(options.steps, options.time, options.distance)
+        if (options.steps or options.time or options.distance)
+        else StopRule(steps=DEFAULT_STEPS)
+    )
+    scenario = Scenario(
+        **({"controller": options.controller} if options.controller else {}),
+        seed=options.seed,
+        slope_rad=options.slope,
+        floor_roughness_m=options.floor_roughness,
+        model_file=options.model,
+    )
+    folder = writable_folder(options.out) if options.out else None
+    json_file = None if options.json in (None, "-") else pathlib.Path(options.json)
+    if json_file is not None:
+        writable_folder(json_file.parent)
+        if json_file.is_dir():
+            raise UserError(f"--json {json_file}: this is a folder, give a file or -")
+    quiet = options.json == "-"
+    console = Console(stderr=True, quiet=quiet)
+    with contextlib.closing(Ranger(scenario, log=options.log if folder else "none")) as robot:
+        interrupted = walk(robot, stop, console)
+        summary = robot.summary()
+        if folder is not None:
+            write_files(robot, summary, folder, console)
+        text = json.dumps(summary, indent=2)
+        if json_file is not None:
+            replace_file(json_file, (text + "\n").encode())
+        if quiet:
+            print(text)
+        else:
+            print_summary(summary, console)
+            if folder is not None:
+                console.print(f"report: {folder / 'report.html'}", soft_wrap=True)
+    if interrupted:
+        return 130
+    return 1 if summary["fell"] or summary["failed_boards"] else 0
+
+
+def walk(robot: Ranger, stop: StopRule, console: Console) -> bool:
+    """Run until the stop rule, a fall, or Ctrl-C; True when interrupted."""
+    interrupted = []
+    previous = signal.signal(signal.SIGINT, lambda *_: interrupted.append(True))
+    started = wallclock.monotonic_s()
+    try:
+        with Progress(
+            SpinnerColumn(),
+            TextColumn("{task.fields[steps]} steps"),
+            BarColumn(),
+            TextColumn(
+                "{task.fields[distance]:.1f} m  {task.fields[speed]:.2f} m/s  {task.fields[factor]:.1f} x real time"
+            ),
+            TimeRemainingColumn(),
+            console=console,
+            transient=False,
+        ) as progress:
+            task = progress.add_task("walk", total=1.0, steps=0, distance=0.0, speed=0.0, factor=0.0)
+            while not interrupted and not robot.run(stop, SLICE_S):
+                wall = wallclock.monotonic_s() - started
+                progress.update(
+                    task,
+                    completed=robot.fraction_done(stop),
+                    steps=robot.steps,
+                    distance=robot.distance_m,
+                    speed=robot.mean_speed_m_per_s(),
+                    factor=robot.time_s / wall if wall > 0 else 0.0,
+                )
+            progress.update(
+                task,
+                completed=robot.fraction_done(stop),
+                steps=robot.steps,
+                distance=robot.distance_m,
+                speed=robot.mean_speed_m_per_s(),
+                factor=robot.realtime_factor(),
+            )
+    finally:
+        signal.signal(signal.SIGINT, previous)
+    return bool(interrupted)
+
+
+def writable_folder(name) -> pathlib.Path:
+    """The folder, made if missing; UserError when nothing can be written there."""
+    folder = pathlib.Path(name)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except OSError as error:
+        raise UserError(f"cannot write to {folder}: {error.strerror}") from None
+    return folder
+
+
+def replace_file(path: pathlib.Path, content: bytes) -> None:
+    """Write the file whole or not at all."""
+    with tempfile.NamedTemporaryFile(dir=path.parent, prefix=path.name, delete=False) as handle:
+        temporary = pathlib.Path(handle.name)
+        try:
+            handle.write(content)
+            handle.close()
+            temporary.chmod(0o644)
+            temporary.replace(path)
+        except BaseException:
+            temporary.unlink(missing_ok=True)
+            raise
+
+
+def write_files(robot: Ranger, summary: dict, folder: pathlib.Path, console: Console) -> None:
+    """Candump logs, variables, summary and report."""
+    from tools import variables_file
+    from tools.report import page
+
+    with console.status("writing logs and report ..."):
+        for bus, text in robot.candump_logs().items():
+            replace_file(folder / f"{bus}.log", text)
+        variables_file.write(robot, folder / "variables.mf4")
+        replace_file(folder / "report.html", page.render(robot, summary).encode())
+        replace_file(folder / "summary.json", (json.dumps(summary, indent=2) + "\n").encode())
+
+
+def print_summary(summary: dict, console: Console) -> None:
+    """The walk in a few lines."""
+    end = f"fell: {summary['fall_cause']}" if summary["fell"] else "on its feet"
+    console.print(
+        f"{summary['steps']} steps, {summary['distance_m']:.2f} m in {summary['time_s']:.1f} s, {end}; "
+        f"step {summary['mean_step_length_m']:.3f} m, {summary['mean_step_time_s']:.3f} s; "
+        f"{summary['total_power_W']:.1f} W, TCOT {summary['tcot']:.3f}; "
+        f"{summary['realtime_factor']:.1f} x real time {'compiled' if summary['compiled'] else 'interpreted'}; "
+        f"trace {summary['trace_digest'][:16]}",
+        highlight=False,
+    )
+    for board, names in summary["errors"].items():
+        if names:
+            console.print(f"errors of {board}: " + ", ".join(f"{n} x {c}" for n, c in names.items()), highlight=False)
