@@ -1,1 +1,52 @@
-import foundation  # noqa: F401  (first: it chooses compiled or interpreted modules)
+"""The robot-wide master table: variables, errors and boards; loaded, checked, and turned into code.
+
+Master files: `datatable/master/`. Generated and checked in: `datatable/generated/`. The emulated firmware
+imports only generated modules (``from datatable.generated import mch as table``), which read no file.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import foundation  # noqa: F401  (first: it honours RANGER_SIM_INTERPRETED)
+
+if TYPE_CHECKING:
+    from datatable.model import Table
+    from datatable.schedule import PublishedSchedule
+    from datatable.store import DataStore
+
+
+def load(folder: str | None = None) -> Table:
+    """The checked master table. `folder`: where the master files are (ours by default).
+
+    Raises datatable.model.TableError, a UserError, that names every fault at once.
+    """
+    from datatable.loader import load_table
+
+    return load_table(folder)
+
+
+def table_hash(folder: str | None = None) -> str:
+    """SHA-256 over the master files, 64 hexadecimal digits; the same with either line ending."""
+    from datatable.loader import hash_of_master_files
+
+    return hash_of_master_files(folder)
+
+
+def published_schedule(board: str) -> PublishedSchedule:
+    """What the schedule of `board` sends, row by row, as boards.toml says it."""
+    from datatable.schedule import published_schedule as lookup
+
+    return lookup(board)
+
+
+def main_brain_store() -> DataStore:
+    """The main brain's data store at power-up: every variable at its initial value, unread by everyone."""
+    from datatable.generated import all_variables
+    from datatable.packing import word_of_value
+    from datatable.store import DataStore
+
+    store = DataStore(all_variables.TABLE_SIZE)
+    for number, kind in all_variables.TYPES.items():
+        store.set_word(number, word_of_value(kind, all_variables.INITIAL[number]), 0)
+    return store

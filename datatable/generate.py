@@ -1,0 +1,69 @@
+"""Everything that is generated from the master table, as {path below datatable/generated: text}.
+
+The files carry no date, so the same table gives the same bytes on every machine.
+"""
+
+from __future__ import annotations
+
+import pathlib
+
+from datatable.generate_c import c_files
+from datatable.generate_catalogue import catalogue_text
+from datatable.generate_dbc import dbc_text
+from datatable.generate_python import python_files
+from datatable.model import Table
+from foundation.user_error import UserError
+
+GENERATED_FOLDER = pathlib.Path(__file__).parent / "generated"
+GENERATED_SUFFIXES = (".py", ".c", ".h", ".dbc", ".json")
+
+
+def generated_files(table: Table) -> dict[str, str]:
+    """Path and text of every generated file."""
+    files = python_files(table)
+    files.update({f"c/{name}": text for name, text in c_files(table).items()})
+    for bus in table.channels:
+        if bus != "SSP":
+            files[f"{bus.lower()}.dbc"] = dbc_text(table, bus)
+    files["catalogue.json"] = catalogue_text(table)
+    return dict(sorted(files.items()))
+
+
+def on_disk(folder: pathlib.Path) -> set[str]:
+    """Generated files found below `folder`, as relative paths with forward slashes."""
+    return {
+        path.relative_to(folder).as_posix()
+        for path in folder.rglob("*")
+        if path.suffix in GENERATED_SUFFIXES and path.is_file() and "__pycache__" not in path.parts
+    }
+
+
+def write(table: Table, folder: pathlib.Path = GENERATED_FOLDER) -> list[str]:
+    """Write what is missing or stale, delete what the table no longer gives; the paths changed, sorted.
+
+    UserError when the folder cannot be written.
+    """
+    changed = stale(table, folder)
+    files = generated_files(table)
+    try:
+        for name in changed:
+            path = folder / name
+            if name in files:
+                path.parent.mkdir(parents=True, exist_ok=True)
+                path.write_bytes(files[name].encode())
+            else:
+                path.unlink()
+    except OSError as error:
+        raise UserError(f"{error.filename or folder}: cannot be written: {error.strerror}") from error
+    return changed
+
+
+def stale(table: Table, folder: pathlib.Path = GENERATED_FOLDER) -> list[str]:
+    """Paths that differ from what the table gives, that are missing, or that no longer belong there; sorted."""
+    files = generated_files(table)
+    try:
+        found = on_disk(folder) if folder.is_dir() else set()
+        different = {name for name in found & set(files) if (folder / name).read_bytes() != files[name].encode()}
+    except OSError as error:
+        raise UserError(f"{error.filename or folder}: cannot be read: {error.strerror}") from error
+    return sorted(different | (found ^ set(files)))

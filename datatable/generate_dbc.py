@@ -1,0 +1,63 @@
+"""A DBC file per CAN bus: one message per identifier, a value signal and a time signal."""
+
+from __future__ import annotations
+
+from datatable.model import LIMITS, Table, Variable
+
+HEADER = 'VERSION ""\n\nNS_ :\n\nBS_:\n'
+TIME_SIGNAL = ' SG_ time_ms : 32|32@1+ (1,0) [0|4294967295] "ms" {receivers}'
+
+
+def bound(value: float | int) -> str:
+    return f"{value:.9g}" if isinstance(value, float) else str(value)
+
+
+def range_of(variable: Variable) -> str:
+    low, high = LIMITS[variable.type]
+    if variable.type == "f32" and variable.minimum is None and variable.maximum is None:
+        return "[0|0]"  # a DBC file's way to say that no range is stated
+    minimum = low if variable.minimum is None else variable.minimum
+    maximum = high if variable.maximum is None else variable.maximum
+    return f"[{bound(minimum)}|{bound(maximum)}]"
+
+
+def value_signals(variable: Variable, receivers: str) -> list[str]:
+    """Bytes 0-3: the value, or the three parts of an error word (facts network 1.7)."""
+    if variable.is_error_word:
+        return [
+            f' SG_ code : 0|16@1+ (1,0) [0|65535] "" {receivers}',
+            f' SG_ board : 16|6@1+ (1,0) [0|63] "" {receivers}',
+            f' SG_ count : 22|10@1+ (1,0) [0|1023] "" {receivers}',
+        ]
+    sign = "+" if variable.type == "u32" else "-"
+    return [f' SG_ value : 0|32@1{sign} (1,0) {range_of(variable)} "{variable.unit}" {receivers}']
+
+
+def dbc_text(table: Table, bus: str) -> str:
+    """The DBC file of one bus. Senders and receivers are the table's, though frames pass through the router."""
+    variables = table.on_bus(bus)
+    nodes = [board.name for board in table.boards if bus in board.buses or board.role == "main brain"]
+    lines = [HEADER, "BU_: " + " ".join(nodes), ""]
+    for variable in variables:
+        receivers = ",".join(name for name in variable.subscribers if name in nodes) or "Vector__XXX"
+        sender = variable.publisher if variable.publisher in nodes else "Vector__XXX"
+        lines.append(f"BO_ {variable.id} {variable.name}: 8 {sender}")
+        lines += value_signals(variable, receivers)
+        lines += [TIME_SIGNAL.format(receivers=receivers), ""]
+    lines.append(f'CM_ "{bus} of the robot at {table.bit_rates[bus]} bit/s; made from the master table";')
+    for board in table.boards:
+        if board.name in nodes:
+            lines.append(f'CM_ BU_ {board.name} "{board.description}";')
+    lines += [f'CM_ BO_ {variable.id} "{variable.description}";' for variable in variables]
+    lines.append('BA_DEF_ BO_ "PeriodMs" FLOAT 0 1000000000;')
+    lines.append('BA_DEF_DEF_ "PeriodMs" 0;')
+    for variable in variables:
+        if variable.period_ms is not None:
+            lines.append(f'BA_ "PeriodMs" BO_ {variable.id} {float(variable.period_ms):.9g};')
+    codes = " ".join(f'{error.id} "{error.name}"' for error in table.errors)
+    boards = " ".join(f'{board.number} "{board.name}"' for board in table.boards)
+    for variable in variables:
+        if variable.is_error_word:
+            lines += [f"VAL_ {variable.id} code {codes} ;", f"VAL_ {variable.id} board {boards} ;"]
+    lines += [f"SIG_VALTYPE_ {variable.id} value : 1;" for variable in variables if variable.type == "f32"]
+    return "\n".join(lines) + "\n"

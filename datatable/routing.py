@@ -1,0 +1,50 @@
+"""Who can hear whom, and the router's table: one destination mask per identifier (facts network 1.5)."""
+
+from __future__ import annotations
+
+from datatable.model import LARGEST_CAN_ID, Board, Table
+
+ENTRIES = LARGEST_CAN_ID + 1
+
+
+def unreachable(publisher: Board, subscriber: Board, buses: tuple[str, ...]) -> str | None:
+    """Why a variable carried on `buses` does not get from `publisher` to `subscriber`; None when it does.
+
+    The computer hangs on the main brain's serial line, so both share everything. All else goes by the
+    named buses: the router passes a frame on to every bus the variable is carried on.
+    """
+    ends = ("main brain", "computer")
+    if publisher.role in ends and subscriber.role in ends:
+        return None
+    if publisher.role in ends and "SSP" not in buses:
+        return f"leaves {publisher.name} by SSP only, and SSP is not among its buses"
+    if publisher.role not in ends and not set(publisher.buses) & set(buses):
+        exits = " or ".join(publisher.buses) or "no bus"
+        return f"leaves {publisher.name} by {exits} only, and that is not among its buses"
+    entrances = ("SSP",) if subscriber.role in ends else subscriber.buses
+    if not set(entrances) & set(buses):
+        return f"routing cannot reach {subscriber.name}: it listens on {' and '.join(entrances) or 'no bus'}"
+    return None
+
+
+def destination_masks(table: Table) -> bytes:
+    """Destination bits per identifier 0 ... 2031: bit 0 SSP, bits 1-4 CAN1-4.
+
+    Every identifier goes to the main brain unless the table says otherwise. What the main brain or the computer
+    publishes for a satellite goes to the buses named, and not back. What the router sends by itself
+    (`sends_itself`) is on the buses already, so only the SSP copy is routed.
+    """
+    ssp = 1 << table.channels["SSP"]
+    masks = bytearray([ssp]) * ENTRIES
+    for variable in table.variables:
+        if variable.id >= ENTRIES:
+            continue
+        publisher = table.board(variable.publisher)
+        buses = sum(1 << table.channels[bus] for bus in variable.buses if bus != "SSP")
+        if publisher.role in ("main brain", "computer"):
+            if buses:
+                masks[variable.id] = buses
+        elif variable.name not in publisher.sends_itself:
+            own = 0 if publisher.role == "router" else sum(1 << table.channels[bus] for bus in publisher.buses)
+            masks[variable.id] |= buses & ~own
+    return bytes(masks)
