@@ -1,0 +1,70 @@
+"""Each board's own oscillator: true time and the board's time, exact for any length of run.
+
+A crystal that runs `ppb` parts per billion fast makes 10^9 + ppb of its nanoseconds in 10^9 true ones.
+Conversions take quotient and remainder, because a product of nanoseconds and 10^9 leaves 64 bits after
+nine seconds. Results are rounded down, always from absolute counts, so no error accumulates.
+"""
+
+import cython
+
+from foundation.user_error import UserError
+
+# chosen by us: a crystal outside this is broken, and the remainders below still fit into 63 bits
+LARGEST_PPB = 100_000_000
+
+
+class Crystal:
+    """An oscillator of `nominal_hz` that runs `ppb` parts per billion fast (negative: slow)."""
+
+    def __init__(self, nominal_hz=10_000_000, ppb=0) -> None:
+        if nominal_hz <= 0:
+            raise UserError(f"crystal: nominal_hz {nominal_hz} must be above 0")
+        if abs(ppb) > LARGEST_PPB:
+            raise UserError(f"crystal: {ppb} ppb is outside +/-{LARGEST_PPB} ppb")
+        self.nominal_hz = nominal_hz
+        self.ppb = ppb
+
+    def tick_time_ns(
+        self, n: cython.longlong, period_ns: cython.longlong, phase_ns: cython.longlong
+    ) -> cython.longlong:
+        """True instant (ns) of tick `n` of a timer with `period_ns` on this clock; tick 0 is at `phase_ns`."""
+        return phase_ns + self.true_ns(n * period_ns)
+
+    def true_ns(self, local_ns: cython.longlong) -> cython.longlong:
+        """True duration (ns) in which this clock counts `local_ns`."""
+        rate: cython.longlong = 1000000000 + self.ppb
+        quotient: cython.longlong = local_ns // rate
+        return quotient * 1000000000 + (local_ns - quotient * rate) * 1000000000 // rate
+
+    def local_ns(self, true_ns: cython.longlong) -> cython.longlong:
+        """What this clock counts (ns) in `true_ns`."""
+        rate: cython.longlong = 1000000000 + self.ppb
+        quotient: cython.longlong = true_ns // 1000000000
+        return quotient * rate + (true_ns - quotient * 1000000000) * rate // 1000000000
+
+    def cycles_to_ns(self, cycles: cython.longlong, hz: cython.longlong) -> cython.longlong:
+        """True duration (ns) of `cycles` of a clock of nominally `hz` derived from this crystal."""
+        seconds: cython.longlong = cycles // hz
+        return self.true_ns(seconds * 1000000000 + (cycles - seconds * hz) * 1000000000 // hz)
+
+    def ns_to_cycles(self, ns: cython.longlong, hz: cython.longlong) -> cython.longlong:
+        """Whole cycles of a clock of nominally `hz` (below 9 GHz) in `ns` of true time."""
+        local: cython.longlong = self.local_ns(ns)
+        seconds: cython.longlong = local // 1000000000
+        return seconds * hz + (local - seconds * 1000000000) * hz // 1000000000
+
+    def ns_per_cycle(self, hz: cython.longlong) -> cython.double:
+        """True ns per cycle, for durations so short that a double is exact to far below 1 ns."""
+        return 1e18 / (float(hz) * (1e9 + self.ppb))
+
+    def cycles_per_ns(self, hz: cython.longlong) -> cython.double:
+        """Cycles per true ns, for durations so short that a double is exact to far below a cycle."""
+        return float(hz) * (1e9 + self.ppb) / 1e18
+
+
+def seeded_crystal(stream, nominal_hz=10_000_000, spread_ppm=30.0) -> Crystal:
+    """A crystal as bought: its error uniform within +/-`spread_ppm`, drawn from the RandomStream `stream`.
+
+    30 ppm: the usual tolerance of microprocessor crystals (chosen by us; the robot's were never measured).
+    """
+    return Crystal(nominal_hz, int(1000.0 * spread_ppm * (2.0 * stream.uniform() - 1.0)))

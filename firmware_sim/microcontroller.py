@@ -1,0 +1,476 @@
+"""One microcontroller: its inputs, its interrupts and its slots, run to any instant of virtual time.
+
+To everything outside, a board is: advance to a time with stamped messages in `inbox`, find stamped messages
+in `outbox`, and the instant `next_time` at which it must run again if nothing comes in.
+
+How time passes inside:
+- A task or handler takes effect at its start, the instant `now`; then the CPU is busy for its cycles.
+- What arrives meanwhile is handled at its stamp: hardware (peripherals, capture registers) at once, handlers
+  as soon as FIQ, then IRQ, is free. Their cycles lengthen whatever they interrupt.
+- At one instant: messages, peripheral events, the slot timer, handlers (FIQ before IRQ, then by slot), tasks.
+- A handler's `now` is its start plus the latency of its source.
+Each busy time is rounded down to whole ns; cycle counts are exact integers.
+"""
+
+import array
+
+import cython
+
+from firmware_sim.analog import AnalogPins
+from firmware_sim.clock import Crystal
+from firmware_sim.scheduler import Occasional, Schedule, SlotScheduler, Task, Wait
+from firmware_sim.vic import SLOT_TIMER, InterruptController, InterruptSource
+from foundation.events import NEVER, EventQueue
+from foundation.user_error import UserError
+
+PINS = 64  # P0.0 ... P0.31 are 0 ... 31, P1.0 ... P1.31 are 32 ... 63
+MESSAGE_KINDS = 32
+INDICES_PER_KIND = 16
+
+
+class Peripheral:
+    """What all peripherals share: the chip, and the three ways in which the outside reaches them."""
+
+    def __init__(self, chip) -> None:
+        self.chip = chip
+
+    def on_message(self, queue: EventQueue) -> cython.void:
+        """A message of a kind claimed by this peripheral; it is in the fields of `queue`."""
+
+    def on_pin(
+        self, channel: cython.longlong, level: cython.longlong, time: cython.longlong
+    ) -> cython.void:
+        """The pin of `channel` changed to `level` at `time`."""
+
+    def on_alarm(self, alarm: cython.longlong, time: cython.longlong) -> cython.void:
+        """The alarm that this peripheral numbered `alarm` is due."""
+
+
+class Microcontroller:
+    """A chip of `hz` core clock on `crystal`, with schedule, interrupts, pins and queues.
+
+    Hooks (None or a callable): `on_overrun()` when a tick finds the row unfinished, `on_limit(task)` when a
+    task exceeds its limit, `on_near_limit()` when a finished slot took more than 90 % of its length,
+    `on_timer_tick()` in every interrupt of the slot timer.
+    `words`: digital words that sensors hold out to the chip, set from outside.
+    """
+
+    def __init__(self, name="chip", hz=60_000_000, crystal=None) -> None:
+        if hz <= 0:
+            raise UserError(f"{name}: hz {hz} must be above 0")
+        self.name = name
+        self.hz = hz
+        self.crystal = crystal if crystal is not None else Crystal()
+        self.inbox = EventQueue()
+        self.outbox = EventQueue()
+        self.now = 0
+        self.next_time = NEVER
+        self.ns_per_cycle = self.crystal.ns_per_cycle(hz)
+        self.cycles_per_ns = self.crystal.cycles_per_ns(hz)
+        self.scheduler = SlotScheduler(Schedule(), 1)
+        self.vic = InterruptController(self.ns_per_cycle)
+        self.analog = AnalogPins()
+        self.words = array.array("q", [0]) * 16
+        self.pins = array.array("q", [0]) * PINS
+        self.on_overrun = None
+        self.on_limit = None
+        self.on_near_limit = None
+        self.on_timer_tick = None
+        self.extra_cycles = 0
+        self.tick_time = NEVER
+        self.tick_number = 0
+        self.tick_period_ns = 0
+        self.phase_ns = 0
+        self.match_time = 0
+        self.tick_source = self.vic.source(SLOT_TIMER, 0)
+        self.instant = 0
+        self.code_time = 0
+        self.irq_free = 0
+        self.fiq_free = 0
+        self.waiting = False
+        self.check_wait = False
+        self.wait_task = None
+        self.wait_start = 0
+        self.wait_stolen = 0
+        self.stolen_cycles = 0
+        self.alarm_time = NEVER
+        self.alarm_count = 0
+        self.alarm_times = array.array("q", [NEVER]) * 16
+        self.alarm_owners = []
+        self.alarm_numbers = []
+        self.message_table = [None] * (MESSAGE_KINDS * INDICES_PER_KIND)
+        self.pin_owners = [None] * PINS
+        self.pin_channels = array.array("q", [-1]) * PINS
+        self.unclaimed = 0
+
+    # --- set-up -------------------------------------------------------------------------------------------
+
+    def claim(self, kind, index, peripheral) -> None:
+        """Messages of `kind` whose field a is `index` (0 ... 15) go to `peripheral.on_message`."""
+        place = kind * INDICES_PER_KIND + index
+        if self.message_table[place] is not None:
+            raise UserError(f"{self.name}: messages of kind {kind}, index {index} are claimed twice")
+        self.message_table[place] = peripheral
+
+    def claim_pin(self, pin, channel, peripheral) -> None:
+        """Edges of `pin` go to `peripheral.on_pin(channel, level, time)`."""
+        if not 0 <= pin < PINS:
+            raise UserError(f"{self.name}: pin {pin} is not 0 ... {PINS - 1}")
+        if self.pin_owners[pin] is not None:
+            raise UserError(f"{self.name}: pin {pin} is claimed twice")
+        self.pin_owners[pin] = peripheral
+        self.pin_channels[pin] = channel
+
+    def new_alarm(self, peripheral, number) -> int:
+        """An alarm slot; when due, `peripheral.on_alarm(number, time)` runs. Returns the slot."""
+        index = self.alarm_count
+        if index >= 16:
+            raise UserError(f"{self.name}: more than 16 peripheral alarms")
+        self.alarm_count = index + 1
+        self.alarm_owners.append(peripheral)
+        self.alarm_numbers.append(number)
+        return index
+
+    def set_alarm(self, index: cython.longlong, time: cython.longlong) -> cython.void:
+        """Alarm `index` is due at `time` (ns); NEVER takes it back. An alarm holds one instant."""
+        i: cython.longlong
+        first: cython.longlong = 1 << 62
+        self.alarm_times[index] = time
+        for i in range(self.alarm_count):
+            if self.alarm_times[i] < first:
+                first = self.alarm_times[i]
+        self.alarm_time = first
+        if first < self.next_time:
+            self.next_time = first
+
+    def start(self, schedule: Schedule, phase_ns: cython.longlong) -> cython.void:
+        """Run `schedule`: the first slot begins at `phase_ns`, the later ones by this chip's crystal."""
+        cycles: cython.longlong = schedule.slot_ns * self.hz // 1000000000
+        self.scheduler = SlotScheduler(schedule, cycles)
+        self.tick_period_ns = schedule.slot_ns // schedule.divider
+        self.phase_ns = phase_ns
+        self.tick_number = 0
+        self.tick_time = phase_ns
+        self.next_time = min(self.next_time, phase_ns)
+        self.waiting = False
+        self.tick_source = self.vic.attach(
+            SLOT_TIMER,
+            0,
+            self.on_slot_timer,
+            schedule.tick_cost,
+            slot=schedule.tick_slot,
+            latency=None if schedule.tick_latency < 0 else schedule.tick_latency,
+            name="slot timer",
+        )
+
+    # --- what firmware calls ------------------------------------------------------------------------------
+
+    def spend(self, cycles: cython.longlong) -> cython.void:
+        """Add modelled cycles to the task or handler that runs now."""
+        self.extra_cycles += cycles
+
+    def cycles_since_tick(self) -> cython.longlong:
+        """Core cycles at `now` since the slot timer's last match (its count register)."""
+        return int((self.now - self.match_time) * self.cycles_per_ns)
+
+    def request(self, source: InterruptSource) -> cython.void:
+        """Raise an interrupt line; it is served as soon as its priority allows."""
+        self.vic.raise_source(source)
+
+    # --- the event loop -----------------------------------------------------------------------------------
+
+    def due(self, until: cython.longlong) -> cython.bint:
+        """True when something happens here before `until`, inputs that wait in the inbox included."""
+        return self.next_time < until or self.inbox.head_time < until
+
+    def advance(self, until: cython.longlong) -> cython.longlong:
+        """Run everything with an instant before `until` (ns); returns `next_time`."""
+        inbox: EventQueue = self.inbox
+        vic: InterruptController = self.vic
+        scheduler: SlotScheduler = self.scheduler
+        time: cython.longlong
+        service: cython.longlong
+        what: cython.longlong
+        while True:
+            time = self.alarm_time
+            what = 1
+            if self.tick_time < time:
+                time = self.tick_time
+                what = 2
+            if vic.fiq_pending > 0:
+                service = self.fiq_free
+                if service < self.instant:
+                    service = self.instant
+                if service < time:
+                    time = service
+                    what = 3
+            elif vic.irq_pending > 0:
+                service = self.fiq_free
+                if self.irq_free > service:
+                    service = self.irq_free
+                if service < self.instant:
+                    service = self.instant
+                if service < time:
+                    time = service
+                    what = 4
+            if self.code_time < time and not scheduler.done and (not self.waiting or self.check_wait):
+                time = self.code_time
+                what = 5
+            if inbox.head_time <= time:
+                if inbox.head_time >= until:
+                    break
+                inbox.take()
+                self.instant = inbox.time
+                self.now = inbox.time
+                self._input()
+                continue
+            if time >= until:
+                break
+            self.instant = time
+            if what == 5:
+                self._code(until)
+            elif what == 3:
+                self._serve(vic.next_fiq(), time)
+            elif what == 4:
+                self._serve(vic.next_irq(), time)
+            elif what == 2:
+                self._timer_match()
+            else:
+                self._alarm(time)
+        self.next_time = time
+        return time
+
+    def _input(self) -> cython.void:
+        """The message just taken: hardware first; its interrupt line is raised by the peripheral."""
+        inbox: EventQueue = self.inbox
+        pin: cython.longlong
+        channel: cython.longlong
+        peripheral: Peripheral
+        source: InterruptSource
+        if inbox.kind == 1:  # PIN_EDGE
+            pin = inbox.a
+            self.pins[pin] = inbox.b
+            if inbox.c >= 0:
+                self.pins[inbox.c] = inbox.d
+            channel = self.pin_channels[pin]
+            if channel >= 0:
+                peripheral = self.pin_owners[pin]
+                peripheral.on_pin(channel, inbox.b, inbox.time)
+                return
+        elif 0 <= inbox.kind < 32 and 0 <= inbox.a < 16:
+            peripheral = self.message_table[inbox.kind * 16 + inbox.a]
+            if peripheral is not None:
+                peripheral.on_message(inbox)
+                return
+        source = self.vic.sources.get((inbox.kind, inbox.a))
+        if source is None or not source.attached:
+            if inbox.kind != 1:
+                self.unclaimed += 1
+            return
+        source.keeps_message = True
+        source.time = inbox.time
+        source.order = inbox.order
+        source.a = inbox.a
+        source.b = inbox.b
+        source.c = inbox.c
+        source.d = inbox.d
+        source.e = inbox.e
+        source.f = inbox.f
+        source.ref = inbox.ref
+        self.vic.raise_source(source)
+
+    def _alarm(self, time: cython.longlong) -> cython.void:
+        """The first alarm that is due."""
+        i: cython.longlong
+        peripheral: Peripheral
+        self.now = time
+        for i in range(self.alarm_count):
+            if self.alarm_times[i] == time:
+                self.set_alarm(i, 1 << 62)
+                peripheral = self.alarm_owners[i]
+                peripheral.on_alarm(self.alarm_numbers[i], time)
+                break
+        if self.waiting:
+            self.check_wait = True
+            if self.code_time < time:
+                self.code_time = time
+
+    def _timer_match(self) -> cython.void:
+        """The slot timer matches and restarts: its interrupt is requested."""
+        self.match_time = self.tick_time
+        self.tick_number += 1
+        self.tick_time = self.crystal.tick_time_ns(self.tick_number, self.tick_period_ns, self.phase_ns)
+        self.vic.raise_source(self.tick_source)
+
+    def on_slot_timer(self, queue: EventQueue) -> object:
+        """Handler of the slot timer: publish the next row."""
+        if self.on_timer_tick is not None:
+            self.on_timer_tick()
+        if self.scheduler.tick(self.match_time) and self.scheduler.schedule.completion_flag:
+            if self.on_overrun is not None:
+                self.on_overrun()
+        return None
+
+    def _serve(self, source: InterruptSource, time: cython.longlong) -> cython.void:
+        """Run the handler of a pending source at `time` and let its cycles pass."""
+        inbox: EventQueue = self.inbox
+        cycles: cython.longlong = source.base_cycles
+        busy: cython.longlong = source.base_ns
+        items: cython.longlong
+        self.vic.accept(source)
+        source.served += 1
+        self.now = time + source.latency_ns
+        if source.keeps_message:
+            inbox.time = source.time
+            inbox.order = source.order
+            inbox.kind = source.kind
+            inbox.a = source.a
+            inbox.b = source.b
+            inbox.c = source.c
+            inbox.d = source.d
+            inbox.e = source.e
+            inbox.f = source.f
+            inbox.ref = source.ref
+            source.ref = None
+        self.extra_cycles = 0
+        result = source.handler(inbox)
+        if result is not None:
+            items = result
+            cycles += source.per_item * items
+        cycles += self.extra_cycles
+        if cycles != source.base_cycles:
+            busy = int(cycles * self.ns_per_cycle)
+        if source.slot < 0:
+            self.fiq_free = time + busy
+            if self.irq_free > time:
+                self.irq_free += busy
+        else:
+            self.irq_free = time + busy
+        if self.code_time < time:
+            self.code_time = time + busy
+        else:
+            self.code_time += busy
+        source.total_cycles += cycles
+        if cycles > source.max_cycles:
+            source.max_cycles = cycles
+        self.stolen_cycles += cycles
+        if self.waiting:
+            self.check_wait = True
+        if self.scheduler.recording:
+            self.scheduler.note_interrupt(source.name, cycles)
+
+    def _code(self, until: cython.longlong) -> cython.void:
+        """Run tasks from `code_time` on, until something else comes first."""
+        scheduler: SlotScheduler = self.scheduler
+        vic: InterruptController = self.vic
+        inbox: EventQueue = self.inbox
+        task: Task
+        entry: Task
+        wait: Wait
+        occasional: Occasional
+        cycles: cython.longlong
+        items: cython.longlong
+        while True:
+            self.now = self.code_time
+            self.extra_cycles = 0
+            if self.waiting:
+                self.check_wait = False
+                if not self.wait_task.function():
+                    return
+                self._wait_over()
+            else:
+                if scheduler.late:
+                    scheduler.late = False
+                    self._close_slot(scheduler.late_time)
+                    scheduler.late_record = None
+                if scheduler.position >= scheduler.end:
+                    scheduler.done = True
+                    scheduler.finished_time = self.code_time
+                    self._close_slot(scheduler.slot_time)
+                    return
+                task = scheduler.tasks[scheduler.position]
+                scheduler.position += 1
+                scheduler.run_tasks += 1
+                cycles = task.cost
+                if task.kind == 0:
+                    result = task.function()
+                    if result is not None:
+                        items = result
+                        cycles += task.per_item * items
+                    self._charge(task, cycles + self.extra_cycles)
+                elif task.kind == 1:
+                    occasional = task
+                    entry = occasional.next_task()
+                    if entry is None:
+                        self._charge(task, cycles)
+                    else:
+                        result = entry.function()
+                        items = 0
+                        if result is not None:
+                            items = result
+                        items = entry.cost + entry.per_item * items + self.extra_cycles
+                        self._charge(task, cycles)
+                        self._charge(entry, items)
+                else:
+                    wait = task
+                    self.wait_task = wait
+                    self.wait_start = self.code_time
+                    self.wait_stolen = self.stolen_cycles
+                    if wait.function():
+                        self._wait_over()
+                    else:
+                        wait.waits += 1
+                        self.waiting = True
+                        self.check_wait = False
+                        return
+            if (
+                self.code_time >= self.tick_time
+                or self.code_time >= until
+                or self.code_time >= inbox.head_time
+                or self.code_time >= self.alarm_time
+                or vic.irq_pending > 0
+                or vic.fiq_pending > 0
+            ):
+                return
+
+    def _wait_over(self) -> cython.void:
+        """The condition of the spinning task came true: its cycles are the spinning, less what was stolen."""
+        task: Wait = self.wait_task
+        spun: cython.longlong = int((self.code_time - self.wait_start) * self.cycles_per_ns)
+        before: cython.longlong = self.code_time
+        cost: cython.longlong = task.cost + self.extra_cycles
+        spun -= self.stolen_cycles - self.wait_stolen
+        if spun < 0:
+            spun = 0
+        self.waiting = False
+        self._charge(task, spun + cost)
+        spun = int(cost * self.ns_per_cycle)
+        self.code_time = before + spun
+
+    def _charge(self, task: Task, cycles: cython.longlong) -> cython.void:
+        """Let the cycles of a task pass and hold them against its limit."""
+        busy: cython.longlong = int(cycles * self.ns_per_cycle)
+        self.code_time += busy
+        task.calls += 1
+        task.last_cycles = cycles
+        task.total_cycles += cycles
+        if cycles > task.max_cycles:
+            task.max_cycles = cycles
+        if cycles > task.limit > 0:
+            task.hits += 1
+            if self.on_limit is not None:
+                self.on_limit(task)
+        if self.scheduler.recording:
+            self.scheduler.note_task(task.name, cycles)
+
+    def _close_slot(self, since: cython.longlong) -> cython.void:
+        """Record the slot that began at `since` and ends now."""
+        scheduler: SlotScheduler = self.scheduler
+        cycles: cython.longlong = int((self.code_time - since) * self.cycles_per_ns)
+        if scheduler.recording:
+            if scheduler.late_record is not None:
+                scheduler.late_record.cycles = cycles
+            elif scheduler.record is not None:
+                scheduler.record.cycles = cycles
+        if scheduler.close(cycles) and self.on_near_limit is not None:
+            self.on_near_limit()

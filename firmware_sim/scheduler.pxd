@@ -1,0 +1,45 @@
+cdef class Task:
+    cdef public object function
+    cdef public long long cost, per_item, limit, kind
+    cdef public str name, item
+    cdef public long long calls, hits, last_cycles, max_cycles, total_cycles
+
+cdef class Wait(Task):
+    cdef public long long waits
+
+cdef class Occasional(Task):
+    cdef public list tasks
+    cdef public long long position
+    cdef public bint extra_idle_call
+    cpdef Task next_task(self)
+
+cdef class Schedule:
+    cdef public long long slot_ns, divider, tick_cost, tick_slot, tick_latency
+    cdef public list every, rows, last
+    cdef public bint completion_flag
+
+cdef class SlotRecord:
+    cdef public long long time_ns, row, cycles
+    cdef public bint overrun
+    cdef public list tasks
+    cdef public dict interrupts
+
+cdef class SlotScheduler:
+    cdef public Schedule schedule
+    cdef public list tasks, row_starts, row_ends
+    cdef public long long row_count, row, position, end, divider_count, slot_ns
+    cdef public bint done, started
+    cdef public long long slot_time, tick_time, finished_time
+    cdef public long long slot_count, overruns, dropped_tasks, listed_tasks, run_tasks
+    cdef public long long slot_cycles, near_limit_cycles, last_slot_cycles, max_slot_cycles, total_slot_cycles
+    cdef public long long near_limits
+    cdef public long long[::1] histogram
+    cdef public long long histogram_step
+    cdef public bint late
+    cdef public long long late_time
+    cdef public bint recording
+    cdef public long long record_length
+    cdef public list records
+    cdef public SlotRecord record, late_record
+    cpdef bint tick(self, long long timer_time)
+    cpdef bint close(self, long long cycles)

@@ -1,0 +1,352 @@
+"""The cooperative slot scheduler: what runs when, what it costs, and what an overrun drops.
+
+A timer tick starts a slot and steps to the next row of the table. A slot runs the every-slot tasks, the
+row's own tasks and the closing tasks, one after another, each to its end. A tick that finds the row
+unfinished is an overrun: the task in progress finishes, the rest of its row is dropped, the new row
+starts at once. Nothing runs before the first tick.
+
+Cost and limit are two things: a task spends `cost + per_item * items` modelled cycles, and is held
+against `limit`. The event loop that spends the time is in microcontroller.py; here is the book-keeping.
+"""
+
+import array
+
+import cython
+
+from foundation.user_error import UserError
+
+NORMAL_TASK = 0
+OCCASIONAL_TASK = 1
+WAIT_TASK = 2
+
+HISTOGRAM_BINS = 21  # twenty of 5 % of a slot, the last for overruns
+
+
+class Task:
+    """One line of a schedule: `function()` returns None or the number of items it handled (an int).
+
+    Cycles of a call: cost + per_item * items + what the function spends itself by `chip.spend`. `item` names
+    what is counted ("frame", "edge"). limit 0: not held against anything. Ground truth: `calls`, `hits`
+    (calls over the limit), `last_cycles`, `max_cycles`, `total_cycles` (interrupts not included).
+    """
+
+    def __init__(self, function, cost=0, limit=0, per_item=0, item="", name=None) -> None:
+        title = name if name is not None else getattr(function, "__name__", type(function).__name__)
+        if not callable(function):
+            raise UserError(f"task {title}: function {function!r} cannot be called")
+        for what, value in (("cost", cost), ("limit", limit), ("per_item", per_item)):
+            if not isinstance(value, int) or value < 0:
+                raise UserError(f"task {title}: {what} {value!r} must be a whole number of cycles, 0 or more")
+        self.function = function
+        self.cost = cost
+        self.limit = limit
+        self.per_item = per_item
+        self.kind = NORMAL_TASK
+        self.name = title
+        self.item = item
+        self.calls = 0
+        self.hits = 0
+        self.last_cycles = 0
+        self.max_cycles = 0
+        self.total_cycles = 0
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({self.name}, cost={self.cost}, limit={self.limit})"
+
+
+class Wait(Task):
+    """A task that spins until `function()` is true, as `while (!done);` does in C.
+
+    The condition is looked at when the task starts and after every interrupt or peripheral event; the
+    spinning time counts as cycles of the task. `waits` counts the calls that had to spin. A slot tick does
+    not end the spinning (the task in progress always finishes).
+    """
+
+    def __init__(self, function, cost=0, limit=0, name=None) -> None:
+        Task.__init__(self, function, cost=cost, limit=limit, name=name)
+        self.kind = WAIT_TASK
+        self.waits = 0
+
+
+class Occasional(Task):
+    """A task that runs one task of its list per call. `cost` is that of choosing (the static counter).
+
+    After the last entry one extra idle call resets the counter, so n entries come round every n + 1 calls,
+    as the robot's code does; `extra_idle_call=False` leaves that call out.
+    """
+
+    def __init__(self, tasks, cost=20, limit=0, name="occasional", extra_idle_call=True) -> None:
+        # cost 20: a counter, a comparison and an indirect call (chosen by us, no measurement is known)
+        Task.__init__(self, self.next_task, cost=cost, limit=limit, name=name)
+        self.kind = OCCASIONAL_TASK
+        self.tasks = list(tasks)
+        self.position = 0
+        self.extra_idle_call = extra_idle_call
+        for task in self.tasks:
+            if not isinstance(task, Task) or task.kind != NORMAL_TASK:
+                raise UserError(f"occasional list {name}: {task!r} is not a plain Task")
+
+    def next_task(self):
+        """The entry whose turn it is, or None in the idle call."""
+        count: cython.longlong = len(self.tasks)
+        if self.position >= count:
+            self.position = 0
+            if self.extra_idle_call or count == 0:
+                return None
+        task: Task = self.tasks[self.position]
+        self.position += 1
+        return task
+
+
+class Schedule:
+    """The table of one board.
+
+    slot_us: length of a slot (whole us; `slot_ns` for anything finer). `every`: tasks of every slot;
+    `rows`: a tuple of task tuples, one per row; `last`: tasks that close every slot. `occasional`: a tuple
+    of tasks (or an Occasional) called once per pass, at the end of row `occasional_row`.
+    `divider`: timer ticks per slot (the timer then runs at slot/divider). `completion_flag=False`: the
+    runner keeps no DONE flag, so an overrun drops tasks but tells nobody (main-brain scheduler).
+    `tick_slot`: VIC slot of the timer interrupt (or FIQ); `tick_cost`: its cycles.
+    """
+
+    def __init__(
+        self,
+        slot_us=500,
+        every=(),
+        rows=((),),
+        last=(),
+        occasional=None,
+        occasional_row=0,
+        divider=1,
+        completion_flag=True,
+        tick_cost=60,  # finds the row's end and steps to the next one (chosen by us: about 40 instructions)
+        tick_slot=4,
+        tick_latency=None,
+        slot_ns=None,
+        extra_idle_call=True,
+    ) -> None:
+        self.slot_ns = slot_ns if slot_ns is not None else slot_us * 1000
+        self.every = list(every)
+        self.rows = [list(row) for row in rows]
+        self.last = list(last)
+        self.divider = divider
+        self.completion_flag = completion_flag
+        self.tick_cost = tick_cost
+        self.tick_slot = tick_slot
+        self.tick_latency = -1 if tick_latency is None else tick_latency
+        if self.slot_ns <= 0 or divider <= 0 or self.slot_ns % divider:
+            raise UserError(f"schedule: slot of {self.slot_ns} ns does not divide into {divider} timer ticks")
+        if not self.rows:
+            raise UserError("schedule: at least one row is needed (it may be empty)")
+        if occasional is not None:
+            if not 0 <= occasional_row < len(self.rows):
+                raise UserError(
+                    f"schedule: occasional_row {occasional_row} is not one of the {len(self.rows)} rows"
+                )
+            if not isinstance(occasional, Occasional):
+                occasional = Occasional(occasional, extra_idle_call=extra_idle_call)
+            self.rows[occasional_row].append(occasional)
+        for task in self.every + self.last + [task for row in self.rows for task in row]:
+            if not isinstance(task, Task):
+                raise UserError(f"schedule: {task!r} is not a Task")
+
+    def row_tasks(self, row: cython.longlong) -> list:
+        """Everything that a slot of this row runs, in order."""
+        return self.every + self.rows[row] + self.last
+
+    def all_tasks(self) -> list:
+        """Every distinct task of the table, those inside occasional lists too, in order of the table."""
+        found = []
+        for row in range(len(self.rows)):
+            for task in self.row_tasks(row):
+                if task not in found:
+                    found.append(task)
+                if isinstance(task, Occasional):
+                    for entry in task.tasks:
+                        if entry not in found:
+                            found.append(entry)
+        return found
+
+
+class SlotRecord:
+    """One slot as it was: start (ns), row, cycles until its end (interrupts included), whether it overran,
+    `tasks` [(name, cycles), ...] in the order of running, `interrupts` {name: cycles}."""
+
+    def __init__(self, time_ns, row) -> None:
+        self.time_ns = time_ns
+        self.row = row
+        self.cycles = 0
+        self.overrun = False
+        self.tasks = []
+        self.interrupts = {}
+
+
+class SlotScheduler:
+    """Row and position of a running schedule, and its records.
+
+    `slot_count` ticks that began a slot, `overruns`, `dropped_tasks`, `max_slot_cycles` (from the tick to the
+    end of the row, interrupts included), `histogram` of that in 21 bins of 5 % of a slot (the last: more
+    than the slot), `near_limits` (more than 90 % but finished). `listed_tasks` = run_tasks + dropped_tasks +
+    what the present row still has to run.
+    """
+
+    def __init__(self, schedule, slot_cycles) -> None:
+        self.schedule = schedule
+        self.slot_ns = schedule.slot_ns
+        self.slot_cycles = slot_cycles
+        self.near_limit_cycles = slot_cycles * 9 // 10  # "approaching" is 90 % (chosen by us)
+        self.histogram_step = max(1, slot_cycles // 20)
+        self.histogram = array.array("q", [0]) * HISTOGRAM_BINS
+        self.tasks = []
+        self.row_starts = []
+        self.row_ends = []
+        self.layout()
+        self.row = self.row_count - 1  # so that the first tick starts row 0
+        self.position = 0
+        self.end = 0
+        self.divider_count = schedule.divider - 1  # the first timer tick starts a slot
+        self.done = True
+        self.started = False
+        self.slot_time = 0
+        self.tick_time = 0
+        self.finished_time = 0
+        self.slot_count = 0
+        self.overruns = 0
+        self.dropped_tasks = 0
+        self.listed_tasks = 0
+        self.run_tasks = 0
+        self.last_slot_cycles = 0
+        self.max_slot_cycles = 0
+        self.total_slot_cycles = 0
+        self.near_limits = 0
+        self.late = False
+        self.late_time = 0
+        self.recording = False
+        self.record_length = 0
+        self.records = []
+        self.record = None
+        self.late_record = None
+
+    def layout(self) -> None:
+        """One flat list of tasks with each row's first and past-last index."""
+        self.row_count = len(self.schedule.rows)
+        for row in range(self.row_count):
+            self.row_starts.append(len(self.tasks))
+            self.tasks.extend(self.schedule.row_tasks(row))
+            self.row_ends.append(len(self.tasks))
+
+    def tick(self, timer_time: cython.longlong) -> cython.bint:
+        """Timer tick (its hardware instant, ns): step to the next row. True: the old row was unfinished."""
+        overrun: cython.bint = False
+        self.tick_time = timer_time
+        self.divider_count += 1
+        if self.divider_count < self.schedule.divider:
+            return False
+        self.divider_count = 0
+        if not self.done:
+            overrun = True
+            self.overruns += 1
+            self.dropped_tasks += self.end - self.position
+            if not self.late:
+                self.late = True
+                self.late_time = self.slot_time
+                self.late_record = self.record
+            if self.recording and self.record is not None:
+                self.record.overrun = True
+        self.row += 1
+        if self.row >= self.row_count:
+            self.row = 0
+        self.position = self.row_starts[self.row]
+        self.end = self.row_ends[self.row]
+        self.done = False
+        self.started = True
+        self.slot_time = timer_time
+        self.slot_count += 1
+        self.listed_tasks += self.end - self.position
+        if self.recording:
+            self.open_record()
+        # ROBOT PARITY: the robot's runner compares start indices of rows, so in a table of one row it
+        # would not notice the tick and would finish the old pass instead. Its tables all have several rows.
+        return overrun
+
+    def close(self, cycles: cython.longlong) -> cython.bint:
+        """A row (or the last task of an overrun one) ended `cycles` after its tick. True: near the limit."""
+        index: cython.longlong = cycles // self.histogram_step
+        near: cython.bint = False
+        if cycles > self.slot_cycles or index > 20:
+            index = 20
+        elif index == 20:
+            index = 19
+        self.histogram[index] += 1
+        self.last_slot_cycles = cycles
+        self.total_slot_cycles += cycles
+        if cycles > self.max_slot_cycles:
+            self.max_slot_cycles = cycles
+        if self.near_limit_cycles < cycles <= self.slot_cycles:
+            near = True
+            self.near_limits += 1
+        return near
+
+    def record_slots(self, length) -> None:
+        """Keep the last `length` slots in `records` (0: none, the default)."""
+        self.record_length = length
+        self.recording = length > 0
+        self.records = []
+        self.record = None
+
+    def open_record(self) -> None:
+        self.record = SlotRecord(self.slot_time, self.row)
+        self.records.append(self.record)
+        if len(self.records) > self.record_length:
+            del self.records[0]
+
+    def note_task(self, name, cycles) -> None:
+        """Add a task's cycles to the record of the slot that runs."""
+        if self.record is not None:
+            self.record.tasks.append((name, cycles))
+
+    def note_interrupt(self, name, cycles) -> None:
+        """Add stolen cycles to the record of the slot that runs."""
+        if self.record is not None:
+            self.record.interrupts[name] = self.record.interrupts.get(name, 0) + cycles
+
+    def find(self, name):
+        """The one task of this name (or the Task itself), wherever it stands in the table."""
+        tasks = self.schedule.all_tasks()
+        found = [task for task in tasks if task is name or task.name == name]
+        if not found:
+            names = ", ".join(sorted({task.name for task in tasks}))
+            raise UserError(f"schedule: no task named {name!r}; there are {names}")
+        if len(found) > 1:
+            raise UserError(f"schedule: {len(found)} tasks are named {name!r}; give the Task itself")
+        return found[0]
+
+    def replace(self, name, function, cost=None, limit=None, per_item=None):
+        """Put a user's `function` into the entry `name`; it declares its own cost (kept when None).
+
+        Works while running, at the next call. Returns the Task, whose old function is the caller's to keep.
+        """
+        task = self.find(name)
+        if not callable(function):
+            raise UserError(f"task {name}: function {function!r} cannot be called")
+        if task.kind == OCCASIONAL_TASK:
+            raise UserError(f"task {task.name}: an occasional list has entries, replace one of those")
+        checked = Task(
+            function,
+            cost=task.cost if cost is None else cost,
+            limit=task.limit if limit is None else limit,
+            per_item=task.per_item if per_item is None else per_item,
+            name=task.name,
+        )
+        task.function = checked.function
+        task.cost = checked.cost
+        task.limit = checked.limit
+        task.per_item = checked.per_item
+        return task
+
+    def task_cycles(self) -> dict:
+        """Total cycles by task name since power-up."""
+        totals: dict = {}
+        for task in self.schedule.all_tasks():
+            totals[task.name] = totals.get(task.name, 0) + task.total_cycles
+        return totals

@@ -1,0 +1,21 @@
+cdef class InterruptSource:
+    cdef public long long kind, index
+    cdef public str name
+    cdef public object handler
+    cdef public long long cost, per_item, latency, slot
+    cdef public long long base_cycles, base_ns, latency_ns
+    cdef public bint attached, pending, keeps_message
+    cdef public long long requests, merged, served, total_cycles, max_cycles
+    cdef public long long time, order, a, b, c, d, e, f
+    cdef public object ref
+
+cdef class InterruptController:
+    cdef public double ns_per_cycle
+    cdef public dict sources
+    cdef public list fiq_list, irq_list
+    cdef public long long fiq_pending, irq_pending
+    cpdef InterruptSource source(self, long long kind, long long index)
+    cpdef InterruptSource next_fiq(self)
+    cpdef InterruptSource next_irq(self)
+    cpdef bint raise_source(self, InterruptSource source)
+    cpdef void accept(self, InterruptSource source)

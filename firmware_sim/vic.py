@@ -1,0 +1,170 @@
+"""The vectored interrupt controller: one fast interrupt (FIQ) and 16 vectored slots (IRQ), slot 0 first.
+
+An `InterruptSource` is one line into the controller. A request is pending until served; a second request
+of a pending source merges with it, as on a level-sensitive line. FIQ sources share the one FIQ and are
+served in the order in which they were attached. IRQs do not nest; FIQ pre-empts IRQ and code. The event
+loop in microcontroller.py serves; this file only keeps who waits.
+"""
+
+import cython
+
+from foundation.user_error import UserError
+
+FIQ = -1
+
+# Kinds of sources that are not messages of foundation/events.py (those use their own numbers below 64).
+TIMER_MATCH = 64  # index: timer number; MR0 reached
+EXTERNAL_INTERRUPT = 65  # index: EINT number
+ADC_DONE = 66  # internal converter
+SPI_DONE = 67  # index: SPI number
+UART_TRANSMIT = 68  # index: UART number; transmit FIFO empty (THRE)
+SLOT_TIMER = 69  # the scheduler's own timer
+SOFTWARE = 70  # index free: VICSoftInt
+
+# ARM7TDMI technical reference manual: an interrupt waits 5 ... 29 cycles for the instruction in progress.
+# Chosen by us within that: FIQ with its banked registers 12, IRQ with the read of VICVectAddr 25.
+FIQ_LATENCY = 12
+IRQ_LATENCY = 25
+
+
+class InterruptSource:
+    """One interrupt line. Cycle counts and `requests`, `merged`, `served` are ground truth for tests.
+
+    A source whose message no peripheral stores keeps that one message (`keeps_message`): while it waits,
+    a newer message overwrites the older one (counted in `merged`).
+    """
+
+    def __init__(self, kind, index) -> None:
+        self.kind = kind
+        self.index = index
+        self.name = f"{kind}/{index}"
+        self.handler = None
+        self.cost = 0
+        self.per_item = 0
+        self.latency = 0
+        self.slot = 0
+        self.base_cycles = 0
+        self.base_ns = 0
+        self.latency_ns = 0
+        self.attached = False
+        self.pending = False
+        self.keeps_message = False
+        self.requests = 0
+        self.merged = 0
+        self.served = 0
+        self.total_cycles = 0
+        self.max_cycles = 0
+        self.time = 0
+        self.order = 0
+        self.a = 0
+        self.b = 0
+        self.c = 0
+        self.d = 0
+        self.e = 0
+        self.f = 0
+        self.ref = None
+
+
+class InterruptController:
+    """Sources by (kind, index), who is pending, and who comes first. `ns_per_cycle`: of this CPU."""
+
+    def __init__(self, ns_per_cycle=1000.0 / 60.0) -> None:
+        self.ns_per_cycle = ns_per_cycle
+        self.sources = {}
+        self.fiq_list = []
+        self.irq_list = [None] * 16
+        self.fiq_pending = 0
+        self.irq_pending = 0
+
+    def source(self, kind: cython.longlong, index: cython.longlong):
+        """The line of (kind, index); made on first use, silent until a handler is attached."""
+        found = self.sources.get((kind, index))
+        if found is None:
+            found = InterruptSource(kind, index)
+            self.sources[(kind, index)] = found
+        return found
+
+    def attach(self, kind, index, handler, cost, per_item=0, slot=0, latency=None, name=None):
+        """Let `handler(queue)` serve (kind, index); returns the source.
+
+        Cycles stolen per service: latency + cost + per_item * (what the handler returns, None counts 0)
+        + whatever the handler spends. `slot`: 0 ... 15 (one source each) or FIQ.
+        """
+        source = self.source(kind, index)
+        if not callable(handler):
+            raise UserError(f"interrupt {kind}/{index}: handler {handler!r} cannot be called")
+        if slot != FIQ and not 0 <= slot <= 15:
+            raise UserError(f"interrupt {kind}/{index}: slot {slot} is neither FIQ (-1) nor 0 ... 15")
+        if cost < 0 or per_item < 0:
+            raise UserError(f"interrupt {kind}/{index}: cost {cost} and per_item {per_item} must not be negative")
+        if slot != FIQ and self.irq_list[slot] not in (None, source):
+            raise UserError(
+                f"interrupt {kind}/{index}: slot {slot} is taken by {self.irq_list[slot].name}"
+            )
+        self.detach(source)
+        source.handler = handler
+        source.name = name if name is not None else getattr(handler, "__name__", source.name)
+        source.cost = cost
+        source.per_item = per_item
+        source.slot = slot
+        source.latency = latency if latency is not None else (FIQ_LATENCY if slot == FIQ else IRQ_LATENCY)
+        source.base_cycles = source.latency + cost
+        source.base_ns = int(source.base_cycles * self.ns_per_cycle)
+        source.latency_ns = int(source.latency * self.ns_per_cycle)
+        source.attached = True
+        if slot == FIQ:
+            self.fiq_list.append(source)
+        else:
+            self.irq_list[slot] = source
+        return source
+
+    def detach(self, source) -> None:
+        """Take a source out of the controller; a pending request of it is forgotten."""
+        if not source.attached:
+            return
+        if source.pending:
+            self.accept(source)
+        source.attached = False
+        if source.slot == FIQ:
+            self.fiq_list.remove(source)
+        else:
+            self.irq_list[source.slot] = None
+
+    def raise_source(self, source: InterruptSource) -> cython.bint:
+        """Request service; False when nobody listens or the request merged with a pending one."""
+        if not source.attached:
+            return False
+        source.requests += 1
+        if source.pending:
+            source.merged += 1
+            return False
+        source.pending = True
+        if source.slot < 0:
+            self.fiq_pending += 1
+        else:
+            self.irq_pending += 1
+        return True
+
+    def accept(self, source: InterruptSource) -> cython.void:
+        """The request of a pending source is being served."""
+        source.pending = False
+        if source.slot < 0:
+            self.fiq_pending -= 1
+        else:
+            self.irq_pending -= 1
+
+    def next_fiq(self):
+        """First pending FIQ source in attaching order, or None."""
+        source: InterruptSource
+        for source in self.fiq_list:
+            if source.pending:
+                return source
+        return None
+
+    def next_irq(self):
+        """Pending IRQ source with the lowest slot, or None."""
+        source: InterruptSource
+        for source in self.irq_list:
+            if source is not None and source.pending:
+                return source
+        return None
