@@ -1,0 +1,8 @@
+from boards.modules.error_module cimport ErrorModule
+
+cdef class AbsoluteEncoder:
+    cdef public long long zero, sign, largest_step
+    cdef public ErrorModule errors
+    cdef public long long spike_code, value, counts, angle
+    cpdef void accept(self, long long word)
+    cpdef double angle_rad(self)

@@ -1,0 +1,46 @@
+"""Absolute joint encoder AM8192B: 13 bits per turn, its spike limiter, zero and sign
+(facts network-and-boards 4.7)."""
+
+import cython
+
+from boards.modules.error_module import ErrorModule
+
+RAD_PER_COUNT = 0.0007669922  # as in the firmware; 2 pi / 8192 would be 0.00076699039
+# The same in 0.32 fixed point: 0.0007669922 x 2^32, so that the truncation stays below one 16.16 step.
+RAD_PER_COUNT_SHIFTED = 3294206
+
+
+class AbsoluteEncoder:
+    """Angle of a joint. `zero`: raw count at angle 0; `sign`: of the mounting; `rpm`: fastest joint speed.
+
+    `counts` is sign x (value - zero) without any wrap-around; `angle` the same in rad x 65536. `value` is
+    what the spike limiter let through, 0 before the first reading.
+    """
+
+    def __init__(self, zero, sign, rpm, errors: ErrorModule, spike_code) -> None:
+        self.zero = zero
+        self.sign = sign
+        self.largest_step = rpm * 8192 // 120000 + 5  # counts per slot of 0.5 ms, with 5 to spare
+        self.errors = errors
+        self.spike_code = spike_code
+        self.value = 0
+        self.counts = 0
+        self.angle = 0
+
+    def accept(self, word: cython.longlong) -> cython.void:
+        """A transfer of the serial interface ended: keep its low 13 bits, limited in their step."""
+        new: cython.longlong = word & 0x1FFF
+        if self.value != 0:
+            if new > self.value + self.largest_step:
+                new = self.value + self.largest_step
+                self.errors.report(self.spike_code)
+            elif new < self.value - self.largest_step:
+                new = self.value - self.largest_step
+                self.errors.report(self.spike_code)
+        self.value = new
+        self.counts = self.sign * (new - self.zero)
+        self.angle = (self.counts * 3294206) >> 16  # RAD_PER_COUNT_SHIFTED
+
+    def angle_rad(self) -> cython.double:
+        """Angle in rad as it is published."""
+        return self.counts * 0.0007669922  # RAD_PER_COUNT

@@ -1,0 +1,15 @@
+from boards.modules.receiver cimport Receiver
+from foundation.numbers cimport fixed_multiply, fixed_of_float, float_of_word
+
+cdef class CompliantControl:
+    cdef public long long sign
+    cdef public bint latch_with_current
+    cdef public long long command, stiffness, dampness, received_stiffness, received_dampness, target
+    cpdef void set_command(self, long long current)
+    cpdef void set_stiffness(self, long long gain)
+    cpdef void set_dampness(self, long long gain)
+    cpdef long long update(self, long long position, long long velocity)
+
+cdef class GainReceiver(Receiver):
+    cdef public CompliantControl control
+    cdef public long long what

@@ -1,0 +1,81 @@
+"""The outer loop: a motor current that makes the joint behave like a spring and a damper
+(appendix eq. 3 with erratum 11; facts network-and-boards 4.2)."""
+
+import cython
+
+from boards.modules.receiver import Receiver
+
+if not cython.compiled:
+    from foundation.numbers import fixed_multiply, fixed_of_float, float_of_word
+
+COMMAND = 0
+STIFFNESS = 1
+DAMPNESS = 2
+TARGET = 3
+
+
+class CompliantControl:
+    """target = command + sign (stiffness x position + dampness x velocity), all 16.16: A, A/rad, A s/rad.
+
+    `sign` is -1 on the robot. `latch_with_current`: the two gains come into force only when the next command
+    current arrives (firmware of 2016), otherwise at once.
+    """
+
+    def __init__(self, sign=-1, latch_with_current=False) -> None:
+        self.sign = sign
+        self.latch_with_current = latch_with_current
+        self.command = 0
+        self.stiffness = 0
+        self.dampness = 0
+        self.received_stiffness = 0
+        self.received_dampness = 0
+        self.target = 0
+
+    def set_command(self, current: cython.longlong) -> cython.void:
+        """Constant term, A x 65536; the gains received so far come into force."""
+        self.command = current
+        self.stiffness = self.received_stiffness
+        self.dampness = self.received_dampness
+
+    def set_stiffness(self, gain: cython.longlong) -> cython.void:
+        """Position gain, A/rad x 65536."""
+        self.received_stiffness = gain
+        if not self.latch_with_current:
+            self.stiffness = gain
+
+    def set_dampness(self, gain: cython.longlong) -> cython.void:
+        """Velocity gain, A s/rad x 65536."""
+        self.received_dampness = gain
+        if not self.latch_with_current:
+            self.dampness = gain
+
+    def update(self, position: cython.longlong, velocity: cython.longlong) -> cython.longlong:
+        """The current wanted now (A x 65536) at `position` (rad x 65536) and `velocity` (rad/s x 65536)."""
+        self.target = self.command + self.sign * (
+            fixed_multiply(self.stiffness, position) + fixed_multiply(self.dampness, velocity)
+        )
+        return self.target
+
+
+class GainReceiver(Receiver):
+    """Delivers a received float to one setter of a CompliantControl: `what` is one of the four above.
+
+    TARGET writes the target itself, which the law overwrites in the same slot, as on the robot.
+    """
+
+    def __init__(self, control: CompliantControl, what) -> None:
+        Receiver.__init__(self)
+        self.control = control
+        self.what = what
+
+    def deliver(self, value_word: cython.longlong, time_word: cython.longlong) -> cython.void:
+        value: cython.longlong = fixed_of_float(float_of_word(value_word))
+        self.frames += 1
+        if self.what == 0:
+            self.control.set_command(value)
+        elif self.what == 1:
+            self.control.set_stiffness(value)
+        elif self.what == 2:
+            self.control.set_dampness(value)
+        else:
+            self.control.target = value

@@ -1,0 +1,110 @@
+"""Errors of one board: noted anywhere, collected once per slot, sent one at a time (appendix 4.9).
+
+An error frame's value word holds the code (bits 0-15), the board's number (16-21) and how often it came
+since it was last sent (22-31); its time word is when it first came (facts network-and-boards 1.7, 4.12).
+"""
+
+import array
+
+import cython
+
+from boards.modules.network_time import NetworkTime
+
+CODES = 1024  # codes 0 ... CODES-1 can be noted (the table has about 120)
+RING_SIZE = 32  # errors waiting to be sent; one place stays empty, as in all rings of the firmware
+
+
+def error_word(code, board, count):
+    """Value word of an error frame: 16-bit code, 6-bit board number, 10-bit count (at most 1023)."""
+    return (code & 0xFFFF) | (board & 0x3F) << 16 | min(count, 1023) << 22
+
+
+class ErrorModule:
+    """The errors of board number `board`. Ground truth for tests and reports: `totals`, events per code.
+
+    per_event: every recurrence counts (appendix); otherwise one per slot at most (firmware of 2016).
+    lose_new_after_repeat: the firmware's fault that new errors after a repeated one in a slot are lost.
+    """
+
+    def __init__(self, board, time: NetworkTime, per_event=True, lose_new_after_repeat=False) -> None:
+        self.board = board
+        self.time = time
+        self.per_event = per_event
+        self.lose_new_after_repeat = lose_new_after_repeat
+        self.totals = array.array("q", [0]) * CODES
+        # flags of this slot: events per code, and which codes have any, in the order they came
+        self.flags = array.array("q", [0]) * CODES
+        self.flagged = array.array("q", [0]) * CODES
+        self.flagged_count = 0
+        self.codes = array.array("q", [0]) * RING_SIZE
+        self.counts = array.array("q", [0]) * RING_SIZE
+        self.stamps = array.array("q", [0]) * RING_SIZE
+        self.first = 0
+        self.waiting = 0
+        self.dropped = 0
+        self.word = 0
+        self.stamp = 0
+
+    def report(self, code: cython.longlong) -> cython.void:
+        """Note error `code`; it goes into the ring at the end of the slot. Codes above the table are taken
+        as 0 (DEFAULT), so a wrong call is visible rather than lost."""
+        if code < 0 or code >= 1024:
+            code = 0
+        self.totals[code] += 1
+        if self.flags[code] == 0:
+            self.flagged[self.flagged_count] = code
+            self.flagged_count += 1
+        self.flags[code] += 1
+
+    def update(self):
+        """Slot task: move the flags of this slot into the ring; returns how many codes there were."""
+        moved: cython.longlong = self.flagged_count
+        repeated: cython.bint = False
+        i: cython.longlong
+        j: cython.longlong
+        place: cython.longlong
+        code: cython.longlong
+        events: cython.longlong
+        found: cython.bint
+        if moved == 0:
+            return 0
+        for i in range(moved):
+            code = self.flagged[i]
+            events = self.flags[code] if self.per_event else 1
+            self.flags[code] = 0
+            found = False
+            for j in range(self.waiting):
+                place = (self.first + j) & 31
+                if self.codes[place] == code:
+                    self.counts[place] = min(self.counts[place] + events, 1023)
+                    found = True
+                    break
+            if found:
+                repeated = True
+                continue
+            if repeated and self.lose_new_after_repeat:
+                continue
+            if self.waiting == 31:  # full: the oldest goes
+                self.first = (self.first + 1) & 31
+                self.waiting -= 1
+                self.dropped += 1
+            place = (self.first + self.waiting) & 31
+            self.codes[place] = code
+            self.counts[place] = min(events, 1023)
+            self.stamps[place] = self.time.ms
+            self.waiting += 1
+        self.flagged_count = 0
+        return moved
+
+    def take(self) -> cython.bint:
+        """Take the oldest waiting error into `word` and `stamp`; False when none waits."""
+        if self.waiting == 0:
+            return False
+        place: cython.longlong = self.first
+        self.word = (
+            (self.codes[place] & 0xFFFF) | (self.board & 0x3F) << 16 | (self.counts[place] & 0x3FF) << 22
+        )
+        self.stamp = self.stamps[place]
+        self.first = (self.first + 1) & 31
+        self.waiting -= 1
+        return True

@@ -1,0 +1,42 @@
+"""Foot contact and limit switches: hysteresis on a raw reading, then a number of equal samples in a row
+(appendix 4.10; facts network-and-boards 4.9)."""
+
+import cython
+
+
+class Debounce:
+    """A level is believed after `equal_samples` equal readings in a row (the first one counts)."""
+
+    def __init__(self, equal_samples) -> None:
+        self.equal_samples = equal_samples
+        self.last = 0
+        self.run = 0
+        self.state = 0
+
+    def sample(self, level: cython.longlong) -> cython.void:
+        """One reading per slot, 0 or 1."""
+        if level != self.last:
+            self.last = level
+            self.run = 1
+        elif self.run < self.equal_samples:
+            self.run += 1
+        if self.run >= self.equal_samples:
+            self.state = level
+
+
+class FootContact:
+    """A foot sensor's reading (counts) made into contact 0/1: above `on_level` on, below `off_level` off."""
+
+    def __init__(self, on_level, off_level, equal_samples) -> None:
+        self.on_level = on_level
+        self.off_level = off_level
+        self.level = 0
+        self.contact = Debounce(equal_samples)
+
+    def sample(self, counts: cython.longlong) -> cython.void:
+        """One reading per slot; between the two levels the old level stays."""
+        if counts > self.on_level:
+            self.level = 1
+        elif counts < self.off_level:
+            self.level = 0
+        self.contact.sample(self.level)

@@ -1,0 +1,4 @@
+from boards.modules.receiver cimport Receiver
+
+cdef class NetworkTime(Receiver):
+    cdef public long long ms

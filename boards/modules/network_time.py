@@ -1,0 +1,22 @@
+"""The robot's time as this board last heard it: the router's millisecond count, from identifier 0.
+
+It is a board's only clock (no drift correction, no phase lock): when the sync frames stop, it stops
+(facts network-and-boards 1.4).
+"""
+
+import cython
+
+from boards.modules.receiver import Receiver
+
+
+class NetworkTime(Receiver):
+    """`ms`: the last count received, 0 ... 2^32-1."""
+
+    def __init__(self) -> None:
+        Receiver.__init__(self)
+        self.ms = 0
+
+    def deliver(self, value_word: cython.longlong, time_word: cython.longlong) -> cython.void:
+        """Both words of the sync frame hold the count; the time word is used, as on the robot."""
+        self.frames += 1
+        self.ms = time_word

@@ -1,0 +1,184 @@
+"""Incremental encoder: position from both edges of channel A (2X), rate from the time between edges.
+
+The edge part runs in the fast interrupt of every edge, the update part once per slot. All arithmetic is
+the firmware's: 32-bit integers and 16.16 fixed point, truncated where C truncates (facts
+network-and-boards 4.1; appendix 4.6).
+"""
+
+import array
+
+import cython
+
+from boards.modules.error_module import ErrorModule
+
+if not cython.compiled:
+    from foundation.numbers import divide_toward_zero
+
+PI = 3.141592653589793
+TIMER_HZ = 60000000  # the capture timer counts processor cycles
+
+RING_SIZE = 64  # edge times waiting for the next slot; one place stays empty
+
+
+def normalised_gain(gain, low, high):
+    """`gain` scaled by a power of two into low ... high (absolute value), truncated: (integer, shift).
+
+    gain = integer / 2^shift to within the truncation; shift is negative for gains above `high`.
+    """
+    shift = 0
+    while abs(gain) < low:
+        gain *= 2.0
+        shift += 1
+    while abs(gain) > high:
+        gain /= 2.0
+        shift -= 1
+    return int(gain), shift
+
+
+class QuadratureDecoder:
+    """One encoder. `pulses`: lines per turn; `gear`: turns of the encoder per turn of the joint, its sign the
+    mounting. `position` is rad x 65536 and `rate` rad/s x 65536, both at the joint.
+
+    `filter_exponent`: the rate filter moves by 1/2^n of the difference per slot.
+    """
+
+    def __init__(self, pulses, gear, errors: ErrorModule, glitch_code, full_code, filter_exponent=4) -> None:
+        self.errors = errors
+        self.glitch_code = glitch_code
+        self.full_code = full_code
+        per_count = PI / (pulses * gear)
+        self.position_gain, self.position_shift = normalised_gain(per_count * 65536.0, 16384.0, 65535.0)
+        self.rate_gain, self.rate_shift = normalised_gain(per_count * TIMER_HZ, 4096.0, 16383.0)
+        self.rad_per_count = per_count
+        self.filter_exponent = filter_exponent
+        self.count = 0
+        self.position = 0
+        self.rate = 0
+        # the interrupt's side
+        self.ring = array.array("q", [0]) * RING_SIZE
+        self.write = 0
+        self.read = 0
+        self.edges = 0
+        self.glitches = 0
+        self.dropped_times = 0
+        # the slot's side
+        self.sign = 1
+        self.mean = 0x7FFFFFFF  # cycles between counts; the longest: standing still
+        self.idle = 0
+        self.speed = 0  # counts per cycle x 2^31, unfiltered
+        self.filtered = 0
+
+    def edge(self, rising: cython.bint, partner_high: cython.bint, elapsed: cython.longlong) -> cython.void:
+        """An edge of channel A as the fast interrupt sees it.
+
+        `elapsed`: cycles since the edge before. Rising with B low counts up, falling inverts.
+        """
+        up: cython.bint = rising != partner_high
+        self.edges += 1
+        if up:
+            self.count += 1
+            self.store(elapsed)
+        else:
+            self.count -= 1
+            self.store(-elapsed)
+
+    def glitch(self) -> cython.void:
+        """The pin's level did not agree with the armed edge: nothing counted, a time of 0 stored."""
+        self.edges += 1
+        self.glitches += 1
+        self.store(0)
+
+    def store(self, elapsed: cython.longlong) -> cython.void:
+        """Keep a signed time for the next slot; when the ring is full the time is lost, the count is not."""
+        after: cython.longlong = self.write + 1
+        if after >= 64:  # RING_SIZE
+            after = 0
+        if after == self.read:
+            self.dropped_times += 1
+            self.errors.report(self.full_code)
+            return
+        self.ring[self.write] = elapsed
+        self.write = after
+
+    def update_angle(self) -> cython.void:
+        """Slot task: position from the count, floored."""
+        # shift is 8 ... 11 on the robot; never negative for real encoders
+        self.position = (self.count * self.position_gain) >> self.position_shift
+
+    def update_rate(self):
+        """Slot task: rate from the edge times that came since the last slot. Returns how many came.
+
+        A time of the other sign is believed when the next one has that sign too; alone at the end of the
+        ring it waits. Zeros and lone changes of sign are glitches and take the following time with them.
+        """
+        total: cython.longlong = 0
+        valid: cython.longlong = 0
+        seen: cython.longlong = 0
+        here: cython.longlong = self.read
+        write: cython.longlong = self.write
+        after: cython.longlong
+        elapsed: cython.longlong
+        other: cython.longlong
+        exponent: cython.longlong
+        while here != write:
+            elapsed = self.ring[here]
+            after = here + 1
+            if after >= 64:
+                after = 0
+            if elapsed == 0:
+                self.errors.report(self.glitch_code)
+                if after != write:
+                    seen += 1
+                    after += 1
+                    if after >= 64:
+                        after = 0
+            elif (elapsed > 0) == (self.sign > 0):
+                total += elapsed
+                valid += 1
+            elif after == write:
+                break  # alone at the end: judged when its successor is here
+            else:
+                other = self.ring[after]
+                if other != 0 and (other > 0) == (elapsed > 0):
+                    self.sign = -self.sign
+                    total = elapsed
+                    valid = 1
+                else:
+                    self.errors.report(self.glitch_code)
+                    seen += 1
+                    after += 1
+                    if after >= 64:
+                        after = 0
+            seen += 1
+            here = after
+        self.read = here
+        if valid == 0:
+            # the longer the silence, the slower it must be: the estimate decays as 1/t
+            valid = 1
+            self.idle += 30000  # cycles per slot
+            if self.idle > 0x7FFFFFFF:
+                self.idle = 0x7FFFFFFF
+            total = abs(self.mean)
+            if self.idle > total:
+                total = self.idle
+            if self.sign < 0:
+                total = -total
+        else:
+            self.idle = 0
+        if total >= 0:
+            self.speed = valid * (0x7FFFFFFF // total)
+            self.mean = total // valid
+        else:
+            self.speed = -valid * (0x7FFFFFFF // -total)
+            self.mean = -(-total // valid)
+        exponent = self.filter_exponent
+        self.filtered += (self.speed - self.filtered) >> exponent
+        # counts/cycle x 2^31 times rad x 60e6/count x 2^shift: 31 - 16 = 15 more bits go for 16.16
+        if self.rate_shift + 15 >= 0:
+            self.rate = (self.rate_gain * self.filtered) >> (self.rate_shift + 15)
+        return seen
+
+    def set_position(self, position: cython.longlong) -> cython.void:
+        """Set the count so that the position reads `position` (rad x 65536), truncated as in C."""
+        self.count = divide_toward_zero(position << self.position_shift, self.position_gain)
+        self.update_angle()
