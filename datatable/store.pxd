@@ -1,0 +1,25 @@
+from foundation.numbers cimport float_of_word, word_of_float, wrap_i32
+
+
+cdef class DataStore:
+    cdef public long long size
+    cdef public long long[::1] words, stamps, unread
+    cdef public long long out_of_range_count, out_of_range_id
+    cdef public object on_out_of_range
+
+    cpdef bint has(self, long long number)
+    cpdef void set_word(self, long long number, long long word, long long stamp)
+    cpdef long long get_word(self, long long number)
+    cpdef void set_float(self, long long number, double value)
+    cpdef double get_float(self, long long number)
+    cpdef void set_int(self, long long number, long long value)
+    cpdef long long get_int(self, long long number)
+    cpdef void set_u32(self, long long number, long long value)
+    cpdef long long get_u32(self, long long number)
+    cpdef long long stamp(self, long long number)
+    cpdef long long network_time_ms(self)
+    cpdef long long age_ms(self, long long number, long long now)
+    cpdef bint is_unread(self, long long number, long long subscriber)
+    cpdef void mark_read(self, long long number, long long subscriber)
+    cpdef void mark_unread(self, long long number)
+    cpdef long long next_unread(self, long long[::1] numbers, long long start, long long subscriber)

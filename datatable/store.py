@@ -1,0 +1,149 @@
+"""The main brain's data at run time: one 32-bit word and one ms stamp per id, with a read flag per subscriber.
+
+What the robot's io data module keeps (facts network 4.13). A write makes a value new for every subscriber.
+An id beyond the table is no exception here, as in the firmware it is not: it reads 0, changes nothing, and is
+told through `out_of_range_count`, `out_of_range_id` and the attribute `on_out_of_range`, which the board sets
+to raise MB_IO_ID_OOR.
+"""
+
+import array
+
+import cython
+
+from foundation.numbers import float_of_word, word_of_float, wrap_i32
+
+# Bits of the read flags (facts network 4.13).
+BLUETOOTH = 0
+SSP = 1
+LABVIEW = 2
+LCD = 3
+MB_ERR_DIST = 4
+ESTIMATOR = 5
+FSM = 6
+SUBSCRIBERS = ("BLUETOOTH", "SSP", "LABVIEW", "LCD", "MB_ERR_DIST", "ESTIMATOR", "FSM")
+
+TIMESTAMP = 0  # the id whose stamp is the network time
+
+
+class DataStore:
+    """Records 0 ... size-1. At the start all words and stamps are 0 and every record is unread by everyone."""
+
+    def __init__(self, size) -> None:
+        self.size = size
+        self.words = array.array("q", [0]) * size
+        self.stamps = array.array("q", [0]) * size
+        self.unread = array.array("q", [0x7F]) * size
+        self.out_of_range_count = 0
+        self.out_of_range_id = -1
+        self.on_out_of_range = None
+
+    def has(self, number: cython.longlong) -> cython.bint:
+        """True when `number` is an id of the table; otherwise the miss is told and False returned."""
+        if 0 <= number < self.size:
+            return True
+        self.out_of_range_count += 1
+        self.out_of_range_id = number
+        if self.on_out_of_range is not None:
+            self.on_out_of_range()
+        return False
+
+    # ---- frames: word and stamp together
+
+    def set_word(self, number: cython.longlong, word: cython.longlong, stamp: cython.longlong) -> cython.void:
+        """Store the two words of a frame as they are; new for every subscriber."""
+        if 0 <= number < self.size or self.has(number):
+            self.words[number] = word & 0xFFFFFFFF
+            self.stamps[number] = stamp & 0xFFFFFFFF
+            self.unread[number] = 0x7F
+
+    def get_word(self, number: cython.longlong) -> cython.longlong:
+        """The value word, 0 ... 2^32-1."""
+        if 0 <= number < self.size or self.has(number):
+            return self.words[number]
+        return 0
+
+    # ---- typed access: the stamp is the network time the main brain heard last
+
+    def set_float(self, number: cython.longlong, value: cython.double) -> cython.void:
+        """Store a number, rounded to single precision."""
+        if 0 <= number < self.size or self.has(number):
+            self.words[number] = word_of_float(value)
+            self.stamps[number] = self.stamps[0]
+            self.unread[number] = 0x7F
+
+    def get_float(self, number: cython.longlong) -> cython.double:
+        """The word read as a single-precision number."""
+        if 0 <= number < self.size or self.has(number):
+            return float_of_word(self.words[number])
+        return 0.0
+
+    def set_int(self, number: cython.longlong, value: cython.longlong) -> cython.void:
+        """Store a signed integer; only its low 32 bits are kept."""
+        if 0 <= number < self.size or self.has(number):
+            self.words[number] = value & 0xFFFFFFFF
+            self.stamps[number] = self.stamps[0]
+            self.unread[number] = 0x7F
+
+    def get_int(self, number: cython.longlong) -> cython.longlong:
+        """The word read as a signed integer, -2^31 ... 2^31-1."""
+        if 0 <= number < self.size or self.has(number):
+            return wrap_i32(self.words[number])
+        return 0
+
+    def set_u32(self, number: cython.longlong, value: cython.longlong) -> cython.void:
+        """Store an unsigned integer; only its low 32 bits are kept."""
+        self.set_int(number, value)
+
+    def get_u32(self, number: cython.longlong) -> cython.longlong:
+        """The word read as an unsigned integer, 0 ... 2^32-1."""
+        return self.get_word(number)
+
+    # ---- time
+
+    def stamp(self, number: cython.longlong) -> cython.longlong:
+        """Network time of the last write in ms, 0 ... 2^32-1."""
+        if 0 <= number < self.size or self.has(number):
+            return self.stamps[number]
+        return 0
+
+    def network_time_ms(self) -> cython.longlong:
+        """The network time heard last, 0 ... 2^32-1 ms."""
+        return self.stamps[0]
+
+    def age_ms(self, number: cython.longlong, now: cython.longlong) -> cython.longlong:
+        """How long before `now` (ms) the value was written; right across one wrap of the 32-bit count."""
+        if 0 <= number < self.size or self.has(number):
+            return (now - self.stamps[number]) & 0xFFFFFFFF
+        return 0
+
+    # ---- read flags
+
+    def is_unread(self, number: cython.longlong, subscriber: cython.longlong) -> cython.bint:
+        """True when the value was written after `subscriber` read it last."""
+        if 0 <= number < self.size or self.has(number):
+            return (self.unread[number] >> subscriber) & 1 == 1
+        return False
+
+    def mark_read(self, number: cython.longlong, subscriber: cython.longlong) -> cython.void:
+        """`subscriber` has read the value; the others are not concerned."""
+        bit: cython.longlong = 1
+        if 0 <= number < self.size or self.has(number):
+            bit = bit << subscriber
+            self.unread[number] &= ~bit
+
+    def mark_unread(self, number: cython.longlong) -> cython.void:
+        """The value counts as new for every subscriber though it was not written."""
+        if 0 <= number < self.size or self.has(number):
+            self.unread[number] = 0x7F
+
+    def next_unread(
+        self, numbers: cython.longlong[::1], start: cython.longlong, subscriber: cython.longlong
+    ) -> cython.longlong:
+        """Position (from `start` on) in the list of ids of the first that `subscriber` has not read; -1 if none."""
+        i: cython.longlong
+        number: cython.longlong
+        for i in range(start, len(numbers)):
+            number = numbers[i]
+            if (0 <= number < self.size or self.has(number)) and (self.unread[number] >> subscriber) & 1:
+                return i
+        return -1
