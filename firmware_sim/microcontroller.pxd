@@ -37,6 +37,8 @@ cdef class Microcontroller:
     cdef public long long[::1] pin_channels
     cdef public long long unclaimed, match_time, instant
     cdef public object on_timer_tick
+    cdef public object background
+    cdef public bint background_wanted
     cpdef long long advance(self, long long until)
     cpdef bint due(self, long long until)
     cpdef void spend(self, long long cycles)
@@ -48,6 +50,7 @@ cdef class Microcontroller:
     cdef void _input(self)
     cdef void _alarm(self, long long time)
     cdef void _timer_match(self)
+    cdef void _background(self)
     cdef void _serve(self, InterruptSource source, long long time)
     cdef void _code(self, long long until)
     cdef void _wait_over(self)

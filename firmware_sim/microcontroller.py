@@ -52,6 +52,9 @@ class Microcontroller:
     Hooks (None or a callable): `on_overrun()` when a tick finds the row unfinished, `on_limit(task)` when a
     task exceeds its limit, `on_near_limit()` when a finished slot took more than 90 % of its length,
     `on_timer_tick()` in every interrupt of the slot timer.
+    `background()`: what the main loop does beside the scheduler, called while no slot runs; it returns the
+    cycles it took, or 0 when it found nothing to do: it is then called again after the next input, interrupt
+    or slot. Its effects are stamped by `now`, which it may move forward within the cycles it returns.
     `words`: digital words that sensors hold out to the chip, set from outside.
     """
 
@@ -76,6 +79,8 @@ class Microcontroller:
         self.on_limit = None
         self.on_near_limit = None
         self.on_timer_tick = None
+        self.background = None
+        self.background_wanted = True
         self.extra_cycles = 0
         self.tick_time = NEVER
         self.tick_number = 0
@@ -216,6 +221,13 @@ class Microcontroller:
             if self.code_time < time and not scheduler.done and (not self.waiting or self.check_wait):
                 time = self.code_time
                 what = 5
+            elif self.background is not None and self.background_wanted and scheduler.done:
+                service = self.code_time
+                if service < self.instant:
+                    service = self.instant
+                if service < time:
+                    time = service
+                    what = 6
             if inbox.head_time <= time:
                 if inbox.head_time >= until:
                     break
@@ -235,6 +247,8 @@ class Microcontroller:
                 self._serve(vic.next_irq(), time)
             elif what == 2:
                 self._timer_match()
+            elif what == 6:
+                self._background()
             else:
                 self._alarm(time)
         self.next_time = time
@@ -247,6 +261,7 @@ class Microcontroller:
         channel: cython.longlong
         peripheral: Peripheral
         source: InterruptSource
+        self.background_wanted = True
         if inbox.kind == 1:  # PIN_EDGE
             pin = inbox.a
             self.pins[pin] = inbox.b
@@ -311,6 +326,20 @@ class Microcontroller:
                 self.on_overrun()
         return None
 
+    def _background(self) -> cython.void:
+        """One turn of the main loop beside the scheduler."""
+        cycles: cython.longlong
+        if self.code_time < self.instant:
+            self.code_time = self.instant
+        self.now = self.code_time
+        self.extra_cycles = 0
+        cycles = self.background()
+        cycles += self.extra_cycles
+        if cycles <= 0:
+            self.background_wanted = False
+            return
+        self.code_time += int(cycles * self.ns_per_cycle)
+
     def _serve(self, source: InterruptSource, time: cython.longlong) -> cython.void:
         """Run the handler of a pending source at `time` and let its cycles pass."""
         inbox: EventQueue = self.inbox
@@ -318,6 +347,7 @@ class Microcontroller:
         busy: cython.longlong = source.base_ns
         items: cython.longlong
         self.vic.accept(source)
+        self.background_wanted = True
         source.served += 1
         self.now = time + source.latency_ns
         if source.keeps_message:
@@ -385,6 +415,7 @@ class Microcontroller:
                     scheduler.late_record = None
                 if scheduler.position >= scheduler.end:
                     scheduler.done = True
+                    self.background_wanted = True
                     scheduler.finished_time = self.code_time
                     self._close_slot(scheduler.slot_time)
                     return
