@@ -327,6 +327,124 @@
 #define LV_CH_47 311
 #define LV_VERSION 312
 #define ID_LAST 313
+#define C_H_OUTER_STIFFNESS 314
+#define C_H_PM_H_RATE 315
+#define P_H_PM_H_TRATE 316
+#define P_H_PM_TIME 317
+#define P_H_PM_F_RATE 318
+#define C_HI_SH_H_ANG 319
+#define C_HI_SH_H_RATE 320
+#define P_HI_SH_H_TANG 321
+#define C_H_EH_H_ANG 322
+#define C_H_EH_H_RATE 323
+#define P_H_EH_H_TANG 324
+#define P_H_EHOLD_ANG 325
+#define P_H_EHOLD_ANG2 326
+#define P_H_EH_L_TRATE 327
+#define D_H_ON 328
+#define DP_H_AM_H_ANG 329
+#define DP_H_AM_L_ABSRATE 330
+#define DP_H_AM_H_RATE 331
+#define DP_H_AM_TIME1 332
+#define DP_H_AM_TIME2 333
+#define DC2_H_AM_H_ANG1 334
+#define DC2_H_AM_H_ANG2 335
+#define DC2_H_AM_H_RATE1 336
+#define DC2_H_AM_H_RATE2 337
+#define DC3_H_AM_H_ANG1 338
+#define DC3_H_AM_H_ANG2 339
+#define DC3_H_AM_L_ABSRATE1 340
+#define DC3_H_AM_L_ABSRATE2 341
+#define DC3_H_AM_H_RATE1 342
+#define DC3_H_AM_H_RATE2 343
+#define C_F_ST_F_ANG 344
+#define C_F_ST_F_RATE 345
+#define P_F_ST_F_TANG 346
+#define C_F_PP_F_ANG 347
+#define C_F_PP_F_RATE 348
+#define P_F_PP_F_TANG 349
+#define P_F_PP_FRAC_ANG 350
+#define P_F_PP_F_ABSANG 351
+#define P_FO_PP_THEIGHT 352
+#define P_FI_PP_THEIGHT 353
+#define D_F_ON 354
+#define DP_F_PP_L_ABSRATE 355
+#define DC_F_PP_L_ABSRATE 356
+#define DC_F_PP_L_ABSRATE2 357
+#define P_F_AP_TIME 358
+#define C_F_FU_F_ANG 359
+#define C_F_FU_F_RATE 360
+#define P_F_FU_F_TANG 361
+#define P_F_FU_H_ANG 362
+#define P_F_FU_F_CABL_STRETCH 363
+#define C_F_FD_F_ANG 364
+#define C_F_FD_F_RATE 365
+#define P_F_FD_F_TANG 366
+#define C_F_SST_F_ANG 367
+#define C_F_SST_F_RATE 368
+#define P_F_SST_F_TANG 369
+#define P_S_NULL_H_TANG 370
+#define P_S_MAX_CUR 371
+#define P_S_ILST_TWITCH_FRAC 372
+#define P_S_ILST_TWITCH_TIME 373
+#define P_S_RC_DEADBAND 374
+#define P_L_START_ABSRATE 375
+#define P_L_START_H_RATE 376
+#define P_E_GYRO_BIAS 377
+#define P_E_ROLL_BIAS 378
+#define P_E_RESET 379
+#define P_E_HS_THRESHOLD 380
+#define P_E_HS_BASE_LIMIT 381
+#define P_E_HS_TICKS 382
+#define P_E_HS_H_ANG 383
+#define P_E_HS_F_ANG 384
+#define P_E_MIN_STEP_TIME 385
+#define P_E_FALL_ANG 386
+#define P_UI_LCD_TIME 387
+#define P_UI_SONG_STEPS 388
+#define P_UI_PP2HS_TTIME 389
+#define D_UI_STOP_ON_FALL 390
+#define E_H_MOTOR_RATE 391
+#define E_LO_ANGLE 392
+#define E_LI_ANGLE 393
+#define E_LO_RATE 394
+#define E_LI_RATE 395
+#define E_FO_ABSANG 396
+#define E_FI_ABSANG 397
+#define E_SWING_LEG 398
+#define E_T_AFTER_HS 399
+#define E_HS_TIME 400
+#define E_STEP_COUNT 401
+#define E_DISTANCE 402
+#define E_ANKLE_HEIGHT 403
+#define E_SWING_HEIGHT 404
+#define E_LO_ERROR 405
+#define E_HEEL_BASE_LEFT 406
+#define E_HEEL_BASE_RIGHT 407
+#define E_HEEL_STAGE 408
+#define EST_ENERGY_MCSI 409
+#define E_AM_L_ABSRATE 410
+#define E_AM_H_ANG 411
+#define E_AM_H_RATE 412
+#define E_AM_TIME 413
+#define E_AM_TIMER 414
+#define E_PS_TIME 415
+#define E_SS_L_ANG 416
+#define E_SS_L_ABSRATE 417
+#define E_H_DI1 418
+#define E_H_DI2 419
+#define E_FO_PP2HS_TIME 420
+#define E_FI_PP2HS_TIME 421
+#define E_FO_PP_MISSED 422
+#define E_FI_PP_MISSED 423
+#define E_RC_STEER 424
+#define FSM_RESET 425
+#define FSM_UI 426
+#define FSM_LEG 427
+#define FSM_HIP 428
+#define FSM_FI 429
+#define FSM_FO 430
+#define FSM_STEER 431
 
 /* the board's copy of the values */
 struct mb_data {
@@ -644,6 +762,124 @@ struct mb_data {
     float lv_ch_47; /* 311 logging slot 47: id wanted at a higher rate, plus 65536 for medium or 131072 for fast */
     float lv_version; /* 312 end of the logging slots; version of the PC's list */
     float id_last; /* 313 end marker of the robot's own list; its value is its own id */
+    float c_h_outer_stiffness; /* 314 [A/rad] hip stiffness while the outer legs swing */
+    float c_h_pm_h_rate; /* 315 [A s/rad] hip swing: current per missing hip rate */
+    float p_h_pm_h_trate; /* 316 [rad/s] hip swing: rate aimed at */
+    float p_h_pm_time; /* 317 [ms] hip swing: drive ends this long after single stance begins */
+    float p_h_pm_f_rate; /* 318 [rad/s] ankle rate of the flipping foot that ends double stance */
+    float c_hi_sh_h_ang; /* 319 [A/rad] start hold of the hip: stiffness */
+    float c_hi_sh_h_rate; /* 320 [A s/rad] start hold of the hip: damping */
+    float p_hi_sh_h_tang; /* 321 [rad] start hold of the hip: angle */
+    float c_h_eh_h_ang; /* 322 [A/rad] emergency hold of the hip: stiffness */
+    float c_h_eh_h_rate; /* 323 [A s/rad] emergency hold of the hip: damping */
+    float p_h_eh_h_tang; /* 324 [rad] emergency hold of the hip: angle */
+    float p_h_ehold_ang; /* 325 [rad] emergency hold: swing leg beyond this in a slow step */
+    float p_h_ehold_ang2; /* 326 [rad] emergency hold: swing leg on its way back below this */
+    float p_h_eh_l_trate; /* 327 [rad/s] emergency hold: a step is slow below this mid-stance rate */
+    float d_h_on; /* 328 hip correction per step: 0 none, 1 by speed, 2 slow set, 3 fast set */
+    float dp_h_am_h_ang; /* 329 [rad] nominal hip angle at mid-stance */
+    float dp_h_am_l_absrate; /* 330 [rad/s] nominal stance leg rate at mid-stance */
+    float dp_h_am_h_rate; /* 331 [rad/s] nominal hip rate at mid-stance */
+    float dp_h_am_time1; /* 332 [ms] first correction acts until this long after mid-stance */
+    float dp_h_am_time2; /* 333 [ms] second correction acts until this long after mid-stance */
+    float dc2_h_am_h_ang1; /* 334 [A/rad] slow step: first correction per hip angle */
+    float dc2_h_am_h_ang2; /* 335 [A/rad] slow step: second correction per hip angle */
+    float dc2_h_am_h_rate1; /* 336 [A s/rad] slow step: first correction per hip rate */
+    float dc2_h_am_h_rate2; /* 337 [A s/rad] slow step: second correction per hip rate */
+    float dc3_h_am_h_ang1; /* 338 [A/rad] fast step: first correction per hip angle */
+    float dc3_h_am_h_ang2; /* 339 [A/rad] fast step: second correction per hip angle */
+    float dc3_h_am_l_absrate1; /* 340 [A s/rad] fast step: first correction per leg rate */
+    float dc3_h_am_l_absrate2; /* 341 [A s/rad] fast step: second correction per leg rate */
+    float dc3_h_am_h_rate1; /* 342 [A s/rad] fast step: first correction per hip rate */
+    float dc3_h_am_h_rate2; /* 343 [A s/rad] fast step: second correction per hip rate */
+    float c_f_st_f_ang; /* 344 [A/rad] stance foot: stiffness */
+    float c_f_st_f_rate; /* 345 [A s/rad] stance foot: damping */
+    float p_f_st_f_tang; /* 346 [rad] stance foot: published angle held */
+    float c_f_pp_f_ang; /* 347 [A/rad] push-off: stiffness */
+    float c_f_pp_f_rate; /* 348 [A s/rad] push-off: damping */
+    float p_f_pp_f_tang; /* 349 [rad] push-off: angle beyond that of stance */
+    float p_f_pp_frac_ang; /* 350 push-off ends after this part of its angle */
+    float p_f_pp_f_absang; /* 351 [rad] push-off waits until the landing foot is down beyond this published angle */
+    float p_fo_pp_theight; /* 352 [m] outer push-off starts below this height of the swing ankle */
+    float p_fi_pp_theight; /* 353 [m] inner push-off starts below this height of the swing ankle */
+    float d_f_on; /* 354 push correction per step: 0 none, 1 after a slow mid-stance */
+    float dp_f_pp_l_absrate; /* 355 [rad/s] mid-stance rate that parts slow from fast steps */
+    float dc_f_pp_l_absrate; /* 356 [A s/rad^2] slow step: push stiffness per missing rate */
+    float dc_f_pp_l_absrate2; /* 357 [s] slow step: push angle per missing rate */
+    float p_f_ap_time; /* 358 [ms] foot stays limp after a push at most this long */
+    float c_f_fu_f_ang; /* 359 [A/rad] flip-up: stiffness */
+    float c_f_fu_f_rate; /* 360 [A s/rad] flip-up: damping */
+    float p_f_fu_f_tang; /* 361 [rad] flip-up: motor angle */
+    float p_f_fu_h_ang; /* 362 [rad] swing leg ahead by this ends flip-up */
+    float p_f_fu_f_cabl_stretch; /* 363 [rad] cable stretch below which flip-up may start */
+    float c_f_fd_f_ang; /* 364 [A/rad] flip-down: stiffness */
+    float c_f_fd_f_rate; /* 365 [A s/rad] flip-down: damping */
+    float p_f_fd_f_tang; /* 366 [rad] flip-down: published angle */
+    float c_f_sst_f_ang; /* 367 [A/rad] outer feet at the start: stiffness */
+    float c_f_sst_f_rate; /* 368 [A s/rad] outer feet at the start: damping */
+    float p_f_sst_f_tang; /* 369 [rad] outer feet at the start: motor angle less half the hip angle */
+    float p_s_null_h_tang; /* 370 [rad] steering: hip angle at which the inner legs count as in front or behind */
+    float p_s_max_cur; /* 371 [counts] steering: largest duty */
+    float p_s_ilst_twitch_frac; /* 372 steering: part of the twist used the other way on the ground */
+    float p_s_ilst_twitch_time; /* 373 [ticks] steering: ticks to turn over at touchdown */
+    float p_s_rc_deadband; /* 374 steering: radio command taken as straight on */
+    float p_l_start_absrate; /* 375 [rad/s] stance leg rate assumed before the first mid-stance */
+    float p_l_start_h_rate; /* 376 [rad/s] hip rate assumed before the first mid-stance */
+    float p_e_gyro_bias; /* 377 [rad/s] gyro reading at rest */
+    float p_e_roll_bias; /* 378 [rad] IMU roll reading with the outer legs upright */
+    float p_e_reset; /* 379 part of the leg angle error taken out at each heel strike */
+    float p_e_hs_threshold; /* 380 [counts] heel strike: rise above the baseline */
+    float p_e_hs_base_limit; /* 381 [counts] heel strike: a baseline above this marks a faulty sensor */
+    float p_e_hs_ticks; /* 382 [ticks] heel strike: consecutive ticks above the threshold */
+    float p_e_hs_h_ang; /* 383 [rad] heel strike: baseline starts when the swing leg is ahead by this */
+    float p_e_hs_f_ang; /* 384 [rad] heel strike: baseline freezes when the swing ankle opens beyond this */
+    float p_e_min_step_time; /* 385 [ms] shorter steps are reported as stutter */
+    float p_e_fall_ang; /* 386 [rad] leg angle that counts as a fall */
+    float p_ui_lcd_time; /* 387 [ms] display: time per page */
+    float p_ui_song_steps; /* 388 [steps] a song every so many steps; 0 for none */
+    float p_ui_pp2hs_ttime; /* 389 [ms] light 3 warns of pushes that began longer before heel strike */
+    float d_ui_stop_on_fall; /* 390 1 stops all motors at a fall */
+    float e_h_motor_rate; /* 391 [rad/s] hip motor rate after the low-pass filter */
+    float e_lo_angle; /* 392 [rad] outer legs against gravity, positive leaning forward */
+    float e_li_angle; /* 393 [rad] inner legs against gravity, positive leaning forward */
+    float e_lo_rate; /* 394 [rad/s] outer legs' rate from the filtered gyro */
+    float e_li_rate; /* 395 [rad/s] inner legs' rate from the filtered gyro and hip rate */
+    float e_fo_absang; /* 396 [rad] outer feet against the floor plus 1.75 */
+    float e_fi_absang; /* 397 [rad] inner feet against the floor plus 1.75 */
+    int32_t e_swing_leg; /* 398 0 while the outer legs swing, 1 while the inner ones do */
+    int32_t e_t_after_hs; /* 399 [ms] time since the last heel strike */
+    uint32_t e_hs_time; /* 400 [ms] network time of the last heel strike */
+    int32_t e_step_count; /* 401 [steps] heel strikes since calibration */
+    float e_distance; /* 402 [m] way walked since calibration */
+    float e_ankle_height; /* 403 [m] swing ankle above the stance ankle */
+    float e_swing_height; /* 404 [m] swing foot above the floor */
+    float e_lo_error; /* 405 [rad] outer leg angle found wrong at the last heel strike */
+    float e_heel_base_left; /* 406 [counts] baseline of the left swing foot's contact sensor */
+    float e_heel_base_right; /* 407 [counts] baseline of the right swing foot's contact sensor */
+    int32_t e_heel_stage; /* 408 heel strike detector: 0 waits, 1 averages, 2 armed */
+    float est_energy_mcsi; /* 409 [J] battery energy of the steering motor stage */
+    float e_am_l_absrate; /* 410 [rad/s] stance leg rate at mid-stance, mean of two steps */
+    float e_am_h_ang; /* 411 [rad] hip angle at mid-stance, positive swing leg ahead, mean of two steps */
+    float e_am_h_rate; /* 412 [rad/s] hip rate before mid-stance, mean of two steps */
+    float e_am_time; /* 413 [ms] single stance until mid-stance, mean of two steps */
+    int32_t e_am_timer; /* 414 [ms] time since mid-stance, 0 before it */
+    float e_ps_time; /* 415 [ms] duration of the last double stance */
+    float e_ss_l_ang; /* 416 [rad] stance leg angle before vertical when single stance began, mean of two steps */
+    float e_ss_l_absrate; /* 417 [rad/s] stance leg rate during double stance, mean of two steps */
+    float e_h_di1; /* 418 [A] first hip correction of this step */
+    float e_h_di2; /* 419 [A] second hip correction of this step */
+    int32_t e_fo_pp2hs_time; /* 420 [ms] outer push-off: from its begin to heel strike */
+    int32_t e_fi_pp2hs_time; /* 421 [ms] inner push-off: from its begin to heel strike */
+    int32_t e_fo_pp_missed; /* 422 outer push-offs that began after heel strike */
+    int32_t e_fi_pp_missed; /* 423 inner push-offs that began after heel strike */
+    float e_rc_steer; /* 424 steering command of the radio, -1 to 1 */
+    int32_t fsm_reset; /* 425 1 holds all machines in their start states, 2 lets them walk */
+    int32_t fsm_ui; /* 426 mode: 0 calibrate, 1 standby, 2 walk, 3 stop */
+    int32_t fsm_leg; /* 427 state of the leg machine */
+    int32_t fsm_hip; /* 428 state of the hip machine */
+    int32_t fsm_fi; /* 429 state of the inner foot machine */
+    int32_t fsm_fo; /* 430 state of the outer foot machine */
+    int32_t fsm_steer; /* 431 state of the steering machine */
 };
 
 extern const struct mb_data mb_initial;
