@@ -13,22 +13,22 @@ EXIT_DONE, EXIT_STALE = 0, 1
 
 
 def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Add the `table` command; each action sets `handler`, a function of the arguments giving the exit code."""
+    """Add the `table` command; each action sets `run`, a function of the arguments giving the exit code."""
     parser = subparsers.add_parser("table", help="the master table of variables: generate code, look things up")
     actions = parser.add_subparsers(dest="action", required=True, metavar="ACTION")
 
     generate = actions.add_parser("generate", help="write everything that is made from the master table")
     generate.add_argument("--check", action="store_true", help="write nothing; exit code 1 when files are stale")
     generate.add_argument("--out", metavar="DIR", help="write to this folder instead of datatable/generated")
-    generate.set_defaults(handler=run_generate)
+    generate.set_defaults(run=run_generate)
 
     show = actions.add_parser("show", help="one variable by name or id")
     show.add_argument("variable", metavar="NAME|ID")
-    show.set_defaults(handler=run_show)
+    show.set_defaults(run=run_show)
 
     listing = actions.add_parser("list", help="variables, all or of one board")
     listing.add_argument("--board", metavar="BOARD", help="only what this board publishes or hears")
-    listing.set_defaults(handler=run_list)
+    listing.set_defaults(run=run_list)
 
     for action in (generate, show, listing):
         action.add_argument("--master", metavar="DIR", help="folder with other master files")
