@@ -10,6 +10,8 @@ import array
 
 import cython
 
+from boards.modules.receiver import Receiver
+
 # Our own tune, a rising and falling fifth: the robot played a song that belongs to others. (Hz, ms)
 TUNE = ((523, 200), (784, 200), (659, 200), (988, 200), (784, 400), (587, 200), (523, 400), (0, 200))
 # Beeps are chosen by us, because the appendix says only that there were some: short enough to count, far
@@ -31,9 +33,7 @@ class Buzzer:
         self.hertz = 0
         self.mr0 = 0
         self.mr5 = 0
-        self.frequency_command = 0
-        self.amplitude_command = 0
-        self.song_command = 0
+        self.frequency_hertz = 0  # as last commanded
         self.playing = False
         self.note = 0
         self.note_left_ms = 0
@@ -61,31 +61,6 @@ class Buzzer:
             return
         self.mr0 = 60000000 // hertz
         self.mr5 = self.mr0 // 2
-
-    def set_frequency(self, word0: cython.longlong, word1: cython.longlong) -> cython.longlong:
-        """Setter of UI_SET_BUZZER_FREQ (Hz, 32-bit two's complement); the time word is not looked at."""
-        self.frequency_command = word0
-        return 1
-
-    def set_amplitude(self, word0: cython.longlong, word1: cython.longlong) -> cython.longlong:
-        """Setter of UI_SET_BUZZER_AMPL: non-zero starts the tune."""
-        self.amplitude_command = word0
-        if word0 != 0:
-            self.start_tune()
-        return 1
-
-    def set_song(self, word0: cython.longlong, word1: cython.longlong) -> cython.longlong:
-        """Setter of UI_EMPTY_TX2: non-zero starts the tune."""
-        self.song_command = word0
-        if word0 != 0:
-            self.start_tune()
-        return 1
-
-    def set_error_frame(self, word0: cython.longlong, word1: cython.longlong) -> cython.longlong:
-        """Setter of ERROR_LCD: an error of any board, code in bits 0-15; 0 is no error."""
-        if word0 & 0xFFFF:
-            self.error_sound(word0 & 0xFFFF)
-        return 1
 
     def start_tune(self) -> cython.void:
         """From the first note; a tune that plays goes on."""
@@ -142,7 +117,51 @@ class Buzzer:
                 self.note_left_ms = self.tune_ms[self.note]
             return 1
         if self.beeps:
-            self.tone(self.frequency_command)
+            self.tone(self.frequency_hertz)
             return 0
         self.tone(0)
         return 0
+
+
+class BuzzerFrequency(Receiver):
+    """Takes UI_SET_BUZZER_FREQ, Hz."""
+
+    def __init__(self, buzzer: Buzzer) -> None:
+        Receiver.__init__(self)
+        self.buzzer = buzzer
+
+    def deliver(self, value_word: cython.longlong, time_word: cython.longlong) -> cython.void:
+        """A frame came; a negative number is beyond what the buzzer sounds."""
+        self.frames += 1
+        self.buzzer.frequency_hertz = value_word
+
+
+class TuneStart(Receiver):
+    """Takes UI_SET_BUZZER_AMPL and UI_EMPTY_TX2: anything but 0 starts the tune."""
+
+    def __init__(self, buzzer: Buzzer) -> None:
+        Receiver.__init__(self)
+        self.buzzer = buzzer
+
+    def deliver(self, value_word: cython.longlong, time_word: cython.longlong) -> cython.void:
+        """A frame came."""
+        self.frames += 1
+        if value_word != 0:
+            self.buzzer.start_tune()
+
+
+class ErrorSound(Receiver):
+    """Takes ERROR_LCD, an error of any board: code in bits 0-15, and 0 is none.
+
+    ROBOT PARITY: the 2016 user interface has no receiver for it; appendix 3.8 has it beep on errors.
+    """
+
+    def __init__(self, buzzer: Buzzer) -> None:
+        Receiver.__init__(self)
+        self.buzzer = buzzer
+
+    def deliver(self, value_word: cython.longlong, time_word: cython.longlong) -> cython.void:
+        """A frame came."""
+        self.frames += 1
+        if value_word & 0xFFFF:
+            self.buzzer.error_sound(value_word & 0xFFFF)

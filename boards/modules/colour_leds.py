@@ -9,6 +9,8 @@ import array
 
 import cython
 
+from boards.modules.receiver import Receiver
+
 BLUE = 0
 GREEN = 1
 RED = 2
@@ -20,7 +22,7 @@ CYCLES_PER_WRITE = 200
 
 
 class ColourLeds:
-    """Both devices' registers as the SPI writes leave them, and the setters of the six lights."""
+    """Both devices' registers as the SPI writes leave them."""
 
     def __init__(self) -> None:
         self.ports = array.array("q", [1]) * 18
@@ -60,30 +62,6 @@ class ColourLeds:
         self.set_colour(led, 0, (word >> 16) & 0xFF)
         return 3
 
-    def set_led_1(self, word0: cython.longlong, word1: cython.longlong) -> cython.longlong:
-        """Setter of UI_SET_LED_1; the time word is not looked at."""
-        return self.set_led(0, word0)
-
-    def set_led_2(self, word0: cython.longlong, word1: cython.longlong) -> cython.longlong:
-        """Setter of UI_SET_LED_2."""
-        return self.set_led(1, word0)
-
-    def set_led_3(self, word0: cython.longlong, word1: cython.longlong) -> cython.longlong:
-        """Setter of UI_SET_LED_3."""
-        return self.set_led(2, word0)
-
-    def set_led_4(self, word0: cython.longlong, word1: cython.longlong) -> cython.longlong:
-        """Setter of UI_SET_LED_4."""
-        return self.set_led(3, word0)
-
-    def set_led_5(self, word0: cython.longlong, word1: cython.longlong) -> cython.longlong:
-        """Setter of UI_SET_LED_5."""
-        return self.set_led(4, word0)
-
-    def set_led_6(self, word0: cython.longlong, word1: cython.longlong) -> cython.longlong:
-        """Setter of UI_SET_LED_6."""
-        return self.set_led(5, word0)
-
     def level(self, led: cython.longlong, colour: cython.longlong) -> cython.longlong:
         """Brightness that an eye sees of one colour of light 0-5: 0 (off) ... 255 (fully on)."""
         value: cython.longlong = self.ports[9 * (led // 3) + (3 * led + colour) % 9]
@@ -96,3 +74,20 @@ class ColourLeds:
     def colour(self, led: cython.longlong) -> cython.longlong:
         """What light 0-5 shows, as a command word: red byte 0, green byte 1, blue byte 2."""
         return self.level(led, 2) | (self.level(led, 1) << 8) | (self.level(led, 0) << 16)
+
+
+class LedReceiver(Receiver):
+    """Takes UI_SET_LED_n: the colour of light `led` 0-5. The transfers' cycles are spent on `chip`."""
+
+    def __init__(self, leds: ColourLeds, led, chip) -> None:
+        Receiver.__init__(self)
+        self.leds = leds
+        self.led = led
+        self.chip = chip
+        self.cycles = 3 * CYCLES_PER_WRITE
+
+    def deliver(self, value_word: cython.longlong, time_word: cython.longlong) -> cython.void:
+        """A frame came; the time word is not looked at."""
+        self.frames += 1
+        self.leds.set_led(self.led, value_word)
+        self.chip.spend(self.cycles)

@@ -1,3 +1,5 @@
+from boards.modules.receiver cimport Receiver
+
 cdef class CharacterDisplay:
     cdef public long long[::1] memory
     cdef public long long address, commands, characters
@@ -15,8 +17,8 @@ cdef class Lcd:
     cdef public long long written, lost
     cpdef bint put(self, long long position, long long character)
     cpdef long long set_quarter(self, long long quarter, long long word)
-    cpdef long long set_quarter_1(self, long long word0, long long word1)
-    cpdef long long set_quarter_2(self, long long word0, long long word1)
-    cpdef long long set_quarter_3(self, long long word0, long long word1)
-    cpdef long long set_quarter_4(self, long long word0, long long word1)
     cpdef long long tick(self)
+
+cdef class LcdQuarter(Receiver):
+    cdef public Lcd lcd
+    cdef public long long quarter

@@ -10,6 +10,7 @@ import array
 
 import cython
 
+from boards.modules.receiver import Receiver
 from datatable.generated import errors
 
 START_COMMANDS = (0x38, 0x0C, 0x06, 0x01, 0x02)  # 8 bits and 2 lines, on, move right, clear, home
@@ -78,7 +79,7 @@ class CharacterDisplay:
 
 
 class Lcd:
-    """The firmware's side. `tick` belongs into the millisecond interrupt; `set_quarter_n` are setters."""
+    """The firmware's side. `tick` belongs into the millisecond interrupt; quarters come by LcdQuarter."""
 
     def __init__(self, report) -> None:
         self.report = report
@@ -131,22 +132,6 @@ class Lcd:
                 n += 1
         return n
 
-    def set_quarter_1(self, word0: cython.longlong, word1: cython.longlong) -> cython.longlong:
-        """Setter of UI_SET_LCD_QUAD_1; the time word is not looked at."""
-        return self.set_quarter(0, word0)
-
-    def set_quarter_2(self, word0: cython.longlong, word1: cython.longlong) -> cython.longlong:
-        """Setter of UI_SET_LCD_QUAD_2."""
-        return self.set_quarter(1, word0)
-
-    def set_quarter_3(self, word0: cython.longlong, word1: cython.longlong) -> cython.longlong:
-        """Setter of UI_SET_LCD_QUAD_3."""
-        return self.set_quarter(2, word0)
-
-    def set_quarter_4(self, word0: cython.longlong, word1: cython.longlong) -> cython.longlong:
-        """Setter of UI_SET_LCD_QUAD_4."""
-        return self.set_quarter(3, word0)
-
     def tick(self) -> cython.longlong:
         """One millisecond: at most one byte to the device; returns the bytes written."""
         queue: cython.longlong
@@ -177,3 +162,17 @@ class Lcd:
         self.state = 1
         self.countdown = 50
         return 1
+
+
+class LcdQuarter(Receiver):
+    """Takes UI_SET_LCD_QUAD_n: four characters for `quarter` 0-3 of the display."""
+
+    def __init__(self, lcd: Lcd, quarter) -> None:
+        Receiver.__init__(self)
+        self.lcd = lcd
+        self.quarter = quarter
+
+    def deliver(self, value_word: cython.longlong, time_word: cython.longlong) -> cython.void:
+        """A frame came; the time word is not looked at."""
+        self.frames += 1
+        self.lcd.set_quarter(self.quarter, value_word)

@@ -162,13 +162,12 @@ class MainBrainSspLink:
         """
         segments: cython.longlong = self.received_count
         n: cython.longlong = 0
-        k: cython.longlong
         i: cython.longlong
         base: cython.longlong
         used: cython.longlong
         total: cython.longlong
         header: cython.longlong
-        for k in range(segments):
+        for _segment in range(segments):
             base = self.received_read * 31
             used = self.received_used[self.received_read]
             self.received_read = (self.received_read + 1) % 16
