@@ -1,0 +1,63 @@
+from libc.math cimport cos, fabs, sin, sqrt, tanh
+
+cdef class Body:
+    cdef public object parameters, floor, record, terms
+    cdef public str cause
+    cdef public long long mode, stance, last_strike_leg, step_start_ns, event
+    cdef public bint outer_armed, inner_armed, foothold_due, lock_hip, exact_spring, unilateral
+    cdef public bint lift_leading
+    cdef public double[::1] saved, matrix, solution
+    cdef public double foot_outer, leg_outer, leg_inner, foot_inner, motor_outer, motor_inner
+    cdef public double foot_outer_rate, leg_outer_rate, leg_inner_rate, foot_inner_rate, motor_outer_rate, motor_inner_rate
+    cdef public double hip_x, hip_y, hip_vx, hip_vy, anchor_outer, anchor_inner
+    cdef public double height_outer, height_inner, gap_outer, gap_inner, scuff_time_s, passing_gap
+    cdef public double friction_ratio_max, slip_s, normal_force_min, mu, outer_Fx, outer_Fy
+    cdef public double inner_Fx, inner_Fy, foot_outer_acc, leg_outer_acc, leg_inner_acc, foot_inner_acc
+    cdef public double motor_outer_acc, motor_inner_acc, hip_drive, hip_coulomb, hip_viscous, outer_drive
+    cdef public double outer_coulomb, outer_viscous, inner_drive, inner_coulomb, inner_viscous, extra_hip
+    cdef public double extra_outer, extra_inner, extra_outer_motor, extra_inner_motor, M, mc_outer
+    cdef public double mc_inner, mw_outer, mw_inner, J_outer, J_inner, Jf
+    cdef public double JH, JA, el, r, d, kh
+    cdef public double ks, spring_ab, spring_aabb, spring_l0, spring_k, gx
+    cdef public double gy, C_outer, C_inner, heel, toe, stop_low
+    cdef public double stop_high, stop_k, stop_c, inverse_smoothing, closing_rate, fall_lean
+    cdef public double fall_height, fall_split, stall_s, time_s, released_s, elapsed
+    cdef public double P_stance_x, P_stance_y, P_swing_x, P_swing_y
+    cpdef void set_slope(self, double slope_rad)
+    cpdef double chain_x(self, double foot, double leg)
+    cpdef double chain_y(self, double foot, double leg)
+    cdef double _excess(self, double foot)
+    cpdef double contact_x(self, long long leg)
+    cpdef double ankle_x(self, long long leg)
+    cpdef void update_pose(self)
+    cpdef void update_hip_rates(self)
+    cpdef double hip_angle(self)
+    cpdef double hip_rate(self)
+    cpdef dict snapshot(self)
+    cpdef double energy_J(self)
+    cpdef void place(self, double outer_leg_rad, double hip_rad)
+    cpdef void hold(self, double outer_leg_rad)
+    cpdef void release(self, double outer_leg_rate, long long stance=*, double stance_foot_rate=*, double hip_rate=*)
+    cpdef void begin_walk(self)
+    cpdef void _limp_foot(self, long long leg)
+    cpdef void on_feet(self, double h, long long stages)
+    cdef double _stop(self, double angle, double rate)
+    cdef double _exact_spring(self, double angle)
+    cdef void _ask_terms(self, bint outer_stance, double th, double tw, double a_s, double a_w, double p, double n, double us, double uw, double ra_s, double ra_w, double up, double un)
+    cpdef void in_air(self, double h, long long stages)
+    cpdef void impact(self, bint outer, bint inner)
+    cpdef void _eliminate(self, long long n)
+    cpdef void advance(self, double h)
+    cdef void _save(self)
+    cdef void _restore(self)
+    cdef bint _pulled_now(self)
+    cdef double _crossed(self)
+    cdef double _try(self, double h)
+    cdef double _locate(self, double h)
+    cdef void _act(self)
+    cpdef long long event_time_ns(self)
+    cdef void _touch(self, long long foot)
+    cdef void _leave(self, long long foot)
+    cdef void _watch(self, double h)
+    cdef void _keep_forces(self, double h)
+    cpdef void _fall(self, cause)

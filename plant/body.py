@@ -1,0 +1,1459 @@
+"""Ranger's body: four links, two elastic ankle drives, two feet on the floor. Equations: plant/EQUATIONS.md.
+
+Coordinates never swap names: every angle belongs to a leg, outer or inner (EQUATIONS 1). All are positive
+clockwise seen with the walking direction to the right, that is in the forward direction:
+
+    foot_*   absolute angle of the foot, 0 with the sweet spot on the floor, positive rolled to the toe
+    leg_*    absolute angle of the leg, 0 upright, positive leaning forward (hip ahead of the ankle)
+    motor_*  angle of the ankle motor over its gear, relative to its leg; equal to foot - leg without cable stretch
+
+Modes: held by the operator, single stance, double stance, flight, fallen. Forces are those of the floor on the
+robot, along the (sloped) floor and normal to it.
+"""
+
+import array
+
+import cython
+
+from plant.floor import Floor
+from plant.parameters import BodyParameters
+from plant.walk_record import WalkRecord
+
+if not cython.compiled:
+    from math import cos, fabs, sin, sqrt, tanh
+
+OUTER = 0
+INNER = 1
+
+HELD = 0
+SINGLE = 1
+DOUBLE = 2
+FLIGHT = 3
+FALLEN = 4
+MODE_NAMES = ("held", "single stance", "double stance", "flight", "fallen")
+
+
+class Body:
+    """State and motion of the mechanical robot. `parameters`: BodyParameters; `floor`: Floor."""
+
+    def __init__(self, parameters=None, floor=None) -> None:
+        p = parameters if parameters is not None else BodyParameters()
+        self.parameters = p
+        self.floor = floor if floor is not None else Floor(p.slope_rad)
+        self.record = WalkRecord()
+        self.terms = None  # additional joint torques of a model file, see EQUATIONS 12
+
+        # state (rad, rad/s, m, m/s)
+        self.foot_outer = 0.0
+        self.leg_outer = 0.0
+        self.leg_inner = 0.0
+        self.foot_inner = 0.0
+        self.motor_outer = 0.0
+        self.motor_inner = 0.0
+        self.foot_outer_rate = 0.0
+        self.leg_outer_rate = 0.0
+        self.leg_inner_rate = 0.0
+        self.foot_inner_rate = 0.0
+        self.motor_outer_rate = 0.0
+        self.motor_inner_rate = 0.0
+        self.hip_x = 0.0
+        self.hip_y = 0.0
+        self.hip_vx = 0.0
+        self.hip_vy = 0.0
+        self.saved = array.array("d", [0.0]) * 16
+
+        # contact: where the sweet spot of a standing foot would touch, and the height of its foothold
+        self.mode = 0
+        self.stance = 0  # leg that carries in single stance, reference leg in double stance
+        self.anchor_outer = 0.0
+        self.anchor_inner = 0.0
+        self.height_outer = 0.0
+        self.height_inner = 0.0
+        self.gap_outer = 0.0
+        self.gap_inner = 0.0
+        self.outer_armed = False  # the foot has been clear of the floor since it left it
+        self.inner_armed = False
+        self.foothold_due = False  # the swing foot has not passed the stance foot yet
+        self.last_strike_leg = -1
+        self.lock_hip = False
+        self.scuff_time_s = -1.0
+        self.passing_gap = 1.0  # m, lowest clearance while the swing foot passes
+        self.friction_ratio_max = 0.0  # worst |F_x| / F_y of the walk
+        self.slip_s = 0.0  # s with more than the floor's friction asked for
+        self.normal_force_min = 0.0  # N, worst pull (only where a pull is not answered by lift-off)
+        self.mu = p.floor_friction
+
+        # forces of the floor at the start of the last step, N
+        self.outer_Fx = 0.0
+        self.outer_Fy = 0.0
+        self.inner_Fx = 0.0
+        self.inner_Fy = 0.0
+        # accelerations at the start of the last step
+        self.foot_outer_acc = 0.0
+        self.leg_outer_acc = 0.0
+        self.leg_inner_acc = 0.0
+        self.foot_inner_acc = 0.0
+        self.motor_outer_acc = 0.0
+        self.motor_inner_acc = 0.0
+
+        # torques of the motors during a step: drive - coulomb tanh(rate / epsilon) - viscous rate, at the joint
+        self.hip_drive = 0.0
+        self.hip_coulomb = 0.0
+        self.hip_viscous = 0.0
+        self.outer_drive = 0.0
+        self.outer_coulomb = 0.0
+        self.outer_viscous = 0.0
+        self.inner_drive = 0.0
+        self.inner_coulomb = 0.0
+        self.inner_viscous = 0.0
+        # additional torques of the terms, set by them: on h, and on the two ankles (joint side) and motors
+        self.extra_hip = 0.0
+        self.extra_outer = 0.0
+        self.extra_inner = 0.0
+        self.extra_outer_motor = 0.0
+        self.extra_inner_motor = 0.0
+
+        # parameters in the letters of EQUATIONS
+        self.M = p.total_mass_kg
+        self.mc_outer = p.outer_mass_moment_kg_m
+        self.mc_inner = p.inner_mass_moment_kg_m
+        self.mw_outer = p.outer_mass_offset_kg_m
+        self.mw_inner = p.inner_mass_offset_kg_m
+        self.J_outer = p.outer_hip_inertia_kg_m2
+        self.J_inner = p.inner_hip_inertia_kg_m2
+        self.Jf = p.foot_inertia_kg_m2
+        self.JH = p.hip_rotor_inertia_kg_m2
+        self.JA = p.ankle_rotor_inertia_kg_m2
+        self.el = p.leg_length_m
+        self.r = p.foot_radius_m
+        self.d = p.ankle_offset_m
+        self.kh = p.hip_spring_Nm_per_rad
+        self.ks = p.ankle_spring_Nm_per_rad
+        self.exact_spring = p.exact_hip_spring
+        self.spring_ab = p.hip_spring_arm_a_m * p.hip_spring_arm_b_m
+        self.spring_aabb = p.hip_spring_arm_a_m * p.hip_spring_arm_a_m + p.hip_spring_arm_b_m * p.hip_spring_arm_b_m
+        self.spring_l0 = p.hip_spring_rest_length_m
+        self.spring_k = p.hip_spring_rate_N_per_m if p.exact_hip_spring else 0.0
+        self.gx = 0.0
+        self.gy = 0.0
+        self.set_slope(self.floor.slope_rad)
+        self.C_outer = p.outer_rolling_friction_Nms
+        self.C_inner = p.inner_rolling_friction_Nms
+        self.heel = p.arc_heel_rad
+        self.toe = p.arc_toe_rad
+        self.stop_low = p.ankle_stop_low_rad - p.ankle_zero_rad
+        self.stop_high = p.ankle_stop_high_rad - p.ankle_zero_rad
+        self.stop_k = p.ankle_stop_Nm_per_rad
+        self.stop_c = p.ankle_stop_Nms_per_rad
+        self.inverse_smoothing = 1.0 / p.friction_smoothing_rad_s
+        # Errors of the closed linkage in double stance decay at this rate (1/s). Chosen by us: it changes
+        # accelerations only by rate^2 x error, 1e-8 m/s^2 at an error of 1e-12 m, and keeps an endless stand closed.
+        self.closing_rate = 100.0
+        self.fall_lean = 0.6  # rad; see EQUATIONS 11 for the fall rules
+        self.fall_height = 0.65  # of the leg length
+        self.fall_split = 1.2  # rad between the legs
+        self.stall_s = 3.0
+        self.cause = ""
+
+        self.time_s = 0.0  # since the body was made; only for durations
+        self.released_s = 0.0
+        self.elapsed = 0.0  # s since the start of the running step
+        self.step_start_ns = 0
+        self.event = 0
+        self.unilateral = False  # the trailing foot may leave at a heel-strike (EQUATIONS 8)
+        self.lift_leading = True  # the leading foot may leave in double stance
+        self.P_stance_x = 0.0  # impulses of the last impact, N s
+        self.P_stance_y = 0.0
+        self.P_swing_x = 0.0
+        self.P_swing_y = 0.0
+        self.matrix = array.array("d", [0.0]) * 110
+        self.solution = array.array("d", [0.0]) * 10
+        self.place(0.0, 0.3)
+
+    def set_slope(self, slope_rad: cython.double) -> cython.void:
+        """Turn gravity: the floor falls in the walking direction by `slope_rad` (EQUATIONS 3)."""
+        g: cython.double = self.parameters.gravity_m_per_s2
+        self.gx = g * sin(slope_rad)
+        self.gy = -g * cos(slope_rad)
+
+    # ---- where things are -------------------------------------------------------------------------------------
+
+    def chain_x(self, foot: cython.double, leg: cython.double) -> cython.double:
+        """Hip ahead of the anchor of a standing foot, m (EQUATIONS 4)."""
+        excess: cython.double = self._excess(foot)
+        return self.r * (foot - excess + sin(excess)) - self.d * sin(foot) + self.el * sin(leg)
+
+    def chain_y(self, foot: cython.double, leg: cython.double) -> cython.double:
+        """Hip above the foothold of a standing foot, m (EQUATIONS 4)."""
+        return self.r * cos(self._excess(foot)) - self.d * cos(foot) + self.el * cos(leg)
+
+    def _excess(self, foot: cython.double) -> cython.double:
+        """Angle by which a foot has rolled beyond the end of its arc (sigma), 0 on the arc."""
+        if foot < self.heel:
+            return foot - self.heel
+        if foot > self.toe:
+            return foot - self.toe
+        return 0.0
+
+    def contact_x(self, leg: cython.longlong) -> cython.double:
+        """Where the lowest point of a foot is along the floor, m."""
+        foot: cython.double = self.foot_outer if leg == 0 else self.foot_inner
+        lean: cython.double = self.leg_outer if leg == 0 else self.leg_inner
+        excess: cython.double = self._excess(foot)
+        return self.hip_x - self.chain_x(foot, lean) + self.r * (foot - excess)
+
+    def ankle_x(self, leg: cython.longlong) -> cython.double:
+        """Where an ankle is along the floor, m."""
+        return self.hip_x - self.el * sin(self.leg_outer if leg == 0 else self.leg_inner)
+
+    def update_pose(self) -> cython.void:
+        """Hip position and the two gaps from the angles (in flight and held: the gaps only)."""
+        outer: cython.double = self.chain_y(self.foot_outer, self.leg_outer)
+        inner: cython.double = self.chain_y(self.foot_inner, self.leg_inner)
+        if self.mode == 1 or self.mode == 2:
+            if self.stance == 0:
+                self.hip_y = self.height_outer + outer
+                self.hip_x = self.anchor_outer + self.chain_x(self.foot_outer, self.leg_outer)
+            else:
+                self.hip_y = self.height_inner + inner
+                self.hip_x = self.anchor_inner + self.chain_x(self.foot_inner, self.leg_inner)
+        self.gap_outer = self.hip_y - outer - self.height_outer
+        self.gap_inner = self.hip_y - inner - self.height_inner
+
+    def update_hip_rates(self) -> cython.void:
+        """Hip velocity from the standing foot (EQUATIONS 4)."""
+        foot: cython.double
+        leg: cython.double
+        foot_rate: cython.double
+        leg_rate: cython.double
+        excess: cython.double
+        if self.mode != 1 and self.mode != 2:
+            return
+        if self.stance == 0:
+            foot, leg = self.foot_outer, self.leg_outer
+            foot_rate, leg_rate = self.foot_outer_rate, self.leg_outer_rate
+        else:
+            foot, leg = self.foot_inner, self.leg_inner
+            foot_rate, leg_rate = self.foot_inner_rate, self.leg_inner_rate
+        excess = self._excess(foot)
+        self.hip_vx = (self.r * cos(excess) - self.d * cos(foot)) * foot_rate + self.el * cos(leg) * leg_rate
+        self.hip_vy = (self.d * sin(foot) - self.r * sin(excess)) * foot_rate - self.el * sin(leg) * leg_rate
+
+    def hip_angle(self) -> cython.double:
+        """h of the firmware: inner legs ahead of the outer ones, rad."""
+        return self.leg_outer - self.leg_inner
+
+    def hip_rate(self) -> cython.double:
+        return self.leg_outer_rate - self.leg_inner_rate
+
+    def snapshot(self) -> dict:
+        """Points in the plane of the floor for a drawing, m: hip, ankles, foot centres; angles in rad."""
+        joints = {"hip": (self.hip_x, self.hip_y), "mode": MODE_NAMES[self.mode], "stance": int(self.stance)}
+        for name, leg, foot in (
+            ("outer", self.leg_outer, self.foot_outer),
+            ("inner", self.leg_inner, self.foot_inner),
+        ):
+            ankle = (self.hip_x - self.el * sin(leg), self.hip_y - self.el * cos(leg))
+            joints[name] = {
+                "ankle": ankle,
+                "foot_centre": (ankle[0] + self.d * sin(foot), ankle[1] + self.d * cos(foot)),
+                "leg_rad": leg,
+                "foot_rad": foot,
+            }
+        return joints
+
+    def energy_J(self) -> cython.double:
+        """Kinetic and potential energy with springs and rotors, potential measured from the floor's frame."""
+        Ao: cython.double = self.mc_outer * cos(self.leg_outer) + self.mw_outer * sin(self.leg_outer)
+        Bo: cython.double = self.mc_outer * sin(self.leg_outer) - self.mw_outer * cos(self.leg_outer)
+        Ai: cython.double = self.mc_inner * cos(self.leg_inner) + self.mw_inner * sin(self.leg_inner)
+        Bi: cython.double = self.mc_inner * sin(self.leg_inner) - self.mw_inner * cos(self.leg_inner)
+        uo: cython.double = self.leg_outer_rate
+        ui: cython.double = self.leg_inner_rate
+        h: cython.double = self.leg_outer - self.leg_inner
+        so: cython.double = self.motor_outer - (self.foot_outer - self.leg_outer)
+        si: cython.double = self.motor_inner - (self.foot_inner - self.leg_inner)
+        spring: cython.double
+        length: cython.double
+        self.update_pose()
+        self.update_hip_rates()
+        if self.exact_spring:
+            length = sqrt(self.spring_aabb - 2.0 * self.spring_ab * cos(h))
+            spring = self.spring_k * (length - self.spring_l0) * (length - self.spring_l0)
+        else:
+            spring = 0.5 * self.kh * h * h
+        return (
+            0.5 * self.M * (self.hip_vx * self.hip_vx + self.hip_vy * self.hip_vy)
+            - self.hip_vx * (Ao * uo + Ai * ui)
+            + self.hip_vy * (Bo * uo + Bi * ui)
+            + 0.5 * (self.J_outer * uo * uo + self.J_inner * ui * ui)
+            + 0.5 * self.Jf * self.foot_outer_rate * self.foot_outer_rate
+            + 0.5 * self.Jf * self.foot_inner_rate * self.foot_inner_rate
+            + 0.5 * self.JH * (uo - ui) * (uo - ui)
+            + 0.5 * self.JA * self.motor_outer_rate * self.motor_outer_rate
+            + 0.5 * self.JA * self.motor_inner_rate * self.motor_inner_rate
+            + 0.5 * self.ks * (so * so + si * si)
+            + spring
+            - self.gx * (self.M * self.hip_x - Bo - Bi)
+            - self.gy * (self.M * self.hip_y - Ao - Ai)
+        )
+
+    # ---- what the operator does -------------------------------------------------------------------------------
+
+    def place(self, outer_leg_rad: cython.double, hip_rad: cython.double) -> cython.void:
+        """Everything at rest in the operator's hands, feet square to their legs, the outer foot over the floor."""
+        self.leg_outer = outer_leg_rad
+        self.leg_inner = outer_leg_rad - hip_rad
+        self.foot_outer = self.leg_outer
+        self.foot_inner = self.leg_inner
+        self.motor_outer = 0.0
+        self.motor_inner = 0.0
+        self.hold(outer_leg_rad)
+
+    def hold(self, outer_leg_rad: cython.double) -> cython.void:
+        """Lift the robot by its outer legs, which the operator keeps at this lean, motionless.
+
+        The inner leg hangs at the hip and both feet hang free, so the motors move them; the hip is 50 mm higher
+        than standing (chosen by us: feet turn free of the floor). All rates of the outer leg and hip are zero.
+        """
+        self.mode = 0
+        self.stance = 0
+        self.leg_outer = outer_leg_rad
+        self.leg_outer_rate = 0.0
+        self.hip_vx = 0.0
+        self.hip_vy = 0.0
+        self.hip_y = self.el + self.r - self.d + 0.05
+        self.outer_Fx = 0.0
+        self.outer_Fy = 0.0
+        self.inner_Fx = 0.0
+        self.inner_Fy = 0.0
+        self.lock_hip = False
+        self.cause = ""
+        self.last_strike_leg = -1
+        if self.Jf == 0.0:
+            self._limp_foot(0)
+            self._limp_foot(1)
+        self.update_pose()
+
+    def release(
+        self,
+        outer_leg_rate: cython.double,
+        stance: cython.longlong = 0,
+        stance_foot_rate: cython.double = 0.0,
+        hip_rate: cython.double = 0.0,
+    ) -> cython.void:
+        """Set the stance foot on the floor as it is and let go, with these rates (rad/s).
+
+        hip_rate: of h, inner legs forward. When the other foot would stand in the floor the walk ends at once
+        with that as its cause.
+        """
+        self.mode = 1
+        self.stance = stance
+        self.leg_outer_rate = outer_leg_rate
+        self.leg_inner_rate = outer_leg_rate - hip_rate
+        if stance == 0:
+            self.foot_outer_rate = stance_foot_rate
+        else:
+            self.foot_inner_rate = stance_foot_rate
+        self.begin_walk()
+
+    def begin_walk(self) -> cython.void:
+        """Stand on the stance foot from here on: anchors, footholds and the record start anew."""
+        first: cython.double = self.floor.first_height()
+        self.mode = 1
+        self.height_outer = first
+        self.height_inner = first
+        self.foothold_due = True
+        self.last_strike_leg = self.stance
+        self.anchor_outer = 0.0
+        self.anchor_inner = 0.0
+        if self.stance == 0:
+            self.anchor_outer = self.hip_x - self.chain_x(self.foot_outer, self.leg_outer)
+        else:
+            self.anchor_inner = self.hip_x - self.chain_x(self.foot_inner, self.leg_inner)
+        if self.Jf == 0.0:
+            self._limp_foot(1 - self.stance)
+        self.update_pose()
+        self.update_hip_rates()
+        self.outer_armed = self.gap_outer > 1e-6
+        self.inner_armed = self.gap_inner > 1e-6
+        self.released_s = self.time_s
+        self.scuff_time_s = -1.0
+        self.passing_gap = 1.0
+        self.friction_ratio_max = 0.0
+        self.slip_s = 0.0
+        self.normal_force_min = 0.0
+        self.cause = ""
+        self.record.begin(self.step_start_ns, self.contact_x(self.stance))
+        if (self.gap_inner if self.stance == 0 else self.gap_outer) < 0.0:
+            self._fall("put down with the swing foot in the floor")
+
+    def _limp_foot(self, leg: cython.longlong) -> cython.void:
+        """A massless foot in the air stands where its motor holds it, q4 = q4m (EQUATIONS 7)."""
+        if leg == 0:
+            self.foot_outer = self.leg_outer + self.motor_outer
+            self.foot_outer_rate = self.leg_outer_rate + self.motor_outer_rate
+        else:
+            self.foot_inner = self.leg_inner + self.motor_inner
+            self.foot_inner_rate = self.leg_inner_rate + self.motor_inner_rate
+
+    # ---- motion on one or two feet ----------------------------------------------------------------------------
+
+    def on_feet(self, h: cython.double, stages: cython.longlong) -> cython.void:
+        """One Runge-Kutta step of `h` seconds in single or double stance; stages 4, or 1 to look only.
+
+        Inside, s is the stance (reference) leg and w the other. Accelerations and floor forces of the start of
+        the step are left in the fields (EQUATIONS 5, 6).
+        """
+        double_stance: cython.bint = self.mode == 2
+        outer_stance: cython.bint = self.stance == 0
+        massless: cython.bint = self.Jf == 0.0 and not double_stance
+        with_terms: cython.bint = self.terms is not None
+        exact_spring: cython.bint = self.exact_spring
+        stage: cython.longlong
+        M: cython.double = self.M
+        el: cython.double = self.el
+        r: cython.double = self.r
+        d: cython.double = self.d
+        gx: cython.double = self.gx
+        gy: cython.double = self.gy
+        kh: cython.double = self.kh
+        ks: cython.double = self.ks
+        Jf: cython.double = self.Jf
+        JH: cython.double = self.JH
+        iJA: cython.double = 1.0 / self.JA
+        iJf: cython.double = 0.0 if massless else (1.0 / Jf if Jf > 0.0 else 0.0)
+        heel: cython.double = self.heel
+        toe: cython.double = self.toe
+        low: cython.double = self.stop_low
+        high: cython.double = self.stop_high
+        eps: cython.double = self.inverse_smoothing
+        hip_coulomb: cython.double = self.hip_coulomb
+        hip_viscous: cython.double = self.hip_viscous
+        if outer_stance:
+            F0, th0, tw0, G0 = self.foot_outer, self.leg_outer, self.leg_inner, self.foot_inner
+            p0, n0 = self.motor_outer, self.motor_inner
+            uF0, us0, uw0, uG0 = (
+                self.foot_outer_rate,
+                self.leg_outer_rate,
+                self.leg_inner_rate,
+                self.foot_inner_rate,
+            )
+            up0, un0 = self.motor_outer_rate, self.motor_inner_rate
+            mcs, mws, Js, mcw, mww, Jw = (
+                self.mc_outer,
+                self.mw_outer,
+                self.J_outer,
+                self.mc_inner,
+                self.mw_inner,
+                self.J_inner,
+            )
+            Cs, Cw = self.C_outer, self.C_inner
+            hip_drive = self.hip_drive
+            s_drive, s_coulomb, s_viscous = self.outer_drive, self.outer_coulomb, self.outer_viscous
+            w_drive, w_coulomb, w_viscous = self.inner_drive, self.inner_coulomb, self.inner_viscous
+            Xs, Xw, Ys, Yw = self.anchor_outer, self.anchor_inner, self.height_outer, self.height_inner
+        else:
+            F0, th0, tw0, G0 = self.foot_inner, self.leg_inner, self.leg_outer, self.foot_outer
+            p0, n0 = self.motor_inner, self.motor_outer
+            uF0, us0, uw0, uG0 = (
+                self.foot_inner_rate,
+                self.leg_inner_rate,
+                self.leg_outer_rate,
+                self.foot_outer_rate,
+            )
+            up0, un0 = self.motor_inner_rate, self.motor_outer_rate
+            mcs, mws, Js, mcw, mww, Jw = (
+                self.mc_inner,
+                self.mw_inner,
+                self.J_inner,
+                self.mc_outer,
+                self.mw_outer,
+                self.J_outer,
+            )
+            Cs, Cw = self.C_inner, self.C_outer
+            hip_drive = -self.hip_drive
+            s_drive, s_coulomb, s_viscous = self.inner_drive, self.inner_coulomb, self.inner_viscous
+            w_drive, w_coulomb, w_viscous = self.outer_drive, self.outer_coulomb, self.outer_viscous
+            Xs, Xw, Ys, Yw = self.anchor_inner, self.anchor_outer, self.height_inner, self.height_outer
+        m22: cython.double = M * el * el - 2.0 * el * mcs + Js + JH
+        i33: cython.double = 1.0 / (Jw + JH)
+        half: cython.double = 0.5 * h
+        c: cython.double = half
+        weight: cython.double = 1.0
+        F: cython.double = F0
+        th: cython.double = th0
+        tw: cython.double = tw0
+        G: cython.double = G0
+        p: cython.double = p0
+        n: cython.double = n0
+        uF: cython.double = uF0
+        us: cython.double = us0
+        uw: cython.double = uw0
+        uG: cython.double = uG0
+        up: cython.double = up0
+        un: cython.double = un0
+        # sums of k1 + k2 + k3 (positions) and k1 + 2 k2 + 2 k3 + k4 (rates)
+        qF = qs = qw = qG = qp = qn = 0.0
+        vF = vs = vw = vG = vp = vn = 0.0
+        for stage in range(stages):
+            sF = sin(F)
+            cF = cos(F)
+            st = sin(th)
+            ct = cos(th)
+            sw = sin(tw)
+            cw = cos(tw)
+            ls = el * st
+            lc = el * ct
+            As = mcs * ct + mws * st
+            Bs = mcs * st - mws * ct
+            Aw = mcw * cw + mww * sw
+            Bw = mcw * sw - mww * cw
+            if F < heel:
+                sg = F - heel
+                e = r * cos(sg) - d * cF
+                f = d * sF - r * sin(sg)
+                df = -e
+            elif F > toe:
+                sg = F - toe
+                e = r * cos(sg) - d * cF
+                f = d * sF - r * sin(sg)
+                df = -e
+            else:
+                sg = 0.0
+                df = d * cF
+                e = r - df
+                f = d * sF
+            us2 = us * us
+            uw2 = uw * uw
+            uF2 = uF * uF
+            # acceleration of the hip without angular accelerations, less gravity (EQUATIONS 5.2)
+            ax = f * uF2 - ls * us2 - gx
+            ay = df * uF2 - lc * us2 - gy
+            Px = M * ax + Bs * us2 + Bw * uw2
+            Py = M * ay + As * us2 + Aw * uw2
+            # torques: cables with the motors behind them, stops, hip
+            a_s = F - th
+            a_w = G - tw
+            Ts = ks * (p - a_s)
+            Tw = ks * (n - a_w)
+            mp = s_drive - s_coulomb * tanh(up * eps) - s_viscous * up - Ts
+            mn = w_drive - w_coulomb * tanh(un * eps) - w_viscous * un
+            if massless:
+                Tw = 0.0
+            mn -= Tw
+            if a_s < low or a_s > high:
+                Ts += self._stop(a_s, uF - us)
+            if a_w < low or a_w > high:
+                stop = self._stop(a_w, uG - uw)
+                Tw += stop
+                if massless:
+                    mn += stop
+            hd = us - uw
+            Th = hip_drive - hip_coulomb * tanh(hd * eps) - hip_viscous * hd
+            if exact_spring:
+                Th -= self._exact_spring(th - tw)
+            else:
+                Th -= kh * (th - tw)
+            TF = Ts - Cs * uF
+            TG = Tw
+            if with_terms:
+                self._ask_terms(outer_stance, th, tw, a_s, a_w, p, n, us, uw, uF - us, uG - uw, up, un)
+                if outer_stance:
+                    Th += self.extra_hip
+                    Ts += self.extra_outer
+                    TF += self.extra_outer
+                    mp += self.extra_outer_motor
+                    Tw += self.extra_inner
+                    TG += self.extra_inner
+                    mn += self.extra_inner_motor
+                    if massless:
+                        mn += self.extra_inner
+                else:
+                    Th -= self.extra_hip
+                    Ts += self.extra_inner
+                    TF += self.extra_inner
+                    mp += self.extra_inner_motor
+                    Tw += self.extra_outer
+                    TG += self.extra_outer
+                    mn += self.extra_outer_motor
+                    if massless:
+                        mn += self.extra_outer
+            # generalised forces and mass matrix (EQUATIONS 5.3), unknowns: foot s, leg s, leg w
+            Q1 = TF - e * Px - f * Py
+            Q2 = Th - Ts - lc * Px + ls * Py + As * ax - Bs * ay
+            Q3 = -Th - Tw + Aw * ax - Bw * ay
+            m11 = M * (e * e + f * f) + Jf
+            m12 = M * (e * lc - f * ls) - As * e + Bs * f
+            m13 = Bw * f - Aw * e
+            m23 = -(lc * Aw + ls * Bw) - JH
+            t13 = m13 * i33
+            t23 = m23 * i33
+            n11 = m11 - t13 * m13
+            n12 = m12 - t13 * m23
+            n22 = m22 - t23 * m23
+            inv = 1.0 / (n11 * n22 - n12 * n12)
+            b1 = Q1 - t13 * Q3
+            b2 = Q2 - t23 * Q3
+            aF = (n22 * b1 - n12 * b2) * inv
+            as_ = (n11 * b2 - n12 * b1) * inv
+            aw = i33 * Q3 - t13 * aF - t23 * as_
+            ap = mp * iJA
+            an = mn * iJA
+            Rx = 0.0
+            Ry = 0.0
+            if double_stance:
+                # the other foot closes the linkage by its force (Rx, Ry): EQUATIONS 6
+                sG = sin(G)
+                cG = cos(G)
+                if G < heel:
+                    gg = G - heel
+                elif G > toe:
+                    gg = G - toe
+                else:
+                    gg = 0.0
+                ew = r * cos(gg) - d * cG
+                fw = d * sG - r * sin(gg)
+                dfw = -ew if gg != 0.0 else d * cG
+                lsw = el * sw
+                lcw = el * cw
+                uG2 = uG * uG
+                om = self.closing_rate
+                # r (F - sg) + r sin(sg) - d sin F + l sin th, both legs
+                gx_ = (Xs - Xw) + r * ((F - sg + sin(sg)) - (G - gg + sin(gg))) - d * (sF - sG) + ls - lsw
+                gy_ = (Ys - Yw) + r * (cos(sg) - cos(gg)) - d * (cF - cG) + lc - lcw
+                vx_ = e * uF + lc * us - ew * uG - lcw * uw
+                vy_ = f * uF - ls * us - fw * uG + lsw * uw
+                bx = fw * uG2 - lsw * uw2 - (ax + gx) - om * (2.0 * vx_ + om * gx_)
+                by = dfw * uG2 - lcw * uw2 - (ay + gy) - om * (2.0 * vy_ + om * gy_)
+                TG -= Cw * uG
+                # columns: what a unit force on the other foot does to the three accelerations
+                b1 = e + t13 * lcw
+                b2 = lc + t23 * lcw
+                x1 = (n22 * b1 - n12 * b2) * inv
+                x2 = (n11 * b2 - n12 * b1) * inv
+                x3 = -i33 * lcw - t13 * x1 - t23 * x2
+                b1 = f - t13 * lsw
+                b2 = -ls - t23 * lsw
+                y1 = (n22 * b1 - n12 * b2) * inv
+                y2 = (n11 * b2 - n12 * b1) * inv
+                y3 = i33 * lsw - t13 * y1 - t23 * y2
+                Sxx = e * x1 + lc * x2 - lcw * x3
+                Sxy = e * y1 + lc * y2 - lcw * y3
+                Syy = f * y1 - ls * y2 + lsw * y3
+                r1 = bx - (e * aF + lc * as_ - lcw * aw)
+                r2 = by - (f * aF - ls * as_ + lsw * aw)
+                r3 = -TG
+                c11 = -Syy * Jf - fw * fw
+                c12 = ew * fw + Sxy * Jf
+                c13 = ew * Syy - Sxy * fw
+                c22 = -Sxx * Jf - ew * ew
+                c23 = Sxx * fw - Sxy * ew
+                c33 = Sxx * Syy - Sxy * Sxy
+                idet = 1.0 / (Sxx * c11 + Sxy * c12 - ew * c13)
+                Rx = (c11 * r1 + c12 * r2 + c13 * r3) * idet
+                Ry = (c12 * r1 + c22 * r2 + c23 * r3) * idet
+                aG = (c13 * r1 + c23 * r2 + c33 * r3) * idet
+                aF += x1 * Rx + y1 * Ry
+                as_ += x2 * Rx + y2 * Ry
+                aw += x3 * Rx + y3 * Ry
+            elif massless:
+                aG = aw + an
+            else:
+                aG = TG * iJf
+            if stage == 0:
+                # force of the floor on the stance foot: rate of the whole momentum less gravity and the other foot
+                Px += (M * e) * aF + (M * lc - As) * as_ - Aw * aw - Rx
+                Py += (M * f) * aF + (Bs - M * ls) * as_ + Bw * aw - Ry
+                if outer_stance:
+                    self.outer_Fx = Px
+                    self.outer_Fy = Py
+                    self.inner_Fx = Rx
+                    self.inner_Fy = Ry
+                    self.foot_outer_acc = aF
+                    self.leg_outer_acc = as_
+                    self.leg_inner_acc = aw
+                    self.foot_inner_acc = aG
+                    self.motor_outer_acc = ap
+                    self.motor_inner_acc = an
+                else:
+                    self.inner_Fx = Px
+                    self.inner_Fy = Py
+                    self.outer_Fx = Rx
+                    self.outer_Fy = Ry
+                    self.foot_inner_acc = aF
+                    self.leg_inner_acc = as_
+                    self.leg_outer_acc = aw
+                    self.foot_outer_acc = aG
+                    self.motor_inner_acc = ap
+                    self.motor_outer_acc = an
+                if stages == 1:
+                    return
+            vF += weight * aF
+            vs += weight * as_
+            vw += weight * aw
+            vG += weight * aG
+            vp += weight * ap
+            vn += weight * an
+            if stage < 3:
+                qF += aF
+                qs += as_
+                qw += aw
+                qG += aG
+                qp += ap
+                qn += an
+                if stage == 2:
+                    c = h
+                    weight = 1.0
+                else:
+                    weight = 2.0
+                F = F0 + c * uF
+                th = th0 + c * us
+                tw = tw0 + c * uw
+                G = G0 + c * uG
+                p = p0 + c * up
+                n = n0 + c * un
+                uF = uF0 + c * aF
+                us = us0 + c * as_
+                uw = uw0 + c * aw
+                uG = uG0 + c * aG
+                up = up0 + c * ap
+                un = un0 + c * an
+        sixth: cython.double = h / 6.0
+        F = F0 + h * (uF0 + sixth * qF)
+        th = th0 + h * (us0 + sixth * qs)
+        tw = tw0 + h * (uw0 + sixth * qw)
+        G = G0 + h * (uG0 + sixth * qG)
+        p = p0 + h * (up0 + sixth * qp)
+        n = n0 + h * (un0 + sixth * qn)
+        uF = uF0 + sixth * vF
+        us = us0 + sixth * vs
+        uw = uw0 + sixth * vw
+        uG = uG0 + sixth * vG
+        up = up0 + sixth * vp
+        un = un0 + sixth * vn
+        if outer_stance:
+            self.foot_outer = F
+            self.leg_outer = th
+            self.leg_inner = tw
+            self.foot_inner = G
+            self.motor_outer = p
+            self.motor_inner = n
+            self.foot_outer_rate = uF
+            self.leg_outer_rate = us
+            self.leg_inner_rate = uw
+            self.foot_inner_rate = uG
+            self.motor_outer_rate = up
+            self.motor_inner_rate = un
+        else:
+            self.foot_inner = F
+            self.leg_inner = th
+            self.leg_outer = tw
+            self.foot_outer = G
+            self.motor_inner = p
+            self.motor_outer = n
+            self.foot_inner_rate = uF
+            self.leg_inner_rate = us
+            self.leg_outer_rate = uw
+            self.foot_outer_rate = uG
+            self.motor_inner_rate = up
+            self.motor_outer_rate = un
+
+    def _stop(self, angle: cython.double, rate: cython.double) -> cython.double:
+        """Torque of an ankle stop on the foot: a spring and damper that can only push (EQUATIONS 2.5)."""
+        torque: cython.double
+        if angle < self.stop_low:
+            torque = self.stop_k * (self.stop_low - angle) - self.stop_c * rate
+            return torque if torque > 0.0 else 0.0
+        torque = self.stop_k * (self.stop_high - angle) - self.stop_c * rate
+        return torque if torque < 0.0 else 0.0
+
+    def _exact_spring(self, angle: cython.double) -> cython.double:
+        """Torque of the hip spring by its geometry (EQUATIONS 2.4)."""
+        length: cython.double = sqrt(self.spring_aabb - 2.0 * self.spring_ab * cos(angle))
+        return 2.0 * self.spring_k * self.spring_ab * (1.0 - self.spring_l0 / length) * sin(angle)
+
+    def _ask_terms(
+        self,
+        outer_stance: cython.bint,
+        th: cython.double,
+        tw: cython.double,
+        a_s: cython.double,
+        a_w: cython.double,
+        p: cython.double,
+        n: cython.double,
+        us: cython.double,
+        uw: cython.double,
+        ra_s: cython.double,
+        ra_w: cython.double,
+        up: cython.double,
+        un: cython.double,
+    ) -> cython.void:
+        """Let the additional terms set their torques for this state, in fixed legs (EQUATIONS 12)."""
+        if outer_stance:
+            self.terms.joint_torques(self, th - tw, us - uw, a_s, ra_s, a_w, ra_w, p, up, n, un)
+        else:
+            self.terms.joint_torques(self, tw - th, uw - us, a_w, ra_w, a_s, ra_s, n, un, p, up)
+
+    # ---- motion in the air or in the operator's hands ---------------------------------------------------------
+
+    def in_air(self, h: cython.double, stages: cython.longlong) -> cython.void:
+        """One Runge-Kutta step of `h` seconds in flight or held (EQUATIONS 7); stages 4, or 1 to look only."""
+        held: cython.bint = self.mode == 0
+        locked: cython.bint = held and self.lock_hip
+        massless: cython.bint = self.Jf == 0.0
+        with_terms: cython.bint = self.terms is not None
+        stage: cython.longlong
+        M: cython.double = self.M
+        JH: cython.double = self.JH
+        iJA: cython.double = 1.0 / self.JA
+        iJf: cython.double = 0.0 if massless else 1.0 / self.Jf
+        eps: cython.double = self.inverse_smoothing
+        mco: cython.double = self.mc_outer
+        mwo: cython.double = self.mw_outer
+        mci: cython.double = self.mc_inner
+        mwi: cython.double = self.mw_inner
+        ks: cython.double = self.ks
+        low: cython.double = self.stop_low
+        high: cython.double = self.stop_high
+        F: cython.double = self.foot_outer
+        th: cython.double = self.leg_outer
+        tw: cython.double = self.leg_inner
+        G: cython.double = self.foot_inner
+        p: cython.double = self.motor_outer
+        n: cython.double = self.motor_inner
+        uF: cython.double = self.foot_outer_rate
+        us: cython.double = self.leg_outer_rate
+        uw: cython.double = self.leg_inner_rate
+        uG: cython.double = self.foot_inner_rate
+        up: cython.double = self.motor_outer_rate
+        un: cython.double = self.motor_inner_rate
+        F0, th0, tw0, G0, p0, n0 = F, th, tw, G, p, n
+        uF0, us0, uw0, uG0, up0, un0 = uF, us, uw, uG, up, un
+        qF = qs = qw = qG = qp = qn = qx = qy = 0.0
+        vF = vs = vw = vG = vp = vn = vx = vy = 0.0
+        c: cython.double = 0.5 * h
+        weight: cython.double = 1.0
+        for stage in range(stages):
+            Ao = mco * cos(th) + mwo * sin(th)
+            Bo = mco * sin(th) - mwo * cos(th)
+            Ai = mci * cos(tw) + mwi * sin(tw)
+            Bi = mci * sin(tw) - mwi * cos(tw)
+            a_s = F - th
+            a_w = G - tw
+            Ts = 0.0 if massless else ks * (p - a_s)
+            Tw = 0.0 if massless else ks * (n - a_w)
+            mp = self.outer_drive - self.outer_coulomb * tanh(up * eps) - self.outer_viscous * up - Ts
+            mn = self.inner_drive - self.inner_coulomb * tanh(un * eps) - self.inner_viscous * un - Tw
+            if a_s < low or a_s > high:
+                stop = self._stop(a_s, uF - us)
+                Ts += stop
+                if massless:
+                    mp += stop
+            if a_w < low or a_w > high:
+                stop = self._stop(a_w, uG - uw)
+                Tw += stop
+                if massless:
+                    mn += stop
+            hd = us - uw
+            Th = self.hip_drive - self.hip_coulomb * tanh(hd * eps) - self.hip_viscous * hd
+            if self.exact_spring:
+                Th -= self._exact_spring(th - tw)
+            else:
+                Th -= self.kh * (th - tw)
+            if with_terms:
+                self._ask_terms(True, th, tw, a_s, a_w, p, n, us, uw, uF - us, uG - uw, up, un)
+                Th += self.extra_hip
+                Ts += self.extra_outer
+                Tw += self.extra_inner
+                mp += self.extra_outer_motor
+                mn += self.extra_inner_motor
+                if massless:
+                    mp += self.extra_outer
+                    mn += self.extra_inner
+            ap = mp * iJA
+            an = mn * iJA
+            Qo = Th - Ts
+            Qi = -Th - Tw
+            if held:
+                # the hip rests: gravity as if the hip were accelerated by its opposite
+                axh = 0.0
+                ayh = 0.0
+                as_ = 0.0
+                if locked:
+                    aw = 0.0
+                else:
+                    aw = (Qi - Ai * self.gx + Bi * self.gy) / (self.J_inner + JH)
+            else:
+                # eliminate the hip's acceleration less gravity (EQUATIONS 7.1)
+                bx = -(Bo * us * us + Bi * uw * uw) / M
+                by = -(Ao * us * us + Ai * uw * uw) / M
+                n11 = self.J_outer + JH - (Ao * Ao + Bo * Bo) / M
+                n22 = self.J_inner + JH - (Ai * Ai + Bi * Bi) / M
+                n12 = -JH - (Ao * Ai + Bo * Bi) / M
+                b1 = Qo + Ao * bx - Bo * by
+                b2 = Qi + Ai * bx - Bi * by
+                inv = 1.0 / (n11 * n22 - n12 * n12)
+                as_ = (n22 * b1 - n12 * b2) * inv
+                aw = (n11 * b2 - n12 * b1) * inv
+                axh = bx + (Ao * as_ + Ai * aw) / M + self.gx
+                ayh = by - (Bo * as_ + Bi * aw) / M + self.gy
+            if massless:
+                aF = as_ + ap
+                aG = aw + an
+            else:
+                aF = Ts * iJf
+                aG = Tw * iJf
+            if stage == 0:
+                self.foot_outer_acc = aF
+                self.leg_outer_acc = as_
+                self.leg_inner_acc = aw
+                self.foot_inner_acc = aG
+                self.motor_outer_acc = ap
+                self.motor_inner_acc = an
+                self.outer_Fx = 0.0
+                self.outer_Fy = 0.0
+                self.inner_Fx = 0.0
+                self.inner_Fy = 0.0
+                if stages == 1:
+                    return
+            vF += weight * aF
+            vs += weight * as_
+            vw += weight * aw
+            vG += weight * aG
+            vp += weight * ap
+            vn += weight * an
+            vx += weight * axh
+            vy += weight * ayh
+            if stage < 3:
+                qF += aF
+                qs += as_
+                qw += aw
+                qG += aG
+                qp += ap
+                qn += an
+                qx += axh
+                qy += ayh
+                if stage == 2:
+                    c = h
+                    weight = 1.0
+                else:
+                    weight = 2.0
+                F = F0 + c * uF
+                th = th0 + c * us
+                tw = tw0 + c * uw
+                G = G0 + c * uG
+                p = p0 + c * up
+                n = n0 + c * un
+                uF = uF0 + c * aF
+                us = us0 + c * as_
+                uw = uw0 + c * aw
+                uG = uG0 + c * aG
+                up = up0 + c * ap
+                un = un0 + c * an
+        sixth: cython.double = h / 6.0
+        self.foot_outer = F0 + h * (uF0 + sixth * qF)
+        self.leg_outer = th0 + h * (us0 + sixth * qs)
+        self.leg_inner = tw0 + h * (uw0 + sixth * qw)
+        self.foot_inner = G0 + h * (uG0 + sixth * qG)
+        self.motor_outer = p0 + h * (up0 + sixth * qp)
+        self.motor_inner = n0 + h * (un0 + sixth * qn)
+        self.foot_outer_rate = uF0 + sixth * vF
+        self.leg_outer_rate = us0 + sixth * vs
+        self.leg_inner_rate = uw0 + sixth * vw
+        self.foot_inner_rate = uG0 + sixth * vG
+        self.motor_outer_rate = up0 + sixth * vp
+        self.motor_inner_rate = un0 + sixth * vn
+        if not held:
+            self.hip_x += h * (self.hip_vx + sixth * qx)
+            self.hip_y += h * (self.hip_vy + sixth * qy)
+            self.hip_vx += sixth * vx
+            self.hip_vy += sixth * vy
+
+    # ---- impacts ----------------------------------------------------------------------------------------------
+
+    def impact(self, outer: cython.bint, inner: cython.bint) -> cython.void:
+        """Rates just after the feet named here are at rest on the floor (EQUATIONS 8).
+
+        The motors, behind their cables, keep their rates. Impulses are left in P_stance_* and P_swing_*, where
+        the stance foot is the one of `self.stance` before the impact.
+        """
+        n: cython.longlong = 6 + 2 * outer + 2 * inner
+        row: cython.longlong
+        column: cython.longlong
+        foot: cython.longlong
+        Ao: cython.double = self.mc_outer * cos(self.leg_outer) + self.mw_outer * sin(self.leg_outer)
+        Bo: cython.double = self.mc_outer * sin(self.leg_outer) - self.mw_outer * cos(self.leg_outer)
+        Ai: cython.double = self.mc_inner * cos(self.leg_inner) + self.mw_inner * sin(self.leg_inner)
+        Bi: cython.double = self.mc_inner * sin(self.leg_inner) - self.mw_inner * cos(self.leg_inner)
+        Jf: cython.double = self.Jf
+        e: cython.double
+        f: cython.double
+        excess: cython.double
+        total: cython.double
+        angle: cython.double
+        lean: cython.double
+        before = (
+            self.hip_vx,
+            self.hip_vy,
+            self.leg_outer_rate,
+            self.leg_inner_rate,
+            self.foot_outer_rate,
+            self.foot_inner_rate,
+        )
+        a = self.matrix
+        for row in range(110):
+            a[row] = 0.0
+        # rows of 11: unknowns vx, vy, leg o, leg i, foot o, foot i, impulses; last column the right-hand side
+        a[0] = self.M
+        a[2] = -Ao
+        a[3] = -Ai
+        a[11 + 1] = self.M
+        a[11 + 2] = Bo
+        a[11 + 3] = Bi
+        a[22] = -Ao
+        a[22 + 1] = Bo
+        a[22 + 2] = self.J_outer + self.JH
+        a[22 + 3] = -self.JH
+        a[33] = -Ai
+        a[33 + 1] = Bi
+        a[33 + 2] = -self.JH
+        a[33 + 3] = self.J_inner + self.JH
+        a[44 + 4] = Jf
+        a[55 + 5] = Jf
+        for row in range(6):
+            total = 0.0
+            for column in range(6):
+                total += a[11 * row + column] * before[column]
+            a[11 * row + 10] = total
+        row = 6
+        for foot in range(2):
+            if not (outer if foot == 0 else inner):
+                if Jf == 0.0:  # a massless foot in the air follows its motor
+                    a[11 * (4 + foot) + 4 + foot] = 1.0
+                    a[11 * (4 + foot) + 2 + foot] = -1.0
+                    a[11 * (4 + foot) + 10] = self.motor_outer_rate if foot == 0 else self.motor_inner_rate
+                continue
+            angle = self.foot_outer if foot == 0 else self.foot_inner
+            lean = self.leg_outer if foot == 0 else self.leg_inner
+            excess = self._excess(angle)
+            e = self.r * cos(excess) - self.d * cos(angle)
+            f = self.d * sin(angle) - self.r * sin(excess)
+            a[11 * row] = 1.0
+            a[11 * row + 2 + foot] = -self.el * cos(lean)
+            a[11 * row + 4 + foot] = -e
+            a[11 * (row + 1) + 1] = 1.0
+            a[11 * (row + 1) + 2 + foot] = self.el * sin(lean)
+            a[11 * (row + 1) + 4 + foot] = -f
+            for column in range(6):
+                a[11 * column + row] = -a[11 * row + column]
+                a[11 * column + row + 1] = -a[11 * (row + 1) + column]
+            row += 2
+        self._eliminate(n)
+        x = self.solution
+        self.hip_vx = x[0]
+        self.hip_vy = x[1]
+        self.leg_outer_rate = x[2]
+        self.leg_inner_rate = x[3]
+        self.foot_outer_rate = x[4]
+        self.foot_inner_rate = x[5]
+        self.P_stance_x = 0.0
+        self.P_stance_y = 0.0
+        self.P_swing_x = 0.0
+        self.P_swing_y = 0.0
+        row = 6
+        for foot in range(2):
+            if outer if foot == 0 else inner:
+                if foot == self.stance:
+                    self.P_stance_x = x[row]
+                    self.P_stance_y = x[row + 1]
+                else:
+                    self.P_swing_x = x[row]
+                    self.P_swing_y = x[row + 1]
+                row += 2
+
+    def _eliminate(self, n: cython.longlong) -> cython.void:
+        """Solve the first n equations of `matrix` (rows of 11, right-hand side last) by Gauss with pivots."""
+        i: cython.longlong
+        j: cython.longlong
+        k: cython.longlong
+        best: cython.longlong
+        factor: cython.double
+        held: cython.double
+        a = self.matrix
+        x = self.solution
+        for k in range(n):
+            best = k
+            for i in range(k + 1, n):
+                if fabs(a[11 * i + k]) > fabs(a[11 * best + k]):
+                    best = i
+            if best != k:
+                for j in range(11):
+                    held = a[11 * k + j]
+                    a[11 * k + j] = a[11 * best + j]
+                    a[11 * best + j] = held
+            for i in range(k + 1, n):
+                factor = a[11 * i + k] / a[11 * k + k]
+                if factor != 0.0:
+                    for j in range(k, n):
+                        a[11 * i + j] -= factor * a[11 * k + j]
+                    a[11 * i + 10] -= factor * a[11 * k + 10]
+        for k in range(n - 1, -1, -1):
+            factor = a[11 * k + 10]
+            for j in range(k + 1, n):
+                factor -= a[11 * k + j] * x[j]
+            x[k] = factor / a[11 * k + k]
+
+    # ---- a step with its events -------------------------------------------------------------------------------
+
+    def advance(self, h: cython.double) -> cython.void:
+        """Move on by `h` seconds under constant motor torques laws, events located inside (EQUATIONS 10)."""
+        remaining: cython.double = h
+        used: cython.double
+        tries: cython.longlong = 0
+        self.elapsed = 0.0
+        while remaining > 0.0 and self.mode != 4:
+            tries += 1
+            self._save()
+            if self.mode == 1 or self.mode == 2:
+                self.on_feet(remaining, 4)
+                if tries < 20 and self._pulled_now():
+                    continue  # a foot left the floor at the start of this piece: nothing has moved yet
+                self.update_pose()
+            else:
+                self.in_air(remaining, 4)
+                self.update_pose()
+            used = remaining
+            if tries < 20 and self.mode != 0 and self._crossed() < 0.0:
+                used = self._locate(remaining)
+                self.elapsed += used
+                self._act()
+            else:
+                self.elapsed += used
+            remaining -= used
+        if self.mode == 4:
+            self.elapsed = h
+        self.time_s += h
+        if self.mode != 0 and self.mode != 4:
+            self._watch(h)
+
+    def _save(self) -> cython.void:
+        s = self.saved
+        s[0] = self.foot_outer
+        s[1] = self.leg_outer
+        s[2] = self.leg_inner
+        s[3] = self.foot_inner
+        s[4] = self.motor_outer
+        s[5] = self.motor_inner
+        s[6] = self.foot_outer_rate
+        s[7] = self.leg_outer_rate
+        s[8] = self.leg_inner_rate
+        s[9] = self.foot_inner_rate
+        s[10] = self.motor_outer_rate
+        s[11] = self.motor_inner_rate
+        s[12] = self.hip_x
+        s[13] = self.hip_y
+        s[14] = self.hip_vx
+        s[15] = self.hip_vy
+
+    def _restore(self) -> cython.void:
+        s = self.saved
+        self.foot_outer = s[0]
+        self.leg_outer = s[1]
+        self.leg_inner = s[2]
+        self.foot_inner = s[3]
+        self.motor_outer = s[4]
+        self.motor_inner = s[5]
+        self.foot_outer_rate = s[6]
+        self.leg_outer_rate = s[7]
+        self.leg_inner_rate = s[8]
+        self.foot_inner_rate = s[9]
+        self.motor_outer_rate = s[10]
+        self.motor_inner_rate = s[11]
+        self.hip_x = s[12]
+        self.hip_y = s[13]
+        self.hip_vx = s[14]
+        self.hip_vy = s[15]
+
+    def _pulled_now(self) -> cython.bint:
+        """Let a foot go that the floor would have to pull at the start of this piece; True when one was."""
+        Fs: cython.double
+        Fw: cython.double
+        if self.stance == 0:
+            Fs, Fw = self.outer_Fy, self.inner_Fy
+        else:
+            Fs, Fw = self.inner_Fy, self.outer_Fy
+        if self.mode == 1:
+            if Fs >= 0.0:
+                return False
+            self._restore()
+            self.update_pose()
+            self.update_hip_rates()
+            self._leave(self.stance)
+            return True
+        if Fw >= 0.0 and (Fs >= 0.0 or not self.lift_leading):
+            return False
+        self._restore()
+        self.update_pose()
+        if Fw < Fs:
+            self._leave(1 - self.stance)
+        else:
+            self._leave(self.stance)
+        return True
+
+    def _crossed(self) -> cython.double:
+        """Below 0 when an event lies behind; `event` names it: 1 outer touch, 2 inner touch, 3 outer off, 4 inner off."""
+        value: cython.double
+        other: cython.double
+        self.event = 0
+        if self.mode == 2:
+            self.on_feet(0.0, 1)
+            value = self.outer_Fy
+            other = self.inner_Fy
+            if not self.lift_leading:
+                if self.stance == 0:
+                    value = 1.0
+                else:
+                    other = 1.0
+            if value <= other:
+                self.event = 3
+                return value
+            self.event = 4
+            return other
+        value = 1.0
+        if not (self.mode == 1 and self.stance == 0):
+            self.event = 1
+            value = self.gap_outer
+            if not self.outer_armed:
+                value += 2e-6
+        if not (self.mode == 1 and self.stance == 1):
+            other = self.gap_inner
+            if not self.inner_armed:
+                other += 2e-6
+            if other < value:
+                self.event = 2
+                value = other
+        return value
+
+    def _try(self, h: cython.double) -> cython.double:
+        """The event function after a piece of `h` seconds from the saved state."""
+        self._restore()
+        if self.mode == 1 or self.mode == 2:
+            self.on_feet(h, 4)
+        else:
+            self.in_air(h, 4)
+        self.update_pose()
+        return self._crossed()
+
+    def _locate(self, h: cython.double) -> cython.double:
+        """Time in (0, h] at which the event function falls through 0, within 1e-10 s (Illinois method)."""
+        low: cython.double = 0.0
+        high: cython.double = h
+        middle: cython.double
+        value: cython.double
+        f_high: cython.double = self._crossed()
+        f_low: cython.double
+        side: cython.longlong = 0
+        tries: cython.longlong = 0
+        self._restore()
+        self.update_pose()
+        f_low = self._crossed()
+        if f_low <= 0.0:
+            # already behind at the start: it happens now
+            return 0.0
+        while high - low > 1e-10 and tries < 60:
+            tries += 1
+            middle = (low * f_high - high * f_low) / (f_high - f_low)
+            if not low < middle < high:
+                middle = 0.5 * (low + high)
+            value = self._try(middle)
+            if value > 0.0:
+                low = middle
+                f_low = value
+                if side == 1:
+                    f_high *= 0.5
+                side = 1
+            else:
+                high = middle
+                f_high = value
+                if side == -1:
+                    f_low *= 0.5
+                side = -1
+            if value > -1e-13 and value <= 0.0:
+                break
+        self._try(high)
+        return high
+
+    def _act(self) -> cython.void:
+        """Do what the located event asks for."""
+        self.update_hip_rates()
+        if self.event == 1:
+            self._touch(0)
+        elif self.event == 2:
+            self._touch(1)
+        elif self.event == 3:
+            self._leave(0)
+        elif self.event == 4:
+            self._leave(1)
+
+    def event_time_ns(self) -> cython.longlong:
+        """Instant of the running event, ns."""
+        return self.step_start_ns + int(self.elapsed * 1e9 + 0.5)
+
+    def _touch(self, foot: cython.longlong) -> cython.void:
+        """The foot meets the floor: anchor it, take the impact, count a step when it strikes ahead."""
+        other: cython.longlong = 1 - foot
+        was_flight: cython.bint = self.mode == 3
+        ahead: cython.double
+        angle: cython.double = self.foot_outer if foot == 0 else self.foot_inner
+        lean: cython.double = self.leg_outer if foot == 0 else self.leg_inner
+        energy: cython.double = self.energy_J()
+        strike: cython.bint
+        if foot == 0:
+            self.anchor_outer = self.hip_x - self.chain_x(angle, lean)
+            self.outer_armed = False
+        else:
+            self.anchor_inner = self.hip_x - self.chain_x(angle, lean)
+            self.inner_armed = False
+        ahead = self.contact_x(foot) - self.contact_x(other)
+        strike = foot != self.last_strike_leg and ahead > 0.05
+        if was_flight:
+            self.impact(foot == 0, foot == 1)
+            if foot != self.stance:
+                self.P_stance_x = 0.0
+                self.P_stance_y = 0.0
+            self.mode = 1
+            self.stance = foot
+        else:
+            self._save()
+            self.impact(True, True)
+            # a foot that stubs beside or behind the other may throw it off the floor; at a strike the rule of
+            # the appendix holds unless `unilateral` (EQUATIONS 8)
+            if self.P_stance_y < 0.0 and (self.unilateral or not (strike or self.last_strike_leg == foot)):
+                self._restore()
+                self.impact(foot == 0, foot == 1)
+                self.mode = 1
+                if other == 0:
+                    self.outer_armed = False
+                else:
+                    self.inner_armed = False
+            else:
+                self.mode = 2
+            self.stance = foot
+        self.record.touch(
+            self.event_time_ns(),
+            foot,
+            strike,
+            ahead,
+            self.contact_x(foot),
+            angle,
+            (self.P_stance_x, self.P_stance_y, self.P_swing_x, self.P_swing_y),
+            energy - self.energy_J(),
+            self.mode == 2,
+            not self.foothold_due,
+            self.passing_gap,
+        )
+        if strike:
+            self.passing_gap = 1.0
+            self.last_strike_leg = foot
+            self.foothold_due = True
+            self.released_s = self.time_s
+        elif ahead <= 0.05 and foot != self.last_strike_leg and not self.foothold_due:
+            self.scuff_time_s = self.time_s
+        if self.mode == 1 and self.Jf == 0.0:
+            self._limp_foot(other)
+
+    def _leave(self, foot: cython.longlong) -> cython.void:
+        """The foot goes off the floor; the other one carries, or none does."""
+        if foot == 0:
+            self.outer_armed = False
+        else:
+            self.inner_armed = False
+        self.update_hip_rates()
+        if self.mode == 2:
+            self.mode = 1
+            self.stance = 1 - foot
+        else:
+            self.mode = 3
+        if self.Jf == 0.0:
+            self._limp_foot(foot)
+            if self.mode == 3:
+                self._limp_foot(1 - foot)
+        self.update_pose()
+        self.record.leave(self.event_time_ns(), foot, self.mode == 3)
+
+    def _watch(self, h: cython.double) -> cython.void:
+        """Once per step: arm feet that are clear, draw footholds, keep the extremes, judge falls."""
+        s: cython.double
+        w: cython.double
+        gap: cython.double
+        if not self.outer_armed and self.gap_outer > 1e-6:
+            self.outer_armed = True
+        if not self.inner_armed and self.gap_inner > 1e-6:
+            self.inner_armed = True
+        if self.stance == 0:
+            s, w, gap = self.leg_outer, self.leg_inner, self.gap_inner
+        else:
+            s, w, gap = self.leg_inner, self.leg_outer, self.gap_outer
+        if self.mode == 1:
+            if self.foothold_due and 1 - self.stance != self.last_strike_leg and s > w:
+                # the swing ankle passes the stance ankle: from here its next foothold counts
+                self.foothold_due = False
+                if self.stance == 0:
+                    self.height_inner = self.floor.next_height()
+                else:
+                    self.height_outer = self.floor.next_height()
+                self.update_pose()
+            # clearance: the lowest gap while the swing foot is less than 50 mm from passing
+            if gap < self.passing_gap and -0.05 < self.el * (s - w) < 0.05:
+                self.passing_gap = gap
+        self._keep_forces(h)
+        if self.mode == 4:
+            return
+        if self.hip_y < self.fall_height * self.el or s > self.fall_lean or s < -self.fall_lean:
+            if self.scuff_time_s >= 0.0 and self.time_s - self.scuff_time_s < 0.5:
+                self._fall("tripped")
+            elif s > 0.0:
+                self._fall("fell forward")
+            else:
+                self._fall("fell backward")
+        elif s - w > self.fall_split or w - s > self.fall_split:
+            self._fall("legs split")
+        elif self.time_s - self.released_s > self.stall_s:
+            self._fall("stalled")
+
+    def _keep_forces(self, h: cython.double) -> cython.void:
+        """Worst friction ratio and pull of the walk; time with more than the floor's friction."""
+        slips: cython.bint = False
+        if self.outer_Fy > 5.0:  # N; below that the ratio says nothing: chosen by us
+            if fabs(self.outer_Fx) > self.friction_ratio_max * self.outer_Fy:
+                self.friction_ratio_max = fabs(self.outer_Fx) / self.outer_Fy
+            slips = fabs(self.outer_Fx) > self.mu * self.outer_Fy
+        if self.inner_Fy > 5.0:
+            if fabs(self.inner_Fx) > self.friction_ratio_max * self.inner_Fy:
+                self.friction_ratio_max = fabs(self.inner_Fx) / self.inner_Fy
+            slips = slips or fabs(self.inner_Fx) > self.mu * self.inner_Fy
+        if slips:
+            self.slip_s += h
+        if self.outer_Fy < self.normal_force_min:
+            self.normal_force_min = self.outer_Fy
+        if self.inner_Fy < self.normal_force_min:
+            self.normal_force_min = self.inner_Fy
+
+    def _fall(self, cause) -> cython.void:
+        """The walk ends here: the body lies still, with the cause."""
+        self.mode = 4
+        self.cause = cause
+        self.record.fall(self.event_time_ns(), cause)
+        self.foot_outer_rate = 0.0
+        self.leg_outer_rate = 0.0
+        self.leg_inner_rate = 0.0
+        self.foot_inner_rate = 0.0
+        self.motor_outer_rate = 0.0
+        self.motor_inner_rate = 0.0
+        self.hip_vx = 0.0
+        self.hip_vy = 0.0
+        self.outer_Fx = 0.0
+        self.outer_Fy = 0.0
+        self.inner_Fx = 0.0
+        self.inner_Fy = 0.0
