@@ -1,0 +1,3 @@
+"""The main brain: estimator, concurrent state machines, modes, and the controller parameter sets."""
+
+import foundation  # noqa: F401

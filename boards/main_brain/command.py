@@ -1,0 +1,40 @@
+"""What a machine tells a motor board, and how machines come by the numbers of the data table."""
+
+import cython
+
+from datatable.generated import mb as table
+
+
+def table_id(name):
+    """Number of the variable `name` in the data table."""
+    return getattr(table, name)
+
+
+def take_ids(owner, names) -> None:
+    """Give `owner` one field per variable name, holding its number in the data table."""
+    for name in names:
+        setattr(owner, name, table_id(name))
+
+
+class MotorCommand:
+    """The three words of the compliant law I = I0 - K p - D dp/dt of one motor board.
+
+    board: prefix of its variables ("MCH"). All three are rewritten on every call, so the link sends them
+    in every slot, as the machines of 2011 did (facts control-and-data 1.2).
+    """
+
+    def __init__(self, store, board) -> None:
+        self.store = store
+        self.current_id = table_id(f"{board}_COMMAND_CURRENT")
+        self.stiffness_id = table_id(f"{board}_STIFFNESS")
+        self.dampness_id = table_id(f"{board}_DAMPNESS")
+
+    def send(self, current_A: float, stiffness: float, dampness: float) -> cython.void:
+        """I0 in A, K in A/rad, D in A s/rad."""
+        self.store.set_float(self.current_id, current_A)
+        self.store.set_float(self.stiffness_id, stiffness)
+        self.store.set_float(self.dampness_id, dampness)
+
+    def off(self) -> cython.void:
+        """A passive motor."""
+        self.send(0.0, 0.0, 0.0)

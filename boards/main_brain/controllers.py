@@ -1,0 +1,227 @@
+"""Controller parameter sets: what the computer would load into the main brain, and the operator's script.
+
+A set is a TOML file: `title`, `description`, [parameters] name = value, [reasons] name = "why", and
+[operator]. A set with `base = "other set"` holds only what differs, and each difference has a reason.
+Every parameter that the main brain's machines read has to have a value; units and ranges are those of
+the data table. Whatever is wrong is a UserError of one line: file, key, value, limit.
+"""
+
+import functools
+import math
+import pathlib
+import tomllib
+from dataclasses import dataclass, fields
+
+from datatable.generated import mb as table_ids
+from datatable.loader import load_table
+from foundation.user_error import UserError
+
+FOLDER = pathlib.Path(__file__).parent / "parameters"
+FIRST_OWN_ID = 314  # ids below are the robot's of 2016; its CTRL_ parameters belong to another controller
+
+
+@dataclass(frozen=True)
+class KeyPress:
+    """Key `key` (0-5) goes down at `time_s` after power-up and up `hold_s` later."""
+
+    key: int
+    time_s: float
+    hold_s: float
+
+
+@dataclass(frozen=True)
+class Operator:
+    """How a person starts the robot: held in a pose, keys, let go with a push.
+
+    stance: "outer" or "inner", the legs that stand while held; lean_rad: their lean forward of vertical;
+    hip_angle_rad: inner legs ahead; ankle angles as the joints measure them (1.68: sweet spot under the
+    leg); release_time_s after power-up; release_rate_rad_per_s: rate given to the standing legs, positive
+    forward; radio: steering stick, -1 to 1.
+    """
+
+    stance: str
+    lean_rad: float
+    hip_angle_rad: float
+    outer_ankle_rad: float
+    inner_ankle_rad: float
+    release_time_s: float
+    release_rate_rad_per_s: float
+    radio: float
+    keys: tuple
+
+
+# Allowed values of the operator's numbers: beyond these no person could hold or push the robot so, or the
+# joints do not reach (hip stop 0.614 rad, ankle 0 ... 3.2 rad; facts control-and-data 4, 1.1).
+OPERATOR_LIMITS = {
+    "lean_rad": (-0.5, 0.5),
+    "hip_angle_rad": (-0.6, 0.6),
+    "outer_ankle_rad": (0.0, 3.2),
+    "inner_ankle_rad": (0.0, 3.2),
+    "release_time_s": (0.0, 60.0),
+    "release_rate_rad_per_s": (-2.0, 2.0),
+    "radio": (-1.0, 1.0),
+}
+KEY_LIMITS = {"key": (0, 5), "time_s": (0.0, 60.0), "hold_s": (0.05, 60.0)}
+
+
+@dataclass(frozen=True)
+class Controller:
+    """One parameter set: `values` by name, `changes` against its base, `reasons` by name."""
+
+    name: str
+    path: str
+    title: str
+    description: str
+    base: str | None
+    values: dict
+    changes: dict
+    reasons: dict
+    operator: Operator
+
+    def apply(self, store) -> None:
+        """Write every parameter into the data table, as the computer's link would."""
+        for name, value in self.values.items():
+            store.set_float(getattr(table_ids, name), value)
+
+
+@functools.cache
+def parameter_rows() -> dict:
+    """Rows of the master table that are parameters of this controller, by name."""
+    return {
+        row.name: row
+        for row in load_table().variables
+        if row.id >= FIRST_OWN_ID and row.publisher == "PC" and "MB" in row.subscribers
+    }
+
+
+def available() -> tuple:
+    """Names of the sets that come with the project."""
+    return tuple(sorted(path.stem for path in FOLDER.glob("*.toml")))
+
+
+def load(name) -> Controller:
+    """The set `name`, or the file at that path when it ends in .toml."""
+    return _load(str(name), ())
+
+
+def _load(name, users) -> Controller:
+    path = pathlib.Path(name) if name.endswith(".toml") else FOLDER / f"{name}.toml"
+    if not name.endswith(".toml") and name not in available():
+        raise UserError(f"controller {name!r}: unknown; there are {', '.join(available())}, or give a .toml file")
+    data = _read(path)
+    place = str(path)
+    _only(data, ("title", "description", "base", "parameters", "reasons", "operator"), place)
+    title = _text(data, "title", place, path.stem)
+    description = _text(data, "description", place, "")
+    base_name = _text(data, "base", place, None)
+    base = None
+    if base_name is not None:
+        if base_name in users or base_name == path.stem:
+            raise UserError(f"{place}: base {base_name!r} leads back to this set")
+        base = _load(base_name, (*users, path.stem))
+    changes = _parameters(_table(data, "parameters", place), place)
+    values = dict(base.values) if base is not None else {}
+    values.update(changes)
+    missing = [each for each in parameter_rows() if each not in values]
+    if missing:
+        raise UserError(f"{place}: [parameters] lacks {', '.join(missing)}; give them or a base")
+    reasons = _table(data, "reasons", place)
+    for each, reason in reasons.items():
+        if each not in changes:
+            raise UserError(f"{place}: [reasons] {each}: no such entry in [parameters]")
+        if not isinstance(reason, str) or not reason.strip():
+            raise UserError(f"{place}: [reasons] {each} = {reason!r}: a sentence is expected")
+    if base is not None:
+        unexplained = [each for each in changes if each not in reasons]
+        if unexplained:
+            raise UserError(f"{place}: [reasons] lacks {', '.join(unexplained)}: each difference needs a reason")
+    if "operator" in data:
+        operator = _operator(_table(data, "operator", place), place)
+    elif base is not None:
+        operator = base.operator
+    else:
+        raise UserError(f"{place}: [operator] is missing; give it or a base")
+    return Controller(path.stem, place, title, description, base_name, values, changes, reasons, operator)
+
+
+def _read(path):
+    try:
+        text = path.read_bytes().decode()
+    except OSError as error:
+        raise UserError(f"controller file {path}: {error.strerror}") from None
+    except UnicodeDecodeError as error:
+        raise UserError(f"controller file {path}: not UTF-8 text (byte {error.start})") from None
+    try:
+        return tomllib.loads(text)
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
+        raise UserError(f"controller file {path}: not valid TOML: {error}") from None
+
+
+def _only(data, allowed, place) -> None:
+    for key in data:
+        if key not in allowed:
+            raise UserError(f"{place}: unknown key {key!r}; allowed are {', '.join(allowed)}")
+
+
+def _text(data, key, place, default):
+    value = data.get(key, default)
+    if value is not default and not isinstance(value, str):
+        raise UserError(f"{place}: {key} = {value!r}: text is expected")
+    return value
+
+
+def _table(data, key, place):
+    value = data.get(key, {})
+    if not isinstance(value, dict):
+        raise UserError(f"{place}: {key} = {value!r}: a table [{key}] is expected")
+    return value
+
+
+def _number(value, key, limits, unit, place):
+    """`value` as a float within `limits` (either may be None)."""
+    low, high = limits
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        raise UserError(f"{place}: {key} = {value!r}: a number is expected")
+    if (low is not None and value < low) or (high is not None and value > high):
+        raise UserError(f"{place}: {key} = {value!r} is outside {low} to {high}{' ' + unit if unit else ''}")
+    return float(value)
+
+
+def _parameters(table, place):
+    known = parameter_rows()
+    values = {}
+    for name, value in table.items():
+        if name not in known:
+            raise UserError(f"{place}: [parameters] {name}: no such parameter (`ranger-sim table list --board PC`)")
+        row = known[name]
+        values[name] = _number(value, name, (row.minimum, row.maximum), row.unit, place)
+    return values
+
+
+def _operator(table, place):
+    names = tuple(field.name for field in fields(Operator))
+    _only(table, names, f"{place}: [operator]")
+    for name in names:
+        if name not in table:
+            raise UserError(f"{place}: [operator] lacks {name}")
+    if table["stance"] not in ("outer", "inner"):
+        raise UserError(f'{place}: [operator] stance = {table["stance"]!r}: "outer" or "inner" is expected')
+    numbers = {
+        name: _number(table[name], f"[operator] {name}", limits, "", place) for name, limits in OPERATOR_LIMITS.items()
+    }
+    if not isinstance(table["keys"], list) or not all(isinstance(key, dict) for key in table["keys"]):
+        raise UserError(f"{place}: [operator] keys = {table['keys']!r}: tables [[operator.keys]] are expected")
+    keys = []
+    for press in table["keys"]:
+        _only(press, tuple(KEY_LIMITS), f"{place}: [[operator.keys]]")
+        for name in KEY_LIMITS:
+            if name not in press:
+                raise UserError(f"{place}: [[operator.keys]] lacks {name}")
+        checked = {
+            name: _number(press[name], f"[[operator.keys]] {name}", limits, "", place)
+            for name, limits in KEY_LIMITS.items()
+        }
+        if checked["key"] != int(checked["key"]):
+            raise UserError(f"{place}: [[operator.keys]] key = {press['key']!r}: a whole number is expected")
+        keys.append(KeyPress(int(checked["key"]), checked["time_s"], checked["hold_s"]))
+    return Operator(stance=table["stance"], keys=tuple(keys), **numbers)

@@ -1,0 +1,441 @@
+"""The estimator: filtered rates, leg angles, heel strike, step length, distance, energy.
+
+Facts control-and-data 3.1 (the form of the record walks); runs once per 2 ms slot before the machines.
+All angles in rad with the signs of facts 1.1: leg angles positive leaning forward, hip angle positive
+with the inner legs ahead, foot angle positive rolled towards the toe.
+
+The table holds single-precision words; inside, the estimator computes in double precision.
+ROBOT PARITY: the LPC3250 computed in single precision in part; its angle integral is double here.
+"""
+
+import cython
+
+from boards.main_brain.command import take_ids
+from boards.main_brain.filters import ButterworthFilter
+from boards.main_brain.geometry import FloorGeometry
+from datatable.generated import errors
+from datatable.store import DataStore
+
+if not cython.compiled:
+    from math import cos
+
+READS = (
+    "TIMESTAMP",
+    "MCH_ANGLE",
+    "MCH_ANG_RATE",
+    "MCH_MOTOR_VELOCITY",
+    "MCFO_RIGHT_ANKLE_ANGLE",
+    "MCFI_MID_ANKLE_ANGLE",
+    "MCFO_LEFT_HEEL_SENSE",
+    "MCFO_RIGHT_HEEL_SENSE",
+    "MCFI_LEFT_HEEL_SENSE",
+    "MCFI_RIGHT_HEEL_SENSE",
+    "UI_ANG_RATE_X",
+    "UI_ROLL",
+    "MCH_BATT_POWER",
+    "MCFO_BATT_POWER",
+    "MCFI_BATT_POWER",
+    "MCSI_BATT_POWER",
+    "CSR_MCU_POWER",
+    "FSM_RESET",
+    "P_E_GYRO_BIAS",
+    "P_E_ROLL_BIAS",
+    "P_E_RESET",
+    "P_E_HS_THRESHOLD",
+    "P_E_HS_BASE_LIMIT",
+    "P_E_HS_TICKS",
+    "P_E_HS_H_ANG",
+    "P_E_HS_F_ANG",
+    "P_E_MIN_STEP_TIME",
+    "P_E_FALL_ANG",
+)
+WRITES = (
+    "E_MCH_ANG_RATE",
+    "E_H_MOTOR_RATE",
+    "E_LO_ANGLE",
+    "E_LI_ANGLE",
+    "E_LO_RATE",
+    "E_LI_RATE",
+    "E_FO_ABSANG",
+    "E_FI_ABSANG",
+    "E_SWING_LEG",
+    "E_T_AFTER_HS",
+    "E_HS_TIME",
+    "E_STEP_COUNT",
+    "E_DISTANCE",
+    "E_ANKLE_HEIGHT",
+    "E_SWING_HEIGHT",
+    "E_LO_ERROR",
+    "E_HEEL_BASE_LEFT",
+    "E_HEEL_BASE_RIGHT",
+    "E_HEEL_STAGE",
+    "EST_CONTACT_OUTER",
+    "EST_CONTACT_INNER",
+    "EST_LAST_STEP_LENGTH",
+    "EST_LAST_STEP_ANGLE",
+    "EST_LAST_STEP_DURATION",
+    "EST_TOTAL_BATT_POWER",
+    "EST_ENERGY_MCH",
+    "EST_ENERGY_MCFO",
+    "EST_ENERGY_MCFI",
+    "EST_ENERGY_MCSI",
+    "EST_ENERGY_OVERHEAD",
+)
+
+
+class EnergyMeter:
+    """Trapezoidal integral of one published power over its own stamps; `energy_J`, `power_W`."""
+
+    def __init__(self) -> None:
+        self.started = False
+        self.stamp = 0
+        self.power_W = 0.0
+        self.energy_J = 0.0
+
+    def update(self, power_W: float, stamp_ms: cython.longlong) -> cython.bint:
+        """True when the datum was new. Gaps above 1 s are left out (chosen by us: nothing is known then)."""
+        gap: cython.longlong
+        if not self.started:
+            self.started = True
+            self.stamp = stamp_ms
+            self.power_W = power_W
+            return True
+        gap = (stamp_ms - self.stamp) & 0xFFFFFFFF
+        if gap == 0:
+            return False
+        if gap <= 1000:
+            self.energy_J += 0.0005 * (self.power_W + power_W) * gap
+        self.stamp = stamp_ms
+        self.power_W = power_W
+        return True
+
+
+class HeelSensor:
+    """One foot's contact sensor against its own baseline (counts)."""
+
+    def __init__(self) -> None:
+        self.baseline = 0.0
+        self.count = 0
+
+    def restart(self, raw: float) -> cython.void:
+        self.baseline = raw
+        self.count = 0
+
+    def average(self, raw: float) -> cython.void:
+        self.baseline = 0.9 * self.baseline + 0.1 * raw
+
+    def touches(self, raw: float, threshold: float, ticks: float, base_limit: float) -> cython.bint:
+        """One tick; True when raised above the baseline for `ticks` ticks and not judged faulty."""
+        if raw >= self.baseline + threshold:
+            self.count += 1
+        else:
+            self.count = 0
+        return self.count >= ticks and self.baseline < base_limit
+
+
+class Estimator:
+    """update() once per slot. report(code): callable told of an error that was noticed."""
+
+    def __init__(self, store, quirks, report) -> None:
+        self.store = store
+        self.report = report
+        self.code_time_violation = errors.EST_FILTER_TIME_VIOLATION
+        self.code_stutter = errors.EST_STUTTER_STEP
+        self.code_fall = errors.EST_ROBOT_FALL
+        take_ids(self, READS)
+        take_ids(self, WRITES)
+        self.per_tick_filter = quirks.rate_filter == "20_hz"
+        self.use_filtered_sum = quirks.heel_strike == "filtered_sum"
+        self.use_imu_roll = quirks.leg_angle == "imu_roll"
+        self.first_reset_is_full = quirks.first_step_full_reset
+        cutoff: float = 20.0 if self.per_tick_filter else 10.0
+        rate: float = 500.0 if self.per_tick_filter else 1000.0
+        self.hip_rate = ButterworthFilter(cutoff, rate)
+        self.hip_motor_rate = ButterworthFilter(cutoff, rate)
+        self.gyro_rate = ButterworthFilter(cutoff, rate)
+        self.roll = ButterworthFilter(20.0, 500.0)
+        self.outer_left_sense = ButterworthFilter(10.0, 500.0)
+        self.outer_right_sense = ButterworthFilter(10.0, 500.0)
+        self.inner_left_sense = ButterworthFilter(10.0, 500.0)
+        self.inner_right_sense = ButterworthFilter(10.0, 500.0)
+        self.floor = FloorGeometry()
+        if quirks.estimator_feet == "appendix":
+            self.floor.inner_radius_m = self.floor.outer_radius_m = 0.2  # appendix table of the plant
+            self.floor.inner_ankle_m = self.floor.outer_ankle_m = 0.11
+            self.sweet_spot_m = 0.09  # radius less ankle-to-centre distance
+        else:
+            self.sweet_spot_m = 0.054  # facts 3.1, both feet
+        self.ankle_zero = 1.68  # ankle angle with the sweet spot under a vertical leg, rad (facts 1.1)
+        self.foot_offset = 1.75  # published foot angle less geometric one, rad (facts 1.1)
+        self.left = HeelSensor()
+        self.right = HeelSensor()
+        self.stage = 0  # of the strike detector: 0 swing leg behind, 1 averaging, 2 armed
+        self.swing_leg = 1
+        self.outer_angle = 0.0
+        self.outer_raw_rate = 0.0
+        self.gyro_started = False
+        self.gyro_stamp = 0
+        self.strike_time = 0
+        self.first_step = True
+        self.steps = 0
+        self.distance_m = 0.0
+        self.front_foot = 0.0
+        self.fallen = False
+        self.violations = 0
+        self.meters = [EnergyMeter() for _ in range(5)]
+        self.hip_energy, self.outer_energy, self.inner_energy, self.steer_energy, self.mcu_energy = self.meters
+        store.set_int(self.E_SWING_LEG, 1)
+
+    def restart(self) -> cython.void:
+        """What the reset of the machines does to the estimator: inner legs swing, angle 0."""
+        self.stage = 0
+        self.swing_leg = 1
+        self.outer_angle = 0.0
+        self.first_step = True
+        self.fallen = False
+        self.strike_time = self.store.stamp(self.TIMESTAMP)
+        self.store.set_int(self.E_SWING_LEG, 1)
+
+    def zero_counters(self) -> cython.void:
+        """Steps, distance and energies from zero."""
+        meter: EnergyMeter
+        i: cython.longlong
+        self.steps = 0
+        self.distance_m = 0.0
+        for i in range(5):
+            meter = self.meters[i]
+            meter.energy_J = 0.0
+        self.store.set_int(self.E_STEP_COUNT, 0)
+        self.store.set_float(self.E_DISTANCE, 0.0)
+
+    def update(self) -> cython.void:
+        """One slot."""
+        store: DataStore = self.store
+        reset: cython.longlong = store.get_int(self.FSM_RESET)
+        hip: float = store.get_float(self.MCH_ANGLE)
+        outer_ankle: float = store.get_float(self.MCFO_RIGHT_ANKLE_ANGLE) - self.ankle_zero
+        inner_ankle: float = store.get_float(self.MCFI_MID_ANKLE_ANGLE) - self.ankle_zero
+        rate: float
+        if reset == 1:
+            self.restart()
+        self.update_rates()
+        self.update_outer_angle()
+        self.detect_strike(hip, outer_ankle, inner_ankle)
+        rate = -(self.gyro_rate.output - store.get_float(self.P_E_GYRO_BIAS))
+        store.set_float(self.E_LO_RATE, rate)
+        store.set_float(self.E_LI_RATE, rate - self.hip_rate.output)
+        store.set_float(self.E_LO_ANGLE, self.outer_angle)
+        store.set_float(self.E_LI_ANGLE, self.outer_angle - hip)
+        store.set_float(self.E_FO_ABSANG, self.outer_angle + outer_ankle + self.foot_offset)
+        store.set_float(self.E_FI_ABSANG, self.outer_angle - hip + inner_ankle + self.foot_offset)
+        store.set_int(self.E_T_AFTER_HS, (store.stamp(self.TIMESTAMP) - self.strike_time) & 0xFFFFFFFF)
+        self.update_heights(hip, outer_ankle, inner_ankle)
+        self.update_energy()
+        if reset == 2:
+            self.judge_fall(hip)
+
+    def update_rates(self) -> cython.void:
+        store: DataStore = self.store
+        bad: cython.longlong
+        if self.per_tick_filter:
+            self.hip_rate.push(store.get_float(self.MCH_ANG_RATE))
+            self.hip_motor_rate.push(store.get_float(self.MCH_MOTOR_VELOCITY))
+            self.gyro_rate.push(store.get_float(self.UI_ANG_RATE_X))
+        else:
+            self.hip_rate.push_stamped(store.get_float(self.MCH_ANG_RATE), store.stamp(self.MCH_ANG_RATE))
+            self.hip_motor_rate.push_stamped(
+                store.get_float(self.MCH_MOTOR_VELOCITY), store.stamp(self.MCH_MOTOR_VELOCITY)
+            )
+            self.gyro_rate.push_stamped(store.get_float(self.UI_ANG_RATE_X), store.stamp(self.UI_ANG_RATE_X))
+            bad = self.hip_rate.violations + self.hip_motor_rate.violations + self.gyro_rate.violations
+            if bad != self.violations:
+                self.violations = bad
+                self.report(self.code_time_violation)
+        store.set_float(self.E_MCH_ANG_RATE, self.hip_rate.output)
+        store.set_float(self.E_H_MOTOR_RATE, self.hip_motor_rate.output)
+
+    def update_outer_angle(self) -> cython.void:
+        """Trapezoid over the unfiltered gyro and its own ms stamps (or the IMU's roll, by quirk)."""
+        store: DataStore = self.store
+        stamp: cython.longlong = store.stamp(self.UI_ANG_RATE_X)
+        rate: float
+        gap: cython.longlong
+        if self.use_imu_roll:
+            # roll is positive with the foot ahead of the hip, so the lean is its opposite (facts 1.1, 3.2)
+            self.outer_angle = -(self.roll.push(store.get_float(self.UI_ROLL)) - store.get_float(self.P_E_ROLL_BIAS))
+            return
+        gap = (stamp - self.gyro_stamp) & 0xFFFFFFFF
+        if gap == 0:
+            return
+        rate = -(store.get_float(self.UI_ANG_RATE_X) - store.get_float(self.P_E_GYRO_BIAS))
+        if self.gyro_started and gap <= 100:
+            self.outer_angle += 0.0005 * (self.outer_raw_rate + rate) * gap
+        self.gyro_started = True
+        self.gyro_stamp = stamp
+        self.outer_raw_rate = rate
+
+    def detect_strike(self, hip: float, outer_ankle: float, inner_ankle: float) -> cython.void:
+        """Watch the swing feet; on contact flip the swing flag and reset the angle from the pose."""
+        store: DataStore = self.store
+        ahead: float
+        ankle: float
+        left: float
+        right: float
+        left_touches: cython.bint
+        right_touches: cython.bint
+        if self.swing_leg == 1:
+            ahead = hip
+            ankle = inner_ankle
+            left = store.get_float(self.MCFI_LEFT_HEEL_SENSE)
+            right = store.get_float(self.MCFI_RIGHT_HEEL_SENSE)
+        else:
+            ahead = -hip
+            ankle = outer_ankle
+            left = store.get_float(self.MCFO_LEFT_HEEL_SENSE)
+            right = store.get_float(self.MCFO_RIGHT_HEEL_SENSE)
+        if self.use_filtered_sum:
+            self.update_contact_sums()
+        if self.stage == 0:
+            if ahead <= store.get_float(self.P_E_HS_H_ANG):
+                return
+            self.left.restart(left)
+            self.right.restart(right)
+            self.set_stage(1)
+        if self.stage == 1:
+            if ankle + self.ankle_zero <= store.get_float(self.P_E_HS_F_ANG):
+                self.left.average(left)
+                self.right.average(right)
+                return
+            store.set_float(self.E_HEEL_BASE_LEFT, self.left.baseline)
+            store.set_float(self.E_HEEL_BASE_RIGHT, self.right.baseline)
+            self.set_stage(2)
+        if self.use_filtered_sum:
+            if self.contact_sum(self.swing_leg == 1) > 850.0:  # counts, facts 3.2
+                self.strike(hip, outer_ankle, inner_ankle)
+            return
+        left_touches = self.left.touches(
+            left,
+            store.get_float(self.P_E_HS_THRESHOLD),
+            store.get_float(self.P_E_HS_TICKS),
+            store.get_float(self.P_E_HS_BASE_LIMIT),
+        )
+        right_touches = self.right.touches(
+            right,
+            store.get_float(self.P_E_HS_THRESHOLD),
+            store.get_float(self.P_E_HS_TICKS),
+            store.get_float(self.P_E_HS_BASE_LIMIT),
+        )
+        if left_touches or right_touches:
+            self.strike(hip, outer_ankle, inner_ankle)
+
+    def set_stage(self, stage: cython.longlong) -> cython.void:
+        self.stage = stage
+        self.store.set_int(self.E_HEEL_STAGE, stage)
+
+    def update_contact_sums(self) -> cython.void:
+        """The four heel sensors through 10 Hz filters, once per slot (facts network-and-boards 4.17)."""
+        store: DataStore = self.store
+        self.outer_left_sense.push(store.get_float(self.MCFO_LEFT_HEEL_SENSE))
+        self.outer_right_sense.push(store.get_float(self.MCFO_RIGHT_HEEL_SENSE))
+        self.inner_left_sense.push(store.get_float(self.MCFI_LEFT_HEEL_SENSE))
+        self.inner_right_sense.push(store.get_float(self.MCFI_RIGHT_HEEL_SENSE))
+        store.set_float(self.EST_CONTACT_OUTER, self.contact_sum(False))
+        store.set_float(self.EST_CONTACT_INNER, self.contact_sum(True))
+
+    def contact_sum(self, inner: cython.bint) -> float:
+        if inner:
+            return self.inner_left_sense.output + self.inner_right_sense.output
+        return self.outer_left_sense.output + self.outer_right_sense.output
+
+    def strike(self, hip: float, outer_ankle: float, inner_ankle: float) -> cython.void:
+        """A heel strike: exchange the legs, correct the angle, count the step."""
+        store: DataStore = self.store
+        now: cython.longlong = store.stamp(self.TIMESTAMP)
+        lasted: cython.longlong = (now - self.strike_time) & 0xFFFFFFFF
+        error: float
+        geometric: float
+        length: float
+        if self.floor.solve(hip, outer_ankle, inner_ankle):
+            geometric = self.floor.front_leg if hip < 0.0 else self.floor.rear_leg
+            error = self.outer_angle - geometric
+            if self.first_step and self.first_reset_is_full:
+                self.outer_angle -= error
+            else:
+                self.outer_angle -= store.get_float(self.P_E_RESET) * error
+            store.set_float(self.E_LO_ERROR, error)
+            length = self.floor.ankle_distance_m
+            if not self.first_step:
+                length += self.sweet_spot_m * (self.floor.rear_foot - self.front_foot)
+            self.front_foot = self.floor.front_foot
+            self.distance_m += length
+            store.set_float(self.EST_LAST_STEP_LENGTH, length)
+            store.set_float(self.EST_LAST_STEP_ANGLE, hip)
+            store.set_float(self.E_DISTANCE, self.distance_m)
+        self.steps += 1
+        store.set_int(self.E_STEP_COUNT, self.steps)
+        store.set_float(self.EST_LAST_STEP_DURATION, 0.001 * lasted)
+        if not self.first_step and lasted < store.get_float(self.P_E_MIN_STEP_TIME):
+            self.report(self.code_stutter)
+        self.first_step = False
+        self.strike_time = now
+        store.set_u32(self.E_HS_TIME, now)
+        self.swing_leg = 1 - self.swing_leg
+        store.set_int(self.E_SWING_LEG, self.swing_leg)
+        self.set_stage(0)
+
+    def update_heights(self, hip: float, outer_ankle: float, inner_ankle: float) -> cython.void:
+        """Height of the swing ankle over the stance ankle, and of the swing foot over the floor."""
+        store: DataStore = self.store
+        lo: float = self.outer_angle
+        li: float = lo - hip
+        rise: float = self.floor.leg_m * (cos(lo) - cos(li))
+        outer_sole: float
+        inner_sole: float
+        outer_sole = self.floor.outer_radius_m - self.floor.outer_ankle_m * cos(lo + outer_ankle)
+        inner_sole = self.floor.inner_radius_m - self.floor.inner_ankle_m * cos(li + inner_ankle)
+        if self.swing_leg == 1:
+            store.set_float(self.E_ANKLE_HEIGHT, rise)
+            store.set_float(self.E_SWING_HEIGHT, rise + outer_sole - inner_sole)
+        else:
+            store.set_float(self.E_ANKLE_HEIGHT, -rise)
+            store.set_float(self.E_SWING_HEIGHT, -rise + inner_sole - outer_sole)
+
+    def update_energy(self) -> cython.void:
+        """Battery energy of each motor stage and of the electronics, from their published powers."""
+        store: DataStore = self.store
+        new: cython.bint = False
+        if self.hip_energy.update(store.get_float(self.MCH_BATT_POWER), store.stamp(self.MCH_BATT_POWER)):
+            store.set_float(self.EST_ENERGY_MCH, self.hip_energy.energy_J)
+            new = True
+        if self.outer_energy.update(store.get_float(self.MCFO_BATT_POWER), store.stamp(self.MCFO_BATT_POWER)):
+            store.set_float(self.EST_ENERGY_MCFO, self.outer_energy.energy_J)
+            new = True
+        if self.inner_energy.update(store.get_float(self.MCFI_BATT_POWER), store.stamp(self.MCFI_BATT_POWER)):
+            store.set_float(self.EST_ENERGY_MCFI, self.inner_energy.energy_J)
+            new = True
+        if self.steer_energy.update(store.get_float(self.MCSI_BATT_POWER), store.stamp(self.MCSI_BATT_POWER)):
+            store.set_float(self.EST_ENERGY_MCSI, self.steer_energy.energy_J)
+            new = True
+        if self.mcu_energy.update(store.get_float(self.CSR_MCU_POWER), store.stamp(self.CSR_MCU_POWER)):
+            store.set_float(self.EST_ENERGY_OVERHEAD, self.mcu_energy.energy_J)
+            new = True
+        if new:
+            store.set_float(
+                self.EST_TOTAL_BATT_POWER,
+                self.hip_energy.power_W
+                + self.outer_energy.power_W
+                + self.inner_energy.power_W
+                + self.steer_energy.power_W
+                + self.mcu_energy.power_W,
+            )
+
+    def judge_fall(self, hip: float) -> cython.void:
+        """A leg beyond 45 degrees is a fall (facts network-and-boards 4.17); told once per walk."""
+        limit: float = self.store.get_float(self.P_E_FALL_ANG)
+        lo: float = self.outer_angle
+        li: float = lo - hip
+        if self.fallen or self.first_step:
+            return
+        if lo > limit or lo < -limit or li > limit or li < -limit:
+            self.fallen = True
+            self.report(self.code_fall)

@@ -1,0 +1,42 @@
+from boards.main_brain.command cimport MotorCommand
+from boards.main_brain.state_machine cimport State, StateMachine
+from datatable.store cimport DataStore
+
+cdef class FootMachine:
+    cdef public DataStore store
+    cdef public bint inner, wait_for_strike, strike_logged
+    cdef public double hip_sign, hip_margin, push_gain, push_angle, push_start
+    cdef public long long own_swing, push_ms, passive_ms
+    # variables of the data table
+    cdef public long long MCH_ANGLE, E_SWING_LEG, E_ANKLE_HEIGHT, E_AM_L_ABSRATE, FSM_RESET
+    cdef public long long C_F_ST_F_ANG, C_F_ST_F_RATE, P_F_ST_F_TANG, C_F_PP_F_ANG, C_F_PP_F_RATE
+    cdef public long long P_F_PP_F_TANG, P_F_PP_FRAC_ANG, P_F_PP_F_ABSANG, C_F_FU_F_ANG
+    cdef public long long C_F_FU_F_RATE, P_F_FU_F_TANG, P_F_FU_H_ANG, P_F_FU_F_CABL_STRETCH
+    cdef public long long C_F_FD_F_ANG, C_F_FD_F_RATE, P_F_FD_F_TANG, C_F_SST_F_ANG
+    cdef public long long C_F_SST_F_RATE, P_F_SST_F_TANG, P_F_AP_TIME, D_F_ON, DP_F_PP_L_ABSRATE
+    cdef public long long DP_H_AM_L_ABSRATE, DC_F_PP_L_ABSRATE, DC_F_PP_L_ABSRATE2
+    cdef public long long motor_position, ankle_angle, own_absolute, other_absolute
+    cdef public long long push_height, push_to_strike, missed_pushes, state_number
+    cdef public MotorCommand motor
+    cdef public StateMachine machine
+    cpdef void publish_state(self, number)
+    cpdef void track_absolute(self, double target, double stiffness, double dampness)
+    cpdef void track_motor(self, double target, double stiffness, double dampness)
+    cpdef void hold_flipped_down(self)
+    cpdef void hold_standing(self)
+    cpdef void track_stance(self)
+    cpdef void enter_prepush(self)
+    cpdef void push(self)
+    cpdef bint correction_applies(self)
+    cpdef double push_target(self)
+    cpdef void enter_afterpush(self)
+    cpdef void go_limp(self)
+    cpdef void flip_up(self)
+    cpdef void flip_down(self)
+    cpdef bint reset_wanted(self)
+    cpdef bint own_foot_struck(self)
+    cpdef bint other_foot_struck(self)
+    cpdef bint push_is_due(self)
+    cpdef bint push_is_done(self)
+    cpdef bint cable_is_slack_enough(self)
+    cpdef bint own_leg_is_ahead(self)

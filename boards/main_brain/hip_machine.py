@@ -1,0 +1,276 @@
+"""The hip machine: swings the legs, holds them in an emergency, corrects once per step.
+
+Facts control-and-data 1.4. "HI" means that the inner legs swing (outer stance), "HO" the outer ones.
+The entry current H_TEST1 of the preswing states is not here: it was 0, and the main action of the same
+tick overwrites it before anything is sent. The premid discrete controller (D_H2_ON) is not here either:
+it was off and all its gains were 0.
+"""
+
+import cython
+
+from boards.main_brain.command import MotorCommand, take_ids
+from boards.main_brain.state_machine import State, StateMachine
+from datatable.store import DataStore
+
+READS = (
+    "MCH_ANGLE",
+    "E_MCH_ANG_RATE",
+    "E_LO_ANGLE",
+    "E_LI_ANGLE",
+    "E_SWING_LEG",
+    "E_T_AFTER_HS",
+    "E_AM_L_ABSRATE",
+    "E_AM_H_ANG",
+    "E_AM_H_RATE",
+    "E_AM_TIMER",
+    "MCFO_RIGHT_ANKLE_RATE",
+    "MCFI_ANKLE_RATE",
+    "FSM_LEG",
+    "FSM_RESET",
+    "C_H_OUTER_STIFFNESS",
+    "C_H_PM_H_RATE",
+    "P_H_PM_H_TRATE",
+    "P_H_PM_TIME",
+    "P_H_PM_F_RATE",
+    "C_HI_SH_H_ANG",
+    "C_HI_SH_H_RATE",
+    "P_HI_SH_H_TANG",
+    "C_H_EH_H_ANG",
+    "C_H_EH_H_RATE",
+    "P_H_EH_H_TANG",
+    "P_H_EHOLD_ANG",
+    "P_H_EHOLD_ANG2",
+    "P_H_EH_L_TRATE",
+    "D_H_ON",
+    "DP_F_PP_L_ABSRATE",
+    "DP_H_AM_H_ANG",
+    "DP_H_AM_L_ABSRATE",
+    "DP_H_AM_H_RATE",
+    "DP_H_AM_TIME1",
+    "DP_H_AM_TIME2",
+    "DC2_H_AM_H_ANG1",
+    "DC2_H_AM_H_ANG2",
+    "DC2_H_AM_H_RATE1",
+    "DC2_H_AM_H_RATE2",
+    "DC3_H_AM_H_ANG1",
+    "DC3_H_AM_H_ANG2",
+    "DC3_H_AM_L_ABSRATE1",
+    "DC3_H_AM_L_ABSRATE2",
+    "DC3_H_AM_H_RATE1",
+    "DC3_H_AM_H_RATE2",
+)
+WRITES = ("E_H_DI1", "E_H_DI2", "FSM_HIP")
+
+
+class HipMachine:
+    """States 0 HI_starthold ... 9 stop; `machine` is stepped after the leg machine."""
+
+    def __init__(self, store) -> None:
+        self.store = store
+        take_ids(self, READS)
+        take_ids(self, WRITES)
+        self.motor = MotorCommand(store, "MCH")
+        self.premid_time = 0  # ms after heel strike at which premid began
+        self.first_correction = 0.0  # A
+        self.second_correction = 0.0  # A
+        self.leg_lo_aftermid = 5  # numbers of the leg machine's states
+        self.leg_li_aftermid = 2
+        self.machine = StateMachine(
+            "hip",
+            states=(
+                #     no. name             entry               main
+                State(0, "HI_starthold", None, self.hold_start),
+                State(1, "HO_preswing", None, self.motor.off),
+                State(2, "HO_premid", self.enter_premid, self.swing_outer),
+                State(3, "HO_aftermid", self.enter_aftermid, self.swing_outer_corrected),
+                State(4, "HI_preswing", None, self.motor.off),
+                State(5, "HI_premid", self.enter_premid, self.swing_inner),
+                State(6, "HI_aftermid", self.enter_aftermid, self.swing_inner_corrected),
+                State(7, "HI_ehold", None, self.hold_inner_ahead),
+                State(8, "HO_ehold", None, self.hold_outer_ahead),
+                State(9, "stop", None, self.motor.off),
+            ),
+            transitions=(
+                # from                            to             when
+                (NOT_STOP, "HI_starthold", self.reset_wanted),
+                ("HI_starthold", "HO_preswing", self.inner_struck),
+                ("HO_preswing", "HO_premid", self.outer_foot_flips_up),
+                ("HO_premid", "HO_aftermid", self.inner_stance_past_mid),
+                (("HO_aftermid", "HO_ehold"), "HI_preswing", self.outer_struck),
+                ("HI_preswing", "HI_premid", self.inner_foot_flips_up),
+                ("HI_premid", "HI_aftermid", self.outer_stance_past_mid),
+                (("HI_aftermid", "HI_ehold"), "HO_preswing", self.inner_struck),
+                (("HI_premid", "HI_aftermid"), "HI_ehold", self.inner_leg_hangs),
+                (("HO_premid", "HO_aftermid"), "HO_ehold", self.outer_leg_hangs),
+            ),
+            on_change=self.publish_state,
+        )
+
+    def publish_state(self, number) -> cython.void:
+        self.store.set_int(self.FSM_HIP, number)
+
+    # -- actions ---------------------------------------------------------------------------------
+
+    def hold_start(self) -> cython.void:
+        """Hold the inner legs ahead until the first heel strike."""
+        stiffness: float = self.store.get_float(self.C_HI_SH_H_ANG)
+        self.motor.send(
+            stiffness * self.store.get_float(self.P_HI_SH_H_TANG),
+            stiffness,
+            self.store.get_float(self.C_HI_SH_H_RATE),
+        )
+
+    def hold_inner_ahead(self) -> cython.void:
+        stiffness: float = self.store.get_float(self.C_H_EH_H_ANG)
+        self.motor.send(
+            stiffness * self.store.get_float(self.P_H_EH_H_TANG),
+            stiffness,
+            self.store.get_float(self.C_H_EH_H_RATE),
+        )
+
+    def hold_outer_ahead(self) -> cython.void:
+        stiffness: float = self.store.get_float(self.C_H_EH_H_ANG)
+        self.motor.send(
+            -stiffness * self.store.get_float(self.P_H_EH_H_TANG),
+            stiffness,
+            self.store.get_float(self.C_H_EH_H_RATE),
+        )
+
+    def enter_premid(self) -> cython.void:
+        self.premid_time = self.store.get_int(self.E_T_AFTER_HS)
+
+    def enter_aftermid(self) -> cython.void:
+        """The discrete corrections of this step from the figures of mid-stance."""
+        store: DataStore = self.store
+        mode: float = store.get_float(self.D_H_ON)
+        v: float = store.get_float(self.E_AM_L_ABSRATE)
+        angle: float = store.get_float(self.E_AM_H_ANG) - store.get_float(self.DP_H_AM_H_ANG)
+        rate: float = store.get_float(self.E_AM_H_RATE) - store.get_float(self.DP_H_AM_H_RATE)
+        slow: cython.bint
+        if mode == 0.0:
+            self.first_correction = 0.0
+            self.second_correction = 0.0
+        else:
+            slow = v < store.get_float(self.DP_F_PP_L_ABSRATE)
+            if mode == 2.0:
+                slow = True
+            elif mode == 3.0:
+                slow = False
+            if slow:
+                self.first_correction = -(
+                    store.get_float(self.DC2_H_AM_H_ANG1) * angle + store.get_float(self.DC2_H_AM_H_RATE1) * rate
+                )
+                self.second_correction = -(
+                    store.get_float(self.DC2_H_AM_H_ANG2) * angle + store.get_float(self.DC2_H_AM_H_RATE2) * rate
+                )
+            else:
+                v = v - store.get_float(self.DP_H_AM_L_ABSRATE)
+                self.first_correction = -(
+                    store.get_float(self.DC3_H_AM_H_ANG1) * angle
+                    + store.get_float(self.DC3_H_AM_L_ABSRATE1) * v
+                    + store.get_float(self.DC3_H_AM_H_RATE1) * rate
+                )
+                self.second_correction = -(
+                    store.get_float(self.DC3_H_AM_H_ANG2) * angle
+                    + store.get_float(self.DC3_H_AM_L_ABSRATE2) * v
+                    + store.get_float(self.DC3_H_AM_H_RATE2) * rate
+                )
+        store.set_float(self.E_H_DI1, self.first_correction)
+        store.set_float(self.E_H_DI2, self.second_correction)
+
+    def correction(self) -> float:
+        """The correction in force now, A."""
+        timer: float = self.store.get_int(self.E_AM_TIMER)
+        if timer < self.store.get_float(self.DP_H_AM_TIME1):
+            return self.first_correction
+        if timer < self.store.get_float(self.DP_H_AM_TIME2):
+            return self.second_correction
+        return 0.0
+
+    def base_current(self, direction: float) -> float:
+        """Rate control of the swing, one-sided, within the window after premid began; A.
+
+        direction: +1 for the inner legs swinging, -1 for the outer ones.
+        """
+        store: DataStore = self.store
+        elapsed: float = store.get_int(self.E_T_AFTER_HS) - self.premid_time
+        current: float
+        if elapsed >= store.get_float(self.P_H_PM_TIME):
+            return 0.0
+        current = store.get_float(self.C_H_PM_H_RATE) * (
+            direction * store.get_float(self.P_H_PM_H_TRATE) - store.get_float(self.E_MCH_ANG_RATE)
+        )
+        if current * direction < 0.0:
+            return 0.0
+        return current
+
+    def swing_inner(self) -> cython.void:
+        self.motor.send(self.base_current(1.0), 0.0, 0.0)
+
+    def swing_inner_corrected(self) -> cython.void:
+        self.motor.send(self.base_current(1.0) + self.correction(), 0.0, 0.0)
+
+    def swing_outer(self) -> cython.void:
+        self.motor.send(self.base_current(-1.0), self.store.get_float(self.C_H_OUTER_STIFFNESS), 0.0)
+
+    def swing_outer_corrected(self) -> cython.void:
+        self.motor.send(
+            self.base_current(-1.0) - self.correction(),
+            self.store.get_float(self.C_H_OUTER_STIFFNESS),
+            0.0,
+        )
+
+    # -- conditions ------------------------------------------------------------------------------
+
+    def reset_wanted(self) -> cython.bint:
+        return self.store.get_int(self.FSM_RESET) == 1
+
+    def inner_struck(self) -> cython.bint:
+        return self.store.get_int(self.E_SWING_LEG) == 0
+
+    def outer_struck(self) -> cython.bint:
+        return self.store.get_int(self.E_SWING_LEG) == 1
+
+    def inner_foot_flips_up(self) -> cython.bint:
+        return self.store.get_float(self.MCFI_ANKLE_RATE) < -self.store.get_float(self.P_H_PM_F_RATE)
+
+    def outer_foot_flips_up(self) -> cython.bint:
+        return self.store.get_float(self.MCFO_RIGHT_ANKLE_RATE) < -self.store.get_float(self.P_H_PM_F_RATE)
+
+    def outer_stance_past_mid(self) -> cython.bint:
+        return self.store.get_float(self.E_LO_ANGLE) > 0.0 and self.store.get_int(self.FSM_LEG) == self.leg_lo_aftermid
+
+    def inner_stance_past_mid(self) -> cython.bint:
+        return self.store.get_float(self.E_LI_ANGLE) > 0.0 and self.store.get_int(self.FSM_LEG) == self.leg_li_aftermid
+
+    def hangs(self, direction: float) -> cython.bint:
+        """The swing leg is far ahead in a slow walk, or is on its way back."""
+        store: DataStore = self.store
+        ahead: float = direction * store.get_float(self.MCH_ANGLE)
+        if ahead > store.get_float(self.P_H_EHOLD_ANG) and store.get_float(self.E_AM_L_ABSRATE) < store.get_float(
+            self.P_H_EH_L_TRATE
+        ):
+            return True
+        return (
+            0.0 < ahead < store.get_float(self.P_H_EHOLD_ANG2)
+            and direction * store.get_float(self.E_MCH_ANG_RATE) < 0.0
+        )
+
+    def inner_leg_hangs(self) -> cython.bint:
+        return self.hangs(1.0)
+
+    def outer_leg_hangs(self) -> cython.bint:
+        return self.hangs(-1.0)
+
+
+NOT_STOP = (
+    "HI_starthold",
+    "HO_preswing",
+    "HO_premid",
+    "HO_aftermid",
+    "HI_preswing",
+    "HI_premid",
+    "HI_aftermid",
+    "HI_ehold",
+    "HO_ehold",
+)

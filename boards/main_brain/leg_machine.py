@@ -1,0 +1,217 @@
+"""The leg machine: which leg stands, how far the step is, and the figures of mid-stance.
+
+Facts control-and-data 1.3. It commands nothing. Its figures (stance leg rate v, hip angle alpha and hip
+rate omega at mid-stance, each averaged over the last two steps) serve the discrete corrections of the
+hip and foot machines, which run after it in the same tick.
+
+Kept as the robot had them: omega is formed with the hip angle that the *same* leg had at its previous
+mid-stance, because the newer one is stored afterwards; a heel strike before mid-stance leaves the
+machine in premid until the stance leg is next upright.
+"""
+
+import cython
+
+from boards.main_brain.command import take_ids
+from boards.main_brain.state_machine import ANY, State, StateMachine
+from datatable.store import DataStore
+
+READS = (
+    "E_LO_ANGLE",
+    "E_LI_ANGLE",
+    "E_SWING_LEG",
+    "E_T_AFTER_HS",
+    "MCH_ANGLE",
+    "MCFO_RIGHT_ANKLE_RATE",
+    "MCFI_ANKLE_RATE",
+    "FSM_RESET",
+    "P_H_PM_F_RATE",
+    "P_L_START_ABSRATE",
+    "P_L_START_H_RATE",
+)
+WRITES = (
+    "E_AM_L_ABSRATE",
+    "E_AM_H_ANG",
+    "E_AM_H_RATE",
+    "E_AM_TIME",
+    "E_AM_TIMER",
+    "E_PS_TIME",
+    "E_SS_L_ANG",
+    "E_SS_L_ABSRATE",
+    "FSM_LEG",
+)
+
+
+class StanceLeg:
+    """What is remembered of the steps in which one leg pair stands, and the actions that gather it.
+
+    angle_id: the pair's absolute angle in the table; hip_sign: +1 for the outer pair, so that
+    hip_sign * h is positive while the swing leg is ahead of the standing one.
+    """
+
+    def __init__(self, owner, angle_id, hip_sign: float) -> None:
+        self.owner = owner
+        self.store = owner.store
+        self.other = None
+        self.angle_id = angle_id
+        self.hip_sign = hip_sign
+        self.forget()
+
+    def forget(self) -> cython.void:
+        """The state before the first step."""
+        self.strike_angle = 0.0
+        self.preswing_ms = 0
+        self.ss0_known = False
+        self.ss0_angle = 0.0
+        self.ss0_rate = 0.0
+        self.ss0_time = 0
+        self.ss0_hip = 0.0
+        self.mid_rate = 0.0
+        self.mid_hip = 0.0
+        self.mid_hip_rate = 0.0
+        self.mid_time = 0.0
+
+    def angle_before_vertical(self) -> float:
+        """Stance leg angle A, positive before vertical, rad."""
+        return -self.store.get_float(self.angle_id)
+
+    def hip_ahead(self) -> float:
+        """Hip angle, positive while the swing leg is ahead, rad."""
+        return self.hip_sign * self.store.get_float(self.owner.MCH_ANGLE)
+
+    def enter_preswing(self) -> cython.void:
+        self.strike_angle = self.angle_before_vertical()
+        self.preswing_ms = 0
+
+    def count_preswing(self) -> cython.void:
+        self.preswing_ms += 2
+
+    def leave_preswing(self) -> cython.void:
+        self.store.set_float(self.owner.E_PS_TIME, self.preswing_ms)
+
+    def enter_premid(self) -> cython.void:
+        """Single stance begins (SS0): remember the pose, publish the means over both legs."""
+        self.ss0_known = True
+        self.ss0_angle = self.angle_before_vertical()
+        self.ss0_time = self.store.get_int(self.owner.E_T_AFTER_HS)
+        self.ss0_hip = self.hip_ahead()
+        if self.preswing_ms > 0:
+            self.ss0_rate = (self.strike_angle - self.ss0_angle) * 1000.0 / self.preswing_ms
+        self.store.set_float(self.owner.E_SS_L_ANG, 0.5 * (self.ss0_angle + self.other.ss0_angle))
+        self.store.set_float(self.owner.E_SS_L_ABSRATE, 0.5 * (self.ss0_rate + self.other.ss0_rate))
+
+    def enter_aftermid(self) -> cython.void:
+        """Mid-stance: rates by finite differences since SS0, averaged with the other leg's last ones.
+
+        Without an SS0 before (the start state) the presets stay; facts give no rule, chosen by us.
+        """
+        store: DataStore = self.store
+        span_ms: float
+        hip: float
+        rate: float
+        if not self.ss0_known:
+            return
+        hip = self.hip_ahead()
+        span_ms = store.get_int(self.owner.E_T_AFTER_HS) - self.ss0_time
+        if span_ms < 2.0:
+            span_ms = 2.0  # a stopped or restarted step clock must not divide by zero (chosen by us)
+        self.mid_rate = 1000.0 * self.ss0_angle / span_ms
+        if not self.owner.rate_of_previous_step:
+            self.mid_hip = hip
+        self.mid_hip_rate = (self.mid_hip - self.ss0_hip) * 1000.0 / span_ms
+        self.mid_hip = hip
+        self.mid_time = span_ms
+        rate = 0.5 * (self.mid_rate + self.other.mid_rate)
+        if rate >= 1.5:
+            rate = 1.5
+        elif rate <= 0.0:
+            rate = 0.01
+        store.set_float(self.owner.E_AM_L_ABSRATE, rate)
+        store.set_float(self.owner.E_AM_H_ANG, 0.5 * (self.mid_hip + self.other.mid_hip))
+        store.set_float(self.owner.E_AM_H_RATE, 0.5 * (self.mid_hip_rate + self.other.mid_hip_rate))
+        store.set_float(self.owner.E_AM_TIME, 0.5 * (self.mid_time + self.other.mid_time))
+
+
+class LegMachine:
+    """States 0 LI_preswing ... 6 stop; "LO" means that the outer legs stand. `machine` is stepped."""
+
+    def __init__(self, store, quirks) -> None:
+        self.store = store
+        take_ids(self, READS)
+        take_ids(self, WRITES)
+        self.outer = outer = StanceLeg(self, self.E_LO_ANGLE, 1.0)
+        self.inner = inner = StanceLeg(self, self.E_LI_ANGLE, -1.0)
+        outer.other = inner
+        inner.other = outer
+        self.aftermid_ms = 0
+        self.rate_of_previous_step = quirks.hip_mid_rate_of_previous_step
+        self.machine = StateMachine(
+            "leg",
+            states=(
+                #     no. name            entry                 main                  exit
+                State(5, "LO_aftermid", outer.enter_aftermid, self.count_aftermid, self.leave_aftermid),
+                State(0, "LI_preswing", inner.enter_preswing, inner.count_preswing, inner.leave_preswing),
+                State(1, "LI_premid", inner.enter_premid),
+                State(2, "LI_aftermid", inner.enter_aftermid, self.count_aftermid, self.leave_aftermid),
+                State(3, "LO_preswing", outer.enter_preswing, outer.count_preswing, outer.leave_preswing),
+                State(4, "LO_premid", outer.enter_premid),
+                State(6, "stop"),
+            ),
+            transitions=(
+                # from           to              when
+                (ANY, "LO_aftermid", self.reset_wanted),
+                ("LO_preswing", "LO_premid", self.inner_foot_flips_up),
+                ("LO_premid", "LO_aftermid", self.outer_leg_past_vertical),
+                ("LO_aftermid", "LI_preswing", self.inner_struck),
+                ("LI_preswing", "LI_premid", self.outer_foot_flips_up),
+                ("LI_premid", "LI_aftermid", self.inner_leg_past_vertical),
+                ("LI_aftermid", "LO_preswing", self.outer_struck),
+            ),
+            on_change=self.publish_state,
+        )
+
+    def preset(self) -> cython.void:
+        """Before the first step: both legs' figures at the presets (v 0.5 rad/s, omega 1.66 rad/s)."""
+        rate: float = self.store.get_float(self.P_L_START_ABSRATE)
+        hip_rate: float = self.store.get_float(self.P_L_START_H_RATE)
+        self.outer.forget()
+        self.inner.forget()
+        self.outer.mid_rate = rate
+        self.inner.mid_rate = rate
+        self.outer.mid_hip_rate = hip_rate
+        self.inner.mid_hip_rate = hip_rate
+        self.store.set_float(self.E_AM_L_ABSRATE, rate)
+        self.store.set_float(self.E_AM_H_ANG, 0.0)
+        self.store.set_float(self.E_AM_H_RATE, hip_rate)
+        self.store.set_float(self.E_AM_TIME, 0.0)
+
+    def publish_state(self, number) -> cython.void:
+        self.store.set_int(self.FSM_LEG, number)
+
+    def count_aftermid(self) -> cython.void:
+        self.aftermid_ms += 2
+        self.store.set_int(self.E_AM_TIMER, self.aftermid_ms)
+
+    def leave_aftermid(self) -> cython.void:
+        self.aftermid_ms = 0
+        self.store.set_int(self.E_AM_TIMER, 0)
+
+    def reset_wanted(self) -> cython.bint:
+        return self.store.get_int(self.FSM_RESET) == 1
+
+    def inner_foot_flips_up(self) -> cython.bint:
+        return self.store.get_float(self.MCFI_ANKLE_RATE) < -self.store.get_float(self.P_H_PM_F_RATE)
+
+    def outer_foot_flips_up(self) -> cython.bint:
+        return self.store.get_float(self.MCFO_RIGHT_ANKLE_RATE) < -self.store.get_float(self.P_H_PM_F_RATE)
+
+    def outer_leg_past_vertical(self) -> cython.bint:
+        return self.store.get_float(self.E_LO_ANGLE) > 0.0
+
+    def inner_leg_past_vertical(self) -> cython.bint:
+        return self.store.get_float(self.E_LI_ANGLE) > 0.0
+
+    def inner_struck(self) -> cython.bint:
+        return self.store.get_int(self.E_SWING_LEG) == 0
+
+    def outer_struck(self) -> cython.bint:
+        return self.store.get_int(self.E_SWING_LEG) == 1

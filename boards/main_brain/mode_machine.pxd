@@ -1,0 +1,41 @@
+from boards.main_brain.estimator cimport Estimator
+from boards.main_brain.foot_machines cimport FootMachine
+from boards.main_brain.hip_machine cimport HipMachine
+from boards.main_brain.leg_machine cimport LegMachine
+from boards.main_brain.state_machine cimport State, StateMachine
+from boards.main_brain.steering_machine cimport SteeringMachine
+from datatable.store cimport DataStore
+
+cdef class ModeMachine:
+    cdef public DataStore store
+    cdef public Estimator estimator
+    # variables of the data table
+    cdef public long long TIMESTAMP, UI_BUTTONS, MCH_BATT_VOLTAGE, E_STEP_COUNT, E_DISTANCE
+    cdef public long long E_SWING_LEG, E_FO_PP2HS_TIME, E_FI_PP2HS_TIME, P_UI_LCD_TIME
+    cdef public long long P_UI_SONG_STEPS, P_UI_PP2HS_TTIME, D_UI_STOP_ON_FALL
+    cdef public long long FSM_UI, FSM_RESET, EST_UI_FSM_MODE, UI_SET_LED_1, UI_SET_LED_3
+    cdef public long long UI_EMPTY_TX2, MCSI_COMMAND_CURRENT, MCSI_STIFFNESS, MCSI_DAMPNESS
+    cdef public list lcd_ids
+    cdef public LegMachine leg
+    cdef public HipMachine hip
+    cdef public FootMachine inner_foot, outer_foot
+    cdef public SteeringMachine steering
+    cdef public long long buttons, pressed, last_song_steps, page, page_time, late_push_light
+    cdef public StateMachine machine
+    cpdef void update(self)
+    cpdef void publish_state(self, number)
+    cpdef void motors_off(self)
+    cpdef void steering_off(self)
+    cpdef void enter_calibrate(self)
+    cpdef void enter_standby(self)
+    cpdef void enter_stop(self)
+    cpdef void enter_walk(self)
+    cpdef void leave_walk(self)
+    cpdef void walk_display(self)
+    cpdef void show_page(self)
+    cpdef void show_mode(self, name, colour)
+    cpdef void show(self, upper, lower)
+    cpdef bint key_0(self)
+    cpdef bint key_1(self)
+    cpdef bint key_2(self)
+    cpdef bint robot_fell(self)

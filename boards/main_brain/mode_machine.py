@@ -1,0 +1,216 @@
+"""The mode machine: what the keys choose, what the display shows, and the walk's machines inside it.
+
+Facts control-and-data 1.7. Keys: 0 calibrate (from standby), 1 walk (from calibrate or standby), 2
+standby (from walk). A key counts when it goes down. Chosen by us, because no fact gives it: a fall leads
+from walk to stop (the 2016 firmware goes to its safe mode), keys 0 and 2 lead out of stop; colours of
+light 1 as in 2016 (facts network-and-boards 6.4) where the mode exists there.
+"""
+
+import cython
+
+from boards.main_brain.command import table_id, take_ids
+from boards.main_brain.foot_machines import FootMachine
+from boards.main_brain.hip_machine import HipMachine
+from boards.main_brain.leg_machine import LegMachine
+from boards.main_brain.state_machine import State, StateMachine
+from boards.main_brain.steering_machine import SteeringMachine
+from datatable.store import DataStore
+
+READS = (
+    "TIMESTAMP",
+    "UI_BUTTONS",
+    "MCH_BATT_VOLTAGE",
+    "E_STEP_COUNT",
+    "E_DISTANCE",
+    "E_SWING_LEG",
+    "E_FO_PP2HS_TIME",
+    "E_FI_PP2HS_TIME",
+    "P_UI_LCD_TIME",
+    "P_UI_SONG_STEPS",
+    "P_UI_PP2HS_TTIME",
+    "D_UI_STOP_ON_FALL",
+)
+WRITES = (
+    "FSM_UI",
+    "FSM_RESET",
+    "EST_UI_FSM_MODE",
+    "UI_SET_LED_1",
+    "UI_SET_LED_3",
+    "UI_EMPTY_TX2",
+    "MCSI_COMMAND_CURRENT",
+    "MCSI_STIFFNESS",
+    "MCSI_DAMPNESS",
+)
+LCD_QUADS = ("UI_SET_LCD_QUAD_1", "UI_SET_LCD_QUAD_2", "UI_SET_LCD_QUAD_3", "UI_SET_LCD_QUAD_4")
+
+# Colour words: red byte 0, green byte 1, blue byte 2 (facts network-and-boards 4.11, 6.4).
+RED = 0x000080
+GREEN = 0x008000
+BLUE = 0x800000
+PURPLE = 0xE22B8A
+DARK = 0
+
+
+def lcd_words(upper, lower):
+    """Four words of four characters, first character in byte 0, for a display of two lines of eight."""
+    text = f"{upper[:8]:<8}{lower[:8]:<8}".encode("ascii", "replace")
+    return [int.from_bytes(text[i : i + 4], "little") for i in (0, 4, 8, 12)]
+
+
+class ModeMachine:
+    """update() once per slot, after the estimator. Holds every machine of the walk."""
+
+    def __init__(self, store, quirks, estimator) -> None:
+        self.store = store
+        self.estimator = estimator
+        take_ids(self, READS)
+        take_ids(self, WRITES)
+        self.leg = LegMachine(store, quirks)
+        self.hip = HipMachine(store)
+        self.inner_foot = FootMachine(store, quirks, True)
+        self.outer_foot = FootMachine(store, quirks, False)
+        self.steering = SteeringMachine(store)
+        walk_machines = (
+            self.leg.machine,  # first: the others see its figures in the same tick
+            self.hip.machine,
+            self.inner_foot.machine,
+            self.outer_foot.machine,
+            self.steering.machine,
+        )
+        self.lcd_ids = [table_id(name) for name in LCD_QUADS]
+        self.buttons = 0
+        self.pressed = 0  # keys that went down since the slot before
+        self.last_song_steps = 0
+        self.page = 0
+        self.page_time = 0
+        self.late_push_light = -1
+        self.machine = StateMachine(
+            "mode",
+            states=(
+                #     no. name         entry                 main                exit
+                State(0, "calibrate", self.enter_calibrate, self.motors_off),
+                State(1, "standby", self.enter_standby, self.motors_off),
+                State(2, "walk", self.enter_walk, self.walk_display, self.leave_walk, walk_machines),
+                State(3, "stop", self.enter_stop, self.motors_off),
+            ),
+            transitions=(
+                # from                     to            when
+                (("standby", "stop"), "calibrate", self.key_0),
+                (("calibrate", "standby"), "walk", self.key_1),
+                (("walk", "stop"), "standby", self.key_2),
+                ("walk", "stop", self.robot_fell),
+            ),
+            on_change=self.publish_state,
+        )
+        self.store.set_int(self.FSM_RESET, 1)
+
+    def update(self) -> cython.void:
+        """One slot: keys, then the machines."""
+        buttons: cython.longlong = self.store.get_int(self.UI_BUTTONS)
+        self.pressed = buttons & ~self.buttons
+        self.buttons = buttons
+        self.machine.step()
+
+    def publish_state(self, number) -> cython.void:
+        self.store.set_int(self.FSM_UI, number)
+        self.store.set_float(self.EST_UI_FSM_MODE, number)
+
+    # -- actions ---------------------------------------------------------------------------------
+
+    def motors_off(self) -> cython.void:
+        """All commands and gains 0, rewritten in every slot as in the standby of 2016."""
+        self.hip.motor.off()
+        self.outer_foot.motor.off()
+        self.inner_foot.motor.off()
+
+    def steering_off(self) -> cython.void:
+        self.steering.off()
+        self.store.set_float(self.MCSI_STIFFNESS, 0.0)
+        self.store.set_float(self.MCSI_DAMPNESS, 0.0)
+
+    def enter_calibrate(self) -> cython.void:
+        """Power-up mode: motors off, counters to zero."""
+        self.estimator.zero_counters()
+        self.steering_off()
+        self.show_mode("CALIBRAT", PURPLE)
+        self.last_song_steps = 0
+
+    def enter_standby(self) -> cython.void:
+        self.steering_off()
+        self.show_mode("STANDBY", GREEN)
+
+    def enter_stop(self) -> cython.void:
+        self.steering_off()
+        self.show_mode("STOP", RED)
+
+    def enter_walk(self) -> cython.void:
+        self.store.set_int(self.FSM_RESET, 2)
+        self.store.set_int(self.E_SWING_LEG, 1)
+        self.leg.preset()
+        self.show_mode("WALK", BLUE)
+        self.page = 0
+        self.page_time = self.store.stamp(self.TIMESTAMP)
+
+    def leave_walk(self) -> cython.void:
+        """Motors to zero, then one tick of every machine with the reset flag: all return to their starts."""
+        machine: StateMachine
+        walk: State = self.machine.current
+        i: cython.longlong
+        self.motors_off()
+        self.store.set_int(self.FSM_RESET, 1)
+        for i in range(len(walk.machines)):
+            machine = walk.machines[i]
+            machine.step()
+
+    def walk_display(self) -> cython.void:
+        """Every 4 s the next of battery, steps, metres; a song every 3000 steps; a light for late pushes."""
+        store: DataStore = self.store
+        now: cython.longlong = store.stamp(self.TIMESTAMP)
+        elapsed: float = (now - self.page_time) & 0xFFFFFFFF
+        song: float = store.get_float(self.P_UI_SONG_STEPS)
+        steps: cython.longlong = store.get_int(self.E_STEP_COUNT)
+        limit: float = store.get_float(self.P_UI_PP2HS_TTIME)
+        late: cython.longlong = 0
+        if elapsed >= store.get_float(self.P_UI_LCD_TIME):
+            self.page_time = now
+            self.show_page()
+        if song >= 1.0 and steps - self.last_song_steps >= song:
+            self.last_song_steps = steps
+            store.set_int(self.UI_EMPTY_TX2, 1)
+        if store.get_int(self.E_FO_PP2HS_TIME) > limit or store.get_int(self.E_FI_PP2HS_TIME) > limit:
+            late = 1
+        if late != self.late_push_light:
+            self.late_push_light = late
+            store.set_int(self.UI_SET_LED_3, 0x000080 if late else 0)
+
+    def show_page(self) -> cython.void:
+        if self.page == 0:
+            self.show("BATTERY", f"{self.store.get_float(self.MCH_BATT_VOLTAGE):.1f} V")
+        elif self.page == 1:
+            self.show("STEPS", f"{self.store.get_int(self.E_STEP_COUNT)}")
+        else:
+            self.show("METRES", f"{self.store.get_float(self.E_DISTANCE):.1f}")
+        self.page = (self.page + 1) % 3
+
+    def show_mode(self, name, colour) -> cython.void:
+        self.show(name, "")
+        self.store.set_int(self.UI_SET_LED_1, colour)
+
+    def show(self, upper, lower) -> cython.void:
+        """Two lines of eight characters to the display of the user interface board."""
+        for number, word in zip(self.lcd_ids, lcd_words(upper, lower), strict=True):
+            self.store.set_int(number, word)
+
+    # -- conditions ------------------------------------------------------------------------------
+
+    def key_0(self) -> cython.bint:
+        return (self.pressed & 1) != 0
+
+    def key_1(self) -> cython.bint:
+        return (self.pressed & 2) != 0
+
+    def key_2(self) -> cython.bint:
+        return (self.pressed & 4) != 0
+
+    def robot_fell(self) -> cython.bint:
+        return self.estimator.fallen and self.store.get_float(self.D_UI_STOP_ON_FALL) != 0.0

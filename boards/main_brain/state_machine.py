@@ -1,0 +1,129 @@
+"""Concurrent, nestable finite state machines with entry, main and exit actions.
+
+One tick of a machine (facts control-and-data 1.0): of the transitions declared for the present state,
+the first one whose condition holds is taken; with none, the state's main action runs (after its entry
+action, the first time). Taking a transition runs, in the same tick, the exit action of the old state,
+then entry and main of the new one; an old state that was entered but never ran gets its entry and main
+first. There is one transition per tick at most, and a transition to the present state is no change.
+
+A state may hold machines of its own. They are stepped after its main action, in their written order,
+so a state of an outer machine (walking) contains machines that run concurrently (one per motor).
+Conditions and actions are callables without arguments; conditions must not change anything.
+"""
+
+import cython
+
+
+class State:
+    """One state. `entry`, `main`, `exit`: callables or None; `machines`: the machines nested in it."""
+
+    def __init__(self, number, name, entry=None, main=None, exit=None, machines=()) -> None:
+        self.number = number
+        self.name = name
+        self.entry = entry
+        self.main = main
+        self.exit = exit
+        self.machines = list(machines)
+        self.transitions = []
+
+    def run_main(self) -> object:
+        """The main action, then one tick of every nested machine."""
+        machine: StateMachine
+        i: cython.longlong
+        if self.main is not None:
+            self.main()
+        for i in range(len(self.machines)):
+            machine = self.machines[i]
+            machine.step()
+
+
+class Transition:
+    """What `condition` leads to; made by StateMachine from its table."""
+
+    def __init__(self, target, condition) -> None:
+        self.target = target
+        self.condition = condition
+
+
+class StateMachine:
+    """A machine built from two tables.
+
+    states: State objects, the first is the start state. transitions: rows (from, to, condition) of state
+    names; `from` may be one name, a tuple of names or ANY. For each state the order of the rows is the
+    order of precedence. on_change: callable told the new state's number, or None.
+    """
+
+    def __init__(self, name, states, transitions, on_change=None) -> None:
+        self.name = name
+        self.states = list(states)
+        self.on_change = on_change
+        self.changes = 0
+        by_name = {}
+        numbers = set()
+        for state in self.states:
+            if state.name in by_name or state.number in numbers:
+                raise ValueError(f"machine {name}: state {state.number} {state.name} is declared twice")
+            by_name[state.name] = state
+            numbers.add(state.number)
+        for row in transitions:
+            origins, target, condition = row
+            if origins == ANY:
+                origins = tuple(by_name)
+            elif isinstance(origins, str):
+                origins = (origins,)
+            for origin in (*origins, target):
+                if origin not in by_name:
+                    raise ValueError(f"machine {name}: no state {origin!r} for the transition to {target!r}")
+            for origin in origins:
+                if origin != target:
+                    by_name[origin].transitions.append(Transition(by_name[target], condition))
+        self.start = self.states[0]
+        self.current = self.start
+        self.entered = False
+
+    def state_names(self) -> object:
+        """Names by state number."""
+        return {state.number: state.name for state in self.states}
+
+    def put(self, name) -> object:
+        """Place the machine in a state whose entry action has yet to run."""
+        for state in self.states:
+            if state.name == name:
+                self.current = state
+                self.entered = False
+                self._tell()
+                return
+        raise ValueError(f"machine {self.name}: no state {name!r}")
+
+    def _tell(self) -> object:
+        if self.on_change is not None:
+            self.on_change(self.current.number)
+
+    def step(self) -> object:
+        """One tick."""
+        state: State = self.current
+        transition: Transition
+        i: cython.longlong
+        for i in range(len(state.transitions)):
+            transition = state.transitions[i]
+            if transition.condition():
+                if not self.entered:
+                    if state.entry is not None:
+                        state.entry()
+                    state.run_main()
+                if state.exit is not None:
+                    state.exit()
+                self.changes += 1
+                state = transition.target
+                self.current = state
+                self.entered = False
+                self._tell()
+                break
+        if not self.entered:
+            self.entered = True
+            if state.entry is not None:
+                state.entry()
+        state.run_main()
+
+
+ANY = "any state"

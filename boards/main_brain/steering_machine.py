@@ -1,0 +1,139 @@
+"""The steering machine: twists the inner feet one way in the air and the other way on the ground.
+
+Facts control-and-data 1.6, the form of the record walk: the command is a count of PWM duty that the
+steering board writes straight to its drive. The radio's channel 0 says how much; within the dead band
+the motor is shut down.
+"""
+
+import cython
+
+from boards.main_brain.command import take_ids
+from boards.main_brain.state_machine import ANY, State, StateMachine
+
+READS = (
+    "MCH_ANGLE",
+    "E_SWING_LEG",
+    "UI_RC_0",
+    "FSM_RESET",
+    "P_S_NULL_H_TANG",
+    "P_S_MAX_CUR",
+    "P_S_ILST_TWITCH_FRAC",
+    "P_S_ILST_TWITCH_TIME",
+    "P_S_RC_DEADBAND",
+)
+WRITES = ("MCSI_COMMAND_CURRENT", "MCSI_STIFFNESS", "MCSI_DAMPNESS", "MCSI_SHUTDOWN", "E_RC_STEER", "FSM_STEER")
+
+
+class SteeringMachine:
+    """States 0 front, 1 stance, 2 back, 3 swing of the inner legs; stepped last of the walk's machines."""
+
+    def __init__(self, store) -> None:
+        self.store = store
+        take_ids(self, READS)
+        take_ids(self, WRITES)
+        self.twist = 0.0  # S, PWM counts
+        self.ramp_start = 0.0
+        self.ramp_change = 0.0
+        self.ramp_fraction = 0.0
+        self.shut_down = -1  # last word sent to the board, -1 before the first
+        self.machine = StateMachine(
+            "steering",
+            states=(
+                #     no. name      entry               main
+                State(0, "front", self.enter_front),
+                State(1, "stance", self.enter_stance, self.ramp_to_other_side),
+                State(2, "back", self.enter_back),
+                State(3, "swing", None, self.send_twist),
+            ),
+            transitions=(
+                # from      to        when
+                (ANY, "front", self.reset_wanted),
+                ("front", "stance", self.inner_struck),
+                ("stance", "back", self.inner_falls_behind),
+                ("back", "swing", self.outer_struck),
+                ("swing", "front", self.inner_comes_forward),
+            ),
+            on_change=self.publish_state,
+        )
+
+    def publish_state(self, number) -> cython.void:
+        self.store.set_int(self.FSM_STEER, number)
+
+    def send(self, counts: float) -> cython.void:
+        self.store.set_float(self.MCSI_COMMAND_CURRENT, counts)
+
+    def switch(self, shut_down: cython.longlong) -> cython.void:
+        """Tell the board once per change to drive or to shut down."""
+        if shut_down != self.shut_down:
+            self.shut_down = shut_down
+            self.store.set_int(self.MCSI_SHUTDOWN, shut_down)
+
+    def off(self) -> cython.void:
+        """No twist, motor shut down."""
+        self.twist = 0.0
+        self.send(0.0)
+        self.switch(1)
+
+    def radio_command(self) -> float:
+        """-1 ... 1 from the pulse width of channel 0 in 1/60 us (85 000 is the centre).
+
+        A radio that never sent a pulse (width 0) means straight on: facts give no rule, chosen by us,
+        because the formula alone would then steer fully to one side.
+        """
+        width: float = self.store.get_float(self.UI_RC_0)
+        command: float
+        if width <= 0.0:
+            return 0.0
+        command = 4e-5 * width - 3.4
+        if command > 1.0:
+            return 1.0
+        if command < -1.0:
+            return -1.0
+        return command
+
+    def enter_back(self) -> cython.void:
+        """Read the radio once per stride."""
+        command: float = self.radio_command()
+        dead: float = self.store.get_float(self.P_S_RC_DEADBAND)
+        self.store.set_float(self.E_RC_STEER, command)
+        if -dead <= command <= dead:
+            self.off()
+        else:
+            self.twist = self.store.get_float(self.P_S_MAX_CUR) * command
+            self.switch(0)
+
+    def send_twist(self) -> cython.void:
+        self.send(self.twist)
+
+    def enter_front(self) -> cython.void:
+        self.ramp_start = self.twist
+        self.ramp_change = -(1.0 + self.store.get_float(self.P_S_ILST_TWITCH_FRAC)) * self.twist
+
+    def enter_stance(self) -> cython.void:
+        self.ramp_fraction = 0.0
+
+    def ramp_to_other_side(self) -> cython.void:
+        """From S to -S * twitch in steps of 1/twitch time per tick (1.0: in one tick), then hold."""
+        time: float = self.store.get_float(self.P_S_ILST_TWITCH_TIME)
+        if self.ramp_fraction < 1.0:
+            self.ramp_fraction = self.ramp_fraction + (1.0 / time if time > 0.0 else 1.0)
+            if self.ramp_fraction > 1.0:
+                self.ramp_fraction = 1.0
+        self.send(self.ramp_start + self.ramp_fraction * self.ramp_change)
+
+    # -- conditions ------------------------------------------------------------------------------
+
+    def reset_wanted(self) -> cython.bint:
+        return self.store.get_int(self.FSM_RESET) == 1
+
+    def inner_struck(self) -> cython.bint:
+        return self.store.get_int(self.E_SWING_LEG) == 0
+
+    def outer_struck(self) -> cython.bint:
+        return self.store.get_int(self.E_SWING_LEG) == 1
+
+    def inner_falls_behind(self) -> cython.bint:
+        return self.store.get_float(self.MCH_ANGLE) < self.store.get_float(self.P_S_NULL_H_TANG)
+
+    def inner_comes_forward(self) -> cython.bint:
+        return self.store.get_float(self.MCH_ANGLE) > -self.store.get_float(self.P_S_NULL_H_TANG)
