@@ -311,7 +311,10 @@ def read_boards(
         lines[name] = line_of_table(text, name)
         boards[name] = board_of(name, table, channels, faults.at(path.name, lines[name], shown(name)[1:-1]))
     by_number: dict[int, str] = {}
+    without_number = {fault.row for fault in faults.found if fault.field == "number"}
     for name, board in boards.items():
+        if name in without_number:
+            continue
         first = by_number.setdefault(board.number, name)
         if first != name:
             faults.at(path.name, lines[name], name)("number", f"{board.number} is also the number of {first}")
