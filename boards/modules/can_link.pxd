@@ -1,0 +1,28 @@
+from boards.modules.error_module cimport ErrorModule
+from boards.modules.network_time cimport NetworkTime
+from boards.modules.receiver cimport Receiver
+from firmware_sim.microcontroller cimport Microcontroller
+from firmware_sim.peripherals.can_controller cimport CanController
+from foundation.events cimport EventQueue
+from foundation.numbers cimport word_of_float, word_of_i32
+
+cdef class CanLink:
+    cdef public Microcontroller chip
+    cdef public CanController controller
+    cdef public NetworkTime time
+    cdef public ErrorModule errors
+    cdef public bint report_full
+    cdef public long long code_bus_off, code_warning, code_overrun, code_passive, code_bus_rx, code_bus_tx
+    cdef public long long code_receive_full, code_send_full
+    cdef public list receivers
+    cdef public long long[::1] rx_frames, rx_ids, rx_values, rx_times, tx_ids, tx_values, tx_times
+    cdef public long long rx_write, rx_read, tx_write, tx_read
+    cdef public long long received, delivered, ignored, receive_lost, queued, send_lost, most_waiting
+    cpdef object on_receive(self, EventQueue queue)
+    cpdef object on_error(self, EventQueue queue)
+    cpdef object receive_all(self)
+    cpdef bint send_words(self, long long identifier, long long value_word, long long time_word)
+    cpdef bint send_float(self, long long identifier, double value)
+    cpdef bint send_int(self, long long identifier, long long value)
+    cpdef void send_error(self, long long identifier)
+    cpdef object feed(self)

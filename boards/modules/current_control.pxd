@@ -1,0 +1,15 @@
+from boards.modules.error_module cimport ErrorModule
+from boards.modules.mcu_led cimport McuLed
+from boards.modules.motor_limits cimport MotorLimits
+from boards.modules.motor_output cimport MotorOutput
+from foundation.numbers cimport fixed_multiply
+
+cdef class CurrentControl:
+    cdef public MotorLimits limits
+    cdef public MotorOutput output
+    cdef public McuLed leds
+    cdef public ErrorModule errors
+    cdef public long long code_saturated, code_sum, code_duty, code_stopped
+    cdef public long long proportional_gain, integral_gain, integral_limit, integral, error, duty, calls
+    cdef public bint block_positive, block_negative
+    cpdef void update(self, long long target, long long current)

@@ -1,0 +1,106 @@
+"""The inner loop: proportional-integral control of the motor current, 2 kHz, duty in counts of 600
+(appendix 4.7; facts network-and-boards 4.3)."""
+
+import cython
+
+from boards.modules.error_module import ErrorModule
+from boards.modules.mcu_led import McuLed
+from boards.modules.motor_limits import MotorLimits
+from boards.modules.motor_output import MotorOutput
+
+if not cython.compiled:
+    from foundation.numbers import fixed_multiply
+
+# Counts per A and sample, all four boards (facts 4.2). The current settles within one sample, so the motor is a
+# gain of 1/31 A per count (1.34 ohm at 25.9 V): the integral alone has its pole at 1 - 20/31 = 0.35.
+INTEGRAL_GAIN = 20
+# Chosen by us: a fifth of the integral gain, "with the emphasis on the integral" (appendix 4.7). Poles of
+# z^2 + (a + b - 1) z - a with a = 4/31, b = 20/31: 0.49 and -0.26; at 1.0 ohm and 28 V (21 counts/A): 0.37, -0.51.
+PROPORTIONAL_GAIN = 4
+
+START_CALLS = 2  # the first calls only feed the watchdog
+
+
+class CurrentControl:
+    """Current loop of one motor. Gains in counts per A; 16.16 inside. `duty` is the last sum, in counts.
+
+    `block_positive`, `block_negative`: directions closed by the joint's safety check.
+    """
+
+    def __init__(
+        self,
+        limits: MotorLimits,
+        output: MotorOutput,
+        leds: McuLed,
+        errors: ErrorModule,
+        codes,
+        proportional_gain=PROPORTIONAL_GAIN,
+        integral_gain=INTEGRAL_GAIN,
+    ) -> None:
+        self.limits = limits
+        self.output = output
+        self.leds = leds
+        self.errors = errors
+        self.code_saturated = codes.MC_INTEG_SATUR
+        self.code_sum = codes.MC_FIXED_LIMIT
+        self.code_duty = codes.MC_PWM_LIMIT
+        self.code_stopped = codes.MC_NOT_RUNNING
+        self.proportional_gain = proportional_gain * 65536
+        self.integral_gain = integral_gain * 65536
+        self.integral_limit = output.largest * 65536 // integral_gain
+        self.integral = 0  # A samples x 65536
+        self.error = 0
+        self.duty = 0
+        self.calls = 0
+        self.block_positive = False
+        self.block_negative = False
+
+    def update(self, target: cython.longlong, current: cython.longlong) -> cython.void:
+        """One sample: drive the measured `current` towards `target` (A x 65536, the latter already limited)."""
+        total: cython.longlong
+        counts: cython.longlong
+        off: cython.bint
+        self.output.feed_watchdog()
+        if self.calls < 2:  # START_CALLS
+            self.calls += 1
+            return
+        self.limits.monitor(current)
+        off = self.limits.too_hot or self.limits.overloaded
+        if off != self.output.stopped:
+            self.output.stopped = off
+            if off:
+                self.leds.on(0)  # GREEN
+            else:
+                self.leds.off(0)
+        if (self.block_positive and target > 0) or (self.block_negative and target < 0):
+            target = 0
+        if not self.output.running():
+            self.errors.report(self.code_stopped)
+            self.duty = 0
+            self.output.write(0)
+            return
+        self.error = target - current
+        self.integral += self.error
+        if self.integral > self.integral_limit:
+            self.integral = self.integral_limit
+            self.errors.report(self.code_saturated)
+        elif self.integral < -self.integral_limit:
+            self.integral = -self.integral_limit
+            self.errors.report(self.code_saturated)
+        total = (self.proportional_gain * self.error >> 16) + fixed_multiply(self.integral_gain, self.integral)
+        if total > 0x7FFFFFFF:
+            total = 0x7FFFFFFF
+            self.errors.report(self.code_sum)
+        elif total < -0x80000000:
+            total = -0x80000000
+            self.errors.report(self.code_sum)
+        total = self.limits.limit_duty(total, current)
+        counts = total >> 16
+        if counts > self.output.largest:
+            counts = self.output.largest
+            self.errors.report(self.code_duty)
+        elif counts < -self.output.largest:
+            counts = -self.output.largest
+            self.errors.report(self.code_duty)
+        self.duty = counts
+        self.output.write(counts)

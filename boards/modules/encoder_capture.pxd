@@ -1,0 +1,19 @@
+from boards.modules.quadrature_decoder cimport QuadratureDecoder
+from firmware_sim.microcontroller cimport Microcontroller
+from firmware_sim.peripherals.timer_capture cimport TimerCapture
+from foundation.events cimport EventQueue
+
+cdef class WrapCounter:
+    cdef public TimerCapture timer
+    cdef public long long wraps
+    cpdef object on_wrap(self, EventQueue queue)
+
+cdef class EncoderCapture:
+    cdef public Microcontroller chip
+    cdef public TimerCapture timer
+    cdef public WrapCounter wraps
+    cdef public long long channel, flag, pin, partner_pin
+    cdef public QuadratureDecoder decoder
+    cdef public bint armed_rising
+    cdef public long long last_wraps, last_capture
+    cpdef object on_capture(self, EventQueue queue)

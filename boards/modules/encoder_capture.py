@@ -1,0 +1,98 @@
+"""The fast interrupt of an incremental encoder: from a timer capture to a count and a time
+(appendix 4.6; facts network-and-boards 4.1).
+
+The capture channel is armed for one edge of channel A at a time; the handler checks that the pin stands as
+that edge leaves it, looks at channel B for the direction, and arms the other edge.
+"""
+
+import cython
+
+from boards.modules.quadrature_decoder import QuadratureDecoder
+from firmware_sim.microcontroller import Microcontroller
+from firmware_sim.peripherals.timer_capture import TimerCapture
+from firmware_sim.vic import FIQ, TIMER_MATCH
+from foundation.events import EventQueue
+
+# Appendix 4.6: the hand-written handler takes about 150 cycles, entry included.
+EDGE_CYCLES = 150
+# Chosen by us: clear the flag, count the wrap, return; the same entry and exit as an edge.
+WRAP_CYCLES = 50
+LATENCY_CYCLES = 12
+LONGEST_TIME = 0x7F000000  # cycles, about 35 s: longer silences count as this
+
+
+class WrapCounter:
+    """Counts the wraps of the capture timer (every 0.5 ms) in the fast interrupt. `wraps` since power-up."""
+
+    def __init__(self, timer: TimerCapture) -> None:
+        self.timer = timer
+        self.wraps = 0
+
+    def attach(self, chip: Microcontroller) -> None:
+        """Take the timer's match interrupt. Attach after the encoders: captures of before a wrap come first."""
+        chip.vic.attach(
+            TIMER_MATCH,
+            self.timer.number,
+            self.on_wrap,
+            cost=WRAP_CYCLES - LATENCY_CYCLES,
+            slot=FIQ,
+            latency=LATENCY_CYCLES,
+            name="encoder_timer_wrap",
+        )
+
+    def on_wrap(self, queue: EventQueue):
+        """Fast interrupt: the timer restarted at 0."""
+        self.timer.clear(1)
+        self.wraps += 1
+
+
+class EncoderCapture:
+    """One encoder on capture `channel`: A on `pin`, B on `partner_pin`."""
+
+    def __init__(
+        self, chip: Microcontroller, wraps: WrapCounter, channel, pin, partner_pin, decoder: QuadratureDecoder
+    ) -> None:
+        self.chip = chip
+        self.timer = wraps.timer
+        self.wraps = wraps
+        self.channel = channel
+        self.flag = 16 << channel
+        self.pin = pin
+        self.partner_pin = partner_pin
+        self.decoder = decoder
+        self.armed_rising = True
+        self.last_wraps = 0
+        self.last_capture = 0
+        source = self.timer.use_channel(channel, pin, rising=True, falling=False)
+        chip.vic.attach(
+            source.kind,
+            source.index,
+            self.on_capture,
+            cost=EDGE_CYCLES - LATENCY_CYCLES,
+            slot=FIQ,
+            latency=LATENCY_CYCLES,
+            name=f"encoder_edge_{channel}",
+        )
+
+    def on_capture(self, queue: EventQueue):
+        """Fast interrupt: count the edge and keep the time since the one before."""
+        capture: cython.longlong
+        wraps: cython.longlong = self.wraps.wraps
+        elapsed: cython.longlong
+        level: cython.bint = self.chip.pins[self.pin] != 0
+        capture = self.timer.CR0 if self.channel == 0 else self.timer.CR(self.channel)
+        self.timer.clear(self.flag)
+        # a wrap that is not counted yet came before this capture if the capture is a small number
+        if self.timer.IR & 1 and capture < 15000:
+            wraps += 1
+        elapsed = (wraps - self.last_wraps) * 30000 + capture - self.last_capture
+        if elapsed > 0x7F000000:  # LONGEST_TIME
+            elapsed = 0x7F000000
+        self.last_wraps = wraps
+        self.last_capture = capture
+        if level == self.armed_rising:
+            self.decoder.edge(level, self.chip.pins[self.partner_pin] != 0, elapsed)
+        else:
+            self.decoder.glitch()
+        self.armed_rising = not level
+        self.timer.arm(self.channel, self.armed_rising, not self.armed_rising)

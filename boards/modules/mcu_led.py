@@ -1,0 +1,96 @@
+"""The three LEDs beside the processor, and the heartbeat (facts network-and-boards 1.8, 4.11)."""
+
+import cython
+
+from boards.modules.network_time import NetworkTime
+from firmware_sim.peripherals.gpio import Gpio, p1
+
+GREEN = 0
+RED = 1
+BLUE = 2
+PINS = {"green": p1(23), "red": p1(24), "blue": p1(25)}  # active low
+
+HEARTBEAT_MS = 50
+
+
+class McuLed:
+    """Green, red and blue with software timers. `slot_us`: period of `update`, which is a slot task.
+
+    `remaining` per LED: slots until it goes out; -1 stays on until switched off; 0 is off.
+    """
+
+    def __init__(self, gpio: Gpio, slot_us) -> None:
+        self.gpio = gpio
+        self.slots_per_ms = 1000.0 / slot_us
+        self.remaining_green = 0
+        self.remaining_red = 0
+        self.remaining_blue = 0
+        self.lit = 0
+
+    def pin(self, led: cython.longlong) -> cython.longlong:
+        """Pin number of an LED."""
+        return 55 + led  # P1.23, P1.24, P1.25
+
+    def set_remaining(self, led: cython.longlong, slots: cython.longlong) -> cython.void:
+        """Slots until `led` goes out (-1: never, 0: now)."""
+        if led == 0:
+            self.remaining_green = slots
+        elif led == 1:
+            self.remaining_red = slots
+        else:
+            self.remaining_blue = slots
+        if slots != 0:
+            if not self.lit >> led & 1:
+                self.lit |= 1 << led
+                self.gpio.write(self.pin(led), 0)
+        elif self.lit >> led & 1:
+            self.lit &= ~(1 << led)
+            self.gpio.write(self.pin(led), 1)
+
+    def flash(self, led: cython.longlong, ms: cython.longlong) -> cython.void:
+        """Light `led` for `ms` from now; a running flash starts anew."""
+        self.set_remaining(led, int(ms * self.slots_per_ms))
+
+    def on(self, led: cython.longlong) -> cython.void:
+        """Light `led` until it is switched off."""
+        self.set_remaining(led, -1)
+
+    def off(self, led: cython.longlong) -> cython.void:
+        """Put `led` out."""
+        self.set_remaining(led, 0)
+
+    def update(self) -> cython.void:
+        """Slot task: advance the timers."""
+        if self.lit == 0:
+            return
+        if self.remaining_green > 0:
+            self.remaining_green -= 1
+            if self.remaining_green == 0:
+                self.set_remaining(0, 0)
+        if self.remaining_red > 0:
+            self.remaining_red -= 1
+            if self.remaining_red == 0:
+                self.set_remaining(1, 0)
+        if self.remaining_blue > 0:
+            self.remaining_blue -= 1
+            if self.remaining_blue == 0:
+                self.set_remaining(2, 0)
+
+
+class Heartbeat:
+    """The blue LED flashes 50 ms each time bit 8 of the network time rises: every 512 ms while time runs."""
+
+    def __init__(self, time: NetworkTime, leds: McuLed) -> None:
+        self.time = time
+        self.leds = leds
+        self.last_bit = 0
+        self.beats = 0
+
+    def beat(self) -> cython.void:
+        """Slot task."""
+        bit: cython.longlong = self.time.ms >> 8 & 1
+        if bit != self.last_bit:
+            self.last_bit = bit
+            if bit:
+                self.beats += 1
+                self.leds.flash(2, 50)  # BLUE, HEARTBEAT_MS

@@ -1,0 +1,18 @@
+from boards.modules.receiver cimport IntReceiver
+from firmware_sim.peripherals.gpio cimport Gpio
+from firmware_sim.peripherals.pwm cimport Pwm
+
+cdef class MotorOutput:
+    cdef public Gpio gpio
+    cdef public Pwm pwm
+    cdef public IntReceiver sleep, shutdown
+    cdef public long long sign, largest, offset
+    cdef public bint stopped, second_pattern
+    cdef public long long duty, MR2, MR6, low_side
+    cdef public long long watchdog_pin, low_side_2_pin, low_side_6_pin
+    cpdef bint asleep(self)
+    cpdef bint is_shut_down(self)
+    cpdef bint running(self)
+    cpdef void feed_watchdog(self)
+    cpdef void enable_low_side(self, long long on)
+    cpdef void write(self, long long duty)

@@ -1,0 +1,108 @@
+"""The H-bridge seen from the processor: two PWM leads, two low-side enables, the watchdog pin
+(facts network-and-boards 4.4; appendix 3.8 on the alternating leads)."""
+
+import cython
+
+from boards.modules.receiver import IntReceiver
+from firmware_sim.peripherals.gpio import Gpio, p0, p1
+from firmware_sim.peripherals.pwm import Pwm
+
+PINS = {
+    "pwm_lead_2": p0(7),
+    "pwm_lead_6": p0(9),
+    "low_side_2": p0(11),
+    "low_side_6": p1(17),
+    "motor_watchdog": p0(6),
+}
+PERIOD_COUNTS = 600  # 100 kHz at 60 MHz
+
+
+class MotorOutput:
+    """Writes a duty (counts of 600, positive drives the motor forward) to alternating leads.
+
+    `sign`: of the motor's mounting. `largest`: the duty is clipped to +/- this. `offset`: counts that the
+    second of the two patterns drives more (14 in the firmware of 2016). `sleep`, `shutdown`: what the main
+    brain asked for; only their low 15 bits count. `stopped`: the limits switched the motor off.
+    """
+
+    def __init__(
+        self, gpio: Gpio, pwm: Pwm, sleep: IntReceiver, shutdown: IntReceiver, sign, largest, offset
+    ) -> None:
+        self.gpio = gpio
+        self.pwm = pwm
+        self.sleep = sleep
+        self.shutdown = shutdown
+        self.sign = sign
+        self.largest = largest
+        self.offset = offset
+        self.stopped = False
+        self.second_pattern = False
+        self.duty = 0
+        self.MR2 = 0
+        self.MR6 = 0
+        self.low_side = -1
+        self.watchdog_pin = PINS["motor_watchdog"]
+        self.low_side_2_pin = PINS["low_side_2"]
+        self.low_side_6_pin = PINS["low_side_6"]
+
+    def asleep(self) -> cython.bint:
+        """SLEEP is set: the bridge is open, the watchdog stays fed."""
+        return self.sleep.value & 0x7FFF != 0
+
+    def is_shut_down(self) -> cython.bint:
+        """SHUTDOWN is set: no duty, and the watchdog starves."""
+        return self.shutdown.value & 0x7FFF != 0
+
+    def running(self) -> cython.bint:
+        """True when the motor may be driven."""
+        return not (self.stopped or self.asleep() or self.is_shut_down())
+
+    def feed_watchdog(self) -> cython.void:
+        """Toggle the watchdog pin, unless the motor is off or shut down."""
+        if not (self.stopped or self.is_shut_down()):
+            self.gpio.write(self.watchdog_pin, 1 - self.gpio.levels[self.watchdog_pin])
+
+    def enable_low_side(self, on: cython.longlong) -> cython.void:
+        """Both low-side enables, written when they change."""
+        if on != self.low_side:
+            self.low_side = on
+            self.gpio.write(self.low_side_2_pin, on)
+            self.gpio.write(self.low_side_6_pin, on)
+
+    def write(self, duty: cython.longlong) -> cython.void:
+        """Drive the bridge with `duty` counts; the leads take turns at every call.
+
+        Asleep, both leads rest at 0 and the pattern does not advance; so do they when off or shut down.
+        """
+        counts: cython.longlong
+        if not self.running():
+            self.duty = 0
+            self.MR2 = 0
+            self.MR6 = 0
+            self.enable_low_side(0 if self.asleep() else 1)
+        else:
+            self.enable_low_side(1)
+            if duty > self.largest:
+                duty = self.largest
+            elif duty < -self.largest:
+                duty = -self.largest
+            self.duty = duty
+            counts = duty * self.sign
+            if counts >= 0:
+                if self.second_pattern:
+                    self.MR2 = 600  # PERIOD_COUNTS
+                    self.MR6 = 600 - counts - self.offset
+                else:
+                    self.MR2 = counts
+                    self.MR6 = 0
+            else:
+                if self.second_pattern:
+                    self.MR2 = 600 + counts - self.offset
+                    self.MR6 = 600
+                else:
+                    self.MR2 = 0
+                    self.MR6 = -counts
+            self.second_pattern = not self.second_pattern
+        if self.MR2 != self.pwm.MR2 or self.MR6 != self.pwm.MR6:
+            self.pwm.write(self.MR2, self.MR6)
+        self.feed_watchdog()
