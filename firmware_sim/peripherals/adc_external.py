@@ -1,0 +1,156 @@
+"""The external 14-bit converter ADS7871 on the SSP, its BUSY pin on an external interrupt.
+
+Writing register 4 with bit 7 set starts a conversion of the channel (bits 0-3) at the gain (bits 4-6); BUSY
+falls one conversion later, which raises (EXTERNAL_INTERRUPT, eint). The handler reads the result, a signed
+14-bit number right-justified, -8192 ... 8191, and starts the next channel.
+
+Sources: Texas Instruments SLAS370C: gains, multiplexer codes, register numbers, 48 kSamples/s at most. A
+conversion is therefore modelled as 1/48 ms = 20.83 us from the write. The input is sampled at its start.
+The SSP transfers (16 bits at 10 MHz) are part of the cost of the code that does them.
+"""
+
+import array
+
+import cython
+
+from firmware_sim.microcontroller import Peripheral
+from firmware_sim.vic import EXTERNAL_INTERRUPT
+from foundation.events import NEVER
+from foundation.user_error import UserError
+
+CONVERSION_NS = 20_833  # 48 kSamples/s, SLAS370C
+GAINS = (1, 2, 4, 5, 8, 10, 16, 20)  # by gain code 0 ... 7, SLAS370C
+REFERENCE_V = 2.5  # full scale at gain 1; external reference of the usual 2.5 V (chosen by us, as the internal one)
+
+
+def register4(channel_code, gain_code) -> int:
+    """Start word: bit 7, gain code in bits 4-6, multiplexer code in bits 0-3."""
+    if not 0 <= channel_code <= 15:
+        raise UserError(f"ADS7871: channel code {channel_code} is not 0 ... 15")
+    if not 0 <= gain_code <= 7:
+        raise UserError(f"ADS7871: gain code {gain_code} is not 0 ... 7")
+    return 0x80 | gain_code << 4 | channel_code
+
+
+class Ads7871(Peripheral):
+    """One converter. `inputs[code]`: the analog pin behind each multiplexer code (differential: one pin that
+    carries the difference); `results[i]`: last result of entry i of the sequence.
+
+    counts = round(scale * gain * V / reference_V * 8192) + offset_counts, clipped to 14 bits.
+    """
+
+    def __init__(
+        self, chip, eint=1, reference_V=REFERENCE_V, conversion_ns=CONVERSION_NS, scale=1.0, offset_counts=0
+    ) -> None:
+        Peripheral.__init__(self, chip)
+        if reference_V <= 0.0:
+            raise UserError(f"{chip.name}: ADS7871: reference_V {reference_V} must be above 0")
+        self.eint = eint
+        self.conversion_ns = conversion_ns
+        self.alarm = chip.new_alarm(self, 0)
+        self.reference_V = reference_V
+        self.scale = scale
+        self.offset_counts = offset_counts
+        self.source = chip.vic.source(EXTERNAL_INTERRUPT, eint)
+        self.registers = array.array("q", [0]) * 32
+        self.gains = array.array("q", GAINS)
+        self.inputs = array.array("q", range(16))
+        self.busy = False
+        self.result = 0
+        self.conversions = 0
+        self.started_time = 0
+        self.length = 0
+        self.step = 0
+        self.sequence = array.array("q", [0]) * 16
+        self.sequence_inputs = array.array("q", [0]) * 16
+        self.results = array.array("q", [0]) * 16
+        self.done = True
+        self.not_finished = 0
+
+    def set_sequence(self, *entries) -> None:
+        """What `start_sequence` converts: entries (channel code, gain code, analog pin), at most 16."""
+        if not 1 <= len(entries) <= 16:
+            raise UserError(f"{self.chip.name}: ADS7871: {len(entries)} sequence entries; 1 ... 16 are possible")
+        for place, (channel_code, gain_code, pin) in enumerate(entries):
+            self.sequence[place] = register4(channel_code, gain_code)
+            self.sequence_inputs[place] = pin
+            self.inputs[channel_code] = pin
+        self.length = len(entries)
+
+    def convert(self, volts: cython.double, gain_code: cython.longlong) -> cython.longlong:
+        """Counts for a voltage at the input."""
+        scaled: cython.double = self.scale * self.gains[gain_code] * volts / self.reference_V * 8192.0
+        counts: cython.longlong
+        if scaled != scaled:
+            return 0
+        if scaled > 16384.0:
+            scaled = 16384.0
+        if scaled < -16384.0:
+            scaled = -16384.0
+        if scaled >= 0.0:
+            counts = int(scaled + 0.5)
+        else:
+            counts = int(scaled - 0.5)
+        counts += self.offset_counts
+        if counts > 8191:
+            return 8191
+        if counts < -8192:
+            return -8192
+        return counts
+
+    def start(self, register4: cython.longlong) -> cython.bint:
+        """Write register 4; False when a conversion is under way (the write is lost)."""
+        self.registers[4] = register4 & 127
+        if self.busy:
+            return False
+        if register4 & 128 == 0:
+            return True
+        self.busy = True
+        self.started_time = self.chip.now
+        self.chip.set_alarm(self.alarm, self.chip.now + self.conversion_ns)
+        return True
+
+    def on_alarm(self, alarm: cython.longlong, time: cython.longlong) -> cython.void:
+        """The conversion is over: result registers 1 and 0 are loaded, BUSY falls."""
+        volts: cython.double = self.chip.analog.volts(self.inputs[self.registers[4] & 15], self.started_time)
+        self.result = self.convert(volts, self.registers[4] >> 4 & 7)
+        self.registers[0] = self.result << 2 & 255
+        self.registers[1] = self.result >> 6 & 255
+        self.busy = False
+        self.conversions += 1
+        self.chip.request(self.source)
+
+    def read_result(self) -> cython.longlong:
+        """Registers 1 and 0 as one signed number, -8192 ... 8191."""
+        return self.result
+
+    # The firmware's side of a sequence: start it once per slot, let on_busy serve EINT, then wait for it.
+
+    def start_sequence(self) -> cython.bint:
+        """Start at the first entry; False (and `not_finished` counts) while the last sequence still runs."""
+        if not self.done or self.busy:
+            self.not_finished += 1
+            return False
+        self.done = False
+        self.step = 0
+        self.start(self.sequence[0])
+        return True
+
+    def on_busy(self, queue) -> object:
+        """Interrupt handler: store the result, start the next entry."""
+        self.results[self.step] = self.result
+        self.step += 1
+        if self.step < self.length:
+            self.start(self.sequence[self.step])
+        else:
+            self.step = 0
+            self.done = True
+        return None
+
+    def sequence_done(self) -> cython.bint:
+        """True when no sequence runs: the condition of a Wait."""
+        return self.done
+
+    def unplug(self) -> None:
+        """A dead converter: the conversion under way never ends."""
+        self.chip.set_alarm(self.alarm, NEVER)

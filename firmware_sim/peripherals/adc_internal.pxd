@@ -1,0 +1,14 @@
+from firmware_sim.microcontroller cimport Peripheral
+from firmware_sim.vic cimport InterruptSource
+
+cdef class AdcInternal(Peripheral):
+    cdef public long long clkdiv, hz, conversion_ns, alarm, CR, GDR, result, channel
+    cdef public double reference_V
+    cdef public InterruptSource source
+    cdef public bint busy
+    cdef public long long conversions, not_finished, started_time
+    cdef public long long[::1] inputs, channels
+    cdef public long long burst_count, burst_start
+    cpdef long long convert(self, double volts)
+    cpdef bint start(self, long long channel)
+    cpdef long long DR(self, long long channel)

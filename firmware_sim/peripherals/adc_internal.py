@@ -1,0 +1,98 @@
+"""The internal 10-bit converter (ADCR, ADGDR, ADDR0 ... ADDR7): single conversions, or burst over channels.
+
+A conversion takes 11 clocks of core clock / clkdiv: 60 MHz / 200 = 300 kHz gives 36.7 us. The input is
+sampled at the start. A single conversion ends with the interrupt (ADC_DONE, 0). Burst mode converts its
+channels in turn for ever and is polled: `DR(channel)` is the newest finished conversion.
+counts = floor(1024 V / reference_V), clipped to 0 ... 1023 (LPC2194 user manual: result = V / VDDA * 1024).
+"""
+
+import array
+
+import cython
+
+from firmware_sim.microcontroller import Peripheral
+from firmware_sim.vic import ADC_DONE
+from foundation.user_error import UserError
+
+
+class AdcInternal(Peripheral):
+    """One converter. `inputs[channel]`: the analog pin of the chip behind AIN0 ... AIN7."""
+
+    def __init__(self, chip, clkdiv=200, hz=0, reference_V=3.3) -> None:
+        Peripheral.__init__(self, chip)
+        if clkdiv <= 0 or reference_V <= 0.0:
+            raise UserError(f"{chip.name}: ADC: clkdiv {clkdiv} and reference_V {reference_V} must be above 0")
+        self.clkdiv = clkdiv
+        self.hz = hz if hz else chip.hz
+        self.conversion_ns = 11 * clkdiv * 1_000_000_000 // self.hz
+        self.reference_V = reference_V
+        self.alarm = chip.new_alarm(self, 0)
+        self.source = chip.vic.source(ADC_DONE, 0)
+        self.inputs = array.array("q", range(8))
+        self.CR = 0
+        self.GDR = 0
+        self.result = 0
+        self.channel = 0
+        self.busy = False
+        self.conversions = 0
+        self.not_finished = 0
+        self.started_time = 0
+        self.channels = array.array("q", [0]) * 8
+        self.burst_count = 0
+        self.burst_start = 0
+
+    def convert(self, volts: cython.double) -> cython.longlong:
+        """Counts for a voltage at the pin."""
+        scaled: cython.double = volts / self.reference_V * 1024.0
+        counts: cython.longlong
+        if not scaled > 0.0:
+            return 0
+        if scaled >= 1023.0:
+            return 1023
+        counts = int(scaled)
+        return counts
+
+    def start(self, channel: cython.longlong) -> cython.bint:
+        """Start one conversion; False (and `not_finished` counts) while one is under way."""
+        if self.busy:
+            self.not_finished += 1
+            return False
+        self.busy = True
+        self.channel = channel
+        self.started_time = self.chip.now
+        self.CR = 1 << channel | (self.clkdiv - 1) << 8 | 1 << 21 | 1 << 24
+        self.chip.set_alarm(self.alarm, self.chip.now + self.conversion_ns)
+        return True
+
+    def on_alarm(self, alarm: cython.longlong, time: cython.longlong) -> cython.void:
+        """The conversion is over: ADGDR holds result, channel and the DONE bit."""
+        self.result = self.convert(self.chip.analog.volts(self.inputs[self.channel], self.started_time))
+        self.GDR = self.result << 6 | self.channel << 24 | 1 << 31
+        self.busy = False
+        self.conversions += 1
+        self.chip.request(self.source)
+
+    def start_burst(self, *channels) -> None:
+        """Convert `channels` in turn from `now` on, without interrupts."""
+        if not 1 <= len(channels) <= 8 or not all(0 <= channel <= 7 for channel in channels):
+            raise UserError(f"{self.chip.name}: ADC: burst channels {channels} are not 1 ... 8 of 0 ... 7")
+        for place, channel in enumerate(channels):
+            self.channels[place] = channel
+        self.burst_count = len(channels)
+        self.burst_start = self.chip.now
+        self.CR = sum(1 << channel for channel in channels) | (self.clkdiv - 1) << 8 | 1 << 16 | 1 << 21
+
+    def DR(self, channel: cython.longlong) -> cython.longlong:
+        """Newest finished burst result of a channel, 0 ... 1023; 0 before the first."""
+        finished: cython.longlong = (self.chip.now - self.burst_start) // self.conversion_ns
+        back: cython.longlong
+        sampled: cython.longlong
+        if self.burst_count == 0:
+            return 0
+        for back in range(1, self.burst_count + 1):
+            if finished - back < 0:
+                return 0
+            if self.channels[(finished - back) % self.burst_count] == channel:
+                sampled = self.burst_start + (finished - back) * self.conversion_ns
+                return self.convert(self.chip.analog.volts(self.inputs[channel], sampled))
+        return 0

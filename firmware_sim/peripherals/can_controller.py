@@ -1,0 +1,285 @@
+"""One CAN controller of the LPC2194 (CxMOD, CxCMR, CxGSR, CxSR, CxICR, CxIER, CxBTR, CxRFS, CxRID, CxRDA,
+CxRDB, and CxTFI1-3, CxTID1-3, CxTDA1-3, CxTDB1-3 as TFI[1] ... TDB[3]).
+
+Three transmit buffers: a request goes out as CAN_REQUEST; the bus answers CAN_TX_DONE. Transmit and abort in
+one command is single shot. Receive: two hardware buffers, the older in RFS ... RDB; a third frame is a data
+overrun and lost. Interrupts: (CAN_RX, n) while a frame waits, (CAN_TX_DONE, n), and (CAN_STATUS, n) for errors,
+each if CxIER allows it. Bus-off puts the controller into reset mode; writing MOD = 0 begins the recovery.
+
+CMR: TR 1, AT 2, RRB 4, CDO 8, SRR 16, STB1-3 32, 64, 128.
+ICR, IER: RI 1, TI1 2, EI 4, DOI 8, EPI 32, ALI 64, BEI 128, TI2 512, TI3 1024.
+SR, per transmit buffer 8 bits apart: RBS 1, DOS 2, TBS 4, TCS 8, ES 64, BS 128.
+RFS, TFI: DLC in bits 16-19, RTR bit 30, extended identifier bit 31.
+"""
+
+import array
+
+import cython
+
+from firmware_sim.microcontroller import Peripheral
+from foundation.events import CAN_RX, CAN_STATUS, CAN_TX_DONE
+from foundation.user_error import UserError
+
+CMR_TR, CMR_AT, CMR_RRB, CMR_CDO, CMR_SRR, CMR_STB1, CMR_STB2, CMR_STB3 = 1, 2, 4, 8, 16, 32, 64, 128
+ICR_RI, ICR_TI1, ICR_EI, ICR_DOI, ICR_EPI, ICR_ALI, ICR_BEI, ICR_TI2, ICR_TI3 = 1, 2, 4, 8, 32, 64, 128, 512, 1024
+
+
+def btr_value(brp, sjw, tseg1, tseg2, sam=0) -> int:
+    """CxBTR from its fields as written, each one less than what it means: BRP, SJW, TSEG1, TSEG2, SAM."""
+    for name, value, limit in (
+        ("BRP", brp, 1023),
+        ("SJW", sjw, 3),
+        ("TSEG1", tseg1, 15),
+        ("TSEG2", tseg2, 7),
+        ("SAM", sam, 1),
+    ):
+        if not 0 <= value <= limit:
+            raise UserError(f"CxBTR: {name} {value} is not 0 ... {limit}")
+    return brp | sjw << 14 | tseg1 << 16 | tseg2 << 20 | sam << 23
+
+
+def bit_rate_of(btr, hz) -> float:
+    """Bits per second that a CxBTR value gives at a peripheral clock of `hz`."""
+    return hz / (((btr & 1023) + 1) * (3 + (btr >> 16 & 15) + (btr >> 20 & 7)))
+
+
+def sample_point_of(btr) -> float:
+    """Sample point of a CxBTR value as a fraction of the bit."""
+    before = 2 + (btr >> 16 & 15)
+    return before / (before + 1 + (btr >> 20 & 7))
+
+
+class CanController(Peripheral):
+    """Controller `number` (1 ... 4), field a of all its messages. Counters are ground truth for tests."""
+
+    def __init__(self, chip, number=1, btr=0x00254001, IER=ICR_RI) -> None:
+        # 0x00254001: BRP 1, SJW 1, TSEG1 5, TSEG2 2: 3 Mbit/s at 60 MHz, sampled at 70 %
+        Peripheral.__init__(self, chip)
+        if not 1 <= number <= 4:
+            raise UserError(f"{chip.name}: CAN controller {number} is not 1 ... 4")
+        self.number = number
+        self.MOD = 0
+        self.IER = IER
+        self.ICR = 0
+        self.BTR = btr
+        self.RFS = 0
+        self.RID = 0
+        self.RDA = 0
+        self.RDB = 0
+        self.rx_count = 0
+        self.second_RFS = 0
+        self.second_RID = 0
+        self.second_RDA = 0
+        self.second_RDB = 0
+        self.TFI = array.array("q", [0]) * 4
+        self.TID = array.array("q", [0]) * 4
+        self.TDA = array.array("q", [0]) * 4
+        self.TDB = array.array("q", [0]) * 4
+        self.tx_free = array.array("q", [1]) * 4
+        self.tx_complete = array.array("q", [1]) * 4
+        self.overrun = False
+        self.bus_off = False
+        self.error_warning = False
+        self.tx_errors = 0
+        self.rx_errors = 0
+        self.received = 0
+        self.data_overruns = 0
+        self.requests = 0
+        self.sent = 0
+        self.lost = 0
+        self.aborted = 0
+        self.refused = 0
+        self.rx_source = chip.vic.source(CAN_RX, number)
+        self.tx_source = chip.vic.source(CAN_TX_DONE, number)
+        self.error_source = chip.vic.source(CAN_STATUS, number)
+        chip.claim(CAN_RX, number, self)
+        chip.claim(CAN_TX_DONE, number, self)
+        chip.claim(CAN_STATUS, number, self)
+
+    def bit_rate(self) -> cython.double:
+        """Bits per second by CxBTR and the chip's clock."""
+        return bit_rate_of(self.BTR, self.chip.hz)
+
+    # --- transmit ---------------------------------------------------------------------------------------
+
+    def buffer_free(self, buffer: cython.longlong) -> cython.bint:
+        """TBS of a transmit buffer 1 ... 3."""
+        return self.tx_free[buffer] != 0
+
+    def transmit(
+        self,
+        buffer: cython.longlong,
+        identifier: cython.longlong,
+        flags: cython.longlong,
+        lo: cython.longlong,
+        hi: cython.longlong,
+    ) -> cython.bint:
+        """Fill a buffer and request it; flags as in foundation/events.py. False when the buffer is not free."""
+        if self.tx_free[buffer] == 0 or self.MOD & 1:
+            self.refused += 1
+            return False
+        self.TFI[buffer] = (flags & 15) << 16 | (flags >> 4 & 1) << 30 | (flags >> 6 & 1) << 31
+        self.TID[buffer] = identifier
+        self.TDA[buffer] = lo
+        self.TDB[buffer] = hi
+        self.write_CMR((3 if flags & 32 else 1) | 16 << buffer)
+        return True
+
+    def write_CMR(self, command: cython.longlong) -> cython.void:
+        """Write the command register."""
+        buffer: cython.longlong
+        flags: cython.longlong
+        frame: cython.longlong
+        if command & 4:
+            self.release()
+        if command & 8:
+            self.overrun = False
+        if command & 3 == 0 or self.MOD & 1:
+            return
+        for buffer in range(1, 4):
+            if command & 16 << buffer:
+                if command & 1:
+                    if self.tx_free[buffer] == 0:
+                        self.refused += 1
+                        continue
+                    frame = self.TFI[buffer]
+                    flags = frame >> 16 & 15 | (frame >> 30 & 1) << 4 | (frame >> 31 & 1) << 6
+                    if command & 2:
+                        flags |= 32
+                    self.tx_free[buffer] = 0
+                    self.tx_complete[buffer] = 0
+                    self.requests += 1
+                    self.chip.outbox.push(
+                        self.chip.now, 0, 32, self.number, buffer, self.TID[buffer],
+                        flags, self.TDA[buffer], self.TDB[buffer],
+                    )  # CAN_REQUEST  # fmt: skip
+                elif self.tx_free[buffer] == 0:
+                    self.chip.outbox.push(self.chip.now, 0, 33, self.number, buffer)  # CAN_ABORT
+
+    # --- receive ----------------------------------------------------------------------------------------
+
+    def on_message(self, queue) -> cython.void:
+        """What the bus tells: a frame received, the end of a transmission, a change of the error state."""
+        frame: cython.longlong
+        if queue.kind == 2:  # CAN_RX
+            if self.MOD & 1:
+                return
+            if self.rx_count >= 2:
+                self.data_overruns += 1
+                self.overrun = True
+                self.ICR |= 8
+                if self.IER & 8:
+                    self.chip.request(self.error_source)
+                return
+            self.received += 1
+            frame = (queue.c & 15) << 16 | (queue.c >> 4 & 1) << 30 | (queue.c >> 6 & 1) << 31
+            if self.rx_count == 0:
+                self.RFS = frame
+                self.RID = queue.b
+                self.RDA = queue.d
+                self.RDB = queue.e
+            else:
+                self.second_RFS = frame
+                self.second_RID = queue.b
+                self.second_RDA = queue.d
+                self.second_RDB = queue.e
+            self.rx_count += 1
+            self.ICR |= 1
+            if self.IER & 1:
+                self.chip.request(self.rx_source)
+        elif queue.kind == 3:  # CAN_TX_DONE
+            self.tx_free[queue.b] = 1
+            frame = 2 if queue.b == 1 else 256 << (queue.b - 1)
+            if queue.c == 0:
+                self.sent += 1
+                self.tx_complete[queue.b] = 1
+                self.ICR |= frame
+            elif queue.c == 1:
+                self.aborted += 1
+                self.ICR |= frame
+            else:
+                self.lost += 1
+                self.ICR |= frame
+            if self.IER & frame:
+                self.chip.request(self.tx_source)
+        else:  # CAN_STATUS
+            self.tx_errors = queue.c
+            self.rx_errors = queue.d
+            self.error_warning = queue.c >= 96 or queue.d >= 96
+            self.ICR |= queue.b
+            if queue.e and not self.bus_off:
+                self._bus_off()
+            elif not queue.e:
+                self.bus_off = False
+            if self.IER & queue.b:
+                self.chip.request(self.error_source)
+
+    def _bus_off(self) -> cython.void:
+        """Too many transmit errors: reset mode, nothing is sent or received until software restarts it."""
+        buffer: cython.longlong
+        self.bus_off = True
+        self.MOD |= 1
+        for buffer in range(1, 4):
+            self.tx_free[buffer] = 1
+
+    def release(self) -> cython.void:
+        """CMR.RRB: free the older receive buffer; the newer moves up and asks for the interrupt again."""
+        if self.rx_count == 0:
+            return
+        self.rx_count -= 1
+        if self.rx_count == 0:
+            self.ICR &= -2
+            return
+        self.RFS = self.second_RFS
+        self.RID = self.second_RID
+        self.RDA = self.second_RDA
+        self.RDB = self.second_RDB
+        if self.IER & 1:
+            self.chip.request(self.rx_source)
+
+    # --- status -----------------------------------------------------------------------------------------
+
+    def write_MOD(self, mode: cython.longlong) -> cython.void:
+        """Bit 0: 1 reset mode, 0 operating (after bus-off: begin the recovery)."""
+        buffer: cython.longlong
+        self.MOD = mode
+        if mode & 1:
+            self.rx_count = 0
+            self.ICR &= -2
+            for buffer in range(1, 4):
+                self.tx_free[buffer] = 1
+        self.chip.outbox.push(self.chip.now, 0, 34, self.number, mode & 1)  # CAN_MODE
+
+    def read_ICR(self) -> cython.longlong:
+        """Interrupt and capture register; the read clears all but the receive bit."""
+        value: cython.longlong = self.ICR
+        self.ICR &= 1
+        return value
+
+    def SR(self) -> cython.longlong:
+        """Status of the three buffers, 8 bits each."""
+        buffer: cython.longlong
+        word: cython.longlong = 0
+        common: cython.longlong = 0
+        if self.rx_count > 0:
+            common |= 1
+        if self.overrun:
+            common |= 2
+        if self.error_warning:
+            common |= 64
+        if self.bus_off:
+            common |= 128
+        for buffer in range(1, 4):
+            word |= (common | self.tx_free[buffer] << 2 | self.tx_complete[buffer] << 3) << 8 * (buffer - 1)
+        return word
+
+    def GSR(self) -> cython.longlong:
+        """Global status: bit 0 RBS, 1 DOS, 2 all buffers free, 3 all complete, 6 ES, 7 BS, 16-23 receive errors,
+        24-31 transmit errors."""
+        status: cython.longlong = self.SR()
+        word: cython.longlong = status & 195
+        if status >> 2 & status >> 10 & status >> 18 & 1:
+            word |= 4
+        if status >> 3 & status >> 11 & status >> 19 & 1:
+            word |= 8
+        return word | (self.rx_errors & 255) << 16 | (self.tx_errors & 255) << 24

@@ -1,0 +1,74 @@
+"""General-purpose pins: P0.0 ... P0.31 are pins 0 ... 31, P1.0 ... P1.31 are pins 32 ... 63.
+
+Inputs follow PIN_EDGE messages (the chip keeps their levels); a change of an output sends PIN_OUTPUT.
+A pin's level at a stamp is that of its last message: a partner pin without messages of its own is as old as
+the last edge that reported it.
+"""
+
+import array
+
+import cython
+
+from firmware_sim.microcontroller import Peripheral
+
+
+def p0(bit) -> int:
+    """Pin number of P0.`bit`."""
+    return bit
+
+
+def p1(bit) -> int:
+    """Pin number of P1.`bit`."""
+    return 32 + bit
+
+
+class Gpio(Peripheral):
+    """The two ports of a chip. `directions[pin]` is 1 once the pin has been written (IODIR)."""
+
+    def __init__(self, chip) -> None:
+        Peripheral.__init__(self, chip)
+        self.levels = chip.pins
+        self.directions = array.array("q", [0]) * 64
+        self.writes = 0
+        self.changes = 0
+
+    def level(self, pin: cython.longlong) -> cython.longlong:
+        """0 or 1, as the pin is now."""
+        return self.levels[pin]
+
+    def write(self, pin: cython.longlong, level: cython.longlong) -> cython.void:
+        """Drive an output; a change is told outside as PIN_OUTPUT at `now`."""
+        self.writes += 1
+        if self.directions[pin] == 0:
+            self.directions[pin] = 1
+        elif self.levels[pin] == level:
+            return
+        self.levels[pin] = level
+        self.changes += 1
+        self.chip.outbox.push(self.chip.now, 0, 36, pin, level)  # PIN_OUTPUT
+
+    def toggle(self, pin: cython.longlong) -> cython.void:
+        """Invert an output."""
+        self.write(pin, 1 - self.levels[pin])
+
+    def IOSET(self, port: cython.longlong, mask: cython.longlong) -> cython.void:
+        """Set the pins of `mask` (bit 0 = Px.0) of port 0 or 1."""
+        bit: cython.longlong
+        for bit in range(32):
+            if mask >> bit & 1:
+                self.write(port * 32 + bit, 1)
+
+    def IOCLR(self, port: cython.longlong, mask: cython.longlong) -> cython.void:
+        """Clear the pins of `mask` of port 0 or 1."""
+        bit: cython.longlong
+        for bit in range(32):
+            if mask >> bit & 1:
+                self.write(port * 32 + bit, 0)
+
+    def IOPIN(self, port: cython.longlong) -> cython.longlong:
+        """The 32 levels of a port as a word."""
+        bit: cython.longlong
+        word: cython.longlong = 0
+        for bit in range(32):
+            word |= self.levels[port * 32 + bit] << bit
+        return word

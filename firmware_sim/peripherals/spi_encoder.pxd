@@ -1,0 +1,10 @@
+from firmware_sim.microcontroller cimport Peripheral
+from firmware_sim.vic cimport InterruptSource
+
+cdef class SpiEncoder(Peripheral):
+    cdef public long long number, word, bits, bit_rate, transfer_ns, mask, alarm
+    cdef public long long SPDR, SPSR, latched, transfers, not_finished
+    cdef public bint busy
+    cdef public InterruptSource source
+    cpdef bint start(self)
+    cpdef long long read(self)

@@ -1,0 +1,60 @@
+"""An absolute encoder read through an SPI master (S0SPDR, S0SPSR): one word per transfer.
+
+The encoder latches its position at the first clock edge and shifts it out; 14 bits at 1 MHz are 14 us,
+after which (SPI_DONE, number) is raised. The value is the low 13 bits, 0 ... 8191.
+"""
+
+import cython
+
+from firmware_sim.microcontroller import Peripheral
+from firmware_sim.vic import SPI_DONE
+from foundation.user_error import UserError
+
+
+class SpiEncoder(Peripheral):
+    """SPI `number` with the encoder that holds out `chip.words[word]`."""
+
+    def __init__(self, chip, number=0, word=0, bits=14, bit_rate=1_000_000, value_bits=13) -> None:
+        Peripheral.__init__(self, chip)
+        if not 1 <= bits <= 16 or not 1 <= value_bits <= 16 or bit_rate <= 0:
+            raise UserError(
+                f"{chip.name}: SPI {number}: {bits} bits, {value_bits} value bits at {bit_rate} Hz are impossible"
+            )
+        self.number = number
+        self.word = word
+        self.bits = bits
+        self.bit_rate = bit_rate
+        self.transfer_ns = bits * 1_000_000_000 // bit_rate
+        self.mask = (1 << value_bits) - 1
+        self.alarm = chip.new_alarm(self, 0)
+        self.source = chip.vic.source(SPI_DONE, number)
+        self.SPDR = 0
+        self.SPSR = 0
+        self.latched = 0
+        self.transfers = 0
+        self.not_finished = 0
+        self.busy = False
+
+    def start(self) -> cython.bint:
+        """Write S0SPDR: the transfer begins; False (and `not_finished` counts) while one is under way."""
+        if self.busy:
+            self.not_finished += 1
+            return False
+        self.busy = True
+        self.SPSR = 0
+        self.latched = self.chip.words[self.word] & self.mask
+        self.chip.set_alarm(self.alarm, self.chip.now + self.transfer_ns)
+        return True
+
+    def on_alarm(self, alarm: cython.longlong, time: cython.longlong) -> cython.void:
+        """The transfer is complete: SPIF (bit 7 of S0SPSR) is set."""
+        self.SPDR = self.latched
+        self.SPSR = 128
+        self.busy = False
+        self.transfers += 1
+        self.chip.request(self.source)
+
+    def read(self) -> cython.longlong:
+        """Read S0SPDR, which clears SPIF."""
+        self.SPSR = 0
+        return self.SPDR

@@ -1,0 +1,89 @@
+"""The synchronous serial port as a link of whole segments between two chips.
+
+A segment is 31 half-words; at 16 bits and 3 Mbit/s it lasts 165.3 us. The master starts an exchange
+(SSP_START at `now`), the slave has loaded what it will send (SSP_LOAD); when the last bit is through, each
+side gets SSP_SEGMENT and with it the interrupt (SSP_SEGMENT, number). The wire between them is not ours.
+
+The FIFO is not modelled word by word: the interrupts that feed it are charged in one, by `per_item` of the
+handler, which returns the number of half-words.
+"""
+
+import array
+
+import cython
+
+from firmware_sim.microcontroller import Peripheral
+from foundation.events import SSP_SEGMENT
+
+SEGMENT_WORDS = 31
+BIT_RATE = 3_000_000  # 60 MHz / 20
+WORD_BITS = 16
+
+
+def segment_time_ns(
+    words: cython.longlong, word_bits: cython.longlong, bit_rate: cython.longlong
+) -> cython.longlong:
+    """Duration of `words` words of `word_bits` bits (ns, rounded down): 31, 16, 3 Mbit/s give 165,333."""
+    return words * word_bits * 1000000000 // bit_rate
+
+
+class SspSegment:
+    """31 half-words in `words`, each 0 ... 65535; `used`: how many are filled in."""
+
+    def __init__(self) -> None:
+        self.words = array.array("q", [0]) * SEGMENT_WORDS
+        self.used = 0
+
+    def clear(self) -> cython.void:
+        """All zeros, nothing used."""
+        i: cython.longlong
+        for i in range(31):
+            self.words[i] = 0
+        self.used = 0
+
+    def copy_from(self, other: "SspSegment") -> cython.void:
+        """Take over the contents of another segment."""
+        i: cython.longlong
+        for i in range(31):
+            self.words[i] = other.words[i]
+        self.used = other.used
+
+
+class SspPort(Peripheral):
+    """One end of the link. A received segment waits in `received`; one not taken is overwritten and counted."""
+
+    def __init__(self, chip, number=0) -> None:
+        Peripheral.__init__(self, chip)
+        self.number = number
+        self.exchanges = 0
+        self.overwritten = 0
+        self.received = None
+        self.received_time = 0
+        self.fresh = False
+        self.source = chip.vic.source(SSP_SEGMENT, number)
+        chip.claim(SSP_SEGMENT, number, self)
+
+    def start(self, segment: SspSegment) -> cython.void:
+        """Master: exchange `segment` from `now` on. It must not be changed until it is through."""
+        self.chip.outbox.push(self.chip.now, 0, 37, self.number, 0, 0, 0, 0, 0, segment)  # SSP_START
+
+    def load(self, segment: SspSegment) -> cython.void:
+        """Slave: send `segment` in the next exchange. It must not be changed until it is through."""
+        self.chip.outbox.push(self.chip.now, 0, 38, self.number, 0, 0, 0, 0, 0, segment)  # SSP_LOAD
+
+    def on_message(self, queue) -> cython.void:
+        """The other side's segment is in."""
+        if self.fresh:
+            self.overwritten += 1
+        self.received = queue.ref
+        self.received_time = queue.time
+        self.fresh = True
+        self.exchanges += 1
+        self.chip.request(self.source)
+
+    def take(self):
+        """The segment that came in last, or None when it has been taken already."""
+        if not self.fresh:
+            return None
+        self.fresh = False
+        return self.received

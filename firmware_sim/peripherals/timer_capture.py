@@ -1,0 +1,155 @@
+"""A timer with four capture channels, as Timer0 and Timer1 of the LPC2194 (T0CR0, T0CCR, T0IR, T0MR0 ...).
+
+The timer counts 0 ... MR0 and starts again. An edge that T0CCR asks for copies the count into the channel's
+capture register, sets the channel's bit in T0IR and raises the interrupt of the pin, source (PIN_EDGE, pin). A
+channel holds ONE capture: a second edge before the firmware clears the bit overwrites it. An edge of the
+direction that is not armed is not captured at all. Both are counted in `lost`, ground truth for tests.
+
+IR: bit 0 match 0, bits 4-7 capture 0-3. CCR: per channel three bits, rising, falling, interrupt.
+"""
+
+import array
+
+import cython
+
+from firmware_sim.microcontroller import Peripheral
+from firmware_sim.vic import TIMER_MATCH
+from foundation.events import PIN_EDGE
+from foundation.user_error import UserError
+
+
+class TimerCapture(Peripheral):
+    """Timer `number` that wraps every `period` counts of `hz` (core clock unless given), from `phase_ns` on.
+
+    `match_interrupt=True` raises (TIMER_MATCH, number) at every wrap. `edges`, `captured`, `lost` per channel.
+    """
+
+    def __init__(self, chip, number=0, period=30000, hz=0, phase_ns=0, match_interrupt=False) -> None:
+        Peripheral.__init__(self, chip)
+        if period <= 0:
+            raise UserError(f"{chip.name}: timer {number}: period {period} counts must be above 0")
+        self.number = number
+        self.MR0 = period - 1
+        self.hz = hz if hz else chip.hz
+        if period * 1_000_000_000 % self.hz:
+            raise UserError(
+                f"{chip.name}: timer {number}: {period} counts at {self.hz} Hz are no whole number of ns"
+            )
+        self.period_ns = period * 1_000_000_000 // self.hz
+        self.counts_per_ns = chip.crystal.cycles_per_ns(self.hz)
+        self.phase_ns = phase_ns
+        self.CR0 = 0
+        self.CR1 = 0
+        self.CR2 = 0
+        self.CR3 = 0
+        self.CCR = 0
+        self.IR = 0
+        self.wraps = 0
+        self.wrap_time = phase_ns
+        self.next_wrap_time = chip.crystal.tick_time_ns(1, self.period_ns, phase_ns)
+        self.match_interrupt = match_interrupt
+        self.match_source = chip.vic.source(TIMER_MATCH, number)
+        self.sources = [None] * 4
+        self.pins = array.array("q", [-1]) * 4
+        self.edges = array.array("q", [0]) * 4
+        self.captured = array.array("q", [0]) * 4
+        self.lost = array.array("q", [0]) * 4
+        self.capture_times = array.array("q", [0]) * 4
+        self.alarm = chip.new_alarm(self, 0)
+        if match_interrupt:
+            chip.set_alarm(self.alarm, self.next_wrap_time)
+
+    def use_channel(self, channel, pin, rising=True, falling=True):
+        """Connect `pin` to capture `channel` 0 ... 3 and arm it; returns the interrupt source of the pin."""
+        if not 0 <= channel <= 3:
+            raise UserError(f"{self.chip.name}: timer {self.number}: channel {channel} is not 0 ... 3")
+        self.chip.claim_pin(pin, channel, self)
+        self.pins[channel] = pin
+        self.sources[channel] = self.chip.vic.source(PIN_EDGE, pin)
+        self.arm(channel, rising, falling)
+        return self.sources[channel]
+
+    def arm(self, channel: cython.longlong, rising: cython.bint, falling: cython.bint) -> cython.void:
+        """Choose the edges that channel captures (its three bits of T0CCR, interrupt on)."""
+        bits: cython.longlong = 4
+        if rising:
+            bits += 1
+        if falling:
+            bits += 2
+        self.CCR = self.CCR & ~(7 << (3 * channel)) | bits << (3 * channel)
+
+    def clear(self, mask: cython.longlong) -> cython.void:
+        """Write T0IR: the bits of `mask` are cleared, the channels may capture again."""
+        self.IR &= ~mask
+
+    def CR(self, channel: cython.longlong) -> cython.longlong:
+        """Capture register of a channel by number (CR0 ... CR3 are the same)."""
+        if channel == 0:
+            return self.CR0
+        if channel == 1:
+            return self.CR1
+        if channel == 2:
+            return self.CR2
+        return self.CR3
+
+    def TC(self) -> cython.longlong:
+        """The count at `now`."""
+        return self.count_at(self.chip.now)
+
+    def count_at(self, time: cython.longlong) -> cython.longlong:
+        """The count (0 ... MR0) at an instant not before the present wrap."""
+        count: cython.longlong
+        if time >= self.next_wrap_time:
+            self._wrap_to(time)
+        count = int((time - self.wrap_time) * self.counts_per_ns)
+        if count > self.MR0:
+            return self.MR0
+        return count
+
+    def _wrap_to(self, time: cython.longlong) -> cython.void:
+        """Bring the wrap that precedes `time` up to date, however far away."""
+        n: cython.longlong = self.wraps + 1
+        if time >= self.next_wrap_time + 2 * self.period_ns:
+            n = self.chip.crystal.local_ns(time - self.phase_ns) // self.period_ns
+        self.wrap_time = self.chip.crystal.tick_time_ns(n, self.period_ns, self.phase_ns)
+        self.next_wrap_time = self.chip.crystal.tick_time_ns(n + 1, self.period_ns, self.phase_ns)
+        while self.next_wrap_time <= time:
+            n += 1
+            self.wrap_time = self.next_wrap_time
+            self.next_wrap_time = self.chip.crystal.tick_time_ns(n + 1, self.period_ns, self.phase_ns)
+        self.wraps = n
+
+    def on_pin(
+        self, channel: cython.longlong, level: cython.longlong, time: cython.longlong
+    ) -> cython.void:
+        """An edge at a capture pin."""
+        count: cython.longlong
+        flag: cython.longlong = 16 << channel
+        self.edges[channel] += 1
+        if self.CCR >> (3 * channel) & (1 if level else 2) == 0:
+            self.lost[channel] += 1
+            return
+        count = self.count_at(time)
+        if channel == 0:
+            self.CR0 = count
+        elif channel == 1:
+            self.CR1 = count
+        elif channel == 2:
+            self.CR2 = count
+        else:
+            self.CR3 = count
+        self.capture_times[channel] = time
+        if self.IR & flag:
+            self.lost[channel] += 1
+            return
+        self.IR |= flag
+        self.captured[channel] += 1
+        if self.CCR >> (3 * channel) & 4:
+            self.chip.request(self.sources[channel])
+
+    def on_alarm(self, alarm: cython.longlong, time: cython.longlong) -> cython.void:
+        """The timer matched MR0 and restarted."""
+        self._wrap_to(time)
+        self.chip.set_alarm(self.alarm, self.next_wrap_time)
+        self.IR |= 1
+        self.chip.request(self.match_source)

@@ -1,0 +1,137 @@
+"""A UART with byte timing: UnRBR, UnTHR, UnLSR, UnIIR, UnDLL/DLM as one divisor, UnFDR; 8N1.
+
+Receive: UART_BYTE messages stamped with the end of the byte fill a FIFO of 16. The interrupt (UART_BYTE,
+number) comes when the trigger level (1, 4, 8 or 14) is reached, and when bytes have waited for the time of
+four characters (IIR 0xC, LPC2194 user manual: 3.5 to 4.5). Handlers are expected to empty the FIFO.
+Transmit: a byte written to THR leaves as UART_OUTPUT, stamped with the end of its stop bit; FIFO of 16. When
+the FIFO has become empty, (UART_TRANSMIT, number) is raised.
+"""
+
+import array
+
+import cython
+
+from firmware_sim.microcontroller import Peripheral
+from firmware_sim.vic import UART_TRANSMIT
+from foundation.events import NEVER, UART_BYTE
+from foundation.user_error import UserError
+
+FIFO_BYTES = 16
+BITS_PER_BYTE = 10  # start, 8 data, stop
+
+
+class Uart(Peripheral):
+    """UART `number`. baud = hz / (16 * divisor * (1 + divaddval / mulval))."""
+
+    def __init__(self, chip, number=0, divisor=6, divaddval=0, mulval=1, trigger=8, hz=0) -> None:
+        Peripheral.__init__(self, chip)
+        if trigger not in (1, 4, 8, 14):
+            raise UserError(f"{chip.name}: UART {number}: trigger level {trigger} is not 1, 4, 8 or 14")
+        self.number = number
+        self.hz = hz if hz else chip.hz
+        self.trigger = trigger
+        self.set_divisor(divisor, divaddval, mulval)
+        self.source = chip.vic.source(UART_BYTE, number)
+        self.transmit_source = chip.vic.source(UART_TRANSMIT, number)
+        self.timeout_alarm = chip.new_alarm(self, 0)
+        self.transmit_alarm = chip.new_alarm(self, 1)
+        self.fifo = array.array("q", [0]) * FIFO_BYTES
+        self.fifo_head = 0
+        self.fifo_count = 0
+        self.IIR = 1
+        self.errors = 0
+        self.received = 0
+        self.overruns = 0
+        self.sent = 0
+        self.refused = 0
+        self.transmit_free = 0
+        chip.claim(UART_BYTE, number, self)
+
+    def set_divisor(
+        self, DL: cython.longlong, DIVADDVAL: cython.longlong = 0, MULVAL: cython.longlong = 1
+    ) -> cython.void:
+        """Set the divisor latch and the fractional divider."""
+        if DL < 1 or MULVAL < 1 or DIVADDVAL < 0 or DIVADDVAL > 14 or MULVAL > 15:
+            raise UserError(
+                f"{self.chip.name}: UART {self.number}: divisor {DL}, fraction {DIVADDVAL}/{MULVAL} is impossible"
+            )
+        self.DL = DL
+        self.DIVADDVAL = DIVADDVAL
+        self.MULVAL = MULVAL
+        self.baud = self.hz * MULVAL / (16.0 * DL * (MULVAL + DIVADDVAL))
+        self.byte_ns = self.chip.crystal.true_ns(
+            10 * 16 * DL * (MULVAL + DIVADDVAL) * 1000000000 // (self.hz * MULVAL)
+        )
+
+    def waiting(self) -> cython.longlong:
+        """Received bytes that wait in the FIFO."""
+        return self.fifo_count
+
+    def on_message(self, queue) -> cython.void:
+        """A byte came in."""
+        self.received += 1
+        if self.fifo_count >= 16:
+            self.overruns += 1
+            self.errors |= 2
+            return
+        self.fifo[(self.fifo_head + self.fifo_count) % 16] = queue.b & 255
+        self.fifo_count += 1
+        self.chip.set_alarm(self.timeout_alarm, queue.time + 4 * self.byte_ns)
+        if self.fifo_count >= self.trigger:
+            self.IIR = 4
+            self.chip.request(self.source)
+
+    def on_alarm(self, alarm: cython.longlong, time: cython.longlong) -> cython.void:
+        """Character time-out (0) or transmit FIFO empty (1)."""
+        if alarm == 0:
+            if self.fifo_count > 0:
+                self.IIR = 12
+                self.chip.request(self.source)
+        else:
+            self.IIR = 2
+            self.chip.request(self.transmit_source)
+
+    def RBR(self) -> cython.longlong:
+        """Take the oldest received byte; 0 when there is none (see LSR bit 0)."""
+        byte: cython.longlong
+        if self.fifo_count == 0:
+            return 0
+        byte = self.fifo[self.fifo_head]
+        self.fifo_head = (self.fifo_head + 1) % 16
+        self.fifo_count -= 1
+        if self.fifo_count == 0:
+            self.IIR = 1
+            self.chip.set_alarm(self.timeout_alarm, 1 << 62)
+        return byte
+
+    def THR(self, byte: cython.longlong) -> cython.bint:
+        """Send a byte; False (and `refused` counts) when the FIFO is full."""
+        now: cython.longlong = self.chip.now
+        if self.transmit_free - now > 16 * self.byte_ns:
+            self.refused += 1
+            return False
+        if self.transmit_free < now:
+            self.transmit_free = now
+        self.transmit_free += self.byte_ns
+        self.sent += 1
+        self.chip.outbox.push(self.transmit_free, 0, 39, self.number, byte & 255)  # UART_OUTPUT
+        if self.transmit_source.attached:
+            self.chip.set_alarm(self.transmit_alarm, max(now, self.transmit_free - self.byte_ns))
+        return True
+
+    def LSR(self) -> cython.longlong:
+        """Line status: bit 0 data ready, 1 overrun (cleared by this read), 5 THR empty, 6 all sent."""
+        status: cython.longlong = self.errors
+        self.errors = 0
+        if self.fifo_count > 0:
+            status |= 1
+        if self.transmit_free - self.byte_ns <= self.chip.now:
+            status |= 32
+        if self.transmit_free <= self.chip.now:
+            status |= 64
+        return status
+
+    def unplug(self) -> None:
+        """Forget what waits, as after a reset of both FIFOs (UnFCR)."""
+        self.fifo_count = 0
+        self.chip.set_alarm(self.timeout_alarm, NEVER)
