@@ -1,0 +1,175 @@
+"""How fast the bus is. Functions return figures; nothing is printed, the wall clock stays in foundation.
+
+The traffic generator is compiled with the rest, so that the figures are those of the bus.
+"""
+
+import array
+
+import cython
+
+from can_bus.bus import Bus
+from can_bus.frame import frame_bits
+from foundation import wallclock
+from foundation.events import STAGE_BUS, EventQueue
+
+ROBOT_BIT_RATE = 3_000_000  # bit/s, facts network-and-boards 1.2
+ROBOT_BUSES = 4
+
+
+class Load:
+    """Nodes on some buses that send all the time and check every frame they hear.
+
+    Node n of a bus sends identifiers 16 n + 1 ... 16 n + `per_node`, in turn, from its three buffers,
+    `nodes_per_bus` * rate frames/s per bus in all; `load` is the share of the bus's bits it aims at,
+    and with 1 or more every buffer is refilled as soon as it is free. The data carry a running number
+    per identifier: a frame lost, doubled or out of order shows up in `out_of_order`.
+    """
+
+    def __init__(self, buses=4, nodes_per_bus=3, load=0.75, per_node=3) -> None:
+        self.per_node = per_node
+        self.nodes_per_bus = nodes_per_bus
+        self.quantum_ns = 25_000
+        # 117 bits: mean length of such frames with stuffing and intermission
+        self.period_ns = int(117 * nodes_per_bus * 1e9 / ROBOT_BIT_RATE / load) if load < 1.0 else 0
+        self.time = 0
+        self.requested = 0
+        self.delivered = 0
+        self.done = 0
+        self.out_of_order = 0
+        self.wrong = 0
+        self.buses = []
+        self.inboxes = []
+        for b in range(buses):
+            bus = Bus(f"can{b + 1}", ROBOT_BIT_RATE)
+            queues = [EventQueue(64) for _ in range(nodes_per_bus)]
+            for n, queue in enumerate(queues):
+                bus.add_node(f"node{n}", queue, 1, STAGE_BUS * 256 + n)
+            bus.log_capacity = 0  # logs off
+            self.buses.append(bus)
+            self.inboxes.append(queues)
+        count = buses * nodes_per_bus
+        self.sent = array.array("q", [0]) * (count * per_node)  # running number per identifier
+        self.expected = array.array("q", [0]) * (count * nodes_per_bus * per_node)  # by listener
+        self.free = array.array("q", [7]) * count  # bit set of free buffers
+        self.word = array.array("q", [0]) * (2 * count)  # next instant to send (ns), identifiers used
+
+    def run(self, frames: cython.longlong) -> cython.void:
+        """Pass time until `frames` have been asked for, then until the buses are empty."""
+        bus: Bus
+        inbox: EventQueue
+        b: cython.longlong
+        n: cython.longlong
+        node: cython.longlong
+        buffer: cython.longlong
+        which: cython.longlong
+        number: cython.longlong
+        due: cython.longlong
+        goal: cython.longlong = self.requested + frames
+        busy: cython.bint = True
+        while busy:
+            busy = self.requested < goal
+            for b in range(len(self.buses)):
+                bus = self.buses[b]
+                if bus.next_time <= self.time:
+                    bus.advance(self.time)
+                if bus.pending_count > 0:
+                    busy = True
+                for n in range(self.nodes_per_bus):
+                    inbox = self.inboxes[b][n]
+                    node = b * self.nodes_per_bus + n
+                    if inbox.count > 0:
+                        busy = True
+                        self._drain(bus, b, n, inbox)
+                    while self.free[node] != 0 and self.requested < goal:
+                        due = self.word[2 * node]
+                        if due >= self.time + self.quantum_ns:
+                            break
+                        if due < self.time:
+                            due = self.time
+                        # identifier number i always from buffer i % 3, so equal identifiers keep order
+                        which = self.word[2 * node + 1] % self.per_node
+                        buffer = which % 3
+                        if self.free[node] >> buffer & 1 == 0:
+                            break
+                        number = self.sent[node * self.per_node + which]
+                        bus.request(n, buffer + 1, due, 16 * n + 1 + which, 8, number * 40503, number)
+                        self.sent[node * self.per_node + which] = number + 1
+                        self.word[2 * node + 1] += 1
+                        self.word[2 * node] += self.period_ns
+                        self.free[node] ^= 1 << buffer
+                        self.requested += 1
+            self.time += self.quantum_ns
+
+    def _drain(self, bus: Bus, b: cython.longlong, n: cython.longlong, inbox: EventQueue) -> cython.void:
+        """What a node heard up to now."""
+        sender: cython.longlong
+        which: cython.longlong
+        place: cython.longlong
+        node: cython.longlong = b * self.nodes_per_bus + n
+        while inbox.head_time <= self.time:
+            inbox.take()
+            if inbox.kind == 2:  # CAN_RX
+                sender = inbox.b // 16
+                which = inbox.b % 16 - 1
+                place = (node * self.nodes_per_bus + sender) * self.per_node + which
+                if inbox.e != self.expected[place]:
+                    self.out_of_order += 1
+                if inbox.d != (inbox.e * 40503 & 0xFFFFFFFF):
+                    self.wrong += 1
+                self.expected[place] = inbox.e + 1
+                self.delivered += 1
+            elif inbox.kind == 3:  # CAN_TX_DONE
+                self.free[node] |= 1 << (inbox.b - 1)
+                self.done += 1
+
+
+def million_frames(frames: int = 1_000_000, load: float = 1.0, nodes_per_bus: int = 3) -> dict:
+    """`frames` over four buses at `load`; every node checks every frame of the others.
+
+    Figures: frames, delivered, lost (asked for but not heard by every other node), out_of_order, cpu_s,
+    frames_per_s (of processor time), simulated_s, load_mean, times_real_time.
+    """
+    traffic = Load(ROBOT_BUSES, nodes_per_bus, load)
+    start = wallclock.process_cpu_s()
+    traffic.run(frames)
+    cpu_s = max(wallclock.process_cpu_s() - start, 1e-9)
+    simulated_s = traffic.time * 1e-9
+    return {
+        "frames": traffic.requested,
+        "sent": sum(bus.frames for bus in traffic.buses),
+        "delivered": traffic.delivered,
+        "lost": traffic.requested * (nodes_per_bus - 1) - traffic.delivered + sum(bus.lost for bus in traffic.buses),
+        "out_of_order": traffic.out_of_order + traffic.wrong,
+        "cpu_s": cpu_s,
+        "frames_per_s": traffic.requested / cpu_s,
+        "simulated_s": simulated_s,
+        "times_real_time": simulated_s / cpu_s,
+        "load_mean": sum(bus.load_mean(traffic.time) for bus in traffic.buses) / len(traffic.buses),
+    }
+
+
+def add_lengths(frames: cython.longlong) -> cython.longlong:
+    """Sum of the lengths (bits) of `frames` frames of changing content."""
+    total: cython.longlong = 0
+    i: cython.longlong
+    for i in range(frames):
+        total += frame_bits(i & 0x7FF, 8, i * 2654435761 & 0xFFFFFFFF, i * 40503)
+    return total
+
+
+def frame_length_cost(frames: int = 200_000) -> dict:
+    """ns of processor time for the exact length of one frame of eight bytes, mean over `frames`."""
+    start = wallclock.process_cpu_s()
+    bits = add_lengths(frames)
+    cpu_s = wallclock.process_cpu_s() - start
+    return {"frames": frames, "mean_bits": bits / frames, "ns_per_frame": cpu_s / frames * 1e9}
+
+
+def cost_against_load(loads=(0.1, 0.3, 0.5, 0.75, 1.0), frames: int = 100_000) -> list[dict]:
+    """`million_frames` with fewer frames at several bus loads (1.0: every buffer always full)."""
+    return [{"load": load, **million_frames(frames, load)} for load in loads]
+
+
+def cost_against_nodes(nodes=(2, 3, 5, 8), frames: int = 100_000) -> list[dict]:
+    """`million_frames` with fewer frames and 2 ... 8 boards on each bus, at 75 % load."""
+    return [{"nodes_per_bus": count, **million_frames(frames, 0.75, count)} for count in nodes]

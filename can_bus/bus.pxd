@@ -1,0 +1,69 @@
+from foundation.events cimport EventQueue
+from foundation.random_stream cimport RandomStream
+from can_bus.frame cimport arbitration_key, frame_bits
+
+from libc.math cimport log
+
+cdef class Node:
+    cdef public str name
+    cdef public long long index, controller, order
+    cdef public EventQueue inbox
+    cdef public bint listening, passive, warning
+    cdef public long long mode, transmit_errors, receive_errors
+    cdef public long long sequences_left, join_from, suspend_bit, sending_end
+    cdef public long long accepted, refused, sent, received, aborted, single_shot_skipped, flushed
+    cdef public long long arbitrations_lost, retries
+
+cdef class Bus:
+    cdef public str name
+    cdef public long long bitrate
+    cdef public object seed
+    cdef public list nodes
+    cdef public EventQueue commands
+    # the bus in absolute bits since power-up
+    cdef public long long free_bit, quiet_bit, advanced, next_time
+    cdef public long long operating, joining
+    # transmit buffers, index node * 3 + buffer - 1
+    cdef public long long[::1] keys, ready, asked, asked_time, identifiers, flags, lows, highs, busy_until
+    cdef public long long[::1] pending
+    cdef public long long pending_count
+    # disturbances
+    cdef public RandomStream noise
+    cdef public double bit_error_rate
+    cdef public long long next_noise_bit, next_planned_bit, next_strike, strikes_left, strike_position
+    cdef public list planned_bits
+    # statistics
+    cdef public long long accepted, frames, merged, bits, lost, single_shot_skipped, retries, errors, refused
+    cdef public long long arbitrations_lost, aborted, flushed, late_results, late_requests
+    cdef public long long[::1] frames_by_identifier, response_max_ns
+    cdef public dict frames_by_extended_identifier
+    cdef public long long origin_bit, window_bits, window_end, window_busy, window_busy_max, window_count
+    cdef public long long[::1] windows
+    # frame log
+    cdef public long long[::1] log
+    cdef public long long log_capacity, log_count, log_dropped
+    cdef public object log_sink
+
+    cpdef long long bit_of(self, long long time)
+    cpdef long long edge_ns(self, long long bit)
+    cpdef bint request(
+        self, long long node, long long buffer, long long time, long long identifier, long long flags,
+        long long lo, long long hi,
+    )
+    cpdef void abort(self, long long node, long long buffer, long long time)
+    cpdef void set_mode(self, long long node, long long mode, long long time)
+    cpdef long long advance(self, long long until)
+    cpdef long long pending_of(self, long long node)
+    cdef long long _next_start(self)
+    cdef long long _next_join(self)
+    cdef void _look_ahead(self)
+    cdef void _remove(self, long long slot)
+    cdef void _attempt(self, long long k)
+    cdef bint _contend(self, long long k, long long best)
+    cdef void _succeed(self, long long k, long long slot, long long bits, bint merged)
+    cdef void _finish_sender(self, Node node, long long slot, long long end, long long done)
+    cdef void _account(self, long long first, long long last)
+    cdef void _roll(self, long long bit)
+    cdef void _record(
+        self, long long time, long long identifier, long long flags, long long lo, long long hi, long long node
+    )

@@ -1,0 +1,264 @@
+"""A classic CAN frame to the bit: CRC-15, stuffing of the actual content, length on the wire.
+
+A frame is four integers everywhere: identifier, flags (bits 0-3 data length code, then the FLAG_* of
+foundation.events), and two words: `lo` holds data bytes 0-3, `hi` bytes 4-7, both little-endian as the
+transmit registers CxTDA/TDB of the LPC2194 hold them (facts network-and-boards 1.3).
+
+Layout (ISO 11898-1): start of frame, arbitration and control field, data, CRC-15: all of these are
+stuffed; then CRC delimiter, acknowledge slot and delimiter, seven bits end of frame: 10 bits unstuffed.
+The three bits of intermission belong to the bus, not to the frame: `INTERMISSION_BITS`.
+Both chains, CRC and stuffing, go byte by byte through tables; the tables are made from the bitwise rules.
+"""
+
+import array
+
+import cython
+
+INTERMISSION_BITS = 3  # ISO 11898-1: recessive bits between two frames
+TAIL_BITS = 10  # CRC delimiter, ACK slot, ACK delimiter, 7 bits end of frame
+CRC_POLYNOMIAL = 0x4599  # x^15 + x^14 + x^10 + x^8 + x^7 + x^4 + x^3 + 1 (ISO 11898-1)
+
+DOMINANT = 0
+RECESSIVE = 1
+
+# Where in a frame: codes of the error code capture register, LPC2194 CxICR bits 16-20 (as the SJA1000's).
+FIELD_ID_28_21 = 2
+FIELD_START = 3
+FIELD_SRTR = 4
+FIELD_IDE = 5
+FIELD_ID_20_18 = 6
+FIELD_ID_17_13 = 7
+FIELD_CRC = 8
+FIELD_R0 = 9
+FIELD_DATA = 10
+FIELD_DLC = 11
+FIELD_RTR = 12
+FIELD_R1 = 13
+FIELD_ID_4_0 = 14
+FIELD_ID_12_5 = 15
+FIELD_CRC_DELIMITER = 24
+FIELD_ACK_SLOT = 25
+FIELD_END = 26
+FIELD_ACK_DELIMITER = 27
+
+
+def _crc_of_byte(byte: int) -> int:
+    """CRC register after one byte entered an empty register, most significant bit first."""
+    register = 0
+    for position in range(7, -1, -1):
+        feedback = (byte >> position & 1) ^ (register >> 14 & 1)
+        register = register << 1 & 0x7FFF
+        if feedback:
+            register ^= CRC_POLYNOMIAL
+    return register
+
+
+def _stuff_of_byte(state: int, byte: int) -> int:
+    """Stuffing of one byte: next state << 8 | stuff bits inserted.
+
+    A state is level * 4 + run - 1 with run 1..4 equal bits seen last: the fifth equal bit is followed at
+    once by its complement, which begins a run of its own.
+    """
+    level = state >> 2
+    run = (state & 3) + 1
+    inserted = 0
+    for position in range(7, -1, -1):
+        bit = byte >> position & 1
+        if bit == level:
+            run += 1
+        else:
+            level = bit
+            run = 1
+        if run == 5:
+            inserted += 1
+            level = 1 - level
+            run = 1
+    return (level * 4 + run - 1) << 8 | inserted
+
+
+CRC_STEP = array.array("q", [_crc_of_byte(byte) for byte in range(256)])
+STUFF_STEP = array.array("q", [_stuff_of_byte(state, byte) for state in range(8) for byte in range(256)])
+
+
+def _frame(
+    identifier: cython.longlong,
+    flags: cython.longlong,
+    lo: cython.longlong,
+    hi: cython.longlong,
+    want_crc: cython.bint,
+) -> cython.longlong:
+    """The CRC (want_crc) or the number of stuff bits of a frame: one pass over the bytes.
+
+    The header is 19 bits (extended: 39). Its first byte is filled up in front: zeros leave an empty CRC
+    register empty, and for the stuffing an alternating pattern that ends recessive, so that the dominant
+    start of frame begins a new run.
+    """
+    crc: cython.longlong
+    stuff: cython.longlong
+    total: cython.longlong
+    byte: cython.longlong
+    word: cython.longlong
+    i: cython.longlong
+    length: cython.longlong = flags & 15
+    if length > 8:
+        length = 8  # codes 9-15 also mean eight bytes (ISO 11898-1)
+    if flags & 16:  # FLAG_REMOTE
+        length = 0
+    if flags & 64:  # FLAG_EXTENDED: SOF id28-23 | id22-18 SRR IDE id17 | id16-9 | id8-1 | id0 RTR r1 r0 DLC
+        byte = identifier >> 23 & 0x3F
+        crc = CRC_STEP[byte]
+        stuff = STUFF_STEP[byte | 0x80]
+        total = stuff
+        byte = (identifier >> 15 & 0xF8) | 6 | (identifier >> 17 & 1)
+        crc = ((crc << 8) ^ CRC_STEP[(crc >> 7) ^ byte]) & 0x7FFF
+        stuff = STUFF_STEP[(stuff & 0x700) | byte]
+        total += stuff
+        byte = identifier >> 9 & 0xFF
+        crc = ((crc << 8) ^ CRC_STEP[(crc >> 7) ^ byte]) & 0x7FFF
+        stuff = STUFF_STEP[(stuff & 0x700) | byte]
+        total += stuff
+        byte = identifier >> 1 & 0xFF
+        crc = ((crc << 8) ^ CRC_STEP[(crc >> 7) ^ byte]) & 0x7FFF
+        stuff = STUFF_STEP[(stuff & 0x700) | byte]
+        total += stuff
+    else:  # SOF id10-9 | id8-1 | id0 RTR IDE r0 DLC
+        byte = identifier >> 9 & 3
+        crc = CRC_STEP[byte]
+        stuff = STUFF_STEP[byte | 0xA8]
+        total = stuff
+        byte = identifier >> 1 & 0xFF
+        crc = ((crc << 8) ^ CRC_STEP[(crc >> 7) ^ byte]) & 0x7FFF
+        stuff = STUFF_STEP[(stuff & 0x700) | byte]
+        total += stuff
+    byte = (identifier << 7 & 0x80) | (flags << 2 & 0x40) | (flags & 15)
+    crc = ((crc << 8) ^ CRC_STEP[(crc >> 7) ^ byte]) & 0x7FFF
+    stuff = STUFF_STEP[(stuff & 0x700) | byte]
+    total += stuff
+    word = lo
+    for i in range(length):
+        if i == 4:
+            word = hi
+        byte = word & 0xFF
+        word = word >> 8
+        crc = ((crc << 8) ^ CRC_STEP[(crc >> 7) ^ byte]) & 0x7FFF
+        stuff = STUFF_STEP[(stuff & 0x700) | byte]
+        total += stuff
+    if want_crc:
+        return crc
+    stuff = STUFF_STEP[(stuff & 0x700) | crc >> 7]
+    total += stuff
+    # the last 7 bits, filled up behind with the complement of the last one, which never adds a stuff bit
+    total += STUFF_STEP[(stuff & 0x700) | (crc << 1 & 0xFE) | (crc & 1 ^ 1)]
+    return total & 0xFF  # the states summed above bit 8 do not matter; at most 29 stuff bits
+
+
+def crc15(
+    identifier: cython.longlong, flags: cython.longlong, lo: cython.longlong, hi: cython.longlong
+) -> cython.longlong:
+    """CRC-15 over start of frame ... data, 0 ... 0x7FFF (ISO 11898-1)."""
+    return _frame(identifier, flags, lo, hi, True)
+
+
+def stuff_bits(
+    identifier: cython.longlong, flags: cython.longlong, lo: cython.longlong, hi: cython.longlong
+) -> cython.longlong:
+    """Number of stuff bits of this very content (one after every five equal bits, CRC included)."""
+    return _frame(identifier, flags, lo, hi, False)
+
+
+def frame_bits(
+    identifier: cython.longlong, flags: cython.longlong, lo: cython.longlong, hi: cython.longlong
+) -> cython.longlong:
+    """Bits on the wire from start of frame to the end of EOF, stuff bits included, intermission not.
+
+    44 + 8 per byte (extended 64) without stuffing, so 108 for the robot's frames (facts 1.2).
+    """
+    length: cython.longlong = flags & 15
+    if length > 8:
+        length = 8
+    if flags & 16:  # FLAG_REMOTE
+        length = 0
+    if flags & 64:  # FLAG_EXTENDED
+        return 64 + 8 * length + _frame(identifier, flags, lo, hi, False)
+    return 44 + 8 * length + _frame(identifier, flags, lo, hi, False)
+
+
+def arbitration_key(identifier: cython.longlong, flags: cython.longlong) -> cython.longlong:
+    """The arbitration field as a 32-bit number in the order of its bits: the lower key wins the bus.
+
+    Standard: id10-0, RTR, IDE = 0. Extended: id28-18, SRR = 1, IDE = 1, id17-0, RTR. So a standard frame
+    beats an extended one with the same first 11 bits, and data beats remote (ISO 11898-1).
+    """
+    remote: cython.longlong = flags >> 4 & 1
+    if flags & 64:  # FLAG_EXTENDED
+        return (identifier >> 18 & 0x7FF) << 21 | 0x180000 | (identifier & 0x3FFFF) << 1 | remote
+    return (identifier & 0x7FF) << 21 | remote << 20
+
+
+def data_length(flags: int) -> int:
+    """Data bytes that a frame with these flags carries, 0 ... 8."""
+    return 0 if flags & 16 else min(flags & 15, 8)
+
+
+def unstuffed_bits(flags: int) -> int:
+    """Length without any stuff bit and without intermission: 108 for 8 bytes, standard."""
+    return (64 if flags & 64 else 44) + 8 * data_length(flags)
+
+
+def worst_case_bits(flags: int) -> int:
+    """Longest possible length with stuffing, without intermission: 132 for 8 bytes, standard.
+
+    The stuffed region has g = 34 (extended 54) + 8n bits; a stuff bit counts into the next run, so the
+    first may come after 5 and each further one after 4 more: (g - 1) // 4.
+    """
+    length = unstuffed_bits(flags)
+    return length + (length - TAIL_BITS - 1) // 4
+
+
+def wire(identifier: int, flags: int, lo: int, hi: int) -> tuple[list[int], list[int]]:
+    """The bits of a frame as they pass on the wire and, for each, its field (FIELD_*), stuff bits included.
+
+    The acknowledge slot is given as the sender drives it, recessive. Slow and plain: for errors and for
+    people who want to look at a frame.
+    """
+    parts: list[tuple[int, int, int]] = [(FIELD_START, 1, 0)]  # field, number of bits, value
+    remote = flags >> 4 & 1
+    if flags & 64:
+        parts += [
+            (FIELD_ID_28_21, 8, identifier >> 21),
+            (FIELD_ID_20_18, 3, identifier >> 18),
+            (FIELD_SRTR, 1, 1),
+            (FIELD_IDE, 1, 1),
+            (FIELD_ID_17_13, 5, identifier >> 13),
+            (FIELD_ID_12_5, 8, identifier >> 5),
+            (FIELD_ID_4_0, 5, identifier),
+            (FIELD_RTR, 1, remote),
+            (FIELD_R1, 1, 0),
+        ]
+    else:
+        parts += [
+            (FIELD_ID_28_21, 8, identifier >> 3),
+            (FIELD_ID_20_18, 3, identifier),
+            (FIELD_SRTR, 1, remote),
+            (FIELD_IDE, 1, 0),
+        ]
+    parts += [(FIELD_R0, 1, 0), (FIELD_DLC, 4, flags)]
+    for index in range(data_length(flags)):
+        parts.append((FIELD_DATA, 8, (lo if index < 4 else hi) >> 8 * (index & 3)))
+    parts.append((FIELD_CRC, 15, crc15(identifier, flags, lo, hi)))
+    bits: list[int] = []
+    fields: list[int] = []
+    run = 0
+    for field, count, value in parts:
+        for position in range(count - 1, -1, -1):
+            bit = value >> position & 1
+            run = run + 1 if bits and bits[-1] == bit else 1
+            bits.append(bit)
+            fields.append(field)
+            if run == 5:
+                bits.append(1 - bit)
+                fields.append(field)
+                run = 1
+    bits += [RECESSIVE] * TAIL_BITS
+    fields += [FIELD_CRC_DELIMITER, FIELD_ACK_SLOT, FIELD_ACK_DELIMITER] + [FIELD_END] * 7
+    return bits, fields
