@@ -7,7 +7,6 @@ rounding and every wrap therefore goes through this file, which gives the same b
 import cython
 
 if not cython.compiled:
-    from math import isnan
     from struct import pack, unpack
 
 WORD_MASK = 0xFFFFFFFF
@@ -22,13 +21,13 @@ def float32(value: cython.double) -> cython.double:
 
 
 def word_of_float(value: cython.double) -> cython.longlong:
-    """The 32 bits of `value` as a single-precision float, 0 ... 2^32-1."""
+    """The 32 bits of `value` as a single-precision float, 0 ... 2^32-1. Every NaN gives 0x7FC00000."""
+    if value != value:
+        return 0x7FC00000
     if cython.compiled:
         single: cython.float = cython.cast(cython.float, value)
         return cython.cast(cython.longlong, cython.cast(cython.pointer(cython.uint), cython.address(single))[0])
     else:
-        if isnan(value):
-            return 0x7FC00000
         try:
             return unpack("<I", pack("<f", value))[0]
         except OverflowError:

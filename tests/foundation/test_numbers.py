@@ -84,3 +84,8 @@ def test_fixed_products_wrap_as_32_bit_words_do(a, b):
 def test_division_truncates_toward_zero_as_c_does(a, b):
     exact = abs(a) // abs(b)
     assert numbers.divide_toward_zero(a, b) == (exact if (a < 0) == (b < 0) else -exact)
+
+
+def test_every_nan_has_the_same_word():
+    for word in (0x7FC00000, 0xFFC00000, 0x7FC12345, 0xFFFFFFFF, 0x7F800001):
+        assert numbers.word_of_float(numbers.float_of_word(word)) == 0x7FC00000
