@@ -6,9 +6,9 @@ from firmware_sim.vic cimport InterruptController, InterruptSource
 
 cdef class Peripheral:
     cdef public Microcontroller chip
-    cpdef void on_message(self, EventQueue queue)
-    cpdef void on_pin(self, long long channel, long long level, long long time)
-    cpdef void on_alarm(self, long long alarm, long long time)
+    cpdef long long on_message(self, EventQueue queue)
+    cpdef long long on_pin(self, long long channel, long long level, long long time)
+    cpdef long long on_alarm(self, long long alarm, long long time)
 
 cdef class Microcontroller:
     cdef public str name
@@ -32,27 +32,30 @@ cdef class Microcontroller:
     cdef public long long wait_start, wait_stolen, stolen_cycles
     cdef public long long alarm_time, alarm_count
     cdef public long long[::1] alarm_times
-    cdef public list alarm_owners, alarm_numbers
+    cdef public list alarm_owners
+    cdef public long long[::1] alarm_numbers
+    cdef public long long alarm_first
     cdef public list message_table, pin_owners
     cdef public long long[::1] pin_channels
     cdef public long long unclaimed, match_time, instant
     cdef public object on_timer_tick
     cdef public object background
     cdef public bint background_wanted
+    cdef public long long horizon
     cpdef long long advance(self, long long until)
     cpdef bint due(self, long long until)
     cpdef void spend(self, long long cycles)
     cpdef long long cycles_since_tick(self)
-    cpdef void request(self, InterruptSource source)
-    cpdef void set_alarm(self, long long index, long long time)
+    cpdef long long request(self, InterruptSource source)
+    cpdef long long set_alarm(self, long long index, long long time)
     cpdef void start(self, Schedule schedule, long long phase_ns)
     cpdef object on_slot_timer(self, EventQueue queue)
-    cdef void _input(self)
-    cdef void _alarm(self, long long time)
-    cdef void _timer_match(self)
-    cdef void _background(self)
-    cdef void _serve(self, InterruptSource source, long long time)
-    cdef void _code(self, long long until)
-    cdef void _wait_over(self)
-    cdef void _charge(self, Task task, long long cycles)
-    cdef void _close_slot(self, long long since)
+    cdef long long _input(self)
+    cdef long long _alarm(self, long long time)
+    cdef long long _timer_match(self)
+    cdef long long _background(self)
+    cdef long long _serve(self, InterruptSource source, long long time)
+    cdef long long _code(self, long long until)
+    cdef long long _wait_over(self)
+    cdef long long _charge(self, Task task, long long cycles)
+    cdef long long _close_slot(self, long long since)

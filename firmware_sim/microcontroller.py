@@ -34,15 +34,15 @@ class Peripheral:
     def __init__(self, chip) -> None:
         self.chip = chip
 
-    def on_message(self, queue: EventQueue) -> cython.void:
+    def on_message(self, queue: EventQueue) -> cython.longlong:
         """A message of a kind claimed by this peripheral; it is in the fields of `queue`."""
 
     def on_pin(
         self, channel: cython.longlong, level: cython.longlong, time: cython.longlong
-    ) -> cython.void:
+    ) -> cython.longlong:
         """The pin of `channel` changed to `level` at `time`."""
 
-    def on_alarm(self, alarm: cython.longlong, time: cython.longlong) -> cython.void:
+    def on_alarm(self, alarm: cython.longlong, time: cython.longlong) -> cython.longlong:
         """The alarm that this peripheral numbered `alarm` is due."""
 
 
@@ -53,8 +53,9 @@ class Microcontroller:
     task exceeds its limit, `on_near_limit()` when a finished slot took more than 90 % of its length,
     `on_timer_tick()` in every interrupt of the slot timer.
     `background()`: what the main loop does beside the scheduler, called while no slot runs; it returns the
-    cycles it took, or 0 when it found nothing to do: it is then called again after the next input, interrupt
-    or slot. Its effects are stamped by `now`, which it may move forward within the cycles it returns.
+    instant (ns) at which it is done, or 0 when it found nothing to do: it is then called again after the
+    next input, interrupt or slot. It may move `now` forward for its effects, and must return once it is past
+    `horizon`, the next input, alarm or slot, so that steps of any size give the same run.
     `words`: digital words that sensors hold out to the chip, set from outside.
     """
 
@@ -81,6 +82,7 @@ class Microcontroller:
         self.on_timer_tick = None
         self.background = None
         self.background_wanted = True
+        self.horizon = 0
         self.extra_cycles = 0
         self.tick_time = NEVER
         self.tick_number = 0
@@ -102,7 +104,8 @@ class Microcontroller:
         self.alarm_count = 0
         self.alarm_times = array.array("q", [NEVER]) * 16
         self.alarm_owners = []
-        self.alarm_numbers = []
+        self.alarm_numbers = array.array("q", [0]) * 16
+        self.alarm_first = 0
         self.message_table = [None] * (MESSAGE_KINDS * INDICES_PER_KIND)
         self.pin_owners = [None] * PINS
         self.pin_channels = array.array("q", [-1]) * PINS
@@ -133,20 +136,26 @@ class Microcontroller:
             raise UserError(f"{self.name}: more than 16 peripheral alarms")
         self.alarm_count = index + 1
         self.alarm_owners.append(peripheral)
-        self.alarm_numbers.append(number)
+        self.alarm_numbers[index] = number
         return index
 
-    def set_alarm(self, index: cython.longlong, time: cython.longlong) -> cython.void:
-        """Alarm `index` is due at `time` (ns); NEVER takes it back. An alarm holds one instant."""
+    def set_alarm(self, index: cython.longlong, time: cython.longlong) -> cython.longlong:
+        """Alarm `index` is due at `time` (ns); NEVER takes it back. Returns the first alarm's instant."""
         i: cython.longlong
-        first: cython.longlong = 1 << 62
         self.alarm_times[index] = time
-        for i in range(self.alarm_count):
-            if self.alarm_times[i] < first:
-                first = self.alarm_times[i]
-        self.alarm_time = first
-        if first < self.next_time:
-            self.next_time = first
+        if time < self.alarm_time:
+            self.alarm_time = time
+            self.alarm_first = index
+            if time < self.next_time:
+                self.next_time = time
+        elif index == self.alarm_first:
+            for i in range(self.alarm_count):
+                if self.alarm_times[i] < time:
+                    time = self.alarm_times[i]
+                    index = i
+            self.alarm_time = time
+            self.alarm_first = index
+        return self.alarm_time
 
     def start(self, schedule: Schedule, phase_ns: cython.longlong) -> cython.void:
         """Run `schedule`: the first slot begins at `phase_ns`, the later ones by this chip's crystal."""
@@ -178,7 +187,7 @@ class Microcontroller:
         """Core cycles at `now` since the slot timer's last match (its count register)."""
         return int((self.now - self.match_time) * self.cycles_per_ns)
 
-    def request(self, source: InterruptSource) -> cython.void:
+    def request(self, source: InterruptSource) -> cython.longlong:
         """Raise an interrupt line; it is served as soon as its priority allows."""
         self.vic.raise_source(source)
 
@@ -196,20 +205,21 @@ class Microcontroller:
         time: cython.longlong
         service: cython.longlong
         what: cython.longlong
+        self.horizon = until
         while True:
             time = self.alarm_time
             what = 1
             if self.tick_time < time:
                 time = self.tick_time
                 what = 2
-            if vic.fiq_pending > 0:
+            if vic.fiq_pending != 0:
                 service = self.fiq_free
                 if service < self.instant:
                     service = self.instant
                 if service < time:
                     time = service
                     what = 3
-            elif vic.irq_pending > 0:
+            elif vic.irq_pending != 0:
                 service = self.fiq_free
                 if self.irq_free > service:
                     service = self.irq_free
@@ -254,7 +264,7 @@ class Microcontroller:
         self.next_time = time
         return time
 
-    def _input(self) -> cython.void:
+    def _input(self) -> cython.longlong:
         """The message just taken: hardware first; its interrupt line is raised by the peripheral."""
         inbox: EventQueue = self.inbox
         pin: cython.longlong
@@ -294,23 +304,20 @@ class Microcontroller:
         source.ref = inbox.ref
         self.vic.raise_source(source)
 
-    def _alarm(self, time: cython.longlong) -> cython.void:
-        """The first alarm that is due."""
-        i: cython.longlong
-        peripheral: Peripheral
+    def _alarm(self, time: cython.longlong) -> cython.longlong:
+        """The first alarm is due."""
+        i: cython.longlong = self.alarm_first
+        peripheral: Peripheral = self.alarm_owners[i]
         self.now = time
-        for i in range(self.alarm_count):
-            if self.alarm_times[i] == time:
-                self.set_alarm(i, 1 << 62)
-                peripheral = self.alarm_owners[i]
-                peripheral.on_alarm(self.alarm_numbers[i], time)
-                break
+        self.set_alarm(i, 1 << 62)
+        peripheral.on_alarm(self.alarm_numbers[i], time)
         if self.waiting:
             self.check_wait = True
             if self.code_time < time:
                 self.code_time = time
+        return time
 
-    def _timer_match(self) -> cython.void:
+    def _timer_match(self) -> cython.longlong:
         """The slot timer matches and restarts: its interrupt is requested."""
         self.match_time = self.tick_time
         self.tick_number += 1
@@ -328,19 +335,17 @@ class Microcontroller:
 
     def _background(self) -> cython.void:
         """One turn of the main loop beside the scheduler."""
-        cycles: cython.longlong
+        done: cython.longlong
         if self.code_time < self.instant:
             self.code_time = self.instant
         self.now = self.code_time
-        self.extra_cycles = 0
-        cycles = self.background()
-        cycles += self.extra_cycles
-        if cycles <= 0:
+        done = self.background()
+        if done <= self.code_time:
             self.background_wanted = False
             return
-        self.code_time += int(cycles * self.ns_per_cycle)
+        self.code_time = done
 
-    def _serve(self, source: InterruptSource, time: cython.longlong) -> cython.void:
+    def _serve(self, source: InterruptSource, time: cython.longlong) -> cython.longlong:
         """Run the handler of a pending source at `time` and let its cycles pass."""
         inbox: EventQueue = self.inbox
         cycles: cython.longlong = source.base_cycles
@@ -389,7 +394,7 @@ class Microcontroller:
         if self.scheduler.recording:
             self.scheduler.note_interrupt(source.name, cycles)
 
-    def _code(self, until: cython.longlong) -> cython.void:
+    def _code(self, until: cython.longlong) -> cython.longlong:
         """Run tasks from `code_time` on, until something else comes first."""
         scheduler: SlotScheduler = self.scheduler
         vic: InterruptController = self.vic
@@ -459,12 +464,12 @@ class Microcontroller:
                 or self.code_time >= until
                 or self.code_time >= inbox.head_time
                 or self.code_time >= self.alarm_time
-                or vic.irq_pending > 0
-                or vic.fiq_pending > 0
+                or vic.irq_pending != 0
+                or vic.fiq_pending != 0
             ):
                 return
 
-    def _wait_over(self) -> cython.void:
+    def _wait_over(self) -> cython.longlong:
         """The condition of the spinning task came true: its cycles are the spinning, less what was stolen."""
         task: Wait = self.wait_task
         spun: cython.longlong = int((self.code_time - self.wait_start) * self.cycles_per_ns)
@@ -478,7 +483,7 @@ class Microcontroller:
         spun = int(cost * self.ns_per_cycle)
         self.code_time = before + spun
 
-    def _charge(self, task: Task, cycles: cython.longlong) -> cython.void:
+    def _charge(self, task: Task, cycles: cython.longlong) -> cython.longlong:
         """Let the cycles of a task pass and hold them against its limit."""
         busy: cython.longlong = int(cycles * self.ns_per_cycle)
         self.code_time += busy
@@ -494,7 +499,7 @@ class Microcontroller:
         if self.scheduler.recording:
             self.scheduler.note_task(task.name, cycles)
 
-    def _close_slot(self, since: cython.longlong) -> cython.void:
+    def _close_slot(self, since: cython.longlong) -> cython.longlong:
         """Record the slot that began at `since` and ends now."""
         scheduler: SlotScheduler = self.scheduler
         cycles: cython.longlong = int((self.code_time - since) * self.cycles_per_ns)
