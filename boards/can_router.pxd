@@ -1,0 +1,71 @@
+from boards.modules.can_load cimport CanLoad
+from boards.modules.error_module cimport ErrorModule
+from boards.modules.mcu_led cimport Heartbeat, McuLed
+from boards.modules.network_clock cimport NetworkClock
+from boards.modules.network_time cimport NetworkTime
+from boards.modules.routing cimport Router, RoutingTable
+from boards.modules.ssp_link cimport RouterSspLink
+from firmware_sim.microcontroller cimport Microcontroller
+from firmware_sim.peripherals.adc_internal cimport AdcInternal
+from firmware_sim.peripherals.can_controller cimport CanController
+from firmware_sim.peripherals.gpio cimport Gpio
+from firmware_sim.peripherals.ssp cimport SspPort, SspSegment
+from firmware_sim.peripherals.timer_capture cimport TimerCapture
+from firmware_sim.scheduler cimport Task
+from foundation.events cimport EventQueue
+from foundation.numbers cimport float32, word_of_float
+
+cdef class CanRouterBoard(Microcontroller):
+    cdef public object quirks
+    cdef public Gpio gpio
+    cdef public AdcInternal adc
+    cdef public CanController can1, can2, can3, can4
+    cdef public list controllers, error_codes
+    cdef public SspPort ssp
+    cdef public TimerCapture timer1
+    cdef public NetworkTime time
+    cdef public NetworkClock clock
+    cdef public CanLoad load
+    cdef public ErrorModule errors
+    cdef public McuLed leds
+    cdef public Heartbeat heartbeat
+    cdef public RouterSspLink link
+    cdef public Router router
+    cdef public bint errors_one_late, report_full
+    cdef public long long error_before, lost_before
+    cdef public long long[::1] can_leds
+    cdef public long long own_lost
+    cdef public bint idle
+    cdef public long long idle_since, flush_next, pair_ns, wakes, batches
+    cdef public long long route_idle, route_frame, flush_idle, flush_frame
+    cdef public long long code_dnf, code_near_limit, code_task_limit, code_queue_full
+    cpdef void report(self, long long code)
+    cpdef object on_segment_timer(self, EventQueue queue)
+    cpdef object on_segment(self, EventQueue queue)
+    cpdef object on_can1(self, EventQueue queue)
+    cpdef object on_can2(self, EventQueue queue)
+    cpdef object on_can3(self, EventQueue queue)
+    cpdef object on_can4(self, EventQueue queue)
+    cpdef object on_can_error(self, EventQueue queue)
+    cpdef void receive(self, CanController controller)
+    cpdef long long flush(self, CanController controller)
+    cpdef bint can_flush(self)
+    cpdef long long main_loop(self)
+    cpdef void slot_exceeded(self)
+    cpdef void slot_near_limit(self)
+    cpdef void task_limit(self, Task task)
+    cpdef void send_float(self, long long identifier, double value)
+    cpdef void send_time(self)
+    cpdef object update_errors(self)
+    cpdef void count_load(self)
+    cpdef void show_load(self)
+    cpdef void send_error(self)
+    cpdef double current_A(self)
+    cpdef double voltage_V(self)
+    cpdef void send_power(self)
+    cpdef void send_current(self)
+    cpdef void send_voltage(self)
+    cpdef void send_load_1(self)
+    cpdef void send_load_2(self)
+    cpdef void send_load_3(self)
+    cpdef void send_load_4(self)

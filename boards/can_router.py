@@ -1,0 +1,452 @@
+"""The CAN router (CSR, board B10A): four buses, the link to the main brain, the robot's time.
+
+Facts network-and-boards 1.4-1.6, 3.7, 4.16; appendix 3.7, 3.11. Interrupts fill rings and keep the time; the
+main loop moves frames whenever no slot runs: run the scheduler, then four times "route, flush one bus".
+"""
+
+import array
+
+import cython
+
+from boards.modules.can_load import CanLoad
+from boards.modules.error_module import ErrorModule
+from boards.modules.mcu_led import Heartbeat, McuLed
+from boards.modules.network_clock import CYCLES_PER_SYNC, NetworkClock
+from boards.modules.network_time import NetworkTime
+from boards.modules.routing import Router, RoutingTable
+from boards.modules.ssp_link import RouterSspLink
+from datatable.generated import csr as table
+from datatable.generated import errors as codes
+from datatable.generated import routes
+from firmware_sim.microcontroller import Microcontroller
+from firmware_sim.peripherals.adc_internal import AdcInternal
+from firmware_sim.peripherals.can_controller import (
+    ICR_BEI,
+    ICR_DOI,
+    ICR_EI,
+    ICR_EPI,
+    ICR_RI,
+    CanController,
+)
+from firmware_sim.peripherals.gpio import Gpio
+from firmware_sim.peripherals.ssp import SspPort
+from firmware_sim.peripherals.timer_capture import TimerCapture
+from firmware_sim.scheduler import Occasional, Schedule, Task
+from firmware_sim.vic import FIQ, TIMER_MATCH
+from foundation.events import CAN_RX, CAN_STATUS, SSP_SEGMENT
+
+if not cython.compiled:
+    from foundation.numbers import float32, word_of_float
+
+# Cycles of the interrupts and of the main loop, chosen by us, because no cycle count of this firmware is
+# known; each is an estimate of instructions and of accesses over the slow peripheral bus.
+RECEIVE_CYCLES = 90  # assembler: four registers of the controller into the ring, release
+SEGMENT_TIMER_CYCLES = 140  # counters, segment bookkeeping, transmit interrupt on
+# 31 half-words pass a FIFO of eight: about eight entries of 30 cycles, and 14 cycles per half-word both ways
+SEGMENT_CYCLES = 240
+HALF_WORD_CYCLES = 14
+ROUTE_IDLE_CYCLES = 60  # three empty rings looked at
+ROUTE_FRAME_CYCLES = 220  # table, learning, one push
+FLUSH_IDLE_CYCLES = 25
+FLUSH_FRAME_CYCLES = 110  # status, four registers, command
+LOOP_CYCLES = 20  # the scheduler's look at its flag, once per turn of four
+# Supply of the electronics (facts 5): ten-bit readings, gain and offset
+CURRENT_GAIN_A, CURRENT_OFFSET = 0.000501, 6
+VOLTAGE_GAIN_V, VOLTAGE_OFFSET = 0.03046, 5
+CURRENT_INPUT, VOLTAGE_INPUT = 0, 1  # AIN0, AIN1
+WARNING_FRAMES_PER_MS = 20  # facts 1.10
+FULL_FRAMES_PER_MS = 30
+LED_OFF, LED_TRAFFIC, LED_WARNING, LED_FULL = 0, 1, 2, 3
+
+
+def supply_pins_V(current_A, voltage_V):
+    """Voltages at AIN0 and AIN1 for a supply of `current_A` and `voltage_V`: inverse of facts 5, 3.3 V full scale."""
+    lsb = 3.3 / 1024.0
+    return (
+        (current_A / CURRENT_GAIN_A - CURRENT_OFFSET) * lsb,
+        (voltage_V / VOLTAGE_GAIN_V - VOLTAGE_OFFSET) * lsb,
+    )
+
+
+class CanRouterBoard(Microcontroller):
+    """Slots of 1 ms, 10 rows. `phase_ns`: when its program starts; the first sync comes 1 ms later."""
+
+    def __init__(self, crystal, quirks, phase_ns=0) -> None:
+        Microcontroller.__init__(self, "CSR", table.CLOCK_HZ, crystal)
+        self.quirks = quirks
+        self.code_dnf = codes.ASCHED_DNF
+        self.code_near_limit = codes.SCHED_SLOT_NEAR_LIMIT
+        self.code_task_limit = codes.SCHED_TASK_LIMIT
+        self.code_queue_full = codes.CAN_TX_QUEUE_FULL
+        self.errors_one_late = quirks.errors_reported_one_late
+        self.report_full = quirks.full_queues_reported
+        self.error_before = codes.DEFAULT
+        self.lost_before = 0
+
+        self.time = NetworkTime()
+        self.errors = ErrorModule(
+            table.BOARD_NUMBER, self.time, quirks.errors_counted_per_event, quirks.new_errors_lost_after_repeat
+        )
+        self.gpio = Gpio(self)
+        self.leds = McuLed(self.gpio, 1000)
+        self.heartbeat = Heartbeat(self.time, self.leds)
+        self.adc = AdcInternal(self, clkdiv=182)
+        interrupts = ICR_RI | ICR_EI | ICR_DOI | ICR_EPI | ICR_BEI
+        self.can1 = CanController(self, 1, IER=interrupts)
+        self.can2 = CanController(self, 2, IER=interrupts)
+        self.can3 = CanController(self, 3, IER=interrupts)
+        self.can4 = CanController(self, 4, IER=interrupts)
+        self.controllers = [self.can1, self.can2, self.can3, self.can4]
+        self.ssp = SspPort(self, 0)
+        self.timer1 = TimerCapture(self, 1, period=12000, phase_ns=phase_ns, match_interrupt=True)
+        self.load = CanLoad()
+        self.clock = NetworkClock(self.time, self.controllers, self.load)
+        self.link = RouterSspLink(self.report, quirks.ssp_frames_may_straddle)
+        self.router = Router(
+            RoutingTable(enumerate(routes.DESTINATIONS)),
+            self.link,
+            self.load,
+            self.report,
+            quirks.router_one_frame_lag,
+        )
+        self.can_leds = array.array("q", [0]) * 5
+        self.own_lost = 0
+
+        # bus-off, warning, overrun, passive, error while receiving, while sending; per controller
+        kinds = ("TX_BUSOFF", "ERR_WARN", "DATA_OVRN", "ERR_PASS", "BUS_RX", "BUS_TX")
+        self.error_codes = [[getattr(codes, f"CAN{n}_{kind}") for kind in kinds] for n in (1, 2, 3, 4)]
+        errors_line = self.vic.source(CAN_STATUS, 0)  # the chip has one error line for all controllers
+        for controller in self.controllers:
+            controller.error_source = errors_line
+
+        attach = self.vic.attach
+        attach(TIMER_MATCH, 1, self.on_segment_timer, SEGMENT_TIMER_CYCLES, slot=FIQ, name="timer1")
+        attach(SSP_SEGMENT, 0, self.on_segment, SEGMENT_CYCLES, HALF_WORD_CYCLES, slot=FIQ, name="ssp")
+        attach(CAN_RX, 1, self.on_can1, RECEIVE_CYCLES, slot=FIQ, name="can1 receive")
+        attach(CAN_RX, 2, self.on_can2, RECEIVE_CYCLES, slot=FIQ, name="can2 receive")
+        attach(CAN_RX, 3, self.on_can3, RECEIVE_CYCLES, slot=FIQ, name="can3 receive")
+        attach(CAN_RX, 4, self.on_can4, RECEIVE_CYCLES, slot=FIQ, name="can4 receive")
+        attach(CAN_STATUS, 0, self.on_can_error, 150, slot=10, name="can error")
+
+        self.on_overrun = self.slot_exceeded
+        self.on_limit = self.task_limit
+        if quirks.warn_near_slot_limit:
+            self.on_near_limit = self.slot_near_limit
+
+        self.route_idle = ROUTE_IDLE_CYCLES
+        self.route_frame = ROUTE_FRAME_CYCLES
+        self.flush_idle = FLUSH_IDLE_CYCLES
+        self.flush_frame = FLUSH_FRAME_CYCLES
+        self.pair_ns = int((ROUTE_IDLE_CYCLES + FLUSH_IDLE_CYCLES + LOOP_CYCLES // 4) * self.ns_per_cycle)
+        self.idle = True
+        self.idle_since = phase_ns
+        self.flush_next = 0
+        self.wakes = 0
+        self.batches = 0
+        self.background = self.main_loop
+        self.adc.start_burst(CURRENT_INPUT, VOLTAGE_INPUT)
+        self.start(self.schedule(), phase_ns)
+
+    def schedule(self) -> Schedule:
+        """Facts 3.7. Costs and limits are chosen by us: no execution times of this board are known."""
+        return Schedule(
+            slot_us=1000,
+            tick_slot=0,
+            every=(
+                #    function              cost (cycles)  limit
+                Task(self.send_time,       cost=120,      limit=300),
+                Task(self.update_errors,   cost=60,       limit=4000, per_item=150, item="error"),
+                Task(self.count_load,      cost=110,      limit=200),
+                Task(self.leds.update,     cost=50,       limit=150),
+                Task(self.show_load,       cost=100,      limit=200),
+                Task(self.heartbeat.beat,  cost=40,       limit=150),
+            ),
+            rows=((Occasional(
+                (
+                    Task(self.send_error,    cost=150,    limit=400),
+                    Task(self.send_power,    cost=700,    limit=1000),  # two readings, soft-float product
+                    Task(self.send_current,  cost=350,    limit=600),
+                    Task(self.send_voltage,  cost=350,    limit=600),
+                    Task(self.send_load_1,   cost=200,    limit=400),
+                    Task(self.send_load_2,   cost=200,    limit=400),
+                    Task(self.send_load_3,   cost=200,    limit=400),
+                    Task(self.send_load_4,   cost=200,    limit=400),
+                ),
+                extra_idle_call=self.quirks.occasional_idle_call,
+            ),), (), (), (), (), (), (), (), (), ()),
+        )  # fmt: skip
+
+    # --- errors -----------------------------------------------------------------------------------------
+
+    def report(self, code: cython.longlong) -> cython.void:
+        """Note an error; with the firmware's quirk each report carries the one before, the first is 0."""
+        if self.errors_one_late:
+            self.errors.report(self.error_before)
+            self.error_before = code
+        else:
+            self.errors.report(code)
+
+    def slot_exceeded(self) -> cython.void:
+        """A tick found the row unfinished."""
+        self.report(self.code_dnf)
+
+    def slot_near_limit(self) -> cython.void:
+        """A slot took more than 90 % of its length."""
+        self.report(self.code_near_limit)
+
+    def task_limit(self, task: Task) -> cython.void:
+        """A task took longer than its limit."""
+        self.report(self.code_task_limit)
+
+    # --- interrupts -------------------------------------------------------------------------------------
+
+    def on_segment_timer(self, queue) -> object:
+        """Timer1, every 200 us: the time, and the next exchange with the main brain."""
+        self.timer1.clear(1)
+        if self.clock.tick():
+            self.extra_cycles += 4 * CYCLES_PER_SYNC
+        self.ssp.start(self.link.tick(self.now))
+        return None
+
+    def on_segment(self, queue) -> object:
+        """An exchange is over; returns its half-words, whose FIFO service is charged here in one."""
+        segment: SspSegment = self.ssp.take()
+        if segment is None:
+            return None
+        self.link.receive(segment)
+        return 31
+
+    def on_can1(self, queue) -> object:
+        """A frame on CAN1."""
+        self.receive(self.can1)
+        return None
+
+    def on_can2(self, queue) -> object:
+        """A frame on CAN2."""
+        self.receive(self.can2)
+        return None
+
+    def on_can3(self, queue) -> object:
+        """A frame on CAN3."""
+        self.receive(self.can3)
+        return None
+
+    def on_can4(self, queue) -> object:
+        """A frame on CAN4."""
+        self.receive(self.can4)
+        return None
+
+    def receive(self, controller: CanController) -> cython.void:
+        """Copy the older receive buffer into the common ring and release it."""
+        frame: cython.longlong = controller.RFS
+        if controller.rx_count == 0:
+            return
+        self.router.receive(
+            controller.number,
+            controller.RID,
+            (frame >> 16 & 15) | (frame >> 30 & 1) << 4,
+            controller.RDA,
+            controller.RDB,
+        )
+        controller.release()
+
+    def on_can_error(self, queue) -> object:
+        """Read every controller's capture register; restart one that is bus-off."""
+        controller: CanController
+        cause: cython.longlong
+        for controller in self.controllers:
+            cause = controller.read_ICR()
+            named = self.error_codes[controller.number - 1]
+            if controller.bus_off:
+                self.report(named[0])
+                controller.write_MOD(0)
+                continue
+            if cause & 4:
+                self.report(named[1])
+            if cause & 8:
+                self.report(named[2])
+                controller.write_CMR(8)
+            if cause & 32:
+                self.report(named[3])
+            if cause & 128:
+                self.report(named[4] if cause >> 21 & 1 else named[5])
+        return None
+
+    # --- main loop --------------------------------------------------------------------------------------
+
+    def flush(self, controller: CanController) -> cython.longlong:
+        """Fill transmit buffers 1 and 2 from the ring of the controller's bus; returns frames moved."""
+        router: Router = self.router
+        channel: cython.longlong = controller.number
+        buffer: cython.longlong
+        slot: cython.longlong
+        moved: cython.longlong = 0
+        while router.tx_read[channel] != router.tx_write[channel]:
+            if controller.tx_free[1] != 0:
+                buffer = 1
+            elif controller.tx_free[2] != 0:
+                buffer = 2
+            else:
+                break
+            slot = channel * 8 + router.tx_read[channel]
+            if not controller.transmit(
+                buffer, router.tx_id[slot], router.tx_flags[slot], router.tx_word0[slot], router.tx_word1[slot]
+            ):
+                break
+            router.tx_read[channel] = (router.tx_read[channel] + 1) & 7
+            self.load.count(channel)
+            moved += 1
+        return moved
+
+    def can_flush(self) -> cython.bint:
+        """True when a frame waits for a bus that has a free transmit buffer and is not in reset."""
+        router: Router = self.router
+        controller: CanController
+        for controller in self.controllers:
+            if router.tx_read[controller.number] != router.tx_write[controller.number]:
+                if (controller.tx_free[1] != 0 or controller.tx_free[2] != 0) and not controller.MOD & 1:
+                    return True
+        return False
+
+    def main_loop(self) -> cython.longlong:
+        """Move what waits, until nothing does or something else is due; returns the instant reached, or 0.
+
+        An idle loop spins through its four pairs of "route, flush", so work that comes up waits for the
+        pair in progress to end and is met wherever the loop happens to be.
+        """
+        at: cython.longlong = self.now
+        passed: cython.longlong
+        moved: cython.longlong
+        self.wakes += 1
+        if not (self.router.has_work() or self.can_flush()):
+            if not self.idle:
+                self.idle = True
+                self.idle_since = at
+            return 0
+        self.batches += 1
+        if self.idle:
+            self.idle = False
+            passed = at - self.idle_since
+            self.flush_next = (self.flush_next + passed // self.pair_ns) % 4
+            passed = passed % self.pair_ns
+            if passed > 0:
+                self.flush_next = (self.flush_next + 1) % 4
+                at += self.pair_ns - passed
+        while True:
+            self.now = at
+            moved = self.router.route_step(at)
+            at += int((self.route_idle + self.route_frame * moved) * self.ns_per_cycle)
+            self.now = at
+            moved = self.flush(self.controllers[self.flush_next])
+            at += int((self.flush_idle + self.flush_frame * moved) * self.ns_per_cycle)
+            self.flush_next += 1
+            if self.flush_next == 4:
+                self.flush_next = 0
+            if (
+                at >= self.horizon
+                or at >= self.alarm_time
+                or at >= self.tick_time
+                or at >= self.inbox.head_time
+            ):
+                return at
+            if not (self.router.has_work() or self.can_flush()):
+                self.idle = True
+                self.idle_since = at
+                self.background_wanted = False
+                return at
+
+    # --- slot tasks -------------------------------------------------------------------------------------
+
+    def send_float(self, identifier: cython.longlong, value: cython.double) -> cython.void:
+        """A variable of the router itself, stamped with its own time, into its own ring."""
+        if not self.router.send(identifier, word_of_float(value), self.time.ms):
+            self.own_lost += 1
+            if self.report_full:
+                self.report(self.code_queue_full)
+
+    def send_time(self) -> cython.void:
+        """The main brain's copy of the time.
+
+        ROBOT PARITY: on the robot the first word of this copy is the count as a float; the table has the
+        variable as a whole number, so here both words are the count, as on the buses.
+        """
+        if not self.router.send(0, self.time.ms, self.time.ms):
+            self.own_lost += 1
+            if self.report_full:
+                self.report(self.code_queue_full)
+
+    def update_errors(self) -> object:
+        """Collect the errors of the slot; frames lost to full transmit rings since the last look are one."""
+        lost: cython.longlong = 0
+        i: cython.longlong
+        if self.report_full:
+            for i in range(1, 5):
+                lost += self.router.transmit_lost[i]
+            while self.lost_before < lost:
+                self.lost_before += 1
+                self.report(self.code_queue_full)
+        return self.errors.update()
+
+    def count_load(self) -> cython.void:
+        """The millisecond's frame counts."""
+        self.load.end_of_millisecond()
+
+    def show_load(self) -> cython.void:
+        """One light per bus: 0 silent, 1 traffic, 2 from 20 frames/ms, 3 from 30.
+
+        ROBOT PARITY: which pins they hang on is not known, so they are state only.
+        """
+        i: cython.longlong
+        count: cython.longlong
+        for i in range(1, 5):
+            count = self.load.last_counts[i]
+            if count == 0:
+                self.can_leds[i] = 0
+            elif count < 20:
+                self.can_leds[i] = 1
+            elif count < 30:
+                self.can_leds[i] = 2
+            else:
+                self.can_leds[i] = 3
+
+    def send_error(self) -> cython.void:
+        """The error that waits longest, if one does."""
+        if self.errors.take():
+            if not self.router.send(table.ERROR_VARIABLE, self.errors.word, self.errors.stamp):
+                self.own_lost += 1
+
+    def current_A(self) -> cython.double:
+        """Supply current of the electronics by the converter."""
+        return float32(CURRENT_GAIN_A * (self.adc.DR(0) + CURRENT_OFFSET))
+
+    def voltage_V(self) -> cython.double:
+        """Supply voltage of the electronics by the converter."""
+        return float32(VOLTAGE_GAIN_V * (self.adc.DR(1) + VOLTAGE_OFFSET))
+
+    def send_power(self) -> cython.void:
+        """CSR_MCU_POWER, W: the product of both readings."""
+        self.send_float(table.CSR_MCU_POWER, self.current_A() * self.voltage_V())
+
+    def send_current(self) -> cython.void:
+        """CSR_MCU_CURRENT, A."""
+        self.send_float(table.CSR_MCU_CURRENT, self.current_A())
+
+    def send_voltage(self) -> cython.void:
+        """CSR_MCU_VOLTAGE, V."""
+        self.send_float(table.CSR_MCU_VOLTAGE, self.voltage_V())
+
+    def send_load_1(self) -> cython.void:
+        """CSR_CAN1_LOAD, most frames in one ms since the last report."""
+        self.send_float(table.CSR_CAN1_LOAD, self.load.report_peak(1))
+
+    def send_load_2(self) -> cython.void:
+        """CSR_CAN2_LOAD."""
+        self.send_float(table.CSR_CAN2_LOAD, self.load.report_peak(2))
+
+    def send_load_3(self) -> cython.void:
+        """CSR_CAN3_LOAD."""
+        self.send_float(table.CSR_CAN3_LOAD, self.load.report_peak(3))
+
+    def send_load_4(self) -> cython.void:
+        """CSR_CAN4_LOAD."""
+        self.send_float(table.CSR_CAN4_LOAD, self.load.report_peak(4))

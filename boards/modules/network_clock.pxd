@@ -1,0 +1,12 @@
+from boards.modules.can_load cimport CanLoad
+from boards.modules.network_time cimport NetworkTime
+from firmware_sim.peripherals.can_controller cimport CanController
+
+cdef class NetworkClock:
+    cdef public NetworkTime time
+    cdef public CanLoad load
+    cdef public list controllers
+    cdef public long long ticks, divider
+    cdef public long long[::1] sent, skipped
+    cpdef bint tick(self)
+    cpdef void send_sync(self)
