@@ -23,7 +23,7 @@ PIN_EDGE = 1  # a pin, b level 0/1, c partner pin (or -1), d level of the partne
 CAN_RX = 2  # a controller 1..4, b identifier, c flags, d word 0 (bytes 0-3), e word 1 (bytes 4-7)
 CAN_TX_DONE = 3  # a controller, b buffer 1..3, c TX_* status
 CAN_STATUS = 4  # a controller, b interrupt bits, c transmit errors, d receive errors, e bus-off 0/1
-UART_BYTE = 5  # a UART number, b byte
+UART_BYTE = 5  # a UART number, b byte; or c 2-8 bytes at once, d the first four, e the rest, low byte first
 SSP_SEGMENT = 6  # a 0, ref SspSegment received
 
 # Messages from a board (outputs).

@@ -14,3 +14,4 @@ cdef class Uart(Peripheral):
     cpdef bint THR(self, long long byte)
     cpdef long long LSR(self)
     cpdef long long waiting(self)
+    cdef void _store(self, long long byte)

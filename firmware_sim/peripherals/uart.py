@@ -1,8 +1,10 @@
 """A UART with byte timing: UnRBR, UnTHR, UnLSR, UnIIR, UnDLL/DLM as one divisor, UnFDR; 8N1.
 
-Receive: UART_BYTE messages stamped with the end of the byte fill a FIFO of 16. The interrupt (UART_BYTE,
-number) comes when the trigger level (1, 4, 8 or 14) is reached, and when bytes have waited for the time of
-four characters (IIR 0xC, LPC2194 user manual: 3.5 to 4.5). Handlers are expected to empty the FIFO.
+Receive: UART_BYTE messages stamped with the end of the byte fill a FIFO of 16. One message may bring up to
+eight bytes: c their number, d the first four, e the rest, low byte first, stamped with the end of the last.
+The interrupt (UART_BYTE, number) comes when the trigger level (1, 4, 8 or 14) is reached, and when bytes have
+waited for the time of four characters (IIR 0xC, LPC2194 user manual: 3.5 to 4.5). Handlers are expected to
+empty the FIFO.
 Transmit: a byte written to THR leaves as UART_OUTPUT, stamped with the end of its stop bit; FIFO of 16. When
 the FIFO has become empty, (UART_TRANSMIT, number) is raised.
 """
@@ -68,18 +70,33 @@ class Uart(Peripheral):
         return self.fifo_count
 
     def on_message(self, queue) -> cython.void:
-        """A byte came in."""
+        """A byte came in, or up to eight that followed each other without a gap, stamped with the last's end.
+
+        A group is taken at once: with the trigger at or above its size the interrupt comes at the same
+        instant as byte by byte.
+        """
+        i: cython.longlong
+        if queue.c > 1:
+            for i in range(queue.c):
+                self._store((queue.d >> 8 * i if i < 4 else queue.e >> 8 * (i - 4)) & 255)
+        else:
+            self._store(queue.b & 255)
+        if self.fifo_count == 0:
+            return
+        self.chip.set_alarm(self.timeout_alarm, queue.time + 4 * self.byte_ns)
+        if self.fifo_count >= self.trigger:
+            self.IIR = 4
+            self.chip.request(self.source)
+
+    def _store(self, byte: cython.longlong) -> cython.void:
+        """A byte into the FIFO; the seventeenth is lost (overrun)."""
         self.received += 1
         if self.fifo_count >= 16:
             self.overruns += 1
             self.errors |= 2
             return
-        self.fifo[(self.fifo_head + self.fifo_count) % 16] = queue.b & 255
+        self.fifo[(self.fifo_head + self.fifo_count) % 16] = byte
         self.fifo_count += 1
-        self.chip.set_alarm(self.timeout_alarm, queue.time + 4 * self.byte_ns)
-        if self.fifo_count >= self.trigger:
-            self.IIR = 4
-            self.chip.request(self.source)
 
     def on_alarm(self, alarm: cython.longlong, time: cython.longlong) -> cython.void:
         """Character time-out (0) or transmit FIFO empty (1)."""
