@@ -41,7 +41,10 @@ def published_schedule(board: str) -> PublishedSchedule:
 
 
 def main_brain_store() -> DataStore:
-    """The main brain's data store at power-up: every variable at its initial value, unread by everyone."""
+    """The main brain's data store at power-up: every variable at its initial value, unread by everyone.
+
+    ROBOT PARITY: the robot's store ends at id 313; ours goes on with the ids of the 2011 controller.
+    """
     from datatable.generated import all_variables
     from datatable.packing import word_of_value
     from datatable.store import DataStore

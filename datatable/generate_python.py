@@ -56,7 +56,12 @@ def sent_by(table: Table, board: Board) -> list[Variable]:
 
 
 def heard_by(table: Table, board: Board) -> list[Variable]:
-    """What a board takes from a bus or link: subscribed variables that some bus carries."""
+    """What a board takes from a bus or link: subscribed variables that some bus carries.
+
+    ROBOT PARITY: the robot's satellites keep hand-written receive lists, which leave out their spares, the main
+    brain's status and reserved commands; here the list is made from the table, and a frame that no firmware
+    function takes is dropped as an unlisted one would be.
+    """
     return [variable for variable in table.subscribed_by(board.name) if variable.buses]
 
 

@@ -9,7 +9,6 @@ import csv
 import hashlib
 import io
 import keyword
-import math
 import pathlib
 import re
 import tomllib
@@ -81,9 +80,15 @@ class Faults:
 
     def at(self, file: str, line: int, row: str) -> Callable[[str, str], None]:
         def report(field: str, rule: str) -> None:
-            self.found.append(Fault(file, line, row, field, rule))
+            self.found.append(Fault(file, line, one_line(row, 40), one_line(field, 40), one_line(rule, 240)))
 
         return report
+
+
+def one_line(text: str, longest: int) -> str:
+    """`text` without control characters and not longer than `longest`: a file can hold anything."""
+    plain = text if text.isprintable() else repr(text)[1:-1]
+    return plain if len(plain) <= longest else plain[: longest - 3] + "..."
 
 
 def shown(text: object) -> str:
@@ -179,7 +184,7 @@ class BoardReader:
         if not isinstance(value, kind) or (kind is int and isinstance(value, bool)):
             self.report(key, f"is {shown(value)}, not {'text' if kind is str else kind.__name__}")
             return kind()
-        if kind is str and not TEXT.fullmatch(value):
+        if isinstance(value, str) and not TEXT.fullmatch(value):
             self.report(key, f"{shown(value)} has characters beyond printable ASCII")
             return ""
         return value
@@ -296,8 +301,11 @@ def read_boards(
             section = {}
         sections[key] = section
     for name, bus in sections["buses"].items():
-        known = isinstance(bus, dict) and set(bus) == {"channel", "bit_rate"}
-        if not known or not all(type(value) is int and 0 <= value < 10**9 for value in bus.values()):
+        if (
+            not isinstance(bus, dict)
+            or set(bus) != {"channel", "bit_rate"}
+            or not all(type(value) is int and 0 <= value < 10**9 for value in bus.values())
+        ):
             report(f"buses {shown(name)}", "needs exactly channel and bit_rate, both whole numbers below 10^9")
         elif bus["channel"] > 4 or bus["channel"] in channels.values():
             report(f"buses {shown(name)}", f"channel {bus['channel']} is above 4 or used twice")
@@ -362,14 +370,14 @@ def value_of(text: str, kind: str, field: str, report: Callable[[str, str], None
     if not NUMBER.fullmatch(text) or len(text) > 60:
         report(field, f"is {shown(text)}, not a number")
         return None
-    value = float(text) if kind == "f32" else Fraction(text)
-    if isinstance(value, Fraction) and value.denominator != 1:
+    exact = Fraction(text)
+    if kind != "f32" and exact.denominator != 1:
         report(field, f"is {text}, not a whole number as type {kind} needs")
         return None
-    if not low <= value <= high or (isinstance(value, float) and not math.isfinite(value)):
+    if not low <= exact <= high:
         report(field, f"is {text}, outside the range of type {kind} ({low:.9g} ... {high:.9g})")
         return None
-    return value if kind == "f32" else int(value)
+    return float(exact) if kind == "f32" else int(exact)
 
 
 def repeated(names: Iterable[str]) -> list[str]:

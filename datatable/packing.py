@@ -11,14 +11,14 @@ ERROR_CODE_BITS, ERROR_BOARD_BITS, ERROR_COUNT_BITS = 16, 6, 10
 
 def word_of_value(kind: str, value: float) -> int:
     """The 32-bit word of `value` (0 ... 2^32-1). Floats are rounded to single precision, integers wrap."""
-    return word_of_float(value) if kind == "f32" else wrap_u32(int(value))
+    return int(word_of_float(value)) if kind == "f32" else int(value) & 0xFFFFFFFF
 
 
 def value_of_word(kind: str, word: int) -> float | int:
     """The number that a 32-bit word holds, by type f32, i32 or u32."""
     if kind == "f32":
-        return float_of_word(word)
-    return wrap_i32(word) if kind == "i32" else wrap_u32(word)
+        return float(float_of_word(word))
+    return int(wrap_i32(word) if kind == "i32" else wrap_u32(word))
 
 
 def pack_frame(kind: str, value: float, time_ms: int) -> bytes:

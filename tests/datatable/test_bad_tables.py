@@ -277,3 +277,11 @@ def test_any_value_under_a_key_of_the_boards_gives_a_table_or_faults(tmp_path, l
     if "=" in lines[line]:
         lines[line] = lines[line].split("=")[0] + "= " + value
     load_or_be_told(write(tmp_path, boards="\n".join(lines)))
+
+
+def test_line_breaks_and_endless_names_in_cells_do_not_spoil_the_message(tmp_path):
+    spoiled = VARIABLES.replace("5,GAIN,f32,,1.5,PC", '5,LEG_COMMAND,f32,,1.5,"P\nC"')
+    spoiled += f"7,{'N' * 5000},f32,,0,MB,PC,,,,,a name\n" + '8,"ERR_\nX",f32,,0,MB,PC,,,,,a name\n'
+    write(tmp_path, variables=spoiled)
+    load_or_be_told(tmp_path)
+    assert "variables.csv:7 LEG_COMMAND publisher: two publishers, MB and P\\nC" in map(str, faults_of(tmp_path))
