@@ -4,11 +4,9 @@ Master files: `datatable/master/`. Generated and checked in: `datatable/generate
 imports only generated modules (``from datatable.generated import mch as table``), which read no file.
 """
 
-from __future__ import annotations
+import foundation  # noqa: F401, I001  (first: it honours RANGER_SIM_INTERPRETED)
 
 from typing import TYPE_CHECKING
-
-import foundation  # noqa: F401  (first: it honours RANGER_SIM_INTERPRETED)
 
 if TYPE_CHECKING:
     from datatable.model import Table
@@ -16,7 +14,7 @@ if TYPE_CHECKING:
     from datatable.store import DataStore
 
 
-def load(folder: str | None = None) -> Table:
+def load(folder: str | None = None) -> "Table":
     """The checked master table. `folder`: where the master files are (ours by default).
 
     Raises datatable.model.TableError, a UserError, that names every fault at once.
@@ -33,14 +31,14 @@ def table_hash(folder: str | None = None) -> str:
     return hash_of_master_files(folder)
 
 
-def published_schedule(board: str) -> PublishedSchedule:
+def published_schedule(board: str) -> "PublishedSchedule":
     """What the schedule of `board` sends, row by row, as boards.toml says it."""
     from datatable.schedule import published_schedule as lookup
 
     return lookup(board)
 
 
-def main_brain_store() -> DataStore:
+def main_brain_store() -> "DataStore":
     """The main brain's data store at power-up: every variable at its initial value, unread by everyone.
 
     ROBOT PARITY: the robot's store ends at id 313; ours goes on with the ids of the 2011 controller.
