@@ -29,7 +29,7 @@ from firmware_sim.peripherals.can_controller import (
     CanController,
 )
 from firmware_sim.peripherals.gpio import Gpio
-from firmware_sim.peripherals.ssp import SspPort
+from firmware_sim.peripherals.ssp import SspPort, SspSegment
 from firmware_sim.peripherals.timer_capture import TimerCapture
 from firmware_sim.scheduler import Occasional, Schedule, Task
 from firmware_sim.vic import FIQ, TIMER_MATCH
@@ -53,7 +53,8 @@ LOOP_CYCLES = 20  # the scheduler's look at its flag, once per turn of four
 # Supply of the electronics (facts 5): ten-bit readings, gain and offset
 CURRENT_GAIN_A, CURRENT_OFFSET = 0.000501, 6
 VOLTAGE_GAIN_V, VOLTAGE_OFFSET = 0.03046, 5
-CURRENT_INPUT, VOLTAGE_INPUT = 0, 1  # AIN0, AIN1
+# Places on `chip.analog`, in volts at the converter's input: AIN0 and AIN1.
+ANALOG = {"supply_current": 0, "supply_voltage": 1}
 WARNING_FRAMES_PER_MS = 20  # facts 1.10
 FULL_FRAMES_PER_MS = 30
 LED_OFF, LED_TRAFFIC, LED_WARNING, LED_FULL = 0, 1, 2, 3
@@ -144,7 +145,7 @@ class CanRouterBoard(Microcontroller):
         self.wakes = 0
         self.batches = 0
         self.background = self.main_loop
-        self.adc.start_burst(CURRENT_INPUT, VOLTAGE_INPUT)
+        self.adc.start_burst(ANALOG["supply_current"], ANALOG["supply_voltage"])
         self.start(self.schedule(), phase_ns)
 
     def schedule(self) -> Schedule:

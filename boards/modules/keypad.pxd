@@ -1,5 +1,7 @@
+from firmware_sim.peripherals.gpio cimport Gpio
+
 cdef class Keypad:
-    cdef public object gpio
+    cdef public Gpio gpio
     cdef public long long[::1] pins
     cdef public object report
     cdef public long long code_index

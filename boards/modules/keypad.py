@@ -5,6 +5,7 @@ import array
 import cython
 
 from datatable.generated import errors
+from firmware_sim.peripherals.gpio import Gpio
 
 # pin number = 32 x port + bit: P1.18, P0.12, P0.13, P0.28, P1.16, P0.30
 KEY_PINS = (50, 12, 13, 28, 48, 30)
@@ -13,7 +14,7 @@ KEY_PINS = (50, 12, 13, 28, 48, 30)
 class Keypad:
     """Levels of the keys through `gpio.level(pin)`; `report(code)` hears BUTTON_OOB."""
 
-    def __init__(self, gpio, report) -> None:
+    def __init__(self, gpio: Gpio, report) -> None:
         self.gpio = gpio
         self.pins = array.array("q", KEY_PINS)
         self.report = report

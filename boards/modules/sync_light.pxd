@@ -1,8 +1,9 @@
 from boards.modules.colour_leds cimport ColourLeds
 from boards.modules.keypad cimport Keypad
+from firmware_sim.peripherals.gpio cimport Gpio
 
 cdef class SyncLight:
-    cdef public object gpio
+    cdef public Gpio gpio
     cdef public Keypad keypad
     cdef public ColourLeds leds
     cdef public bint running, lit

@@ -10,6 +10,7 @@ import cython
 
 from boards.modules.colour_leds import ColourLeds
 from boards.modules.keypad import Keypad
+from firmware_sim.peripherals.gpio import Gpio
 
 SYNC_KEY = 4
 SYNC_PIN = 16  # P0.16
@@ -24,7 +25,7 @@ PATTERNS = 10
 class SyncLight:
     """`watch_key` and `update` run once per slot of 1 ms, in this order."""
 
-    def __init__(self, gpio, keypad: Keypad, leds: ColourLeds) -> None:
+    def __init__(self, gpio: Gpio, keypad: Keypad, leds: ColourLeds) -> None:
         self.gpio = gpio
         self.keypad = keypad
         self.leds = leds

@@ -1,0 +1,68 @@
+from boards.modules.buzzer cimport Buzzer
+from boards.modules.can_link cimport CanLink
+from boards.modules.colour_leds cimport ColourLeds
+from boards.modules.error_module cimport ErrorModule
+from boards.modules.execution_timer cimport ExecutionTimer
+from boards.modules.imu_parser cimport ImuParser
+from boards.modules.keypad cimport Keypad
+from boards.modules.lcd cimport Lcd
+from boards.modules.mcu_led cimport Heartbeat, McuLed
+from boards.modules.network_time cimport NetworkTime
+from boards.modules.rc_receiver cimport RcReceiver
+from boards.modules.sync_light cimport SyncLight
+from firmware_sim.microcontroller cimport Microcontroller
+from firmware_sim.peripherals.can_controller cimport CanController
+from firmware_sim.peripherals.gpio cimport Gpio
+from firmware_sim.peripherals.timer_capture cimport TimerCapture
+from firmware_sim.peripherals.uart cimport Uart
+from firmware_sim.scheduler cimport Task
+from foundation.events cimport EventQueue
+
+cdef class UserInterfaceBoard(Microcontroller):
+    cdef public object quirks
+    cdef public NetworkTime time
+    cdef public ErrorModule errors
+    cdef public Gpio gpio
+    cdef public McuLed mcu_leds
+    cdef public Heartbeat heartbeat
+    cdef public ExecutionTimer execution
+    cdef public CanController can2
+    cdef public CanLink can
+    cdef public TimerCapture timer0
+    cdef public RcReceiver rc
+    cdef public Uart uart1
+    cdef public ImuParser imu
+    cdef public Keypad keypad
+    cdef public Lcd lcd
+    cdef public ColourLeds leds
+    cdef public Buzzer buzzer
+    cdef public SyncLight sync_light
+    cdef public long long slots, imu_start_slots
+    cdef public bytes imu_command
+    cpdef void report(self, long long code)
+    cpdef object on_uart(self, EventQueue queue)
+    cpdef object on_rc_edge(self, EventQueue queue)
+    cpdef void lcd_tick(self)
+    cpdef void note_overrun(self)
+    cpdef void note_limit(self, Task task)
+    cpdef void note_near_limit(self)
+    cpdef object update_imu(self)
+    cpdef object update_errors(self)
+    cpdef void update_buzzer(self)
+    cpdef object update_sync_light(self)
+    cpdef void watch_sync_key(self)
+    cpdef void send_roll(self)
+    cpdef void send_pitch(self)
+    cpdef void send_yaw(self)
+    cpdef void send_rate_x(self)
+    cpdef void send_rate_y(self)
+    cpdef void send_rate_z(self)
+    cpdef void send_error(self)
+    cpdef void send_buttons(self)
+    cpdef void send_rc_0(self)
+    cpdef void send_rc_1(self)
+    cpdef void send_rc_2(self)
+    cpdef void send_rc_3(self)
+    cpdef void send_status(self)
+    cpdef void send_execution_time(self)
+    cpdef void send_max_execution_time(self)
