@@ -12,4 +12,5 @@ cdef class CurrentControl:
     cdef public long long code_saturated, code_sum, code_duty, code_stopped
     cdef public long long proportional_gain, integral_gain, integral_limit, integral, error, duty, calls
     cdef public bint block_positive, block_negative
+    cpdef bint supervise(self, long long current)
     cpdef void update(self, long long target, long long current)

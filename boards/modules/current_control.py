@@ -55,15 +55,16 @@ class CurrentControl:
         self.block_positive = False
         self.block_negative = False
 
-    def update(self, target: cython.longlong, current: cython.longlong) -> cython.void:
-        """One sample: drive the measured `current` towards `target` (A x 65536, the latter already limited)."""
-        total: cython.longlong
-        counts: cython.longlong
+    def supervise(self, current: cython.longlong) -> cython.bint:
+        """First part of a sample: feed the watchdog, advance the monitors, switch the motor off or on.
+
+        False in the first two calls, which do nothing else than feed.
+        """
         off: cython.bint
         self.output.feed_watchdog()
         if self.calls < 2:  # START_CALLS
             self.calls += 1
-            return
+            return False
         self.limits.monitor(current)
         off = self.limits.too_hot or self.limits.overloaded
         if off != self.output.stopped:
@@ -72,6 +73,14 @@ class CurrentControl:
                 self.leds.on(0)  # GREEN
             else:
                 self.leds.off(0)
+        return True
+
+    def update(self, target: cython.longlong, current: cython.longlong) -> cython.void:
+        """One sample: drive the measured `current` towards `target` (A x 65536, the latter already limited)."""
+        total: cython.longlong
+        counts: cython.longlong
+        if not self.supervise(current):
+            return
         if (self.block_positive and target > 0) or (self.block_negative and target < 0):
             target = 0
         if not self.output.running():

@@ -1,0 +1,16 @@
+from boards.modules.joint_safety cimport HipSafety
+from boards.modules.quadrature_decoder cimport QuadratureDecoder
+from boards.motor_board cimport MotorBoard
+from firmware_sim.scheduler cimport Schedule
+from foundation.numbers cimport float32, float_of_fixed
+
+cdef class HipBoard(MotorBoard):
+    cdef public QuadratureDecoder joint
+    cdef public HipSafety safety
+    cdef public long long id_angle, id_ang_rate
+    cpdef Schedule schedule(self)
+    cpdef void set_start_values(self)
+    cpdef long long controlled_position(self)
+    cpdef void rezero(self)
+    cpdef void send_angle(self)
+    cpdef void send_ang_rate(self)

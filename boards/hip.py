@@ -1,0 +1,136 @@
+"""Hip motor board (MCH): B2A, 0.5 ms slots, 4 rows.
+
+Facts: network-and-boards 3.2 (schedule, laid out below line by line), 4.1, 4.2, 4.5, 4.7, 4.8, 5.
+Positive hip angle: inner legs swung forward.
+"""
+
+import cython
+
+from boards.modules.can_link import HIP_INTERRUPTS
+from boards.modules.joint_safety import HipSafety
+from boards.motor_board import ANALOG, PINS, WORDS, MotorBoard
+from datatable.generated import mch as table
+from firmware_sim.scheduler import Schedule, Task, Wait
+
+if not cython.compiled:
+    from foundation.numbers import float32, float_of_fixed
+
+__all__ = ["ANALOG", "PINS", "WORDS", "HipBoard"]
+
+# (place, multiplexer code, gain code): motor current on 4-5, battery current on 2-3, both times 2
+SEQUENCE = (("motor_current", 2, 1), ("battery_current", 1, 1))
+READINGS = dict(
+    motor_gain=0.00154,
+    motor_offset=-9,
+    battery_gain=0.000506,
+    battery_offset=-4,
+    voltage_gain=0.0323,
+)
+LIMITS = dict(
+    target_min=-4.0,
+    target_max=4.0,
+    current_min=-5.0,
+    current_max=5.0,
+    thermal_current=3.1,
+    thermal_time=10.0,
+    excess_limit=20,
+)
+JOINT_ENCODER = (2048, 1.0)  # pulses, gear
+MOTOR_ENCODER = (192, 66.0)
+REZERO_SHARE = 3276  # 5 %, 0.05 x 65536 truncated
+
+
+class HipBoard(MotorBoard):
+    """Position of the compliant law: absolute encoder. Velocity: motor encoder / 66."""
+
+    def __init__(self, crystal=None, quirks=None, phase_ns=0) -> None:
+        MotorBoard.__init__(
+            self,
+            table,
+            crystal,
+            quirks,
+            phase_ns,
+            sequence=SEQUENCE,
+            readings=READINGS,
+            limits=LIMITS,
+            sign=1,
+            largest_duty=250,
+            gear=66.0,
+            interrupts=HIP_INTERRUPTS,
+        )
+        self.add_encoders(phase_ns, cap01=JOINT_ENCODER, cap23=MOTOR_ENCODER)
+        self.joint = self.cap01
+        self.motor = self.cap23
+        self.add_absolute_encoder(second_connector=0, zero=4590, sign=1, rpm=94)
+        self.safety = HipSafety(self.encoder, self.current_control, self.leds)
+        self.id_angle = table.MCH_ANGLE
+        self.id_ang_rate = table.MCH_ANG_RATE
+        self.begin(phase_ns)
+
+    def schedule(self) -> Schedule:
+        """One pass takes 2 ms; each row's variable goes out at 500 Hz, the occasional ones at 45.45 Hz."""
+        return Schedule(
+            slot_us=table.SLOT_US,
+            every=(
+                #    function                         cost limit  per item      name
+                Task(self.start_external_adc,          200,  300,   0, "",      "adcx_convert_all"),
+                Task(self.start_internal_adc,           60,  100,   0, "",      "adci_convert_all"),
+                Task(self.joint.update_angle,          120,  160,   0, "",      "qdc_cap01_angle"),
+                Task(self.joint.update_rate,           850, 3600,  30, "edge",  "qdc_cap01_rate"),
+                Task(self.motor.update_angle,          120,  160,   0, "",      "qdc_cap23_angle"),
+                Task(self.motor.update_rate,           850, 3600,  30, "edge",  "qdc_cap23_rate"),
+                Task(self.start_absolute_encoder,       80,  110,   0, "",      "ae_update"),
+                Task(self.can.receive_all,             120, 4000, 220, "frame", "can_rx_dispatch_all"),
+                Task(self.heartbeat.beat,               40,   60,   0, "",      "hb_beat"),
+                Task(self.leds.update,                  60,   80,   0, "",      "mcu_led_update"),
+                Task(self.safety.check,                 80,  110,   0, "",      "dn_safety"),
+                Task(self.errors.update,                90, 2700, 120, "error", "error_update"),
+                Task(self.can.feed,                     50,  300,  80, "frame", "can_tx1"),
+                Wait(self.adc_external.sequence_done,   20, 4500,              "adcx_conversion_wait"),
+                Task(self.compliant_control,          2600, 3400,   0, "",      "mc_compliant_control"),
+            ),
+            rows=(
+                (Task(self.send_angle,                 420,  560,   0, "",      "MCH_ANGLE"),),
+                (Task(self.send_ang_rate,              380,  510,   0, "",      "MCH_ANG_RATE"),),
+                (Task(self.send_battery_power,         900, 1200,   0, "",      "MCH_BATT_POWER"),),
+                (),  # the occasional list
+            ),
+            occasional_row=3,
+            occasional=(
+                Task(self.send_error,                  200,  270,   0, "",      "ERROR_MCH"),
+                Task(self.send_motor_position,         380,  510,   0, "",      "MCH_MOTOR_POSITION"),
+                Task(self.send_motor_current,          480,  640,   0, "",      "MCH_MOTOR_CURRENT"),
+                Task(self.send_status,                 260,  350,   0, "",      "MCH_STATUS"),
+                Task(self.send_battery_current,        480,  640,   0, "",      "MCH_BATT_CURRENT"),
+                Task(self.send_battery_voltage,        420,  560,   0, "",      "MCH_BATT_VOLTAGE"),
+                Task(self.send_motor_velocity,         380,  510,   0, "",      "MCH_MOTOR_VELOCITY"),
+                Task(self.rezero,                      700,  940,   0, "",      "motor_encoder_rezero"),
+                Task(self.send_execution_time,         420,  560,   0, "",      "MCH_EXECUTION_TIME"),
+                Task(self.send_max_execution_time,     420,  560,   0, "",      "MCH_MAX_EXECUTION_TIME"),
+            ),
+            extra_idle_call=self.quirks.occasional_idle_call,
+            last=(
+                Task(self.execution.record,             60,   80,   0, "",      "execution_time_record"),
+            ),
+        )  # fmt: skip
+
+    def set_start_values(self) -> cython.void:
+        """Encoders start at the absolute angle; the firmware of 2016 forgets the motor's."""
+        self.joint.set_position(self.encoder.angle)
+        if self.quirks.hip_motor_encoder_preset:
+            self.motor.set_position(self.encoder.angle)
+
+    def controlled_position(self) -> cython.longlong:
+        """The joint's own angle, rad x 65536."""
+        return self.encoder.angle
+
+    def rezero(self) -> cython.void:
+        """5 % of the difference per call, always."""
+        if self.quirks.hip_rezero:
+            self.rezero_motor(REZERO_SHARE)
+
+    def send_angle(self) -> cython.void:
+        self.can.send_float(self.id_angle, float32(self.encoder.angle_rad()))
+
+    def send_ang_rate(self) -> cython.void:
+        self.can.send_float(self.id_ang_rate, float_of_fixed(self.joint.rate))

@@ -1,0 +1,70 @@
+"""From converter counts to amperes, volts and watts, with the constants of one board
+(facts network-and-boards 4 and 5).
+
+Values that are published are single floats of the full constants; inside the control loop the gain is
+truncated to 16.16 (100 instead of 100.9 for the hip), as in the firmware.
+"""
+
+import cython
+
+from firmware_sim.peripherals.adc_external import Ads7871
+from firmware_sim.peripherals.adc_internal import AdcInternal
+
+if not cython.compiled:
+    from foundation.numbers import fixed_multiply, fixed_of_float, float32, float_of_fixed
+
+
+class AdcReadings:
+    """Motor current = -gain (raw - offset), battery current = gain (raw - offset), voltage = gain raw.
+
+    `*_entry`: place of the quantity in the external converter's sequence. Currents in A, voltages in V.
+    """
+
+    def __init__(
+        self,
+        external: Ads7871,
+        internal: AdcInternal,
+        motor_entry,
+        motor_gain,
+        motor_offset,
+        battery_entry,
+        battery_gain,
+        battery_offset,
+        voltage_gain,
+    ) -> None:
+        self.external = external
+        self.internal = internal
+        self.motor_entry = motor_entry
+        self.motor_gain = motor_gain
+        self.motor_offset = motor_offset
+        self.motor_gain_fixed = fixed_of_float(motor_gain)
+        self.battery_entry = battery_entry
+        self.battery_gain = battery_gain
+        self.battery_offset = battery_offset
+        self.voltage_gain = voltage_gain
+
+    def motor_current_fixed(self) -> cython.longlong:
+        """Motor current as the loop sees it, A x 65536."""
+        return -(self.external.results[self.motor_entry] - self.motor_offset) * self.motor_gain_fixed
+
+    def motor_current(self) -> cython.double:
+        """Motor current, A."""
+        return float32(-self.motor_gain * (self.external.results[self.motor_entry] - self.motor_offset))
+
+    def battery_current(self) -> cython.double:
+        """Current from the battery into the motor stage, A."""
+        return float32(self.battery_gain * (self.external.results[self.battery_entry] - self.battery_offset))
+
+    def battery_voltage(self) -> cython.double:
+        """Battery voltage, V."""
+        return float32(self.voltage_gain * self.internal.result)
+
+    def battery_power(self) -> cython.double:
+        """Power from the battery, W: product of the two single floats."""
+        return float32(self.battery_voltage() * self.battery_current())
+
+    def battery_power_fixed(self) -> cython.double:
+        """The same by a 16.16 product, as the steering board does it, W."""
+        return float_of_fixed(
+            fixed_multiply(fixed_of_float(self.battery_voltage()), fixed_of_float(self.battery_current()))
+        )

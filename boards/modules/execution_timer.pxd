@@ -1,0 +1,10 @@
+from boards.modules.network_time cimport NetworkTime
+from firmware_sim.microcontroller cimport Microcontroller
+
+cdef class ExecutionTimer:
+    cdef public Microcontroller chip
+    cdef public NetworkTime time
+    cdef public long long longest, longest_ever
+    cpdef void record(self)
+    cpdef double seconds(self)
+    cpdef double longest_seconds(self)

@@ -1,0 +1,23 @@
+from boards.modules.absolute_encoder cimport AbsoluteEncoder
+from boards.modules.current_control cimport CurrentControl
+from boards.modules.error_module cimport ErrorModule
+from boards.modules.limit_switch cimport LimitSwitch
+from boards.modules.mcu_led cimport McuLed
+from boards.modules.quadrature_decoder cimport QuadratureDecoder
+from foundation.numbers cimport fixed_of_float
+
+cdef class HipSafety:
+    cdef public AbsoluteEncoder encoder
+    cdef public CurrentControl control
+    cdef public McuLed leds
+    cpdef void check(self)
+
+cdef class AnkleSafety:
+    cdef public AbsoluteEncoder encoder
+    cdef public QuadratureDecoder motor
+    cdef public LimitSwitch left, right
+    cdef public CurrentControl control
+    cdef public McuLed leds
+    cdef public ErrorModule errors
+    cdef public long long code_switch, code_stretch, code_low, code_high, low, high, stretch
+    cpdef void check(self)

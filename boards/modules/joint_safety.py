@@ -1,0 +1,93 @@
+"""Joint limits that close one direction of the motor (facts network-and-boards 4.8)."""
+
+import cython
+
+from boards.modules.absolute_encoder import AbsoluteEncoder
+from boards.modules.current_control import CurrentControl
+from boards.modules.error_module import ErrorModule
+from boards.modules.limit_switch import LimitSwitch
+from boards.modules.mcu_led import McuLed
+from boards.modules.quadrature_decoder import QuadratureDecoder
+
+if not cython.compiled:
+    from foundation.numbers import fixed_of_float
+
+HIP_LIMIT_COUNTS = 800  # 0.614 rad
+ANKLE_LOW_RAD = 0.2
+ANKLE_HIGH_RAD = 2.9
+CABLE_STRETCH_RAD = 0.3  # joint ahead of the motor by this: the cable has slipped or torn
+FLASH_MS = 100
+
+
+class HipSafety:
+    """Beyond +800 counts positive current is blocked (red LED), beyond -800 negative current (green LED)."""
+
+    def __init__(self, encoder: AbsoluteEncoder, control: CurrentControl, leds: McuLed) -> None:
+        self.encoder = encoder
+        self.control = control
+        self.leds = leds
+
+    def check(self) -> cython.void:
+        """Slot task."""
+        high: cython.bint = self.encoder.counts > 800  # HIP_LIMIT_COUNTS
+        low: cython.bint = self.encoder.counts < -800
+        if high:
+            self.leds.flash(1, 100)  # RED
+        elif low:
+            self.leds.flash(0, 100)  # GREEN
+        self.control.block_positive = high
+        self.control.block_negative = low
+
+
+class AnkleSafety:
+    """Limit switches, cable stretch and the low end block negative current, the high end positive current."""
+
+    def __init__(
+        self,
+        encoder: AbsoluteEncoder,
+        motor: QuadratureDecoder,
+        left: LimitSwitch,
+        right: LimitSwitch,
+        control: CurrentControl,
+        leds: McuLed,
+        errors: ErrorModule,
+        code_switch,
+        code_stretch,
+        code_low,
+        code_high,
+    ) -> None:
+        self.encoder = encoder
+        self.motor = motor
+        self.left = left
+        self.right = right
+        self.control = control
+        self.leds = leds
+        self.errors = errors
+        self.code_switch = code_switch
+        self.code_stretch = code_stretch
+        self.code_low = code_low
+        self.code_high = code_high
+        self.low = fixed_of_float(ANKLE_LOW_RAD)
+        self.high = fixed_of_float(ANKLE_HIGH_RAD)
+        self.stretch = fixed_of_float(CABLE_STRETCH_RAD)
+
+    def check(self) -> cython.void:
+        """Slot task."""
+        negative: cython.bint = False
+        positive: cython.bint = False
+        if self.left.switch.state or self.right.switch.state:
+            negative = True
+            self.errors.report(self.code_switch)
+        if self.encoder.angle - self.motor.position > self.stretch:
+            negative = True
+            self.errors.report(self.code_stretch)
+        if self.encoder.angle < self.low:
+            negative = True
+            self.errors.report(self.code_low)
+        if self.encoder.angle > self.high:
+            positive = True
+            self.errors.report(self.code_high)
+        if negative or positive:
+            self.leds.flash(1, 100)  # RED, FLASH_MS
+        self.control.block_negative = negative
+        self.control.block_positive = positive

@@ -1,0 +1,90 @@
+from boards.modules.absolute_encoder cimport AbsoluteEncoder
+from boards.modules.adc_readings cimport AdcReadings
+from boards.modules.can_link cimport CanLink
+from boards.modules.compliant_control cimport CompliantControl
+from boards.modules.current_control cimport CurrentControl
+from boards.modules.encoder_capture cimport EncoderCapture, WrapCounter
+from boards.modules.error_module cimport ErrorModule
+from boards.modules.execution_timer cimport ExecutionTimer
+from boards.modules.mcu_led cimport Heartbeat, McuLed
+from boards.modules.motor_limits cimport MotorLimits
+from boards.modules.motor_output cimport MotorOutput
+from boards.modules.network_time cimport NetworkTime
+from boards.modules.quadrature_decoder cimport QuadratureDecoder
+from boards.modules.receiver cimport IntReceiver
+from firmware_sim.microcontroller cimport Microcontroller, Peripheral
+from firmware_sim.peripherals.adc_external cimport Ads7871
+from firmware_sim.peripherals.adc_internal cimport AdcInternal
+from firmware_sim.peripherals.can_controller cimport CanController
+from firmware_sim.peripherals.gpio cimport Gpio
+from firmware_sim.peripherals.pwm cimport Pwm
+from firmware_sim.peripherals.spi_encoder cimport SpiEncoder
+from firmware_sim.peripherals.timer_capture cimport TimerCapture
+from firmware_sim.scheduler cimport Schedule, Task
+from foundation.events cimport EventQueue
+from foundation.numbers cimport float_of_fixed
+
+cdef long long CODE_ADCI_DNF, CODE_ADCX_DNF, CODE_OVERRUN, CODE_TASK_LIMIT, CODE_NEAR_LIMIT
+cdef long long BATTERY_VOLTAGE_CHANNEL
+
+cdef class PowerUp(Peripheral):
+    cdef public MotorBoard board
+    cdef public long long first, second
+    cpdef void begin(self, long long phase_ns)
+
+cdef class MotorBoard(Microcontroller):
+    cdef public object table, quirks
+    cdef public NetworkTime time
+    cdef public ErrorModule errors
+    cdef public Gpio gpio
+    cdef public McuLed leds
+    cdef public Heartbeat heartbeat
+    cdef public ExecutionTimer execution
+    cdef public Ads7871 adc_external
+    cdef public AdcInternal adc_internal
+    cdef public AdcReadings readings
+    cdef public CanController can_controller
+    cdef public CanLink can
+    cdef public Pwm pwm
+    cdef public IntReceiver sleep, shutdown
+    cdef public MotorOutput output
+    cdef public CompliantControl compliance
+    cdef public MotorLimits limits
+    cdef public CurrentControl current_control
+    cdef public QuadratureDecoder motor, cap01, cap23
+    cdef public EncoderCapture capture01, capture23
+    cdef public WrapCounter wraps
+    cdef public TimerCapture timer0
+    cdef public AbsoluteEncoder encoder
+    cdef public SpiEncoder spi
+    cdef public long long encoder_select
+    cdef public PowerUp power_up
+    cdef public long long id_error, id_motor_position, id_motor_velocity, id_motor_current, id_batt_power
+    cdef public long long id_batt_current, id_batt_voltage, id_hbridge_temp, id_status, id_execution_time
+    cdef public long long id_max_execution_time
+    cpdef Schedule schedule(self)
+    cpdef void read_sensors_once(self)
+    cpdef void set_start_values(self)
+    cpdef void start_internal_adc(self)
+    cpdef void start_absolute_encoder(self)
+    cpdef object on_absolute_encoder(self, EventQueue queue)
+    cpdef object on_internal_adc(self, EventQueue queue)
+    cpdef void start_external_adc(self)
+    cpdef long long controlled_position(self)
+    cpdef long long controlled_velocity(self)
+    cpdef void compliant_control(self)
+    cpdef void rezero_motor(self, long long share)
+    cpdef void send_error(self)
+    cpdef void send_motor_position(self)
+    cpdef void send_motor_velocity(self)
+    cpdef void send_motor_current(self)
+    cpdef void send_battery_power(self)
+    cpdef void send_battery_current(self)
+    cpdef void send_battery_voltage(self)
+    cpdef void send_bridge_temperature(self)
+    cpdef void send_status(self)
+    cpdef void send_execution_time(self)
+    cpdef void send_max_execution_time(self)
+    cpdef void note_overrun(self)
+    cpdef void note_limit(self, Task task)
+    cpdef void note_near_limit(self)

@@ -1,0 +1,414 @@
+"""What the four motor boards (B2A) share: chip, peripherals, modules, publishing, start-up.
+
+Each board's own room (hip.py, outer_feet.py, inner_feet.py, steering.py) holds its constants and its one
+schedule table. Facts: network-and-boards 1.2, 4, 5, 6.1.
+
+Where the numbers of cycles come from: measured on the robot is only the encoder interrupt (about 150
+cycles, appendix 4.6). All others are chosen by us: instructions of the described work counted at 1.5 cycles
+each (ARM7 with its flash accelerator on), a software division 350, a single-float operation 100, an exchange
+of 16 bits with the converter at 10 MHz 100 cycles. They give slots of a third standing still and of three
+quarters with the motor at full speed; the robot is known never to have missed a slot.
+A task's limit is what it may take at the busiest (ring full, fastest motor), plus about a third.
+"""
+
+import cython
+
+from boards.modules.absolute_encoder import AbsoluteEncoder
+from boards.modules.adc_readings import AdcReadings
+from boards.modules.can_link import ALL_INTERRUPTS, CanLink
+from boards.modules.compliant_control import (
+    COMMAND,
+    DAMPNESS,
+    STIFFNESS,
+    TARGET,
+    CompliantControl,
+    GainReceiver,
+)
+from boards.modules.current_control import INTEGRAL_GAIN, PROPORTIONAL_GAIN, CurrentControl
+from boards.modules.encoder_capture import EncoderCapture, WrapCounter
+from boards.modules.error_module import ErrorModule
+from boards.modules.execution_timer import ExecutionTimer
+from boards.modules.mcu_led import PINS as LED_PINS
+from boards.modules.mcu_led import Heartbeat, McuLed
+from boards.modules.motor_limits import MotorLimits
+from boards.modules.motor_output import PERIOD_COUNTS, MotorOutput
+from boards.modules.motor_output import PINS as MOTOR_PINS
+from boards.modules.network_time import NetworkTime
+from boards.modules.quadrature_decoder import QuadratureDecoder
+from boards.modules.receiver import IntReceiver
+from datatable.generated import errors as codes
+from firmware_sim.microcontroller import Microcontroller, Peripheral
+from firmware_sim.peripherals.adc_external import Ads7871
+from firmware_sim.peripherals.adc_internal import AdcInternal
+from firmware_sim.peripherals.can_controller import CanController
+from firmware_sim.peripherals.gpio import Gpio, p0
+from firmware_sim.peripherals.pwm import Pwm
+from firmware_sim.peripherals.spi_encoder import SpiEncoder
+from firmware_sim.peripherals.timer_capture import TimerCapture
+from firmware_sim.scheduler import Schedule, Task
+from firmware_sim.vic import ADC_DONE, EXTERNAL_INTERRUPT, SPI_DONE
+from foundation.events import EventQueue
+from foundation.user_error import UserError
+
+if not cython.compiled:
+    from foundation.numbers import float_of_fixed
+
+# Processor pins by what hangs on them (facts 4.1, 4.4, 4.7, 4.9, 4.11); for the wiring table.
+PINS = {
+    **{f"led_{colour}": pin for colour, pin in LED_PINS.items()},
+    **MOTOR_PINS,
+    "limit_switch_left": p0(0),
+    "limit_switch_right": p0(1),
+    "absolute_encoder_select": p0(13),
+    "encoder_01_a": p0(22),
+    "encoder_01_b": p0(27),
+    "encoder_23_a": p0(16),
+    "encoder_23_b": p0(29),
+}
+# Places on `chip.analog`, in volts at the converter's input; differential pairs are one place.
+ANALOG = {
+    "motor_current": 0,
+    "battery_current": 1,
+    "left_foot": 2,
+    "right_foot": 3,
+    "steering_sensor": 4,
+    "battery_voltage": 5,
+}
+# Places on `chip.words`.
+WORDS = {"absolute_encoder": 0}
+
+BATTERY_VOLTAGE_CHANNEL = 1  # AIN1, P0.28
+# About 23,000 instructions pass from reset to the first slot (facts 7.3): at 1.3 cycles each 0.5 ms.
+START_VALUES_NS = 400_000
+SLOTS_BEGIN_NS = 500_000
+
+# Error codes as C numbers of the compiled module
+CODE_ADCI_DNF = codes.ADCI_DNF
+CODE_ADCX_DNF = codes.ADCX_DNF
+CODE_OVERRUN = codes.ASCHED_DNF
+CODE_TASK_LIMIT = codes.SCHED_TASK_LIMIT
+CODE_NEAR_LIMIT = codes.SCHED_SLOT_NEAR_LIMIT
+
+# VIC slots (facts 4.16)
+CAN_RECEIVE_SLOT = 0
+EXTERNAL_ADC_SLOT = 1
+INTERNAL_ADC_SLOT = 3
+TIMER_SLOT = 4
+CAN_ERROR_SLOT = 8
+SPI_SLOT = 10
+
+
+class PowerUp(Peripheral):
+    """The part of `main` before the scheduler's loop: one reading of the sensors, then start values.
+
+    ROBOT PARITY: the firmware waits for the reading and hangs for ever without a sensor; here the slots begin
+    anyhow and the start values are those of a count of 0.
+    """
+
+    def __init__(self, chip, board) -> None:
+        Peripheral.__init__(self, chip)
+        self.board = board
+        self.first = chip.new_alarm(self, 0)
+        self.second = chip.new_alarm(self, 1)
+
+    def begin(self, phase_ns: cython.longlong) -> cython.void:
+        """Power comes at `phase_ns`."""
+        self.chip.set_alarm(self.first, phase_ns + START_VALUES_NS)
+        self.chip.set_alarm(self.second, phase_ns + SLOTS_BEGIN_NS - 1)
+
+    def on_alarm(self, alarm: cython.longlong, time: cython.longlong) -> cython.void:
+        if alarm == 0:
+            self.board.read_sensors_once()
+        else:
+            self.board.set_start_values()
+
+
+class MotorBoard(Microcontroller):
+    """A B2A board. `table`: generated module of the board; `quirks`: switches; `phase_ns`: when it gets power.
+
+    `largest_duty` in counts of 600, `sign` of the motor's mounting, `gear` of the motor (0: no encoder).
+    """
+
+    def __init__(
+        self,
+        table,
+        crystal,
+        quirks,
+        phase_ns,
+        sequence,
+        readings,
+        limits,
+        sign,
+        largest_duty,
+        gear,
+        interrupts=ALL_INTERRUPTS,
+    ) -> None:
+        Microcontroller.__init__(self, name=table.BOARD, hz=table.CLOCK_HZ, crystal=crystal)
+        self.table = table
+        self.quirks = quirks
+        self.time = NetworkTime()
+        self.errors = ErrorModule(
+            table.BOARD_NUMBER,
+            self.time,
+            per_event=quirks.errors_counted_per_event,
+            lose_new_after_repeat=quirks.new_errors_lost_after_repeat,
+        )
+        self.gpio = Gpio(self)
+        self.leds = McuLed(self.gpio, table.SLOT_US)
+        self.heartbeat = Heartbeat(self.time, self.leds)
+        self.execution = ExecutionTimer(self, self.time)
+        # converters
+        self.adc_external = Ads7871(self, eint=1)
+        self.adc_external.set_sequence(
+            *((channel, gain, ANALOG[place]) for place, channel, gain in sequence)
+        )
+        self.adc_internal = AdcInternal(self, clkdiv=200)
+        self.adc_internal.inputs[BATTERY_VOLTAGE_CHANNEL] = ANALOG["battery_voltage"]
+        places = [place for place, _, _ in sequence]
+        self.readings = AdcReadings(
+            self.adc_external,
+            self.adc_internal,
+            motor_entry=places.index("motor_current"),
+            battery_entry=places.index("battery_current"),
+            **readings,
+        )
+        # exchange of two result bytes and of the next start word: three times 100, and the store
+        self.vic.attach(
+            EXTERNAL_INTERRUPT,
+            1,
+            self.adc_external.on_busy,
+            cost=400,
+            slot=EXTERNAL_ADC_SLOT,
+            name="adcx_busy",
+        )
+        self.vic.attach(
+            ADC_DONE, 0, self.on_internal_adc, cost=80, slot=INTERNAL_ADC_SLOT, name="adci_done"
+        )
+        # network
+        self.can_controller = CanController(self, table.CONTROLLER, IER=interrupts)
+        self.can = CanLink(
+            self, self.can_controller, self.time, self.errors, codes, quirks.full_queues_reported
+        )
+        self.can.attach(receive_slot=CAN_RECEIVE_SLOT, error_slot=CAN_ERROR_SLOT)
+        # motor
+        self.pwm = Pwm(self, period=PERIOD_COUNTS, phase_ns=phase_ns)
+        self.sleep = IntReceiver()
+        self.shutdown = IntReceiver()
+        self.output = MotorOutput(
+            self.gpio,
+            self.pwm,
+            self.sleep,
+            self.shutdown,
+            sign=sign,
+            largest=largest_duty,
+            offset=quirks.alternating_offset_counts,
+        )
+        self.compliance = CompliantControl(quirks.compliant_gain_sign, quirks.gains_latch_with_current)
+        self.limits = MotorLimits(
+            self.errors,
+            codes,
+            gear=gear,
+            derating=quirks.thermal_derating,
+            peak=quirks.peak_current_limiter,
+            speed=quirks.speed_limiter,
+            **limits,
+        )
+        self.current_control = CurrentControl(
+            self.limits,
+            self.output,
+            self.leds,
+            self.errors,
+            codes,
+            proportional_gain=PROPORTIONAL_GAIN if quirks.proportional_current_control else 0,
+            integral_gain=INTEGRAL_GAIN,
+        )
+        self.motor = None
+        self.encoder = None
+        self.spi = None
+        self.encoder_select = 0
+        # identifiers, from the generated table
+        self.id_error = table.ERROR_VARIABLE
+        for field in (
+            "MOTOR_POSITION",
+            "MOTOR_VELOCITY",
+            "MOTOR_CURRENT",
+            "BATT_POWER",
+            "BATT_CURRENT",
+            "BATT_VOLTAGE",
+            "HBRIDGE_TEMP",
+            "STATUS",
+            "EXECUTION_TIME",
+            "MAX_EXECUTION_TIME",
+        ):
+            setattr(self, "id_" + field.lower(), getattr(table, f"{table.BOARD}_{field}", -1))
+        self.listen()
+        self.on_overrun = self.note_overrun
+        self.on_limit = self.note_limit if quirks.warn_near_slot_limit else None
+        self.on_near_limit = self.note_near_limit if quirks.warn_near_slot_limit else None
+        self.power_up = PowerUp(self, self)
+        self.power_up.begin(phase_ns)
+
+    def listen(self) -> None:
+        """Receive list, in the order of the firmware's (facts 2.4)."""
+        name = self.table.BOARD + "_"
+        for suffix, receiver in (
+            ("MOTOR_TARGET_CURRENT", GainReceiver(self.compliance, TARGET)),
+            ("SHUTDOWN", self.shutdown),
+            ("COMMAND_CURRENT", GainReceiver(self.compliance, COMMAND)),
+            ("STIFFNESS", GainReceiver(self.compliance, STIFFNESS)),
+            ("DAMPNESS", GainReceiver(self.compliance, DAMPNESS)),
+            ("SLEEP", self.sleep),
+        ):
+            self.can.listen(getattr(self.table, name + suffix), receiver)
+        self.can.listen(self.table.TIMESTAMP, self.time)
+
+    def add_encoders(self, phase_ns, cap01, cap23) -> None:
+        """The two incremental encoders on timer 0: (pulses, gear) of the pairs 0/1 and 2/3."""
+        quirks = self.quirks
+        self.timer0 = TimerCapture(self, number=0, period=30000, phase_ns=phase_ns, match_interrupt=True)
+        self.wraps = WrapCounter(self.timer0)
+        self.cap01 = QuadratureDecoder(
+            *cap01,
+            self.errors,
+            codes.QDC_CH01_GLTCH,
+            codes.QDC_CH01_BUF_F,
+            filter_exponent=quirks.rate_filter_exponent,
+        )
+        self.cap23 = QuadratureDecoder(
+            *cap23,
+            self.errors,
+            codes.QDC_CH23_GLTCH,
+            codes.QDC_CH23_BUF_F,
+            filter_exponent=quirks.rate_filter_exponent,
+        )
+        self.capture01 = EncoderCapture(
+            self, self.wraps, 0, PINS["encoder_01_a"], PINS["encoder_01_b"], self.cap01
+        )
+        self.capture23 = EncoderCapture(
+            self, self.wraps, 2, PINS["encoder_23_a"], PINS["encoder_23_b"], self.cap23
+        )
+        self.wraps.attach(self)
+
+    def add_absolute_encoder(self, second_connector, zero, sign, rpm) -> None:
+        """The joint's encoder on SPI 0, at connector J3 (AE_1) or, `second_connector`, J9 (AE_2)."""
+        self.encoder = AbsoluteEncoder(zero, sign, rpm, self.errors, codes.AE_SPIKE)
+        self.spi = SpiEncoder(self, number=0, word=WORDS["absolute_encoder"])
+        self.encoder_select = second_connector
+        self.vic.attach(SPI_DONE, 0, self.on_absolute_encoder, cost=100, slot=SPI_SLOT, name="ae_read")
+
+    def begin(self, phase_ns) -> None:
+        """Start the scheduler; the first slot comes when the start values are set."""
+        self.start(self.schedule(), phase_ns + SLOTS_BEGIN_NS)
+
+    def schedule(self) -> Schedule:
+        """The board's table; every room has its own."""
+        raise UserError(f"{self.name}: this board has no schedule")
+
+    # --- start-up ---------------------------------------------------------------------------------------
+
+    def read_sensors_once(self) -> cython.void:
+        """Before the first slot: low sides on, multiplexer set, and one reading of the joint's angle."""
+        self.output.enable_low_side(1)
+        if self.encoder is not None:
+            self.gpio.write(PINS["absolute_encoder_select"], self.encoder_select)
+            self.spi.start()
+
+    def set_start_values(self) -> cython.void:
+        """When that reading has come."""
+
+    # --- tasks ------------------------------------------------------------------------------------------
+
+    def start_internal_adc(self) -> cython.void:
+        """adci_convert_all: battery voltage on AIN1."""
+        if not self.adc_internal.start(BATTERY_VOLTAGE_CHANNEL):
+            self.errors.report(CODE_ADCI_DNF)
+
+    def start_absolute_encoder(self) -> cython.void:
+        """ae_update: begin a transfer; the interrupt 14 us later has the result for this slot's control."""
+        self.spi.start()
+
+    def on_absolute_encoder(self, queue: EventQueue) -> object:
+        """Interrupt: the transfer is complete."""
+        self.encoder.accept(self.spi.read())
+        return None
+
+    def on_internal_adc(self, queue: EventQueue) -> object:
+        """Interrupt: the result stays in `adc_internal.result`; no filter on these boards."""
+        return None
+
+    def start_external_adc(self) -> cython.void:
+        """adcx_convert_all: start the sequence; the last one unfinished is an error, and it goes on."""
+        if not self.adc_external.start_sequence():
+            self.errors.report(CODE_ADCX_DNF)
+
+    def controlled_position(self) -> cython.longlong:
+        """Position in the compliant law, rad x 65536: of the motor, unless a room says otherwise."""
+        return self.motor.position
+
+    def controlled_velocity(self) -> cython.longlong:
+        """Velocity in the compliant law, rad/s x 65536."""
+        return self.motor.rate
+
+    def compliant_control(self) -> cython.void:
+        """mc_compliant_control: both loops, outer then inner."""
+        velocity: cython.longlong = self.controlled_velocity()
+        target: cython.longlong = self.compliance.update(self.controlled_position(), velocity)
+        target = self.limits.limit_target(target, velocity)
+        self.compliance.target = target
+        self.current_control.update(target, self.readings.motor_current_fixed())
+
+    def rezero_motor(self, share: cython.longlong) -> cython.void:
+        """Move the motor's angle towards the joint's by `share` (x 65536) of their difference."""
+        difference: cython.longlong = self.encoder.angle - self.motor.position
+        self.motor.set_position(self.motor.position + ((difference * share) >> 16))
+
+    # --- what is published --------------------------------------------------------------------------------
+
+    def send_error(self) -> cython.void:
+        self.can.send_error(self.id_error)
+
+    def send_motor_position(self) -> cython.void:
+        self.can.send_float(self.id_motor_position, float_of_fixed(self.motor.position))
+
+    def send_motor_velocity(self) -> cython.void:
+        self.can.send_float(self.id_motor_velocity, float_of_fixed(self.motor.rate))
+
+    def send_motor_current(self) -> cython.void:
+        self.can.send_float(self.id_motor_current, self.readings.motor_current())
+
+    def send_battery_power(self) -> cython.void:
+        self.can.send_float(self.id_batt_power, self.readings.battery_power())
+
+    def send_battery_current(self) -> cython.void:
+        self.can.send_float(self.id_batt_current, self.readings.battery_current())
+
+    def send_battery_voltage(self) -> cython.void:
+        self.can.send_float(self.id_batt_voltage, self.readings.battery_voltage())
+
+    def send_bridge_temperature(self) -> cython.void:
+        """AIN3 is never converted, so 0 is sent (facts 4.6)."""
+        self.can.send_float(self.id_hbridge_temp, 0.0)
+
+    def send_status(self) -> cython.void:
+        self.can.send_float(self.id_status, 1.0)
+
+    def send_execution_time(self) -> cython.void:
+        self.can.send_float(self.id_execution_time, self.execution.seconds())
+
+    def send_max_execution_time(self) -> cython.void:
+        self.can.send_float(self.id_max_execution_time, self.execution.longest_seconds())
+
+    # --- what the scheduler tells ---------------------------------------------------------------------------
+
+    def note_overrun(self) -> cython.void:
+        """A tick found the row unfinished."""
+        self.errors.report(CODE_OVERRUN)
+
+    def note_limit(self, task: Task) -> cython.void:
+        """A task took longer than its limit."""
+        self.errors.report(CODE_TASK_LIMIT)
+
+    def note_near_limit(self) -> cython.void:
+        """A slot took more than 90 % of its length."""
+        self.errors.report(CODE_NEAR_LIMIT)
+
