@@ -6,9 +6,9 @@ from firmware_sim.vic cimport InterruptController, InterruptSource
 
 cdef class Peripheral:
     cdef public Microcontroller chip
-    cpdef long long on_message(self, EventQueue queue)
-    cpdef long long on_pin(self, long long channel, long long level, long long time)
-    cpdef long long on_alarm(self, long long alarm, long long time)
+    cpdef void on_message(self, EventQueue queue)
+    cpdef void on_pin(self, long long channel, long long level, long long time)
+    cpdef void on_alarm(self, long long alarm, long long time)
 
 cdef class Microcontroller:
     cdef public str name

@@ -34,15 +34,15 @@ class Peripheral:
     def __init__(self, chip) -> None:
         self.chip = chip
 
-    def on_message(self, queue: EventQueue) -> cython.longlong:
+    def on_message(self, queue: EventQueue) -> cython.void:
         """A message of a kind claimed by this peripheral; it is in the fields of `queue`."""
 
     def on_pin(
         self, channel: cython.longlong, level: cython.longlong, time: cython.longlong
-    ) -> cython.longlong:
+    ) -> cython.void:
         """The pin of `channel` changed to `level` at `time`."""
 
-    def on_alarm(self, alarm: cython.longlong, time: cython.longlong) -> cython.longlong:
+    def on_alarm(self, alarm: cython.longlong, time: cython.longlong) -> cython.void:
         """The alarm that this peripheral numbered `alarm` is due."""
 
 
@@ -188,8 +188,8 @@ class Microcontroller:
         return int((self.now - self.match_time) * self.cycles_per_ns)
 
     def request(self, source: InterruptSource) -> cython.longlong:
-        """Raise an interrupt line; it is served as soon as its priority allows."""
-        self.vic.raise_source(source)
+        """Raise an interrupt line; it is served as soon as its priority allows. 1 if newly pending."""
+        return self.vic.raise_source(source)
 
     # --- the event loop -----------------------------------------------------------------------------------
 
@@ -281,17 +281,17 @@ class Microcontroller:
             if channel >= 0:
                 peripheral = self.pin_owners[pin]
                 peripheral.on_pin(channel, inbox.b, inbox.time)
-                return
+                return 0
         elif 0 <= inbox.kind < 32 and 0 <= inbox.a < 16:
             peripheral = self.message_table[inbox.kind * 16 + inbox.a]
             if peripheral is not None:
                 peripheral.on_message(inbox)
-                return
+                return 0
         source = self.vic.sources.get((inbox.kind, inbox.a))
         if source is None or not source.attached:
             if inbox.kind != 1:
                 self.unclaimed += 1
-            return
+            return 0
         source.keeps_message = True
         source.time = inbox.time
         source.order = inbox.order
@@ -303,6 +303,7 @@ class Microcontroller:
         source.f = inbox.f
         source.ref = inbox.ref
         self.vic.raise_source(source)
+        return 0
 
     def _alarm(self, time: cython.longlong) -> cython.longlong:
         """The first alarm is due."""
@@ -323,6 +324,7 @@ class Microcontroller:
         self.tick_number += 1
         self.tick_time = self.crystal.tick_time_ns(self.tick_number, self.tick_period_ns, self.phase_ns)
         self.vic.raise_source(self.tick_source)
+        return self.match_time
 
     def on_slot_timer(self, queue: EventQueue) -> object:
         """Handler of the slot timer: publish the next row."""
@@ -333,7 +335,7 @@ class Microcontroller:
                 self.on_overrun()
         return None
 
-    def _background(self) -> cython.void:
+    def _background(self) -> cython.longlong:
         """One turn of the main loop beside the scheduler."""
         done: cython.longlong
         if self.code_time < self.instant:
@@ -342,8 +344,9 @@ class Microcontroller:
         done = self.background()
         if done <= self.code_time:
             self.background_wanted = False
-            return
+            return done
         self.code_time = done
+        return done
 
     def _serve(self, source: InterruptSource, time: cython.longlong) -> cython.longlong:
         """Run the handler of a pending source at `time` and let its cycles pass."""
@@ -353,7 +356,6 @@ class Microcontroller:
         items: cython.longlong
         self.vic.accept(source)
         self.background_wanted = True
-        source.served += 1
         self.now = time + source.latency_ns
         if source.keeps_message:
             inbox.time = source.time
@@ -393,6 +395,7 @@ class Microcontroller:
             self.check_wait = True
         if self.scheduler.recording:
             self.scheduler.note_interrupt(source.name, cycles)
+        return cycles
 
     def _code(self, until: cython.longlong) -> cython.longlong:
         """Run tasks from `code_time` on, until something else comes first."""
@@ -411,7 +414,7 @@ class Microcontroller:
             if self.waiting:
                 self.check_wait = False
                 if not self.wait_task.function():
-                    return
+                    return 0
                 self._wait_over()
             else:
                 if scheduler.late:
@@ -423,7 +426,7 @@ class Microcontroller:
                     self.background_wanted = True
                     scheduler.finished_time = self.code_time
                     self._close_slot(scheduler.slot_time)
-                    return
+                    return 0
                 task = scheduler.tasks[scheduler.position]
                 scheduler.position += 1
                 scheduler.run_tasks += 1
@@ -458,7 +461,7 @@ class Microcontroller:
                         wait.waits += 1
                         self.waiting = True
                         self.check_wait = False
-                        return
+                        return 0
             if (
                 self.code_time >= self.tick_time
                 or self.code_time >= until
@@ -467,7 +470,7 @@ class Microcontroller:
                 or vic.irq_pending != 0
                 or vic.fiq_pending != 0
             ):
-                return
+                return 0
 
     def _wait_over(self) -> cython.longlong:
         """The condition of the spinning task came true: its cycles are the spinning, less what was stolen."""
@@ -482,6 +485,7 @@ class Microcontroller:
         self._charge(task, spun + cost)
         spun = int(cost * self.ns_per_cycle)
         self.code_time = before + spun
+        return spun
 
     def _charge(self, task: Task, cycles: cython.longlong) -> cython.longlong:
         """Let the cycles of a task pass and hold them against its limit."""
@@ -498,6 +502,7 @@ class Microcontroller:
                 self.on_limit(task)
         if self.scheduler.recording:
             self.scheduler.note_task(task.name, cycles)
+        return cycles
 
     def _close_slot(self, since: cython.longlong) -> cython.longlong:
         """Record the slot that began at `since` and ends now."""
@@ -510,3 +515,4 @@ class Microcontroller:
                 scheduler.record.cycles = cycles
         if scheduler.close(cycles) and self.on_near_limit is not None:
             self.on_near_limit()
+        return cycles

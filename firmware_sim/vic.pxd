@@ -2,7 +2,7 @@ cdef class InterruptSource:
     cdef public long long kind, index
     cdef public str name
     cdef public object handler
-    cdef public long long cost, per_item, latency, slot
+    cdef public long long cost, per_item, latency, slot, bit
     cdef public long long base_cycles, base_ns, latency_ns
     cdef public bint attached, pending, keeps_message
     cdef public long long requests, merged, served, total_cycles, max_cycles
@@ -18,4 +18,4 @@ cdef class InterruptController:
     cpdef InterruptSource next_fiq(self)
     cpdef InterruptSource next_irq(self)
     cpdef bint raise_source(self, InterruptSource source)
-    cpdef void accept(self, InterruptSource source)
+    cpdef long long accept(self, InterruptSource source)

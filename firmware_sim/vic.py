@@ -43,6 +43,7 @@ class InterruptSource:
         self.per_item = 0
         self.latency = 0
         self.slot = 0
+        self.bit = 0
         self.base_cycles = 0
         self.base_ns = 0
         self.latency_ns = 0
@@ -73,7 +74,7 @@ class InterruptController:
         self.sources = {}
         self.fiq_list = []
         self.irq_list = [None] * 16
-        self.fiq_pending = 0
+        self.fiq_pending = 0  # one bit per source, as VICFIQStatus and VICIRQStatus
         self.irq_pending = 0
 
     def source(self, kind: cython.longlong, index: cython.longlong):
@@ -113,8 +114,12 @@ class InterruptController:
         source.latency_ns = int(source.latency * self.ns_per_cycle)
         source.attached = True
         if slot == FIQ:
+            if len(self.fiq_list) >= 62:
+                raise UserError(f"interrupt {kind}/{index}: more than 62 sources on the FIQ")
+            source.bit = 1 << len(self.fiq_list)
             self.fiq_list.append(source)
         else:
+            source.bit = 1 << slot
             self.irq_list[slot] = source
         return source
 
@@ -122,13 +127,14 @@ class InterruptController:
         """Take a source out of the controller; a pending request of it is forgotten."""
         if not source.attached:
             return
-        if source.pending:
-            self.accept(source)
-        source.attached = False
         if source.slot == FIQ:
-            self.fiq_list.remove(source)
+            self.fiq_pending &= ~source.bit
+            self.fiq_list[self.fiq_list.index(source)] = None
         else:
+            self.irq_pending &= ~source.bit
             self.irq_list[source.slot] = None
+        source.pending = False
+        source.attached = False
 
     def raise_source(self, source: InterruptSource) -> cython.bint:
         """Request service; False when nobody listens or the request merged with a pending one."""
@@ -140,31 +146,31 @@ class InterruptController:
             return False
         source.pending = True
         if source.slot < 0:
-            self.fiq_pending += 1
+            self.fiq_pending |= source.bit
         else:
-            self.irq_pending += 1
+            self.irq_pending |= source.bit
         return True
 
-    def accept(self, source: InterruptSource) -> cython.void:
-        """The request of a pending source is being served."""
+    def accept(self, source: InterruptSource) -> cython.longlong:
+        """The request of a pending source is being served; returns how often it was served."""
         source.pending = False
         if source.slot < 0:
-            self.fiq_pending -= 1
+            self.fiq_pending &= ~source.bit
         else:
-            self.irq_pending -= 1
+            self.irq_pending &= ~source.bit
+        source.served += 1
+        return source.served
 
     def next_fiq(self):
-        """First pending FIQ source in attaching order, or None."""
-        source: InterruptSource
-        for source in self.fiq_list:
-            if source.pending:
-                return source
-        return None
+        """First pending FIQ source in attaching order; only while `fiq_pending` is not 0."""
+        place: cython.longlong = 0
+        while self.fiq_pending >> place & 1 == 0:
+            place += 1
+        return self.fiq_list[place]
 
     def next_irq(self):
-        """Pending IRQ source with the lowest slot, or None."""
-        source: InterruptSource
-        for source in self.irq_list:
-            if source is not None and source.pending:
-                return source
-        return None
+        """Pending IRQ source with the lowest slot; only while `irq_pending` is not 0."""
+        place: cython.longlong = 0
+        while self.irq_pending >> place & 1 == 0:
+            place += 1
+        return self.irq_list[place]

@@ -41,7 +41,7 @@ class SspSegment:
             self.words[i] = 0
         self.used = 0
 
-    def copy_from(self, other: "SspSegment") -> cython.void:
+    def copy_from(self, other) -> cython.void:
         """Take over the contents of another segment."""
         i: cython.longlong
         for i in range(31):
