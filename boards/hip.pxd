@@ -4,6 +4,8 @@ from boards.motor_board cimport MotorBoard
 from firmware_sim.scheduler cimport Schedule
 from foundation.numbers cimport float32, float_of_fixed
 
+cdef long long REZERO_SHARE
+
 cdef class HipBoard(MotorBoard):
     cdef public QuadratureDecoder joint
     cdef public HipSafety safety

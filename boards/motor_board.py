@@ -36,6 +36,7 @@ from boards.modules.motor_output import PINS as MOTOR_PINS
 from boards.modules.network_time import NetworkTime
 from boards.modules.quadrature_decoder import QuadratureDecoder
 from boards.modules.receiver import IntReceiver
+from boards.quirks import Quirks
 from datatable.generated import errors as codes
 from firmware_sim.microcontroller import Microcontroller, Peripheral
 from firmware_sim.peripherals.adc_external import Ads7871
@@ -143,6 +144,7 @@ class MotorBoard(Microcontroller):
         gear,
         interrupts=ALL_INTERRUPTS,
     ) -> None:
+        quirks = quirks if quirks is not None else Quirks()
         Microcontroller.__init__(self, name=table.BOARD, hz=table.CLOCK_HZ, crystal=crystal)
         self.table = table
         self.quirks = quirks

@@ -1,0 +1,26 @@
+from boards.modules.foot_contact cimport FootContact
+from boards.modules.joint_safety cimport AnkleSafety
+from boards.modules.limit_switch cimport LimitSwitch
+from boards.modules.quadrature_decoder cimport QuadratureDecoder
+from boards.motor_board cimport MotorBoard
+from foundation.numbers cimport fixed_of_float, float32, float_of_fixed
+
+cdef class AnkleBoard(MotorBoard):
+    cdef public QuadratureDecoder joint
+    cdef public AnkleSafety safety
+    cdef public FootContact left_foot, right_foot
+    cdef public LimitSwitch left_switch, right_switch
+    cdef public long long rezero_share, rezero_angle, rezero_rate
+    cdef public long long id_right_hs, id_left_hs, id_right_heel_sense, id_left_heel_sense
+    cdef public long long id_right_ls, id_left_ls, id_ankle_angle, id_ankle_rate
+    cpdef void set_start_values(self)
+    cpdef void update_switches(self)
+    cpdef void rezero(self)
+    cpdef void send_ankle_angle(self)
+    cpdef void send_ankle_rate(self)
+    cpdef void send_right_heel_sense(self)
+    cpdef void send_left_heel_sense(self)
+    cpdef void send_right_contact(self)
+    cpdef void send_left_contact(self)
+    cpdef void send_right_switch(self)
+    cpdef void send_left_switch(self)

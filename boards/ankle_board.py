@@ -1,0 +1,142 @@
+"""What the boards of the outer and the inner feet share: two feet, two limit switches, one ankle motor.
+
+Facts: network-and-boards 4.2, 4.7-4.9, 5. The two rooms hold their constants and their tables.
+"""
+
+import cython
+
+from boards.modules.foot_contact import FootContact
+from boards.modules.joint_safety import AnkleSafety
+from boards.modules.limit_switch import LimitSwitch
+from boards.motor_board import PINS, MotorBoard
+from datatable.generated import errors as codes
+
+if not cython.compiled:
+    from foundation.numbers import fixed_of_float, float32, float_of_fixed
+
+# (place, multiplexer code, gain code): differential 4-5 and 2-3 times 2, single-ended 0 and 1 times 1
+SEQUENCE = (
+    ("motor_current", 2, 1),
+    ("battery_current", 1, 1),
+    ("left_foot", 8, 0),
+    ("right_foot", 9, 0),
+)
+LIMITS = dict(
+    target_min=-1.0,
+    target_max=6.0,
+    current_min=-2.0,
+    current_max=8.0,
+    thermal_current=3.1,
+    thermal_time=10.0,
+    excess_limit=20,
+)
+GEAR = 34.0
+FOOT_ON_LEVEL = 2000  # counts
+FOOT_OFF_LEVEL = 1000
+REZERO_ANGLE_RAD = 0.3
+REZERO_RATE_RAD_S = 0.01
+
+
+class AnkleBoard(MotorBoard):
+    """Position and velocity of the compliant law: motor encoder / 34. `rezero_share` x 65536."""
+
+    def __init__(
+        self,
+        table,
+        crystal,
+        quirks,
+        phase_ns,
+        readings,
+        sign,
+        motor_encoder,
+        joint_encoder,
+        absolute_encoder,
+        rezero_share,
+        right_off_level,
+    ) -> None:
+        MotorBoard.__init__(
+            self,
+            table,
+            crystal,
+            quirks,
+            phase_ns,
+            sequence=SEQUENCE,
+            readings=readings,
+            limits=LIMITS,
+            sign=sign,
+            largest_duty=300,
+            gear=GEAR,
+        )
+        self.add_encoders(phase_ns, cap01=motor_encoder, cap23=joint_encoder)
+        self.motor = self.cap01
+        self.joint = self.cap23
+        self.add_absolute_encoder(second_connector=1, **absolute_encoder)
+        self.rezero_share = rezero_share
+        self.rezero_angle = fixed_of_float(REZERO_ANGLE_RAD)
+        self.rezero_rate = fixed_of_float(REZERO_RATE_RAD_S)
+        samples = self.quirks.contact_equal_samples
+        self.left_foot = FootContact(FOOT_ON_LEVEL, FOOT_OFF_LEVEL, samples)
+        self.right_foot = FootContact(FOOT_ON_LEVEL, right_off_level, samples)
+        self.left_switch = LimitSwitch(self.gpio, PINS["limit_switch_left"])
+        self.right_switch = LimitSwitch(self.gpio, PINS["limit_switch_right"])
+        board = table.BOARD
+        self.safety = AnkleSafety(
+            self.encoder,
+            self.motor,
+            self.left_switch,
+            self.right_switch,
+            self.current_control,
+            self.leds,
+            self.errors,
+            getattr(codes, board + "_ANKL_LS"),
+            getattr(codes, board + "_CBL_STRCH"),
+            getattr(codes, board + "_ANKL_LO"),
+            getattr(codes, board + "_ANKL_HI"),
+        )
+        for field in ("RIGHT_HS", "LEFT_HS", "RIGHT_HEEL_SENSE", "LEFT_HEEL_SENSE", "RIGHT_LS", "LEFT_LS"):
+            setattr(self, "id_" + field.lower(), getattr(table, f"{board}_{field}"))
+        # set by the rooms, whose ankles have different names
+        self.id_ankle_angle = -1
+        self.id_ankle_rate = -1
+
+    def set_start_values(self) -> cython.void:
+        """Both incremental encoders start at the absolute angle."""
+        self.motor.set_position(self.encoder.angle)
+        self.joint.set_position(self.encoder.angle)
+
+    def update_switches(self) -> cython.void:
+        """ls_update: both limit switches and both feet, with the newest converter results."""
+        self.left_switch.sample()
+        self.right_switch.sample()
+        self.right_foot.sample(self.adc_external.results[3])
+        self.left_foot.sample(self.adc_external.results[2])
+
+    def rezero(self) -> cython.void:
+        """Motor encoder towards the ankle, only while the foot rests near its upper stop."""
+        rate: cython.longlong = self.joint.rate
+        if self.encoder.angle < self.rezero_angle and -self.rezero_rate < rate < self.rezero_rate:
+            self.rezero_motor(self.rezero_share)
+
+    def send_ankle_angle(self) -> cython.void:
+        self.can.send_float(self.id_ankle_angle, float32(self.encoder.angle_rad()))
+
+    def send_ankle_rate(self) -> cython.void:
+        self.can.send_float(self.id_ankle_rate, float_of_fixed(self.joint.rate))
+
+    def send_right_heel_sense(self) -> cython.void:
+        self.can.send_float(self.id_right_heel_sense, self.adc_external.results[3])
+
+    def send_left_heel_sense(self) -> cython.void:
+        self.can.send_float(self.id_left_heel_sense, self.adc_external.results[2])
+
+    def send_right_contact(self) -> cython.void:
+        self.can.send_float(self.id_right_hs, self.right_foot.contact.state)
+
+    def send_left_contact(self) -> cython.void:
+        self.can.send_float(self.id_left_hs, self.left_foot.contact.state)
+
+    def send_right_switch(self) -> cython.void:
+        self.can.send_float(self.id_right_ls, self.right_switch.switch.state)
+
+    def send_left_switch(self) -> cython.void:
+        self.can.send_float(self.id_left_ls, self.left_switch.switch.state)

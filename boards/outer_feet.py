@@ -1,0 +1,107 @@
+"""Outer feet motor board (MCFO): B2A, 0.5 ms slots, 9 rows.
+
+Facts: network-and-boards 3.3 (schedule, laid out below line by line), 4.1, 4.2, 4.5, 4.7-4.9, 5.
+Ankle angle: 0 with the foot flipped up, growing as the foot is pushed down.
+"""
+
+from boards.ankle_board import FOOT_OFF_LEVEL, AnkleBoard
+from boards.motor_board import ANALOG, PINS, WORDS
+from datatable.generated import mcfo as table
+from firmware_sim.scheduler import Schedule, Task, Wait
+
+__all__ = ["ANALOG", "PINS", "WORDS", "OuterFeetBoard"]
+
+READINGS = dict(
+    motor_gain=-0.00152,
+    motor_offset=0,
+    battery_gain=0.000502,
+    battery_offset=-9,
+    voltage_gain=0.0327,
+)
+MOTOR_ENCODER = (512, -34.0)  # pulses, gear; the sign is the mounting
+JOINT_ENCODER = (2048, -1.0)
+ABSOLUTE_ENCODER = dict(zero=6562, sign=-1, rpm=186)
+REZERO_SHARE = 13107  # 20 %, 0.2 x 65536 truncated
+OPERATION_SIGN = -1  # the motor is mounted the other way round
+
+
+class OuterFeetBoard(AnkleBoard):
+    """Outer ankle motor, two foot sensors, two limit switches."""
+
+    def __init__(self, crystal=None, quirks=None, phase_ns=0) -> None:
+        AnkleBoard.__init__(
+            self,
+            table,
+            crystal,
+            quirks,
+            phase_ns,
+            readings=READINGS,
+            sign=OPERATION_SIGN,
+            motor_encoder=MOTOR_ENCODER,
+            joint_encoder=JOINT_ENCODER,
+            absolute_encoder=ABSOLUTE_ENCODER,
+            rezero_share=REZERO_SHARE,
+            right_off_level=FOOT_OFF_LEVEL,
+        )
+        self.id_ankle_angle = table.MCFO_RIGHT_ANKLE_ANGLE
+        self.id_ankle_rate = table.MCFO_RIGHT_ANKLE_RATE
+        self.begin(phase_ns)
+
+    def schedule(self) -> Schedule:
+        """One pass takes 4.5 ms; each row's variable goes out at 222.2 Hz, the occasional ones at 14.81 Hz."""
+        rate = Task(self.send_ankle_rate, 380, 510, 0, "", "MCFO_RIGHT_ANKLE_RATE")
+        right_heel = Task(self.send_right_heel_sense, 330, 440, 0, "", "MCFO_RIGHT_HEEL_SENSE")
+        return Schedule(
+            slot_us=table.SLOT_US,
+            every=(
+                #    function                         cost limit  per item      name
+                Task(self.start_external_adc,          200,  300,   0, "",      "adcx_convert_all"),
+                Task(self.start_internal_adc,           60,  100,   0, "",      "adci_convert_all"),
+                Task(self.motor.update_angle,          120,  160,   0, "",      "qdc_cap01_angle"),
+                Task(self.motor.update_rate,           850, 3600,  30, "edge",  "qdc_cap01_rate"),
+                Task(self.joint.update_angle,          120,  160,   0, "",      "qdc_cap23_angle"),
+                Task(self.joint.update_rate,           850, 3600,  30, "edge",  "qdc_cap23_rate"),
+                Task(self.start_absolute_encoder,       80,  110,   0, "",      "ae_update"),
+                Task(self.can.receive_all,             120, 4000, 220, "frame", "can_rx_dispatch_all"),
+                Task(self.heartbeat.beat,               40,   60,   0, "",      "hb_beat"),
+                Task(self.leds.update,                  60,   80,   0, "",      "mcu_led_update"),
+                Task(self.update_switches,             180,  240,   0, "",      "ls_update"),
+                Task(self.safety.check,                140,  190,   0, "",      "dn_safety"),
+                Task(self.errors.update,                90, 2700, 120, "error", "error_update"),
+                Task(self.can.feed,                     50,  300,  80, "frame", "can_tx1"),
+                Wait(self.adc_external.sequence_done,   20, 6500,              "adcx_conversion_wait"),
+                Task(self.compliant_control,          2600, 3400,   0, "",      "mc_compliant_control"),
+            ),
+            rows=(
+                (Task(self.send_ankle_angle,           420,  560,   0, "",      "MCFO_RIGHT_ANKLE_ANGLE"),),
+                (rate,),
+                (right_heel,),
+                (Task(self.send_right_contact,         300,  400,   0, "",      "MCFO_RIGHT_HS"),),
+                (Task(self.send_left_contact,          300,  400,   0, "",      "MCFO_LEFT_HS"),),
+                (Task(self.send_motor_position,        380,  510,   0, "",      "MCFO_MOTOR_POSITION"),),
+                (Task(self.send_left_heel_sense,       330,  440,   0, "",      "MCFO_LEFT_HEEL_SENSE"),),
+                (Task(self.send_battery_power,         900, 1200,   0, "",      "MCFO_BATT_POWER"),),
+                (),  # the occasional list
+            ),
+            occasional_row=8,
+            occasional=(
+                Task(self.send_error,                  200,  270,   0, "",      "ERROR_MCFO"),
+                Task(self.send_motor_velocity,         380,  510,   0, "",      "MCFO_MOTOR_VELOCITY"),
+                Task(self.send_motor_current,          480,  640,   0, "",      "MCFO_MOTOR_CURRENT"),
+                Task(self.send_status,                 260,  350,   0, "",      "MCFO_STATUS"),
+                Task(self.send_battery_current,        480,  640,   0, "",      "MCFO_BATT_CURRENT"),
+                Task(self.send_battery_voltage,        420,  560,   0, "",      "MCFO_BATT_VOLTAGE"),
+                Task(self.send_bridge_temperature,     260,  350,   0, "",      "MCFO_HBRIDGE_TEMP"),
+                Task(self.send_right_switch,           300,  400,   0, "",      "MCFO_RIGHT_LS"),
+                Task(self.send_left_switch,            300,  400,   0, "",      "MCFO_LEFT_LS"),
+                Task(self.rezero,                      700,  940,   0, "",      "motor_encoder_rezero"),
+                Task(self.send_execution_time,         420,  560,   0, "",      "MCFO_EXECUTION_TIME"),
+                Task(self.send_max_execution_time,     420,  560,   0, "",      "MCFO_MAX_EXECUTION_TIME"),
+                rate,
+                right_heel,
+            ),
+            extra_idle_call=self.quirks.occasional_idle_call,
+            last=(
+                Task(self.execution.record,             60,   80,   0, "",      "execution_time_record"),
+            ),
+        )  # fmt: skip

@@ -1,0 +1,167 @@
+"""Steering motor board (MCSI): B2A, 0.5 ms slots, 4 rows, no incremental encoders.
+
+Facts: network-and-boards 3.5 (schedule, laid out below line by line), 4.2, 4.5, 5, 6.1; control-and-data 1.6.
+The controller of May 2011 commands the duty itself, in counts of 600 (at most 75); see `steering_output` in
+quirks.py for what the firmware of 2016 made of it.
+"""
+
+import cython
+
+from boards.motor_board import ANALOG, PINS, WORDS, MotorBoard
+from datatable.generated import errors as codes
+from datatable.generated import mcsi as table
+from firmware_sim.scheduler import Schedule, Task, Wait
+
+if not cython.compiled:
+    from foundation.numbers import divide_toward_zero
+
+__all__ = ["ANALOG", "PINS", "WORDS", "SteeringBoard"]
+
+# (place, multiplexer code, gain code): single-ended 0 times 2, 4-5 times 2, 2-3 times 20
+SEQUENCE = (("steering_sensor", 8, 1), ("motor_current", 2, 1), ("battery_current", 1, 7))
+READINGS = dict(
+    motor_gain=0.0001535,
+    motor_offset=25,
+    battery_gain=0.0000505,
+    battery_offset=-75,
+    voltage_gain=0.0327,
+)
+LIMITS = dict(
+    target_min=-0.25,
+    target_max=0.25,
+    current_min=-0.3,
+    current_max=0.3,
+    thermal_current=0.3,
+    thermal_time=10.1,
+    excess_limit=10,
+)
+CENTRE_COUNTS = 4803  # of the limit check
+LIMIT_COUNTS = 200
+SENSOR = 0  # place in SEQUENCE
+
+
+class SteeringBoard(MotorBoard):
+    """`zero`: sensor counts at power-up, subtracted from what is published and controlled."""
+
+    def __init__(self, crystal=None, quirks=None, phase_ns=0) -> None:
+        MotorBoard.__init__(
+            self,
+            table,
+            crystal,
+            quirks,
+            phase_ns,
+            sequence=SEQUENCE,
+            readings=READINGS,
+            limits=LIMITS,
+            sign=1,
+            largest_duty=200,
+            gear=0,
+        )
+        self.zero = 0
+        self.direct = self.quirks.steering_output in ("duty", "duty_then_current")
+        self.closed_loop = self.quirks.steering_output in ("current", "duty_then_current")
+        self.check_limits = self.quirks.steering_limit_check
+        self.code_left = codes.MCSI_LEFT
+        self.code_right = codes.MCSI_RIGHT
+        self.id_steer_angle = table.MCSI_STEER_ANGLE
+        self.begin(phase_ns)
+
+    def schedule(self) -> Schedule:
+        """One pass takes 2 ms; each row's variable goes out at 500 Hz, the occasional ones at 100 Hz."""
+        return Schedule(
+            slot_us=table.SLOT_US,
+            every=(
+                #    function                         cost limit  per item      name
+                Task(self.start_external_adc,          200,  300,   0, "",      "adcx_convert_all"),
+                Task(self.start_internal_adc,           60,  100,   0, "",      "adci_convert_all"),
+                Task(self.can.receive_all,             120, 4000, 220, "frame", "can_rx_dispatch_all"),
+                Task(self.heartbeat.beat,               40,   60,   0, "",      "hb_beat"),
+                Task(self.leds.update,                  60,   80,   0, "",      "mcu_led_update"),
+                Task(self.errors.update,                90, 2700, 120, "error", "error_update"),
+                Task(self.can.feed,                     50,  300,  80, "frame", "can_tx2"),
+                Wait(self.adc_external.sequence_done,   20, 6500,              "adcx_conversion_wait"),
+                Task(self.update_pwm,                  250,  340,   0, "",      "dn_update_pwm"),
+                Task(self.steering_control,           2600, 3400,   0, "",      "mc_compliant_control"),
+            ),
+            rows=(
+                (Task(self.send_steer_angle,           330,  440,   0, "",      "MCSI_STEER_ANGLE"),),
+                (Task(self.send_motor_current,         480,  640,   0, "",      "MCSI_MOTOR_CURRENT"),),
+                (Task(self.send_power,                 600,  800,   0, "",      "MCSI_BATT_POWER"),),
+                (),  # the occasional list
+            ),
+            occasional_row=3,
+            occasional=(
+                Task(self.send_error,                  200,  270,   0, "",      "ERROR_MCSI"),
+                Task(self.send_status,                 260,  350,   0, "",      "MCSI_STATUS"),
+                Task(self.send_execution_time,         420,  560,   0, "",      "MCSI_EXECUTION_TIME"),
+                Task(self.send_max_execution_time,     420,  560,   0, "",      "MCSI_MAX_EXECUTION_TIME"),
+            ),
+            extra_idle_call=self.quirks.occasional_idle_call,
+            last=(
+                Task(self.execution.record,             60,   80,   0, "",      "execution_time_record"),
+            ),
+        )  # fmt: skip
+
+    def read_sensors_once(self) -> cython.void:
+        """Before the first slot: one sequence of the converter."""
+        self.output.enable_low_side(1)
+        self.start_external_adc()
+
+    def set_start_values(self) -> cython.void:
+        """The present steering angle is the zero."""
+        self.zero = self.adc_external.results[SENSOR]
+
+    def controlled_position(self) -> cython.longlong:
+        """Steering angle in counts x 65536: there is no other unit on this board."""
+        return (self.adc_external.results[SENSOR] - self.zero) << 16
+
+    def controlled_velocity(self) -> cython.longlong:
+        """No velocity is measured."""
+        return 0
+
+    def update_pwm(self) -> cython.void:
+        """dn_update_pwm: COMMAND_CURRENT, whole counts, straight to the duty.
+
+        The current monitors act on it as they do in the current loop, and so do blocked directions.
+        """
+        duty: cython.longlong
+        if self.check_limits:
+            self.check()
+        if not self.direct:
+            return
+        duty = divide_toward_zero(self.compliance.command, 65536)
+        duty = self.limits.limit_duty(duty << 16, self.readings.motor_current_fixed())
+        duty = divide_toward_zero(duty, 65536)
+        if (duty > 0 and self.current_control.block_positive) or (
+            duty < 0 and self.current_control.block_negative
+        ):
+            duty = 0
+        self.output.write(duty)
+
+    def steering_control(self) -> cython.void:
+        """mc_compliant_control: the loops if they are wanted, otherwise only watchdog and monitors."""
+        if self.closed_loop:
+            self.compliant_control()
+        else:
+            self.current_control.supervise(self.readings.motor_current_fixed())
+
+    def check(self) -> cython.void:
+        """The limit check of the firmware, which never calls it: +/-200 counts about 4803.
+
+        Positive duty turns towards higher counts (chosen by us: no record tells).
+        """
+        counts: cython.longlong = self.adc_external.results[SENSOR] - CENTRE_COUNTS
+        high: cython.bint = counts > LIMIT_COUNTS
+        low: cython.bint = counts < -LIMIT_COUNTS
+        if high:
+            self.errors.report(self.code_right)
+        elif low:
+            self.errors.report(self.code_left)
+        self.current_control.block_positive = high
+        self.current_control.block_negative = low
+
+    def send_steer_angle(self) -> cython.void:
+        self.can.send_float(self.id_steer_angle, self.adc_external.results[SENSOR] - self.zero)
+
+    def send_power(self) -> cython.void:
+        self.can.send_float(self.id_batt_power, self.readings.battery_power_fixed())
