@@ -5,7 +5,7 @@ cdef class SteeringMachine:
     cdef public DataStore store
     # variables of the data table
     cdef public long long MCH_ANGLE, E_SWING_LEG, UI_RC_0, FSM_RESET, P_S_NULL_H_TANG, P_S_MAX_CUR
-    cdef public long long P_S_ILST_TWITCH_FRAC, P_S_ILST_TWITCH_TIME, P_S_RC_DEADBAND
+    cdef public long long P_S_ILST_TWITCH_FRAC, P_S_ILST_TWITCH_TIME, P_S_RC_DEADBAND, D_S_SHUT_DOWN
     cdef public long long MCSI_COMMAND_CURRENT, MCSI_STIFFNESS, MCSI_DAMPNESS, MCSI_SHUTDOWN
     cdef public long long E_RC_STEER, FSM_STEER
     cdef public double twist, ramp_start, ramp_change, ramp_fraction

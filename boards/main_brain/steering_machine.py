@@ -20,6 +20,7 @@ READS = (
     "P_S_ILST_TWITCH_FRAC",
     "P_S_ILST_TWITCH_TIME",
     "P_S_RC_DEADBAND",
+    "D_S_SHUT_DOWN",
 )
 WRITES = ("MCSI_COMMAND_CURRENT", "MCSI_STIFFNESS", "MCSI_DAMPNESS", "MCSI_SHUTDOWN", "E_RC_STEER", "FSM_STEER")
 
@@ -69,10 +70,10 @@ class SteeringMachine:
             self.store.set_int(self.MCSI_SHUTDOWN, shut_down)
 
     def off(self) -> cython.void:
-        """No twist, motor shut down."""
+        """No twist; motor shut down where the parameter says so."""
         self.twist = 0.0
         self.send(0.0)
-        self.switch(1)
+        self.switch(1 if self.store.get_float(self.D_S_SHUT_DOWN) != 0.0 else 0)
 
     def radio_command(self) -> float:
         """-1 ... 1 from the pulse width of channel 0 in 1/60 us (85 000 is the centre).

@@ -388,63 +388,64 @@ P_S_MAX_CUR = 371
 P_S_ILST_TWITCH_FRAC = 372
 P_S_ILST_TWITCH_TIME = 373
 P_S_RC_DEADBAND = 374
-P_L_START_ABSRATE = 375
-P_L_START_H_RATE = 376
-P_E_GYRO_BIAS = 377
-P_E_ROLL_BIAS = 378
-P_E_RESET = 379
-P_E_HS_THRESHOLD = 380
-P_E_HS_BASE_LIMIT = 381
-P_E_HS_TICKS = 382
-P_E_HS_H_ANG = 383
-P_E_HS_F_ANG = 384
-P_E_MIN_STEP_TIME = 385
-P_E_FALL_ANG = 386
-P_UI_LCD_TIME = 387
-P_UI_SONG_STEPS = 388
-P_UI_PP2HS_TTIME = 389
-D_UI_STOP_ON_FALL = 390
-E_H_MOTOR_RATE = 391
-E_LO_ANGLE = 392
-E_LI_ANGLE = 393
-E_LO_RATE = 394
-E_LI_RATE = 395
-E_FO_ABSANG = 396
-E_FI_ABSANG = 397
-E_SWING_LEG = 398
-E_T_AFTER_HS = 399
-E_HS_TIME = 400
-E_STEP_COUNT = 401
-E_DISTANCE = 402
-E_ANKLE_HEIGHT = 403
-E_SWING_HEIGHT = 404
-E_LO_ERROR = 405
-E_HEEL_BASE_LEFT = 406
-E_HEEL_BASE_RIGHT = 407
-E_HEEL_STAGE = 408
-EST_ENERGY_MCSI = 409
-E_AM_L_ABSRATE = 410
-E_AM_H_ANG = 411
-E_AM_H_RATE = 412
-E_AM_TIME = 413
-E_AM_TIMER = 414
-E_PS_TIME = 415
-E_SS_L_ANG = 416
-E_SS_L_ABSRATE = 417
-E_H_DI1 = 418
-E_H_DI2 = 419
-E_FO_PP2HS_TIME = 420
-E_FI_PP2HS_TIME = 421
-E_FO_PP_MISSED = 422
-E_FI_PP_MISSED = 423
-E_RC_STEER = 424
-FSM_RESET = 425
-FSM_UI = 426
-FSM_LEG = 427
-FSM_HIP = 428
-FSM_FI = 429
-FSM_FO = 430
-FSM_STEER = 431
+D_S_SHUT_DOWN = 375
+P_L_START_ABSRATE = 376
+P_L_START_H_RATE = 377
+P_E_GYRO_BIAS = 378
+P_E_ROLL_BIAS = 379
+P_E_RESET = 380
+P_E_HS_THRESHOLD = 381
+P_E_HS_BASE_LIMIT = 382
+P_E_HS_TICKS = 383
+P_E_HS_H_ANG = 384
+P_E_HS_F_ANG = 385
+P_E_MIN_STEP_TIME = 386
+P_E_FALL_ANG = 387
+P_UI_LCD_TIME = 388
+P_UI_SONG_STEPS = 389
+P_UI_PP2HS_TTIME = 390
+D_UI_STOP_ON_FALL = 391
+E_H_MOTOR_RATE = 392
+E_LO_ANGLE = 393
+E_LI_ANGLE = 394
+E_LO_RATE = 395
+E_LI_RATE = 396
+E_FO_ABSANG = 397
+E_FI_ABSANG = 398
+E_SWING_LEG = 399
+E_T_AFTER_HS = 400
+E_HS_TIME = 401
+E_STEP_COUNT = 402
+E_DISTANCE = 403
+E_ANKLE_HEIGHT = 404
+E_SWING_HEIGHT = 405
+E_LO_ERROR = 406
+E_HEEL_BASE_LEFT = 407
+E_HEEL_BASE_RIGHT = 408
+E_HEEL_STAGE = 409
+EST_ENERGY_MCSI = 410
+E_AM_L_ABSRATE = 411
+E_AM_H_ANG = 412
+E_AM_H_RATE = 413
+E_AM_TIME = 414
+E_AM_TIMER = 415
+E_PS_TIME = 416
+E_SS_L_ANG = 417
+E_SS_L_ABSRATE = 418
+E_H_DI1 = 419
+E_H_DI2 = 420
+E_FO_PP2HS_TIME = 421
+E_FI_PP2HS_TIME = 422
+E_FO_PP_MISSED = 423
+E_FI_PP_MISSED = 424
+E_RC_STEER = 425
+FSM_RESET = 426
+FSM_UI = 427
+FSM_LEG = 428
+FSM_HIP = 429
+FSM_FI = 430
+FSM_FO = 431
+FSM_STEER = 432
 
 # what the board sends and hears, by id
 SEND: tuple[int, ...] = (
@@ -876,40 +877,41 @@ TYPES: dict[int, str] = {
     395: "f32",
     396: "f32",
     397: "f32",
-    398: "i32",
+    398: "f32",
     399: "i32",
-    400: "u32",
-    401: "i32",
-    402: "f32",
+    400: "i32",
+    401: "u32",
+    402: "i32",
     403: "f32",
     404: "f32",
     405: "f32",
     406: "f32",
     407: "f32",
-    408: "i32",
-    409: "f32",
+    408: "f32",
+    409: "i32",
     410: "f32",
     411: "f32",
     412: "f32",
     413: "f32",
-    414: "i32",
-    415: "f32",
+    414: "f32",
+    415: "i32",
     416: "f32",
     417: "f32",
     418: "f32",
     419: "f32",
-    420: "i32",
+    420: "f32",
     421: "i32",
     422: "i32",
     423: "i32",
-    424: "f32",
-    425: "i32",
+    424: "i32",
+    425: "f32",
     426: "i32",
     427: "i32",
     428: "i32",
     429: "i32",
     430: "i32",
     431: "i32",
+    432: "i32",
 }
 INITIAL: dict[int, float] = {
     0: 0,
@@ -1287,63 +1289,64 @@ INITIAL: dict[int, float] = {
     372: 1.0,
     373: 1.0,
     374: 0.019999999552965164,
-    375: 0.5,
-    376: 1.659999966621399,
-    377: -0.004000000189989805,
-    378: -0.020999999716877937,
-    379: 0.10000000149011612,
-    380: 2000.0,
-    381: 5000.0,
-    382: 2.0,
-    383: 0.004999999888241291,
-    384: 0.800000011920929,
-    385: 250.0,
-    386: 0.7853981852531433,
-    387: 4000.0,
-    388: 3000.0,
-    389: 70.0,
-    390: 1.0,
-    391: 0.0,
+    375: 0.0,
+    376: 0.5,
+    377: 1.659999966621399,
+    378: -0.004000000189989805,
+    379: -0.020999999716877937,
+    380: 0.10000000149011612,
+    381: 2000.0,
+    382: 5000.0,
+    383: 2.0,
+    384: 0.004999999888241291,
+    385: 0.800000011920929,
+    386: 250.0,
+    387: 0.7853981852531433,
+    388: 4000.0,
+    389: 3000.0,
+    390: 70.0,
+    391: 1.0,
     392: 0.0,
     393: 0.0,
     394: 0.0,
     395: 0.0,
     396: 0.0,
     397: 0.0,
-    398: 1,
-    399: 0,
+    398: 0.0,
+    399: 1,
     400: 0,
     401: 0,
-    402: 0.0,
+    402: 0,
     403: 0.0,
     404: 0.0,
     405: 0.0,
     406: 0.0,
     407: 0.0,
-    408: 0,
-    409: 0.0,
+    408: 0.0,
+    409: 0,
     410: 0.0,
     411: 0.0,
     412: 0.0,
     413: 0.0,
-    414: 0,
-    415: 0.0,
+    414: 0.0,
+    415: 0,
     416: 0.0,
     417: 0.0,
     418: 0.0,
     419: 0.0,
-    420: 0,
+    420: 0.0,
     421: 0,
     422: 0,
     423: 0,
-    424: 0.0,
-    425: 1,
-    426: 0,
+    424: 0,
+    425: 0.0,
+    426: 1,
     427: 0,
     428: 0,
     429: 0,
     430: 0,
     431: 0,
+    432: 0,
 }
 NAMES: dict[int, str] = {
     0: "TIMESTAMP",
@@ -1721,66 +1724,67 @@ NAMES: dict[int, str] = {
     372: "P_S_ILST_TWITCH_FRAC",
     373: "P_S_ILST_TWITCH_TIME",
     374: "P_S_RC_DEADBAND",
-    375: "P_L_START_ABSRATE",
-    376: "P_L_START_H_RATE",
-    377: "P_E_GYRO_BIAS",
-    378: "P_E_ROLL_BIAS",
-    379: "P_E_RESET",
-    380: "P_E_HS_THRESHOLD",
-    381: "P_E_HS_BASE_LIMIT",
-    382: "P_E_HS_TICKS",
-    383: "P_E_HS_H_ANG",
-    384: "P_E_HS_F_ANG",
-    385: "P_E_MIN_STEP_TIME",
-    386: "P_E_FALL_ANG",
-    387: "P_UI_LCD_TIME",
-    388: "P_UI_SONG_STEPS",
-    389: "P_UI_PP2HS_TTIME",
-    390: "D_UI_STOP_ON_FALL",
-    391: "E_H_MOTOR_RATE",
-    392: "E_LO_ANGLE",
-    393: "E_LI_ANGLE",
-    394: "E_LO_RATE",
-    395: "E_LI_RATE",
-    396: "E_FO_ABSANG",
-    397: "E_FI_ABSANG",
-    398: "E_SWING_LEG",
-    399: "E_T_AFTER_HS",
-    400: "E_HS_TIME",
-    401: "E_STEP_COUNT",
-    402: "E_DISTANCE",
-    403: "E_ANKLE_HEIGHT",
-    404: "E_SWING_HEIGHT",
-    405: "E_LO_ERROR",
-    406: "E_HEEL_BASE_LEFT",
-    407: "E_HEEL_BASE_RIGHT",
-    408: "E_HEEL_STAGE",
-    409: "EST_ENERGY_MCSI",
-    410: "E_AM_L_ABSRATE",
-    411: "E_AM_H_ANG",
-    412: "E_AM_H_RATE",
-    413: "E_AM_TIME",
-    414: "E_AM_TIMER",
-    415: "E_PS_TIME",
-    416: "E_SS_L_ANG",
-    417: "E_SS_L_ABSRATE",
-    418: "E_H_DI1",
-    419: "E_H_DI2",
-    420: "E_FO_PP2HS_TIME",
-    421: "E_FI_PP2HS_TIME",
-    422: "E_FO_PP_MISSED",
-    423: "E_FI_PP_MISSED",
-    424: "E_RC_STEER",
-    425: "FSM_RESET",
-    426: "FSM_UI",
-    427: "FSM_LEG",
-    428: "FSM_HIP",
-    429: "FSM_FI",
-    430: "FSM_FO",
-    431: "FSM_STEER",
+    375: "D_S_SHUT_DOWN",
+    376: "P_L_START_ABSRATE",
+    377: "P_L_START_H_RATE",
+    378: "P_E_GYRO_BIAS",
+    379: "P_E_ROLL_BIAS",
+    380: "P_E_RESET",
+    381: "P_E_HS_THRESHOLD",
+    382: "P_E_HS_BASE_LIMIT",
+    383: "P_E_HS_TICKS",
+    384: "P_E_HS_H_ANG",
+    385: "P_E_HS_F_ANG",
+    386: "P_E_MIN_STEP_TIME",
+    387: "P_E_FALL_ANG",
+    388: "P_UI_LCD_TIME",
+    389: "P_UI_SONG_STEPS",
+    390: "P_UI_PP2HS_TTIME",
+    391: "D_UI_STOP_ON_FALL",
+    392: "E_H_MOTOR_RATE",
+    393: "E_LO_ANGLE",
+    394: "E_LI_ANGLE",
+    395: "E_LO_RATE",
+    396: "E_LI_RATE",
+    397: "E_FO_ABSANG",
+    398: "E_FI_ABSANG",
+    399: "E_SWING_LEG",
+    400: "E_T_AFTER_HS",
+    401: "E_HS_TIME",
+    402: "E_STEP_COUNT",
+    403: "E_DISTANCE",
+    404: "E_ANKLE_HEIGHT",
+    405: "E_SWING_HEIGHT",
+    406: "E_LO_ERROR",
+    407: "E_HEEL_BASE_LEFT",
+    408: "E_HEEL_BASE_RIGHT",
+    409: "E_HEEL_STAGE",
+    410: "EST_ENERGY_MCSI",
+    411: "E_AM_L_ABSRATE",
+    412: "E_AM_H_ANG",
+    413: "E_AM_H_RATE",
+    414: "E_AM_TIME",
+    415: "E_AM_TIMER",
+    416: "E_PS_TIME",
+    417: "E_SS_L_ANG",
+    418: "E_SS_L_ABSRATE",
+    419: "E_H_DI1",
+    420: "E_H_DI2",
+    421: "E_FO_PP2HS_TIME",
+    422: "E_FI_PP2HS_TIME",
+    423: "E_FO_PP_MISSED",
+    424: "E_FI_PP_MISSED",
+    425: "E_RC_STEER",
+    426: "FSM_RESET",
+    427: "FSM_UI",
+    428: "FSM_LEG",
+    429: "FSM_HIP",
+    430: "FSM_FI",
+    431: "FSM_FO",
+    432: "FSM_STEER",
 }
 
 # error codes that the board can raise
 ERRORS: tuple[int, ...] = (
-    0, 76, 77, 78, 79, 80, 81, 82, 83, 84, 95, 96, 110, 111, 112, 113, 114, 115, 118,
+    0, 62, 76, 77, 78, 79, 80, 81, 82, 83, 84, 95, 96, 110, 111, 112, 113, 114, 115, 118,
 )

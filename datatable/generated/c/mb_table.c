@@ -377,6 +377,7 @@ const struct mb_data mb_initial = {
     .p_s_ilst_twitch_frac = 1.0f,
     .p_s_ilst_twitch_time = 1.0f,
     .p_s_rc_deadband = 0.0199999996f,
+    .d_s_shut_down = 0.0f,
     .p_l_start_absrate = 0.5f,
     .p_l_start_h_rate = 1.65999997f,
     .p_e_gyro_bias = -0.00400000019f,

@@ -388,63 +388,64 @@
 #define P_S_ILST_TWITCH_FRAC 372
 #define P_S_ILST_TWITCH_TIME 373
 #define P_S_RC_DEADBAND 374
-#define P_L_START_ABSRATE 375
-#define P_L_START_H_RATE 376
-#define P_E_GYRO_BIAS 377
-#define P_E_ROLL_BIAS 378
-#define P_E_RESET 379
-#define P_E_HS_THRESHOLD 380
-#define P_E_HS_BASE_LIMIT 381
-#define P_E_HS_TICKS 382
-#define P_E_HS_H_ANG 383
-#define P_E_HS_F_ANG 384
-#define P_E_MIN_STEP_TIME 385
-#define P_E_FALL_ANG 386
-#define P_UI_LCD_TIME 387
-#define P_UI_SONG_STEPS 388
-#define P_UI_PP2HS_TTIME 389
-#define D_UI_STOP_ON_FALL 390
-#define E_H_MOTOR_RATE 391
-#define E_LO_ANGLE 392
-#define E_LI_ANGLE 393
-#define E_LO_RATE 394
-#define E_LI_RATE 395
-#define E_FO_ABSANG 396
-#define E_FI_ABSANG 397
-#define E_SWING_LEG 398
-#define E_T_AFTER_HS 399
-#define E_HS_TIME 400
-#define E_STEP_COUNT 401
-#define E_DISTANCE 402
-#define E_ANKLE_HEIGHT 403
-#define E_SWING_HEIGHT 404
-#define E_LO_ERROR 405
-#define E_HEEL_BASE_LEFT 406
-#define E_HEEL_BASE_RIGHT 407
-#define E_HEEL_STAGE 408
-#define EST_ENERGY_MCSI 409
-#define E_AM_L_ABSRATE 410
-#define E_AM_H_ANG 411
-#define E_AM_H_RATE 412
-#define E_AM_TIME 413
-#define E_AM_TIMER 414
-#define E_PS_TIME 415
-#define E_SS_L_ANG 416
-#define E_SS_L_ABSRATE 417
-#define E_H_DI1 418
-#define E_H_DI2 419
-#define E_FO_PP2HS_TIME 420
-#define E_FI_PP2HS_TIME 421
-#define E_FO_PP_MISSED 422
-#define E_FI_PP_MISSED 423
-#define E_RC_STEER 424
-#define FSM_RESET 425
-#define FSM_UI 426
-#define FSM_LEG 427
-#define FSM_HIP 428
-#define FSM_FI 429
-#define FSM_FO 430
-#define FSM_STEER 431
+#define D_S_SHUT_DOWN 375
+#define P_L_START_ABSRATE 376
+#define P_L_START_H_RATE 377
+#define P_E_GYRO_BIAS 378
+#define P_E_ROLL_BIAS 379
+#define P_E_RESET 380
+#define P_E_HS_THRESHOLD 381
+#define P_E_HS_BASE_LIMIT 382
+#define P_E_HS_TICKS 383
+#define P_E_HS_H_ANG 384
+#define P_E_HS_F_ANG 385
+#define P_E_MIN_STEP_TIME 386
+#define P_E_FALL_ANG 387
+#define P_UI_LCD_TIME 388
+#define P_UI_SONG_STEPS 389
+#define P_UI_PP2HS_TTIME 390
+#define D_UI_STOP_ON_FALL 391
+#define E_H_MOTOR_RATE 392
+#define E_LO_ANGLE 393
+#define E_LI_ANGLE 394
+#define E_LO_RATE 395
+#define E_LI_RATE 396
+#define E_FO_ABSANG 397
+#define E_FI_ABSANG 398
+#define E_SWING_LEG 399
+#define E_T_AFTER_HS 400
+#define E_HS_TIME 401
+#define E_STEP_COUNT 402
+#define E_DISTANCE 403
+#define E_ANKLE_HEIGHT 404
+#define E_SWING_HEIGHT 405
+#define E_LO_ERROR 406
+#define E_HEEL_BASE_LEFT 407
+#define E_HEEL_BASE_RIGHT 408
+#define E_HEEL_STAGE 409
+#define EST_ENERGY_MCSI 410
+#define E_AM_L_ABSRATE 411
+#define E_AM_H_ANG 412
+#define E_AM_H_RATE 413
+#define E_AM_TIME 414
+#define E_AM_TIMER 415
+#define E_PS_TIME 416
+#define E_SS_L_ANG 417
+#define E_SS_L_ABSRATE 418
+#define E_H_DI1 419
+#define E_H_DI2 420
+#define E_FO_PP2HS_TIME 421
+#define E_FI_PP2HS_TIME 422
+#define E_FO_PP_MISSED 423
+#define E_FI_PP_MISSED 424
+#define E_RC_STEER 425
+#define FSM_RESET 426
+#define FSM_UI 427
+#define FSM_LEG 428
+#define FSM_HIP 429
+#define FSM_FI 430
+#define FSM_FO 431
+#define FSM_STEER 432
 
 /* the board's copy of the values */
 struct mb_data {
@@ -823,63 +824,64 @@ struct mb_data {
     float p_s_ilst_twitch_frac; /* 372 steering: part of the twist used the other way on the ground */
     float p_s_ilst_twitch_time; /* 373 [ticks] steering: ticks to turn over at touchdown */
     float p_s_rc_deadband; /* 374 steering: radio command taken as straight on */
-    float p_l_start_absrate; /* 375 [rad/s] stance leg rate assumed before the first mid-stance */
-    float p_l_start_h_rate; /* 376 [rad/s] hip rate assumed before the first mid-stance */
-    float p_e_gyro_bias; /* 377 [rad/s] gyro reading at rest */
-    float p_e_roll_bias; /* 378 [rad] IMU roll reading with the outer legs upright */
-    float p_e_reset; /* 379 part of the leg angle error taken out at each heel strike */
-    float p_e_hs_threshold; /* 380 [counts] heel strike: rise above the baseline */
-    float p_e_hs_base_limit; /* 381 [counts] heel strike: a baseline above this marks a faulty sensor */
-    float p_e_hs_ticks; /* 382 [ticks] heel strike: consecutive ticks above the threshold */
-    float p_e_hs_h_ang; /* 383 [rad] heel strike: baseline starts when the swing leg is ahead by this */
-    float p_e_hs_f_ang; /* 384 [rad] heel strike: baseline freezes when the swing ankle opens beyond this */
-    float p_e_min_step_time; /* 385 [ms] shorter steps are reported as stutter */
-    float p_e_fall_ang; /* 386 [rad] leg angle that counts as a fall */
-    float p_ui_lcd_time; /* 387 [ms] display: time per page */
-    float p_ui_song_steps; /* 388 [steps] a song every so many steps; 0 for none */
-    float p_ui_pp2hs_ttime; /* 389 [ms] light 3 warns of pushes that began longer before heel strike */
-    float d_ui_stop_on_fall; /* 390 1 stops all motors at a fall */
-    float e_h_motor_rate; /* 391 [rad/s] hip motor rate after the low-pass filter */
-    float e_lo_angle; /* 392 [rad] outer legs against gravity, positive leaning forward */
-    float e_li_angle; /* 393 [rad] inner legs against gravity, positive leaning forward */
-    float e_lo_rate; /* 394 [rad/s] outer legs' rate from the filtered gyro */
-    float e_li_rate; /* 395 [rad/s] inner legs' rate from the filtered gyro and hip rate */
-    float e_fo_absang; /* 396 [rad] outer feet against the floor plus 1.75 */
-    float e_fi_absang; /* 397 [rad] inner feet against the floor plus 1.75 */
-    int32_t e_swing_leg; /* 398 0 while the outer legs swing, 1 while the inner ones do */
-    int32_t e_t_after_hs; /* 399 [ms] time since the last heel strike */
-    uint32_t e_hs_time; /* 400 [ms] network time of the last heel strike */
-    int32_t e_step_count; /* 401 [steps] heel strikes since calibration */
-    float e_distance; /* 402 [m] way walked since calibration */
-    float e_ankle_height; /* 403 [m] swing ankle above the stance ankle */
-    float e_swing_height; /* 404 [m] swing foot above the floor */
-    float e_lo_error; /* 405 [rad] outer leg angle found wrong at the last heel strike */
-    float e_heel_base_left; /* 406 [counts] baseline of the left swing foot's contact sensor */
-    float e_heel_base_right; /* 407 [counts] baseline of the right swing foot's contact sensor */
-    int32_t e_heel_stage; /* 408 heel strike detector: 0 waits, 1 averages, 2 armed */
-    float est_energy_mcsi; /* 409 [J] battery energy of the steering motor stage */
-    float e_am_l_absrate; /* 410 [rad/s] stance leg rate at mid-stance, mean of two steps */
-    float e_am_h_ang; /* 411 [rad] hip angle at mid-stance, positive swing leg ahead, mean of two steps */
-    float e_am_h_rate; /* 412 [rad/s] hip rate before mid-stance, mean of two steps */
-    float e_am_time; /* 413 [ms] single stance until mid-stance, mean of two steps */
-    int32_t e_am_timer; /* 414 [ms] time since mid-stance, 0 before it */
-    float e_ps_time; /* 415 [ms] duration of the last double stance */
-    float e_ss_l_ang; /* 416 [rad] stance leg angle before vertical when single stance began, mean of two steps */
-    float e_ss_l_absrate; /* 417 [rad/s] stance leg rate during double stance, mean of two steps */
-    float e_h_di1; /* 418 [A] first hip correction of this step */
-    float e_h_di2; /* 419 [A] second hip correction of this step */
-    int32_t e_fo_pp2hs_time; /* 420 [ms] outer push-off: from its begin to heel strike */
-    int32_t e_fi_pp2hs_time; /* 421 [ms] inner push-off: from its begin to heel strike */
-    int32_t e_fo_pp_missed; /* 422 outer push-offs that began after heel strike */
-    int32_t e_fi_pp_missed; /* 423 inner push-offs that began after heel strike */
-    float e_rc_steer; /* 424 steering command of the radio, -1 to 1 */
-    int32_t fsm_reset; /* 425 1 holds all machines in their start states, 2 lets them walk */
-    int32_t fsm_ui; /* 426 mode: 0 calibrate, 1 standby, 2 walk, 3 stop */
-    int32_t fsm_leg; /* 427 state of the leg machine */
-    int32_t fsm_hip; /* 428 state of the hip machine */
-    int32_t fsm_fi; /* 429 state of the inner foot machine */
-    int32_t fsm_fo; /* 430 state of the outer foot machine */
-    int32_t fsm_steer; /* 431 state of the steering machine */
+    float d_s_shut_down; /* 375 steering: 1 shuts the motor down while the radio says straight on */
+    float p_l_start_absrate; /* 376 [rad/s] stance leg rate assumed before the first mid-stance */
+    float p_l_start_h_rate; /* 377 [rad/s] hip rate assumed before the first mid-stance */
+    float p_e_gyro_bias; /* 378 [rad/s] gyro reading at rest */
+    float p_e_roll_bias; /* 379 [rad] IMU roll reading with the outer legs upright */
+    float p_e_reset; /* 380 part of the leg angle error taken out at each heel strike */
+    float p_e_hs_threshold; /* 381 [counts] heel strike: rise above the baseline */
+    float p_e_hs_base_limit; /* 382 [counts] heel strike: a baseline above this marks a faulty sensor */
+    float p_e_hs_ticks; /* 383 [ticks] heel strike: consecutive ticks above the threshold */
+    float p_e_hs_h_ang; /* 384 [rad] heel strike: baseline starts when the swing leg is ahead by this */
+    float p_e_hs_f_ang; /* 385 [rad] heel strike: baseline freezes when the swing ankle opens beyond this */
+    float p_e_min_step_time; /* 386 [ms] shorter steps are reported as stutter */
+    float p_e_fall_ang; /* 387 [rad] leg angle that counts as a fall */
+    float p_ui_lcd_time; /* 388 [ms] display: time per page */
+    float p_ui_song_steps; /* 389 [steps] a song every so many steps; 0 for none */
+    float p_ui_pp2hs_ttime; /* 390 [ms] light 3 warns of pushes that began longer before heel strike */
+    float d_ui_stop_on_fall; /* 391 1 stops all motors at a fall */
+    float e_h_motor_rate; /* 392 [rad/s] hip motor rate after the low-pass filter */
+    float e_lo_angle; /* 393 [rad] outer legs against gravity, positive leaning forward */
+    float e_li_angle; /* 394 [rad] inner legs against gravity, positive leaning forward */
+    float e_lo_rate; /* 395 [rad/s] outer legs' rate from the filtered gyro */
+    float e_li_rate; /* 396 [rad/s] inner legs' rate from the filtered gyro and hip rate */
+    float e_fo_absang; /* 397 [rad] outer feet against the floor plus 1.75 */
+    float e_fi_absang; /* 398 [rad] inner feet against the floor plus 1.75 */
+    int32_t e_swing_leg; /* 399 0 while the outer legs swing, 1 while the inner ones do */
+    int32_t e_t_after_hs; /* 400 [ms] time since the last heel strike */
+    uint32_t e_hs_time; /* 401 [ms] network time of the last heel strike */
+    int32_t e_step_count; /* 402 [steps] heel strikes since calibration */
+    float e_distance; /* 403 [m] way walked since calibration */
+    float e_ankle_height; /* 404 [m] swing ankle above the stance ankle */
+    float e_swing_height; /* 405 [m] swing foot above the floor */
+    float e_lo_error; /* 406 [rad] outer leg angle found wrong at the last heel strike */
+    float e_heel_base_left; /* 407 [counts] baseline of the left swing foot's contact sensor */
+    float e_heel_base_right; /* 408 [counts] baseline of the right swing foot's contact sensor */
+    int32_t e_heel_stage; /* 409 heel strike detector: 0 waits, 1 averages, 2 armed */
+    float est_energy_mcsi; /* 410 [J] battery energy of the steering motor stage */
+    float e_am_l_absrate; /* 411 [rad/s] stance leg rate at mid-stance, mean of two steps */
+    float e_am_h_ang; /* 412 [rad] hip angle at mid-stance, positive swing leg ahead, mean of two steps */
+    float e_am_h_rate; /* 413 [rad/s] hip rate before mid-stance, mean of two steps */
+    float e_am_time; /* 414 [ms] single stance until mid-stance, mean of two steps */
+    int32_t e_am_timer; /* 415 [ms] time since mid-stance, 0 before it */
+    float e_ps_time; /* 416 [ms] duration of the last double stance */
+    float e_ss_l_ang; /* 417 [rad] stance leg angle before vertical when single stance began, mean of two steps */
+    float e_ss_l_absrate; /* 418 [rad/s] stance leg rate during double stance, mean of two steps */
+    float e_h_di1; /* 419 [A] first hip correction of this step */
+    float e_h_di2; /* 420 [A] second hip correction of this step */
+    int32_t e_fo_pp2hs_time; /* 421 [ms] outer push-off: from its begin to heel strike */
+    int32_t e_fi_pp2hs_time; /* 422 [ms] inner push-off: from its begin to heel strike */
+    int32_t e_fo_pp_missed; /* 423 outer push-offs that began after heel strike */
+    int32_t e_fi_pp_missed; /* 424 inner push-offs that began after heel strike */
+    float e_rc_steer; /* 425 steering command of the radio, -1 to 1 */
+    int32_t fsm_reset; /* 426 1 holds all machines in their start states, 2 lets them walk */
+    int32_t fsm_ui; /* 427 mode: 0 calibrate, 1 standby, 2 walk, 3 stop */
+    int32_t fsm_leg; /* 428 state of the leg machine */
+    int32_t fsm_hip; /* 429 state of the hip machine */
+    int32_t fsm_fi; /* 430 state of the inner foot machine */
+    int32_t fsm_fo; /* 431 state of the outer foot machine */
+    int32_t fsm_steer; /* 432 state of the steering machine */
 };
 
 extern const struct mb_data mb_initial;

@@ -1,0 +1,35 @@
+from boards.main_brain.estimator cimport Estimator
+from boards.main_brain.io_data cimport IoData
+from boards.main_brain.mode_machine cimport ModeMachine
+from boards.modules.error_module cimport ErrorModule
+from boards.modules.network_time cimport NetworkTime
+from boards.modules.ssp_link cimport MainBrainSspLink
+from datatable.store cimport DataStore
+from firmware_sim.microcontroller cimport Microcontroller
+from firmware_sim.peripherals.ssp cimport SspPort, SspSegment
+from firmware_sim.scheduler cimport Schedule, Task
+from foundation.events cimport EventQueue
+
+cdef class MainBrainBoard(Microcontroller):
+    cdef public object quirks, distribution, controller
+    cdef public DataStore store
+    cdef public NetworkTime time
+    cdef public ErrorModule errors
+    cdef public SspPort ssp
+    cdef public MainBrainSspLink link
+    cdef public IoData io
+    cdef public Estimator estimator
+    cdef public ModeMachine modes
+    cdef public bint errors_one_late, heartbeat_on, execution_time_folds
+    cdef public long long error_before, heartbeat_bit, heartbeat_until, execution_time_id
+    cdef public long long code_dnf, code_near_limit, code_task_limit, code_id_out_of_range
+    cpdef object load_controller(self, controller)
+    cpdef object schedule(self)
+    cpdef object on_segment(self, EventQueue queue)
+    cpdef void beat(self)
+    cpdef void store_execution_time(self)
+    cpdef void report(self, long long code)
+    cpdef void id_out_of_range(self)
+    cpdef void slot_exceeded(self)
+    cpdef void slot_near_limit(self)
+    cpdef void task_limit(self, Task task)

@@ -1,0 +1,173 @@
+"""The main brain (MB, LPC3250 at 208 MHz): all data, estimator, state machines. Slots of 2 ms, 11 rows.
+
+Facts network-and-boards 1.6, 3.1, 3.8, 4.12, 4.13; appendix 4.3, 4.4. Its tick comes from its own crystal,
+not from the router: phase and drift against the rest of the robot are arbitrary; its time is that of the
+last frame of identifier 0.
+
+ROBOT PARITY: the serial line to the computer is not part of this board yet (parse packets, swap receive
+DMA, rebuild lists, send data: facts 3.8, rows 0-2 and the end of every slot): parameters are put into the
+data table by `load_controller`, logs are taken from it from outside.
+"""
+
+import cython
+
+from boards.main_brain import controllers
+from boards.main_brain.error_distribution import ErrorDistribution
+from boards.main_brain.estimator import Estimator
+from boards.main_brain.io_data import IoData
+from boards.main_brain.mode_machine import ModeMachine
+from boards.modules.error_module import ErrorModule
+from boards.modules.network_time import NetworkTime
+from boards.modules.ssp_link import MainBrainSspLink
+from datatable.generated import errors as codes
+from datatable.generated import mb as table
+from datatable.generated.all_variables import ID_OF_LAST, TABLE_SIZE
+from datatable.store import DataStore
+from firmware_sim.microcontroller import Microcontroller
+from firmware_sim.peripherals.ssp import SspPort, SspSegment
+from firmware_sim.scheduler import Schedule, Task
+from firmware_sim.vic import FIQ
+from foundation.events import SSP_SEGMENT, EventQueue
+
+# Both edges of slave select: stop and restart two DMA channels; about 300 instructions of C (chosen by us).
+SEGMENT_CYCLES = 450
+EXECUTION_TIMER_HZ = 13_000_000  # Timer0 counts the peripheral clock (facts 3.8)
+
+
+class MainBrainBoard(Microcontroller):
+    """`controller`: name of a parameter set, path of a .toml file, or a loaded Controller.
+
+    Open to the harness and to tests: `store` (the data table), `estimator`, `modes`, `errors`, `distribution`.
+    """
+
+    def __init__(self, crystal, quirks, phase_ns=0, controller="record-2011") -> None:
+        Microcontroller.__init__(self, table.BOARD, table.CLOCK_HZ, crystal)
+        self.quirks = quirks
+        self.store = DataStore(TABLE_SIZE)
+        self.time = NetworkTime()
+        self.errors = ErrorModule(
+            table.BOARD_NUMBER, self.time, quirks.errors_counted_per_event, quirks.new_errors_lost_after_repeat
+        )
+        self.errors_one_late = quirks.errors_reported_one_late
+        self.error_before = codes.DEFAULT
+        self.code_dnf = codes.ASCHED_DNF
+        self.code_near_limit = codes.SCHED_SLOT_NEAR_LIMIT
+        self.code_task_limit = codes.SCHED_TASK_LIMIT
+        self.code_id_out_of_range = codes.MB_IO_ID_OOR
+        self.store.on_out_of_range = self.id_out_of_range
+        for number, value in table.INITIAL.items():
+            if table.TYPES[number] == "f32":
+                self.store.set_float(number, value)
+            else:
+                self.store.set_int(number, int(value))
+
+        self.ssp = SspPort(self, 0)
+        self.link = MainBrainSspLink(self.report, ID_OF_LAST)
+        self.io = IoData(self.store, self.link, self.time, table.SEND)
+        self.estimator = Estimator(self.store, quirks, self.report)
+        self.modes = ModeMachine(self.store, quirks, self.estimator)
+        self.distribution = ErrorDistribution(self.store, self.errors, quirks.error_distribution_inverted)
+        self.controller = None
+        self.load_controller(controller)
+
+        self.heartbeat_on = False
+        self.heartbeat_bit = 0
+        self.heartbeat_until = 0
+        self.execution_time_folds = quirks.main_brain_execution_time_folds
+        self.execution_time_id = table.MB_EXECUTION_TIME
+        self.vic.attach(SSP_SEGMENT, 0, self.on_segment, SEGMENT_CYCLES, slot=FIQ, name="ssp")
+        if quirks.main_brain_overrun_check:
+            self.on_overrun = self.slot_exceeded
+        self.on_limit = self.task_limit
+        if quirks.warn_near_slot_limit:
+            self.on_near_limit = self.slot_near_limit
+        self.ssp.load(self.link.next_segment())
+        self.start(self.schedule(), phase_ns)
+
+    def load_controller(self, controller) -> None:
+        """Take over a parameter set; also while walking, as the computer's parameter page could."""
+        if not isinstance(controller, controllers.Controller):
+            controller = controllers.load(controller)
+        self.controller = controller
+        controller.apply(self.store)
+
+    def schedule(self) -> Schedule:
+        """Facts 3.8 without the serial line.
+
+        Costs are chosen by us, because no execution times of this board are known: the ARM926 has no
+        floating point unit, so about 60 cycles per operation, 1500 per sine or root, 30 per table access.
+        """
+        return Schedule(
+            slot_us=2000,
+            divider=2,  # Timer0 ticks every 1 ms
+            tick_slot=0,
+            completion_flag=self.quirks.main_brain_overrun_check,
+            every=(
+                #    function                 cost (cycles)  limit
+                Task(self.errors.update,      cost=300,      limit=6000, per_item=200, item="error"),
+                Task(self.beat,               cost=150,      limit=300),
+                Task(self.io.receive,         cost=2500,     limit=30000, per_item=220, item="frame"),
+                Task(self.estimator.update,   cost=38000,    limit=60000),
+                Task(self.modes.update,       cost=16000,    limit=30000),
+                Task(self.io.send,            cost=2000,     limit=12000, per_item=160, item="frame"),
+            ),
+            rows=(
+                (), (), (),  # serial line: parse packets; swap receive DMA; rebuild lists
+                (Task(self.distribution.distribute, cost=900, limit=6000, per_item=500, item="error"),),
+                (),  # test of the user interface: empty on the robot as well
+                (), (), (), (), (),
+                (Task(self.store_execution_time,    cost=200, limit=400),),
+            ),
+        )  # fmt: skip
+
+    # --- interrupt --------------------------------------------------------------------------------------
+
+    def on_segment(self, queue: EventQueue) -> object:
+        """An exchange with the router is over: keep what came, load what goes next."""
+        segment: SspSegment = self.ssp.take()
+        if segment is not None:
+            self.ssp.load(self.link.exchanged(segment))
+        return None
+
+    # --- tasks of our own -------------------------------------------------------------------------------
+
+    def beat(self) -> cython.void:
+        """The heartbeat light: on for 50 ms when bit 8 of the network time rises (facts 1.8)."""
+        bit: cython.longlong = self.time.ms >> 8 & 1
+        if bit == 1 and self.heartbeat_bit == 0:
+            self.heartbeat_on = True
+            self.heartbeat_until = self.time.ms + 50
+        elif self.heartbeat_on and (self.time.ms - self.heartbeat_until) & 0x80000000 == 0:
+            self.heartbeat_on = False
+        self.heartbeat_bit = bit
+
+    def store_execution_time(self) -> cython.void:
+        """Seconds since the slot began, by Timer0; with the firmware's quirk since the last 1 ms tick."""
+        since: cython.longlong = self.scheduler.slot_time
+        counts: cython.longlong
+        if self.execution_time_folds:
+            since = self.match_time
+        counts = (self.now - since) * 13 // 1000
+        self.store.set_float(self.execution_time_id, counts / 13e6)
+
+    # --- errors -----------------------------------------------------------------------------------------
+
+    def report(self, code: cython.longlong) -> cython.void:
+        """Note an error; with the firmware's quirk each report carries the one before, the first is 0."""
+        if self.errors_one_late:
+            self.errors.report(self.error_before)
+            self.error_before = code
+        else:
+            self.errors.report(code)
+
+    def id_out_of_range(self) -> cython.void:
+        self.report(self.code_id_out_of_range)
+
+    def slot_exceeded(self) -> cython.void:
+        self.report(self.code_dnf)
+
+    def slot_near_limit(self) -> cython.void:
+        self.report(self.code_near_limit)
+
+    def task_limit(self, task: Task) -> cython.void:
+        self.report(self.code_task_limit)

@@ -1,0 +1,95 @@
+"""The main brain gathers every board's error frames and passes them on, one at a time.
+
+Facts network-and-boards 4.12: called in one row (45.45 Hz); equal errors of one board are merged (counts
+added, newest time kept) in a ring of 64 for the computer and one of 16 for the display. As intended by the
+appendix, the next error goes out when the last one was read; by the quirk of 2016 the computer's variable
+is marked new while its ring is empty, and the display's ring is never emptied.
+
+Runs 45 times a second and mostly finds nothing, so it is plain Python.
+"""
+
+from boards.modules.error_module import error_word
+from datatable.generated import mb as table
+from datatable.store import LABVIEW, MB_ERR_DIST, SSP
+
+SOURCES = ("ERROR_MB", "ERROR_MCH", "ERROR_MCFO", "ERROR_MCFI", "ERROR_MCSO", "ERROR_MCSI", "ERROR_UI", "ERROR_CSR")
+COMPUTER_RING = 64
+DISPLAY_RING = 16
+UNREAD_LIMIT_MS = 1000  # chosen by us: without a computer on the line the next error replaces an unread one
+
+
+class ErrorRing:
+    """Errors waiting for one reader, oldest first: {(board, code): [count, stamp]}; the oldest goes when full."""
+
+    def __init__(self, size) -> None:
+        self.size = size
+        self.waiting = {}
+        self.dropped = 0
+
+    def add(self, board, code, count, stamp) -> None:
+        entry = self.waiting.get((board, code))
+        if entry is not None:
+            entry[0] += count
+            entry[1] = stamp
+            return
+        if len(self.waiting) == self.size:
+            del self.waiting[next(iter(self.waiting))]
+            self.dropped += 1
+        self.waiting[board, code] = [count, stamp]
+
+    def take(self):
+        """(word, stamp) of the oldest, or None."""
+        if not self.waiting:
+            return None
+        board, code = next(iter(self.waiting))
+        count, stamp = self.waiting.pop((board, code))
+        return error_word(code, board, count), stamp
+
+
+class ErrorDistribution:
+    """`distribute()` is the task. `totals`: {(board number, code): count} of everything that came through."""
+
+    def __init__(self, store, errors, inverted) -> None:
+        self.store = store
+        self.errors = errors  # this board's own error module
+        self.inverted = inverted
+        self.source_ids = [getattr(table, name) for name in SOURCES]
+        self.computer = ErrorRing(COMPUTER_RING)
+        self.display = ErrorRing(DISPLAY_RING)
+        self.computer_time_ms = None  # network time at which ERROR_LABVIEW was last renewed
+        self.totals = {}
+
+    def distribute(self):
+        """Own error into ERROR_MB, new frames into the rings, one error to each reader; returns frames read."""
+        store = self.store
+        if self.errors.take():
+            store.set_word(table.ERROR_MB, self.errors.word, self.errors.stamp)
+        read = 0
+        for number in self.source_ids:
+            if not store.is_unread(number, MB_ERR_DIST):
+                continue
+            store.mark_read(number, MB_ERR_DIST)
+            word = store.get_word(number)
+            if word == 0:
+                continue  # nothing was ever received: at the start every variable is unread
+            stamp = store.stamp(number)
+            board, code, count = word >> 16 & 0x3F, word & 0xFFFF, word >> 22
+            self.computer.add(board, code, count, stamp)
+            self.display.add(board, code, count, stamp)
+            self.totals[board, code] = self.totals.get((board, code), 0) + count
+            read += 1
+        if self.inverted:
+            if not self.computer.waiting:
+                store.mark_unread(table.ERROR_LABVIEW)
+            return read
+        now = store.network_time_ms()
+        if self.computer.waiting and (
+            not store.is_unread(table.ERROR_LABVIEW, LABVIEW)
+            or self.computer_time_ms is None
+            or now - self.computer_time_ms & 0xFFFFFFFF >= UNREAD_LIMIT_MS
+        ):
+            store.set_word(table.ERROR_LABVIEW, *self.computer.take())
+            self.computer_time_ms = now
+        if self.display.waiting and not store.is_unread(table.ERROR_LCD, SSP):
+            store.set_word(table.ERROR_LCD, *self.display.take())
+        return read

@@ -1,0 +1,12 @@
+from boards.modules.network_time cimport NetworkTime
+from boards.modules.ssp_link cimport MainBrainSspLink
+from datatable.store cimport DataStore
+
+cdef class IoData:
+    cdef public DataStore store
+    cdef public MainBrainSspLink link
+    cdef public NetworkTime time
+    cdef public long long[::1] send_ids
+    cdef public long long subscriber, timestamp
+    cpdef object receive(self)
+    cpdef object send(self)

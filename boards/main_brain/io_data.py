@@ -1,0 +1,55 @@
+"""IO data: between the serial link and the data table, once per slot each way.
+
+Received frames overwrite value and time stamp together. Every variable of the send list that was written
+since the link took it last is sent, in the order of the table, with its own stamp: so a command is sent
+only when it is rewritten, and at most once per slot (facts network-and-boards 1.6, 4.13).
+"""
+
+import array
+
+import cython
+
+from boards.modules.network_time import NetworkTime
+from boards.modules.ssp_link import MainBrainSspLink
+from datatable.store import DataStore
+
+
+class IoData:
+    """`send_ids`: what may leave by the link, ascending. `time` follows the network time."""
+
+    def __init__(self, store, link, time, send_ids) -> None:
+        self.store = store
+        self.link = link
+        self.time = time
+        self.send_ids = array.array("q", send_ids)
+        self.subscriber = 1  # SSP, bit of the store's read flags
+        self.timestamp = 0  # id of TIMESTAMP
+
+    def receive(self) -> object:
+        """All waiting segments into the table; returns the number of frames."""
+        link: MainBrainSspLink = self.link
+        store: DataStore = self.store
+        time: NetworkTime = self.time
+        i: cython.longlong
+        link.parse()
+        for i in range(link.frames):
+            store.set_word(link.ids[i], link.words0[i], link.words1[i])
+        time.ms = store.stamp(self.timestamp)
+        return link.frames
+
+    def send(self) -> object:
+        """Queue what was rewritten; returns the number of frames. With all segments full the rest waits."""
+        link: MainBrainSspLink = self.link
+        store: DataStore = self.store
+        sent: cython.longlong = 0
+        number: cython.longlong
+        place: cython.longlong = store.next_unread(self.send_ids, 0, self.subscriber)
+        while place >= 0:
+            number = self.send_ids[place]
+            if not link.send(number, store.get_word(number), store.stamp(number)):
+                break
+            store.mark_read(number, self.subscriber)
+            sent += 1
+            place = store.next_unread(self.send_ids, place + 1, self.subscriber)
+        link.flush()
+        return sent
