@@ -1,0 +1,157 @@
+"""boards.toml against the firmware: each board runs alone on a bench, and what it sends is laid beside its lists.
+
+Nothing is read out of the boards' tables but the numbers of slots, rows and entries: the names are those of the
+frames that come out.
+"""
+
+import importlib
+
+import pytest
+
+import datatable
+from boards.quirks import Quirks
+from datatable.generated import all_variables
+from firmware_sim.clock import Crystal
+from firmware_sim.scheduler import Occasional
+from foundation.events import CAN_REQUEST, CAN_TX_DONE, SSP_START, STAGE_BUS, TX_SENT
+
+QUANTUM_NS = 25_000  # as the assembled robot runs
+FRAME_NS = 37_000  # a frame of 8 bytes with intermission at 3 Mbit/s: 111 bits
+SATELLITES = {
+    "MCH": "boards.hip.HipBoard",
+    "MCFO": "boards.outer_feet.OuterFeetBoard",
+    "MCFI": "boards.inner_feet.InnerFeetBoard",
+    "MCSI": "boards.steering.SteeringBoard",
+    "UI": "boards.user_interface.UserInterfaceBoard",
+}
+ROUTER = "boards.can_router.CanRouterBoard"
+
+
+def power_up(path):
+    """A board on a perfect crystal, powered at 0."""
+    module, name = path.rsplit(".", 1)
+    return getattr(importlib.import_module(module), name)(Crystal(), Quirks(), 0)
+
+
+def run(board, until_ns, seen):
+    """Run to `until_ns`; every message that comes out is given to `seen(outbox)`, every frame is acknowledged."""
+    time = 0
+    while time < until_ns:
+        time += QUANTUM_NS
+        board.advance(time)
+        while board.outbox.take():
+            out = board.outbox
+            seen(out)
+            if out.kind == CAN_REQUEST:
+                done = max(out.time, time - QUANTUM_NS) + FRAME_NS
+                board.inbox.push(done, STAGE_BUS * 256, CAN_TX_DONE, out.a, out.b, TX_SENT)
+
+
+def occasional_of(schedule):
+    """(row, entries) of the occasional list in a board's Schedule."""
+    for index, row in enumerate(schedule.rows):
+        for task in row:
+            if isinstance(task, Occasional):
+                return index, len(task.tasks)
+    return None, 0
+
+
+def is_error(name):
+    return name.startswith("ERROR_")
+
+
+@pytest.mark.parametrize("name", [*SATELLITES, "CSR"])
+def test_slot_length_rows_and_occasional_entries_are_those_of_the_boards_own_table(name):
+    published = datatable.published_schedule(name)
+    schedule = power_up({**SATELLITES, "CSR": ROUTER}[name]).scheduler.schedule
+    assert schedule.slot_ns == published.slot_us * 1000
+    assert len(schedule.rows) == len(published.rows)
+    assert occasional_of(schedule) == (published.occasional_row, len(published.occasional))
+
+
+@pytest.mark.parametrize("name", SATELLITES)
+def test_a_satellite_sends_row_by_row_what_boards_toml_says(name):
+    published = datatable.published_schedule(name)
+    rows, calls = len(published.rows), len(published.occasional) + 1
+    board = power_up(SATELLITES[name])
+    slots = {}  # slot -> names sent in it
+
+    def seen(out):
+        if out.kind == CAN_REQUEST:
+            slot = out.time // (published.slot_us * 1000)
+            slots.setdefault(slot, []).append(all_variables.NAMES[out.c])
+
+    run(board, (2 * rows * calls + 2 * rows) * published.slot_us * 1000, seen)
+    first = min(slots)
+    # the slot of row 0: every later one follows from it
+    row_of_first = next(
+        index for index, row in enumerate(published.rows) if slots[first][: len(row)] == list(row) and row
+    )
+    call = None
+    compared = 0
+    for slot in range(first, first + 2 * rows * calls):
+        row = (row_of_first + slot - first) % rows
+        sent = slots.get(slot, [])
+        expected = [*published.every, *published.rows[row]]
+        assert sent[: len(expected)] == expected, f"slot {slot}, row {row}"
+        rest = sent[len(expected) :]
+        if row != published.occasional_row:
+            assert rest == [], f"slot {slot}, row {row}"
+            continue
+        if call is None:
+            call = published.occasional.index(rest[0]) if rest else 0  # an error, if one waits, is entry 0
+        entry = published.occasional[call % calls] if call % calls < calls - 1 else "(idle)"
+        if entry.startswith("(") or (is_error(entry) and not rest):
+            assert rest == [], f"slot {slot}, call {call}: {entry}"
+        else:
+            assert rest == [entry], f"slot {slot}, call {call}"
+        call += 1
+        compared += 1
+    assert compared == 2 * calls
+
+
+def frames_in(segment):
+    """Identifiers of the frames in a segment of the link (facts network 1.6), in order."""
+    found = []
+    for start in range(0, 30, 5):
+        header = segment.words[start]
+        if header >> 11 & 0x1F != 0b01111:
+            break
+        found.append(header & 0x7FF)
+    return found
+
+
+def test_the_router_sends_row_by_row_what_boards_toml_says():
+    published = datatable.published_schedule("CSR")
+    passes = 2 * (len(published.occasional) + 1)
+    board = power_up(ROUTER)
+    on_link, on_buses = [], {1: 0, 2: 0, 3: 0, 4: 0}
+
+    def seen(out):
+        if out.kind == SSP_START:
+            on_link.extend(all_variables.NAMES[number] for number in frames_in(out.ref))
+        elif out.kind == CAN_REQUEST and out.c == 0:
+            on_buses[out.a] += 1
+
+    pass_ms = len(published.rows) * published.slot_us // 1000
+    run(board, (passes * pass_ms + pass_ms) * 1_000_000, seen)
+    milliseconds = passes * pass_ms + pass_ms
+    assert all(milliseconds - 2 <= count <= milliseconds for count in on_buses.values()), "a sync frame every ms"
+    times = [index for index, name in enumerate(on_link) if name == "TIMESTAMP"]
+    assert milliseconds - 3 <= len(times) <= milliseconds, "the time to the main brain in every slot"
+    occasional = [name for name in on_link if name != "TIMESTAMP" and not is_error(name)]
+    cycle = [name for name in published.occasional if not is_error(name)]
+    assert occasional[: 2 * len(cycle)] == 2 * cycle
+    assert len(occasional) <= 2 * len(cycle) + 1, "one idle call after the last entry"
+
+
+@pytest.mark.parametrize("name", SATELLITES)
+def test_a_satellite_listens_only_to_what_the_table_gives_it(name):
+    generated = importlib.import_module(f"datatable.generated.{name.lower()}")
+    board = power_up(SATELLITES[name])
+    heard = {number for number, receiver in enumerate(board.can.receivers) if receiver is not None}
+    assert heard and heard <= set(generated.RECEIVE)
+    unheard = {generated.NAMES[number] for number in set(generated.RECEIVE) - heard}
+    # facts network 2.4: nobody takes the main brain's status, the spares and what is reserved
+    reserved = {"MB_STATUS", "MCFO_HS_STATE", "MCFI_HS_STATE", "UI_AUDIO", "ERROR_LCD", "MCSO_LEFT_ANKLE_ANGLE"}
+    assert {variable for variable in unheard if "_EMPTY_" not in variable} <= reserved
