@@ -150,6 +150,9 @@ class CanRouterBoard(Microcontroller):
 
     def schedule(self) -> Schedule:
         """Facts 3.7. Costs and limits are chosen by us: no execution times of this board are known."""
+        # untyped names: the compiler cannot hand out a bound method of another module's compiled class
+        leds: object = self.leds
+        heartbeat: object = self.heartbeat
         return Schedule(
             slot_us=1000,
             tick_slot=0,
@@ -158,9 +161,9 @@ class CanRouterBoard(Microcontroller):
                 Task(self.send_time,       cost=120,      limit=300),
                 Task(self.update_errors,   cost=60,       limit=4000, per_item=150, item="error"),
                 Task(self.count_load,      cost=110,      limit=200),
-                Task(self.leds.update,     cost=50,       limit=150),
+                Task(leds.update,          cost=50,       limit=150),
                 Task(self.show_load,       cost=100,      limit=200),
-                Task(self.heartbeat.beat,  cost=40,       limit=150),
+                Task(heartbeat.beat,       cost=40,       limit=150),
             ),
             rows=((Occasional(
                 (

@@ -134,17 +134,22 @@ class UserInterfaceBoard(Microcontroller):
 
     def schedule(self) -> Schedule:
         """Facts 3.6. Costs and limits are chosen by us: no execution times of this board are known."""
+        # untyped names: the compiler cannot hand out a bound method of another module's compiled class
+        can: object = self.can
+        heartbeat: object = self.heartbeat
+        mcu_leds: object = self.mcu_leds
+        execution: object = self.execution
         return Schedule(
             slot_us=table.SLOT_US,
             tick_slot=TIMER_SLOT,
             every=(
                 #    function                   cost (cycles)  limit
-                Task(self.can.receive_all,      cost=80,       limit=9000, per_item=90, item="frame"),
-                Task(self.heartbeat.beat,       cost=40,       limit=150),
-                Task(self.mcu_leds.update,      cost=50,       limit=150),
+                Task(can.receive_all,           cost=80,       limit=9000, per_item=90, item="frame"),
+                Task(heartbeat.beat,            cost=40,       limit=150),
+                Task(mcu_leds.update,           cost=50,       limit=150),
                 Task(self.update_imu,           cost=60,       limit=2800, per_item=16, item="byte"),
                 Task(self.update_errors,        cost=60,       limit=4000, per_item=150, item="error"),
-                Task(self.can.feed,             cost=50,       limit=1000, per_item=110, item="frame"),
+                Task(can.feed,                  cost=50,       limit=1000, per_item=110, item="frame"),
                 Task(self.watch_sync_key,       cost=30,       limit=100),
                 Task(self.update_sync_light,    cost=40,       limit=900,
                      per_item=CYCLES_PER_WRITE, item="transfer"),
@@ -173,7 +178,7 @@ class UserInterfaceBoard(Microcontroller):
                 Task(self.send_rc_3,            cost=260,      limit=500),
             ),
             extra_idle_call=self.quirks.occasional_idle_call,
-            last=(Task(self.execution.record,   cost=40,       limit=80, name="record_execution_time"),),
+            last=(Task(execution.record,       cost=40,       limit=80, name="record_execution_time"),),
         )  # fmt: skip
 
     # --- interrupts -------------------------------------------------------------------------------------
