@@ -1,0 +1,72 @@
+"""Stamped edges and stamped bytes that leave a sensor during one step of the plant."""
+
+import array
+
+import cython
+
+
+class EdgeBuffer:
+    """Edges of channel A: `times` (ns), the level that A takes, the level of B then. `count` are valid.
+
+    It grows when it is full, so no edge is ever lost; `clear` keeps the storage.
+    """
+
+    def __init__(self, capacity=64) -> None:
+        self.capacity = capacity
+        self.count = 0
+        self.times = array.array("q", [0]) * capacity
+        self.levels_a = array.array("q", [0]) * capacity
+        self.levels_b = array.array("q", [0]) * capacity
+
+    def clear(self) -> cython.void:
+        """Forget the edges."""
+        self.count = 0
+
+    def grow(self) -> cython.void:
+        """Double the storage, keeping what is there."""
+        self.capacity = 2 * self.capacity
+        for name in ("times", "levels_a", "levels_b"):
+            old = getattr(self, name)
+            grown = array.array("q", old)
+            grown.extend(array.array("q", [0]) * (self.capacity - len(old)))
+            setattr(self, name, grown)
+
+    def push(self, time: cython.longlong, level_a: cython.longlong, level_b: cython.longlong) -> cython.void:
+        """Add an edge; the caller keeps the order of time."""
+        if self.count == self.capacity:
+            self.grow()
+        self.times[self.count] = time
+        self.levels_a[self.count] = level_a
+        self.levels_b[self.count] = level_b
+        self.count += 1
+
+
+class ByteBuffer:
+    """Bytes on a serial line: `times` (ns, end of the stop bit) and `values` (0 ... 255). `count` are valid."""
+
+    def __init__(self, capacity=128) -> None:
+        self.capacity = capacity
+        self.count = 0
+        self.times = array.array("q", [0]) * capacity
+        self.values = array.array("q", [0]) * capacity
+
+    def clear(self) -> cython.void:
+        """Forget the bytes."""
+        self.count = 0
+
+    def grow(self) -> cython.void:
+        """Double the storage, keeping what is there."""
+        self.capacity = 2 * self.capacity
+        for name in ("times", "values"):
+            old = getattr(self, name)
+            grown = array.array("q", old)
+            grown.extend(array.array("q", [0]) * (self.capacity - len(old)))
+            setattr(self, name, grown)
+
+    def push(self, time: cython.longlong, value: cython.longlong) -> cython.void:
+        """Add a byte; the caller keeps the order of time."""
+        if self.count == self.capacity:
+            self.grow()
+        self.times[self.count] = time
+        self.values[self.count] = value
+        self.count += 1

@@ -1,0 +1,24 @@
+from libc.math cimport exp, log, tanh
+from plant.drive cimport Drive
+
+cdef class MotorUnit:
+    cdef public str name
+    cdef public object parameters
+    cdef public Drive drive
+    cdef public double mounting
+    cdef public double gear, contact_drop_V, winding_ohm, series_ohm, K, inductance_H, ripple_factor, gate_W_per_V
+    cdef public double diode_drop_V, dead_time_fraction, mu, C0, C1, inverse_smoothing
+    cdef public double resistance_per_K, torque_constant_per_K, G_wh, G_ha, inverse_C_w, inverse_C_h
+    cdef public bint heat_matters
+    cdef public double air_C, rotor_temperature_C, housing_temperature_C
+    cdef public double bridge_current_A, current_A, mean_current_A, battery_current_A, heat_W, drive_voltage_V
+    cdef public double drive_Nm, coulomb_Nm, viscous_Nms
+    cdef public double drawn_J, returned_J, mechanical_J, winding_J, series_J, contact_J, ripple_J, gate_J, diode_J
+    cdef public double charge_As, absolute_As, square_A2s, last_duration_s, decay, decay_rate
+    cpdef double magnetic_J(self)
+    cpdef double battery_J(self)
+    cpdef double torque_Nm(self, double current_A, double rate_rad_s)
+    cpdef void load(self, double current_A)
+    cpdef void step_electrical(self, long long t0, long long t1, double rate_rad_s, double battery_V)
+    cpdef void _current(self, double seconds, double x, double drop)
+    cpdef void _warm(self, double h)
