@@ -1,0 +1,302 @@
+"""The slot scheduler: known answers, one per rule of the table's semantics."""
+
+import pytest
+
+from firmware_sim.clock import Crystal
+from firmware_sim.scheduler import Occasional, Schedule, Task, Wait
+from firmware_sim.vic import EXTERNAL_INTERRUPT
+from foundation.user_error import UserError
+from tests.firmware_sim.board import TICK_CYCLES, TICK_NS, Log, raise_at
+
+
+def test_nothing_runs_before_the_first_tick():
+    log = Log()
+    log.start(phase_ns=700_000, every=(log.task("a", 60),))
+    assert log.chip.advance(700_000) == 700_000
+    assert log.entries == []
+    log.chip.advance(702_000)
+    assert log.entries == [("a", 700_000 + TICK_NS)]
+
+
+def test_a_slot_runs_the_common_tasks_then_the_row_then_the_closing_tasks():
+    log = Log()
+    log.start(
+        every=(log.task("every", 600),),
+        rows=((log.task("row 0", 600),), (log.task("row 1", 600),)),
+        last=(log.task("last", 600),),
+    )
+    log.chip.advance(1_400_000)
+    assert log.names() == ["every", "row 0", "last", "every", "row 1", "last", "every", "row 0", "last"]
+
+
+def test_each_task_starts_when_the_cycles_of_the_one_before_are_over():
+    log = Log()
+    log.start(every=(log.task("a", 600), log.task("b", 1200), log.task("c", 60)))
+    log.chip.advance(500_000)
+    assert log.entries == [("a", TICK_NS), ("b", TICK_NS + 10_000), ("c", TICK_NS + 30_000)]
+    assert log.chip.scheduler.max_slot_cycles == TICK_CYCLES - 1 + 600 + 1200 + 60  # 1 by rounding down ns
+
+
+def test_items_and_spent_cycles_lengthen_a_task():
+    log = Log()
+
+    def busy():
+        log.chip.spend(40)
+        return 7
+
+    task = Task(busy, cost=100, per_item=10, limit=500, item="frame")
+    log.start(every=(task, log.task("next", 1)))
+    log.chip.advance(400_000)
+    assert task.last_cycles == task.max_cycles == task.total_cycles == 100 + 70 + 40
+    assert log.times("next") == [TICK_NS + 3_500]
+
+
+def test_an_overrun_lets_the_task_finish_drops_the_rest_and_starts_the_new_row_at_once():
+    log = Log()
+    scheduler = log.start(
+        rows=(
+            (log.task("long", 36_000), log.task("dropped 1", 60), log.task("dropped 2", 60)),
+            (log.task("next row", 60),),
+        ),
+    )
+    told = []
+    log.chip.on_overrun = lambda: told.append(log.chip.now)
+    log.chip.advance(1_000_000)
+    assert log.names() == ["long", "next row"]
+    # 600 us of work, prolonged by the tick's own interrupt, begun after the first one
+    assert log.times("next row") == [TICK_NS + 600_000 + TICK_NS]
+    assert (scheduler.overruns, scheduler.dropped_tasks, scheduler.slot_count) == (1, 2, 2)
+    assert len(told) == 1
+    assert 500_000 <= told[0] < 501_000
+
+
+def test_an_overrun_is_counted_once_and_the_rows_go_on_in_step():
+    log = Log()
+    scheduler = log.start(
+        rows=((log.task("long", 36_000),), (log.task("one", 60),), (log.task("two", 60),)),
+    )
+    log.chip.advance(1_500_000)
+    assert log.names() == ["long", "one", "two"]
+    assert (scheduler.overruns, scheduler.dropped_tasks) == (1, 0)
+    assert scheduler.histogram[20] == 1
+    assert sum(scheduler.histogram) == 3
+
+
+def test_a_task_that_lasts_three_slots_overruns_twice_and_drops_whole_rows():
+    log = Log()
+    scheduler = log.start(
+        rows=((log.task("long", 70_000),), (log.task("a", 60), log.task("b", 60)), (log.task("c", 60),)),
+    )
+    log.chip.advance(1_500_000)
+    assert log.names() == ["long", "c"]
+    assert (scheduler.overruns, scheduler.dropped_tasks) == (2, 2)
+
+
+def test_a_row_that_ends_at_the_very_instant_of_the_tick_has_overrun():
+    for cost, overruns in ((29_939, 0), (29_940, 1)):
+        log = Log()
+        # latency 25 and cost 35 of the tick are 1 us, 29,940 cycles 499 us
+        scheduler = log.start(every=(log.task("a", cost),), tick_cost=35)
+        log.chip.advance(600_000)
+        assert scheduler.overruns == overruns
+
+
+def test_without_a_completion_flag_tasks_are_dropped_in_silence():
+    log = Log()
+    scheduler = log.start(rows=((log.task("long", 36_000), log.task("dropped", 60)), ()), completion_flag=False)
+    told = []
+    log.chip.on_overrun = lambda: told.append(1)
+    log.chip.advance(1_000_000)
+    assert log.names() == ["long"]
+    assert told == []
+    assert scheduler.dropped_tasks == 1
+
+
+def test_a_divider_of_two_starts_a_slot_at_every_second_timer_tick():
+    log = Log()
+    log.start(slot_us=2000, every=(log.task("a", 600),), divider=2)
+    counts = []
+    log.chip.on_timer_tick = lambda: counts.append(log.chip.now // 1_000_000)
+    log.chip.advance(6_000_000)
+    assert [time // 1_000_000 for time in log.times("a")] == [0, 2, 4]
+    assert counts == [0, 1, 2, 3, 4, 5]
+
+
+def test_with_a_divider_the_cycle_count_folds_at_every_timer_tick():
+    log = Log(hz=208_000_000)
+    seen = []
+    log.start(
+        slot_us=2000,
+        every=(log.task("long", 1_500 * 208), Task(lambda: seen.append(log.chip.cycles_since_tick()), cost=1)),
+        divider=2,
+    )
+    log.chip.advance(2_000_000)
+    # 1.5 ms and two timer interrupts of 85 cycles into the slot, the 1 ms timer shows 0.5 ms and those two
+    assert 500 * 208 + 168 <= seen[0] <= 500 * 208 + 170
+
+
+def test_the_occasional_list_of_three_has_a_period_of_four_calls():
+    log = Log()
+    log.start(occasional=tuple(log.task(name, 60) for name in "xyz"))
+    log.chip.advance(9 * 500_000)
+    assert log.names() == ["x", "y", "z", "x", "y", "z", "x"]
+    assert [time // 500_000 for time in log.times("x")] == [0, 4, 8]
+
+
+def test_the_extra_idle_call_can_be_left_out():
+    log = Log()
+    log.start(occasional=tuple(log.task(name, 60) for name in "xyz"), extra_idle_call=False)
+    log.chip.advance(6 * 500_000)
+    assert log.names() == ["x", "y", "z", "x", "y", "z"]
+
+
+def test_an_occasional_task_charges_its_own_cost_and_that_of_choosing():
+    log = Log()
+    entry = log.task("x", 300, limit=200)
+    chooser = Occasional((entry,), cost=20, limit=50)
+    log.start(rows=((chooser, log.task("after", 60)),))
+    log.chip.advance(400_000)
+    assert (entry.last_cycles, chooser.last_cycles) == (300, 20)
+    assert (entry.hits, chooser.hits) == (1, 0)
+    assert log.times("after")[0] - log.times("x")[0] in (5_333, 5_332)
+
+
+def test_a_limit_exceeded_is_counted_and_told_but_cost_alone_decides_the_time():
+    log = Log()
+    told = []
+    log.chip.on_limit = told.append
+    within = log.task("within", 600, limit=600)
+    beyond = log.task("beyond", 601, limit=600)
+    log.start(every=(within, beyond))
+    log.chip.advance(900_000)
+    assert (within.hits, beyond.hits) == (0, 2)
+    assert told == [beyond, beyond]
+
+
+@pytest.mark.parametrize(
+    "cost, near, over", [(26_900, 0, 0), (26_920, 1, 0), (29_900, 1, 0), (29_930, 0, 1)]
+)
+def test_a_slot_of_more_than_90_percent_is_near_its_limit_and_beyond_it_an_overrun(cost, near, over):
+    log = Log()
+    told = []
+    log.chip.on_near_limit = lambda: told.append("near")
+    log.chip.on_overrun = lambda: told.append("over")
+    scheduler = log.start(rows=((log.task("a", cost),), ()))
+    log.chip.advance(900_000)
+    assert told == ["near"] * near + ["over"] * over
+    assert (scheduler.near_limits, scheduler.overruns) == (near, over)
+
+
+def test_slots_follow_the_boards_own_crystal():
+    log = Log(crystal=Crystal(10_000_000, 100_000))
+    log.start(every=(log.task("a", 60),))
+    log.chip.advance(1_000_000_000)
+    assert len(log.entries) == 2001  # 100 ppm fast: slot 2000 starts 100 us before the second is over
+
+
+def test_replacing_an_entry_runs_the_users_function_at_its_declared_cost():
+    log = Log()
+    task = log.task("control", 3900, limit=4200)
+    log.start(every=(task, log.task("after", 60)))
+    log.chip.advance(500_000)
+    log.chip.scheduler.replace("control", log.function("mine"), cost=600, limit=500)
+    log.chip.advance(1_000_000)
+    assert log.names() == ["control", "after", "mine", "after"]
+    assert (task.last_cycles, task.hits) == (600, 1)
+    log.chip.scheduler.replace(task, log.function("mine again"))
+    assert (task.cost, task.limit) == (600, 500)
+
+
+def test_replacing_an_entry_that_is_not_there_names_those_that_are():
+    log = Log()
+    scheduler = log.start(every=(log.task("control", 1),), occasional=(log.task("status", 1),))
+    with pytest.raises(UserError, match="no task named 'contrl'; there are control, occasional, status"):
+        scheduler.replace("contrl", print)
+    with pytest.raises(UserError, match="cannot be called"):
+        scheduler.replace("control", 7)
+    with pytest.raises(UserError, match="occasional list"):
+        scheduler.replace("occasional", print)
+    assert scheduler.replace("status", print).function is print
+
+
+def test_a_wait_spins_until_an_interrupt_makes_its_condition_true():
+    log = Log()
+    ready = []
+    wait = Wait(lambda: bool(ready), cost=30, name="wait")
+    log.start(every=(log.task("before", 600), wait, log.task("after", 60)))
+    source = log.chip.vic.attach(EXTERNAL_INTERRUPT, 1, lambda queue: ready.append(1), cost=35, slot=1)
+    raise_at(log.chip, source, 100_000)
+    log.chip.advance(400_000)
+    # the interrupt takes 60 cycles from 100 us on, then the condition holds, 30 cycles later the task ends
+    assert log.times("after") == [100_000 + 1_000 + 500]
+    assert wait.waits == 1
+    # spinning from 11,416 ns to 101,000 ns is 5375 cycles, less the 60 stolen, and its own 30
+    assert wait.last_cycles == 5375 - 60 + 30
+
+
+def test_a_wait_whose_condition_already_holds_costs_only_itself():
+    log = Log()
+    wait = Wait(lambda: True, cost=60, limit=100, name="wait")
+    log.start(every=(wait, log.task("after", 60)))
+    log.chip.advance(400_000)
+    assert log.times("after") == [TICK_NS + 1000]
+    assert (wait.waits, wait.last_cycles) == (0, 60)
+
+
+def test_a_wait_for_what_never_comes_hangs_the_row_and_every_slot_overruns():
+    log = Log()
+    scheduler = log.start(every=(Wait(lambda: False, name="wait"), log.task("never", 60)))
+    log.chip.advance(5_000_000)
+    assert log.names() == []
+    assert scheduler.overruns == 9
+    assert scheduler.dropped_tasks == 1 + 8 * 2
+
+
+def test_records_show_each_slot_with_its_tasks_and_interrupts():
+    log = Log()
+    scheduler = log.start(
+        rows=((log.task("a", 600),), (log.task("b", 36_000), log.task("c", 60)), (log.task("d", 60),))
+    )
+    scheduler.record_slots(2)
+    log.chip.advance(500_000)
+    (record,) = scheduler.records
+    assert (record.time_ns, record.row, record.overrun) == (0, 0, False)
+    assert record.tasks == [("a", 600)]
+    log.chip.advance(1_500_000)
+    b, d = scheduler.records
+    assert (b.row, b.overrun, b.tasks) == (1, True, [("b", 36_000)])
+    assert b.cycles == 2 * TICK_CYCLES + 36_000 - 1
+    assert (d.row, d.overrun, d.tasks) == (2, False, [("d", 60)])
+    assert d.interrupts == {"slot timer": TICK_CYCLES}
+    assert scheduler.task_cycles() == {"a": 600, "b": 36_000, "c": 0, "d": 60}
+
+
+def test_the_histogram_has_bins_of_five_percent():
+    log = Log()
+    scheduler = log.start(rows=((log.task("a", 1600),), (log.task("b", 15_000),), ()))
+    log.chip.advance(1_500_000)
+    assert [place for place, count in enumerate(scheduler.histogram) if count] == [0, 1, 10]
+
+
+@pytest.mark.parametrize(
+    "table, told",
+    [
+        (dict(rows=()), "at least one row"),
+        (dict(slot_us=0), "does not divide"),
+        (dict(slot_us=500, divider=3), "does not divide"),
+        (dict(every=(print,)), "is not a Task"),
+        (dict(occasional=(), occasional_row=4), "occasional_row 4"),
+    ],
+)
+def test_a_faulty_table_is_refused(table, told):
+    with pytest.raises(UserError, match=told):
+        Schedule(**table)
+
+
+def test_a_faulty_task_is_refused():
+    with pytest.raises(UserError, match="task f: cost -1"):
+        Task(print, cost=-1, name="f")
+    with pytest.raises(UserError, match="cannot be called"):
+        Task(3, cost=1)
+    with pytest.raises(UserError, match="plain Task"):
+        Occasional((Wait(bool),))
