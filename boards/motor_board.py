@@ -144,6 +144,7 @@ class MotorBoard(Microcontroller):
         gear,
         interrupts=ALL_INTERRUPTS,
     ) -> None:
+        board: object = self  # bound methods are looked up dynamically
         quirks = quirks if quirks is not None else Quirks()
         Microcontroller.__init__(self, name=table.BOARD, hz=table.CLOCK_HZ, crystal=crystal)
         self.table = table
@@ -178,13 +179,13 @@ class MotorBoard(Microcontroller):
         self.vic.attach(
             EXTERNAL_INTERRUPT,
             1,
-            self.adc_external.on_busy,
+            board.adc_external.on_busy,
             cost=400,
             slot=EXTERNAL_ADC_SLOT,
             name="adcx_busy",
         )
         self.vic.attach(
-            ADC_DONE, 0, self.on_internal_adc, cost=80, slot=INTERNAL_ADC_SLOT, name="adci_done"
+            ADC_DONE, 0, board.on_internal_adc, cost=80, slot=INTERNAL_ADC_SLOT, name="adci_done"
         )
         # network
         self.can_controller = CanController(self, table.CONTROLLER, IER=interrupts)
@@ -244,9 +245,9 @@ class MotorBoard(Microcontroller):
         ):
             setattr(self, "id_" + field.lower(), getattr(table, f"{table.BOARD}_{field}", -1))
         self.listen()
-        self.on_overrun = self.note_overrun
-        self.on_limit = self.note_limit if quirks.warn_near_slot_limit else None
-        self.on_near_limit = self.note_near_limit if quirks.warn_near_slot_limit else None
+        self.on_overrun = board.note_overrun
+        self.on_limit = board.note_limit if quirks.warn_near_slot_limit else None
+        self.on_near_limit = board.note_near_limit if quirks.warn_near_slot_limit else None
         self.power_up = PowerUp(self, self)
         self.power_up.begin(phase_ns)
 
@@ -296,7 +297,8 @@ class MotorBoard(Microcontroller):
         self.encoder = AbsoluteEncoder(zero, sign, rpm, self.errors, codes.AE_SPIKE)
         self.spi = SpiEncoder(self, number=0, word=WORDS["absolute_encoder"])
         self.encoder_select = second_connector
-        self.vic.attach(SPI_DONE, 0, self.on_absolute_encoder, cost=100, slot=SPI_SLOT, name="ae_read")
+        board: object = self
+        self.vic.attach(SPI_DONE, 0, board.on_absolute_encoder, cost=100, slot=SPI_SLOT, name="ae_read")
 
     def begin(self, phase_ns) -> None:
         """Start the scheduler; the first slot comes when the start values are set."""

@@ -68,37 +68,38 @@ class SteeringBoard(MotorBoard):
 
     def schedule(self) -> Schedule:
         """One pass takes 2 ms; each row's variable goes out at 500 Hz, the occasional ones at 100 Hz."""
+        board: object = self
         return Schedule(
             slot_us=table.SLOT_US,
             every=(
                 #    function                         cost limit  per item      name
-                Task(self.start_external_adc,          200,  300,   0, "",      "adcx_convert_all"),
-                Task(self.start_internal_adc,           60,  100,   0, "",      "adci_convert_all"),
-                Task(self.can.receive_all,             120, 4000, 220, "frame", "can_rx_dispatch_all"),
-                Task(self.heartbeat.beat,               40,   60,   0, "",      "hb_beat"),
-                Task(self.leds.update,                  60,   80,   0, "",      "mcu_led_update"),
-                Task(self.errors.update,                90, 2700, 120, "error", "error_update"),
-                Task(self.can.feed,                     50,  300,  80, "frame", "can_tx2"),
-                Wait(self.adc_external.sequence_done,   20, 6500,              "adcx_conversion_wait"),
-                Task(self.update_pwm,                  250,  340,   0, "",      "dn_update_pwm"),
-                Task(self.steering_control,           2600, 3400,   0, "",      "mc_compliant_control"),
+                Task(board.start_external_adc,         200,  300,   0, "",      "adcx_convert_all"),
+                Task(board.start_internal_adc,          60,  100,   0, "",      "adci_convert_all"),
+                Task(board.can.receive_all,            120, 4000, 220, "frame", "can_rx_dispatch_all"),
+                Task(board.heartbeat.beat,              40,   60,   0, "",      "hb_beat"),
+                Task(board.leds.update,                 60,   80,   0, "",      "mcu_led_update"),
+                Task(board.errors.update,               90, 2700, 120, "error", "error_update"),
+                Task(board.can.feed,                    50,  300,  80, "frame", "can_tx2"),
+                Wait(board.adc_external.sequence_done,  20, 6500,              "adcx_conversion_wait"),
+                Task(board.update_pwm,                 250,  340,   0, "",      "dn_update_pwm"),
+                Task(board.steering_control,          2600, 3400,   0, "",      "mc_compliant_control"),
             ),
             rows=(
-                (Task(self.send_steer_angle,           330,  440,   0, "",      "MCSI_STEER_ANGLE"),),
-                (Task(self.send_motor_current,         480,  640,   0, "",      "MCSI_MOTOR_CURRENT"),),
-                (Task(self.send_power,                 600,  800,   0, "",      "MCSI_BATT_POWER"),),
+                (Task(board.send_steer_angle,          330,  440,   0, "",      "MCSI_STEER_ANGLE"),),
+                (Task(board.send_motor_current,        480,  640,   0, "",      "MCSI_MOTOR_CURRENT"),),
+                (Task(board.send_power,                600,  800,   0, "",      "MCSI_BATT_POWER"),),
                 (),  # the occasional list
             ),
             occasional_row=3,
             occasional=(
-                Task(self.send_error,                  200,  270,   0, "",      "ERROR_MCSI"),
-                Task(self.send_status,                 260,  350,   0, "",      "MCSI_STATUS"),
-                Task(self.send_execution_time,         420,  560,   0, "",      "MCSI_EXECUTION_TIME"),
-                Task(self.send_max_execution_time,     420,  560,   0, "",      "MCSI_MAX_EXECUTION_TIME"),
+                Task(board.send_error,                 200,  270,   0, "",      "ERROR_MCSI"),
+                Task(board.send_status,                260,  350,   0, "",      "MCSI_STATUS"),
+                Task(board.send_execution_time,        420,  560,   0, "",      "MCSI_EXECUTION_TIME"),
+                Task(board.send_max_execution_time,    420,  560,   0, "",      "MCSI_MAX_EXECUTION_TIME"),
             ),
             extra_idle_call=self.quirks.occasional_idle_call,
             last=(
-                Task(self.execution.record,             60,   80,   0, "",      "execution_time_record"),
+                Task(board.execution.record,            60,   80,   0, "",      "execution_time_record"),
             ),
         )  # fmt: skip
 
