@@ -37,20 +37,14 @@ def write(robot, path: pathlib.Path) -> None:
 
 def groups(robot):
     """(group name, time in s, [(channel, unit, description, samples)]) of everything that was kept."""
-    samples = robot.plant_samples()
-    time_s = samples.pop("time_s")
-    units = robot.plant_units()
+    kept = robot.recorded()
     yield (
         "plant",
-        time_s,
+        kept.samples["time_s"],
         [
-            (f"plant.{name}", units[name], "true state of the body", np.ascontiguousarray(values))
-            for name, values in samples.items()
+            (f"plant.{name}", unit, "true state of the body", np.ascontiguousarray(kept.samples[name]))
+            for name, unit in robot.plant.sample_names.items()
         ],
     )
-    for variable in robot.variable_series():
-        yield (
-            variable.name,
-            variable.time_s,
-            [(variable.name, variable.unit, variable.description, variable.values)],
-        )
+    for series in kept.variables():
+        yield series.name, series.time_s, [(series.name, series.unit, series.description, series.values)]

@@ -7,12 +7,12 @@ import pathlib
 import signal
 import tempfile
 
-from harness.ranger import Ranger
 from rich.console import Console
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeRemainingColumn
 
 from foundation import wallclock
 from foundation.user_error import UserError
+from harness.ranger import Ranger
 from harness.scenario import Scenario, StopRule
 from tools.units import LENGTHS, TIMES, quantity, whole_number
 

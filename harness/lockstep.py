@@ -1,0 +1,326 @@
+"""The loop that everything serves, in virtual time and in one process.
+
+    plant -> sensors -> pins -> interrupts and slots -> data table -> CAN -> router -> main brain
+          -> CAN -> slots -> PWM -> plant
+
+Virtual time advances in quanta of 25 us. That is shorter than the shortest frame on Ranger's buses (36 us),
+so a frame requested within a quantum ends after it: boards that are advanced one after the other never miss
+what another one sends, and the result does not depend on the order in which they are advanced. Within a
+quantum: plant, pins, buses, then the boards with their interrupts and slots, then their outputs.
+"""
+
+import array
+
+import cython
+
+from can_bus.bus import Bus
+from firmware_sim.microcontroller import Microcontroller
+from foundation.events import EventQueue
+from harness.recorder import RowStream
+from plant.edge_buffer import ByteBuffer
+from plant.motor_unit import MotorUnit
+from plant.ranger import RangerPlant
+from plant.sensors import IncrementalEncoder
+
+QUANTUM_NS = 25_000
+SAMPLE_NS = 2_000_000  # the canonical trace samples body and data table at the main brain's rate
+
+# Why `run` returned.
+REACHED_TIME = 0
+REACHED_STEPS = 1
+REACHED_DISTANCE = 2
+FELL = 3
+
+
+class Wire:
+    """One encoder on two pins of a board: edges of channel A arrive with the level of channel B."""
+
+    def __init__(self, encoder, board, pin_a, pin_b) -> None:
+        self.encoder = encoder
+        self.board = board
+        self.pin_a = pin_a
+        self.pin_b = pin_b
+
+    def deliver(self) -> cython.void:
+        """Hand the edges of the last plant step to the board."""
+        i: cython.longlong
+        encoder: IncrementalEncoder = self.encoder
+        board: Microcontroller = self.board
+        inbox: EventQueue = board.inbox
+        for i in range(encoder.edges.count):
+            # order 256: stage pins; kind 1: PIN_EDGE
+            inbox.push(
+                encoder.edges.times[i],
+                256,
+                1,
+                self.pin_a,
+                encoder.edges.levels_a[i],
+                self.pin_b,
+                encoder.edges.levels_b[i],
+            )
+
+
+class AnalogWire:
+    """One analog value of the plant on one analog input of a board."""
+
+    def __init__(self, source, board, channel) -> None:
+        self.source = source
+        self.board = board
+        self.channel = channel
+
+
+class WordWire:
+    """The register of one digital sensor of the plant, as a board reads it over its serial interface."""
+
+    def __init__(self, source, board, word) -> None:
+        self.source = source
+        self.board = board
+        self.word = word
+
+
+class SspWire:
+    """The serial link between router (master) and main brain (slave): an exchange takes 165.3 us."""
+
+    def __init__(self, master, slave, exchange_ns, idle_segment) -> None:
+        self.master = master
+        self.slave = slave
+        self.exchange_ns = exchange_ns
+        self.loaded = idle_segment
+        self.exchanges = 0
+
+    def start(self, time_ns: cython.longlong, segment: object) -> cython.void:
+        """The master starts an exchange; both sides have the other's segment at its end."""
+        # order 768: stage interrupts; kind 6: SSP_SEGMENT
+        self.slave.inbox.push(time_ns + self.exchange_ns, 768, 6, 0, 0, 0, 0, 0, 0, segment)
+        self.master.inbox.push(time_ns + self.exchange_ns, 768, 6, 0, 0, 0, 0, 0, 0, self.loaded)
+        self.exchanges += 1
+
+    def load(self, segment: object) -> cython.void:
+        """The slave puts up what it will send in the next exchange."""
+        self.loaded = segment
+
+
+class Lockstep:
+    """Boards, buses and plant on one clock. Built by `harness.ranger.Ranger`, which wires it."""
+
+    def __init__(self, plant, boards, buses, recorder, start_ns) -> None:
+        self.plant = plant
+        self.boards = boards
+        self.buses = buses
+        self.recorder = recorder
+        self.time = start_ns
+        self.next_sample = start_ns
+        self.main_brain = None
+        self.encoder_wires = []
+        self.analog_wires = []
+        self.word_wires = []
+        self.ssp = None
+        self.main_brain_words = array.array("q")
+        self.records_words = False
+        self.sample_row = array.array("d", [0.0]) * 64
+        self.sample_count = 0
+        # routing tables, index board * 4 + controller - 1; -1 where nothing is connected
+        self.bus_of = array.array("q", [-1]) * (4 * len(boards))
+        self.node_of = array.array("q", [-1]) * (4 * len(boards))
+        self.motors = [None] * len(boards)
+        self.watchdog_pin = array.array("q", [-1]) * len(boards)
+        self.enable_pins = array.array("q", [-1]) * (2 * len(boards))
+        self.enables = array.array("q", [0]) * (2 * len(boards))
+        self.stop_steps = 1 << 62
+        self.stop_distance_m = 1e300
+        self.pin_watch = None
+        self.imu = None
+        self.imu_board = None
+        self.imu_index = -1
+        self.imu_uart = 0
+        self.estimator = None
+        self.swing_leg = 1
+        self.strike_seen_ns = -1
+        self.strike_count = 0
+        self.strikes_unmatched = 0
+        self.strike_sum_ms = 0.0
+        self.strike_squares_ms2 = 0.0
+
+    def connect_imu(self, imu, board, index, uart) -> None:
+        """The inertial unit's bytes go to UART `uart` of `board`, the board's to the unit."""
+        self.imu = imu
+        self.imu_board = board
+        self.imu_index = index
+        self.imu_uart = uart
+
+    def watch_strikes(self, main_brain) -> None:
+        """Time from the body's heel strikes to the main-brain slots that notice them."""
+        self.main_brain = main_brain
+        self.estimator = main_brain.estimator
+        self.swing_leg = main_brain.estimator.swing_leg
+
+    def run(self, until: cython.longlong) -> cython.longlong:
+        """Advance to `until` (ns) or until the walk is over; returns one of the reasons above."""
+        plant: RangerPlant = self.plant
+        board: Microcontroller
+        bus: Bus
+        i: cython.longlong
+        now: cython.longlong
+        then: cython.longlong
+        board_count: cython.longlong = len(self.boards)
+        while self.time < until:
+            now = self.time
+            then = now + 25_000
+            if plant.time_ns <= now:
+                if now >= self.next_sample:
+                    self._sample(now)
+                if plant.fell:
+                    return 3
+                if plant.steps >= self.stop_steps:
+                    return 1
+                if plant.distance_m >= self.stop_distance_m:
+                    return 2
+                plant.step()
+                self._sense()
+                self._collect_frames()
+            for bus in self.buses:
+                if bus.next_time <= now:
+                    bus.advance(now)
+            for i in range(board_count):
+                board = self.boards[i]
+                if board.due(then):
+                    board.advance(then)
+                    if board.outbox.count:
+                        self._route(i, board)
+            if self.estimator is not None and self.estimator.swing_leg != self.swing_leg:
+                self._notice_strike()
+            self.time = then
+        return 0
+
+    def _notice_strike(self) -> cython.void:
+        """The main brain has flipped the swing leg: how long after the body's strike began that slot?"""
+        delay_ms: cython.double
+        struck: cython.longlong = self.plant.strike_time_ns
+        self.swing_leg = self.estimator.swing_leg
+        if self.plant.steps == 0:
+            return  # the reset on entering the walk
+        if struck == self.strike_seen_ns:
+            self.strikes_unmatched += 1
+            return
+        self.strike_seen_ns = struck
+        delay_ms = (self.main_brain.scheduler.slot_time - struck) * 1e-6
+        self.strike_count += 1
+        self.strike_sum_ms += delay_ms
+        self.strike_squares_ms2 += delay_ms * delay_ms
+
+    def _sense(self) -> cython.void:
+        """What the plant's sensors showed during the step that was just integrated."""
+        plant: RangerPlant = self.plant
+        wire: Wire
+        analog: AnalogWire
+        word: WordWire
+        board: Microcontroller
+        end: cython.longlong = plant.time_ns
+        start: cython.longlong = end - plant.step_ns
+        i: cython.longlong
+        for wire in self.encoder_wires:
+            wire.deliver()
+        if self.imu is not None:
+            bytes_out: ByteBuffer = self.imu.output
+            board = self.imu_board
+            for i in range(bytes_out.count):
+                # order 256: stage pins; kind 5: UART_BYTE
+                board.inbox.push(bytes_out.times[i], 256, 5, self.imu_uart, bytes_out.values[i])
+        for analog in self.analog_wires:
+            board = analog.board
+            board.analog.set_pair(
+                analog.channel,
+                start,
+                plant.analog_start[analog.source],
+                end,
+                plant.analog_end[analog.source],
+            )
+        for word in self.word_wires:
+            board = word.board
+            board.words[word.word] = plant.words[word.source]
+
+    def _collect_frames(self) -> cython.void:
+        """Move what the buses logged into the canonical trace, bus after bus."""
+        bus: Bus
+        b: cython.longlong
+        i: cython.longlong
+        at: cython.longlong
+        for b in range(len(self.buses)):
+            bus = self.buses[b]
+            for i in range(bus.log_count):
+                at = i * 6
+                self.recorder.frame(bus.log[at], b, bus.log[at + 1], bus.log[at + 2], bus.log[at + 3], bus.log[at + 4])
+            bus.log_count = 0
+
+    def _route(self, index: cython.longlong, board: Microcontroller) -> cython.void:
+        """Hand on what a board put out: frames to its bus, PWM and pins to its drive, segments to the link."""
+        out: EventQueue = board.outbox
+        place: cython.longlong
+        bus: Bus
+        motor: MotorUnit
+        ssp: SspWire
+        while out.take():
+            if out.kind == 36:  # PIN_OUTPUT
+                motor = self.motors[index]
+                if motor is not None:
+                    if out.a == self.watchdog_pin[index]:
+                        motor.drive.watchdog_edge(out.time)
+                        continue
+                    if out.a == self.enable_pins[2 * index]:
+                        self.enables[2 * index] = out.b
+                        motor.drive.low_side(out.time, self.enables[2 * index], self.enables[2 * index + 1])
+                        continue
+                    if out.a == self.enable_pins[2 * index + 1]:
+                        self.enables[2 * index + 1] = out.b
+                        motor.drive.low_side(out.time, self.enables[2 * index], self.enables[2 * index + 1])
+                        continue
+                if self.pin_watch is not None:
+                    self.pin_watch(index, out.time, out.a, out.b)
+            elif out.kind == 35:  # PWM_UPDATE
+                motor = self.motors[index]
+                if motor is not None:
+                    motor.drive.write_pwm(out.time, out.a, out.b, out.c)
+            elif out.kind == 32:  # CAN_REQUEST
+                place = 4 * index + out.a - 1
+                if self.bus_of[place] >= 0:
+                    bus = self.buses[self.bus_of[place]]
+                    bus.request(self.node_of[place], out.b, out.time, out.c, out.d, out.e, out.f)
+            elif out.kind == 37:  # SSP_START
+                ssp = self.ssp
+                ssp.start(out.time, out.ref)
+            elif out.kind == 38:  # SSP_LOAD
+                ssp = self.ssp
+                ssp.load(out.ref)
+            elif out.kind == 33:  # CAN_ABORT
+                place = 4 * index + out.a - 1
+                if self.bus_of[place] >= 0:
+                    bus = self.buses[self.bus_of[place]]
+                    bus.abort(self.node_of[place], out.b, out.time)
+            elif out.kind == 34:  # CAN_MODE
+                place = 4 * index + out.a - 1
+                if self.bus_of[place] >= 0:
+                    bus = self.buses[self.bus_of[place]]
+                    bus.set_mode(self.node_of[place], out.b, out.time)
+            elif out.kind == 39 and index == self.imu_index and out.a == self.imu_uart:  # UART_OUTPUT
+                self.imu.receive(out.b, out.time)
+
+    def _sample(self, now: cython.longlong) -> cython.void:
+        """One row of the trace: the body, and when a log is kept the main brain's data table."""
+        stream: RowStream = self.recorder.samples
+        at: cython.longlong = stream.used
+        i: cython.longlong
+        self.plant.fill_sample(self.sample_row)
+        stream.reals[at] = now * 1e-9
+        for i in range(self.sample_count):
+            stream.reals[at + 1 + i] = self.sample_row[i]
+        stream.used = at + 1 + self.sample_count
+        stream.finish_row(now)
+        if self.records_words:
+            stream = self.recorder.words
+            at = stream.used
+            stream.integers[at] = now
+            for i in range(stream.columns - 1):
+                stream.integers[at + 1 + i] = self.main_brain_words[i]
+            stream.used = at + stream.columns
+            stream.finish_row(now)
+        self.next_sample += 2_000_000

@@ -1,0 +1,232 @@
+"""The whole robot, wired: seven boards, four buses, one link, one body.
+
+Follow the loop here: `Ranger.__init__` builds the plant, the boards and the buses and connects them by the
+tables of harness/wiring.py; `harness/lockstep.py` then passes time and carries what goes over the wires.
+"""
+
+from boards.can_router import CanRouterBoard
+from boards.hip import HipBoard
+from boards.inner_feet import InnerFeetBoard
+from boards.main_brain import controllers
+from boards.main_brain.board import MainBrainBoard
+from boards.modules.ssp_link import EXCHANGE_NS, empty_segment
+from boards.outer_feet import OuterFeetBoard
+from boards.quirks import Quirks
+from boards.steering import SteeringBoard
+from boards.user_interface import UserInterfaceBoard
+from can_bus.bus import Bus
+from datatable.generated import all_variables
+from firmware_sim.clock import seeded_crystal
+from foundation import wallclock
+from foundation.events import STAGE_BUS
+from foundation.random_stream import RandomStream
+from harness import lockstep, wiring
+from harness.logbook import Logbook
+from harness.operator import Operator
+from harness.recorder import Recorder
+from harness.scenario import Scenario, StopRule
+from plant.ranger import RangerPlant
+
+BUS_BIT_RATE = 3_000_000  # bit/s, appendix 3.11
+# Boards get their power together but their resets and start-up code differ: first slots spread over 2 ms.
+POWER_UP_SPREAD_NS = 2_000_000
+GRID_NS = 20_000_000  # the operator acts on this grid, so that a run does not depend on how it is sliced
+
+
+class Ranger:
+    """One robot in one scenario. Same scenario, same bytes. Close it when done (or use contextlib.closing)."""
+
+    def __init__(self, scenario: Scenario | None = None, log: str = "none", quirks: Quirks | None = None) -> None:
+        self.scenario = scenario if scenario is not None else Scenario()
+        self.quirks = quirks if quirks is not None else Quirks()
+        self.controller = controllers.load(self.scenario.controller)
+        self.start_ns = self.scenario.start_uptime_ms * 1_000_000
+        seed = self.scenario.seed
+
+        # plant -> sensors
+        self.plant = RangerPlant(
+            seed=seed,
+            slope_rad=self.scenario.slope_rad,
+            floor_roughness_m=self.scenario.floor_roughness_m,
+            model_file=self.scenario.model_file,
+            start_ns=self.start_ns,
+        )
+        # interrupts and slots: each board on its own crystal, powered up in its own moment
+        self.boards = {
+            "MCH": HipBoard(*self._clock("MCH")),
+            "MCFO": OuterFeetBoard(*self._clock("MCFO")),
+            "MCFI": InnerFeetBoard(*self._clock("MCFI")),
+            "MCSI": SteeringBoard(*self._clock("MCSI")),
+            "UI": UserInterfaceBoard(*self._clock("UI")),
+            "CSR": CanRouterBoard(*self._clock("CSR")),
+            "MB": MainBrainBoard(*self._clock("MB"), controller=self.controller),
+        }
+        self.boards["CSR"].time.ms = self.scenario.start_uptime_ms
+        # CAN
+        self.buses = [Bus(f"can{n}", BUS_BIT_RATE, seed) for n in (1, 2, 3, 4)]
+        self.recorder = Recorder(len(self.plant.sample_names), all_variables.TABLE_SIZE)
+        self.logbook = Logbook(self.recorder, log)
+        self.loop = lockstep.Lockstep(
+            self.plant, [self.boards[name] for name in wiring.BOARDS], self.buses, self.recorder, self.start_ns
+        )
+        self._connect()
+        self.operator = Operator(self.controller.operator, self.plant, self.boards["UI"], self.start_ns)
+        self.cpu_s = 0.0
+        self.wall_s = 0.0
+        self.ended = ""
+
+    def _clock(self, board: str):
+        """(crystal, quirks, power-up instant) of a board, drawn from the scenario's seed."""
+        stream = RandomStream(self.scenario.seed, f"board {board}")
+        crystal = seeded_crystal(stream)
+        return crystal, self.quirks, self.start_ns + stream.integer(POWER_UP_SPREAD_NS)
+
+    def _connect(self) -> None:
+        """Solder every wire of the tables."""
+        loop, boards = self.loop, self.boards
+        place = {name: number for number, name in enumerate(wiring.BOARDS)}
+        for wire in wiring.ENCODERS:
+            pins = wiring.PINS[wire.board]
+            loop.encoder_wires.append(
+                lockstep.Wire(self.plant.encoders[wire.encoder], boards[wire.board], pins[wire.pin_a], pins[wire.pin_b])
+            )
+        for wire in wiring.ANALOG:
+            channel = wiring.ANALOG_INPUTS[wire.board][wire.input]
+            loop.analog_wires.append(lockstep.AnalogWire(wire.voltage, boards[wire.board], channel))
+        for wire in wiring.WORDS:
+            loop.word_wires.append(
+                lockstep.WordWire(wire.word, boards[wire.board], wiring.WORD_REGISTERS[wire.register])
+            )
+        for wire in wiring.CAN:
+            board, bus = boards[wire.board], self.buses[wire.bus - 1]
+            node = bus.add_node(
+                wire.board, board.inbox, wire.controller, STAGE_BUS * 256 + 16 * place[wire.board] + wire.controller
+            )
+            loop.bus_of[4 * place[wire.board] + wire.controller - 1] = wire.bus - 1
+            loop.node_of[4 * place[wire.board] + wire.controller - 1] = node
+        pins = wiring.MOTOR_PINS
+        for name, motor in wiring.MOTORS.items():
+            loop.motors[place[name]] = self.plant.motors[motor]
+            loop.watchdog_pin[place[name]] = pins["motor_watchdog"]
+            loop.enable_pins[2 * place[name]] = pins["low_side_2"]
+            loop.enable_pins[2 * place[name] + 1] = pins["low_side_6"]
+        loop.ssp = lockstep.SspWire(boards["CSR"], boards["MB"], EXCHANGE_NS, empty_segment())
+        loop.connect_imu(self.plant.imu, boards[wiring.IMU_BOARD], place[wiring.IMU_BOARD], wiring.IMU_UART)
+        loop.watch_strikes(boards["MB"])
+        loop.sample_count = len(self.plant.sample_names)
+        loop.main_brain_words = boards["MB"].store.words
+        loop.records_words = self.logbook.records_words
+
+    # --- passing time -------------------------------------------------------------------------------------
+
+    def run(self, stop: StopRule, slice_s: float = 1.0) -> bool:
+        """Pass up to `slice_s` of virtual time; True when the stop rule is met or the robot fell."""
+        if self.ended:
+            return True
+        loop = self.loop
+        loop.stop_steps = stop.steps if stop.steps is not None else 1 << 62
+        loop.stop_distance_m = stop.distance_m if stop.distance_m is not None else 1e300
+        limit = 1 << 62 if stop.time_s is None else self.start_ns + round(stop.time_s * 1e9)
+        until = min(loop.time + round(slice_s * 1e9), limit)
+        cpu, wall = wallclock.process_cpu_s(), wallclock.monotonic_s()
+        reason = lockstep.REACHED_TIME
+        while loop.time < until and reason == lockstep.REACHED_TIME:
+            end = self.start_ns + ((loop.time - self.start_ns) // GRID_NS + 1) * GRID_NS
+            self.operator.act(end)
+            reason = loop.run(min(end, until))
+        self.cpu_s += wallclock.process_cpu_s() - cpu
+        self.wall_s += wallclock.monotonic_s() - wall
+        if reason == lockstep.FELL:
+            self.ended = "fell"
+        elif reason != lockstep.REACHED_TIME or loop.time >= limit:
+            return True
+        return bool(self.ended)
+
+    def run_for(self, seconds: float) -> None:
+        """Pass `seconds` of virtual time, or less when the robot falls."""
+        self.run(StopRule(time_s=self.time_s + seconds), seconds)
+
+    @property
+    def time_s(self) -> float:
+        """Virtual time since power-up, s."""
+        return (self.loop.time - self.start_ns) * 1e-9
+
+    @property
+    def steps(self) -> int:
+        """Steps walked so far."""
+        return self.plant.steps
+
+    @property
+    def distance_m(self) -> float:
+        """Distance walked so far, m."""
+        return self.plant.distance_m
+
+    def mean_speed_m_per_s(self) -> float:
+        """Distance over the time since the robot was let go."""
+        walked = self.time_s - self.controller.operator.release_time_s
+        return self.distance_m / walked if walked > 0.0 else 0.0
+
+    def realtime_factor(self) -> float:
+        """Virtual seconds per wall-clock second of the stepping loop."""
+        return self.time_s / self.wall_s if self.wall_s > 0.0 else 0.0
+
+    def fraction_done(self, stop: StopRule) -> float:
+        """How much of the stop rule is reached, 0 ... 1."""
+        shares = [0.0]
+        if stop.steps is not None:
+            shares.append(self.steps / stop.steps)
+        if stop.time_s is not None:
+            shares.append(self.time_s / stop.time_s)
+        if stop.distance_m is not None:
+            shares.append(self.distance_m / stop.distance_m)
+        return min(1.0, max(shares))
+
+    # --- looking in, reaching in --------------------------------------------------------------------------
+
+    def board(self, name: str):
+        """The board MCH, MCFO, MCFI, MCSI, UI, CSR or MB."""
+        return self.boards[name]
+
+    def variable(self, name: str):
+        """Value of a variable as the main brain's data table has it."""
+        from datatable.packing import value_of_word
+
+        number = all_variables.ID_OF[name]
+        return value_of_word(all_variables.TYPES[number], self.boards["MB"].store.get_word(number))
+
+    def replace(self, board: str, task: str, function, cost: int, limit: int | None = None) -> None:
+        """Put your own function in a schedule entry; it declares its cost in cycles."""
+        self.boards[board].scheduler.replace(task, function, cost=cost, limit=limit)
+
+    def trace_digest(self) -> str:
+        """SHA-256 of the canonical trace so far."""
+        return self.recorder.trace_digest()
+
+    def recorded(self):
+        """What the log kept, as arrays: a `harness.recorded.Recorded`."""
+        from harness.recorded import Recorded
+
+        return Recorded(self)
+
+    def candump_logs(self) -> dict:
+        """{bus: what it carried, as candump writes it}, bytes."""
+        from can_bus.edge import candump
+
+        frames = self.logbook.frames()
+        return {bus.name: candump.text_of(bus.name, frames, number) for number, bus in enumerate(self.buses)}
+
+    def error_meaning(self, name: str) -> str:
+        """What an error code means."""
+        from datatable.generated import errors
+
+        return errors.MEANINGS[getattr(errors, name)]
+
+    def close(self) -> None:
+        """Give back the log's files."""
+        self.logbook.close()
+
+    def summary(self) -> dict:
+        """The walk in numbers: what `--json` prints."""
+        from harness import summary
+
+        return summary.of(self)

@@ -1,0 +1,131 @@
+"""The walk in numbers."""
+
+import math
+
+from datatable.generated import errors as error_table
+from harness import build
+
+MASS_KG, GRAVITY = 9.91, 9.81  # total cost of transport: appendix 1, table of the walk
+SKIPPED_STEPS = 5  # the start is left out of means
+
+
+def of(robot) -> dict:
+    """Everything `--json` prints; units are in the names. Means leave out the first 5 steps."""
+    plant = robot.plant
+    record = plant.record
+    speed = record.length_sum / record.time_sum_s if record.time_sum_s > 0.0 else 0.0
+    powers = motor_powers(robot)
+    motor_power = sum(powers.values())
+    electronics_power = plant.electronics_power_W
+    total = motor_power + electronics_power
+    failed = [name for name, board in robot.boards.items() if not alive(robot, name, board)]
+    return {
+        "steps": plant.steps,
+        "fell": bool(plant.fell),
+        "fall_cause": plant.fall_cause or None,
+        "failed_boards": failed,
+        "distance_m": plant.distance_m,
+        "time_s": robot.time_s,
+        "mean_step_length_m": record.mean_step_length_m(),
+        "std_step_length_m": record.step_length_deviation_m(),
+        "mean_step_time_s": record.mean_step_time_s(),
+        "std_step_time_s": record.step_time_deviation_s(),
+        "double_stance_s": record.mean_double_stance_s(),
+        "speed_m_per_s": speed,
+        "motor_power_W": motor_power,
+        "motor_powers_W": powers,
+        "electronics_power_W": electronics_power,
+        "total_power_W": total,
+        "tcot": total / (MASS_KG * GRAVITY * speed) if speed > 0.0 else None,
+        "battery_V": plant.battery_V,
+        "heel_strike_delay_ms": strike_delay(robot.loop),
+        "oddities": oddities(plant),
+        "can": {bus.name: can(robot, bus) for bus in robot.buses},
+        "slots": {name: slots(board) for name, board in robot.boards.items()},
+        "errors": {name: errors(board) for name, board in robot.boards.items()},
+        "realtime_factor": robot.realtime_factor(),
+        "cpu_factor": robot.time_s / robot.cpu_s if robot.cpu_s > 0.0 else None,
+        "compiled": build.is_compiled(),
+        "controller": robot.controller.name,
+        "seed": robot.scenario.seed,
+        "slope_rad": robot.scenario.slope_rad,
+        "floor_roughness_m": robot.scenario.floor_roughness_m,
+        "trace_digest": robot.trace_digest(),
+    }
+
+
+def motor_powers(robot) -> dict:
+    """Mean power each motor drew at the battery since the robot was let go, W; what it gave back is not credited."""
+    plant = robot.plant
+    walked_s = (plant.time_ns - plant.record.begin_ns) * 1e-9
+    if walked_s <= 0.0:
+        return dict.fromkeys((motor.name for motor in plant.motors), 0.0)
+    return {motor.name: (motor.drawn_J - motor.drawn_before_J) / walked_s for motor in plant.motors}
+
+
+def oddities(plant) -> dict:
+    """What the model met that a textbook gait has not; each is a count or a worst value of the walk."""
+    record, body = plant.record, plant.body
+    return {
+        "bounces": record.bounces,
+        "recontacts": record.recontacts,
+        "scuffs": record.scuffs,
+        "flights": record.flights,
+        "lead_lifts": record.lead_lifts,
+        "tensile_strikes": record.tensile_strikes,
+        "tensile_impulse_min_Ns": record.tensile_impulse_min_Ns,
+        "friction_ratio_max": body.friction_ratio_max,
+        "slip_s": body.slip_s,
+        "normal_force_min_N": body.normal_force_min,
+        "min_clearance_m": record.min_clearance_m,
+    }
+
+
+def strike_delay(loop) -> dict:
+    """From the plant's strike to the start of the main-brain slot that flips the swing flag."""
+    n = loop.strike_count
+    if n == 0:
+        return {"mean": None, "std": None, "count": 0, "unmatched": loop.strikes_unmatched}
+    mean = loop.strike_sum_ms / n
+    return {
+        "mean": mean,
+        "std": math.sqrt(max(0.0, loop.strike_squares_ms2 / n - mean * mean)),
+        "count": n,
+        "unmatched": loop.strikes_unmatched,
+    }
+
+
+def can(robot, bus) -> dict:
+    """Traffic of one bus; loads as fractions 0-1 with stuff bits and intermission."""
+    now = robot.loop.time
+    return {
+        "frames": bus.frames,
+        "load_mean": bus.load_mean(now),
+        "load_max": bus.load_max(),
+        "lost": bus.lost,
+        "single_shot_skipped": bus.single_shot_skipped,
+        "errors": bus.errors,
+    }
+
+
+def slots(board) -> dict:
+    """How one board kept its slots; interrupts included."""
+    scheduler = board.scheduler
+    return {
+        "count": scheduler.slot_count,
+        "overruns": scheduler.overruns,
+        "max_execution_us": scheduler.max_slot_cycles * 1e6 / board.hz,
+        "budget_us": scheduler.schedule.slot_ns * scheduler.schedule.divider / 1000.0,
+    }
+
+
+def errors(board) -> dict:
+    """Errors the board itself noted, by name."""
+    totals = board.errors.totals
+    return {name: totals[code] for code, name in error_table.NAMES.items() if totals[code]}
+
+
+def alive(robot, name: str, board) -> bool:
+    """True when the board's slots are as recent as they should be."""
+    silent_ns = robot.loop.time - board.scheduler.slot_time
+    return robot.loop.time - robot.start_ns < 20_000_000 or silent_ns < 20 * board.scheduler.schedule.slot_ns

@@ -1,0 +1,117 @@
+"""Every wire of the robot, as tables: which sensor hangs on which pin of which board, which board on which bus.
+
+Facts network-and-boards 1.1 (buses), 4.1 (encoders), 4.5-4.9 (converters, switches), 4.10, 4.11 (user interface).
+Read a line from left to right in the direction in which the signal goes.
+"""
+
+from typing import NamedTuple
+
+from boards import can_router, motor_board, user_interface
+from plant import wiring_points as point
+
+# The order in which boards are advanced and their messages sorted within an instant.
+BOARDS = ("MCH", "MCFO", "MCFI", "MCSI", "UI", "CSR", "MB")
+
+
+class CanWire(NamedTuple):
+    """Controller `controller` of `board` hangs on bus `bus` (1 ... 4)."""
+
+    board: str
+    controller: int
+    bus: int
+
+
+CAN = (
+    CanWire("CSR", 1, 1),
+    CanWire("CSR", 2, 2),
+    CanWire("CSR", 3, 3),
+    CanWire("CSR", 4, 4),
+    CanWire("MCH", 1, 1),
+    CanWire("UI", 2, 2),
+    CanWire("MCFO", 1, 3),
+    CanWire("MCFI", 2, 4),
+    CanWire("MCSI", 2, 4),
+)
+
+
+class EncoderWire(NamedTuple):
+    """Channels A and B of an incremental encoder (place in the plant's list) on two pins of a board."""
+
+    encoder: int
+    board: str
+    pin_a: str
+    pin_b: str
+
+
+ENCODERS = (
+    EncoderWire(point.HIP_JOINT_EDGES, "MCH", "encoder_01_a", "encoder_01_b"),
+    EncoderWire(point.HIP_MOTOR_EDGES, "MCH", "encoder_23_a", "encoder_23_b"),
+    EncoderWire(point.OUTER_MOTOR_EDGES, "MCFO", "encoder_01_a", "encoder_01_b"),
+    EncoderWire(point.OUTER_ANKLE_EDGES, "MCFO", "encoder_23_a", "encoder_23_b"),
+    EncoderWire(point.INNER_MOTOR_EDGES, "MCFI", "encoder_01_a", "encoder_01_b"),
+    EncoderWire(point.INNER_ANKLE_EDGES, "MCFI", "encoder_23_a", "encoder_23_b"),
+)
+
+
+class AnalogInput(NamedTuple):
+    """A voltage of the plant on an analog input of a board."""
+
+    voltage: int
+    board: str
+    input: str
+
+
+ANALOG = (
+    AnalogInput(point.HIP_MOTOR_CURRENT, "MCH", "motor_current"),
+    AnalogInput(point.HIP_BATTERY_CURRENT, "MCH", "battery_current"),
+    AnalogInput(point.HIP_BATTERY_VOLTAGE, "MCH", "battery_voltage"),
+    AnalogInput(point.OUTER_ANKLE_MOTOR_CURRENT, "MCFO", "motor_current"),
+    AnalogInput(point.OUTER_ANKLE_BATTERY_CURRENT, "MCFO", "battery_current"),
+    AnalogInput(point.OUTER_ANKLE_BATTERY_VOLTAGE, "MCFO", "battery_voltage"),
+    AnalogInput(point.OUTER_FOOT_LEFT, "MCFO", "left_foot"),
+    AnalogInput(point.OUTER_FOOT_RIGHT, "MCFO", "right_foot"),
+    AnalogInput(point.INNER_ANKLE_MOTOR_CURRENT, "MCFI", "motor_current"),
+    AnalogInput(point.INNER_ANKLE_BATTERY_CURRENT, "MCFI", "battery_current"),
+    AnalogInput(point.INNER_ANKLE_BATTERY_VOLTAGE, "MCFI", "battery_voltage"),
+    AnalogInput(point.INNER_FOOT_LEFT, "MCFI", "left_foot"),
+    AnalogInput(point.INNER_FOOT_RIGHT, "MCFI", "right_foot"),
+    AnalogInput(point.STEERING_MOTOR_CURRENT, "MCSI", "motor_current"),
+    AnalogInput(point.STEERING_BATTERY_CURRENT, "MCSI", "battery_current"),
+    AnalogInput(point.STEERING_BATTERY_VOLTAGE, "MCSI", "battery_voltage"),
+    AnalogInput(point.STEERING_ANGLE, "MCSI", "steering_sensor"),
+    AnalogInput(point.ROUTER_CURRENT, "CSR", "supply_current"),
+    AnalogInput(point.ROUTER_VOLTAGE, "CSR", "supply_voltage"),
+)
+ANALOG_INPUTS = {
+    **dict.fromkeys(("MCH", "MCFO", "MCFI", "MCSI"), motor_board.ANALOG),
+    "CSR": can_router.ANALOG,
+}
+
+
+class EncoderWord(NamedTuple):
+    """The serial word of an absolute encoder, read by a board's SPI."""
+
+    word: int
+    board: str
+    register: str
+
+
+WORDS = (
+    EncoderWord(point.HIP_WORD, "MCH", "absolute_encoder"),
+    EncoderWord(point.OUTER_ANKLE_WORD, "MCFO", "absolute_encoder"),
+    EncoderWord(point.INNER_ANKLE_WORD, "MCFI", "absolute_encoder"),
+)
+WORD_REGISTERS = motor_board.WORDS
+
+# Board -> the motor its bridge drives. PWM, low-side enables and the watchdog line go there.
+MOTORS = {
+    "MCH": point.HIP,
+    "MCFO": point.OUTER_ANKLE,
+    "MCFI": point.INNER_ANKLE,
+    "MCSI": point.STEERING,
+}
+MOTOR_PINS = motor_board.PINS
+PINS = {**dict.fromkeys(("MCH", "MCFO", "MCFI", "MCSI"), motor_board.PINS), "UI": user_interface.PINS}
+
+# The inertial unit talks to UART 1 of the user interface board.
+IMU_BOARD, IMU_UART = "UI", user_interface.IMU_UART

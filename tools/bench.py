@@ -1,0 +1,165 @@
+"""`ranger-sim bench`: how fast the parts and the whole are, as ratios within one run.
+
+Machines differ and are noisy: every figure is the median of several runs in their own processes, taken in
+turn, and what matters is how the figures of one run compare.
+"""
+
+import argparse
+import json
+import os
+import pathlib
+import platform
+import statistics
+import subprocess
+import sys
+
+from rich.console import Console
+from rich.table import Table
+
+from foundation import wallclock
+from foundation.user_error import UserError
+from tools.units import whole_number
+
+
+def register(commands) -> None:
+    """Add the subcommand to the command line."""
+    command = commands.add_parser("bench", help="times real time of the whole robot and of its parts")
+    command.add_argument("--runs", type=whole_number(1), default=3, help="runs of each case (default 3)")
+    command.add_argument("--seconds", type=whole_number(1), default=20, help="virtual seconds per compiled run")
+    command.add_argument("--json", metavar="FILE|-", help="figures as JSON; - prints them and nothing else")
+    command.add_argument("--case", choices=sorted(CASES), help=argparse.SUPPRESS)
+    command.set_defaults(run=run)
+
+
+def robot_case(seconds: float, log: str = "none", swap: bool = False, uptime_ms: int = 0) -> dict:
+    """Run the whole robot for so long; CPU seconds of the stepping loop only."""
+    from harness.ranger import Ranger
+    from harness.scenario import Scenario, StopRule
+
+    robot = Ranger(Scenario(start_uptime_ms=uptime_ms), log=log)
+    if swap:
+        board = robot.board("MCH")
+        law = board.compliant_control_task()
+        robot.replace("MCH", law.name, lambda: law.function(), cost=law.cost, limit=law.limit)
+    robot.run(StopRule(time_s=1.0), 1.0)
+    started = wallclock.process_cpu_s()
+    robot.run(StopRule(time_s=1.0 + seconds), seconds)
+    used = wallclock.process_cpu_s() - started
+    steps = robot.steps
+    robot.close()
+    return {"figure": seconds / used, "unit": "simulated s per CPU s", "steps": steps}
+
+
+def plant_case(seconds: float) -> dict:
+    """The plant alone, held, motors off."""
+    from plant.ranger import RangerPlant
+
+    plant = RangerPlant()
+    steps = round(seconds * 1e9 / plant.step_ns)
+    started = wallclock.process_cpu_s()
+    for _ in range(steps):
+        plant.step()
+    return {"figure": seconds / (wallclock.process_cpu_s() - started), "unit": "simulated s per CPU s"}
+
+
+def bus_case(frames: int) -> dict:
+    """Our bus: send, arbitrate and deliver on four buses."""
+    from can_bus import benchmark
+
+    return {"figure": benchmark.frames_per_cpu_second(frames), "unit": "frames per CPU s"}
+
+
+def virtual_case(frames: int) -> dict:
+    """The same work on python-can's `virtual` interface."""
+    from can_bus.edge import benchmark
+
+    return {"figure": benchmark.virtual_frames_per_cpu_second(frames), "unit": "frames per CPU s"}
+
+
+CASES = {
+    "robot": lambda s: robot_case(s),
+    "robot-window": lambda s: robot_case(s, log="window"),
+    "robot-swapped": lambda s: robot_case(s, swap=True),
+    "robot-four-times-longer": lambda s: robot_case(4 * s),
+    "plant": lambda s: plant_case(s),
+    "bus": lambda s: bus_case(50_000 * int(s)),
+    "virtual": lambda s: virtual_case(2_000 * int(s)),
+}
+TITLES = {
+    "robot": "whole robot, digest on, logs off",
+    "robot-window": "whole robot, last 10 s kept",
+    "robot-swapped": "hip control law replaced by a user's function",
+    "robot-four-times-longer": "whole robot, four times the simulated time",
+    "plant": "plant alone",
+    "bus": "our bus, four buses",
+    "virtual": "python-can virtual, same work",
+}
+
+
+def measured(case: str, seconds: float, interpreted: bool) -> dict:
+    """One case in its own process."""
+    environment = dict(os.environ)
+    environment.pop("RANGER_SIM_INTERPRETED", None)
+    if interpreted:
+        environment["RANGER_SIM_INTERPRETED"] = "1"
+    call = [sys.executable, "-m", "tools.cli", "bench", "--case", case, "--seconds", str(max(1, int(seconds)))]
+    done = subprocess.run(call, env=environment, capture_output=True, text=True, check=False)
+    if done.returncode != 0:
+        raise UserError(f"bench: case {case} failed: {done.stderr.strip().splitlines()[-1:]}")
+    return json.loads(done.stdout)
+
+
+def machine() -> dict:
+    """What the figures were taken on."""
+    model = platform.processor() or platform.machine()
+    cpuinfo = pathlib.Path("/proc/cpuinfo")
+    if cpuinfo.exists():
+        names = [line for line in cpuinfo.read_text(encoding="utf-8").splitlines() if line.startswith("model name")]
+        if names:
+            model = names[0].partition(":")[2].strip()
+    return {
+        "processor": model,
+        "cores": os.cpu_count(),
+        "python": platform.python_version(),
+        "system": platform.system(),
+    }
+
+
+def run(options: argparse.Namespace) -> int:
+    """Measure every case `--runs` times in turn; print medians and the ratio to the whole robot."""
+    if options.case:
+        print(json.dumps(CASES[options.case](options.seconds)))
+        return 0
+    plan = [(case, False, options.seconds) for case in CASES]
+    plan += [(case, True, max(1, options.seconds // 10)) for case in ("robot", "plant")]
+    figures: dict = {}
+    console = Console(stderr=True, quiet=options.json == "-")
+    with console.status("measuring ...") as status:
+        for turn in range(options.runs):
+            for case, interpreted, seconds in plan:
+                status.update(f"run {turn + 1} of {options.runs}: {TITLES[case]}")
+                result = measured(case, seconds, interpreted)
+                key = case + (" (interpreted)" if interpreted else "")
+                figures.setdefault(key, {"unit": result["unit"], "values": []})["values"].append(result["figure"])
+    base = statistics.median(figures["robot"]["values"])
+    for figure in figures.values():
+        figure["median"] = statistics.median(figure["values"])
+        figure["min"], figure["max"] = min(figure["values"]), max(figure["values"])
+        if figure["unit"] == "simulated s per CPU s":
+            figure["ratio_to_robot"] = figure["median"] / base
+    result = {"date": wallclock.today_iso(), "machine": machine(), "runs": options.runs, "figures": figures}
+    if options.json == "-":
+        print(json.dumps(result, indent=2))
+        return 0
+    if options.json:
+        pathlib.Path(options.json).write_text(json.dumps(result, indent=2) + "\n", encoding="utf-8")
+    table = Table(title="ranger-sim bench")
+    for column in ("case", "median", "min", "max", "unit", "/ robot"):
+        table.add_column(column, justify="left" if column in ("case", "unit") else "right")
+    for key, figure in figures.items():
+        case = key.removesuffix(" (interpreted)")
+        title = TITLES[case] + (", interpreted" if case != key else "")
+        ratio = f"{figure['ratio_to_robot']:.3f}" if "ratio_to_robot" in figure else ""
+        table.add_row(title, *(f"{figure[k]:,.4g}" for k in ("median", "min", "max")), figure["unit"], ratio)
+    Console().print(table)
+    return 0
