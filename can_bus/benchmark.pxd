@@ -1,5 +1,6 @@
 from foundation.events cimport EventQueue
 from can_bus.bus cimport Bus
+from can_bus.frame cimport frame_bits
 
 cdef class Load:
     cdef public list buses, inboxes, numbers

@@ -105,6 +105,7 @@ class Load:
         sender: cython.longlong
         which: cython.longlong
         place: cython.longlong
+        mask: cython.longlong = 0xFFFFFFFF
         node: cython.longlong = b * self.nodes_per_bus + n
         while inbox.head_time <= self.time:
             inbox.take()
@@ -114,7 +115,7 @@ class Load:
                 place = (node * self.nodes_per_bus + sender) * self.per_node + which
                 if inbox.e != self.expected[place]:
                     self.out_of_order += 1
-                if inbox.d != (inbox.e * 40503 & 0xFFFFFFFF):
+                if inbox.d != (inbox.e * 40503 & mask):
                     self.wrong += 1
                 self.expected[place] = inbox.e + 1
                 self.delivered += 1
@@ -152,8 +153,10 @@ def add_lengths(frames: cython.longlong) -> cython.longlong:
     """Sum of the lengths (bits) of `frames` frames of changing content."""
     total: cython.longlong = 0
     i: cython.longlong
+    mixer: cython.longlong = 2654435761  # Knuth's multiplier: changes all bits
+    mask: cython.longlong = 0xFFFFFFFF
     for i in range(frames):
-        total += frame_bits(i & 0x7FF, 8, i * 2654435761 & 0xFFFFFFFF, i * 40503)
+        total += frame_bits(i & 0x7FF, 8, i * mixer & mask, i * 40503 & mask)
     return total
 
 

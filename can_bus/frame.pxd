@@ -1,5 +1,9 @@
-cdef long long[::1] CRC_STEP
-cdef long long[::1] STUFF_STEP
+cdef short CRC_1[256]
+cdef short CRC_2[256]
+cdef short CRC_3[256]
+cdef short CRC_4[256]
+cdef short STUFF_STEP[2048]
+cdef long long _frame(long long identifier, long long flags, long long lo, long long hi, bint want_crc)
 cpdef long long crc15(long long identifier, long long flags, long long lo, long long hi)
 cpdef long long stuff_bits(long long identifier, long long flags, long long lo, long long hi)
 cpdef long long frame_bits(long long identifier, long long flags, long long lo, long long hi)

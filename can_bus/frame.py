@@ -42,11 +42,11 @@ FIELD_END = 26
 FIELD_ACK_DELIMITER = 27
 
 
-def _crc_of_byte(byte: int) -> int:
-    """CRC register after one byte entered an empty register, most significant bit first."""
+def _crc_of_byte(byte: int, zeros: int) -> int:
+    """CRC register after a byte (most significant bit first) and `zeros` zero bits entered it empty."""
     register = 0
-    for position in range(7, -1, -1):
-        feedback = (byte >> position & 1) ^ (register >> 14 & 1)
+    for position in range(7, -1 - zeros, -1):
+        feedback = (byte >> position & 1 if position >= 0 else 0) ^ (register >> 14 & 1)
         register = register << 1 & 0x7FFF
         if feedback:
             register ^= CRC_POLYNOMIAL
@@ -76,10 +76,28 @@ def _stuff_of_byte(state: int, byte: int) -> int:
     return (level * 4 + run - 1) << 8 | inserted
 
 
-CRC_STEP = array.array("q", [_crc_of_byte(byte) for byte in range(256)])
-STUFF_STEP = array.array("q", [_stuff_of_byte(state, byte) for state in range(8) for byte in range(256)])
+# CRC_n: a byte that n - 1 further bytes follow; the CRC is linear, so four bytes go in at once.
+# Compiled, the tables are C arrays (declared in the .pxd).
+if not cython.compiled:
+    CRC_1, CRC_2, CRC_3, CRC_4 = (array.array("h", [0]) * 256 for _ in range(4))
+    STUFF_STEP = array.array("h", [0]) * 2048
 
 
+def _fill_tables() -> None:
+    for byte in range(256):
+        CRC_1[byte] = _crc_of_byte(byte, 0)
+        CRC_2[byte] = _crc_of_byte(byte, 8)
+        CRC_3[byte] = _crc_of_byte(byte, 16)
+        CRC_4[byte] = _crc_of_byte(byte, 24)
+        for state in range(8):
+            STUFF_STEP[state * 256 + byte] = _stuff_of_byte(state, byte)
+
+
+_fill_tables()
+
+
+@cython.boundscheck(False)  # table places are masked to 8 and 11 bits: no index can leave its table
+@cython.wraparound(False)
 def _frame(
     identifier: cython.longlong,
     flags: cython.longlong,
@@ -97,8 +115,10 @@ def _frame(
     stuff: cython.longlong
     total: cython.longlong
     byte: cython.longlong
+    second: cython.longlong
+    third: cython.longlong
+    fourth: cython.longlong
     word: cython.longlong
-    i: cython.longlong
     length: cython.longlong = flags & 15
     if length > 8:
         length = 8  # codes 9-15 also mean eight bytes (ISO 11898-1)
@@ -106,43 +126,59 @@ def _frame(
         length = 0
     if flags & 64:  # FLAG_EXTENDED: SOF id28-23 | id22-18 SRR IDE id17 | id16-9 | id8-1 | id0 RTR r1 r0 DLC
         byte = identifier >> 23 & 0x3F
-        crc = CRC_STEP[byte]
+        crc = CRC_1[byte]
         stuff = STUFF_STEP[byte | 0x80]
         total = stuff
         byte = (identifier >> 15 & 0xF8) | 6 | (identifier >> 17 & 1)
-        crc = ((crc << 8) ^ CRC_STEP[(crc >> 7) ^ byte]) & 0x7FFF
+        crc = ((crc << 8) ^ CRC_1[(crc >> 7) ^ byte]) & 0x7FFF
         stuff = STUFF_STEP[(stuff & 0x700) | byte]
         total += stuff
         byte = identifier >> 9 & 0xFF
-        crc = ((crc << 8) ^ CRC_STEP[(crc >> 7) ^ byte]) & 0x7FFF
+        crc = ((crc << 8) ^ CRC_1[(crc >> 7) ^ byte]) & 0x7FFF
         stuff = STUFF_STEP[(stuff & 0x700) | byte]
         total += stuff
         byte = identifier >> 1 & 0xFF
-        crc = ((crc << 8) ^ CRC_STEP[(crc >> 7) ^ byte]) & 0x7FFF
+        crc = ((crc << 8) ^ CRC_1[(crc >> 7) ^ byte]) & 0x7FFF
         stuff = STUFF_STEP[(stuff & 0x700) | byte]
         total += stuff
     else:  # SOF id10-9 | id8-1 | id0 RTR IDE r0 DLC
         byte = identifier >> 9 & 3
-        crc = CRC_STEP[byte]
+        crc = CRC_1[byte]
         stuff = STUFF_STEP[byte | 0xA8]
         total = stuff
         byte = identifier >> 1 & 0xFF
-        crc = ((crc << 8) ^ CRC_STEP[(crc >> 7) ^ byte]) & 0x7FFF
+        crc = ((crc << 8) ^ CRC_1[(crc >> 7) ^ byte]) & 0x7FFF
         stuff = STUFF_STEP[(stuff & 0x700) | byte]
         total += stuff
     byte = (identifier << 7 & 0x80) | (flags << 2 & 0x40) | (flags & 15)
-    crc = ((crc << 8) ^ CRC_STEP[(crc >> 7) ^ byte]) & 0x7FFF
+    crc = ((crc << 8) ^ CRC_1[(crc >> 7) ^ byte]) & 0x7FFF
     stuff = STUFF_STEP[(stuff & 0x700) | byte]
     total += stuff
     word = lo
-    for i in range(length):
-        if i == 4:
+    while length > 0:
+        if length >= 4:
+            byte = word & 0xFF
+            second = word >> 8 & 0xFF
+            third = word >> 16 & 0xFF
+            fourth = word >> 24 & 0xFF
+            crc = CRC_4[(crc >> 7) ^ byte] ^ CRC_3[(crc << 1 & 0xFF) ^ second] ^ CRC_2[third] ^ CRC_1[fourth]
+            stuff = STUFF_STEP[(stuff & 0x700) | byte]
+            total += stuff
+            stuff = STUFF_STEP[(stuff & 0x700) | second]
+            total += stuff
+            stuff = STUFF_STEP[(stuff & 0x700) | third]
+            total += stuff
+            stuff = STUFF_STEP[(stuff & 0x700) | fourth]
+            total += stuff
+            length -= 4
             word = hi
-        byte = word & 0xFF
-        word = word >> 8
-        crc = ((crc << 8) ^ CRC_STEP[(crc >> 7) ^ byte]) & 0x7FFF
-        stuff = STUFF_STEP[(stuff & 0x700) | byte]
-        total += stuff
+        else:
+            byte = word & 0xFF
+            crc = ((crc << 8) ^ CRC_1[(crc >> 7) ^ byte]) & 0x7FFF
+            stuff = STUFF_STEP[(stuff & 0x700) | byte]
+            total += stuff
+            word = word >> 8
+            length -= 1
     if want_crc:
         return crc
     stuff = STUFF_STEP[(stuff & 0x700) | crc >> 7]
