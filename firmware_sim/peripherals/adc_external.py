@@ -100,9 +100,9 @@ class Ads7871(Peripheral):
 
     def start(self, register4: cython.longlong) -> cython.bint:
         """Write register 4; False when a conversion is under way (the write is lost)."""
-        self.registers[4] = register4 & 127
         if self.busy:
             return False
+        self.registers[4] = register4 & 127
         if register4 & 128 == 0:
             return True
         self.busy = True
