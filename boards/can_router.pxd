@@ -37,7 +37,7 @@ cdef class CanRouterBoard(Microcontroller):
     cdef public long long own_lost
     cdef public bint idle
     cdef public long long idle_since, flush_next, pair_ns, wakes, batches
-    cdef public long long route_idle, route_frame, flush_idle, flush_frame
+    cdef public long long route_idle, route_frame, flush_idle, flush_frame, sync_cycles
     cdef public long long code_dnf, code_near_limit, code_task_limit, code_queue_full
     cpdef void report(self, long long code)
     cpdef object on_segment_timer(self, EventQueue queue)

@@ -138,6 +138,7 @@ class CanRouterBoard(Microcontroller):
         self.route_frame = ROUTE_FRAME_CYCLES
         self.flush_idle = FLUSH_IDLE_CYCLES
         self.flush_frame = FLUSH_FRAME_CYCLES
+        self.sync_cycles = 4 * CYCLES_PER_SYNC
         self.pair_ns = int((ROUTE_IDLE_CYCLES + FLUSH_IDLE_CYCLES + LOOP_CYCLES // 4) * self.ns_per_cycle)
         self.idle = True
         self.idle_since = phase_ns
@@ -208,7 +209,7 @@ class CanRouterBoard(Microcontroller):
         """Timer1, every 200 us: the time, and the next exchange with the main brain."""
         self.timer1.clear(1)
         if self.clock.tick():
-            self.extra_cycles += 4 * CYCLES_PER_SYNC
+            self.extra_cycles += self.sync_cycles
         self.ssp.start(self.link.tick(self.now))
         return None
 
@@ -339,10 +340,12 @@ class CanRouterBoard(Microcontroller):
         while True:
             self.now = at
             moved = self.router.route_step(at)
-            at += int((self.route_idle + self.route_frame * moved) * self.ns_per_cycle)
+            passed = int((self.route_idle + self.route_frame * moved) * self.ns_per_cycle)
+            at += passed
             self.now = at
             moved = self.flush(self.controllers[self.flush_next])
-            at += int((self.flush_idle + self.flush_frame * moved) * self.ns_per_cycle)
+            passed = int((self.flush_idle + self.flush_frame * moved) * self.ns_per_cycle)
+            at += passed
             self.flush_next += 1
             if self.flush_next == 4:
                 self.flush_next = 0

@@ -130,11 +130,11 @@ class MainBrainSspLink:
         base = slot * 31
         for i in range(used):
             self.received_words[base + i] = segment.words[i]
+        for i in range(used, self.received_used[slot]):
+            self.received_words[base + i] = 0
         self.received_used[slot] = used
         self.received_words[base + 30] = segment.words[30]
         if self.segments_received == 0 and self.first_is_junk:
-            for i in range(used, 30):
-                self.received_words[base + i] = 0
             for i in range(30):
                 self.received_words[base + i] = self.received_words[base + i + 1]
             self.received_words[base + 30] = 0
@@ -190,22 +190,13 @@ class MainBrainSspLink:
                     self.report(self.code_id_out_of_range)
                 else:
                     self.ids[n] = header
-                    # half-words behind `used` were zeros on the wire; the copy may hold older ones
-                    self.words0[n] = (self._word(base, used, i + 1) << 16) | self._word(base, used, i + 2)
-                    self.words1[n] = (self._word(base, used, i + 3) << 16) | self._word(base, used, i + 4)
+                    self.words0[n] = (self.received_words[base + i + 1] << 16) | self.received_words[base + i + 2]
+                    self.words1[n] = (self.received_words[base + i + 3] << 16) | self.received_words[base + i + 4]
                     n += 1
                 i += 5
         self.frames = n
         self.frames_received += n
         return segments
-
-    def _word(
-        self, base: cython.longlong, used: cython.longlong, i: cython.longlong
-    ) -> cython.longlong:
-        """Half-word i of the segment at `base`."""
-        if i < used:
-            return self.received_words[base + i]
-        return 0
 
     def send(
         self, identifier: cython.longlong, word0: cython.longlong, word1: cython.longlong
