@@ -104,18 +104,14 @@ def simplest_step(state, p=SIMPLEST):
         return np.array([y[1], a1, y[3], a3])
 
     # The heel's height is 0 where the legs coincide (the scuff) and where q3 = 2 q1 (the strike).
-    y = integrate_to(
-        rhs, np.asarray(state, float), lambda y: 2 * y[0] - y[2], lambda y: 2 * y[1] - y[3], 6.0, 2.5
-    )
+    y = integrate_to(rhs, np.asarray(state, float), lambda y: 2 * y[0] - y[2], lambda y: 2 * y[1] - y[3], 6.0, 2.5)
     r, v = spread(y)
     q = pm.swapped(r)
     old = pm.momenta(p, r, v, "P2", (1, 2)), pm.momenta(p, r, v, "H", (1,))
 
     def residual(X):
         u = np.array([X[0], 0, 0, X[1], 0, 0])
-        return np.array(
-            [pm.momenta(p, q, u, "P1", (1, 2)) - old[0], pm.momenta(p, q, u, "H", (2,)) - old[1]]
-        )
+        return np.array([pm.momenta(p, q, u, "P1", (1, 2)) - old[0], pm.momenta(p, q, u, "H", (2,)) - old[1]])
 
     u1, u3 = pm.solve_affine(residual, 2)
     return np.array([q[0], u1, q[3], u3])

@@ -4,25 +4,26 @@ cdef class Body:
     cdef public object parameters, floor, record, terms
     cdef public str cause
     cdef public long long mode, stance, last_strike_leg, step_start_ns, event
-    cdef public bint outer_armed, inner_armed, foothold_due, lock_hip, exact_spring, unilateral
-    cdef public bint lift_leading
+    cdef public bint outer_armed, inner_armed, foothold_due, lock_hip, standing, brush
+    cdef public bint brushing, exact_spring, unilateral, lift_leading
     cdef public double[::1] saved, matrix, solution
     cdef public double foot_outer, leg_outer, leg_inner, foot_inner, motor_outer, motor_inner
     cdef public double foot_outer_rate, leg_outer_rate, leg_inner_rate, foot_inner_rate, motor_outer_rate, motor_inner_rate
     cdef public double hip_x, hip_y, hip_vx, hip_vy, anchor_outer, anchor_inner
     cdef public double height_outer, height_inner, gap_outer, gap_inner, scuff_time_s, passing_gap
-    cdef public double friction_ratio_max, slip_s, normal_force_min, mu, outer_Fx, outer_Fy
+    cdef public double friction_ratio_max, slip_s, normal_force_min, brush_s, sole_k, sole_c
+    cdef public double sole_v, strike_ahead, pull_s, mu, outer_Fx, outer_Fy
     cdef public double inner_Fx, inner_Fy, foot_outer_acc, leg_outer_acc, leg_inner_acc, foot_inner_acc
-    cdef public double motor_outer_acc, motor_inner_acc, hip_drive, hip_coulomb, hip_viscous, outer_drive
-    cdef public double outer_coulomb, outer_viscous, inner_drive, inner_coulomb, inner_viscous, extra_hip
-    cdef public double extra_outer, extra_inner, extra_outer_motor, extra_inner_motor, M, mc_outer
-    cdef public double mc_inner, mw_outer, mw_inner, J_outer, J_inner, Jf
-    cdef public double JH, JA, el, r, d, kh
-    cdef public double ks, spring_ab, spring_aabb, spring_l0, spring_k, gx
-    cdef public double gy, C_outer, C_inner, heel, toe, stop_low
-    cdef public double stop_high, stop_k, stop_c, inverse_smoothing, closing_rate, fall_lean
-    cdef public double fall_height, fall_split, stall_s, time_s, released_s, elapsed
-    cdef public double P_stance_x, P_stance_y, P_swing_x, P_swing_y
+    cdef public double motor_outer_acc, motor_inner_acc, hip_ay, hip_drive, hip_coulomb, hip_viscous
+    cdef public double outer_drive, outer_coulomb, outer_viscous, inner_drive, inner_coulomb, inner_viscous
+    cdef public double extra_hip, extra_outer, extra_inner, extra_outer_motor, extra_inner_motor, M
+    cdef public double mc_outer, mc_inner, mw_outer, mw_inner, J_outer, J_inner
+    cdef public double Jf, JH, JA, el, r, d
+    cdef public double kh, ks, spring_ab, spring_aabb, spring_l0, spring_k
+    cdef public double gx, gy, C_outer, C_inner, heel, toe
+    cdef public double stop_low, stop_high, stop_k, stop_c, inverse_smoothing, closing_rate
+    cdef public double fall_lean, fall_height, fall_split, stall_s, time_s, released_s
+    cdef public double elapsed, P_stance_x, P_stance_y, P_swing_x, P_swing_y
     cpdef void set_slope(self, double slope_rad)
     cpdef double chain_x(self, double foot, double leg)
     cpdef double chain_y(self, double foot, double leg)
@@ -37,6 +38,8 @@ cdef class Body:
     cpdef double energy_J(self)
     cpdef void place(self, double outer_leg_rad, double hip_rad)
     cpdef void hold(self, double outer_leg_rad)
+    cpdef void hold_both(self, double outer_leg_rad, double hip_rad)
+    cpdef void hold_standing(self, double outer_leg_rad, double hip_rad)
     cpdef void release(self, double outer_leg_rate, long long stance=*, double stance_foot_rate=*, double hip_rate=*)
     cpdef void begin_walk(self)
     cpdef void _limp_foot(self, long long leg)
@@ -50,8 +53,13 @@ cdef class Body:
     cpdef void advance(self, double h)
     cdef void _save(self)
     cdef void _restore(self)
-    cdef bint _pulled_now(self)
+    cdef double _rise(self, long long leg)
+    cpdef bint lets_go(self, long long leg)
+    cdef bint _pulled_now(self, double h)
+    cdef bint _sole_ready(self, long long leg)
+    cdef bint _may_leave(self, long long leg)
     cdef double _crossed(self)
+    cdef double _ahead(self)
     cdef double _try(self, double h)
     cdef double _locate(self, double h)
     cdef void _act(self)

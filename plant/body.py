@@ -76,11 +76,20 @@ class Body:
         self.foothold_due = False  # the swing foot has not passed the stance foot yet
         self.last_strike_leg = -1
         self.lock_hip = False
+        self.standing = False
         self.scuff_time_s = -1.0
         self.passing_gap = 1.0  # m, lowest clearance while the swing foot passes
         self.friction_ratio_max = 0.0  # worst |F_x| / F_y of the walk
         self.slip_s = 0.0  # s with more than the floor's friction asked for
-        self.normal_force_min = 0.0  # N, worst pull (only where a pull is not answered by lift-off)
+        self.normal_force_min = 0.0  # N, worst pull that lift-off could not answer
+        self.brush = False  # the swing foot is near the floor and not ahead: its sole may touch
+        self.brushing = False
+        self.brush_s = 0.0  # s with the swing foot's sole on the floor
+        self.sole_k = p.sole_N_per_m
+        self.sole_c = p.sole_Ns_per_m
+        self.sole_v = 1.0 / p.sole_sliding_smoothing_m_s
+        self.strike_ahead = p.strike_ahead_m
+        self.pull_s = 0.0  # s with a pull of more than 1 N
         self.mu = p.floor_friction
 
         # forces of the floor at the start of the last step, N
@@ -95,6 +104,7 @@ class Body:
         self.foot_inner_acc = 0.0
         self.motor_outer_acc = 0.0
         self.motor_inner_acc = 0.0
+        self.hip_ay = 0.0  # in the air only
 
         # torques of the motors during a step: drive - coulomb tanh(rate / epsilon) - viscous rate, at the joint
         self.hip_drive = 0.0
@@ -210,7 +220,7 @@ class Body:
         """Hip position and the two gaps from the angles (in flight and held: the gaps only)."""
         outer: cython.double = self.chain_y(self.foot_outer, self.leg_outer)
         inner: cython.double = self.chain_y(self.foot_inner, self.leg_inner)
-        if self.mode == 1 or self.mode == 2:
+        if self.mode == 1 or self.mode == 2 or self.standing:
             if self.stance == 0:
                 self.hip_y = self.height_outer + outer
                 self.hip_x = self.anchor_outer + self.chain_x(self.foot_outer, self.leg_outer)
@@ -301,13 +311,18 @@ class Body:
     # ---- what the operator does -------------------------------------------------------------------------------
 
     def place(self, outer_leg_rad: cython.double, hip_rad: cython.double) -> cython.void:
-        """Everything at rest in the operator's hands, feet square to their legs, the outer foot over the floor."""
+        """Everything at rest in the operator's hands, feet square to their legs, the hip free."""
         self.leg_outer = outer_leg_rad
         self.leg_inner = outer_leg_rad - hip_rad
         self.foot_outer = self.leg_outer
         self.foot_inner = self.leg_inner
         self.motor_outer = 0.0
         self.motor_inner = 0.0
+        self.foot_outer_rate = 0.0
+        self.foot_inner_rate = 0.0
+        self.leg_inner_rate = 0.0
+        self.motor_outer_rate = 0.0
+        self.motor_inner_rate = 0.0
         self.hold(outer_leg_rad)
 
     def hold(self, outer_leg_rad: cython.double) -> cython.void:
@@ -328,11 +343,32 @@ class Body:
         self.inner_Fx = 0.0
         self.inner_Fy = 0.0
         self.lock_hip = False
+        self.standing = False
         self.cause = ""
         self.last_strike_leg = -1
         if self.Jf == 0.0:
             self._limp_foot(0)
             self._limp_foot(1)
+        self.update_pose()
+
+    def hold_both(self, outer_leg_rad: cython.double, hip_rad: cython.double) -> cython.void:
+        """As `hold`, and the operator keeps the inner legs at this hip angle too."""
+        self.leg_inner = outer_leg_rad - hip_rad
+        self.leg_inner_rate = 0.0
+        self.hold(outer_leg_rad)
+        self.lock_hip = True
+
+    def hold_standing(self, outer_leg_rad: cython.double, hip_rad: cython.double) -> cython.void:
+        """As `hold_both`, with the outer foot on the floor under the robot's weight, where it may roll.
+
+        The hands guide the outer leg's lean and the hip angle only. They also damp the rolling; 2 N m s/rad, about
+        critical for the 0.08 kg m^2 that roll against the cable: chosen by us, so that a posture settles at once.
+        """
+        self.hold_both(outer_leg_rad, hip_rad)
+        self.standing = True
+        self.anchor_outer = self.hip_x - self.chain_x(self.foot_outer, self.leg_outer)
+        self.height_outer = 0.0
+        self.height_inner = 0.0
         self.update_pose()
 
     def release(
@@ -361,6 +397,7 @@ class Body:
         """Stand on the stance foot from here on: anchors, footholds and the record start anew."""
         first: cython.double = self.floor.first_height()
         self.mode = 1
+        self.standing = False
         self.height_outer = first
         self.height_inner = first
         self.foothold_due = True
@@ -383,6 +420,10 @@ class Body:
         self.friction_ratio_max = 0.0
         self.slip_s = 0.0
         self.normal_force_min = 0.0
+        self.pull_s = 0.0
+        self.brush = False
+        self.brushing = False
+        self.brush_s = 0.0
         self.cause = ""
         self.record.begin(self.step_start_ns, self.contact_x(self.stance))
         if (self.gap_inner if self.stance == 0 else self.gap_outer) < 0.0:
@@ -408,6 +449,7 @@ class Body:
         double_stance: cython.bint = self.mode == 2
         outer_stance: cython.bint = self.stance == 0
         massless: cython.bint = self.Jf == 0.0 and not double_stance
+        brush: cython.bint = self.brush and not double_stance
         with_terms: cython.bint = self.terms is not None
         exact_spring: cython.bint = self.exact_spring
         stage: cython.longlong
@@ -428,6 +470,9 @@ class Body:
         low: cython.double = self.stop_low
         high: cython.double = self.stop_high
         eps: cython.double = self.inverse_smoothing
+        sole_k: cython.double = self.sole_k
+        sole_c: cython.double = self.sole_c
+        sole_v: cython.double = self.sole_v
         hip_coulomb: cython.double = self.hip_coulomb
         hip_viscous: cython.double = self.hip_viscous
         if outer_stance:
@@ -583,6 +628,35 @@ class Body:
             Q1 = TF - e * Px - f * Py
             Q2 = Th - Ts - lc * Px + ls * Py + As * ax - Bs * ay
             Q3 = -Th - Tw + Aw * ax - Bw * ay
+            Rx = 0.0
+            Ry = 0.0
+            if brush:
+                # the swing foot brushes the floor with its sole: normal force and sliding friction (EQUATIONS 9)
+                if G < heel:
+                    gg = G - heel
+                elif G > toe:
+                    gg = G - toe
+                else:
+                    gg = 0.0
+                ew = r * cos(gg) - d * cos(G)
+                fw = d * sin(G) - r * sin(gg)
+                lsw = el * sw
+                lcw = el * cw
+                gap = (Ys + r * cos(sg) - d * cF + lc) - (Yw + r * cos(gg) - d * cos(G) + lcw)
+                if gap < 0.0:
+                    Ry = -sole_k * gap - sole_c * (f * uF - ls * us - fw * uG + lsw * uw)
+                    if Ry > 0.0:
+                        Rx = -self.mu * Ry * tanh((e * uF + lc * us - ew * uG - lcw * uw) * sole_v)
+                        push = -ew * Rx - fw * Ry
+                        Q1 += e * Rx + f * Ry
+                        Q2 += lc * Rx - ls * Ry
+                        Q3 += lsw * Ry - lcw * Rx
+                        TG += push
+                        if massless:
+                            Q3 += push
+                            mn += push
+                    else:
+                        Ry = 0.0
             m11 = M * (e * e + f * f) + Jf
             m12 = M * (e * lc - f * ls) - As * e + Bs * f
             m13 = Bw * f - Aw * e
@@ -600,8 +674,6 @@ class Body:
             aw = i33 * Q3 - t13 * aF - t23 * as_
             ap = mp * iJA
             an = mn * iJA
-            Rx = 0.0
-            Ry = 0.0
             if double_stance:
                 # the other foot closes the linkage by its force (Rx, Ry): EQUATIONS 6
                 sG = sin(G)
@@ -801,6 +873,7 @@ class Body:
         """One Runge-Kutta step of `h` seconds in flight or held (EQUATIONS 7); stages 4, or 1 to look only."""
         held: cython.bint = self.mode == 0
         locked: cython.bint = held and self.lock_hip
+        standing: cython.bint = held and self.standing
         massless: cython.bint = self.Jf == 0.0
         with_terms: cython.bint = self.terms is not None
         stage: cython.longlong
@@ -841,7 +914,7 @@ class Body:
             Bi = mci * sin(tw) - mwi * cos(tw)
             a_s = F - th
             a_w = G - tw
-            Ts = 0.0 if massless else ks * (p - a_s)
+            Ts = 0.0 if massless and not standing else ks * (p - a_s)
             Tw = 0.0 if massless else ks * (n - a_w)
             mp = self.outer_drive - self.outer_coulomb * tanh(up * eps) - self.outer_viscous * up - Ts
             mn = self.inner_drive - self.inner_coulomb * tanh(un * eps) - self.inner_viscous * un - Tw
@@ -904,6 +977,14 @@ class Body:
             else:
                 aF = Ts * iJf
                 aG = Tw * iJf
+            if standing:
+                # the foot rolls under the weight, the leg's lean is kept (EQUATIONS 7.2)
+                stop = self._excess(F)
+                e = self.r * cos(stop) - self.d * cos(F)
+                f = self.d * sin(F) - self.r * sin(stop)
+                aF = (Ts - (self.C_outer + 2.0) * uF + M * (e * self.gx + f * self.gy)) / (
+                    M * (e * e + f * f) + self.Jf
+                )
             if stage == 0:
                 self.foot_outer_acc = aF
                 self.leg_outer_acc = as_
@@ -911,8 +992,9 @@ class Body:
                 self.foot_inner_acc = aG
                 self.motor_outer_acc = ap
                 self.motor_inner_acc = an
-                self.outer_Fx = 0.0
-                self.outer_Fy = 0.0
+                self.hip_ay = ayh
+                self.outer_Fx = -M * self.gx if standing else 0.0
+                self.outer_Fy = -M * self.gy if standing else 0.0
                 self.inner_Fx = 0.0
                 self.inner_Fy = 0.0
                 if stages == 1:
@@ -1117,7 +1199,7 @@ class Body:
             self._save()
             if self.mode == 1 or self.mode == 2:
                 self.on_feet(remaining, 4)
-                if tries < 20 and self._pulled_now():
+                if tries < 20 and self._pulled_now(remaining):
                     continue  # a foot left the floor at the start of this piece: nothing has moved yet
                 self.update_pose()
             else:
@@ -1175,65 +1257,152 @@ class Body:
         self.hip_vx = s[14]
         self.hip_vy = s[15]
 
-    def _pulled_now(self) -> cython.bint:
-        """Let a foot go that the floor would have to pull at the start of this piece; True when one was."""
-        Fs: cython.double
-        Fw: cython.double
-        if self.stance == 0:
-            Fs, Fw = self.outer_Fy, self.inner_Fy
+    def _rise(self, leg: cython.longlong) -> cython.double:
+        """Vertical acceleration of a chain's hip end over a resting contact: f foot'' - l sin leg'' + bias."""
+        foot: cython.double = self.foot_outer if leg == 0 else self.foot_inner
+        lean: cython.double = self.leg_outer if leg == 0 else self.leg_inner
+        foot_rate: cython.double = self.foot_outer_rate if leg == 0 else self.foot_inner_rate
+        leg_rate: cython.double = self.leg_outer_rate if leg == 0 else self.leg_inner_rate
+        foot_acc: cython.double = self.foot_outer_acc if leg == 0 else self.foot_inner_acc
+        leg_acc: cython.double = self.leg_outer_acc if leg == 0 else self.leg_inner_acc
+        excess: cython.double = self._excess(foot)
+        down: cython.double = self.d * cos(foot)
+        if excess != 0.0:
+            down -= self.r * cos(excess)
+        return (
+            (self.d * sin(foot) - self.r * sin(excess)) * foot_acc
+            - self.el * sin(lean) * leg_acc
+            + down * foot_rate * foot_rate
+            - self.el * cos(lean) * leg_rate * leg_rate
+        )
+
+    def lets_go(self, leg: cython.longlong) -> cython.bint:
+        """True when this foot, let go by the floor now, would rise: only then may it leave (EQUATIONS 9).
+
+        A rigid foot that sticks can ask for a pull and yet, let go, drive into the floor, because letting go also
+        takes the friction force away; on the robot it would slip there. It stays, and the pull is reported.
+        """
+        mode: cython.longlong = self.mode
+        stance: cython.longlong = self.stance
+        fo: cython.double = self.foot_outer
+        fi: cython.double = self.foot_inner
+        fo_rate: cython.double = self.foot_outer_rate
+        fi_rate: cython.double = self.foot_inner_rate
+        outer_Fx: cython.double = self.outer_Fx
+        outer_Fy: cython.double = self.outer_Fy
+        inner_Fx: cython.double = self.inner_Fx
+        inner_Fy: cython.double = self.inner_Fy
+        gap: cython.double
+        rise: cython.double
+        if mode == 2:
+            self.mode = 1
+            self.stance = 1 - leg
         else:
-            Fs, Fw = self.inner_Fy, self.outer_Fy
+            self.mode = 3
+        if self.Jf == 0.0:
+            self._limp_foot(leg)
+        self.update_pose()
+        gap = self.gap_outer if leg == 0 else self.gap_inner
         if self.mode == 1:
-            if Fs >= 0.0:
-                return False
-            self._restore()
-            self.update_pose()
-            self.update_hip_rates()
-            self._leave(self.stance)
+            self.on_feet(0.0, 1)
+            rise = self._rise(1 - leg) - self._rise(leg)
+        else:
+            self.in_air(0.0, 1)
+            rise = self.hip_ay - self._rise(leg)
+        self.mode = mode
+        self.stance = stance
+        self.foot_outer = fo
+        self.foot_inner = fi
+        self.foot_outer_rate = fo_rate
+        self.foot_inner_rate = fi_rate
+        self.outer_Fx = outer_Fx
+        self.outer_Fy = outer_Fy
+        self.inner_Fx = inner_Fx
+        self.inner_Fy = inner_Fy
+        self.update_pose()
+        # a massless foot turns to its motor's angle at once and may come clear, or down, by that alone
+        if gap > 1e-9:
             return True
-        if Fw >= 0.0 and (Fs >= 0.0 or not self.lift_leading):
+        return gap > -1e-9 and rise > 0.0
+
+    def _pulled_now(self, h: cython.double) -> cython.bint:
+        """Let a foot go that the floor would have to pull at the start of this piece of `h` seconds.
+
+        True when one was: then the state is that of the start.
+        """
+        first: cython.longlong
+        leg: cython.longlong
+        k: cython.longlong
+        force: cython.double
+        if self.mode == 1:
+            if (self.outer_Fy if self.stance == 0 else self.inner_Fy) >= 0.0:
+                return False
+        elif self.outer_Fy >= 0.0 and self.inner_Fy >= 0.0:
             return False
         self._restore()
         self.update_pose()
-        if Fw < Fs:
-            self._leave(1 - self.stance)
-        else:
-            self._leave(self.stance)
-        return True
+        first = 0 if self.outer_Fy < self.inner_Fy else 1
+        for k in range(2):
+            leg = first if k == 0 else 1 - first
+            force = self.outer_Fy if leg == 0 else self.inner_Fy
+            if force < 0.0 and self._may_leave(leg) and (self._sole_ready(leg) or self.lets_go(leg)):
+                self.update_hip_rates()
+                self._leave(leg)
+                return True
+        self.on_feet(h, 4)
+        return False
+
+    def _sole_ready(self, leg: cython.longlong) -> cython.bint:
+        """True when this foot of a double stance is not ahead: let go, its sole stops it from driving in."""
+        if self.mode != 2 or self.Jf == 0.0:
+            return False
+        return self.contact_x(leg) - self.contact_x(1 - leg) < self.strike_ahead
+
+    def _may_leave(self, leg: cython.longlong) -> cython.bint:
+        """Feet on the floor may leave it; the leading one in double stance only with `lift_leading`."""
+        if self.mode == 1:
+            return leg == self.stance
+        return self.lift_leading or leg != self.last_strike_leg
 
     def _crossed(self) -> cython.double:
-        """Below 0 when an event lies behind; `event` names it: 1 outer touch, 2 inner touch, 3 outer off, 4 inner off."""
-        value: cython.double
+        """Below 0 when an event lies behind. `event`: 1, 2 outer, inner foot touches; 3, 4 outer, inner foot leaves."""
+        value: cython.double = 1.0
         other: cython.double
         self.event = 0
         if self.mode == 2:
             self.on_feet(0.0, 1)
-            value = self.outer_Fy
-            other = self.inner_Fy
-            if not self.lift_leading:
+            if self._may_leave(0):
+                other = self.outer_Fy
+                if other >= 0.0 or self._sole_ready(0) or self.lets_go(0):
+                    value = other
+                    self.event = 3
+            if self._may_leave(1):
+                other = self.inner_Fy
+                if other < value and (other >= 0.0 or self._sole_ready(1) or self.lets_go(1)):
+                    value = other
+                    self.event = 4
+            return value
+        if self.mode == 1:
+            # only a foot ahead can strike; beside and behind it brushes with its sole
+            if self._ahead() > self.strike_ahead:
+                self.event = 2 - self.stance  # the other foot
                 if self.stance == 0:
-                    value = 1.0
-                else:
-                    other = 1.0
-            if value <= other:
-                self.event = 3
-                return value
-            self.event = 4
+                    return self.gap_inner + (0.0 if self.inner_armed else 2e-6)
+                return self.gap_outer + (0.0 if self.outer_armed else 2e-6)
+            return 1.0
+        self.event = 1
+        value = self.gap_outer + (0.0 if self.outer_armed else 2e-6)
+        other = self.gap_inner + (0.0 if self.inner_armed else 2e-6)
+        if other < value:
+            self.event = 2
             return other
-        value = 1.0
-        if not (self.mode == 1 and self.stance == 0):
-            self.event = 1
-            value = self.gap_outer
-            if not self.outer_armed:
-                value += 2e-6
-        if not (self.mode == 1 and self.stance == 1):
-            other = self.gap_inner
-            if not self.inner_armed:
-                other += 2e-6
-            if other < value:
-                self.event = 2
-                value = other
         return value
+
+    def _ahead(self) -> cython.double:
+        """How far the swing foot's lowest point is ahead of the stance foot's, m."""
+        if self.stance == 0:
+            return self.contact_x(1) - self.contact_x(0)
+        return self.contact_x(0) - self.contact_x(1)
 
     def _try(self, h: cython.double) -> cython.double:
         """The event function after a piece of `h` seconds from the saved state."""
@@ -1309,14 +1478,17 @@ class Body:
         lean: cython.double = self.leg_outer if foot == 0 else self.leg_inner
         energy: cython.double = self.energy_J()
         strike: cython.bint
+        # a foot that strikes with its sole already pressed stands as deep as it is
         if foot == 0:
             self.anchor_outer = self.hip_x - self.chain_x(angle, lean)
             self.outer_armed = False
+            self.height_outer += self.gap_outer
         else:
             self.anchor_inner = self.hip_x - self.chain_x(angle, lean)
             self.inner_armed = False
+            self.height_inner += self.gap_inner
         ahead = self.contact_x(foot) - self.contact_x(other)
-        strike = foot != self.last_strike_leg and ahead > 0.05
+        strike = foot != self.last_strike_leg and ahead > self.strike_ahead
         if was_flight:
             self.impact(foot == 0, foot == 1)
             if foot != self.stance:
@@ -1327,9 +1499,8 @@ class Body:
         else:
             self._save()
             self.impact(True, True)
-            # a foot that stubs beside or behind the other may throw it off the floor; at a strike the rule of
-            # the appendix holds unless `unilateral` (EQUATIONS 8)
-            if self.P_stance_y < 0.0 and (self.unilateral or not (strike or self.last_strike_leg == foot)):
+            # the rule of the appendix keeps the trailing foot on the floor, by a pull if need be (EQUATIONS 8)
+            if self.P_stance_y < 0.0 and self.unilateral:
                 self._restore()
                 self.impact(foot == 0, foot == 1)
                 self.mode = 1
@@ -1350,7 +1521,6 @@ class Body:
             (self.P_stance_x, self.P_stance_y, self.P_swing_x, self.P_swing_y),
             energy - self.energy_J(),
             self.mode == 2,
-            not self.foothold_due,
             self.passing_gap,
         )
         if strike:
@@ -1358,8 +1528,7 @@ class Body:
             self.last_strike_leg = foot
             self.foothold_due = True
             self.released_s = self.time_s
-        elif ahead <= 0.05 and foot != self.last_strike_leg and not self.foothold_due:
-            self.scuff_time_s = self.time_s
+        self.brush = False
         if self.mode == 1 and self.Jf == 0.0:
             self._limp_foot(other)
 
@@ -1373,6 +1542,8 @@ class Body:
         if self.mode == 2:
             self.mode = 1
             self.stance = 1 - foot
+            self.brush = self._ahead() <= self.strike_ahead
+            self.brushing = True  # it leaves: only a later touch counts as one
         else:
             self.mode = 3
         if self.Jf == 0.0:
@@ -1404,6 +1575,17 @@ class Body:
                 else:
                     self.height_outer = self.floor.next_height()
                 self.update_pose()
+            # near the floor and not ahead: the sole may touch in the next step
+            self.brush = gap < 1e-3 and self._ahead() <= self.strike_ahead
+            if gap < 0.0 and self.brush:
+                self.brush_s += h
+                if not self.brushing:
+                    self.brushing = True
+                    self.record.brush(not self.foothold_due)
+                    if not self.foothold_due:
+                        self.scuff_time_s = self.time_s
+            elif gap > 1e-3:
+                self.brushing = False
             # clearance: the lowest gap while the swing foot is less than 50 mm from passing
             if gap < self.passing_gap and -0.05 < self.el * (s - w) < 0.05:
                 self.passing_gap = gap
@@ -1435,6 +1617,8 @@ class Body:
             slips = slips or fabs(self.inner_Fx) > self.mu * self.inner_Fy
         if slips:
             self.slip_s += h
+        if self.outer_Fy < -1.0 or self.inner_Fy < -1.0:
+            self.pull_s += h
         if self.outer_Fy < self.normal_force_min:
             self.normal_force_min = self.outer_Fy
         if self.inner_Fy < self.normal_force_min:

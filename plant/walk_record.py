@@ -11,8 +11,8 @@ class WalkRecord:
     A step is counted when a foot meets the floor ahead of the other one, in turn. `step_length_m` is what the walk
     gained by it: the distance of this foot's contact point from the previous strike's. The first step counts from
     where the robot was put down. Oddities: `bounces` (the leading foot left the floor and came back), `recontacts`
-    (the trailing foot touched again behind), `scuffs` (the swing foot touched beside or after passing, not ahead),
-    `flights` (no foot on the floor), `lead_lifts`, `tensile_strikes` (the rule of the strike asked the trailing foot
+    (a foot touched out of turn), `brushes` and `scuffs` (the swing foot's sole touched the floor before, after it
+    passed the stance foot), `flights` (no foot on the floor), `lead_lifts`, `tensile_strikes` (the rule of the strike asked the trailing foot
     to be pulled; `tensile_impulse_Ns` the last, `_min_Ns` the worst).
     """
 
@@ -45,6 +45,7 @@ class WalkRecord:
         self.tensile_strikes = 0
         self.bounces = 0
         self.recontacts = 0
+        self.brushes = 0
         self.scuffs = 0
         self.flights = 0
         self.lead_lifts = 0
@@ -59,13 +60,11 @@ class WalkRecord:
         self.time_squares = 0.0
         self.double_stance_sum_s = 0.0
 
-    def touch(self, time_ns, leg, strike, ahead, x, foot_rad, impulses, loss_J, double, passed, gap) -> None:
+    def touch(self, time_ns, leg, strike, ahead, x, foot_rad, impulses, loss_J, double, gap) -> None:
         """A foot met the floor. `impulses`: stance x, y, swing x, y in N s; `gap`: lowest clearance at passing."""
         if not strike:
             if leg == self.strike_leg and ahead > 0.0:
                 self.bounces += 1
-            elif passed:
-                self.scuffs += 1
             else:
                 self.recontacts += 1
             return
@@ -96,6 +95,13 @@ class WalkRecord:
             self.length_squares += self.step_length_m * self.step_length_m
             self.time_sum_s += seconds
             self.time_squares += seconds * seconds
+
+    def brush(self, passed) -> None:
+        """The swing foot's sole touched the floor, before or after it passed the stance foot."""
+        if passed:
+            self.scuffs += 1
+        else:
+            self.brushes += 1
 
     def leave(self, time_ns, leg, flight) -> None:
         """A foot left the floor."""

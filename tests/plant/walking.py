@@ -15,6 +15,7 @@ MU = 0.1
 C0 = 0.1  # N m on the robot [facts on the plant 3]
 C1 = 0.01  # N m s/rad
 STEP_S = 125e-6
+ZERO = 1.68  # rad, ankle reading with the sweet spot under an upright leg
 TICK = 16  # steps of the plant per controller tick of 2 ms
 
 
@@ -51,6 +52,7 @@ class Walker:
         self.delay_s = delay_s
         self.limits = limits
         self.count = 0
+        self.commands = None  # hip, outer, inner: (I0, K, D) of the boards' law I = I0 - K p - D rate
 
     def set_currents(self, hip, outer, inner):
         if self.limits:
@@ -64,6 +66,16 @@ class Walker:
         b.hip_drive, b.hip_coulomb, b.hip_viscous = self.hip.laws()
         b.outer_drive, b.outer_coulomb, b.outer_viscous = self.ankles[0].laws()
         b.inner_drive, b.inner_coulomb, b.inner_viscous = self.ankles[1].laws()
+
+    def obey(self):
+        """The motor boards at 2 kHz, with currents that follow at once."""
+        b = self.body
+        hip, outer, inner = self.commands
+        self.set_currents(
+            hip[0] - hip[1] * b.hip_angle() - hip[2] * b.hip_rate(),
+            outer[0] - outer[1] * (b.motor_outer + ZERO) - outer[2] * b.motor_outer_rate,
+            inner[0] - inner[1] * (b.motor_inner + ZERO) - inner[2] * b.motor_inner_rate,
+        )
 
     @property
     def seconds(self):
@@ -79,6 +91,8 @@ class Walker:
         while b.mode != FALLEN and b.record.steps < steps and self.seconds < seconds:
             if self.count % TICK == 0:
                 self.controller.tick(self)
+            if self.commands is not None and self.count % 4 == 0:
+                self.obey()
             self.hip.spend(b.hip_rate(), STEP_S)
             self.ankles[0].spend(b.motor_outer_rate, STEP_S)
             self.ankles[1].spend(b.motor_inner_rate, STEP_S)
@@ -173,6 +187,201 @@ class PaperGait:
             walker.set_currents(hip, ankle_w, ankle_s)
 
 
+class Butterworth:
+    """10 Hz at 1 kHz, second order, iterated twice per tick of 2 ms [facts on control 3.1]."""
+
+    def __init__(self):
+        self.x = [0.0, 0.0]
+        self.y = [0.0, 0.0]
+
+    def once(self, x):
+        b0, a1, a2 = 0.00094469184384, -1.911197067426073, 0.914975834801434
+        y = b0 * (x + 2 * self.x[0] + self.x[1]) - a1 * self.y[0] - a2 * self.y[1]
+        self.x = [x, self.x[0]]
+        self.y = [y, self.y[0]]
+        return y
+
+    def tick(self, x):
+        self.once(self.x[0])
+        return self.once(x)
+
+
+class RecordGait:
+    """The May 2011 machines [facts on control 1.3-1.5] with ideal angles: leg, hip, two feet, no boards.
+
+    Side 0 outer, 1 inner. `flag` is the swing leg flag: 0 outer legs swing, 1 inner legs swing.
+    """
+
+    RECORD = dict(outer_stiffness=2.0, trigger=0.012, flip_down=0.10)
+    ROBUST = dict(outer_stiffness=0.0, trigger=0.022, flip_down=0.13)  # "F" of facts on the record walk
+
+    def __init__(self, parameters=None):
+        self.p = dict(self.RECORD if parameters is None else parameters)
+        self.flag = 1
+        self.seen = 0
+        self.strike_s = 0.0
+        self.filter = Butterworth()
+        self.leg = ["aftermid", 0]  # state, stance side
+        self.hip = "starthold"
+        self.hip_side = 1  # side that swings
+        self.feet = ["startstance", "startflipdown"]
+        self.foot_time = [0.0, 0.0]
+        self.push = [(0.0, 0.0, 0.0), (0.0, 0.0, 0.0)]  # gain, extra angle, angle at entry
+        self.v_leg = [0.5, 0.5]
+        self.hip_mid = [0.0, 0.0]
+        self.omega_leg = [1.66, 1.66]
+        self.v, self.alpha, self.omega = 0.5, 0.0, 1.66
+        self.A0 = self.t0 = self.hip_start = self.after_ms = 0.0
+        self.dI = (0.0, 0.0)
+
+    def tick(self, walker):
+        b = walker.body
+        now = walker.seconds
+        # a robot put down starts its clock of strikes anew
+        if b.record.steps > self.seen and now >= b.record.strike_time_ns * 1e-9 + walker.delay_s:
+            self.seen = b.record.steps
+            self.flag = 1 - self.flag
+            self.strike_s = now
+        self.t_hs = (now - self.strike_s) * 1e3
+        self.lean = (b.leg_outer, b.leg_inner)
+        self.h = b.hip_angle()
+        self.h_rate = self.filter.tick(b.hip_rate())
+        self.a = (b.foot_outer - b.leg_outer + ZERO, b.foot_inner - b.leg_inner + ZERO)
+        self.a_rate = (b.foot_outer_rate - b.leg_outer_rate, b.foot_inner_rate - b.leg_inner_rate)
+        self.m = (b.motor_outer + ZERO, b.motor_inner + ZERO)
+        self.published = (b.foot_outer + 1.75, b.foot_inner + 1.75)
+        self.leg_machine()
+        hip = self.hip_machine()
+        inner = self.foot_machine(1)
+        outer = self.foot_machine(0)
+        walker.commands = (hip, outer, inner)
+
+    def ahead(self, stance):
+        """Hip angle, positive with the swing leg ahead."""
+        return self.h if stance == 0 else -self.h
+
+    def leg_machine(self):
+        state, side = self.leg
+        A = -self.lean[side]
+        if state == "preswing" and self.a_rate[1 - side] < -5.0:
+            self.leg[0] = "premid"
+            self.A0, self.t0, self.hip_start = A, self.t_hs, self.ahead(side)
+        elif state == "premid" and A < 0.0:
+            self.leg[0] = "aftermid"
+            lasted = max(self.t_hs - self.t0, 2.0)
+            self.v_leg[side] = 1000.0 * self.A0 / lasted
+            self.omega_leg[side] = (self.hip_mid[side] - self.hip_start) * 1000.0 / lasted
+            self.hip_mid[side] = self.ahead(side)
+            v = sum(self.v_leg) / 2
+            self.v = 1.5 if v >= 1.5 else 0.01 if v <= 0.0 else v
+            self.alpha = sum(self.hip_mid) / 2
+            self.omega = sum(self.omega_leg) / 2
+        elif state == "aftermid" and self.flag == side:
+            self.leg = ["preswing", 1 - side]
+
+    def hip_machine(self):
+        swing = self.hip_side
+        sign = 1.0 if swing == 1 else -1.0
+        stance = 1 - swing
+        struck = self.flag != swing
+        ahead = sign * self.h
+        held = (ahead > 0.2 and self.v < 0.4) or (0.0 < ahead < 0.3 and sign * self.h_rate < 0.0)
+        if self.hip in ("starthold", "aftermid", "ehold") and struck:
+            self.hip, self.hip_side = "preswing", 1 - swing
+        elif self.hip == "preswing" and self.a_rate[swing] < -5.0:
+            self.hip = "premid"
+        elif self.hip == "premid" and self.lean[stance] > 0.0 and self.leg == ["aftermid", stance]:
+            self.hip = "aftermid"
+            self.after_ms = 0.0
+            if self.v >= 0.65:
+                self.dI = (-2.0 * self.alpha, -1.0 * self.alpha)
+            else:
+                self.dI = (
+                    1.0 * self.alpha + 0.3 * (self.omega - 1.66),
+                    0.5 * self.alpha + 0.2 * (self.omega - 1.66),
+                )
+        elif self.hip in ("premid", "aftermid") and held:
+            self.hip = "ehold"
+        swing = self.hip_side
+        sign = 1.0 if swing == 1 else -1.0
+        if self.hip == "starthold":
+            return 30 * 0.35, 30.0, 3.0
+        if self.hip == "ehold":
+            return sign * 30 * 0.35, 30.0, 4.0
+        if self.hip == "preswing":
+            return 0.0, 0.0, 0.0
+        current = max(0.0, 3.0 * (2.0 - sign * self.h_rate)) if self.t_hs - self.t0 < 300.0 else 0.0
+        if self.hip == "aftermid":
+            current += self.dI[0] if self.after_ms < 150 else self.dI[1] if self.after_ms < 300 else 0.0
+            self.after_ms += 2.0
+        return sign * current, self.p["outer_stiffness"] if swing == 0 else 0.0, 0.0
+
+    def foot_machine(self, side):
+        other = 1 - side
+        sign = 1.0 if side == 1 else -1.0
+        ahead = sign * self.h  # positive with this foot ahead
+        swings = self.flag == side
+        state = self.feet[side]
+        height = 0.96 * (math.cos(self.lean[side]) - math.cos(self.lean[other]))
+        turned = self.published[side] - self.push[side][2]
+        new = state
+        if state == "stance":
+            near = height < self.p["trigger"] and self.published[other] > 1.7
+            if ahead < -0.05 and (near or swings):
+                new = "prepush"
+        elif state == "prepush":
+            if swings and turned > 0.5 * (0.2 + self.push[side][1]):
+                new = "afterpush"
+        elif state == "afterpush":
+            if self.m[side] - self.a[side] <= 0.07 or self.foot_time[side] >= 30.0:
+                new = "flipup"
+        elif state == "flipup":
+            if ahead > self.p["flip_down"]:
+                new = "flipdown"
+        elif state in ("flipdown", "startflipdown"):
+            if not swings and self.flag == other:
+                new = "stance"
+        elif state == "startstance" and self.flag == side:
+            new = "flipup"
+        if new != state:
+            self.feet[side] = new
+            self.foot_time[side] = 0.0
+            if new == "prepush":
+                slow = self.v < 0.65
+                gain = -5.0 * (self.v - 0.72) if slow else 0.0
+                extra = -0.5 * (self.v - 0.72) if slow else 0.0
+                self.push[side] = (gain, extra, self.published[side])
+        self.foot_time[side] += 2.0
+        state = self.feet[side]
+
+        def absolute(target, stiffness, damping):
+            return stiffness * (target + self.m[side] - self.published[side]), stiffness, damping
+
+        if state == "stance":
+            return absolute(2.0, 4.0, 0.2)
+        if state == "prepush":
+            gain, extra, _ = self.push[side]
+            return absolute(2.0 + 0.2 + extra, 10.0 + gain, 0.0)
+        if state == "afterpush":
+            return 0.0, 0.0, 0.0
+        if state == "flipup":
+            return 1.5 * 0.2, 1.5, 0.1
+        if state == "flipdown":
+            return absolute(2.0, 1.5, 0.1)
+        if state == "startflipdown":
+            return 1.5 * (2.0 + 0.5 * self.h), 1.5, 0.1
+        return 30.0 * (2.0 - 0.5 * self.h), 30.0, 0.3
+
+
+def held_start(walker, lean=0.09, rate=0.7, seconds=1.5):
+    """The operator's start [facts on the record walk]: standing, legs held 0.35 rad apart, then let go."""
+    walker.body.place(lean, 0.35)
+    walker.body.hold_standing(lean, 0.35)
+    walker.run(1, seconds)
+    walker.body.step_start_ns = walker.count * 125_000
+    walker.body.release(rate)
+
+
 def mid_stance_start(body, leg_rate=0.62, hip_rate=2.1, stance_foot=0.0, swing_ankle=-1.3):
     """Outer leg upright and going forward, inner leg swinging forward, inner foot flipped up."""
     b = body
@@ -189,4 +398,15 @@ def mid_stance_start(body, leg_rate=0.62, hip_rate=2.1, stance_foot=0.0, swing_a
     b.foothold_due = False
 
 
-__all__ = ["DOUBLE", "FALLEN", "SINGLE", "IdealMotor", "PaperGait", "Walker", "clip", "mid_stance_start"]
+__all__ = [
+    "DOUBLE",
+    "FALLEN",
+    "SINGLE",
+    "IdealMotor",
+    "PaperGait",
+    "RecordGait",
+    "Walker",
+    "clip",
+    "held_start",
+    "mid_stance_start",
+]
