@@ -223,7 +223,7 @@ class MotorUnit:
         """Bridge current over `seconds` with x = V - K G w; leaves the integrals of I, |I| and I^2."""
         R: cython.double = self.winding_ohm + self.series_ohm
         tau: cython.double
-        I: cython.double = self.bridge_current_A  # noqa: E741  (the appendix's letter)
+        amps: cython.double = self.bridge_current_A
         left: cython.double = seconds
         final: cython.double
         start: cython.double
@@ -236,9 +236,9 @@ class MotorUnit:
         square: cython.double = 0.0
         while left > 0.0:
             # `sign`: side of zero the current is on or goes to; start and final are measured on that side
-            if I > 0.0:
+            if amps > 0.0:
                 sign = 1.0
-            elif I < 0.0:
+            elif amps < 0.0:
                 sign = -1.0
             elif x > drop:
                 sign = 1.0
@@ -247,7 +247,7 @@ class MotorUnit:
             else:
                 break  # the contact drop holds the current at zero
             tau = self.inductance_H / R
-            start = sign * I
+            start = sign * amps
             final = (sign * x - drop) / R
             crossing = left
             if final < 0.0:
@@ -258,7 +258,7 @@ class MotorUnit:
                 # the current reaches zero inside: there e = -final / (start - final)
                 e = -final / (start - final)
                 left -= crossing
-                I = 0.0
+                amps = 0.0
             else:
                 if left == self.last_duration_s and R == self.decay_rate:
                     e = self.decay
@@ -269,9 +269,9 @@ class MotorUnit:
                     self.decay = e
                 crossing = left
                 left = 0.0
-                I = sign * (final + (start - final) * e)
-                if sign * I < 0.0:
-                    I = 0.0
+                amps = sign * (final + (start - final) * e)
+                if sign * amps < 0.0:
+                    amps = 0.0
             part = final * crossing + (start - final) * tau * (1.0 - e)
             charge += sign * part
             absolute += part
@@ -280,7 +280,7 @@ class MotorUnit:
                 + 2.0 * final * (start - final) * tau * (1.0 - e)
                 + (start - final) * (start - final) * (0.5 * tau) * (1.0 - e * e)
             )
-        self.bridge_current_A = I
+        self.bridge_current_A = amps
         self.charge_As = charge
         self.absolute_As = absolute
         self.square_A2s = square

@@ -1,0 +1,25 @@
+from libc.math cimport cos, exp, sin
+from foundation.numbers cimport word_of_float
+from foundation.random_stream cimport RandomStream
+from plant.edge_buffer cimport ByteBuffer
+
+cdef class Imu:
+    cdef public double bias_rad_s, noise_rad_s, roll_bias_rad, roll_noise_rad, rate_scale, lag_s, cross_x_from_z
+    cdef public long long filter_samples, latency_ns, baud, sample_ns, fusion_divider, ppb, phase_ns
+    cdef public RandomStream stream
+    cdef public ByteBuffer bytes
+    cdef public long long samples, next_sample_ns, line_free_ns, packets, mode, command
+    cdef public long long acknowledge, acknowledge_ns, checksum
+    cdef public double[::1] ring
+    cdef public double ring_sum, lagged, rate_x, roll
+    cpdef void receive_byte(self, long long time, long long byte)
+    cpdef long long sample_time(self, long long n)
+    cpdef void update(
+        self, long long t0, long long t1, double lean0, double rate0, double lean1, double rate1,
+        double yaw=*, double yaw_rate=*,
+    )
+    cpdef void _send(self, long long byte)
+    cpdef void _word(self, long long word)
+    cpdef void _sum(self)
+    cpdef void _packet(self, long long start, double first, double second, double third, double yaw_rate)
+    cpdef void _acknowledge(self)

@@ -1,0 +1,224 @@
+"""The inertial sensor 3DM-GX3-25 on the outer legs: packets of bytes on its serial line.
+
+It is silent until the command C4 C1 29 xx arrives, acknowledges it and then sends packet xx for ever (00 stops
+it). Both packets known here have 31 bytes: header, six big-endian singles, a four-byte timer in ticks of
+1/62 500 s, and the 16-bit sum of the first 29 bytes.
+
+- CF: roll, pitch, yaw (rad), rates about x, y, z (rad/s), at the rate of its sensor fusion (200-250 Hz, appendix
+  3.8; one packet per `fusion_divider` samples).
+- C2: accelerations x, y, z (g), rates x, y, z (rad/s), every sample, 1 kHz. ROBOT PARITY: of the record walk we
+  know only "rates alone at 1000 Hz"; C2 is the device's packet with scaled rates and no angles, as its protocol
+  describes it. The accelerations are those of gravity alone, because nothing on the robot reads them.
+
+Signs (facts control-and-data 1.1, 3.2): with the outer legs' lean LO positive forward, rate x = bias - dLO/dt and
+roll = roll_bias - LO. So the firmware's -(rate x - bias) is the legs' rate. The physical bias is the one that the
+2011 firmware takes off, -0.004 rad/s; the roll bias the one of 2016, -0.021 rad.
+
+ROBOT PARITY: fused angles are the true ones with noise and bias; the device's slow correction is not modelled.
+"""
+
+import array
+
+import cython
+
+from foundation.random_stream import RandomStream
+from foundation.user_error import UserError
+from plant.edge_buffer import ByteBuffer
+
+if not cython.compiled:
+    from math import cos, exp, sin
+
+    from foundation.numbers import word_of_float
+
+HEADER_ANGLES_AND_RATES = 0xCF
+HEADER_RATES = 0xC2
+PACKET_BYTES = 31
+MAX_FILTER = 64
+
+
+class Imu:
+    """The device. `bytes`: ByteBuffer of what it sent in the last `update`, stamped with the end of each byte.
+
+    `bias_rad_s`, `noise_rad_s` of each rate; `filter_samples`: moving average over so many samples (1: none);
+    `latency_ns`: sample to first start bit; `ppb`: its own clock fast by this many parts per billion.
+    """
+
+    def __init__(
+        self,
+        seed=0,
+        bias_rad_s=-0.004,  # facts control-and-data 3.1
+        # Chosen by us: the log of the resting gyro (facts control-and-data 6.2) spans 0.03 rad/s in 18 000 samples.
+        noise_rad_s=0.004,
+        roll_bias_rad=-0.021,  # facts network-and-boards 4.17
+        roll_noise_rad=0.001,  # chosen by us: a few hundredths of a degree, far below the 0.5 degrees of accuracy
+        filter_samples=1,
+        latency_ns=500_000,  # chosen by us: half a sample to compute and frame a packet
+        baud=460_800,  # the device's setting; the board's divider makes 460 526 of it
+        sample_ns=1_000_000,
+        fusion_divider=4,  # 250 Hz, appendix 3.8
+        ppb=0,
+        phase_ns=0,
+    ) -> None:
+        if not 1 <= filter_samples <= MAX_FILTER or fusion_divider < 1 or baud < 1 or sample_ns < 1:
+            raise UserError(
+                f"inertial sensor: filter_samples {filter_samples} (1 ... {MAX_FILTER}), fusion_divider "
+                f"{fusion_divider}, baud {baud} or sample_ns {sample_ns} is impossible"
+            )
+        if noise_rad_s < 0.0 or roll_noise_rad < 0.0 or latency_ns < 0:
+            raise UserError("inertial sensor: noise and latency must not be negative")
+        self.bias_rad_s = bias_rad_s
+        self.noise_rad_s = noise_rad_s
+        self.roll_bias_rad = roll_bias_rad
+        self.roll_noise_rad = roll_noise_rad
+        self.filter_samples = filter_samples
+        self.latency_ns = latency_ns
+        self.baud = baud
+        self.sample_ns = sample_ns
+        self.fusion_divider = fusion_divider
+        self.ppb = ppb
+        self.phase_ns = phase_ns
+        self.rate_scale = 1.0
+        self.lag_s = 0.0
+        self.cross_x_from_z = 0.0  # rad, misalignment: how much of the yaw rate shows about x
+        self.stream = RandomStream(seed, "inertial sensor")
+        self.bytes = ByteBuffer()
+        self.samples = 0
+        self.next_sample_ns = phase_ns
+        self.line_free_ns = 0
+        self.packets = 0
+        self.mode = 0  # header of the packet that is sent, 0: silent
+        self.command = 0  # bytes of a command received so far
+        self.acknowledge = -1  # command byte to acknowledge
+        self.acknowledge_ns = 0
+        self.ring = array.array("d", [0.0]) * MAX_FILTER
+        self.ring_sum = 0.0
+        self.lagged = 0.0
+        self.rate_x = 0.0  # of the last sample
+        self.roll = 0.0
+        self.checksum = 0
+
+    def receive_byte(self, time: cython.longlong, byte: cython.longlong) -> cython.void:
+        """A byte of the board arrived complete at `time` (ns)."""
+        if self.command == 3:
+            self.mode = byte & 255
+            if self.mode != 0xCF and self.mode != 0xC2:
+                self.mode = 0
+            self.acknowledge = byte & 255
+            self.acknowledge_ns = time
+            self.command = 0
+        elif self.command == 1 and byte == 0xC1 or self.command == 2 and byte == 0x29:
+            self.command += 1
+        else:
+            self.command = 1 if byte == 0xC4 else 0
+
+    def sample_time(self, n: cython.longlong) -> cython.longlong:
+        """Instant (ns) of sample n, from the count, in a clock that is `ppb` fast."""
+        drift: cython.longlong = (n // 1000000) * self.ppb * (self.sample_ns // 1000)
+        drift += (n % 1000000) * self.ppb * self.sample_ns // 1000000000
+        return self.phase_ns + n * self.sample_ns - drift
+
+    def update(
+        self,
+        t0: cython.longlong,
+        t1: cython.longlong,
+        lean0: cython.double,
+        rate0: cython.double,
+        lean1: cython.double,
+        rate1: cython.double,
+        yaw: cython.double = 0.0,
+        yaw_rate: cython.double = 0.0,
+    ) -> cython.void:
+        """Take all samples of [t0, t1) and send what is due: lean (rad) and lean rate (rad/s) at both ends."""
+        fraction: cython.double
+        rate: cython.double
+        roll: cython.double
+        place: cython.longlong
+        start: cython.longlong
+        self.bytes.count = 0
+        if self.acknowledge >= 0 and t1 > self.acknowledge_ns:
+            self._acknowledge()
+        while self.next_sample_ns < t1:
+            fraction = 0.0
+            if self.next_sample_ns > t0:
+                fraction = (self.next_sample_ns - t0) / (t1 - t0)
+            rate = -self.rate_scale * (rate0 + fraction * (rate1 - rate0)) + self.cross_x_from_z * yaw_rate
+            if self.lag_s > 0.0:
+                self.lagged += (rate - self.lagged) * (1.0 - exp(-1e-9 * self.sample_ns / self.lag_s))
+                rate = self.lagged
+            rate += self.bias_rad_s
+            if self.noise_rad_s > 0.0:
+                rate += self.noise_rad_s * self.stream.normal()
+            if self.filter_samples > 1:
+                place = self.samples % self.filter_samples
+                self.ring_sum += rate - self.ring[place]
+                self.ring[place] = rate
+                rate = self.ring_sum / self.filter_samples
+            self.rate_x = rate
+            start = self.next_sample_ns + self.latency_ns
+            if start < self.line_free_ns:
+                start = self.line_free_ns
+            if self.mode == 0xC2:
+                roll = self.roll_bias_rad - (lean0 + fraction * (lean1 - lean0))
+                self.roll = roll
+                self._packet(start, 0.0, -sin(roll), -cos(roll), yaw_rate)
+            elif self.mode == 0xCF and self.samples % self.fusion_divider == 0:
+                roll = self.roll_bias_rad - (lean0 + fraction * (lean1 - lean0))
+                if self.roll_noise_rad > 0.0:
+                    roll += self.roll_noise_rad * self.stream.normal()
+                self.roll = roll
+                self._packet(start, roll, 0.0, yaw, yaw_rate)
+            self.samples += 1
+            self.next_sample_ns = self.sample_time(self.samples)
+
+    def _send(self, byte: cython.longlong) -> cython.void:
+        """One byte on the line, from `line_free_ns` on; 10 bits at the baud rate."""
+        self.checksum += byte
+        self.line_free_ns += 10000000000 // self.baud
+        self.bytes.push(self.line_free_ns, byte)
+
+    def _word(self, word: cython.longlong) -> cython.void:
+        """Four bytes, the highest first."""
+        self._send(word >> 24 & 255)
+        self._send(word >> 16 & 255)
+        self._send(word >> 8 & 255)
+        self._send(word & 255)
+
+    def _sum(self) -> cython.void:
+        """The 16-bit sum of everything since the header."""
+        total: cython.longlong = self.checksum & 65535
+        self._send(total >> 8)
+        self._send(total & 255)
+
+    def _packet(
+        self,
+        start: cython.longlong,
+        first: cython.double,
+        second: cython.double,
+        third: cython.double,
+        yaw_rate: cython.double,
+    ) -> cython.void:
+        """One packet of 31 bytes whose first start bit is at `start`."""
+        self.line_free_ns = start
+        self.checksum = 0
+        self._send(self.mode)
+        self._word(word_of_float(first))
+        self._word(word_of_float(second))
+        self._word(word_of_float(third))
+        self._word(word_of_float(self.rate_x))
+        self._word(word_of_float(self.bias_rad_s))  # about y the legs do not turn
+        self._word(word_of_float(yaw_rate + self.bias_rad_s))
+        self._word(self.next_sample_ns // 16000 & 0xFFFFFFFF)
+        self._sum()
+        self.packets += 1
+
+    def _acknowledge(self) -> cython.void:
+        """The answer to a mode command: C4, the command, timer, sum (8 bytes)."""
+        start: cython.longlong = self.acknowledge_ns + self.latency_ns
+        if start > self.line_free_ns:
+            self.line_free_ns = start
+        self.checksum = 0
+        self._send(0xC4)
+        self._send(self.acknowledge)
+        self._word(self.acknowledge_ns // 16000 & 0xFFFFFFFF)
+        self._sum()
+        self.acknowledge = -1

@@ -1,0 +1,25 @@
+from libc.math cimport cos, sin, sqrt
+from foundation.random_stream cimport RandomStream
+from plant.edge_buffer cimport EdgeBuffer
+
+cdef class IncrementalEncoder:
+    cdef public str name
+    cdef public long long lines, sign, table_size, cell, total, t0, last_time
+    cdef public double gear, shaft_per_rad, edges_per_shaft_rad, scale, offset_rad
+    cdef public double eccentricity_1, phase_1, eccentricity_2, phase_2, jitter
+    cdef public RandomStream stream
+    cdef public double[::1] errors
+    cdef public bint has_errors, started, broken
+    cdef public EdgeBuffer edges
+    cdef public double u0, du, m0, m1, span_ns
+    cpdef double position(self, double angle)
+    cpdef double speed(self, double angle, double rate)
+    cpdef double threshold(self, long long n)
+    cpdef void reset(self, double angle)
+    cpdef long long level_a(self)
+    cpdef long long level_b(self, double angle)
+    cpdef void update(self, long long t0, long long t1, double angle0, double rate0, double angle1, double rate1)
+    cpdef double _value(self, double x)
+    cpdef void _turning(self, long long t0, long long t1, double u0, double u1)
+    cpdef void _piece(self, double x0, double x1)
+    cpdef void _emit(self, double x0, double x1, double level, long long level_b)

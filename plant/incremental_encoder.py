@@ -1,0 +1,326 @@
+"""An incremental encoder: every edge of channel A with the level of channel B, from angle and rate.
+
+Position is counted in edges of A, u = sign x gear x lines / pi x angle: two edges per line, as the 2X decoder
+of the firmware counts them. Edge n lies at u = n; A is high from even to odd n, B from n + 1/2 of even n to
+n + 1/2 of odd n. So forward, A rises while B is low, which the firmware counts up (facts
+network-and-boards 4.1).
+
+Between the ends of a step the position is the cubic with the given angles and rates. Where it runs one way
+with moderate change of rate, the time of an edge comes from the cubic of the inverse function; otherwise the
+cubic is cut at its turning points and each edge found by bisection, so a reversal inside a step gives its edges.
+
+Errors of the disc, all in edges (1 = half a line): `line_error` (standard deviation per line, seeded, fixed for
+a disc), `duty_error` (falling edges late by this, so that A's high time is longer), `jitter` (standard deviation
+per edge, new every time; it moves the stamp, never past a neighbour or out of the step), and eccentricity of the
+disc (rad of encoder shaft, once and twice per turn).
+"""
+
+import array
+
+import cython
+
+from foundation.random_stream import RandomStream
+from foundation.user_error import UserError
+from plant.edge_buffer import EdgeBuffer
+
+if not cython.compiled:
+    from math import cos, sin, sqrt
+
+PI = 3.141592653589793
+
+
+class IncrementalEncoder:
+    """One encoder. `lines` per turn of its shaft; `gear` turns of the shaft per turn of the joint; `sign` of the
+    mounting. `edges`: EdgeBuffer of the last `update`; `cell`: edges below the present position, the count
+    that a perfect 2X decoder would hold.
+    """
+
+    def __init__(
+        self,
+        name,
+        lines,
+        gear=1.0,
+        sign=1,
+        line_error=0.0,
+        duty_error=0.0,
+        jitter=0.0,
+        seed=0,
+    ) -> None:
+        if lines < 1 or gear <= 0.0 or sign not in (-1, 1):
+            raise UserError(f"encoder {name}: {lines} lines, gear {gear}, sign {sign} are impossible")
+        if line_error < 0.0 or jitter < 0.0 or not -0.4 <= duty_error <= 0.4 or line_error > 0.1:
+            raise UserError(
+                f"encoder {name}: line_error {line_error} (0 ... 0.1), duty_error {duty_error} (-0.4 ... 0.4) or "
+                f"jitter {jitter} (0 or more) is out of range"
+            )
+        self.name = name
+        self.lines = lines
+        self.gear = gear
+        self.sign = sign
+        self.shaft_per_rad = sign * gear
+        self.edges_per_shaft_rad = lines / PI
+        self.scale = 1.0
+        self.offset_rad = 0.0
+        self.eccentricity_1 = 0.0
+        self.phase_1 = 0.0
+        self.eccentricity_2 = 0.0
+        self.phase_2 = 0.0
+        self.jitter = jitter
+        self.stream = RandomStream(seed, f"encoder {name} jitter")
+        self.table_size = 2 * lines
+        self.errors = array.array("d", [0.0]) * (2 * lines)
+        self.has_errors = line_error > 0.0 or duty_error != 0.0
+        if self.has_errors:
+            disc = RandomStream(seed, f"encoder {name} disc")
+            for line in range(lines):
+                # clipped at four deviations, so that edges keep their order
+                error = line_error * max(-4.0, min(4.0, disc.normal()))
+                self.errors[2 * line] = error
+                self.errors[2 * line + 1] = error + duty_error
+        self.edges = EdgeBuffer()
+        self.cell = 0
+        self.total = 0
+        self.started = False
+        self.broken = False
+        # the running piece, as fields so that the helpers need no long argument lists
+        self.u0 = 0.0
+        self.du = 0.0
+        self.m0 = 0.0
+        self.m1 = 0.0
+        self.t0 = 0
+        self.span_ns = 0.0
+        self.last_time = 0
+
+    def position(self, angle: cython.double) -> cython.double:
+        """Position in edges for a joint angle (rad)."""
+        shaft: cython.double = self.shaft_per_rad * (self.scale * angle + self.offset_rad)
+        if self.eccentricity_1 != 0.0 or self.eccentricity_2 != 0.0:
+            shaft += self.eccentricity_1 * sin(shaft + self.phase_1) + self.eccentricity_2 * sin(
+                2.0 * shaft + self.phase_2
+            )
+        return self.edges_per_shaft_rad * shaft
+
+    def speed(self, angle: cython.double, rate: cython.double) -> cython.double:
+        """Edges per second at a joint angle and rate."""
+        shaft: cython.double
+        factor: cython.double = 1.0
+        if self.eccentricity_1 != 0.0 or self.eccentricity_2 != 0.0:
+            shaft = self.shaft_per_rad * (self.scale * angle + self.offset_rad)
+            factor += self.eccentricity_1 * cos(shaft + self.phase_1)
+            factor += 2.0 * self.eccentricity_2 * cos(2.0 * shaft + self.phase_2)
+        return self.edges_per_shaft_rad * self.shaft_per_rad * self.scale * rate * factor
+
+    def threshold(self, n: cython.longlong) -> cython.double:
+        """Where edge n lies, in edges."""
+        if self.has_errors:
+            return n + self.errors[n % self.table_size]
+        return n
+
+    def reset(self, angle: cython.double) -> cython.void:
+        """Stand at an angle without having moved: no edges."""
+        u: cython.double = self.position(angle)
+        n: cython.longlong = int(u)
+        if u < n:
+            n -= 1
+        if u >= self.threshold(n + 1):
+            n += 1
+        elif u < self.threshold(n):
+            n -= 1
+        self.cell = n
+        self.started = True
+        self.edges.count = 0
+
+    def level_a(self) -> cython.longlong:
+        """Level of channel A now."""
+        return 1 - (self.cell & 1)
+
+    def level_b(self, angle: cython.double) -> cython.longlong:
+        """Level of channel B at an angle (rad): the level A had a quarter of a line earlier."""
+        u: cython.double = self.position(angle) - 0.5
+        n: cython.longlong = int(u)
+        if u < n:
+            n -= 1
+        return 1 - (n & 1)
+
+    def update(
+        self,
+        t0: cython.longlong,
+        t1: cython.longlong,
+        angle0: cython.double,
+        rate0: cython.double,
+        angle1: cython.double,
+        rate1: cython.double,
+    ) -> cython.void:
+        """All edges of [t0, t1) into `edges`, stamped in ns: joint angles (rad) and rates (rad/s) at both ends."""
+        h: cython.double = (t1 - t0) * 1e-9
+        u0: cython.double
+        u1: cython.double
+        du: cython.double
+        g0: cython.double
+        g1: cython.double
+        b: cython.double
+        c: cython.double
+        s: cython.double
+        x: cython.double
+        level: cython.double
+        inverse: cython.double
+        span: cython.double
+        time: cython.longlong
+        last: cython.longlong
+        cell: cython.longlong
+        buffer: EdgeBuffer = self.edges
+        buffer.count = 0
+        if not self.started:
+            self.reset(angle0)
+        if self.broken:
+            return
+        u0 = self.position(angle0)
+        u1 = self.position(angle1)
+        du = u1 - u0
+        self.m0 = h * self.speed(angle0, rate0)
+        self.m1 = h * self.speed(angle1, rate1)
+        if du > 0.0:
+            if self.m0 < 0.5 * du or self.m0 > 2.0 * du or self.m1 < 0.5 * du or self.m1 > 2.0 * du:
+                self._turning(t0, t1, u0, u1)
+                return
+            level = self.threshold(self.cell + 1)
+            if u1 < level:
+                return
+        elif du < 0.0:
+            if self.m0 > 0.5 * du or self.m0 < 2.0 * du or self.m1 > 0.5 * du or self.m1 < 2.0 * du:
+                self._turning(t0, t1, u0, u1)
+                return
+            level = self.threshold(self.cell)
+            if u1 >= level:
+                return
+        else:
+            if self.m0 != 0.0 or self.m1 != 0.0:
+                self._turning(t0, t1, u0, u1)
+            return
+        # x(s): fraction of the step at which the fraction s of the way is done
+        inverse = 1.0 / du
+        g0 = du / self.m0
+        g1 = du / self.m1
+        b = 3.0 - 2.0 * g0 - g1
+        c = g0 + g1 - 2.0
+        span = t1 - t0
+        last = t0
+        cell = self.cell
+        while True:
+            s = (level - u0) * inverse
+            x = s * (g0 + s * (b + s * c))
+            if self.jitter > 0.0:
+                x += self.stream.normal() * self.jitter * (inverse if inverse > 0.0 else -inverse)
+            time = t0 + int(x * span)
+            if time < last:
+                time = last
+            if time >= t1:
+                time = t1 - 1
+            last = time
+            if buffer.count == buffer.capacity:
+                buffer.grow()
+            buffer.times[buffer.count] = time
+            if du > 0.0:
+                cell += 1
+                buffer.levels_a[buffer.count] = 1 - (cell & 1)
+                buffer.levels_b[buffer.count] = cell & 1
+                buffer.count += 1
+                level = self.errors[(cell + 1) % self.table_size] + (cell + 1) if self.has_errors else cell + 1
+                if u1 < level:
+                    break
+            else:
+                buffer.levels_b[buffer.count] = cell & 1
+                cell -= 1
+                buffer.levels_a[buffer.count] = 1 - (cell & 1)
+                buffer.count += 1
+                level = self.errors[cell % self.table_size] + cell if self.has_errors else cell
+                if u1 >= level:
+                    break
+        self.cell = cell
+        self.total += buffer.count
+
+    def _value(self, x: cython.double) -> cython.double:
+        """The cubic at the fraction x of the step, in edges."""
+        return self.u0 + x * (
+            self.m0 + x * (3.0 * self.du - 2.0 * self.m0 - self.m1 + x * (self.m0 + self.m1 - 2.0 * self.du))
+        )
+
+    def _turning(self, t0: cython.longlong, t1: cython.longlong, u0: cython.double, u1: cython.double) -> cython.void:
+        """Edges of a step in which the position may turn round: pieces between the cubic's turning points."""
+        a: cython.double
+        b: cython.double
+        c: cython.double
+        root: cython.double
+        x1: cython.double = 1.0
+        x2: cython.double = 1.0
+        before: cython.longlong = self.edges.count
+        self.u0 = u0
+        self.du = u1 - u0
+        self.t0 = t0
+        self.span_ns = t1 - t0
+        self.last_time = t0
+        # derivative: a x^2 + b x + c
+        a = 3.0 * (self.m0 + self.m1 - 2.0 * self.du)
+        b = 2.0 * (3.0 * self.du - 2.0 * self.m0 - self.m1)
+        c = self.m0
+        if a == 0.0:
+            if b != 0.0:
+                x1 = -c / b
+        else:
+            root = b * b - 4.0 * a * c
+            if root > 0.0:
+                root = sqrt(root)
+                x1 = (-b - root) / (2.0 * a)
+                x2 = (-b + root) / (2.0 * a)
+                if x1 > x2:
+                    x1, x2 = x2, x1
+        if not 0.0 < x1 < 1.0:
+            x1 = x2
+            x2 = 1.0
+        if not 0.0 < x1 < 1.0:
+            x1 = 1.0
+        if not 0.0 < x2 < 1.0:
+            x2 = 1.0
+        self._piece(0.0, x1)
+        if x1 < 1.0:
+            self._piece(x1, x2)
+        if x2 < 1.0 and x1 < x2:
+            self._piece(x2, 1.0)
+        self.total += self.edges.count - before
+
+    def _piece(self, x0: cython.double, x1: cython.double) -> cython.void:
+        """Edges between two fractions of the step in which the cubic runs one way."""
+        start: cython.double = self._value(x0)
+        end: cython.double = self._value(x1) if x1 < 1.0 else self.u0 + self.du
+        if end > start:
+            while end >= self.threshold(self.cell + 1):
+                self.cell += 1
+                self._emit(x0, x1, self.threshold(self.cell), self.cell & 1)
+        else:
+            while end < self.threshold(self.cell):
+                self.cell -= 1
+                self._emit(x0, x1, self.threshold(self.cell + 1), (self.cell + 1) & 1)
+
+    def _emit(
+        self, x0: cython.double, x1: cython.double, level: cython.double, level_b: cython.longlong
+    ) -> cython.void:
+        """One edge where the cubic passes `level` between two fractions of the step (bisection)."""
+        low: cython.double = x0
+        high: cython.double = x1
+        middle: cython.double
+        rising: cython.bint = self._value(x1) > self._value(x0)
+        time: cython.longlong
+        _i: cython.longlong
+        for _i in range(40):  # 125 us / 2^40 is far below 1 ns; a fixed number keeps both runs equal
+            middle = 0.5 * (low + high)
+            if (self._value(middle) < level) == rising:
+                low = middle
+            else:
+                high = middle
+        time = self.t0 + int(high * self.span_ns)
+        if time < self.last_time:
+            time = self.last_time
+        if time >= self.t0 + int(self.span_ns):
+            time = self.t0 + int(self.span_ns) - 1
+        self.last_time = time
+        self.edges.push(time, 1 - (self.cell & 1), level_b)

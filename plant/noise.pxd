@@ -1,0 +1,7 @@
+from foundation.random_stream cimport RandomStream
+
+cdef class NoiseSource:
+    cdef public RandomStream stream
+    cdef public double[::1] table
+    cdef public long long word, left
+    cpdef double normal(self)
