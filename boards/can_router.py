@@ -130,8 +130,8 @@ class CanRouterBoard(Microcontroller):
         attach(CAN_STATUS, 0, self.on_can_error, 150, slot=10, name="can error")
 
         self.on_overrun = self.slot_exceeded
-        self.on_limit = self.task_limit
         if quirks.warn_near_slot_limit:
+            self.on_limit = self.task_limit
             self.on_near_limit = self.slot_near_limit
 
         self.route_idle = ROUTE_IDLE_CYCLES

@@ -70,6 +70,29 @@ def test_the_main_brain_gets_its_copy_of_the_time_every_millisecond():
     assert stamps == list(range(0, 49)) or stamps == list(range(0, 50))
 
 
+# --- tables of the facts --------------------------------------------------------------------------------
+
+
+def test_the_schedule_is_that_of_the_facts():
+    schedule = build().board.scheduler.schedule
+    assert [task.name for task in schedule.every] == [
+        "send_time", "update_errors", "count_load", "update", "show_load", "beat",
+    ]  # fmt: skip
+    assert [len(row) for row in schedule.rows] == [1] + [0] * 9
+    assert [task.name for task in schedule.rows[0][0].tasks] == [
+        "send_error", "send_power", "send_current", "send_voltage",
+        "send_load_1", "send_load_2", "send_load_3", "send_load_4",
+    ]  # fmt: skip
+
+
+def test_timer_link_and_buses_are_fast_interrupts_in_the_order_of_the_facts():
+    vic = build().board.vic
+    assert [source.name for source in vic.fiq_list] == [
+        "timer1", "ssp", "can1 receive", "can2 receive", "can3 receive", "can4 receive",
+    ]  # fmt: skip
+    assert {n: s.name for n, s in enumerate(vic.irq_list) if s} == {0: "slot timer", 10: "can error"}
+
+
 # --- forwarding ---------------------------------------------------------------------------------------
 
 
@@ -359,6 +382,13 @@ def test_a_controller_that_is_bus_off_is_restarted_and_reported():
     wires.board.inbox.push(wires.time + 100, 512, CAN_STATUS, 4, 4, 96, 0, 0)
     wires.run(7 * MS)
     assert wires.board.errors.totals[errors.CAN4_ERR_WARN] == 1
+
+
+def test_a_frame_of_another_length_is_forwarded_and_arrives_as_eight_bytes():
+    wires = build()
+    wires.frame(MS, 1, 14, 0x11, 0, flags=4)
+    wires.run(3 * MS)
+    assert (14, 0x11, 0) in wires.heard
 
 
 def test_the_segment_interrupt_is_charged_per_half_word():

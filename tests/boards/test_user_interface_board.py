@@ -72,6 +72,25 @@ def test_the_occasional_list_runs_in_the_order_of_the_facts():
     ]  # fmt: skip
 
 
+def test_the_every_slot_list_is_that_of_the_facts():
+    schedule = build().board.scheduler.schedule
+    assert [task.name for task in schedule.every] == [
+        "receive_all", "beat", "update", "update_imu", "update_errors", "feed",
+        "watch_sync_key", "update_sync_light", "update_buzzer",
+    ]  # fmt: skip
+    assert [[task.name for task in row] for row in schedule.rows] == [
+        ["send_roll"], ["send_rate_x"], ["occasional"],
+    ]  # fmt: skip
+
+
+def test_interrupts_have_the_slots_of_the_facts():
+    vic = build().board.vic
+    assert vic.fiq_list == []
+    assert {n: s.name for n, s in enumerate(vic.irq_list) if s} == {
+        0: "can_receive", 1: "slot timer", 2: "timer0 capture", 3: "uart1", 9: "can_error",
+    }  # fmt: skip
+
+
 def test_frames_carry_the_network_time_last_heard():
     wires = build().run(10 * MS)
     wires.frame(10 * MS + 100, 2, table.TIMESTAMP, 4711, 4711)
