@@ -1,0 +1,207 @@
+"""Parameter sets: what they hold, and one clear line for everything that can be wrong with a file."""
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from boards.main_brain import controllers
+from datatable.generated import mb as table
+from datatable.generated.all_variables import TABLE_SIZE
+from datatable.store import DataStore
+from foundation.user_error import UserError
+
+
+def test_both_sets_load_and_give_every_parameter():
+    assert {"record-2011", "robust"} <= set(controllers.available())
+    for name in controllers.available():
+        controller = controllers.load(name)
+        assert set(controller.values) == set(controllers.parameter_rows())
+        assert controller.name == name
+
+
+def test_the_record_set_is_what_the_table_starts_with():
+    for name, value in controllers.load("record-2011").values.items():
+        assert value == pytest.approx(table.INITIAL[getattr(table, name)], rel=1e-7)  # single precision
+
+
+@pytest.mark.parametrize(
+    "name, value",
+    [  # facts control-and-data 1.8, values that a slip of the pen would spoil unnoticed
+        ("C_H_OUTER_STIFFNESS", 2),
+        ("C_H_PM_H_RATE", 3),
+        ("P_H_PM_H_TRATE", 2),
+        ("P_H_PM_TIME", 300),
+        ("DP_H_AM_L_ABSRATE", 0.72),
+        ("DP_F_PP_L_ABSRATE", 0.65),
+        ("DP_H_AM_H_RATE", 1.66),
+        ("DC2_H_AM_H_RATE2", -0.2),
+        ("DC3_H_AM_H_ANG1", 2),
+        ("P_F_PP_FRAC_ANG", 0.5),
+        ("P_FO_PP_THEIGHT", 0.012),
+        ("P_FI_PP_THEIGHT", 0.012),
+        ("P_F_FU_H_ANG", 0.1),
+        ("P_F_FU_F_CABL_STRETCH", 0.07),
+        ("P_S_MAX_CUR", 75),
+        ("P_E_GYRO_BIAS", -0.004),
+        ("P_E_RESET", 0.1),
+    ],
+)
+def test_record_parameters_are_those_of_the_walk(name, value):
+    assert controllers.load("record-2011").values[name] == value
+
+
+def test_each_difference_of_the_robust_set_has_a_reason():
+    robust = controllers.load("robust")
+    record = controllers.load("record-2011")
+    assert robust.base == "record-2011"
+    different = {name for name in robust.values if robust.values[name] != record.values[name]}
+    assert different == set(robust.changes) == set(robust.reasons)
+    assert different
+
+
+def test_a_set_is_written_into_the_data_table():
+    store = DataStore(TABLE_SIZE)
+    controllers.load("robust").apply(store)
+    assert store.get_float(table.P_FO_PP_THEIGHT) == pytest.approx(controllers.load("robust").values["P_FO_PP_THEIGHT"])
+    assert store.get_float(table.C_F_PP_F_ANG) == 10.0
+
+
+def test_the_operators_script_says_how_the_robot_is_held_and_which_keys_are_pressed():
+    operator = controllers.load("robust").operator
+    assert operator.stance == "outer"
+    assert operator.hip_angle_rad == 0.35
+    assert [press.key for press in operator.keys] == [1]
+    assert operator.keys[0].time_s < operator.release_time_s
+
+
+def write(tmp_path, text):
+    path = tmp_path / "mine.toml"
+    path.write_text(text)
+    return str(path)
+
+
+BASE = 'base = "record-2011"\n'
+
+
+@pytest.mark.parametrize(
+    "text, words",
+    [
+        ("title = ", ("mine.toml", "not valid TOML")),
+        ("title = 3\n" + BASE, ("mine.toml", "title", "3", "text")),
+        ('colour = "red"\n' + BASE, ("mine.toml", "colour", "allowed")),
+        ('base = "nothing"\n', ("nothing", "unknown", "record-2011")),
+        ("[parameters]\nP_F_ST_F_TANG = 2.0\n", ("mine.toml", "lacks", "C_H_OUTER_STIFFNESS")),
+        (BASE + "[parameters]\nP_WRONG = 1.0\n", ("mine.toml", "P_WRONG", "no such parameter")),
+        (BASE + '[parameters]\nP_F_ST_F_TANG = "2"\n', ("mine.toml", "P_F_ST_F_TANG", "'2'", "number")),
+        (BASE + "[parameters]\nP_F_ST_F_TANG = true\n", ("P_F_ST_F_TANG", "True", "number")),
+        (BASE + "[parameters]\nP_F_ST_F_TANG = nan\n", ("P_F_ST_F_TANG", "nan", "number")),
+        (BASE + "[parameters]\nP_F_ST_F_TANG = 9.0\n", ("P_F_ST_F_TANG", "9.0", "0.0 to 3.2 rad")),
+        (BASE + "[parameters]\nP_F_ST_F_TANG = 2.1\n", ("P_F_ST_F_TANG", "reason")),
+        (
+            BASE + '[parameters]\nP_F_ST_F_TANG = 2.1\n[reasons]\nP_F_ST_F_TANG = ""\n',
+            ("P_F_ST_F_TANG", "sentence"),
+        ),
+        (BASE + '[reasons]\nP_F_ST_F_TANG = "why"\n', ("P_F_ST_F_TANG", "no such entry")),
+        ("parameters = 4\n" + BASE, ("parameters", "4", "table")),
+        (BASE + '[operator]\nstance = "outer"\n', ("[operator]", "lacks")),
+    ],
+)
+def test_a_broken_file_gets_one_clear_line(tmp_path, text, words):
+    with pytest.raises(UserError) as caught:
+        controllers.load(write(tmp_path, text))
+    line = str(caught.value)
+    assert "\n" not in line
+    for word in words:
+        assert word in line
+
+
+OPERATOR = """
+[operator]
+stance = "outer"
+lean_rad = 0.1
+hip_angle_rad = 0.35
+outer_ankle_rad = 1.8
+inner_ankle_rad = 2.1
+release_time_s = 1.0
+release_rate_rad_per_s = 0.7
+radio = 0.0
+[[operator.keys]]
+key = 1
+time_s = 0.5
+hold_s = 0.2
+"""
+
+
+def test_a_set_may_bring_its_own_operator(tmp_path):
+    operator = controllers.load(write(tmp_path, BASE + OPERATOR)).operator
+    assert (operator.lean_rad, operator.keys[0].time_s) == (0.1, 0.5)
+
+
+@pytest.mark.parametrize(
+    "old, new, words",
+    [
+        ('"outer"', '"left"', ("stance", "'left'")),
+        ("lean_rad = 0.1", "lean_rad = 0.9", ("lean_rad", "0.9", "-0.5 to 0.5")),
+        ("key = 1", "key = 6", ("key", "6", "0 to 5")),
+        ("key = 1", "key = 1.5", ("key", "1.5", "whole number")),
+        ("hold_s = 0.2", "hold_s = 0.0", ("hold_s", "0.0")),
+        ("hold_s = 0.2", "", ("hold_s",)),
+        ("radio = 0.0", "radio = 0.0\ncolour = 1", ("colour",)),
+    ],
+)
+def test_a_broken_operator_gets_one_clear_line(tmp_path, old, new, words):
+    with pytest.raises(UserError) as caught:
+        controllers.load(write(tmp_path, BASE + OPERATOR.replace(old, new)))
+    for word in words:
+        assert word in str(caught.value)
+
+
+@pytest.mark.parametrize("name", ["", "nobody", "../robust", "/nowhere/x.toml", "."])
+def test_an_unknown_set_gets_one_clear_line(name):
+    with pytest.raises(UserError) as caught:
+        controllers.load(name)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_folder_is_not_a_set(tmp_path):
+    (tmp_path / "x.toml").mkdir()
+    with pytest.raises(UserError, match="x.toml"):
+        controllers.load(tmp_path / "x.toml")
+
+
+def test_a_set_that_is_its_own_base_is_refused(tmp_path):
+    path = tmp_path / "robust.toml"
+    path.write_text('base = "robust"\n')
+    with pytest.raises(UserError, match="leads back"):
+        controllers.load(path)
+
+
+toml_values = st.one_of(
+    st.floats().map(lambda x: repr(x)),
+    st.integers(-(2**70), 2**70).map(str),
+    st.sampled_from(["true", '"text"', "[1, 2]", "{ a = 1 }", "1979-05-27", "inf", "-nan"]),
+)
+
+
+@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    key=st.sampled_from(["title", "base", "parameters", "reasons", "operator", "P_F_ST_F_TANG", "stance", "keys"]),
+    value=toml_values,
+    where=st.sampled_from(["", "[parameters]\n", "[reasons]\n", "[operator]\n", "[[operator.keys]]\n"]),
+)
+def test_no_value_anywhere_makes_a_traceback(tmp_path, key, value, where):
+    path = tmp_path / "fuzz.toml"
+    path.write_text(f'base = "record-2011"\n{where}{key} = {value}\n')
+    try:
+        controllers.load(path)
+    except UserError as error:
+        assert "\n" not in str(error)
+
+
+@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(content=st.binary(max_size=200))
+def test_no_bytes_make_a_traceback(tmp_path, content):
+    path = tmp_path / "fuzz.toml"
+    path.write_bytes(content)
+    with pytest.raises(UserError):
+        controllers.load(path)

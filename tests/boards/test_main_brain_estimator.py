@@ -1,0 +1,327 @@
+"""Heel strike, angle integration and reset, heights, distance, energy, fall; and the switches of 2016."""
+
+import math
+
+import pytest
+
+from boards.quirks import Quirks
+from datatable.generated import errors
+from tests.boards.main_brain_bench import Bench
+
+FLAT_FEET = {"MCFO_RIGHT_ANKLE_ANGLE": 1.68 + 0.2, "MCFI_MID_ANKLE_ANGLE": 1.68 + 0.2}
+
+
+def walking(quirks=None):
+    """A bench in walk mode with a level gyro."""
+    bench = Bench(quirks=quirks)
+    bench.tick(UI_ANG_RATE_X=-0.004)
+    bench.press(1)
+    bench.tick(UI_ANG_RATE_X=-0.004)
+    assert bench.states()[0] == "walk"
+    return bench
+
+
+def swing_inner_and_strike(bench, left=3000.0, right=300.0, ticks=2):
+    """Inner legs come forward with the foot up, flip it down, and touch for `ticks` slots."""
+    quiet = {"MCFI_LEFT_HEEL_SENSE": 300.0, "MCFI_RIGHT_HEEL_SENSE": 300.0}
+    bench.tick(MCH_ANGLE=0.1, MCFI_MID_ANKLE_ANGLE=0.3, **quiet)
+    for _ in range(20):
+        bench.tick()
+    bench.tick(MCH_ANGLE=0.4, MCFI_MID_ANKLE_ANGLE=1.88, MCFO_RIGHT_ANKLE_ANGLE=1.88)
+    for _ in range(ticks):
+        bench.tick(MCFI_LEFT_HEEL_SENSE=left, MCFI_RIGHT_HEEL_SENSE=right)
+
+
+# --- rates and angle ------------------------------------------------------------------------------
+
+
+def test_leg_rates_come_from_gyro_and_hip_with_the_signs_of_the_robot():
+    bench = Bench()
+    for _ in range(300):
+        bench.tick(UI_ANG_RATE_X=-0.504, MCH_ANG_RATE=2.0)
+    # outer rate = -(gyro - bias), inner rate = outer rate - hip rate; settled, single precision
+    assert bench.get("E_LO_RATE") == pytest.approx(0.5, abs=1e-5)
+    assert bench.get("E_LI_RATE") == pytest.approx(-1.5, abs=1e-5)
+    assert bench.get("E_MCH_ANG_RATE") == pytest.approx(2.0, abs=1e-5)
+
+
+def test_the_outer_angle_is_the_trapezoid_of_the_unfiltered_gyro():
+    bench = walking()
+    before = bench.estimator.outer_angle
+    rates = [0.1, -0.3, 0.5, 0.7, 0.2]
+    for rate in rates:
+        bench.tick(UI_ANG_RATE_X=-0.004 - rate)
+    expected = sum(0.001 * (a + b) for a, b in zip([0.0, *rates], rates, strict=False))
+    # gyro and bias are single-precision words: 5 slots of 2 ms, 1e-8 rad/s each
+    assert bench.estimator.outer_angle - before == pytest.approx(expected, abs=1e-9)
+    assert bench.get("E_LI_ANGLE") == pytest.approx(bench.get("E_LO_ANGLE") - bench.get("MCH_ANGLE"), abs=1e-7)
+
+
+def test_the_gyro_is_integrated_over_its_own_stamps():
+    bench = walking()
+    bench.tick(UI_ANG_RATE_X=-1.004)
+    before = bench.estimator.outer_angle
+    for _ in range(5):
+        bench.time_passes()  # slots without a new gyro word
+        bench.estimator.update()
+    assert bench.estimator.outer_angle == before
+    bench.tick(UI_ANG_RATE_X=-1.004)
+    assert bench.estimator.outer_angle - before == pytest.approx(0.012, abs=1e-8)
+
+
+def test_angle_and_swing_leg_stay_reset_until_walking_begins():
+    bench = Bench()
+    for _ in range(50):
+        bench.tick(UI_ANG_RATE_X=-1.0)
+    assert abs(bench.estimator.outer_angle) < 0.003  # the last slot only
+    assert bench.get("E_SWING_LEG") == 1
+
+
+def test_published_foot_angles_carry_the_offset_of_the_robot():
+    bench = walking()
+    bench.tick(MCFO_RIGHT_ANKLE_ANGLE=1.68 + 0.3, MCFI_MID_ANKLE_ANGLE=1.68 - 0.1, MCH_ANGLE=0.2)
+    assert bench.get("E_FO_ABSANG") == pytest.approx(bench.get("E_LO_ANGLE") + 0.3 + 1.75, abs=1e-6)
+    assert bench.get("E_FI_ABSANG") == pytest.approx(bench.get("E_LI_ANGLE") - 0.1 + 1.75, abs=1e-6)
+
+
+def test_the_swing_ankle_height_follows_the_swinging_leg():
+    bench = walking()
+    bench.estimator.outer_angle = 0.1
+    bench.tick(MCH_ANGLE=0.4)
+    rise = 0.96 * (math.cos(bench.get("E_LO_ANGLE")) - math.cos(bench.get("E_LI_ANGLE")))
+    assert bench.get("E_ANKLE_HEIGHT") == pytest.approx(rise, abs=1e-7)
+    bench.estimator.swing_leg = 0
+    bench.tick()
+    assert bench.get("E_ANKLE_HEIGHT") == pytest.approx(-rise, abs=1e-6)
+
+
+# --- heel strike ------------------------------------------------------------------------------------
+
+
+def test_two_slots_above_the_threshold_are_a_heel_strike():
+    bench = walking()
+    swing_inner_and_strike(bench, ticks=1)
+    assert bench.get("E_SWING_LEG") == 1
+    bench.tick()
+    assert bench.get("E_SWING_LEG") == 0
+    assert bench.get("E_STEP_COUNT") == 1
+    assert bench.get("E_T_AFTER_HS") == 0
+
+
+def test_one_slot_above_the_threshold_is_not():
+    bench = walking()
+    swing_inner_and_strike(bench, ticks=1)
+    bench.tick(MCFI_LEFT_HEEL_SENSE=300.0)
+    bench.tick(MCFI_LEFT_HEEL_SENSE=3000.0)
+    assert bench.get("E_SWING_LEG") == 1
+
+
+@pytest.mark.parametrize("raw, strikes", [(2299.0, False), (2300.0, True)])
+def test_the_threshold_is_2000_counts_above_the_baseline(raw, strikes):
+    bench = walking()
+    swing_inner_and_strike(bench, left=raw)
+    assert (bench.get("E_SWING_LEG") == 0) is strikes
+
+
+@pytest.mark.parametrize("left, right", [(3000.0, 300.0), (300.0, 3000.0), (3000.0, 3000.0)])
+def test_either_foot_of_the_pair_is_enough(left, right):
+    bench = walking()
+    swing_inner_and_strike(bench, left, right)
+    assert bench.get("E_SWING_LEG") == 0
+
+
+def test_a_sensor_with_a_high_baseline_is_ignored_for_the_step():
+    bench = walking()
+    quiet = {"MCFI_LEFT_HEEL_SENSE": 6000.0, "MCFI_RIGHT_HEEL_SENSE": 300.0}
+    bench.tick(MCH_ANGLE=0.1, MCFI_MID_ANKLE_ANGLE=0.3, **quiet)
+    bench.tick(MCH_ANGLE=0.4, MCFI_MID_ANKLE_ANGLE=1.88)
+    for _ in range(5):
+        bench.tick(MCFI_LEFT_HEEL_SENSE=9000.0)
+    assert bench.get("E_SWING_LEG") == 1
+    for _ in range(2):
+        bench.tick(MCFI_RIGHT_HEEL_SENSE=2300.0)
+    assert bench.get("E_SWING_LEG") == 0
+
+
+def test_the_baseline_is_an_average_frozen_when_the_foot_flips_down():
+    bench = walking()
+    bench.tick(MCH_ANGLE=0.1, MCFI_MID_ANKLE_ANGLE=0.3, MCFI_LEFT_HEEL_SENSE=100.0, MCFI_RIGHT_HEEL_SENSE=0.0)
+    expected = 100.0
+    for raw in (200.0, 150.0, 400.0):
+        expected = 0.9 * expected + 0.1 * raw
+        bench.tick(MCFI_LEFT_HEEL_SENSE=raw)
+    bench.tick(MCFI_MID_ANKLE_ANGLE=0.81, MCFI_LEFT_HEEL_SENSE=5000.0)
+    assert bench.get("E_HEEL_BASE_LEFT") == pytest.approx(expected, abs=1e-4)
+    assert bench.get("E_HEEL_STAGE") == 2
+
+
+def test_contact_before_the_foot_flips_down_is_no_strike():
+    bench = walking()
+    bench.tick(MCH_ANGLE=0.1, MCFI_MID_ANKLE_ANGLE=0.3)
+    for _ in range(10):
+        bench.tick(MCFI_LEFT_HEEL_SENSE=8000.0)
+    assert bench.get("E_SWING_LEG") == 1
+
+
+def test_a_swing_leg_still_behind_is_not_watched():
+    bench = walking()
+    for _ in range(10):
+        bench.tick(MCH_ANGLE=-0.3, MCFI_MID_ANKLE_ANGLE=1.88, MCFI_LEFT_HEEL_SENSE=8000.0)
+    assert bench.get("E_SWING_LEG") == 1
+
+
+def test_after_the_inner_strike_the_outer_feet_are_watched():
+    bench = walking()
+    swing_inner_and_strike(bench)
+    bench.tick(MCH_ANGLE=-0.1, MCFO_RIGHT_ANKLE_ANGLE=0.3, MCFO_LEFT_HEEL_SENSE=200.0, MCFO_RIGHT_HEEL_SENSE=200.0)
+    bench.tick(MCH_ANGLE=-0.4, MCFO_RIGHT_ANKLE_ANGLE=1.88)
+    for _ in range(2):
+        bench.tick(MCFO_RIGHT_HEEL_SENSE=2500.0)
+    assert bench.get("E_SWING_LEG") == 1
+    assert bench.get("E_STEP_COUNT") == 2
+
+
+# --- reset, distance ----------------------------------------------------------------------------------
+
+
+def test_the_first_strike_resets_the_angle_fully_and_later_ones_by_a_tenth():
+    bench = walking()
+    swing_inner_and_strike(bench)
+    # equal feet, both ankles at 1.88, legs 0.4 apart: the pose is symmetric in height
+    geometric = bench.estimator.floor.rear_leg
+    assert bench.get("E_LO_ANGLE") == pytest.approx(geometric, abs=1e-7)
+    bench.estimator.outer_angle += 0.05
+    bench.tick(MCH_ANGLE=-0.1, MCFO_RIGHT_ANKLE_ANGLE=0.3)
+    bench.tick(MCH_ANGLE=-0.4, MCFO_RIGHT_ANKLE_ANGLE=1.88)
+    before = bench.estimator.outer_angle
+    for _ in range(2):
+        bench.tick(MCFO_RIGHT_HEEL_SENSE=2500.0)
+    error = before - bench.estimator.floor.front_leg
+    assert bench.get("E_LO_ERROR") == pytest.approx(error, abs=1e-5)
+    assert bench.estimator.outer_angle == pytest.approx(before - 0.1 * error, abs=1e-5)
+
+
+def test_the_first_reset_is_a_tenth_as_well_when_the_switch_says_so():
+    bench = walking(Quirks(first_step_full_reset=False))
+    swing_inner_and_strike(bench)
+    assert bench.get("E_LO_ANGLE") == pytest.approx(0.1 * bench.estimator.floor.rear_leg, abs=1e-5)
+
+
+def test_distance_adds_the_ankle_distance_and_the_rolling_of_the_foot():
+    bench = walking()
+    swing_inner_and_strike(bench)
+    first = 1.92 * math.sin(0.2)
+    assert bench.get("E_DISTANCE") == pytest.approx(first, abs=1e-4)
+    rolled_from = bench.estimator.front_foot
+    bench.tick(MCH_ANGLE=-0.1, MCFO_RIGHT_ANKLE_ANGLE=0.3)
+    bench.tick(MCH_ANGLE=-0.3, MCFO_RIGHT_ANKLE_ANGLE=1.9, MCFI_MID_ANKLE_ANGLE=2.2)
+    for _ in range(2):
+        bench.tick(MCFO_RIGHT_HEEL_SENSE=2500.0)
+    second = 1.92 * math.sin(0.15) + 0.09 * (bench.estimator.floor.rear_foot - rolled_from)
+    assert bench.get("EST_LAST_STEP_LENGTH") == pytest.approx(second, abs=1e-4)
+    assert bench.get("E_DISTANCE") == pytest.approx(first + second, abs=1e-4)
+
+
+def test_the_feet_of_the_robot_can_be_chosen_for_the_geometry():
+    floor = Bench(quirks=Quirks(estimator_feet="robot")).estimator.floor
+    assert (floor.inner_radius_m, floor.inner_ankle_m) == (0.23, 0.176)
+    assert (floor.outer_radius_m, floor.outer_ankle_m) == (0.168, 0.114)
+
+
+def test_time_after_heel_strike_counts_across_the_wrap_of_the_network_time():
+    bench = Bench()
+    bench.ms = 2**32 - 140
+    bench.set(UI_ANG_RATE_X=-0.004)
+    bench.tick()
+    bench.press(1)
+    swing_inner_and_strike(bench)
+    struck = bench.ms
+    for _ in range(60):
+        bench.time_passes()
+        bench.store.set_word(0, bench.ms & 0xFFFFFFFF, bench.ms & 0xFFFFFFFF)
+        bench.estimator.update()
+    assert bench.ms > 2**32 > struck
+    assert bench.get("E_T_AFTER_HS") == bench.ms - struck == 120
+
+
+# --- energy, fall, errors -------------------------------------------------------------------------------
+
+
+def test_energy_is_the_trapezoid_of_each_boards_power():
+    bench = Bench()
+    bench.tick(MCH_BATT_POWER=10.0, MCFO_BATT_POWER=0.0)
+    for _ in range(500):
+        bench.tick(MCH_BATT_POWER=20.0)
+    # half of the first 2 ms at 10 W
+    assert bench.get("EST_ENERGY_MCH") == pytest.approx(20.0 - 0.01, abs=1e-4)
+    assert bench.get("EST_ENERGY_MCFO") == 0.0
+    assert bench.get("EST_TOTAL_BATT_POWER") == 20.0
+
+
+def test_a_leg_beyond_45_degrees_is_a_fall_told_once_and_stops_the_motors():
+    bench = walking()
+    swing_inner_and_strike(bench)
+    bench.estimator.outer_angle = 0.8
+    for _ in range(5):
+        bench.tick()
+    assert bench.errors.count(errors.EST_ROBOT_FALL) == 1
+    assert bench.states()[0] == "stop"
+    assert bench.command("MCH") == (0.0, 0.0, 0.0)
+
+
+def test_no_fall_is_judged_before_the_first_strike():
+    bench = walking()
+    bench.estimator.outer_angle = 1.5
+    bench.tick()
+    assert bench.errors == []
+
+
+def test_a_leap_of_the_time_stamps_is_an_error():
+    bench = Bench()
+    bench.tick(MCH_ANG_RATE=1.0)
+    bench.ms += 5000
+    bench.tick(MCH_ANG_RATE=1.0)
+    assert errors.EST_FILTER_TIME_VIOLATION in bench.errors
+
+
+def test_a_step_of_less_than_a_quarter_second_is_reported_as_stutter():
+    bench = walking()
+    swing_inner_and_strike(bench)
+    bench.tick(MCH_ANGLE=-0.1, MCFO_RIGHT_ANKLE_ANGLE=0.3)
+    bench.tick(MCH_ANGLE=-0.4, MCFO_RIGHT_ANKLE_ANGLE=1.88)
+    for _ in range(2):
+        bench.tick(MCFO_RIGHT_HEEL_SENSE=2500.0)
+    assert bench.errors == [errors.EST_STUTTER_STEP]
+
+
+# --- the estimator of 2016, by switches ---------------------------------------------------------------------
+
+
+def test_by_switch_rates_pass_20_hz_filters_once_per_slot():
+    bench = Bench(quirks=Quirks(rate_filter="20_hz"))
+    bench.tick(MCH_ANG_RATE=0.0)
+    bench.tick(MCH_ANG_RATE=1.0)
+    assert bench.get("E_MCH_ANG_RATE") == pytest.approx(0.013359200, abs=1e-8)
+
+
+def test_by_switch_the_leg_angle_is_the_imus_roll():
+    bench = Bench(quirks=Quirks(leg_angle="imu_roll"))
+    for _ in range(200):
+        bench.tick(UI_ROLL=0.179)
+    # roll is positive with the foot ahead; bias -0.021
+    assert bench.get("E_LO_ANGLE") == pytest.approx(-0.2, abs=1e-6)
+
+
+def test_by_switch_contact_is_a_filtered_sum_above_850_counts():
+    bench = walking(Quirks(heel_strike="filtered_sum"))
+    bench.tick(MCH_ANGLE=0.1, MCFI_MID_ANKLE_ANGLE=0.3, MCFI_LEFT_HEEL_SENSE=350.0, MCFI_RIGHT_HEEL_SENSE=350.0)
+    for _ in range(100):
+        bench.tick()
+    bench.tick(MCH_ANGLE=0.4, MCFI_MID_ANKLE_ANGLE=1.88)
+    slots = 0
+    while bench.get("E_SWING_LEG") == 1 and slots < 100:
+        bench.tick(MCFI_LEFT_HEEL_SENSE=3500.0, MCFI_RIGHT_HEEL_SENSE=3500.0)
+        slots += 1
+    # 700 -> 7000 counts: 850 is 2.4 % of the rise; the filter's step response is 0.36, 1.75, 4.3 %
+    assert slots == 3
+    assert bench.get("EST_CONTACT_INNER") > 850.0
