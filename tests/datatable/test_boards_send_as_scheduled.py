@@ -11,6 +11,7 @@ import pytest
 import datatable
 from boards.quirks import Quirks
 from datatable.generated import all_variables
+from datatable.store import BLUETOOTH
 from firmware_sim.clock import Crystal
 from firmware_sim.scheduler import Occasional
 from foundation.events import CAN_REQUEST, CAN_TX_DONE, SSP_START, STAGE_BUS, TX_SENT
@@ -25,6 +26,8 @@ SATELLITES = {
     "UI": "boards.user_interface.UserInterfaceBoard",
 }
 ROUTER = "boards.can_router.CanRouterBoard"
+MAIN_BRAIN = "boards.main_brain.board.MainBrainBoard"
+EVERY_BOARD = {**SATELLITES, "CSR": ROUTER, "MB": MAIN_BRAIN}
 
 
 def power_up(path):
@@ -60,10 +63,14 @@ def is_error(name):
     return name.startswith("ERROR_")
 
 
-@pytest.mark.parametrize("name", [*SATELLITES, "CSR"])
+def test_every_board_with_firmware_is_on_the_bench():
+    assert set(EVERY_BOARD) == {board.name for board in datatable.load().boards if board.firmware}
+
+
+@pytest.mark.parametrize("name", EVERY_BOARD)
 def test_slot_length_rows_and_occasional_entries_are_those_of_the_boards_own_table(name):
     published = datatable.published_schedule(name)
-    schedule = power_up({**SATELLITES, "CSR": ROUTER}[name]).scheduler.schedule
+    schedule = power_up(EVERY_BOARD[name]).scheduler.schedule
     assert schedule.slot_ns == published.slot_us * 1000
     assert len(schedule.rows) == len(published.rows)
     assert occasional_of(schedule) == (published.occasional_row, len(published.occasional))
@@ -143,6 +150,28 @@ def test_the_router_sends_row_by_row_what_boards_toml_says():
     cycle = [name for name in published.occasional if not is_error(name)]
     assert occasional[: 2 * len(cycle)] == 2 * cycle
     assert len(occasional) <= 2 * len(cycle) + 1, "one idle call after the last entry"
+
+
+def test_the_main_brain_writes_row_by_row_what_boards_toml_says():
+    published = datatable.published_schedule("MB")
+    board = power_up(MAIN_BRAIN)
+    scheduled = [all_variables.ID_OF[name] for row in published.rows for name in row]
+    assert scheduled and published.every == published.occasional == ()
+    slots = 3 * len(published.rows)
+    written = []  # (row, name) in the order of writing
+    time, counted = 0, 0
+    for number in scheduled:
+        board.store.mark_read(number, BLUETOOTH)
+    while counted <= slots:  # until the last of them has ended
+        time += QUANTUM_NS
+        board.advance(time)
+        counted = board.scheduler.slot_count
+        for number in scheduled:
+            if board.store.is_unread(number, BLUETOOTH):
+                board.store.mark_read(number, BLUETOOTH)
+                written.append((board.scheduler.row, all_variables.NAMES[number]))
+    one_pass = [(index, name) for index, row in enumerate(published.rows) for name in row]
+    assert written == 3 * one_pass
 
 
 @pytest.mark.parametrize("name", SATELLITES)
