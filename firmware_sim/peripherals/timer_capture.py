@@ -148,8 +148,9 @@ class TimerCapture(Peripheral):
             self.chip.request(self.sources[channel])
 
     def on_alarm(self, alarm: cython.longlong, time: cython.longlong) -> cython.void:
-        """The timer matched MR0 and restarted."""
-        self._wrap_to(time)
+        """The timer matched MR0 and restarted (an edge at this very instant may have told already)."""
+        if time >= self.next_wrap_time:
+            self._wrap_to(time)
         self.chip.set_alarm(self.alarm, self.next_wrap_time)
         self.IR |= 1
         self.chip.request(self.match_source)
