@@ -41,7 +41,8 @@ class RowStream:
         """Hash and hand over what the block holds."""
         if self.used == 0:
             return
-        block = memoryview(self.reals if self.is_real else self.integers)[: self.used]
+        block: object = memoryview(self.reals) if self.is_real else memoryview(self.integers)
+        block = block[: self.used]
         if self.digest is not None:
             self.digest.update(block)
         if self.sink is not None:
