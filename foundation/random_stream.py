@@ -26,16 +26,26 @@ class RandomStream:
     def __init__(self, seed, name) -> None:
         self.name = name
         self.state = stream_key(seed, name)
+        self.increment = 0x9E3779B97F4A7C15
+        self.multiplier_1 = 0xBF58476D1CE4E5B9
+        self.multiplier_2 = 0x94D049BB133111EB
         self.spare = 0.0
         self.has_spare = False
 
     def bits(self) -> cython.ulonglong:
         """The next 64 random bits."""
         z: cython.ulonglong
-        self.state = (self.state + 0x9E3779B97F4A7C15) & 0xFFFFFFFFFFFFFFFF
-        z = self.state
-        z = ((z ^ (z >> 30)) * 0xBF58476D1CE4E5B9) & 0xFFFFFFFFFFFFFFFF
-        z = ((z ^ (z >> 27)) * 0x94D049BB133111EB) & 0xFFFFFFFFFFFFFFFF
+        if cython.compiled:
+            # an unsigned C word wraps by itself; literals above 63 bits would be Python objects here
+            self.state += self.increment
+            z = self.state
+            z = (z ^ (z >> 30)) * self.multiplier_1
+            z = (z ^ (z >> 27)) * self.multiplier_2
+        else:
+            self.state = (self.state + self.increment) & 0xFFFFFFFFFFFFFFFF
+            z = self.state
+            z = ((z ^ (z >> 30)) * self.multiplier_1) & 0xFFFFFFFFFFFFFFFF
+            z = ((z ^ (z >> 27)) * self.multiplier_2) & 0xFFFFFFFFFFFFFFFF
         return z ^ (z >> 31)
 
     def uniform(self) -> cython.double:
