@@ -97,26 +97,33 @@ class MainBrainBoard(Microcontroller):
         Costs are chosen by us, because no execution times of this board are known: the ARM926 has no
         floating point unit, so about 60 cycles per operation, 1500 per sine or root, 30 per table access.
         """
+        # untyped names: a compiled class would hand out wrappers of its parts' methods instead of the methods
+        errors: object = self.errors
+        io: object = self.io
+        estimator: object = self.estimator
+        modes: object = self.modes
+        errors_of_all: object = self.distribution.distribute
+        execution_time: object = self.store_execution_time
         return Schedule(
             slot_us=2000,
             divider=2,  # Timer0 ticks every 1 ms
             tick_slot=0,
             completion_flag=self.quirks.main_brain_overrun_check,
             every=(
-                #    function                 cost (cycles)  limit
-                Task(self.errors.update,      cost=300,      limit=6000, per_item=200, item="error"),
-                Task(self.beat,               cost=150,      limit=300),
-                Task(self.io.receive,         cost=2500,     limit=30000, per_item=220, item="frame"),
-                Task(self.estimator.update,   cost=38000,    limit=60000),
-                Task(self.modes.update,       cost=16000,    limit=30000),
-                Task(self.io.send,            cost=2000,     limit=12000, per_item=160, item="frame"),
+                #    function            name                      cost (cycles) limit
+                Task(errors.update,      name="update_errors",     cost=300,   limit=6000,  per_item=200, item="error"),
+                Task(self.beat,          name="heartbeat",         cost=150,   limit=300),
+                Task(io.receive,         name="parse_ssp",         cost=2500,  limit=30000, per_item=220, item="frame"),
+                Task(estimator.update,   name="estimator",         cost=38000, limit=60000),
+                Task(modes.update,       name="controller",        cost=16000, limit=30000),
+                Task(io.send,            name="send_ssp",          cost=2000,  limit=12000, per_item=160, item="frame"),
             ),
             rows=(
                 (), (), (),  # serial line: parse packets; swap receive DMA; rebuild lists
-                (Task(self.distribution.distribute, cost=900, limit=6000, per_item=500, item="error"),),
+                (Task(errors_of_all,     name="distribute_errors", cost=900,   limit=6000,  per_item=500, item="error"),),
                 (),  # test of the user interface: empty on the robot as well
                 (), (), (), (), (),
-                (Task(self.store_execution_time,    cost=200, limit=400),),
+                (Task(execution_time,    name="execution_time",    cost=200,   limit=400),),
             ),
         )  # fmt: skip
 

@@ -69,7 +69,8 @@ class FootMachine:
         self.push_to_strike = table_id(f"E_{own}_PP2HS_TIME")
         self.missed_pushes = table_id(f"E_{own}_PP_MISSED")
         self.state_number = table_id(f"FSM_{own}")
-        self.motor = MotorCommand(store, board)
+        motor: object = MotorCommand(store, board)  # untyped, so that its methods are plain ones
+        self.motor = motor
         self.hip_margin = 0.05  # rad, a literal of the original: own legs this far behind before a push
         self.push_gain = 0.0  # A/rad added at prepush entry
         self.push_angle = 0.0  # rad added at prepush entry
@@ -88,7 +89,7 @@ class FootMachine:
                 State(3, "afterpush", self.enter_afterpush, self.go_limp),
                 State(4, "flipup", None, self.flip_up),
                 State(5, "flipdown", None, self.flip_down),
-                State(6, "stop", None, self.motor.off),
+                State(6, "stop", None, motor.off),
             ),
             transitions=(
                 # from         to           when

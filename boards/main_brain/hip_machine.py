@@ -69,7 +69,8 @@ class HipMachine:
         self.store = store
         take_ids(self, READS)
         take_ids(self, WRITES)
-        self.motor = MotorCommand(store, "MCH")
+        motor: object = MotorCommand(store, "MCH")  # untyped, so that its methods are plain ones
+        self.motor = motor
         self.premid_time = 0  # ms after heel strike at which premid began
         self.first_correction = 0.0  # A
         self.second_correction = 0.0  # A
@@ -80,15 +81,15 @@ class HipMachine:
             states=(
                 #     no. name             entry               main
                 State(0, "HI_starthold", None, self.hold_start),
-                State(1, "HO_preswing", None, self.motor.off),
+                State(1, "HO_preswing", None, motor.off),
                 State(2, "HO_premid", self.enter_premid, self.swing_outer),
                 State(3, "HO_aftermid", self.enter_aftermid, self.swing_outer_corrected),
-                State(4, "HI_preswing", None, self.motor.off),
+                State(4, "HI_preswing", None, motor.off),
                 State(5, "HI_premid", self.enter_premid, self.swing_inner),
                 State(6, "HI_aftermid", self.enter_aftermid, self.swing_inner_corrected),
                 State(7, "HI_ehold", None, self.hold_inner_ahead),
                 State(8, "HO_ehold", None, self.hold_outer_ahead),
-                State(9, "stop", None, self.motor.off),
+                State(9, "stop", None, motor.off),
             ),
             transitions=(
                 # from                            to             when

@@ -138,8 +138,10 @@ class LegMachine:
         self.store = store
         take_ids(self, READS)
         take_ids(self, WRITES)
-        self.outer = outer = StanceLeg(self, self.E_LO_ANGLE, 1.0)
-        self.inner = inner = StanceLeg(self, self.E_LI_ANGLE, -1.0)
+        outer: object = StanceLeg(self, self.E_LO_ANGLE, 1.0)  # untyped, so that its methods are plain ones
+        inner: object = StanceLeg(self, self.E_LI_ANGLE, -1.0)
+        self.outer = outer
+        self.inner = inner
         outer.other = inner
         inner.other = outer
         self.aftermid_ms = 0
