@@ -24,6 +24,7 @@ cdef class Electrics:
     cpdef void settle(
         self, bint outer_contact, double outer_load_N, bint inner_contact, double inner_load_N, double steering_rad,
     )
+    cpdef double battery_electronics_A(self)
     cpdef void _read(self, double h, double steering_rad)
     cpdef void _motor(self, long long motor, MotorUnit unit, double battery_V, double h)
     cpdef void _set(self, long long i, double value, double h)

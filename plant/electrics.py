@@ -223,8 +223,8 @@ class Electrics:
         """Fill `analog_end`."""
         V: cython.double = self.battery.voltage_V
         seen: cython.double = V if V < self.voltage_clip_V else self.voltage_clip_V
-        value: cython.double
         steps: cython.double
+        nearest: cython.longlong
         self._motor(0, self.hip, seen, h)
         self._motor(1, self.outer_ankle, seen, h)
         self._motor(2, self.inner_ankle, seen, h)
@@ -235,10 +235,19 @@ class Electrics:
         self._set(15, self.inner_feet.right_V, h)
         # the sensor's own 1024 steps of a turn: the nearest one
         steps = steering_rad * (1024.0 / 6.283185307179586)
-        value = int(steps + 0.5) if steps >= 0.0 else -int(0.5 - steps)
-        self._set(16, value * (6.283185307179586 / 1024.0), h)
-        self._set(17, self.electronics_W / V if V > 0.0 else 0.0, h)
+        if steps >= 0.0:
+            nearest = int(steps + 0.5)
+        else:
+            nearest = -int(0.5 - steps)
+        self._set(16, nearest * (6.283185307179586 / 1024.0), h)
+        self._set(17, self.battery_electronics_A(), h)
         self._set(18, V, h)
+
+    def battery_electronics_A(self) -> cython.double:
+        """What the router board draws for all electronics, A."""
+        if self.battery.voltage_V > 0.0:
+            return self.electronics_W / self.battery.voltage_V
+        return 0.0
 
     def _motor(
         self, motor: cython.longlong, unit: MotorUnit, battery_V: cython.double, h: cython.double

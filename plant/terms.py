@@ -1,0 +1,423 @@
+"""Additional named terms from a model file: effects of motors, joints and sensors added without editing equations.
+
+A model file is TOML, one table per term:
+
+    [[term]]
+    form = "cogging"
+    at = "hip_motor"
+    amplitude_Nm = 0.05
+    periods_per_turn = 12
+
+`FORMS` says which forms there are, where each may stand, and its parameters with unit and limits. Everything a
+file can get wrong is a UserError that names file, term, field and limit. A plant without terms does no extra work:
+torques are asked for only when there are any, and sensors and windings keep their neutral numbers.
+"""
+
+import array
+import dataclasses
+import math
+import pathlib
+import tomllib
+
+from foundation.user_error import UserError
+from plant import term_torques as torques
+from plant.wiring_points import ANALOG_NAMES, ENCODER_NAMES, WORD_NAMES
+
+MOTORS = ("hip_motor", "outer_motor", "inner_motor", "steering_motor")
+TORQUE_PLACES = ("hip_joint", "hip_motor", "outer_ankle", "outer_motor", "inner_ankle", "inner_motor")
+ROTORS = ("hip_motor", "outer_motor", "inner_motor")
+CABLES = ("outer_cable", "inner_cable")
+PLACE_NUMBER = {name: number for number, name in enumerate(TORQUE_PLACES + CABLES)}
+
+
+@dataclasses.dataclass(frozen=True)
+class Parameter:
+    """One number of a form: its unit, the limits it must keep (inclusive), its value when a file leaves it out."""
+
+    name: str
+    unit: str
+    low: float
+    high: float
+    default: float | None = None
+
+
+@dataclasses.dataclass(frozen=True)
+class Form:
+    """A named effect: where it may stand, its parameters in order, and what it does in one sentence."""
+
+    name: str
+    places: tuple[str, ...]
+    parameters: tuple[Parameter, ...]
+    meaning: str
+    torque: int = -1  # row code of plant/term_torques.py, -1 when it acts elsewhere
+
+
+def _phase(name="phase_rad"):
+    return Parameter(name, "rad", -2.0 * math.pi, 2.0 * math.pi, 0.0)
+
+
+_FORMS = (
+    Form(
+        "stribeck",
+        TORQUE_PLACES,
+        (Parameter("excess_Nm", "N m", 0.0, 10.0), Parameter("speed_rad_s", "rad/s", 0.001, 100.0)),
+        "friction that is larger at low speed and falls off with its square",
+        torques.STRIBECK,
+    ),
+    Form(
+        "coulomb_friction",
+        TORQUE_PLACES,
+        (Parameter("change_Nm", "N m", -0.1, 10.0),),
+        "constant friction on top of the base model's",
+        torques.COULOMB,
+    ),
+    Form(
+        "viscous_friction",
+        TORQUE_PLACES,
+        (Parameter("change_Nms", "N m s/rad", -0.01, 10.0),),
+        "friction in proportion to the rate, on top of the base model's",
+        torques.VISCOUS,
+    ),
+    Form(
+        "direction_friction",
+        TORQUE_PLACES,
+        (
+            Parameter("coulomb_Nm", "N m", -10.0, 10.0, 0.0),
+            Parameter("viscous_Nms", "N m s/rad", -10.0, 10.0, 0.0),
+        ),
+        "friction that is larger in the positive direction by twice this",
+        torques.DIRECTION,
+    ),
+    Form(
+        "drag",
+        TORQUE_PLACES,
+        (Parameter("quadratic_Nms2", "N m s^2/rad^2", 0.0, 10.0),),
+        "drag with the square of the rate",
+        torques.DRAG,
+    ),
+    Form(
+        "spring",
+        TORQUE_PLACES,
+        (
+            Parameter("linear_Nm_per_rad", "N m/rad", -100.0, 100.0, 0.0),
+            Parameter("square_Nm_per_rad2", "N m/rad^2", -100.0, 100.0, 0.0),
+            Parameter("cubic_Nm_per_rad3", "N m/rad^3", -1000.0, 1000.0, 0.0),
+            Parameter("rest_rad", "rad", -4.0, 4.0, 0.0),
+        ),
+        "a spring about a rest angle, up to the third power: return springs of the ankle, the hip spring's bend",
+        torques.SPRING,
+    ),
+    Form(
+        "cogging",
+        ROTORS,
+        (
+            Parameter("amplitude_Nm", "N m", 0.0, 5.0),
+            Parameter("periods_per_turn", "1", 1.0, 1000.0),
+            _phase(),
+        ),
+        "a torque periodic in the rotor's angle, without current; at the joint side",
+        torques.COGGING,
+    ),
+    Form(
+        "commutation_ripple",
+        ROTORS,
+        (
+            Parameter("fraction", "1", 0.0, 0.5),
+            Parameter("periods_per_turn", "1", 1.0, 1000.0),
+            _phase(),
+        ),
+        "a part of the motor's torque that is periodic in the rotor's angle",
+        torques.COMMUTATION,
+    ),
+    Form(
+        "once_per_turn",
+        TORQUE_PLACES,
+        (
+            Parameter("amplitude_Nm", "N m", 0.0, 5.0),
+            Parameter("periods_per_turn", "1", 1.0, 100.0, 1.0),
+            _phase(),
+        ),
+        "a torque periodic in the joint's angle: gear or pulley out of centre",
+        torques.TURN,
+    ),
+    Form(
+        "cable_stiffening",
+        CABLES,
+        (Parameter("cubic_Nm_per_rad3", "N m/rad^3", -1000.0, 10000.0),),
+        "a cable that gets stiffer the further it is stretched",
+        torques.STIFFENING,
+    ),
+    Form(
+        "cable_backlash",
+        CABLES,
+        (
+            Parameter("gap_rad", "rad", 0.0, 0.5),
+            Parameter("stiffness_Nm_per_rad", "N m/rad", 0.0, 100.0, 14.0),
+        ),
+        "a gap between motor and joint: the cable pulls only beyond it",
+        torques.BACKLASH,
+    ),
+    Form(
+        "cable_slack",
+        CABLES,
+        (Parameter("stiffness_Nm_per_rad", "N m/rad", 0.0, 100.0, 14.0),),
+        "a cable that goes slack instead of pushing",
+        torques.SLACK,
+    ),
+    Form(
+        "cable_damping",
+        CABLES,
+        (Parameter("damping_Nms", "N m s/rad", 0.0, 1.0),),
+        "damping of the cable's stretch",
+        torques.CABLE_DAMPING,
+    ),
+    Form(
+        "resistance_temperature",
+        MOTORS,
+        (Parameter("per_K", "1/K", -0.01, 0.02),),
+        "winding resistance that grows with the rotor's temperature above 25 C (copper 0.0039)",
+    ),
+    Form(
+        "torque_constant_temperature",
+        MOTORS,
+        (Parameter("per_K", "1/K", -0.02, 0.01),),
+        "torque constant that falls with the housing's temperature above 25 C (ferrite -0.002)",
+    ),
+    Form(
+        "resistance_change",
+        MOTORS,
+        (Parameter("change_ohm", "ohm", -1.0, 100.0),),
+        "more resistance in series with the winding",
+    ),
+    Form(
+        "contact_drop_change",
+        MOTORS,
+        (Parameter("change_V", "V", -0.7, 10.0),),
+        "a larger drop at the brushes",
+    ),
+    Form(
+        "dead_time",
+        MOTORS,
+        (Parameter("fraction", "1", 0.0, 0.2),),
+        "part of the PWM period in which neither transistor of a lead conducts, both edges together",
+    ),
+    Form(
+        "sensor_scale",
+        ANALOG_NAMES + ENCODER_NAMES + WORD_NAMES + ("gyro",),
+        (Parameter("factor", "1", 0.1, 10.0),),
+        "a sensor that shows its quantity multiplied by this",
+    ),
+    Form(
+        "sensor_offset",
+        ANALOG_NAMES + ENCODER_NAMES + WORD_NAMES + ("gyro",),
+        (Parameter("value", "unit of the sensor: A, V, rad or rad/s", -100.0, 100.0),),
+        "a sensor that shows its quantity plus this",
+    ),
+    Form(
+        "sensor_lag",
+        ANALOG_NAMES + WORD_NAMES + ("gyro",),
+        (Parameter("time_constant_s", "s", 0.0, 10.0),),
+        "a sensor behind a first-order filter",
+    ),
+    Form(
+        "sensor_noise",
+        ANALOG_NAMES,
+        (Parameter("deviation", "unit of the sensor: A, V or rad", 0.0, 100.0),),
+        "standard deviation of the sensor's noise, in place of the base model's",
+    ),
+    Form(
+        "eccentricity",
+        ENCODER_NAMES + WORD_NAMES,
+        (
+            Parameter("once_rad", "rad", -0.2, 0.2),
+            _phase("once_phase_rad"),
+            Parameter("twice_rad", "rad", -0.2, 0.2, 0.0),
+            _phase("twice_phase_rad"),
+        ),
+        "disc or magnet out of centre: an error once and twice per turn of the encoder's shaft",
+    ),
+    Form(
+        "edge_jitter",
+        ENCODER_NAMES,
+        (Parameter("edges", "edges", 0.0, 0.4),),
+        "random shift of every edge's stamp, standard deviation in edges",
+    ),
+    Form(
+        "bit_flip",
+        WORD_NAMES,
+        (Parameter("probability", "1", 0.0, 1.0),),
+        "probability that a word has one wrong bit",
+    ),
+    Form(
+        "gyro_misalignment",
+        ("gyro",),
+        (Parameter("yaw_rad", "rad", -0.5, 0.5),),
+        "part of the yaw rate that shows in the lean rate",
+    ),
+)
+FORMS = {form.name: form for form in _FORMS}
+
+
+@dataclasses.dataclass(frozen=True)
+class Term:
+    """One term of a model file, checked: its form, its place, a value for every parameter of the form."""
+
+    form: Form
+    at: str
+    values: dict[str, float]
+
+
+def describe() -> str:
+    """All forms with places, parameters, units and limits, as text for a person."""
+    lines = []
+    for form in FORMS.values():
+        lines.append(f"{form.name}: {form.meaning}")
+        lines.append(f"    at: {', '.join(form.places)}")
+        for p in form.parameters:
+            default = "" if p.default is None else f", {p.default:g} when left out"
+            lines.append(f"    {p.name} [{p.unit}]: {p.low:g} to {p.high:g}{default}")
+    return "\n".join(lines) + "\n"
+
+
+def _check(place: str, table: object) -> Term:
+    """One table of a file as a Term; `place` starts every error."""
+    if not isinstance(table, dict):
+        raise UserError(f"{place}: a term is a table, not {table!r}")
+    name = table.get("form")
+    if name not in FORMS:
+        raise UserError(f"{place}: form is {name!r}; there are: {', '.join(FORMS)}")
+    form = FORMS[name]
+    at = table.get("at")
+    place = f"{place} ({name})"
+    if at not in form.places:
+        raise UserError(f"{place}: at is {at!r}; this form can stand at: {', '.join(form.places)}")
+    known = {p.name for p in form.parameters}
+    for key in table:
+        if key not in known and key not in ("form", "at"):
+            raise UserError(f"{place}: {key} is no parameter of this form; it has: {', '.join(sorted(known))}")
+    values = {}
+    for p in form.parameters:
+        value = table.get(p.name, p.default)
+        if value is None:
+            raise UserError(f"{place}: {p.name} is missing, a number from {p.low:g} to {p.high:g} {p.unit}")
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise UserError(
+                f"{place}: {p.name} is {value!r}, it must be a number from {p.low:g} to {p.high:g} {p.unit}"
+            )
+        if not p.low <= value <= p.high:
+            raise UserError(f"{place}: {p.name} is {value!r}, allowed are {p.low:g} to {p.high:g} {p.unit}")
+        values[p.name] = float(value)
+    return Term(form, at, values)
+
+
+class Model:
+    """The terms of one model file (or of `tables`, a list of dictionaries like the file's)."""
+
+    def __init__(self, tables, source="model") -> None:
+        self.source = source
+        self.terms = [_check(f"{source}: term {number}", table) for number, table in enumerate(tables, 1)]
+
+    def apply(self, plant) -> None:
+        """Put every term into a RangerPlant, before its first step."""
+        electrics = plant.electrics
+        rows = None
+        for term in self.terms:
+            if term.form.torque >= 0:
+                if rows is None:
+                    p = plant.parameters
+                    rows = torques.TermTorques(p.ankle_zero_rad, p.hip_gear, p.ankle_gear, p.friction_smoothing_rad_s)
+                rows.add(term.form.torque, PLACE_NUMBER[term.at], list(term.values.values()))
+            elif term.at in MOTORS:
+                motors = (electrics.hip, electrics.outer_ankle, electrics.inner_ankle, electrics.steering)
+                _apply_electric(motors[MOTORS.index(term.at)], term)
+            elif term.at in ANALOG_NAMES:
+                _apply_analog(electrics, ANALOG_NAMES.index(term.at), term)
+            elif term.at in WORD_NAMES:
+                _apply_angle((plant.hip_word, plant.outer_word, plant.inner_word)[WORD_NAMES.index(term.at)], term)
+            elif term.at in ENCODER_NAMES:
+                _apply_angle(plant.encoders[ENCODER_NAMES.index(term.at)], term)
+            else:
+                _apply_gyro(plant.imu, term)
+        if rows is not None:
+            plant.body.terms = rows
+
+
+def _apply_electric(unit, term: Term) -> None:
+    """A term of a winding or its bridge."""
+    name, (value,) = term.form.name, term.values.values()
+    if name == "resistance_temperature":
+        unit.resistance_per_K += value
+        unit.heat_matters = True
+    elif name == "torque_constant_temperature":
+        unit.torque_constant_per_K += value
+        unit.heat_matters = True
+    elif name == "resistance_change":
+        unit.series_ohm += value
+    elif name == "contact_drop_change":
+        unit.contact_drop_V += value
+    else:
+        unit.dead_time_fraction += value
+
+
+def _apply_analog(electrics, i: int, term: Term) -> None:
+    """A term of a voltage sensor, number i of the wiring points."""
+    name, (value,) = term.form.name, term.values.values()
+    if name == "sensor_noise":
+        noise = array.array("d", electrics.noise_V)
+        noise[i] = value * abs(electrics.slope_V[i])
+        electrics.noise_V = noise
+        return
+    electrics.has_terms = True
+    field = {"sensor_scale": "scale", "sensor_offset": "offset", "sensor_lag": "lag_s"}[name]
+    numbers = array.array("d", getattr(electrics, field))
+    numbers[i] = value * numbers[i] if name == "sensor_scale" else value + numbers[i]
+    setattr(electrics, field, numbers)
+
+
+def _apply_angle(encoder, term: Term) -> None:
+    """A term of an incremental or absolute encoder."""
+    name, values = term.form.name, list(term.values.values())
+    if name == "sensor_scale":
+        encoder.scale *= values[0]
+    elif name == "sensor_offset":
+        encoder.offset_rad += values[0]
+    elif name == "sensor_lag":
+        encoder.lag_s += values[0]
+    elif name == "edge_jitter":
+        encoder.jitter = values[0]
+    elif name == "bit_flip":
+        encoder.bit_flip = values[0]
+    else:
+        encoder.eccentricity_1, encoder.phase_1, encoder.eccentricity_2, encoder.phase_2 = values
+
+
+def _apply_gyro(imu, term: Term) -> None:
+    """A term of the inertial sensor's rate about the hip."""
+    name, (value,) = term.form.name, term.values.values()
+    if name == "sensor_scale":
+        imu.rate_scale *= value
+    elif name == "sensor_offset":
+        imu.bias_rad_s += value
+    elif name == "sensor_lag":
+        imu.lag_s += value
+    else:
+        imu.cross_x_from_z += value
+
+
+def load(path) -> Model:
+    """The model of a TOML file; UserError with file, term, field and limit for everything wrong in it."""
+    path = pathlib.Path(path)
+    try:
+        with path.open("rb") as file:
+            content = tomllib.load(file)
+    except OSError as error:
+        raise UserError(f"{path}: the model file cannot be read ({error.strerror or error})") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise UserError(f"{path}: this is no TOML file ({error})") from None
+    unknown = [key for key in content if key not in ("term", "title")]
+    if unknown:
+        raise UserError(f"{path}: {unknown[0]} is not known here; a model file holds [[term]] tables and a title")
+    tables = content.get("term", [])
+    if not isinstance(tables, list):
+        raise UserError(f"{path}: term is written [[term]], once per term")
+    return Model(tables, str(path))
