@@ -120,7 +120,7 @@ class MainBrainBoard(Microcontroller):
             ),
             rows=(
                 (), (), (),  # serial line: parse packets; swap receive DMA; rebuild lists
-                (Task(errors_of_all,     name="distribute_errors", cost=900,   limit=6000,  per_item=500, item="error"),),
+                (Task(errors_of_all,     name="distribute_errors", cost=900,  limit=6000, per_item=500, item="error"),),
                 (),  # test of the user interface: empty on the robot as well
                 (), (), (), (), (),
                 (Task(execution_time,    name="execution_time",    cost=200,   limit=400),),
