@@ -7,7 +7,7 @@ from firmware_sim.vic cimport InterruptController, InterruptSource
 cdef class Peripheral:
     cdef public Microcontroller chip
     cpdef void on_message(self, EventQueue queue)
-    cpdef void on_pin(self, long long channel, long long level, long long time)
+    cpdef long long on_pin(self, long long channel, long long level, long long time)
     cpdef void on_alarm(self, long long alarm, long long time)
 
 cdef class Microcontroller:

@@ -39,8 +39,9 @@ class Peripheral:
 
     def on_pin(
         self, channel: cython.longlong, level: cython.longlong, time: cython.longlong
-    ) -> cython.void:
-        """The pin of `channel` changed to `level` at `time`."""
+    ) -> cython.longlong:
+        """The pin of `channel` changed to `level` at `time`; returns 0."""
+        return 0
 
     def on_alarm(self, alarm: cython.longlong, time: cython.longlong) -> cython.void:
         """The alarm that this peripheral numbered `alarm` is due."""
@@ -245,6 +246,13 @@ class Microcontroller:
                 self.instant = inbox.time
                 self.now = inbox.time
                 self._input()
+                if (
+                    vic.fiq_pending != 0
+                    and self.fiq_free <= self.instant < inbox.head_time
+                    and self.instant < self.alarm_time
+                    and self.instant < self.tick_time
+                ):
+                    self._serve(vic.next_fiq(), self.instant)  # the common case, without another round
                 continue
             if time >= until:
                 break

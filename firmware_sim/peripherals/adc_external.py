@@ -118,7 +118,7 @@ class Ads7871(Peripheral):
         self.registers[1] = self.result >> 6 & 255
         self.busy = False
         self.conversions += 1
-        self.chip.request(self.source)
+        self.chip.vic.raise_source(self.source)
 
     def read_result(self) -> cython.longlong:
         """Registers 1 and 0 as one signed number, -8192 ... 8191."""

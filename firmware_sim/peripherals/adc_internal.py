@@ -70,7 +70,7 @@ class AdcInternal(Peripheral):
         self.GDR = self.result << 6 | self.channel << 24 | 1 << 31
         self.busy = False
         self.conversions += 1
-        self.chip.request(self.source)
+        self.chip.vic.raise_source(self.source)
 
     def start_burst(self, *channels) -> None:
         """Convert `channels` in turn from `now` on, without interrupts."""

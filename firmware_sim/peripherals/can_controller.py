@@ -169,7 +169,7 @@ class CanController(Peripheral):
                 self.overrun = True
                 self.ICR |= 8
                 if self.IER & 8:
-                    self.chip.request(self.error_source)
+                    self.chip.vic.raise_source(self.error_source)
                 return
             self.received += 1
             frame = (queue.c & 15) << 16 | (queue.c >> 4 & 1) << 30 | (queue.c >> 6 & 1) << 31
@@ -186,7 +186,7 @@ class CanController(Peripheral):
             self.rx_count += 1
             self.ICR |= 1
             if self.IER & 1:
-                self.chip.request(self.rx_source)
+                self.chip.vic.raise_source(self.rx_source)
         elif queue.kind == 3:  # CAN_TX_DONE
             self.tx_free[queue.b] = 1
             frame = 2 if queue.b == 1 else 256 << (queue.b - 1)
@@ -201,7 +201,7 @@ class CanController(Peripheral):
                 self.lost += 1
                 self.ICR |= frame
             if self.IER & frame:
-                self.chip.request(self.tx_source)
+                self.chip.vic.raise_source(self.tx_source)
         else:  # CAN_STATUS
             self.tx_errors = queue.c
             self.rx_errors = queue.d
@@ -212,7 +212,7 @@ class CanController(Peripheral):
             elif not queue.e:
                 self.bus_off = False
             if self.IER & queue.b:
-                self.chip.request(self.error_source)
+                self.chip.vic.raise_source(self.error_source)
 
     def _bus_off(self) -> cython.void:
         """Too many transmit errors: reset mode, nothing is sent or received until software restarts it."""
@@ -235,7 +235,7 @@ class CanController(Peripheral):
         self.RDA = self.second_RDA
         self.RDB = self.second_RDB
         if self.IER & 1:
-            self.chip.request(self.rx_source)
+            self.chip.vic.raise_source(self.rx_source)
 
     # --- status -----------------------------------------------------------------------------------------
 

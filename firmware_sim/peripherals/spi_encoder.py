@@ -52,7 +52,7 @@ class SpiEncoder(Peripheral):
         self.SPSR = 128
         self.busy = False
         self.transfers += 1
-        self.chip.request(self.source)
+        self.chip.vic.raise_source(self.source)
 
     def read(self) -> cython.longlong:
         """Read S0SPDR, which clears SPIF."""

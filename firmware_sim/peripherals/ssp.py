@@ -79,7 +79,7 @@ class SspPort(Peripheral):
         self.received_time = queue.time
         self.fresh = True
         self.exchanges += 1
-        self.chip.request(self.source)
+        self.chip.vic.raise_source(self.source)
 
     def take(self):
         """The segment that came in last, or None when it has been taken already."""

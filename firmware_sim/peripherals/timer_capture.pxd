@@ -12,8 +12,8 @@ cdef class TimerCapture(Peripheral):
     cdef public long long[::1] pins
     cdef public long long[::1] edges, captured, lost, capture_times
     cpdef long long TC(self)
-    cpdef void clear(self, long long mask)
+    cpdef long long clear(self, long long mask)
     cpdef long long CR(self, long long channel)
     cpdef void arm(self, long long channel, bint rising, bint falling)
     cpdef long long count_at(self, long long time)
-    cdef void _wrap_to(self, long long time)
+    cdef long long _wrap_to(self, long long time)

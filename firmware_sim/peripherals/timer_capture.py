@@ -78,9 +78,10 @@ class TimerCapture(Peripheral):
             bits += 2
         self.CCR = self.CCR & ~(7 << (3 * channel)) | bits << (3 * channel)
 
-    def clear(self, mask: cython.longlong) -> cython.void:
-        """Write T0IR: the bits of `mask` are cleared, the channels may capture again."""
+    def clear(self, mask: cython.longlong) -> cython.longlong:
+        """Write T0IR: the bits of `mask` are cleared, the channels may capture again. Returns what is left."""
         self.IR &= ~mask
+        return self.IR
 
     def CR(self, channel: cython.longlong) -> cython.longlong:
         """Capture register of a channel by number (CR0 ... CR3 are the same)."""
@@ -106,7 +107,7 @@ class TimerCapture(Peripheral):
             return self.MR0
         return count
 
-    def _wrap_to(self, time: cython.longlong) -> cython.void:
+    def _wrap_to(self, time: cython.longlong) -> cython.longlong:
         """Bring the wrap that precedes `time` up to date, however far away."""
         n: cython.longlong = self.wraps + 1
         if time >= self.next_wrap_time + 2 * self.period_ns:
@@ -118,17 +119,18 @@ class TimerCapture(Peripheral):
             self.wrap_time = self.next_wrap_time
             self.next_wrap_time = self.chip.crystal.tick_time_ns(n + 1, self.period_ns, self.phase_ns)
         self.wraps = n
+        return n
 
     def on_pin(
         self, channel: cython.longlong, level: cython.longlong, time: cython.longlong
-    ) -> cython.void:
-        """An edge at a capture pin."""
+    ) -> cython.longlong:
+        """An edge at a capture pin; returns 0."""
         count: cython.longlong
         flag: cython.longlong = 16 << channel
         self.edges[channel] += 1
         if self.CCR >> (3 * channel) & (1 if level else 2) == 0:
             self.lost[channel] += 1
-            return
+            return 0
         count = self.count_at(time)
         if channel == 0:
             self.CR0 = count
@@ -141,11 +143,12 @@ class TimerCapture(Peripheral):
         self.capture_times[channel] = time
         if self.IR & flag:
             self.lost[channel] += 1
-            return
+            return 0
         self.IR |= flag
         self.captured[channel] += 1
         if self.CCR >> (3 * channel) & 4:
-            self.chip.request(self.sources[channel])
+            self.chip.vic.raise_source(self.sources[channel])
+        return 0
 
     def on_alarm(self, alarm: cython.longlong, time: cython.longlong) -> cython.void:
         """The timer matched MR0 and restarted (an edge at this very instant may have told already)."""
@@ -153,4 +156,4 @@ class TimerCapture(Peripheral):
             self._wrap_to(time)
         self.chip.set_alarm(self.alarm, self.next_wrap_time)
         self.IR |= 1
-        self.chip.request(self.match_source)
+        self.chip.vic.raise_source(self.match_source)

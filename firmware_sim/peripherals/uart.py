@@ -86,7 +86,7 @@ class Uart(Peripheral):
         self.chip.set_alarm(self.timeout_alarm, queue.time + 4 * self.byte_ns)
         if self.fifo_count >= self.trigger:
             self.IIR = 4
-            self.chip.request(self.source)
+            self.chip.vic.raise_source(self.source)
 
     def _store(self, byte: cython.longlong) -> cython.void:
         """A byte into the FIFO; the seventeenth is lost (overrun)."""
@@ -103,10 +103,10 @@ class Uart(Peripheral):
         if alarm == 0:
             if self.fifo_count > 0:
                 self.IIR = 12
-                self.chip.request(self.source)
+                self.chip.vic.raise_source(self.source)
         else:
             self.IIR = 2
-            self.chip.request(self.transmit_source)
+            self.chip.vic.raise_source(self.transmit_source)
 
     def RBR(self) -> cython.longlong:
         """Take the oldest received byte; 0 when there is none (see LSR bit 0)."""
