@@ -3,7 +3,7 @@ from libc.math cimport cos, fabs, sin, sqrt, tanh
 cdef class Body:
     cdef public object parameters, floor, record, terms
     cdef public str cause
-    cdef public long long mode, stance, last_strike_leg, step_start_ns, event
+    cdef public long long mode, stance, last_strike_leg, step_start_ns, event, changes
     cdef public bint outer_armed, inner_armed, foothold_due, lock_hip, standing, brush
     cdef public bint brushing, exact_spring, unilateral, lift_leading
     cdef public double[::1] saved, matrix, solution
@@ -32,6 +32,7 @@ cdef class Body:
     cpdef double ankle_x(self, long long leg)
     cpdef void update_pose(self)
     cpdef void update_hip_rates(self)
+    cpdef bint stands(self, long long leg)
     cpdef double hip_angle(self)
     cpdef double hip_rate(self)
     cpdef dict snapshot(self)
@@ -39,10 +40,10 @@ cdef class Body:
     cpdef void place(self, double outer_leg_rad, double hip_rad)
     cpdef void hold(self, double outer_leg_rad)
     cpdef void hold_both(self, double outer_leg_rad, double hip_rad)
-    cpdef void hold_standing(self, double outer_leg_rad, double hip_rad)
+    cpdef void hold_standing(self, double outer_leg_rad, double hip_rad, long long stance=*)
     cpdef void release(self, double outer_leg_rate, long long stance=*, double stance_foot_rate=*, double hip_rate=*)
     cpdef void begin_walk(self)
-    cpdef void _limp_foot(self, long long leg)
+    cpdef void limp_foot(self, long long leg)
     cpdef void on_feet(self, double h, long long stages)
     cdef double _stop(self, double angle, double rate)
     cdef double _exact_spring(self, double angle)

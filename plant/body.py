@@ -170,6 +170,7 @@ class Body:
         self.elapsed = 0.0  # s since the start of the running step
         self.step_start_ns = 0
         self.event = 0
+        self.changes = 0  # touches, lift-offs and falls so far
         self.unilateral = False  # the trailing foot may leave at a heel-strike (EQUATIONS 8)
         self.lift_leading = True  # the leading foot may leave in double stance
         self.P_stance_x = 0.0  # impulses of the last impact, N s
@@ -248,6 +249,16 @@ class Body:
         excess = self._excess(foot)
         self.hip_vx = (self.r * cos(excess) - self.d * cos(foot)) * foot_rate + self.el * cos(leg) * leg_rate
         self.hip_vy = (self.d * sin(foot) - self.r * sin(excess)) * foot_rate - self.el * sin(leg) * leg_rate
+
+    def stands(self, leg: cython.longlong) -> cython.bint:
+        """True while this foot has the floor under it."""
+        if self.mode == 2:
+            return True
+        if self.mode == 1 or self.standing:
+            if leg == self.stance:
+                return True
+            return (self.outer_Fy if leg == 0 else self.inner_Fy) > 0.0
+        return False
 
     def hip_angle(self) -> cython.double:
         """h of the firmware: inner legs ahead of the outer ones, rad."""
@@ -329,7 +340,7 @@ class Body:
         """Lift the robot by its outer legs, which the operator keeps at this lean, motionless.
 
         The inner leg hangs at the hip and both feet hang free, so the motors move them; the hip is 50 mm higher
-        than standing (chosen by us: feet turn free of the floor). All rates of the outer leg and hip are zero.
+        than standing (chosen by us: feet turn free of the floor).
         """
         self.mode = 0
         self.stance = 0
@@ -347,8 +358,8 @@ class Body:
         self.cause = ""
         self.last_strike_leg = -1
         if self.Jf == 0.0:
-            self._limp_foot(0)
-            self._limp_foot(1)
+            self.limp_foot(0)
+            self.limp_foot(1)
         self.update_pose()
 
     def hold_both(self, outer_leg_rad: cython.double, hip_rad: cython.double) -> cython.void:
@@ -358,17 +369,23 @@ class Body:
         self.hold(outer_leg_rad)
         self.lock_hip = True
 
-    def hold_standing(self, outer_leg_rad: cython.double, hip_rad: cython.double) -> cython.void:
-        """As `hold_both`, with the outer foot on the floor under the robot's weight, where it may roll.
+    def hold_standing(
+        self, outer_leg_rad: cython.double, hip_rad: cython.double, stance: cython.longlong = 0
+    ) -> cython.void:
+        """As `hold_both`, with the stance foot on the floor under the robot's weight, where it may roll.
 
-        The hands guide the outer leg's lean and the hip angle only. They also damp the rolling; 2 N m s/rad, about
-        critical for the 0.08 kg m^2 that roll against the cable: chosen by us, so that a posture settles at once.
+        The hands guide the legs' angles only. They also damp the rolling; 2 N m s/rad, about critical for the
+        0.08 kg m^2 that roll against the cable: chosen by us, so that a posture settles at once.
         """
         self.hold_both(outer_leg_rad, hip_rad)
         self.standing = True
-        self.anchor_outer = self.hip_x - self.chain_x(self.foot_outer, self.leg_outer)
+        self.stance = stance
         self.height_outer = 0.0
         self.height_inner = 0.0
+        if stance == 0:
+            self.anchor_outer = self.hip_x - self.chain_x(self.foot_outer, self.leg_outer)
+        else:
+            self.anchor_inner = self.hip_x - self.chain_x(self.foot_inner, self.leg_inner)
         self.update_pose()
 
     def release(
@@ -409,7 +426,7 @@ class Body:
         else:
             self.anchor_inner = self.hip_x - self.chain_x(self.foot_inner, self.leg_inner)
         if self.Jf == 0.0:
-            self._limp_foot(1 - self.stance)
+            self.limp_foot(1 - self.stance)
         self.update_pose()
         self.update_hip_rates()
         self.outer_armed = self.gap_outer > 1e-6
@@ -426,10 +443,11 @@ class Body:
         self.brush_s = 0.0
         self.cause = ""
         self.record.begin(self.step_start_ns, self.contact_x(self.stance))
+        self.changes += 1
         if (self.gap_inner if self.stance == 0 else self.gap_outer) < 0.0:
             self._fall("put down with the swing foot in the floor")
 
-    def _limp_foot(self, leg: cython.longlong) -> cython.void:
+    def limp_foot(self, leg: cython.longlong) -> cython.void:
         """A massless foot in the air stands where its motor holds it, q4 = q4m (EQUATIONS 7)."""
         if leg == 0:
             self.foot_outer = self.leg_outer + self.motor_outer
@@ -874,6 +892,8 @@ class Body:
         held: cython.bint = self.mode == 0
         locked: cython.bint = held and self.lock_hip
         standing: cython.bint = held and self.standing
+        outer_stands: cython.bint = standing and self.stance == 0
+        inner_stands: cython.bint = standing and self.stance == 1
         massless: cython.bint = self.Jf == 0.0
         with_terms: cython.bint = self.terms is not None
         stage: cython.longlong
@@ -914,8 +934,8 @@ class Body:
             Bi = mci * sin(tw) - mwi * cos(tw)
             a_s = F - th
             a_w = G - tw
-            Ts = 0.0 if massless and not standing else ks * (p - a_s)
-            Tw = 0.0 if massless else ks * (n - a_w)
+            Ts = 0.0 if massless and not outer_stands else ks * (p - a_s)
+            Tw = 0.0 if massless and not inner_stands else ks * (n - a_w)
             mp = self.outer_drive - self.outer_coulomb * tanh(up * eps) - self.outer_viscous * up - Ts
             mn = self.inner_drive - self.inner_coulomb * tanh(un * eps) - self.inner_viscous * un - Tw
             if a_s < low or a_s > high:
@@ -978,13 +998,17 @@ class Body:
                 aF = Ts * iJf
                 aG = Tw * iJf
             if standing:
-                # the foot rolls under the weight, the leg's lean is kept (EQUATIONS 7.2)
-                stop = self._excess(F)
-                e = self.r * cos(stop) - self.d * cos(F)
-                f = self.d * sin(F) - self.r * sin(stop)
-                aF = (Ts - (self.C_outer + 2.0) * uF + M * (e * self.gx + f * self.gy)) / (
-                    M * (e * e + f * f) + self.Jf
-                )
+                # the stance foot rolls under the weight, the legs keep their lean (EQUATIONS 7.2)
+                angle = F if outer_stands else G
+                stop = self._excess(angle)
+                e = self.r * cos(stop) - self.d * cos(angle)
+                f = self.d * sin(angle) - self.r * sin(stop)
+                push = M * (e * self.gx + f * self.gy)
+                weight_J = M * (e * e + f * f) + self.Jf
+                if outer_stands:
+                    aF = (Ts - (self.C_outer + 2.0) * uF + push) / weight_J
+                else:
+                    aG = (Tw - (self.C_inner + 2.0) * uG + push) / weight_J
             if stage == 0:
                 self.foot_outer_acc = aF
                 self.leg_outer_acc = as_
@@ -993,10 +1017,10 @@ class Body:
                 self.motor_outer_acc = ap
                 self.motor_inner_acc = an
                 self.hip_ay = ayh
-                self.outer_Fx = -M * self.gx if standing else 0.0
-                self.outer_Fy = -M * self.gy if standing else 0.0
-                self.inner_Fx = 0.0
-                self.inner_Fy = 0.0
+                self.outer_Fx = -M * self.gx if outer_stands else 0.0
+                self.outer_Fy = -M * self.gy if outer_stands else 0.0
+                self.inner_Fx = -M * self.gx if inner_stands else 0.0
+                self.inner_Fy = -M * self.gy if inner_stands else 0.0
                 if stages == 1:
                     return
             vF += weight * aF
@@ -1300,7 +1324,7 @@ class Body:
         else:
             self.mode = 3
         if self.Jf == 0.0:
-            self._limp_foot(leg)
+            self.limp_foot(leg)
         self.update_pose()
         gap = self.gap_outer if leg == 0 else self.gap_inner
         if self.mode == 1:
@@ -1522,7 +1546,9 @@ class Body:
             energy - self.energy_J(),
             self.mode == 2,
             self.passing_gap,
+            self.height_outer if foot == 0 else self.height_inner,
         )
+        self.changes += 1
         if strike:
             self.passing_gap = 1.0
             self.last_strike_leg = foot
@@ -1530,7 +1556,7 @@ class Body:
             self.released_s = self.time_s
         self.brush = False
         if self.mode == 1 and self.Jf == 0.0:
-            self._limp_foot(other)
+            self.limp_foot(other)
 
     def _leave(self, foot: cython.longlong) -> cython.void:
         """The foot goes off the floor; the other one carries, or none does."""
@@ -1547,11 +1573,12 @@ class Body:
         else:
             self.mode = 3
         if self.Jf == 0.0:
-            self._limp_foot(foot)
+            self.limp_foot(foot)
             if self.mode == 3:
-                self._limp_foot(1 - foot)
+                self.limp_foot(1 - foot)
         self.update_pose()
         self.record.leave(self.event_time_ns(), foot, self.mode == 3)
+        self.changes += 1
 
     def _watch(self, h: cython.double) -> cython.void:
         """Once per step: arm feet that are clear, draw footholds, keep the extremes, judge falls."""
@@ -1629,6 +1656,7 @@ class Body:
         self.mode = 4
         self.cause = cause
         self.record.fall(self.event_time_ns(), cause)
+        self.changes += 1
         self.foot_outer_rate = 0.0
         self.leg_outer_rate = 0.0
         self.leg_inner_rate = 0.0

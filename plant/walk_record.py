@@ -2,7 +2,7 @@
 
 import array
 
-RING = 64  # strikes kept for whoever reads them later than at once; chosen by us: half a minute of walking
+RING = 4096  # strikes kept for whoever draws them later; chosen by us: 41 minutes of walking, 160 kB
 
 
 class WalkRecord:
@@ -18,7 +18,11 @@ class WalkRecord:
 
     def __init__(self) -> None:
         self.strike_times_ns = array.array("q", [0]) * RING
+        self.strike_durations_ns = array.array("q", [0]) * RING
+        self.strike_legs = array.array("q", [0]) * RING
         self.strike_lengths_m = array.array("d", [0.0]) * RING
+        self.strike_xs_m = array.array("d", [0.0]) * RING
+        self.strike_heights_m = array.array("d", [0.0]) * RING
         self.begin(0, 0.0)
 
     def begin(self, time_ns, contact_x) -> None:
@@ -60,8 +64,9 @@ class WalkRecord:
         self.time_squares = 0.0
         self.double_stance_sum_s = 0.0
 
-    def touch(self, time_ns, leg, strike, ahead, x, foot_rad, impulses, loss_J, double, gap) -> None:
-        """A foot met the floor. `impulses`: stance x, y, swing x, y in N s; `gap`: lowest clearance at passing."""
+    def touch(self, time_ns, leg, strike, ahead, x, foot_rad, impulses, loss_J, double, gap, height) -> None:
+        """A foot met the floor. `impulses`: stance x, y, swing x, y in N s; `gap`: lowest clearance at passing;
+        `height`: of the foothold."""
         if not strike:
             if leg == self.strike_leg and ahead > 0.0:
                 self.bounces += 1
@@ -80,7 +85,11 @@ class WalkRecord:
         self.distance_m = x - self.start_x
         self.last_x = x
         self.strike_times_ns[self.steps % RING] = time_ns
+        self.strike_durations_ns[self.steps % RING] = self.step_time_ns
+        self.strike_legs[self.steps % RING] = leg
         self.strike_lengths_m[self.steps % RING] = self.step_length_m
+        self.strike_xs_m[self.steps % RING] = x
+        self.strike_heights_m[self.steps % RING] = height
         self.strike_time_ns = time_ns
         self.strike_leg = leg
         self.strike_foot_rad = foot_rad

@@ -458,7 +458,7 @@ def test_energy_is_kept_without_friction(mode, foot_inertia, exact_spring):
         body.mode = mode
         for leg in (OUTER, INNER) if mode == FLIGHT else (INNER,):
             if foot_inertia == 0.0:
-                body._limp_foot(leg)
+                body.limp_foot(leg)
         body.update_pose()
     before = body.energy_J()
     seconds = 0.03 if mode == DOUBLE else 0.2

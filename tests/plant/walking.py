@@ -382,6 +382,54 @@ def held_start(walker, lean=0.09, rate=0.7, seconds=1.5):
     walker.body.release(rate)
 
 
+class ElectricWalker(Walker):
+    """The same controllers on the whole plant: bridges, windings, battery; current loops as on the motor boards.
+
+    Integral-only loop at 2 kHz with 20 counts of 600 per A and sample, duty clips 250 and 300 counts
+    [facts on control 4], on the true current.
+    """
+
+    def __init__(self, plant, controller, delay_s=0.014):
+        super().__init__(plant.body, controller, delay_s)
+        self.plant = plant
+        self.counts = [0.0, 0.0, 0.0]
+
+    def obey(self):
+        b, plant = self.body, self.plant
+        rates = (b.hip_rate(), b.motor_outer_rate, b.motor_inner_rate)
+        places = (b.hip_angle(), b.motor_outer + ZERO, b.motor_inner + ZERO)
+        for k, (low, high, ceiling) in enumerate(((-4.0, 4.0, 250), (-1.0, 6.0, 300), (-1.0, 6.0, 300))):
+            i0, stiffness, damping = self.commands[k]
+            target = clip(i0 - stiffness * places[k] - damping * rates[k], low, high)
+            motor = plant.motors[k]
+            self.counts[k] = clip(self.counts[k] + 20.0 * (target - motor.current_A), -ceiling, ceiling)
+            counts = round(self.counts[k]) * int(motor.mounting)
+            motor.drive.write_pwm(plant.time_ns, max(counts, 0), max(-counts, 0), 600)
+            motor.drive.watchdog_edge(plant.time_ns)
+
+    def run(self, steps, seconds=1e9):
+        plant = self.plant
+        while not plant.fell and plant.steps < steps and self.seconds < seconds:
+            if self.count % TICK == 0:
+                self.controller.tick(self)
+            if self.count % 4 == 0:
+                self.obey()
+            plant.step()
+            self.count += 1
+        return not plant.fell
+
+    @property
+    def energy_J(self):
+        return sum(motor.drawn_J for motor in self.plant.motors)
+
+
+def electric_start(plant, walker, lean=0.09, rate=0.8, seconds=1.5):
+    """The record set's operator script: stand, settle, let go."""
+    plant.hold("outer", lean, 0.35, 1.825, 2.175)
+    walker.run(1, seconds)
+    plant.release(rate)
+
+
 def mid_stance_start(body, leg_rate=0.62, hip_rate=2.1, stance_foot=0.0, swing_ankle=-1.3):
     """Outer leg upright and going forward, inner leg swinging forward, inner foot flipped up."""
     b = body
@@ -400,6 +448,7 @@ def mid_stance_start(body, leg_rate=0.62, hip_rate=2.1, stance_foot=0.0, swing_a
 
 __all__ = [
     "DOUBLE",
+    "ElectricWalker",
     "FALLEN",
     "SINGLE",
     "IdealMotor",
@@ -407,6 +456,7 @@ __all__ = [
     "RecordGait",
     "Walker",
     "clip",
+    "electric_start",
     "held_start",
     "mid_stance_start",
 ]

@@ -1,0 +1,376 @@
+"""The physical robot in one object: body, motors, battery, sensors, steering, floor; 125 us a step.
+
+A step in order (EQUATIONS 10): currents of the motors at the rates of its start, in closed form; the body under
+their mean torques, events located inside; steering; then everything the boards can see, as straight lines between
+start and end of the step, and every encoder edge with its time.
+
+Seen from the boards: `motors` with their drives, `encoders` with their edges, `analog_start` and `analog_end`,
+`words`, `imu`. Seen from outside: `body`, `record`, `steering`, and the few fields a harness asks every step.
+"""
+
+import array
+
+import cython
+import numpy as np
+
+from plant.absolute_encoder import AbsoluteEncoder
+from plant.body import Body
+from plant.electrics import Electrics
+from plant.floor import Floor
+from plant.imu import Imu
+from plant.incremental_encoder import IncrementalEncoder
+from plant.parameters import BodyParameters
+from plant.steering import Steering
+from plant.walk_record import RING
+
+STEP_NS = 125_000  # the plant's step; its error is measured in EQUATIONS 10
+
+# What `fill_sample` writes, in this order: name and unit.
+SAMPLES = {
+    "hip_x_m": "m",
+    "hip_y_m": "m",
+    "foot_outer_rad": "rad",
+    "leg_outer_rad": "rad",
+    "leg_inner_rad": "rad",
+    "foot_inner_rad": "rad",
+    "leg_outer_rad_s": "rad/s",
+    "leg_inner_rad_s": "rad/s",
+    "hip_rad": "rad",
+    "hip_rad_s": "rad/s",
+    "ankle_outer_rad": "rad",
+    "motor_outer_rad": "rad",
+    "ankle_inner_rad": "rad",
+    "motor_inner_rad": "rad",
+    "motor_outer_rad_s": "rad/s",
+    "motor_inner_rad_s": "rad/s",
+    "outer_Fx_N": "N",
+    "outer_Fy_N": "N",
+    "inner_Fx_N": "N",
+    "inner_Fy_N": "N",
+    "hip_A": "A",
+    "outer_A": "A",
+    "inner_A": "A",
+    "steering_A": "A",
+    "hip_W": "W",
+    "outer_W": "W",
+    "inner_W": "W",
+    "steering_W": "W",
+    "battery_V": "V",
+    "battery_A": "A",
+    "twist_rad": "rad",
+    "yaw_rad": "rad",
+    "path_x_m": "m",
+    "path_y_m": "m",
+    "mode": "",
+    "steps": "",
+}
+
+
+class RangerPlant:
+    """The robot's physics. `seed`: of every noise and foothold; `model_file`: additional named terms (plant/terms.py).
+
+    `parameters`: BodyParameters, `electrics`: ElectricsParameters, `floor`: Floor (built from slope and roughness
+    when None). `start_ns`: virtual time at power-up.
+    """
+
+    def __init__(
+        self,
+        seed=0,
+        slope_rad=0.0,
+        floor_roughness_m=0.0,
+        model_file=None,
+        start_ns=0,
+        parameters=None,
+        electrics=None,
+        floor=None,
+    ) -> None:
+        self.parameters = parameters if parameters is not None else BodyParameters()
+        self.floor = floor if floor is not None else Floor(slope_rad, floor_roughness_m, seed)
+        self.body = Body(self.parameters, self.floor)
+        self.electrics = Electrics(electrics, seed)
+        self.hip = self.electrics.hip
+        self.outer_ankle = self.electrics.outer_ankle
+        self.inner_ankle = self.electrics.inner_ankle
+        self.steering_motor = self.electrics.steering
+        self.motors = [self.hip, self.outer_ankle, self.inner_ankle, self.steering_motor]
+        self.steering = Steering(self.steering_motor.parameters.reflected_inertia_kg_m2)
+        self.record = self.body.record
+        self.time_ns = start_ns
+        self.step_ns = STEP_NS
+        self.step_s = STEP_NS * 1e-9
+        self.zero = self.parameters.ankle_zero_rad
+
+        # Lines, gears and senses of the encoders: facts network-and-boards 4.1; the outer feet's are mirrored.
+        self.hip_joint = IncrementalEncoder("hip_joint", 2048, seed=seed)
+        self.hip_motor = IncrementalEncoder("hip_motor", 192, 66.0, seed=seed)
+        self.outer_motor = IncrementalEncoder("outer_motor", 512, 34.0, -1, seed=seed)
+        self.outer_joint = IncrementalEncoder("outer_ankle", 2048, 1.0, -1, seed=seed)
+        self.inner_motor = IncrementalEncoder("inner_motor", 512, 34.0, seed=seed)
+        self.inner_joint = IncrementalEncoder("inner_ankle", 2048, seed=seed)
+        self.encoders = [
+            self.hip_joint,
+            self.hip_motor,
+            self.outer_motor,
+            self.outer_joint,
+            self.inner_motor,
+            self.inner_joint,
+        ]
+        # Zeros: facts network-and-boards 4.7.
+        self.hip_word = AbsoluteEncoder("hip", 4590, 1, seed=seed)
+        self.outer_word = AbsoluteEncoder("outer_ankle", 6562, -1, seed=seed)
+        self.inner_word = AbsoluteEncoder("inner_ankle", 1572, 1, seed=seed)
+        self.words = array.array("q", [0]) * 3
+        self.imu = Imu(seed, phase_ns=start_ns)
+        self.analog_start = self.electrics.analog_start
+        self.analog_end = self.electrics.analog_end
+
+        # the walk, as a harness asks for it every step
+        self.steps = 0
+        self.strike_time_ns = start_ns
+        self.lift_off_time_ns = -1
+        self.step_length_m = 0.0
+        self.distance_m = 0.0
+        self.fell = False
+        self.fall_cause = ""
+        self.changes = 0
+        self.sample_names = SAMPLES
+        self.model_file = model_file
+        if model_file is not None:
+            from plant import terms
+
+            terms.load(model_file).apply(self)
+        self._settle()
+
+    # ---- what the operator does -------------------------------------------------------------------------------
+
+    def hold(
+        self,
+        stance: object = "outer",
+        lean_rad: cython.double = 0.0,
+        hip_angle_rad: cython.double = 0.3,
+        outer_ankle_rad: cython.double = 1.68,
+        inner_ankle_rad: cython.double = 1.68,
+        lifted: cython.bint = False,
+    ) -> cython.void:
+        """Put the robot in this pose and keep its legs there; feet and motors are free.
+
+        stance: "outer" or "inner", the legs that stand with the robot's weight, or hang when `lifted`; lean_rad:
+        theirs, forward; hip_angle_rad: inner legs ahead; ankle angles as the joints measure them, motors alike.
+        """
+        b: Body = self.body
+        outer: cython.double = lean_rad if stance == "outer" else lean_rad + hip_angle_rad
+        b.place(outer, hip_angle_rad)
+        b.motor_outer = outer_ankle_rad - self.zero
+        b.motor_inner = inner_ankle_rad - self.zero
+        b.foot_outer = outer + b.motor_outer
+        b.foot_inner = outer - hip_angle_rad + b.motor_inner
+        if lifted:
+            b.hold_both(outer, hip_angle_rad)
+        else:
+            b.hold_standing(outer, hip_angle_rad, 0 if stance == "outer" else 1)
+        self._settle()
+
+    def release(self, rate_rad_s: cython.double, hip_rate_rad_s: cython.double = 0.0) -> cython.void:
+        """Let go at this rate of the legs, forward; the standing foot rolls along with its ankle at rest."""
+        b: Body = self.body
+        b.step_start_ns = self.time_ns
+        b.elapsed = 0.0
+        b.release(rate_rad_s, b.stance, rate_rad_s, hip_rate_rad_s)
+        self.begin()
+
+    def begin(self) -> cython.void:
+        """Everything that counts from the moment the robot is let go."""
+        for motor in self.motors:
+            motor.drawn_before_J = motor.drawn_J
+        self.steering.begin(self.body.hip_x)
+        self._note()
+
+    def _settle(self) -> cython.void:
+        """Sensors as if the robot had stood like this for long, from here on."""
+        b: Body = self.body
+        h: cython.double = b.leg_outer - b.leg_inner
+        outer: cython.double = b.foot_outer - b.leg_outer + self.zero
+        inner: cython.double = b.foot_inner - b.leg_inner + self.zero
+        self.hip_joint.reset(h)
+        self.hip_motor.reset(h)
+        self.outer_motor.reset(b.motor_outer + self.zero)
+        self.outer_joint.reset(outer)
+        self.inner_motor.reset(b.motor_inner + self.zero)
+        self.inner_joint.reset(inner)
+        self.words[0] = self.hip_word.word(h)
+        self.words[1] = self.outer_word.word(outer)
+        self.words[2] = self.inner_word.word(inner)
+        self.electrics.settle(b.outer_Fy > 0.0, b.outer_Fy, b.inner_Fy > 0.0, b.inner_Fy, self.steering.twist)
+
+    # ---- passing time -----------------------------------------------------------------------------------------
+
+    def step(self) -> cython.void:
+        """Integrate over [time_ns, time_ns + step_ns]; sensors then show this step."""
+        b: Body = self.body
+        e: Electrics = self.electrics
+        s: Steering = self.steering
+        t0: cython.longlong = self.time_ns
+        t1: cython.longlong = t0 + self.step_ns
+        h0: cython.double = b.leg_outer - b.leg_inner
+        h0_rate: cython.double = b.leg_outer_rate - b.leg_inner_rate
+        lean0: cython.double = b.leg_outer
+        lean0_rate: cython.double = b.leg_outer_rate
+        p0: cython.double = b.motor_outer + self.zero
+        p0_rate: cython.double = b.motor_outer_rate
+        n0: cython.double = b.motor_inner + self.zero
+        n0_rate: cython.double = b.motor_inner_rate
+        o0: cython.double = b.foot_outer - b.leg_outer + self.zero
+        o0_rate: cython.double = b.foot_outer_rate - b.leg_outer_rate
+        i0: cython.double = b.foot_inner - b.leg_inner + self.zero
+        i0_rate: cython.double = b.foot_inner_rate - b.leg_inner_rate
+        h1: cython.double
+        h1_rate: cython.double
+        o1: cython.double
+        i1: cython.double
+        outer_stands: cython.bint
+        inner_stands: cython.bint
+        yaw0: cython.double = s.yaw
+
+        e.step_motors(t0, t1, h0_rate, p0_rate, n0_rate, s.rate)
+        b.hip_drive = self.hip.drive_Nm
+        b.hip_coulomb = self.hip.coulomb_Nm
+        b.hip_viscous = self.hip.viscous_Nms
+        b.outer_drive = self.outer_ankle.drive_Nm
+        b.outer_coulomb = self.outer_ankle.coulomb_Nm
+        b.outer_viscous = self.outer_ankle.viscous_Nms
+        b.inner_drive = self.inner_ankle.drive_Nm
+        b.inner_coulomb = self.inner_ankle.coulomb_Nm
+        b.inner_viscous = self.inner_ankle.viscous_Nms
+
+        b.step_start_ns = t0
+        b.advance(self.step_s)
+
+        outer_stands = b.stands(0)
+        inner_stands = b.stands(1)
+        s.advance(
+            self.step_s,
+            self.steering_motor.drive_Nm,
+            self.steering_motor.coulomb_Nm,
+            self.steering_motor.viscous_Nms,
+            self.steering_motor.inverse_smoothing,
+            outer_stands,
+            inner_stands,
+            b.hip_x,
+        )
+
+        self.time_ns = t1
+        h1 = b.leg_outer - b.leg_inner
+        h1_rate = b.leg_outer_rate - b.leg_inner_rate
+        o1 = b.foot_outer - b.leg_outer + self.zero
+        i1 = b.foot_inner - b.leg_inner + self.zero
+        self.hip_joint.update(t0, t1, h0, h0_rate, h1, h1_rate)
+        self.hip_motor.update(t0, t1, h0, h0_rate, h1, h1_rate)
+        self.outer_motor.update(t0, t1, p0, p0_rate, b.motor_outer + self.zero, b.motor_outer_rate)
+        self.outer_joint.update(t0, t1, o0, o0_rate, o1, b.foot_outer_rate - b.leg_outer_rate)
+        self.inner_motor.update(t0, t1, n0, n0_rate, b.motor_inner + self.zero, b.motor_inner_rate)
+        self.inner_joint.update(t0, t1, i0, i0_rate, i1, b.foot_inner_rate - b.leg_inner_rate)
+        self.words[0] = self.hip_word.word(h1, self.step_s)
+        self.words[1] = self.outer_word.word(o1, self.step_s)
+        self.words[2] = self.inner_word.word(i1, self.step_s)
+        self.imu.update(t0, t1, lean0, lean0_rate, b.leg_outer, b.leg_outer_rate, s.yaw, (s.yaw - yaw0) / self.step_s)
+        e.sense(t0, t1, outer_stands, b.outer_Fy, inner_stands, b.inner_Fy, s.twist)
+        if b.changes != self.changes:
+            self._note()
+
+    def _note(self) -> cython.void:
+        """Copy what a harness asks for every step out of the record; only after something happened."""
+        r = self.record
+        self.changes = self.body.changes
+        self.steps = r.steps
+        self.strike_time_ns = r.strike_time_ns
+        self.lift_off_time_ns = r.lift_off_time_ns
+        self.step_length_m = r.step_length_m
+        self.distance_m = r.distance_m
+        self.fell = r.fell
+        self.fall_cause = r.fall_cause
+
+    # ---- looking from outside ---------------------------------------------------------------------------------
+
+    def fill_sample(self, row: cython.double[::1]) -> cython.void:
+        """Write the values named in SAMPLES."""
+        b: Body = self.body
+        s: Steering = self.steering
+        V: cython.double = self.electrics.battery.voltage_V
+        row[0] = b.hip_x
+        row[1] = b.hip_y
+        row[2] = b.foot_outer
+        row[3] = b.leg_outer
+        row[4] = b.leg_inner
+        row[5] = b.foot_inner
+        row[6] = b.leg_outer_rate
+        row[7] = b.leg_inner_rate
+        row[8] = b.leg_outer - b.leg_inner
+        row[9] = b.leg_outer_rate - b.leg_inner_rate
+        row[10] = b.foot_outer - b.leg_outer + self.zero
+        row[11] = b.motor_outer + self.zero
+        row[12] = b.foot_inner - b.leg_inner + self.zero
+        row[13] = b.motor_inner + self.zero
+        row[14] = b.motor_outer_rate
+        row[15] = b.motor_inner_rate
+        row[16] = b.outer_Fx
+        row[17] = b.outer_Fy
+        row[18] = b.inner_Fx
+        row[19] = b.inner_Fy
+        row[20] = self.hip.current_A
+        row[21] = self.outer_ankle.current_A
+        row[22] = self.inner_ankle.current_A
+        row[23] = self.steering_motor.current_A
+        row[24] = V * self.hip.battery_current_A
+        row[25] = V * self.outer_ankle.battery_current_A
+        row[26] = V * self.inner_ankle.battery_current_A
+        row[27] = V * self.steering_motor.battery_current_A
+        row[28] = V
+        row[29] = self.electrics.battery.current_A
+        row[30] = s.twist
+        row[31] = s.yaw
+        row[32] = s.path_x
+        row[33] = s.path_y
+        row[34] = b.mode
+        row[35] = self.steps
+
+    @property
+    def electronics_power_W(self):
+        """Power of computers and sensors at the battery."""
+        return self.electrics.electronics_W
+
+    @property
+    def battery_V(self):
+        """Terminal voltage now."""
+        return self.electrics.battery.voltage_V
+
+    def geometry(self):
+        """What a drawing needs: lengths in m, angles in rad."""
+        p = self.parameters
+        return {
+            "leg": p.leg_length_m,
+            "radius": p.foot_radius_m,
+            "eccentricity": p.ankle_offset_m,
+            "heel": p.arc_heel_rad,
+            "toe": p.arc_toe_rad,
+            "slope": self.floor.slope_rad,
+        }
+
+    def recent_steps(self):
+        """(number from 1, length m, time s, onto the outer feet) of the last steps, numpy arrays, oldest first."""
+        r = self.record
+        kept = min(r.steps, RING)
+        number = np.arange(r.steps - kept + 1, r.steps + 1)
+        at = (number - 1) % RING
+        length = np.asarray(r.strike_lengths_m, dtype=float)[at]
+        seconds = np.asarray(r.strike_durations_ns, dtype=np.int64)[at] * 1e-9
+        outer = np.asarray(r.strike_legs, dtype=np.int64)[at] == 0
+        return number, length, seconds, outer
+
+    def recent_footholds(self):
+        """[{x, height}] of the last footholds in m, oldest first."""
+        r = self.record
+        kept = min(r.steps, RING)
+        return [
+            {"x": r.strike_xs_m[n % RING], "height": r.strike_heights_m[n % RING]}
+            for n in range(r.steps - kept, r.steps)
+        ]
