@@ -399,8 +399,13 @@ class Bus:
         if self.strikes_left > 0:
             self.strikes_left -= 1
             position = self.strike_position if self.strike_position >= 0 else (last - first) // 2
-        while self.next_strike < first:
+        while self.next_planned_bit < first:
             self._forget_strike()
+        if self.next_noise_bit < first:
+            # what fell on idle bits is forgotten; the distance to the next one has no memory
+            self.next_noise_bit = first - 1
+            self._draw_noise()
+            self.next_strike = min(self.next_planned_bit, self.next_noise_bit)
         if self.next_strike < last and position < 0:
             position = self.next_strike - first
         if position < 0:
@@ -408,11 +413,9 @@ class Bus:
         return min(max(position, vulnerable), last - first - 1)
 
     def _forget_strike(self) -> None:
-        if self.planned_bits and self.planned_bits[0] == self.next_strike:
-            self.planned_bits.pop(0)
-            self.next_planned_bit = self.planned_bits[0] if self.planned_bits else NEVER
-        else:
-            self._draw_noise()
+        """The first planned disturbance is over."""
+        self.planned_bits.pop(0)
+        self.next_planned_bit = self.planned_bits[0] if self.planned_bits else NEVER
         self.next_strike = min(self.next_planned_bit, self.next_noise_bit)
 
     # ---- passing of time
