@@ -72,7 +72,7 @@ class InnerFeetBoard(AnkleBoard):
                 Task(board.errors.update,               90, 2700, 120, "error", "error_update"),
                 Task(board.can.feed,                    50,  300,  80, "frame", "can_tx2"),
                 Wait(board.adc_external.sequence_done,  20, 6500,              "adcx_conversion_wait"),
-                Task(board.compliant_control,         2600, 3400,   0, "",      "mc_compliant_control"),
+                Task(board.compliant_control,         3900, 5200,   0, "",      "mc_compliant_control"),
             ),
             rows=(
                 (Task(board.send_ankle_angle,          420,  560,   0, "",      "MCFI_MID_ANKLE_ANGLE"),),

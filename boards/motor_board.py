@@ -6,8 +6,8 @@ schedule table. Facts: network-and-boards 1.2, 4, 5, 6.1.
 Where the numbers of cycles come from: measured on the robot is only the encoder interrupt (about 150
 cycles, appendix 4.6). All others are chosen by us: instructions of the described work counted at 1.5 cycles
 each (ARM7 with its flash accelerator on), a software division 350, a single-float operation 100, an exchange
-of 16 bits with the converter at 10 MHz 100 cycles. They give slots of a third standing still and of three
-quarters with the motor at full speed; the robot is known never to have missed a slot.
+of 16 bits with the converter at 10 MHz 100 cycles. They give slots of a third standing still and of nearly
+two thirds with the motor at full speed; the robot is known never to have missed a slot.
 A task's limit is what it may take at the busiest (ring full, fastest motor), plus about a third.
 """
 

@@ -82,7 +82,7 @@ class SteeringBoard(MotorBoard):
                 Task(board.can.feed,                    50,  300,  80, "frame", "can_tx2"),
                 Wait(board.adc_external.sequence_done,  20, 6500,              "adcx_conversion_wait"),
                 Task(board.update_pwm,                 250,  340,   0, "",      "dn_update_pwm"),
-                Task(board.steering_control,          2600, 3400,   0, "",      "mc_compliant_control"),
+                Task(board.steering_control,          3900, 5200,   0, "",      "mc_compliant_control"),
             ),
             rows=(
                 (Task(board.send_steer_angle,          330,  440,   0, "",      "MCSI_STEER_ANGLE"),),
