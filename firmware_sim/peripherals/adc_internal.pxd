@@ -3,7 +3,8 @@ from firmware_sim.vic cimport InterruptSource
 
 cdef class AdcInternal(Peripheral):
     cdef public long long clkdiv, hz, conversion_ns, alarm, CR, GDR, result, channel
-    cdef public double reference_V
+    cdef public double reference_V, scale
+    cdef public long long offset_counts
     cdef public InterruptSource source
     cdef public bint busy
     cdef public long long conversions, not_finished, started_time

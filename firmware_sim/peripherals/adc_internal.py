@@ -3,7 +3,8 @@
 A conversion takes 11 clocks of core clock / clkdiv: 60 MHz / 200 = 300 kHz gives 36.7 us. The input is
 sampled at the start. A single conversion ends with the interrupt (ADC_DONE, 0). Burst mode converts its
 channels in turn for ever and is polled: `DR(channel)` is the newest finished conversion.
-counts = floor(1024 V / reference_V), clipped to 0 ... 1023 (LPC2194 user manual: result = V / VDDA * 1024).
+counts = floor(scale * 1024 V / reference_V) + offset_counts, clipped to 0 ... 1023 (LPC2194 user manual: result =
+V / VDDA * 1024; scale and offset are those of a board's own divider and converter).
 """
 
 import array
@@ -18,7 +19,7 @@ from foundation.user_error import UserError
 class AdcInternal(Peripheral):
     """One converter. `inputs[channel]`: the analog pin of the chip behind AIN0 ... AIN7."""
 
-    def __init__(self, chip, clkdiv=200, hz=0, reference_V=3.3) -> None:
+    def __init__(self, chip, clkdiv=200, hz=0, reference_V=3.3, scale=1.0, offset_counts=0) -> None:
         Peripheral.__init__(self, chip)
         if clkdiv <= 0 or reference_V <= 0.0:
             raise UserError(f"{chip.name}: ADC: clkdiv {clkdiv} and reference_V {reference_V} must be above 0")
@@ -26,6 +27,8 @@ class AdcInternal(Peripheral):
         self.hz = hz if hz else chip.hz
         self.conversion_ns = 11 * clkdiv * 1_000_000_000 // self.hz
         self.reference_V = reference_V
+        self.scale = scale
+        self.offset_counts = offset_counts
         self.alarm = chip.new_alarm(self, 0)
         self.source = chip.vic.source(ADC_DONE, 0)
         self.inputs = array.array("q", range(8))
@@ -43,13 +46,18 @@ class AdcInternal(Peripheral):
 
     def convert(self, volts: cython.double) -> cython.longlong:
         """Counts for a voltage at the pin."""
-        scaled: cython.double = volts / self.reference_V * 1024.0
+        scaled: cython.double = self.scale * volts / self.reference_V * 1024.0
         counts: cython.longlong
         if not scaled > 0.0:
-            return 0
-        if scaled >= 1023.0:
-            return 1023
+            scaled = 0.0
+        if scaled > 2048.0:
+            scaled = 2048.0
         counts = int(scaled)
+        counts += self.offset_counts
+        if counts < 0:
+            return 0
+        if counts > 1023:
+            return 1023
         return counts
 
     def start(self, channel: cython.longlong) -> cython.bint:

@@ -191,6 +191,7 @@ def test_an_edge_at_the_instant_of_a_wrap_counts_zero_and_is_served_in_attaching
     edges(chip, 22, (500_000, 1))
     chip.advance(510_000)
     assert order == [("edge", 0), "wrap"]
+    assert (timer.wraps, timer.wrap_time) == (1, 500_000)
 
 
 # --- PWM ---------------------------------------------------------------------------------------------------
@@ -318,6 +319,13 @@ def test_an_internal_conversion_at_300_kilohertz_takes_36_7_microseconds():
 )
 def test_internal_counts_are_10_bits(volts, counts):
     assert AdcInternal(chip_at()).convert(volts) == counts
+
+
+def test_scale_and_offset_of_a_board_enter_the_internal_counts_too():
+    adc = AdcInternal(chip_at(), scale=1.01, offset_counts=-5)
+    assert adc.convert(1.65) == 517 - 5
+    assert adc.convert(0.0) == 0
+    assert adc.convert(float("nan")) == 0
 
 
 def test_burst_mode_converts_two_channels_in_turn_at_15_kilohertz_each():
