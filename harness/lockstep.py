@@ -18,9 +18,9 @@ from firmware_sim.microcontroller import Microcontroller
 from foundation.events import EventQueue
 from harness.recorder import RowStream
 from plant.edge_buffer import ByteBuffer
+from plant.incremental_encoder import IncrementalEncoder
 from plant.motor_unit import MotorUnit
 from plant.ranger import RangerPlant
-from plant.sensors import IncrementalEncoder
 
 QUANTUM_NS = 25_000
 SAMPLE_NS = 2_000_000  # the canonical trace samples body and data table at the main brain's rate
@@ -217,15 +217,10 @@ class Lockstep:
         board: Microcontroller
         end: cython.longlong = plant.time_ns
         start: cython.longlong = end - plant.step_ns
-        i: cython.longlong
         for wire in self.encoder_wires:
             wire.deliver()
-        if self.imu is not None:
-            bytes_out: ByteBuffer = self.imu.output
-            board = self.imu_board
-            for i in range(bytes_out.count):
-                # order 256: stage pins; kind 5: UART_BYTE
-                board.inbox.push(bytes_out.times[i], 256, 5, self.imu_uart, bytes_out.values[i])
+        if self.imu is not None and self.imu.bytes.count:
+            self._deliver_bytes()
         for analog in self.analog_wires:
             board = analog.board
             board.analog.set_pair(
@@ -238,6 +233,30 @@ class Lockstep:
         for word in self.word_wires:
             board = word.board
             board.words[word.word] = plant.words[word.source]
+
+    def _deliver_bytes(self) -> cython.void:
+        """Bytes of the inertial unit: up to eight that follow each other closely travel as one message."""
+        line: ByteBuffer = self.imu.bytes
+        board: Microcontroller = self.imu_board
+        i: cython.longlong = 0
+        k: cython.longlong
+        n: cython.longlong
+        low: cython.longlong
+        high: cython.longlong
+        while i < line.count:
+            n = 1
+            while n < 8 and i + n < line.count and line.times[i + n] - line.times[i + n - 1] < 25_000:
+                n += 1
+            low = 0
+            high = 0
+            for k in range(n):
+                if k < 4:
+                    low |= line.values[i + k] << (8 * k)
+                else:
+                    high |= line.values[i + k] << (8 * (k - 4))
+            # order 256: stage pins; kind 5: UART_BYTE
+            board.inbox.push(line.times[i + n - 1], 256, 5, self.imu_uart, line.values[i], n, low, high)
+            i += n
 
     def _collect_frames(self) -> cython.void:
         """Move what the buses logged into the canonical trace, bus after bus."""
@@ -302,7 +321,7 @@ class Lockstep:
                     bus = self.buses[self.bus_of[place]]
                     bus.set_mode(self.node_of[place], out.b, out.time)
             elif out.kind == 39 and index == self.imu_index and out.a == self.imu_uart:  # UART_OUTPUT
-                self.imu.receive(out.b, out.time)
+                self.imu.receive_byte(out.time, out.b)
 
     def _sample(self, now: cython.longlong) -> cython.void:
         """One row of the trace: the body, and when a log is kept the main brain's data table."""

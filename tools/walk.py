@@ -1,20 +1,25 @@
 """`ranger-sim walk`: let the robot walk, watch it, keep what it did."""
 
+from __future__ import annotations
+
 import argparse
 import contextlib
 import json
 import pathlib
 import signal
 import tempfile
+from typing import TYPE_CHECKING
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeRemainingColumn
 
 from foundation import wallclock
 from foundation.user_error import UserError
-from harness.ranger import Ranger
 from harness.scenario import Scenario, StopRule
 from tools.units import LENGTHS, TIMES, quantity, whole_number
+
+if TYPE_CHECKING:
+    from harness.ranger import Ranger
 
 DEFAULT_STEPS = 100
 SLICE_S = 0.05  # virtual seconds between two looks at the screen and at Ctrl-C
@@ -61,6 +66,8 @@ def register(commands) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Walk, write the files, print the summary; 0 done, 1 fell or a board failed, 130 interrupted."""
+    from harness.ranger import Ranger  # the whole robot: only when it is to walk
+
     stop = (
         StopRule(options.steps, options.time, options.distance)
         if (options.steps or options.time or options.distance)

@@ -1,0 +1,56 @@
+from boards.main_brain.estimator cimport Estimator
+from can_bus.bus cimport Bus
+from firmware_sim.microcontroller cimport Microcontroller
+from foundation.events cimport EventQueue
+from harness.recorder cimport Recorder, RowStream
+from plant.edge_buffer cimport ByteBuffer
+from plant.imu cimport Imu
+from plant.motor_unit cimport MotorUnit
+from plant.ranger cimport RangerPlant
+from plant.incremental_encoder cimport IncrementalEncoder
+
+cdef class Wire:
+    cdef public IncrementalEncoder encoder
+    cdef public Microcontroller board
+    cdef public long long pin_a, pin_b
+    cpdef void deliver(self)
+
+cdef class AnalogWire:
+    cdef public long long source, channel
+    cdef public Microcontroller board
+
+cdef class WordWire:
+    cdef public long long source, word
+    cdef public Microcontroller board
+
+cdef class SspWire:
+    cdef public Microcontroller master, slave
+    cdef public long long exchange_ns, exchanges
+    cdef public object loaded
+    cpdef void start(self, long long time_ns, object segment)
+    cpdef void load(self, object segment)
+
+cdef class Lockstep:
+    cdef public RangerPlant plant
+    cdef public list boards, buses, encoder_wires, analog_wires, word_wires, motors
+    cdef public Recorder recorder
+    cdef public long long time, next_sample, sample_count, stop_steps
+    cdef public double stop_distance_m
+    cdef public SspWire ssp
+    cdef public object pin_watch
+    cdef public Imu imu
+    cdef public Microcontroller imu_board, main_brain
+    cdef public Estimator estimator
+    cdef public long long imu_index, imu_uart
+    cdef public long long swing_leg, strike_seen_ns, strike_count, strikes_unmatched
+    cdef public double strike_sum_ms, strike_squares_ms2
+    cdef public long long[::1] main_brain_words, bus_of, node_of, watchdog_pin, enable_pins, enables
+    cdef public bint records_words
+    cdef public double[::1] sample_row
+    cpdef long long run(self, long long until)
+    cdef void _notice_strike(self)
+    cdef void _sense(self)
+    cdef void _deliver_bytes(self)
+    cdef void _collect_frames(self)
+    cdef void _route(self, long long index, Microcontroller board)
+    cdef void _sample(self, long long now)
