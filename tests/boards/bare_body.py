@@ -85,6 +85,7 @@ class BareRobot:
         body.foot_outer = body.leg_outer + body.motor_outer
         body.foot_inner = body.leg_inner + body.motor_inner
         body.update_pose()
+        body.hold_standing(operator.lean_rad, operator.hip_angle_rad)
 
     def set_ids(self, **values) -> None:
         for name, value in values.items():
@@ -161,10 +162,8 @@ class BareRobot:
                 table.UI_BUTTONS,
                 sum(1 << k.key for k in operator.keys if k.time_s <= self.time_s < k.time_s + k.hold_s),
             )
-            self.body.hold(operator.lean_rad)
-            self.body.lock_hip = True
             self.step()
-        self.body.release(operator.release_rate_rad_per_s, 0, operator.release_rate_rad_per_s)
+        self.body.release(operator.release_rate_rad_per_s)
 
     def walk(self, steps, limit_s) -> bool:
         """Walk until so many steps; False when the robot fell or the time was up."""
