@@ -677,7 +677,7 @@ class Bus:
 
     def _senders(self, k, best) -> list:
         """Slots that send together: of each node its first slot with the winning field."""
-        found = {}
+        found: dict = {}
         for i in range(self.pending_count):
             slot = self.pending[i]
             if self.ready[slot] <= k and self.keys[slot] == self.keys[best]:

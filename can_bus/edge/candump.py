@@ -1,0 +1,147 @@
+"""Frame logs in the format of `candump -L`, which can-utils, python-can, cantools and SavvyCAN read.
+
+One line per frame: `(seconds.microseconds) interface identifier#data`; three hexadecimal digits are a
+standard identifier, eight an extended one; `#R` and a length is a remote frame. An error frame is
+written as identifier 20000080 (error flag of SocketCAN and its class "bus error") with the field of the
+error in byte 3 (linux/can/error.h: where the violation was seen, the same codes as in can_bus.frame).
+Nanoseconds are cut to microseconds, the resolution of the format; the time is the receivers'.
+"""
+
+import pathlib
+from collections.abc import Iterable, Iterator
+from typing import Any, TextIO
+
+from can_bus.bus import LOG_FIELDS
+from can_bus.edge.messages import data_of_words, words_of_data
+from foundation.events import FLAG_ERROR, FLAG_EXTENDED, FLAG_REMOTE
+from foundation.user_error import UserError
+
+ERROR_FLAG = 0x20000000  # CAN_ERR_FLAG, linux/can.h
+ERROR_BUS = 0x00000080  # CAN_ERR_BUSERROR, linux/can/error.h
+
+Frame = tuple[int, int, int, int, int]  # time_ns, identifier, flags, lo, hi
+
+
+def line_of_frame(interface: str, time_ns: int, identifier: int, flags: int, lo: int, hi: int) -> str:
+    """One line of the log, with its line end."""
+    seconds, rest = divmod(time_ns, 1_000_000_000)
+    if flags & FLAG_ERROR:
+        text = f"{ERROR_FLAG | ERROR_BUS:08X}#000000{lo & 0xFF:02X}00000000"
+    else:
+        name = f"{identifier:08X}" if flags & FLAG_EXTENDED else f"{identifier:03X}"
+        if flags & FLAG_REMOTE:
+            text = f"{name}#R{min(flags & 15, 8)}"
+        else:
+            text = f"{name}#{data_of_words(flags, lo, hi).hex().upper()}"
+    return f"({seconds:010d}.{rest // 1000:06d}) {interface} {text}\n"
+
+
+class CandumpWriter:
+    """Writes frames of one or more buses to a file. A context manager.
+
+    UserError when the file cannot be written. `frames` counts the lines.
+    """
+
+    def __init__(self, path: str | pathlib.Path) -> None:
+        self.path = pathlib.Path(path)
+        self.frames = 0
+        try:
+            self.file: TextIO = self.path.open("w", encoding="ascii", newline="\n")
+        except OSError as error:
+            raise UserError(f"{self.path}: the frame log cannot be written ({error.strerror})") from None
+
+    def __enter__(self) -> "CandumpWriter":
+        return self
+
+    def __exit__(self, *_: Any) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Finish the file."""
+        self.file.close()
+
+    def write(self, interface: str, frames: Iterable[Frame]) -> None:
+        """Append frames (time_ns, identifier, flags, lo, hi), in the order of their times."""
+        lines = [line_of_frame(interface, *frame) for frame in frames]
+        self.file.writelines(lines)
+        self.frames += len(lines)
+
+    def write_log(self, interface: str, log: bytes) -> None:
+        """Append what `Bus.take_log()` returned."""
+        self.write(interface, frames_of_log(log))
+
+
+def frames_of_log(log: bytes) -> list[Frame]:
+    """The frames in what `Bus.take_log()` returned, without their senders."""
+    v: list[int] = memoryview(log).cast("q").tolist()
+    return [(v[i], v[i + 1], v[i + 2], v[i + 3], v[i + 4]) for i in range(0, len(v), LOG_FIELDS)]
+
+
+def read_candump(path: str | pathlib.Path) -> Iterator[tuple[str, int, int, int, int, int]]:
+    """(interface, time_ns, identifier, flags, lo, hi) per line; empty lines are skipped.
+
+    A trailing R or T, as python-can writes it, is allowed. UserError names the file and the line for
+    anything else, CAN FD included.
+    """
+    source = pathlib.Path(path)
+    try:
+        text = source.read_text(encoding="ascii")
+    except (OSError, UnicodeDecodeError) as error:
+        reason = error.strerror if isinstance(error, OSError) else "not plain ASCII"
+        raise UserError(f"{source}: the frame log cannot be read ({reason})") from None
+    for number, line in enumerate(text.splitlines(), 1):
+        if line.strip():
+            try:
+                yield _frame_of_line(line)
+            except ValueError as error:
+                raise UserError(f"{source}:{number}: {error}") from None
+
+
+def _frame_of_line(line: str) -> tuple[str, int, int, int, int, int]:
+    """One line of a log; ValueError says what is wrong with it."""
+    parts = line.split()
+    if len(parts) == 4 and parts[3] in ("R", "T"):
+        del parts[3]
+    if len(parts) != 3 or not (parts[0].startswith("(") and parts[0].endswith(")")):
+        raise ValueError(f"not `(seconds.microseconds) interface identifier#data`: {line.strip()[:60]!r}")
+    stamp, interface, frame = parts
+    seconds, _, fraction = stamp[1:-1].partition(".")
+    if not (_digits(seconds) and _digits(fraction) and len(fraction) <= 9):
+        raise ValueError(f"time {stamp} is not (seconds.fraction) with at most nine decimals")
+    time_ns = int(seconds) * 1_000_000_000 + int(fraction.ljust(9, "0"))
+    name, mark, data = frame.partition("#")
+    if not mark:
+        raise ValueError(f"frame {frame[:40]!r} has no #")
+    if data.startswith("#"):
+        raise ValueError(f"frame {frame[:40]!r} is CAN FD; these logs are classic CAN")
+    if len(name) not in (3, 8) or not _hexadecimal(name):
+        raise ValueError(f"identifier {name[:20]!r} is not three or eight hexadecimal digits")
+    identifier = int(name, 16)
+    flags = FLAG_EXTENDED if len(name) == 8 else 0
+    if len(name) == 3 and identifier > 0x7FF:
+        raise ValueError(f"identifier {name} is above 7FF")
+    if len(name) == 8 and identifier & ERROR_FLAG:
+        if not _hexadecimal(data or "0") or len(data) % 2 or len(data) > 16:
+            raise ValueError(f"data {data[:40]!r} is not up to eight bytes in hexadecimal")
+        content = bytes.fromhex(data).ljust(8, b"\0")
+        return interface, time_ns, 0, FLAG_ERROR, content[3], 0
+    if identifier > 0x1FFFFFFF:
+        raise ValueError(f"identifier {name} is above 1FFFFFFF")
+    if data[:1] in ("R", "r"):
+        length = data[1:] or "0"
+        if not _digits(length) or int(length) > 8:
+            raise ValueError(f"length {length[:10]!r} of a remote frame is not 0 ... 8")
+        return interface, time_ns, identifier, flags | FLAG_REMOTE | int(length), 0, 0
+    if data and (not _hexadecimal(data) or len(data) % 2 or len(data) > 16):
+        raise ValueError(f"data {data[:40]!r} is not up to eight bytes in hexadecimal")
+    content = bytes.fromhex(data)
+    lo, hi = words_of_data(content)
+    return interface, time_ns, identifier, flags | len(content), lo, hi
+
+
+def _digits(text: str) -> bool:
+    return text.isascii() and text.isdigit()
+
+
+def _hexadecimal(text: str) -> bool:
+    return all(letter in "0123456789abcdefABCDEF" for letter in text)
