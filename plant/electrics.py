@@ -81,7 +81,7 @@ class ElectricsParameters:
     # The AD623's range "was not really sufficient" [A 3.8]: highest battery voltage that it passes on. Chosen by
     # us: out of reach by default, so that the firmware's constants hold; 27 V shows the effect.
     voltage_clip_V: float = 60.0
-    foot_rise_time_constant_s: float = 0.011
+    foot_rise_time_constant_s: float = 0.012
     foot_share: float = 0.4
     foot_full_load_N: float = 50.0
 

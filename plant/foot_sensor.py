@@ -8,8 +8,8 @@ in stance (facts control-and-data 3.2). Between them (EQUATIONS 11):
 
 `rise_time_constant` is the one number of the dynamics. The robot's strike is known 14 +/- 3 ms after it happens
 (appendix 4.3) and the chain from the converter to the swing flag takes about 5 ms, so the sole needs about 9 ms
-to the threshold of 2000 counts above the baseline. Chosen by us: 11 ms; with the load of the leading foot
-rising to its share of the weight over double stance that makes 9 ms (a test holds it).
+to the threshold of 2000 counts above the baseline. Chosen by us: 12 ms; with the load of the leading foot
+rising to the weight over 30 ms of double stance that makes 9 ms (a test holds it).
 `share` stands for what the blow itself presses the gap shut at small loads: chosen by us, 0.4. `full_load`, where the
 gap is closed and the stop takes over (appendix 2.4): chosen by us, half of the weight, 50 N.
 """
@@ -35,7 +35,7 @@ class FootSensors:
     def __init__(
         self,
         name,
-        rise_time_constant_s=0.011,
+        rise_time_constant_s=0.012,
         share=0.4,
         full_load_N=50.0,
         left_gain=1.0,

@@ -329,7 +329,14 @@ class Model:
                 rows.add(term.form.torque, PLACE_NUMBER[term.at], list(term.values.values()))
             elif term.at in MOTORS:
                 motors = (electrics.hip, electrics.outer_ankle, electrics.inner_ankle, electrics.steering)
-                _apply_electric(motors[MOTORS.index(term.at)], term)
+                unit = motors[MOTORS.index(term.at)]
+                _apply_electric(unit, term)
+                ohm = unit.winding_ohm + unit.series_ohm
+                if ohm <= 0.0 or unit.contact_drop_V < 0.0:
+                    raise UserError(
+                        f"{self.source}: the terms at {term.at} together leave {ohm:g} ohm "
+                        f"and {unit.contact_drop_V:g} V at the brushes; both must stay above 0"
+                    )
             elif term.at in ANALOG_NAMES:
                 _apply_analog(electrics, ANALOG_NAMES.index(term.at), term)
             elif term.at in WORD_NAMES:
