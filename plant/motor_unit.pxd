@@ -13,7 +13,7 @@ cdef class MotorUnit:
     cdef public double air_C, rotor_temperature_C, housing_temperature_C
     cdef public double bridge_current_A, current_A, mean_current_A, battery_current_A, heat_W, drive_voltage_V
     cdef public double drive_Nm, coulomb_Nm, viscous_Nms
-    cdef public double drawn_J, drawn_before_J, drawn_before_J, returned_J, mechanical_J, winding_J, series_J, contact_J, ripple_J, gate_J, diode_J
+    cdef public double drawn_J, drawn_before_J, returned_J, mechanical_J, winding_J, series_J, contact_J, ripple_J, gate_J, diode_J
     cdef public double charge_As, absolute_As, square_A2s, last_duration_s, decay, decay_rate
     cpdef double magnetic_J(self)
     cpdef double battery_J(self)

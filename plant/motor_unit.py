@@ -85,7 +85,6 @@ class MotorUnit:
         self.viscous_Nms = p.viscous_friction_Nms
 
         self.drawn_J = 0.0
-        self.drawn_before_J = 0.0  # of drawn_J when the walk began; set from outside
         self.drawn_before_J = 0.0  # until the robot was let go; kept by plant/ranger.py
         self.returned_J = 0.0
         self.mechanical_J = 0.0  # K G w I, before friction
