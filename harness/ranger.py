@@ -208,18 +208,11 @@ class Ranger:
 
         return Recorded(self)
 
-    def candump_logs(self) -> dict:
-        """{bus: what it carried, as candump writes it}, bytes."""
-        from can_bus.edge import candump
-
-        frames = self.logbook.frames()
-        return {bus.name: candump.text_of(bus.name, frames, number) for number, bus in enumerate(self.buses)}
-
     def error_meaning(self, name: str) -> str:
-        """What an error code means."""
-        from datatable.generated import errors
+        """What an error code means, in the words of the master table."""
+        import datatable
 
-        return errors.MEANINGS[getattr(errors, name)]
+        return next((row.description for row in datatable.load().errors if row.name == name), "")
 
     def close(self) -> None:
         """Give back the log's files."""

@@ -64,14 +64,14 @@ class Recorded:
         names = {state.number: state.name for state in getattr(self.robot.boards["MB"].modes, machine).machine.states}
         return self._seconds(self.word_times_ns), self.words[:, number].astype(int), names
 
-    def state_text(self, times_s) -> list[str]:
-        """The states of hip and feet at the given times, as one line each."""
+    def state_text(self, times_s) -> list[list[str]]:
+        """The states of hip and feet at the given times, three lines each."""
         parts = []
         for machine in ("hip", "outer_foot", "inner_foot"):
             time, states, names = self.machine_states(machine)
             at = np.clip(np.searchsorted(time, times_s, side="right") - 1, 0, max(0, len(states) - 1))
             parts.append([f"{machine.replace('_', ' ')}: {names.get(int(states[i]), '?')}" for i in at])
-        return ["   ".join(row) for row in zip(*parts, strict=True)]
+        return [list(row) for row in zip(*parts, strict=True)]
 
     def _seconds(self, time_ns):
         return (time_ns - self.robot.start_ns) * 1e-9

@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.table import Table
 
 import datatable
-from can_bus import edge
+from can_bus.edge import interfaces
 from harness.build import compiled_modules, is_compiled
 
 
@@ -21,18 +21,26 @@ def register(commands) -> None:
     command.set_defaults(run=run)
 
 
+def version() -> str:
+    """Version of the installed package; a bare source tree says so."""
+    try:
+        return metadata.version("ranger-sim")
+    except metadata.PackageNotFoundError:
+        return "source tree, not installed"
+
+
 def facts() -> dict:
     """Everything the command tells, as plain data."""
     compiled, interpreted = compiled_modules()
     return {
-        "version": metadata.version("ranger-sim"),
+        "version": version(),
         "compiled": is_compiled(),
         "compiled_modules": len(compiled),
         "interpreted_modules": sorted(interpreted),
         "python": sys.version.split()[0],
         "implementation": platform.python_implementation(),
         "platform": platform.platform(),
-        "can_interfaces": edge.available_interfaces(),
+        "can_interfaces": interfaces.available_interfaces(),
         "data_table_hash": datatable.table_hash(),
     }
 

@@ -180,11 +180,27 @@ def write_files(robot: Ranger, summary: dict, folder: pathlib.Path, console: Con
     from tools.report import page
 
     with console.status("writing logs and report ..."):
-        for bus, text in robot.candump_logs().items():
-            replace_file(folder / f"{bus}.log", text)
+        write_frames(robot, folder)
         variables_file.write(robot, folder / "variables.mf4")
         replace_file(folder / "report.html", page.render(robot, summary).encode())
         replace_file(folder / "summary.json", (json.dumps(summary, indent=2) + "\n").encode())
+
+
+def write_frames(robot: Ranger, folder: pathlib.Path) -> None:
+    """One log per bus in candump's format."""
+    from can_bus.edge.candump import CandumpWriter
+
+    frames = robot.logbook.frames()
+    columns = [frames[name] for name in ("time_ns", "identifier", "flags", "word0", "word1")]
+    for number, bus in enumerate(robot.buses):
+        of_bus = (frames["bus"] == number).nonzero()[0]
+        with tempfile.TemporaryDirectory(dir=folder, prefix=f".{bus.name}") as partial:
+            path = pathlib.Path(partial) / f"{bus.name}.log"
+            with CandumpWriter(path) as log:
+                for start in range(0, len(of_bus), 100_000):
+                    rows = of_bus[start : start + 100_000]
+                    log.write(bus.name, zip(*(column[rows].tolist() for column in columns), strict=True))
+            path.replace(folder / f"{bus.name}.log")
 
 
 def print_summary(summary: dict, console: Console) -> None:

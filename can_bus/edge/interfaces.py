@@ -4,7 +4,9 @@ import logging
 
 import can
 
-SOFTWARE_ONLY = {"virtual", "udp_multicast"}  # always there, so nothing that is found
+# Left out: `virtual` and `udp_multicast` are always there; looking for a socketcand server means listening to the
+# network for seconds.
+NOT_LOOKED_FOR = {"virtual", "udp_multicast", "socketcand"}
 
 
 def available_interfaces() -> list[str]:
@@ -13,7 +15,7 @@ def available_interfaces() -> list[str]:
     level = log.level
     log.setLevel(logging.CRITICAL)  # drivers that are not installed announce themselves, which is no news here
     try:
-        found = can.detect_available_configs(sorted(can.VALID_INTERFACES - SOFTWARE_ONLY))
+        found = can.detect_available_configs(sorted(can.VALID_INTERFACES - NOT_LOOKED_FOR))
     finally:
         log.setLevel(level)
     return sorted({f"{each['interface']}:{each['channel']}" for each in found})

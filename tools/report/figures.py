@@ -47,7 +47,11 @@ def finished(figure, title, note="", height=420, **layout) -> Figure:
         font={"color": INK},
         **layout,
     )
-    return Figure(title, figure.to_html(full_html=False, include_plotlyjs=False, config={"displaylogo": False}), note)
+    return Figure(
+        title,
+        figure.to_html(full_html=False, include_plotlyjs=False, config={"displaylogo": False, "displayModeBar": False}),
+        note,
+    )
 
 
 def phase_portraits(walk) -> Figure:
@@ -115,9 +119,15 @@ def joint_angles(walk, seconds=2.6) -> Figure:
         rows=3, shared_xaxes=True, vertical_spacing=0.05, subplot_titles=("hip", "outer ankle", "inner ankle")
     )
     rows = (
-        ("hip", [("hip_rad", "hip", HIP)]),
-        ("outer_foot", [("ankle_outer_rad", "joint", OUTER), ("motor_outer_rad", "motor", "#7fb2dc")]),
-        ("inner_foot", [("ankle_inner_rad", "joint", INNER), ("motor_inner_rad", "motor", "#f0b27a")]),
+        ("hip", [("hip_rad", "hip angle", HIP)]),
+        (
+            "outer_foot",
+            [("ankle_outer_rad", "outer ankle, joint", OUTER), ("motor_outer_rad", "outer ankle, motor", "#7fb2dc")],
+        ),
+        (
+            "inner_foot",
+            [("ankle_inner_rad", "inner ankle, joint", INNER), ("motor_inner_rad", "inner ankle, motor", "#f0b27a")],
+        ),
     )
     for row, (machine, lines) in enumerate(rows, start=1):
         for name, label, colour in lines:
@@ -126,7 +136,7 @@ def joint_angles(walk, seconds=2.6) -> Figure:
                 go.Scatter(
                     x=x,
                     y=y,
-                    name=f"{machine.replace('_', ' ')} {label}",
+                    name=label,
                     line={"color": colour, "width": 1.6},
                 ),
                 row,

@@ -105,7 +105,7 @@ def animation(robot, walk) -> dict:
     data = {key: np.round(s[name][pick], 5).tolist() for key, name in names.items()}
     data["t"] = np.round(time[pick], 4).tolist()
     data["state"] = walk.state_text(time[pick])
-    data["geometry"] = robot.geometry()
+    data["geometry"] = robot.plant.geometry()
     data["footholds"] = walk.footholds
     return data
 

@@ -1,5 +1,5 @@
 // Draws the recorded walk. WALK: geometry {leg, radius, eccentricity, heel, toe, slope} in m and rad,
-// arrays t [s], hip_x, hip_y [m], foot_outer, leg_outer, leg_inner, foot_inner [rad, absolute, positive
+// arrays t [s], state [lines of text], hip_x, hip_y [m], foot_outer, leg_outer, leg_inner, foot_inner [rad, absolute, positive
 // leaning forward], currents [A] and the footholds {x, height}.
 (function () {
   const canvas = document.getElementById("stage");
@@ -70,7 +70,7 @@
     context.moveTo(0, canvas.height);
     const half = canvas.width / 2 / scale;
     const heightAt = (x) => {
-      let y = -Math.tan(WALK.geometry.slope) * 0;
+      let y = 0;
       for (const hold of WALK.footholds) { if (hold.x <= x) y = hold.height; else break; }
       return y;
     };
@@ -103,7 +103,9 @@
       context.fillRect(width >= 0 ? 120 : 120 + width, y, Math.abs(width), 8);
     });
     context.fillStyle = "#1d2733";
-    context.fillText(WALK.state[i], canvas.width - 300, 34);
+    context.textAlign = "right";
+    WALK.state[i].forEach((line, k) => context.fillText(line, canvas.width - 24, 34 + 18 * k));
+    context.textAlign = "left";
     clock.textContent = time[i].toFixed(3) + " s";
     position.value = Math.round(1000 * at / span);
   }
