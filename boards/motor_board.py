@@ -162,9 +162,7 @@ class MotorBoard(Microcontroller):
         self.execution = ExecutionTimer(self, self.time)
         # converters
         self.adc_external = Ads7871(self, eint=1)
-        self.adc_external.set_sequence(
-            *((channel, gain, ANALOG[place]) for place, channel, gain in sequence)
-        )
+        self.adc_external.set_sequence(*((channel, gain, ANALOG[place]) for place, channel, gain in sequence))
         self.adc_internal = AdcInternal(self, clkdiv=200)
         self.adc_internal.inputs[BATTERY_VOLTAGE_CHANNEL] = ANALOG["battery_voltage"]
         places = [place for place, _, _ in sequence]
@@ -184,14 +182,10 @@ class MotorBoard(Microcontroller):
             slot=EXTERNAL_ADC_SLOT,
             name="adcx_busy",
         )
-        self.vic.attach(
-            ADC_DONE, 0, board.on_internal_adc, cost=80, slot=INTERNAL_ADC_SLOT, name="adci_done"
-        )
+        self.vic.attach(ADC_DONE, 0, board.on_internal_adc, cost=80, slot=INTERNAL_ADC_SLOT, name="adci_done")
         # network
         self.can_controller = CanController(self, table.CONTROLLER, IER=interrupts)
-        self.can = CanLink(
-            self, self.can_controller, self.time, self.errors, codes, quirks.full_queues_reported
-        )
+        self.can = CanLink(self, self.can_controller, self.time, self.errors, codes, quirks.full_queues_reported)
         self.can.attach(receive_slot=CAN_RECEIVE_SLOT, error_slot=CAN_ERROR_SLOT)
         # motor
         self.pwm = Pwm(self, period=PERIOD_COUNTS, phase_ns=phase_ns)
@@ -284,12 +278,8 @@ class MotorBoard(Microcontroller):
             codes.QDC_CH23_BUF_F,
             filter_exponent=quirks.rate_filter_exponent,
         )
-        self.capture01 = EncoderCapture(
-            self, self.wraps, 0, PINS["encoder_01_a"], PINS["encoder_01_b"], self.cap01
-        )
-        self.capture23 = EncoderCapture(
-            self, self.wraps, 2, PINS["encoder_23_a"], PINS["encoder_23_b"], self.cap23
-        )
+        self.capture01 = EncoderCapture(self, self.wraps, 0, PINS["encoder_01_a"], PINS["encoder_01_b"], self.cap01)
+        self.capture23 = EncoderCapture(self, self.wraps, 2, PINS["encoder_23_a"], PINS["encoder_23_b"], self.cap23)
         self.wraps.attach(self)
 
     def add_absolute_encoder(self, second_connector, zero, sign, rpm) -> None:
@@ -415,4 +405,3 @@ class MotorBoard(Microcontroller):
     def note_near_limit(self) -> cython.void:
         """A slot took more than 90 % of its length."""
         self.errors.report(CODE_NEAR_LIMIT)
-

@@ -133,9 +133,7 @@ class SteeringBoard(MotorBoard):
         duty = divide_toward_zero(self.compliance.command, 65536)
         duty = self.limits.limit_duty(duty << 16, self.readings.motor_current_fixed())
         duty = divide_toward_zero(duty, 65536)
-        if (duty > 0 and self.current_control.block_positive) or (
-            duty < 0 and self.current_control.block_negative
-        ):
+        if (duty > 0 and self.current_control.block_positive) or (duty < 0 and self.current_control.block_negative):
             duty = 0
         self.output.write(duty)
 

@@ -97,9 +97,7 @@ class CanLink:
         self.chip.vic.attach(
             CAN_RX, number, self.on_receive, cost=RECEIVE_CYCLES, slot=receive_slot, name="can_receive"
         )
-        self.chip.vic.attach(
-            CAN_STATUS, number, self.on_error, cost=ERROR_CYCLES, slot=error_slot, name="can_error"
-        )
+        self.chip.vic.attach(CAN_STATUS, number, self.on_error, cost=ERROR_CYCLES, slot=error_slot, name="can_error")
 
     def listen(self, identifier, receiver: Receiver) -> None:
         """Frames of `identifier` go to `receiver` from now on; one receiver per identifier."""
@@ -220,9 +218,7 @@ class CanLink:
             else:
                 break
             place = self.tx_read
-            if not self.controller.transmit(
-                buffer, self.tx_ids[place], 8, self.tx_values[place], self.tx_times[place]
-            ):
+            if not self.controller.transmit(buffer, self.tx_ids[place], 8, self.tx_values[place], self.tx_times[place]):
                 break
             self.tx_read = (place + 1) & 7
             frames += 1

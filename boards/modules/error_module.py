@@ -101,9 +101,7 @@ class ErrorModule:
         if self.waiting == 0:
             return False
         place: cython.longlong = self.first
-        self.word = (
-            (self.codes[place] & 0xFFFF) | (self.board & 0x3F) << 16 | (self.counts[place] & 0x3FF) << 22
-        )
+        self.word = (self.codes[place] & 0xFFFF) | (self.board & 0x3F) << 16 | (self.counts[place] & 0x3FF) << 22
         self.stamp = self.stamps[place]
         self.first = (self.first + 1) & 31
         self.waiting -= 1

@@ -83,9 +83,7 @@ class MotorLimits:
 
     def monitor(self, current: cython.longlong) -> cython.void:
         """Every slot, also while the motor is off: advance both monitors with the measured current."""
-        loss: cython.longlong = fixed_multiply(current, current) - fixed_multiply(
-            self.thermal, self.thermal_rate
-        )
+        loss: cython.longlong = fixed_multiply(current, current) - fixed_multiply(self.thermal, self.thermal_rate)
         self.thermal += (loss * 32) >> 16  # SLOT_S_FIXED
         if self.thermal >= self.thermal_limit:
             self.thermal_multiplier = 0
@@ -93,9 +91,7 @@ class MotorLimits:
                 self.too_hot = True
                 self.errors.report(self.code_hot)
         elif self.thermal >= self.thermal_soft:
-            self.thermal_multiplier = 65536 - fixed_multiply(
-                self.thermal - self.thermal_soft, self.thermal_slope
-            )
+            self.thermal_multiplier = 65536 - fixed_multiply(self.thermal - self.thermal_soft, self.thermal_slope)
             self.errors.report(self.code_warm)
         else:
             self.thermal_multiplier = 65536

@@ -25,9 +25,7 @@ class MotorOutput:
     brain asked for; only their low 15 bits count. `stopped`: the limits switched the motor off.
     """
 
-    def __init__(
-        self, gpio: Gpio, pwm: Pwm, sleep: IntReceiver, shutdown: IntReceiver, sign, largest, offset
-    ) -> None:
+    def __init__(self, gpio: Gpio, pwm: Pwm, sleep: IntReceiver, shutdown: IntReceiver, sign, largest, offset) -> None:
         self.gpio = gpio
         self.pwm = pwm
         self.sleep = sleep

@@ -239,9 +239,7 @@ def test_the_high_bits_of_the_transfer_are_ignored_and_the_sign_is_the_mounting(
     ("name", "loop_gain", "gain", "offset"),
     [("MCH", 100, 0.00154, -9), ("MCFO", -99, -0.00152, 0), ("MCFI", 99, 0.001525, -1), ("MCSI", 10, 0.0001535, 25)],
 )
-def test_motor_current_is_scaled_by_full_constants_outside_and_truncated_ones_inside(
-    name, loop_gain, gain, offset
-):
+def test_motor_current_is_scaled_by_full_constants_outside_and_truncated_ones_inside(name, loop_gain, gain, offset):
     bench = Bench(name).run(ms=2)
     bench.counts("motor_current", 1000)
     bench.run(ms=2)
