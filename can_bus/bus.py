@@ -883,13 +883,18 @@ class Bus:
 
     def _roll(self, bit: cython.longlong) -> cython.void:
         """Close load windows until `bit` lies in the open one."""
+        idle: cython.longlong
+        if self.window_busy > self.window_busy_max:
+            self.window_busy_max = self.window_busy
         while bit >= self.window_end:
-            if self.window_busy > self.window_busy_max:
-                self.window_busy_max = self.window_busy
             self.windows[self.window_count % 1024] = self.window_busy  # WINDOW_RING
             self.window_count += 1
             self.window_busy = 0
             self.window_end += self.window_bits
+            idle = (bit - self.window_end) // self.window_bits - 1024
+            if idle > 0:  # a ring full of idle windows is enough
+                self.window_count += idle
+                self.window_end += idle * self.window_bits
 
     def load_mean(self, time) -> float:
         """Share of the bus that was taken from the start of the statistics to `time` (ns), 0 ... 1."""

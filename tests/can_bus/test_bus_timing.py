@@ -249,6 +249,19 @@ def test_a_frame_across_the_border_of_a_window_is_split_and_idle_windows_are_emp
     assert wired.bus.load_max() == max(first, bits - first, bits) / 30_000
 
 
+def test_a_day_without_frames_leaves_a_ring_of_idle_windows():
+    wired = Wired(2)
+    day = 86_400 * SECOND
+    wired.send(0, 0, time=0)
+    wired.bus.advance(1000)
+    wired.send(0, 0, time=day + 20_000_000)
+    wired.bus.advance(day + 21_000_000)
+    bits = frame_bits(0, 8, 0, 0) + 3
+    assert wired.bus.window_count == 86_400 * 100 + 2
+    assert wired.bus.load_windows() == [0.0] * 1024
+    assert wired.bus.window_busy == bits and wired.bus.load_max() == bits / 30_000
+
+
 def test_a_full_bus_has_load_one():
     wired = Wired(2)
     time = 0
