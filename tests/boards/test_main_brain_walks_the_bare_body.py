@@ -9,6 +9,7 @@ windows here are wide: they are those that the whole robot has to meet.
 import pytest
 
 from datatable.generated import mb as table
+from plant.floor import Floor
 from plant.parameters import BodyParameters
 from tests.boards.bare_body import BareRobot
 
@@ -106,3 +107,9 @@ def test_the_wrong_sign_of_the_gyro_is_noticed_by_this_very_test():
     robot.sense = turned_round
     robot.start()
     assert not robot.walk(20, 20.0)
+
+
+def test_the_robust_set_walks_100_steps_on_a_floor_rough_by_1_mm():
+    robot = BareRobot("robust", floor=Floor(0.0, 0.001, 2))
+    robot.start()
+    assert robot.walk(100, 80.0), robot.body.record.fall_cause
