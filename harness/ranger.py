@@ -64,6 +64,8 @@ class Ranger:
         self.boards["CSR"].time.ms = self.scenario.start_uptime_ms
         # CAN
         self.buses = [Bus(f"can{n}", BUS_BIT_RATE, seed) for n in (1, 2, 3, 4)]
+        for bus in self.buses:
+            bus.reset_statistics(self.start_ns)  # loads count from the start of the run
         self.recorder = Recorder(len(self.plant.sample_names), all_variables.TABLE_SIZE)
         self.logbook = Logbook(self.recorder, log)
         self.loop = lockstep.Lockstep(
