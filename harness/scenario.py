@@ -18,7 +18,7 @@ class Scenario:
     start_uptime_ms: network time at power-up, so that wraps and long runs can be tested.
     """
 
-    controller: str = "record-2011"
+    controller: str = "robust"
     seed: int = 1
     slope_rad: float = 0.0
     floor_roughness_m: float = 0.0

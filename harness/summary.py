@@ -115,7 +115,7 @@ def slots(board) -> dict:
         "count": scheduler.slot_count,
         "overruns": scheduler.overruns,
         "max_execution_us": scheduler.max_slot_cycles * 1e6 / board.hz,
-        "budget_us": scheduler.schedule.slot_ns * scheduler.schedule.divider / 1000.0,
+        "budget_us": scheduler.schedule.slot_ns / 1000.0,
     }
 
 

@@ -38,9 +38,9 @@ def robot_case(seconds: float, log: str = "none", swap: bool = False, uptime_ms:
 
     robot = Ranger(Scenario(start_uptime_ms=uptime_ms), log=log)
     if swap:
-        board = robot.board("MCH")
-        law = board.compliant_control_task()
-        robot.replace("MCH", law.name, lambda: law.function(), cost=law.cost, limit=law.limit)
+        law = robot.board("MCH").scheduler.find("mc_compliant_control")
+        original = law.function
+        robot.replace("MCH", law.name, lambda: original(), cost=law.cost, limit=law.limit)
     robot.run(StopRule(time_s=1.0), 1.0)
     started = wallclock.process_cpu_s()
     robot.run(StopRule(time_s=1.0 + seconds), seconds)
@@ -62,38 +62,41 @@ def plant_case(seconds: float) -> dict:
     return {"figure": seconds / (wallclock.process_cpu_s() - started), "unit": "simulated s per CPU s"}
 
 
-def bus_case(frames: int) -> dict:
-    """Our bus: send, arbitrate and deliver on four buses."""
+def bus_case(frames: int, load: float = 1.0, nodes: int = 3) -> dict:
+    """Our bus: send, arbitrate and deliver on four buses of `nodes` boards at `load`."""
     from can_bus import benchmark
 
-    return {"figure": benchmark.frames_per_cpu_second(frames), "unit": "frames per CPU s"}
+    done = benchmark.million_frames(frames, load, nodes)
+    return {
+        "figure": done["frames_per_s"],
+        "unit": "frames per CPU s",
+        "frames": done["frames"],
+        "lost": done["lost"],
+        "out_of_order": done["out_of_order"],
+    }
 
 
 def virtual_case(frames: int) -> dict:
     """The same work on python-can's `virtual` interface."""
     from can_bus.edge import benchmark
 
-    return {"figure": benchmark.virtual_frames_per_cpu_second(frames), "unit": "frames per CPU s"}
+    return {"figure": benchmark.virtual_frames(frames)["frames_per_s"], "unit": "frames per CPU s"}
 
 
 CASES = {
-    "robot": lambda s: robot_case(s),
-    "robot-window": lambda s: robot_case(s, log="window"),
-    "robot-swapped": lambda s: robot_case(s, swap=True),
-    "robot-four-times-longer": lambda s: robot_case(4 * s),
-    "plant": lambda s: plant_case(s),
-    "bus": lambda s: bus_case(50_000 * int(s)),
-    "virtual": lambda s: virtual_case(2_000 * int(s)),
+    # case: (title, function of the virtual seconds)
+    "robot": ("whole robot, digest on, logs off", lambda s: robot_case(s)),
+    "robot-window": ("whole robot, last 10 s kept", lambda s: robot_case(s, log="window")),
+    "robot-full": ("whole robot, everything kept", lambda s: robot_case(s, log="full")),
+    "robot-swapped": ("hip control law replaced by a user's function", lambda s: robot_case(s, swap=True)),
+    "robot-longer": ("whole robot, four times the simulated time", lambda s: robot_case(4 * s)),
+    "plant": ("plant alone", lambda s: plant_case(s)),
+    "bus": ("our four buses, every buffer always full", lambda s: bus_case(50_000 * int(s))),
+    "bus-quarter": ("our four buses at 25 % load", lambda s: bus_case(50_000 * int(s), 0.25)),
+    "bus-eight": ("our four buses, eight boards each, 75 % load", lambda s: bus_case(50_000 * int(s), 0.75, 8)),
+    "virtual": ("python-can virtual, three boards", lambda s: virtual_case(1_000 * int(s))),
 }
-TITLES = {
-    "robot": "whole robot, digest on, logs off",
-    "robot-window": "whole robot, last 10 s kept",
-    "robot-swapped": "hip control law replaced by a user's function",
-    "robot-four-times-longer": "whole robot, four times the simulated time",
-    "plant": "plant alone",
-    "bus": "our bus, four buses",
-    "virtual": "python-can virtual, same work",
-}
+INTERPRETED = ("robot", "plant", "bus")
 
 
 def measured(case: str, seconds: float, interpreted: bool) -> dict:
@@ -128,16 +131,16 @@ def machine() -> dict:
 def run(options: argparse.Namespace) -> int:
     """Measure every case `--runs` times in turn; print medians and the ratio to the whole robot."""
     if options.case:
-        print(json.dumps(CASES[options.case](options.seconds)))
+        print(json.dumps(CASES[options.case][1](options.seconds)))
         return 0
     plan = [(case, False, options.seconds) for case in CASES]
-    plan += [(case, True, max(1, options.seconds // 10)) for case in ("robot", "plant")]
+    plan += [(case, True, max(1, options.seconds // 10)) for case in INTERPRETED]
     figures: dict = {}
     console = Console(stderr=True, quiet=options.json == "-")
     with console.status("measuring ...") as status:
         for turn in range(options.runs):
             for case, interpreted, seconds in plan:
-                status.update(f"run {turn + 1} of {options.runs}: {TITLES[case]}")
+                status.update(f"run {turn + 1} of {options.runs}: {CASES[case][0]}")
                 result = measured(case, seconds, interpreted)
                 key = case + (" (interpreted)" if interpreted else "")
                 figures.setdefault(key, {"unit": result["unit"], "values": []})["values"].append(result["figure"])
@@ -158,7 +161,7 @@ def run(options: argparse.Namespace) -> int:
         table.add_column(column, justify="left" if column in ("case", "unit") else "right")
     for key, figure in figures.items():
         case = key.removesuffix(" (interpreted)")
-        title = TITLES[case] + (", interpreted" if case != key else "")
+        title = CASES[case][0] + (", interpreted" if case != key else "")
         ratio = f"{figure['ratio_to_robot']:.3f}" if "ratio_to_robot" in figure else ""
         table.add_row(title, *(f"{figure[k]:,.4g}" for k in ("median", "min", "max")), figure["unit"], ratio)
     Console().print(table)

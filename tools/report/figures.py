@@ -201,23 +201,32 @@ def bus_load(walk) -> Figure:
 
 def slot_times(walk) -> Figure:
     """How long the slots of each board took, against their length."""
-    figure = go.Figure()
-    for name, (edges, counts) in walk.slot_histograms.items():
-        total = counts.sum()
-        if total:
-            figure.add_trace(
-                go.Scatter(
-                    x=edges,
-                    y=100 * counts / total,
-                    name=name,
-                    mode="lines",
-                    line={"shape": "hv", "width": 1.4},
-                )
-            )
-    figure.update_xaxes(title_text="% of the slot used, interrupts included", range=[0, 110])
-    figure.update_yaxes(title_text="% of the slots", type="log")
+    boards = list(walk.slot_histograms)
+    percent = walk.slot_histograms[boards[0]][0]
+    shares = np.array([counts / max(1, counts.sum()) for _, counts in walk.slot_histograms.values()])
+    figure = go.Figure(
+        go.Heatmap(
+            x=percent + 2.5,
+            y=boards,
+            z=np.where(shares > 0, np.log10(np.maximum(shares, 1e-9)) + 2, None),
+            customdata=100 * shares,
+            text=[[f"{100 * share:.3g}" if share > 0 else "" for share in row] for row in shares],
+            texttemplate="%{text}",
+            hovertemplate="%{y}: %{customdata:.3g} % of the slots took about %{x} % of their length<extra></extra>",
+            colorscale="Blues",
+            zmin=-4,
+            zmax=2.6,
+            showscale=False,
+            xgap=2,
+            ygap=4,
+        )
+    )
+    figure.update_xaxes(title_text="% of the slot used, interrupts included", range=[0, 107], dtick=10)
+    figure.update_yaxes(autorange="reversed")
     figure.add_vline(x=100, line={"color": "#b3261e", "dash": "dash"})
-    return finished(figure, "Slot times", "Right of the dashed line a slot would have overrun.", height=360)
+    return finished(
+        figure, "Slot times", "Numbers: % of the slots. Right of the dashed line a slot has overrun.", height=330
+    )
 
 
 def steps(walk) -> Figure:
