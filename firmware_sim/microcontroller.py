@@ -37,9 +37,7 @@ class Peripheral:
     def on_message(self, queue: EventQueue) -> cython.void:
         """A message of a kind claimed by this peripheral; it is in the fields of `queue`."""
 
-    def on_pin(
-        self, channel: cython.longlong, level: cython.longlong, time: cython.longlong
-    ) -> cython.longlong:
+    def on_pin(self, channel: cython.longlong, level: cython.longlong, time: cython.longlong) -> cython.longlong:
         """The pin of `channel` changed to `level` at `time`; returns 0."""
         return 0
 

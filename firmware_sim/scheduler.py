@@ -140,9 +140,7 @@ class Schedule:
             raise UserError("schedule: at least one row is needed (it may be empty)")
         if occasional is not None:
             if not 0 <= occasional_row < len(self.rows):
-                raise UserError(
-                    f"schedule: occasional_row {occasional_row} is not one of the {len(self.rows)} rows"
-                )
+                raise UserError(f"schedule: occasional_row {occasional_row} is not one of the {len(self.rows)} rows")
             if not isinstance(occasional, Occasional):
                 occasional = Occasional(occasional, extra_idle_call=extra_idle_call)
             self.rows[occasional_row].append(occasional)

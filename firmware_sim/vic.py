@@ -99,9 +99,7 @@ class InterruptController:
         if cost < 0 or per_item < 0:
             raise UserError(f"interrupt {kind}/{index}: cost {cost} and per_item {per_item} must not be negative")
         if slot != FIQ and self.irq_list[slot] not in (None, source):
-            raise UserError(
-                f"interrupt {kind}/{index}: slot {slot} is taken by {self.irq_list[slot].name}"
-            )
+            raise UserError(f"interrupt {kind}/{index}: slot {slot} is taken by {self.irq_list[slot].name}")
         self.detach(source)
         source.handler = handler
         source.name = name if name is not None else getattr(handler, "__name__", source.name)

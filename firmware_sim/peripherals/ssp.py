@@ -20,9 +20,7 @@ BIT_RATE = 3_000_000  # 60 MHz / 20
 WORD_BITS = 16
 
 
-def segment_time_ns(
-    words: cython.longlong, word_bits: cython.longlong, bit_rate: cython.longlong
-) -> cython.longlong:
+def segment_time_ns(words: cython.longlong, word_bits: cython.longlong, bit_rate: cython.longlong) -> cython.longlong:
     """Duration of `words` words of `word_bits` bits (ns, rounded down): 31, 16, 3 Mbit/s give 165,333."""
     return words * word_bits * 1000000000 // bit_rate
 

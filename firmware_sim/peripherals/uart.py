@@ -61,9 +61,7 @@ class Uart(Peripheral):
         self.DIVADDVAL = DIVADDVAL
         self.MULVAL = MULVAL
         self.baud = self.hz * MULVAL / (16.0 * DL * (MULVAL + DIVADDVAL))
-        self.byte_ns = self.chip.crystal.true_ns(
-            10 * 16 * DL * (MULVAL + DIVADDVAL) * 1000000000 // (self.hz * MULVAL)
-        )
+        self.byte_ns = self.chip.crystal.true_ns(10 * 16 * DL * (MULVAL + DIVADDVAL) * 1000000000 // (self.hz * MULVAL))
 
     def waiting(self) -> cython.longlong:
         """Received bytes that wait in the FIFO."""

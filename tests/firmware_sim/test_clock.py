@@ -33,19 +33,19 @@ def test_one_cycle_of_60_megahertz_is_16_ns_and_60_are_a_microsecond():
     assert crystal.ns_to_cycles(1000, 60_000_000) == 60
 
 
-@given(n=st.integers(0, 2**40), period=st.sampled_from([500_000, 1_000_000, 13]), ppb=st.integers(-10**6, 10**6))
+@given(n=st.integers(0, 2**40), period=st.sampled_from([500_000, 1_000_000, 13]), ppb=st.integers(-(10**6), 10**6))
 def test_every_tick_is_the_exact_quotient_rounded_down_even_after_years(n, period, ppb):
     exact = Fraction(n * period) * 10**9 / (10**9 + ppb)
     assert Crystal(10_000_000, ppb).tick_time_ns(n, period, 0) == exact.__floor__()
 
 
-@given(ns=st.integers(0, 1000 * 24 * HOUR_NS), ppb=st.integers(-10**6, 10**6))
+@given(ns=st.integers(0, 1000 * 24 * HOUR_NS), ppb=st.integers(-(10**6), 10**6))
 def test_local_time_and_true_time_undo_each_other_to_a_nanosecond(ns, ppb):
     crystal = Crystal(10_000_000, ppb)
     assert ns - 2 <= crystal.true_ns(crystal.local_ns(ns)) <= ns
 
 
-@given(ns=st.integers(0, 365 * 24 * HOUR_NS), ppb=st.integers(-10**6, 10**6))
+@given(ns=st.integers(0, 365 * 24 * HOUR_NS), ppb=st.integers(-(10**6), 10**6))
 def test_counted_cycles_are_exact_after_a_year(ns, ppb):
     exact = Fraction(ns) * (10**9 + ppb) * 208_000_000 / 10**18
     assert abs(Crystal(13_000_000, ppb).ns_to_cycles(ns, 208_000_000) - exact) < 2

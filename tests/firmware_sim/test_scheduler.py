@@ -173,9 +173,7 @@ def test_a_limit_exceeded_is_counted_and_told_but_cost_alone_decides_the_time():
     assert told == [beyond, beyond]
 
 
-@pytest.mark.parametrize(
-    "cost, near, over", [(26_900, 0, 0), (26_920, 1, 0), (29_900, 1, 0), (29_930, 0, 1)]
-)
+@pytest.mark.parametrize("cost, near, over", [(26_900, 0, 0), (26_920, 1, 0), (29_900, 1, 0), (29_930, 0, 1)])
 def test_a_slot_of_more_than_90_percent_is_near_its_limit_and_beyond_it_an_overrun(cost, near, over):
     log = Log()
     told = []

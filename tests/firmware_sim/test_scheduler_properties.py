@@ -44,9 +44,7 @@ class Run:
         rows = tuple(tasks(f"row{row}", costs) for row, costs in enumerate(table["rows"]))
         self.schedule = Schedule(every=tasks("every", table["every"]), rows=rows, last=tasks("last", table["last"]))
         chip.start(self.schedule, 0)
-        self.edge = chip.vic.attach(
-            PIN_EDGE, 3, self.log.function("edge"), cost=table["edge_cost"], slot=table["slot"]
-        )
+        self.edge = chip.vic.attach(PIN_EDGE, 3, self.log.function("edge"), cost=table["edge_cost"], slot=table["slot"])
         for time in table["edges"]:
             chip.inbox.push(time, 0, PIN_EDGE, 3, 1, -1)
         for stop in stops:

@@ -119,9 +119,7 @@ def run(seed, duration_ns=200_000_000):
         for _ in range(inputs.integer(5)):
             level = 1 - level
             pin = 22 if inputs.uniform() < 0.7 else 16
-            board.inbox.push(
-                start + inputs.integer(QUANTUM_NS), 256, PIN_EDGE, pin, level, pin + 5, inputs.integer(2)
-            )
+            board.inbox.push(start + inputs.integer(QUANTUM_NS), 256, PIN_EDGE, pin, level, pin + 5, inputs.integer(2))
         if inputs.uniform() < 0.2:
             board.inbox.push(start + inputs.integer(QUANTUM_NS), 512, CAN_RX, 1, 7, 8, inputs.integer(1 << 32), 5)
         if inputs.uniform() < 0.5:
