@@ -2,7 +2,7 @@
 
 Both reductions use the balances and momenta of `plant/paper_model.py` with the parameters of the appendix's table 1,
 integrated by scipy's DOP853 near rounding, the strike polished by Newton steps on its time. Run as a module it
-prints the figures. `step_errors` measures the running plant's step length and friction smoothing (EQUATIONS 10).
+prints the figures. `step_errors` measures the running plant's step length and friction smoothing (EQUATIONS 15).
 """
 
 import dataclasses

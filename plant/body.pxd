@@ -68,5 +68,5 @@ cdef class Body:
     cdef void _touch(self, long long foot)
     cdef void _leave(self, long long foot)
     cdef void _watch(self, double h)
-    cdef void _keep_forces(self, double h)
+    cpdef void _keep_forces(self, double h)
     cpdef void _fall(self, cause)

@@ -159,7 +159,7 @@ class Body:
         # Errors of the closed linkage in double stance decay at this rate (1/s). Chosen by us: it changes
         # accelerations only by rate^2 x error, 1e-8 m/s^2 at an error of 1e-12 m, and keeps an endless stand closed.
         self.closing_rate = 100.0
-        self.fall_lean = 0.6  # rad; see EQUATIONS 11 for the fall rules
+        self.fall_lean = 0.6  # rad; see EQUATIONS 16 for the fall rules
         self.fall_height = 0.65  # of the leg length
         self.fall_split = 1.2  # rad between the legs
         self.stall_s = 3.0
@@ -1213,7 +1213,7 @@ class Body:
     # ---- a step with its events -------------------------------------------------------------------------------
 
     def advance(self, h: cython.double) -> cython.void:
-        """Move on by `h` seconds under constant motor torques laws, events located inside (EQUATIONS 10)."""
+        """Move on by `h` seconds under constant laws of the motors' torques, events located inside (EQUATIONS 15)."""
         remaining: cython.double = h
         used: cython.double
         tries: cython.longlong = 0

@@ -1,6 +1,6 @@
 """The physical robot in one object: body, motors, battery, sensors, steering, floor; 125 us a step.
 
-A step in order (EQUATIONS 10): currents of the motors at the rates of its start, in closed form; the body under
+A step in order (EQUATIONS 15): currents of the motors at the rates of its start, in closed form; the body under
 their mean torques, events located inside; steering; then everything the boards can see, as straight lines between
 start and end of the step, and every encoder edge with its time.
 
@@ -23,7 +23,7 @@ from plant.parameters import BodyParameters
 from plant.steering import Steering
 from plant.walk_record import RING
 
-STEP_NS = 125_000  # the plant's step; its error is measured in EQUATIONS 10
+STEP_NS = 125_000  # the plant's step; its error is measured in EQUATIONS 15
 
 # What `fill_sample` writes, in this order: name and unit.
 SAMPLES = {

@@ -12,8 +12,8 @@ class WalkRecord:
     gained by it: the distance of this foot's contact point from the previous strike's. The first step counts from
     where the robot was put down. Oddities: `bounces` (the leading foot left the floor and came back), `recontacts`
     (a foot touched out of turn), `brushes` and `scuffs` (the swing foot's sole touched the floor before, after it
-    passed the stance foot), `flights` (no foot on the floor), `lead_lifts`, `tensile_strikes` (the rule of the strike asked the trailing foot
-    to be pulled; `tensile_impulse_Ns` the last, `_min_Ns` the worst).
+    passed the stance foot), `flights` (no foot on the floor), `lead_lifts`, `tensile_strikes` (the rule of the strike
+    asked the trailing foot to be pulled; `tensile_impulse_Ns` the last, `_min_Ns` the worst).
     """
 
     def __init__(self) -> None:
@@ -33,6 +33,7 @@ class WalkRecord:
         self.steps = 0
         self.strike_time_ns = time_ns
         self.strike_leg = -1
+        self.touch_time_ns = -1
         self.lift_off_time_ns = -1
         self.step_length_m = 0.0
         self.step_time_ns = 0
@@ -67,6 +68,7 @@ class WalkRecord:
     def touch(self, time_ns, leg, strike, ahead, x, foot_rad, impulses, loss_J, double, gap, height) -> None:
         """A foot met the floor. `impulses`: stance x, y, swing x, y in N s; `gap`: lowest clearance at passing;
         `height`: of the foothold."""
+        self.touch_time_ns = time_ns
         if not strike:
             if leg == self.strike_leg and ahead > 0.0:
                 self.bounces += 1

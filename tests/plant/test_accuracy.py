@@ -1,0 +1,74 @@
+"""What the plant's step of 125 us and its friction smoothing cost, as plant/EQUATIONS.md 15 states it."""
+
+import math
+
+import pytest
+
+from plant import benchmarks as bm
+from plant.body import Body
+from tests.plant.walking import STEP_S, TICK, PaperGait, Walker, mid_stance_start
+
+
+def test_errors_of_the_step_are_those_of_the_table():
+    found = {(step, smoothing): error for step, smoothing, error in bm.step_errors((500.0, 125.0, 62.5))}
+    table = {
+        (500.0, 0.05): 2.6e-6,
+        (125.0, 0.05): 5.7e-9,
+        (62.5, 0.05): 4.7e-10,
+        (500.0, 0.01): 1.0e-4,
+        (125.0, 0.01): 1.5e-6,
+        (62.5, 0.01): 1.6e-8,
+    }
+    for key, error in table.items():
+        # the table is rounded to two digits; the last bit of sin and tanh may differ between machines
+        assert found[key] == pytest.approx(error, rel=0.2), key
+
+
+def test_smoothing_of_friction_costs_what_the_table_says():
+    for smoothing, difference in bm.smoothing_errors():
+        expected = {0.1: 1.7e-3, 0.05: 8.2e-4, 0.02: 3.2e-4, 0.01: 1.5e-4}[smoothing]
+        assert difference == pytest.approx(expected, rel=0.1)
+
+
+def first_strike(parts):
+    """Instant (ns) of the first strike of the robust gait with each step cut in `parts`."""
+    body = Body()
+    mid_stance_start(body)
+    walker = Walker(body, PaperGait())
+    while body.record.steps < 1:
+        if walker.count % TICK == 0:
+            walker.controller.tick(walker)
+        for part in range(parts):
+            body.step_start_ns = walker.count * 125_000 + part * 125_000 // parts
+            body.advance(STEP_S / parts)
+        walker.count += 1
+    return body.record.strike_time_ns
+
+
+def test_a_strike_is_timed_within_a_microsecond():
+    fine = first_strike(16)
+    assert abs(first_strike(1) - fine) < 1000
+    assert abs(first_strike(2) - fine) < 100
+
+
+def test_touch_is_located_inside_a_step():
+    """A robot dropped from 2 mm in flight lands when free fall says so: t = sqrt(2 gap / g)."""
+    body = Body()
+    body.place(0.0, 0.0)
+    body.leg_outer, body.leg_inner = 0.1, -0.2
+    body.foot_outer, body.foot_inner = 0.1, -0.2
+    body.motor_outer = body.motor_inner = 0.0
+    body.hip_y = body.chain_y(body.foot_outer, body.leg_outer) + 0.002
+    body.kh = 0.0  # nothing turns: no spring, no cable stretch, centres of mass fall with the hip
+    body.mode = 3
+    body.standing = False
+    body.outer_armed = body.inner_armed = True
+    body.update_pose()
+    count = 0
+    while body.mode == 3:
+        body.step_start_ns = count * 125_000
+        body.advance(STEP_S)
+        count += 1
+    landed = body.record.touch_time_ns
+    # the inertia of a falling body without rotation does not matter; 1 ns is the stamp's own unit
+    assert abs(landed - math.sqrt(2 * 0.002 / 9.81) * 1e9) < 2.0
