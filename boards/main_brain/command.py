@@ -10,12 +10,6 @@ def table_id(name):
     return getattr(table, name)
 
 
-def take_ids(owner, names) -> None:
-    """Give `owner` one field per variable name, holding its number in the data table."""
-    for name in names:
-        setattr(owner, name, table_id(name))
-
-
 class MotorCommand:
     """The three words of the compliant law I = I0 - K p - D dp/dt of one motor board.
 

@@ -10,7 +10,7 @@ ROBOT PARITY: the LPC3250 computed in single precision in part; its angle integr
 
 import cython
 
-from boards.main_brain.command import take_ids
+from boards.main_brain.command import table_id
 from boards.main_brain.filters import ButterworthFilter
 from boards.main_brain.geometry import FloorGeometry
 from datatable.generated import errors
@@ -142,8 +142,8 @@ class Estimator:
         self.code_time_violation = errors.EST_FILTER_TIME_VIOLATION
         self.code_stutter = errors.EST_STUTTER_STEP
         self.code_fall = errors.EST_ROBOT_FALL
-        take_ids(self, READS)
-        take_ids(self, WRITES)
+        for name in READS + WRITES:
+            setattr(self, name, table_id(name))
         self.per_tick_filter = quirks.rate_filter == "20_hz"
         self.use_filtered_sum = quirks.heel_strike == "filtered_sum"
         self.use_imu_roll = quirks.leg_angle == "imu_roll"

@@ -7,7 +7,7 @@ the inner feet start flipped down in the air, the outer ones start standing, and
 
 import cython
 
-from boards.main_brain.command import MotorCommand, table_id, take_ids
+from boards.main_brain.command import MotorCommand, table_id
 from boards.main_brain.state_machine import ANY, State, StateMachine
 from datatable.store import DataStore
 
@@ -60,7 +60,8 @@ class FootMachine:
         self.wait_for_strike = quirks.push_correction_after_strike
         self.hip_sign = 1.0 if inner else -1.0
         self.own_swing = 1 if inner else 0  # value of E_SWING_LEG while the own legs swing
-        take_ids(self, COMMON)
+        for name in COMMON:
+            setattr(self, name, table_id(name))
         self.motor_position = table_id(f"{board}_MOTOR_POSITION")
         self.ankle_angle = table_id(ankle)
         self.own_absolute = table_id(f"E_{own}_ABSANG")

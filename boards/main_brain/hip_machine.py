@@ -8,7 +8,7 @@ it was off and all its gains were 0.
 
 import cython
 
-from boards.main_brain.command import MotorCommand, take_ids
+from boards.main_brain.command import MotorCommand, table_id
 from boards.main_brain.state_machine import State, StateMachine
 from datatable.store import DataStore
 
@@ -67,8 +67,8 @@ class HipMachine:
 
     def __init__(self, store) -> None:
         self.store = store
-        take_ids(self, READS)
-        take_ids(self, WRITES)
+        for name in READS + WRITES:
+            setattr(self, name, table_id(name))
         motor: object = MotorCommand(store, "MCH")  # untyped, so that its methods are plain ones
         self.motor = motor
         self.premid_time = 0  # ms after heel strike at which premid began

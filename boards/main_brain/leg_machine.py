@@ -11,7 +11,7 @@ machine in premid until the stance leg is next upright.
 
 import cython
 
-from boards.main_brain.command import take_ids
+from boards.main_brain.command import table_id
 from boards.main_brain.state_machine import ANY, State, StateMachine
 from datatable.store import DataStore
 
@@ -136,8 +136,8 @@ class LegMachine:
 
     def __init__(self, store, quirks) -> None:
         self.store = store
-        take_ids(self, READS)
-        take_ids(self, WRITES)
+        for name in READS + WRITES:
+            setattr(self, name, table_id(name))
         outer: object = StanceLeg(self, self.E_LO_ANGLE, 1.0)  # untyped, so that its methods are plain ones
         inner: object = StanceLeg(self, self.E_LI_ANGLE, -1.0)
         self.outer = outer

@@ -8,7 +8,7 @@ light 1 as in 2016 (facts network-and-boards 6.4) where the mode exists there.
 
 import cython
 
-from boards.main_brain.command import table_id, take_ids
+from boards.main_brain.command import table_id
 from boards.main_brain.foot_machines import FootMachine
 from boards.main_brain.hip_machine import HipMachine
 from boards.main_brain.leg_machine import LegMachine
@@ -63,8 +63,8 @@ class ModeMachine:
     def __init__(self, store, quirks, estimator) -> None:
         self.store = store
         self.estimator = estimator
-        take_ids(self, READS)
-        take_ids(self, WRITES)
+        for name in READS + WRITES:
+            setattr(self, name, table_id(name))
         self.leg = LegMachine(store, quirks)
         self.hip = HipMachine(store)
         self.inner_foot = FootMachine(store, quirks, True)

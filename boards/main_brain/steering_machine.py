@@ -7,7 +7,7 @@ the motor is shut down.
 
 import cython
 
-from boards.main_brain.command import take_ids
+from boards.main_brain.command import table_id
 from boards.main_brain.state_machine import ANY, State, StateMachine
 
 READS = (
@@ -30,8 +30,8 @@ class SteeringMachine:
 
     def __init__(self, store) -> None:
         self.store = store
-        take_ids(self, READS)
-        take_ids(self, WRITES)
+        for name in READS + WRITES:
+            setattr(self, name, table_id(name))
         self.twist = 0.0  # S, PWM counts
         self.ramp_start = 0.0
         self.ramp_change = 0.0
