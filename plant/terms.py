@@ -327,7 +327,7 @@ class Model:
                     p = plant.parameters
                     rows = torques.TermTorques(p.ankle_zero_rad, p.hip_gear, p.ankle_gear, p.friction_smoothing_rad_s)
                 rows.add(term.form.torque, PLACE_NUMBER[term.at], list(term.values.values()))
-            elif term.at in MOTORS:
+            elif term.form.places is MOTORS:  # an encoder may have the same name
                 motors = (electrics.hip, electrics.outer_ankle, electrics.inner_ankle, electrics.steering)
                 unit = motors[MOTORS.index(term.at)]
                 _apply_electric(unit, term)
