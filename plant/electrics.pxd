@@ -10,7 +10,7 @@ cdef class Electrics:
     cdef public MotorUnit hip, outer_ankle, inner_ankle, steering
     cdef public FootSensors outer_feet, inner_feet
     cdef public NoiseSource noise
-    cdef public double[::1] analog_start, analog_end, zero_V, slope_V, noise_V, scale, offset, lag_s, state, battery_A
+    cdef public double[::1] analog_start, analog_end, values, zero_V, slope_V, noise_V, scale, offset, lag_s, state, battery_A
     cdef public bint has_terms
     cdef public double electronics_W, pwm_offset_A, voltage_clip_V, battery_current_lag_s, lag_h, lag_factor
     cdef public double electronics_J, motor_current_A
@@ -24,7 +24,5 @@ cdef class Electrics:
     cpdef void settle(
         self, bint outer_contact, double outer_load_N, bint inner_contact, double inner_load_N, double steering_rad,
     )
-    cpdef double battery_electronics_A(self)
     cpdef void _read(self, double h, double steering_rad)
-    cpdef void _motor(self, long long motor, MotorUnit unit, double battery_V, double h)
-    cpdef void _set(self, long long i, double value, double h)
+    cpdef void _motor(self, long long motor, MotorUnit unit, double battery_V)

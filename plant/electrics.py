@@ -110,6 +110,7 @@ class Electrics:
         self.noise = NoiseSource(seed, "analog sensors")
         self.analog_start = array.array("d", [0.0]) * ANALOG_COUNT
         self.analog_end = array.array("d", [0.0]) * ANALOG_COUNT
+        self.values = array.array("d", [0.0]) * ANALOG_COUNT  # what is measured: A, V, rad
         self.zero_V = array.array("d", [0.0]) * ANALOG_COUNT
         self.slope_V = array.array("d", [0.0]) * ANALOG_COUNT  # volts per ampere, volt or rad
         self.noise_V = array.array("d", [0.0]) * ANALOG_COUNT
@@ -225,51 +226,50 @@ class Electrics:
         seen: cython.double = V if V < self.voltage_clip_V else self.voltage_clip_V
         steps: cython.double
         nearest: cython.longlong
-        self._motor(0, self.hip, seen, h)
-        self._motor(1, self.outer_ankle, seen, h)
-        self._motor(2, self.inner_ankle, seen, h)
-        self._motor(3, self.steering, seen, h)
-        self._set(12, self.outer_feet.left_V, h)
-        self._set(13, self.outer_feet.right_V, h)
-        self._set(14, self.inner_feet.left_V, h)
-        self._set(15, self.inner_feet.right_V, h)
+        value: cython.double
+        place: cython.longlong
+        i: cython.longlong
+        values: cython.double[::1] = self.values
+        end: cython.double[::1] = self.analog_end
+        self._motor(0, self.hip, seen)
+        self._motor(1, self.outer_ankle, seen)
+        self._motor(2, self.inner_ankle, seen)
+        self._motor(3, self.steering, seen)
+        values[12] = self.outer_feet.left_V
+        values[13] = self.outer_feet.right_V
+        values[14] = self.inner_feet.left_V
+        values[15] = self.inner_feet.right_V
         # the sensor's own 1024 steps of a turn: the nearest one
         steps = steering_rad * (1024.0 / 6.283185307179586)
         if steps >= 0.0:
             nearest = int(steps + 0.5)
         else:
             nearest = -int(0.5 - steps)
-        self._set(16, nearest * (6.283185307179586 / 1024.0), h)
-        self._set(17, self.battery_electronics_A(), h)
-        self._set(18, V, h)
+        values[16] = nearest * (6.283185307179586 / 1024.0)
+        values[17] = self.electronics_W / V if V > 0.0 else 0.0
+        values[18] = V
+        if self.has_terms:
+            for i in range(19):  # ANALOG_COUNT
+                value = self.scale[i] * values[i] + self.offset[i]
+                if self.lag_s[i] > 0.0:
+                    if h > 0.0:
+                        value = self.state[i] + (value - self.state[i]) * (1.0 - exp(-h / self.lag_s[i]))
+                    self.state[i] = value
+                values[i] = value
+        place = self.noise.block()
+        table: cython.double[::1] = self.noise.table
+        zero: cython.double[::1] = self.zero_V
+        slope: cython.double[::1] = self.slope_V
+        noise: cython.double[::1] = self.noise_V
+        for i in range(19):
+            end[i] = zero[i] + slope[i] * values[i] + noise[i] * table[place + i]
 
-    def battery_electronics_A(self) -> cython.double:
-        """What the router board draws for all electronics, A."""
-        if self.battery.voltage_V > 0.0:
-            return self.electronics_W / self.battery.voltage_V
-        return 0.0
-
-    def _motor(
-        self, motor: cython.longlong, unit: MotorUnit, battery_V: cython.double, h: cython.double
-    ) -> cython.void:
-        """The three sensors of one motor board."""
+    def _motor(self, motor: cython.longlong, unit: MotorUnit, battery_V: cython.double) -> cython.void:
+        """What the three sensors of one motor board measure."""
         amps: cython.double = unit.current_A
         if unit.drive.sensed_lead_switches:
             amps += unit.mounting * self.pwm_offset_A
         self.battery_A[motor] += (unit.battery_current_A - self.battery_A[motor]) * self.lag_factor
-        self._set(3 * motor, amps, h)
-        self._set(3 * motor + 1, self.battery_A[motor], h)
-        self._set(3 * motor + 2, battery_V, h)
-
-    def _set(self, i: cython.longlong, value: cython.double, h: cython.double) -> cython.void:
-        """One voltage from its quantity."""
-        if self.has_terms:
-            value = self.scale[i] * value + self.offset[i]
-            if self.lag_s[i] > 0.0:
-                if h > 0.0:
-                    value = self.state[i] + (value - self.state[i]) * (1.0 - exp(-h / self.lag_s[i]))
-                self.state[i] = value
-        value = self.zero_V[i] + self.slope_V[i] * value
-        if self.noise_V[i] > 0.0:
-            value += self.noise_V[i] * self.noise.normal()
-        self.analog_end[i] = value
+        self.values[3 * motor] = amps
+        self.values[3 * motor + 1] = self.battery_A[motor]
+        self.values[3 * motor + 2] = battery_V

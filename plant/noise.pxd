@@ -5,3 +5,4 @@ cdef class NoiseSource:
     cdef public double[::1] table
     cdef public long long word, left
     cpdef double normal(self)
+    cpdef long long block(self)
