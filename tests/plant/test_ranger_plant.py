@@ -2,6 +2,10 @@
 
 import array
 import math
+import os
+import pathlib
+import subprocess
+import sys
 
 import pytest
 
@@ -11,6 +15,8 @@ from plant.ranger import SAMPLES, STEP_NS, RangerPlant
 from plant.steering import Steering
 from plant.walk_record import RING, WalkRecord
 from tests.plant.walking import ElectricWalker, RecordGait, electric_start
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
 
 
 def walking_plant(seed=1, seconds=4.0):
@@ -116,6 +122,24 @@ def test_the_same_seed_gives_the_same_robot_and_another_seed_other_noise():
     assert list(one.analog_end) == list(two.analog_end)
     assert one.body.leg_inner_rate == two.body.leg_inner_rate
     assert list(one.analog_end) != list(three.analog_end)
+
+
+def walk_in_bits(seconds=2.6):
+    """Every state of the body, all voltages and edge counts after a walk, exactly."""
+    plant, _ = walking_plant(seed=3, seconds=seconds)
+    body = plant.body
+    numbers = [body.leg_outer, body.leg_inner, body.foot_outer, body.foot_inner, body.hip_x, plant.battery_V]
+    numbers += [body.leg_outer_rate, body.foot_inner_rate, plant.steering.path_x, *plant.analog_end]
+    return " ".join([*(x.hex() for x in numbers), *(str(e.total) for e in plant.encoders), str(plant.strike_time_ns)])
+
+
+def test_interpreted_and_compiled_walk_alike_to_the_last_bit():
+    program = "from tests.plant.test_ranger_plant import walk_in_bits; print(walk_in_bits())"
+    environment = dict(os.environ, RANGER_SIM_INTERPRETED="1")
+    done = subprocess.run(
+        [sys.executable, "-c", program], cwd=ROOT, env=environment, capture_output=True, text=True, check=True
+    )
+    assert done.stdout.strip() == walk_in_bits()
 
 
 def test_a_sample_holds_what_its_names_say():
