@@ -48,8 +48,10 @@ class BodyParameters:
     outer_rolling_friction_Nms: float = 0.05  # C_FW [A 1.1.1; P 3 for the unit]
     inner_rolling_friction_Nms: float = 0.05
 
-    # Ends of the arc seen from the sweet spot [P 1: -0.2 ... +0.9 works; R: a heel end of -0.1 adds 14 mm clearance].
-    arc_heel_rad: float = -0.2
+    # Ends of the arc seen from the sweet spot. [P 1: -0.2 ... +0.9 works; R: a heel end of -0.1 adds 14 mm clearance.]
+    # Heel -0.1, 20 mm behind the sweet spot, because the sweet spot "is near the heel" [A 2.4]; with -0.2 the heel of
+    # the flipping foot brushes the floor and half of the record machines' starts end within five steps.
+    arc_heel_rad: float = -0.1
     arc_toe_rad: float = 0.9
 
     # Ankle stops: joint angle a = 0 and 3.2 [C 1.1], a is 1.68 with the sweet spot below an upright leg.
