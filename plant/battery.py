@@ -2,7 +2,7 @@
 
 Seven packs of 25.9 V and 67 Wh nominal (appendix 3.10); 493 Wh were used on the long walk, so capacity and
 number are parameters. The terminal voltage of a step follows from the current of the motors and the constant
-power of the electronics together (EQUATIONS 10):
+power of the electronics together (EQUATIONS 10.8):
 
     V = E(q) - R (I_motors + P / V)    solved for V as a quadratic, so a load of constant power is stable
 

@@ -4,6 +4,7 @@ from plant.edge_buffer cimport EdgeBuffer
 
 cdef class IncrementalEncoder:
     cdef public str name
+    cdef public object seed
     cdef public long long lines, sign, table_size, cell, total, t0, last_time
     cdef public double gear, shaft_per_rad, edges_per_shaft_rad, scale, offset_rad
     cdef public double eccentricity_1, phase_1, eccentricity_2, phase_2, jitter

@@ -48,11 +48,6 @@ class IncrementalEncoder:
     ) -> None:
         if lines < 1 or gear <= 0.0 or sign not in (-1, 1):
             raise UserError(f"encoder {name}: {lines} lines, gear {gear}, sign {sign} are impossible")
-        if line_error < 0.0 or jitter < 0.0 or not -0.4 <= duty_error <= 0.4 or line_error > 0.1:
-            raise UserError(
-                f"encoder {name}: line_error {line_error} (0 ... 0.1), duty_error {duty_error} (-0.4 ... 0.4) or "
-                f"jitter {jitter} (0 or more) is out of range"
-            )
         self.name = name
         self.lines = lines
         self.gear = gear
@@ -69,14 +64,9 @@ class IncrementalEncoder:
         self.stream = RandomStream(seed, f"encoder {name} jitter")
         self.table_size = 2 * lines
         self.errors = array.array("d", [0.0]) * (2 * lines)
-        self.has_errors = line_error > 0.0 or duty_error != 0.0
-        if self.has_errors:
-            disc = RandomStream(seed, f"encoder {name} disc")
-            for line in range(lines):
-                # clipped at four deviations, so that edges keep their order
-                error = line_error * max(-4.0, min(4.0, disc.normal()))
-                self.errors[2 * line] = error
-                self.errors[2 * line + 1] = error + duty_error
+        self.has_errors = False
+        self.seed = seed
+        self.set_disc(line_error, duty_error)
         self.edges = EdgeBuffer()
         self.cell = 0
         self.total = 0
@@ -90,6 +80,22 @@ class IncrementalEncoder:
         self.t0 = 0
         self.span_ns = 0.0
         self.last_time = 0
+
+    def set_disc(self, line_error, duty_error) -> None:
+        """Draw the disc's errors (edges) from the seed; the encoder then has to be reset."""
+        if not 0.0 <= line_error <= 0.1 or not -0.4 <= duty_error <= 0.4 or self.jitter < 0.0:
+            raise UserError(
+                f"encoder {self.name}: line_error {line_error} (0 ... 0.1), duty_error {duty_error} (-0.4 ... 0.4) "
+                f"or jitter {self.jitter} (0 or more) is out of range"
+            )
+        self.has_errors = line_error > 0.0 or duty_error != 0.0
+        disc = RandomStream(self.seed, f"encoder {self.name} disc")
+        for line in range(self.lines):
+            # clipped at four deviations, so that edges keep their order
+            error = line_error * max(-4.0, min(4.0, disc.normal())) if line_error > 0.0 else 0.0
+            self.errors[2 * line] = error
+            self.errors[2 * line + 1] = error + duty_error
+        self.started = False
 
     def position(self, angle: cython.double) -> cython.double:
         """Position in edges for a joint angle (rad)."""

@@ -243,6 +243,15 @@ _FORMS = (
         "random shift of every edge's stamp, standard deviation in edges",
     ),
     Form(
+        "disc_error",
+        ENCODER_NAMES,
+        (
+            Parameter("line_edges", "edges", 0.0, 0.1, 0.0),
+            Parameter("duty_edges", "edges", -0.4, 0.4, 0.0),
+        ),
+        "lasting errors of the disc: deviation per line, and a high time of channel A that is longer by this",
+    ),
+    Form(
         "bit_flip",
         WORD_NAMES,
         (Parameter("probability", "1", 0.0, 1.0),),
@@ -392,6 +401,8 @@ def _apply_angle(encoder, term: Term) -> None:
         encoder.lag_s += values[0]
     elif name == "edge_jitter":
         encoder.jitter = values[0]
+    elif name == "disc_error":
+        encoder.set_disc(*values)
     elif name == "bit_flip":
         encoder.bit_flip = values[0]
     else:

@@ -240,7 +240,17 @@ def test_more_edges_than_the_buffer_holds_are_kept():
     assert encoder.edges.capacity >= encoder.edges.count
 
 
-@pytest.mark.parametrize("arguments", [dict(lines=0), dict(lines=10, gear=0.0), dict(lines=10, sign=2)])
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        dict(lines=0),
+        dict(lines=10, gear=0.0),
+        dict(lines=10, sign=2),
+        dict(lines=10, line_error=0.2),
+        dict(lines=10, duty_error=-0.5),
+        dict(lines=10, jitter=-1.0),
+    ],
+)
 def test_an_impossible_encoder_is_refused(arguments):
     with pytest.raises(UserError, match="encoder e"):
         IncrementalEncoder("e", **arguments)

@@ -163,6 +163,7 @@ def test_sensor_terms_change_what_the_boards_see():
         dict(form="sensor_scale", at="hip_joint", factor=1.01),
         dict(form="eccentricity", at="outer_ankle_absolute", once_rad=0.01, twice_rad=0.002),
         dict(form="edge_jitter", at="hip_motor", edges=0.05),
+        dict(form="disc_error", at="inner_motor", duty_edges=0.03),
         dict(form="bit_flip", at="hip_absolute", probability=0.5),
         dict(form="sensor_lag", at="gyro", time_constant_s=0.004),
         dict(form="gyro_misalignment", at="gyro", yaw_rad=0.02),
@@ -177,6 +178,7 @@ def test_sensor_terms_change_what_the_boards_see():
     assert plant.hip_joint.scale == 1.01
     assert plant.outer_word.eccentricity_2 == 0.002
     assert plant.hip_motor.jitter == 0.05
+    assert plant.inner_motor.has_errors and plant.inner_motor.threshold(3) == pytest.approx(3.03)
     assert plant.hip_word.bit_flip == 0.5
     assert plant.imu.lag_s == 0.004 and plant.imu.cross_x_from_z == 0.02
 
