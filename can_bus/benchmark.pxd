@@ -3,7 +3,7 @@ from can_bus.bus cimport Bus
 from can_bus.frame cimport frame_bits
 
 cdef class Load:
-    cdef public list buses, inboxes, numbers
+    cdef public list buses, inboxes
     cdef public long long per_node, nodes_per_bus, period_ns, quantum_ns, time
     cdef public long long requested, delivered, done, out_of_order, wrong
     cdef public long long[::1] sent, expected, free, word
