@@ -40,7 +40,7 @@ DIRECTIVES = {
 }
 
 
-class NotCompiled(Exception):
+class NotCompiledError(Exception):
     """Why there will be no compiled modules, in one line."""
 
 
@@ -55,7 +55,7 @@ class OptionalBuild(build_ext):
             self.translate(jobs)
             self.parallel = jobs
             super().run()
-        except NotCompiled as why:
+        except NotCompiledError as why:
             reason = str(why)
         except Exception as error:  # noqa: BLE001  (whatever the tool chain throws, we fall back)
             reason = one_line(error)
@@ -70,9 +70,9 @@ class OptionalBuild(build_ext):
         self.write_record(reason)
 
     def check_wish_and_compiler(self):
-        """NotCompiled when compiling is not wanted, or when a one-line C program with Python's header fails."""
+        """NotCompiledError when compiling is not wanted, or when a one-line C program with Python's header fails."""
         if os.environ.get("RANGER_SIM_INTERPRETED", "") not in ("", "0"):
-            raise NotCompiled("RANGER_SIM_INTERPRETED was set when it was built")
+            raise NotCompiledError("RANGER_SIM_INTERPRETED was set when it was built")
         from distutils.ccompiler import new_compiler
         from distutils.sysconfig import customize_compiler, get_python_inc
 
@@ -85,7 +85,7 @@ class OptionalBuild(build_ext):
                 compiler.compile([str(program)], output_dir=folder, include_dirs=[get_python_inc()])
             except Exception as error:  # noqa: BLE001  (each tool chain has its own)
                 tool = " ".join(getattr(compiler, "compiler_so", ["cc"])[:1])
-                raise NotCompiled(
+                raise NotCompiledError(
                     f"the C compiler {tool!r} cannot compile a file that includes Python.h "
                     "(are a compiler and Python's development files installed?)"
                 ) from error
@@ -95,7 +95,7 @@ class OptionalBuild(build_ext):
         try:
             from Cython.Build import cythonize
         except ImportError as error:
-            raise NotCompiled(f"no Cython ({one_line(error)})") from error
+            raise NotCompiledError(f"no Cython ({one_line(error)})") from error
         os.chdir(HERE)
         try:
             translated = cythonize(
@@ -106,7 +106,7 @@ class OptionalBuild(build_ext):
                 compiler_directives=DIRECTIVES,
             )
         except Exception as error:  # noqa: BLE001  (Cython has printed the place)
-            raise NotCompiled(f"Cython could not translate the sources ({one_line(error)})") from error
+            raise NotCompiledError(f"Cython could not translate the sources ({one_line(error)})") from error
         by_name = {extension.name: extension for extension in translated}
         for extension in self.extensions:
             extension.sources = by_name[extension.name].sources

@@ -25,3 +25,10 @@ def is_compiled() -> bool:
     from harness import lockstep
 
     return not (lockstep.__file__ or "").endswith(".py")
+
+
+def why_interpreted() -> str:
+    """Why the plain sources run, in one line; empty when the robot runs compiled."""
+    if is_compiled():
+        return ""
+    return foundation.RUNS_INTERPRETED_BECAUSE or "the built modules are not there: build again"

@@ -18,6 +18,7 @@ from rich.table import Table
 
 from foundation import wallclock
 from foundation.user_error import UserError
+from tools.files import json_target, replace_file
 from tools.units import whole_number
 
 
@@ -133,6 +134,7 @@ def run(options: argparse.Namespace) -> int:
     if options.case:
         print(json.dumps(CASES[options.case][1](options.seconds)))
         return 0
+    json_file = json_target(options.json)
     plan = [(case, False, options.seconds) for case in CASES]
     plan += [(case, True, max(1, options.seconds // 10)) for case in INTERPRETED]
     figures: dict = {}
@@ -154,8 +156,8 @@ def run(options: argparse.Namespace) -> int:
     if options.json == "-":
         print(json.dumps(result, indent=2))
         return 0
-    if options.json:
-        pathlib.Path(options.json).write_text(json.dumps(result, indent=2) + "\n", encoding="utf-8")
+    if json_file is not None:
+        replace_file(json_file, (json.dumps(result, indent=2) + "\n").encode())
     table = Table(title="ranger-sim bench")
     for column in ("case", "median", "min", "max", "unit", "/ robot"):
         table.add_column(column, justify="left" if column in ("case", "unit") else "right")

@@ -3,6 +3,7 @@
 import argparse
 import os
 import sys
+from typing import NoReturn
 
 from foundation.user_error import UserError
 
@@ -12,12 +13,20 @@ EXIT_MISUSE = 2
 EXIT_INTERRUPTED = 130
 
 
+class OneLineParser(argparse.ArgumentParser):
+    """An argument parser whose complaint is one line."""
+
+    def error(self, message: str) -> NoReturn:
+        """Print what is wrong and where help is; exit code 2."""
+        self.exit(EXIT_MISUSE, f"{self.prog}: {message} (see {self.prog} --help)\n")
+
+
 def parser() -> argparse.ArgumentParser:
     """The whole command line."""
     from datatable import cli as table_command
     from tools import bench, info, walk
 
-    top = argparse.ArgumentParser(
+    top = OneLineParser(
         prog="ranger-sim",
         description="The Cornell Ranger biped emulated whole: seven boards' firmware, four CAN buses, one body.",
     )
@@ -33,13 +42,31 @@ def main(arguments: list[str] | None = None) -> int:
     """Run one command; returns the process's exit code. A user's mistake is one line and code 2."""
     try:
         options = parser().parse_args(arguments)
-        return options.run(options)
+        code: int = options.run(options)
+        sys.stdout.flush()
+        return code
     except UserError as mistake:
         print(f"ranger-sim: {mistake}", file=sys.stderr)
         return EXIT_MISUSE
+    except KeyboardInterrupt:
+        print("ranger-sim: interrupted", file=sys.stderr)
+        return EXIT_INTERRUPTED
     except BrokenPipeError:  # the reader of our output left, e.g. `| head`
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return EXIT_DONE
+        return output_closed()
+    except SystemExit as leaving:
+        if isinstance(leaving.__context__, BrokenPipeError):  # rich leaves so
+            return output_closed()
+        raise
+    except OSError as error:  # a full disk, a folder that vanished: of the machine, not of the program
+        place = f"{error.filename}: " if error.filename else ""
+        print(f"ranger-sim: {place}{error.strerror or error}", file=sys.stderr)
+        return EXIT_MISUSE
+
+
+def output_closed() -> int:
+    """Nobody reads standard output any more: let the interpreter flush into nothing."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    return EXIT_DONE
 
 
 if __name__ == "__main__":

@@ -5,13 +5,14 @@ import json
 import platform
 import sys
 from importlib import metadata
+from typing import Any
 
 from rich.console import Console
 from rich.table import Table
 
 import datatable
 from can_bus.edge import interfaces
-from harness.build import compiled_modules, is_compiled
+from harness.build import compiled_modules, is_compiled, why_interpreted
 
 
 def register(commands) -> None:
@@ -29,12 +30,13 @@ def version() -> str:
         return "source tree, not installed"
 
 
-def facts() -> dict:
+def facts() -> dict[str, Any]:
     """Everything the command tells, as plain data."""
     compiled, interpreted = compiled_modules()
     return {
         "version": version(),
         "compiled": is_compiled(),
+        "interpreted_because": why_interpreted(),
         "compiled_modules": len(compiled),
         "interpreted_modules": sorted(interpreted),
         "python": sys.version.split()[0],
@@ -52,7 +54,7 @@ def run(options: argparse.Namespace) -> int:
         print(json.dumps(found, indent=2))
         return 0
     table = Table(show_header=False, box=None, pad_edge=False)
-    run_as = "compiled" if found["compiled"] else "interpreted"
+    run_as = "compiled" if found["compiled"] else f"interpreted ({found['interpreted_because']})"
     if found["compiled"] and found["interpreted_modules"]:
         run_as += f" (not compiled: {', '.join(found['interpreted_modules'])})"
     table.add_row("ranger-sim", found["version"])

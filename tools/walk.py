@@ -14,11 +14,15 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeRemainingColumn
 
 from foundation import wallclock
-from foundation.user_error import UserError
+from harness import build
 from harness.scenario import Scenario, StopRule
+from tools.files import json_target, replace_file, writable_folder
 from tools.units import LENGTHS, TIMES, quantity, whole_number
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from types import FrameType
+
     from harness.ranger import Ranger
 
 DEFAULT_STEPS = 100
@@ -66,8 +70,6 @@ def register(commands) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Walk, write the files, print the summary; 0 done, 1 fell or a board failed, 130 interrupted."""
-    from harness.ranger import Ranger  # the whole robot: only when it is to walk
-
     stop = (
         StopRule(options.steps, options.time, options.distance)
         if (options.steps or options.time or options.distance)
@@ -80,16 +82,22 @@ def run(options: argparse.Namespace) -> int:
         floor_roughness_m=options.floor_roughness,
         model_file=options.model,
     )
+    with ctrl_c_noted() as interrupted:
+        return run_scenario(scenario, stop, options, interrupted)
+
+
+def run_scenario(scenario: Scenario, stop: StopRule, options: argparse.Namespace, interrupted: list[bool]) -> int:
+    """`run` with everything checked; `interrupted` is filled by Ctrl-C."""
+    from harness.ranger import Ranger  # the whole robot: only when it is to walk
+
     folder = writable_folder(options.out) if options.out else None
-    json_file = None if options.json in (None, "-") else pathlib.Path(options.json)
-    if json_file is not None:
-        writable_folder(json_file.parent)
-        if json_file.is_dir():
-            raise UserError(f"--json {json_file}: this is a folder, give a file or -")
+    json_file = json_target(options.json)
     quiet = options.json == "-"
     console = Console(stderr=True, quiet=quiet)
     with contextlib.closing(Ranger(scenario, log=options.log if folder else "none")) as robot:
-        interrupted = walk(robot, stop, console)
+        if not build.is_compiled():
+            console.print(f"running interpreted, slowly: {build.why_interpreted()}", highlight=False, soft_wrap=True)
+        walk(robot, stop, console, interrupted)
         summary = robot.summary()
         if folder is not None:
             write_files(robot, summary, folder, console)
@@ -107,71 +115,56 @@ def run(options: argparse.Namespace) -> int:
     return 1 if summary["fell"] or summary["failed_boards"] else 0
 
 
-def walk(robot: Ranger, stop: StopRule, console: Console) -> bool:
-    """Run until the stop rule, a fall, or Ctrl-C; True when interrupted."""
-    interrupted = []
-    previous = signal.signal(signal.SIGINT, lambda *_: interrupted.append(True))
-    started = wallclock.monotonic_s()
+@contextlib.contextmanager
+def ctrl_c_noted() -> Iterator[list[bool]]:
+    """Inside, the first Ctrl-C only fills the list, so that the files are finished; the second one breaks off."""
+    interrupted: list[bool] = []
+
+    def note(_number: int, _frame: FrameType | None) -> None:
+        if interrupted:
+            raise KeyboardInterrupt
+        interrupted.append(True)
+
+    previous = signal.signal(signal.SIGINT, note)
     try:
-        with Progress(
-            SpinnerColumn(),
-            TextColumn("{task.fields[steps]} steps"),
-            BarColumn(),
-            TextColumn(
-                "{task.fields[distance]:.1f} m  {task.fields[speed]:.2f} m/s  {task.fields[factor]:.1f} x real time"
-            ),
-            TimeRemainingColumn(),
-            console=console,
-            transient=False,
-        ) as progress:
-            task = progress.add_task("walk", total=1.0, steps=0, distance=0.0, speed=0.0, factor=0.0)
-            while not interrupted and not robot.run(stop, SLICE_S):
-                wall = wallclock.monotonic_s() - started
-                progress.update(
-                    task,
-                    completed=robot.fraction_done(stop),
-                    steps=robot.steps,
-                    distance=robot.distance_m,
-                    speed=robot.mean_speed_m_per_s(),
-                    factor=robot.time_s / wall if wall > 0 else 0.0,
-                )
+        yield interrupted
+    finally:
+        signal.signal(signal.SIGINT, previous)
+
+
+def walk(robot: Ranger, stop: StopRule, console: Console, interrupted: list[bool]) -> None:
+    """Run until the stop rule, a fall, or Ctrl-C (at least one slice, so that there is something to write)."""
+    started = wallclock.monotonic_s()
+    with Progress(
+        SpinnerColumn(),
+        TextColumn("{task.fields[steps]} steps"),
+        BarColumn(),
+        TextColumn(
+            "{task.fields[distance]:.1f} m  {task.fields[speed]:.2f} m/s  {task.fields[factor]:.1f} x real time"
+        ),
+        TimeRemainingColumn(),
+        console=console,
+        transient=False,
+    ) as progress:
+        task = progress.add_task("walk", total=1.0, steps=0, distance=0.0, speed=0.0, factor=0.0)
+        while not robot.run(stop, SLICE_S) and not interrupted:
+            wall = wallclock.monotonic_s() - started
             progress.update(
                 task,
                 completed=robot.fraction_done(stop),
                 steps=robot.steps,
                 distance=robot.distance_m,
                 speed=robot.mean_speed_m_per_s(),
-                factor=robot.realtime_factor(),
+                factor=robot.time_s / wall if wall > 0 else 0.0,
             )
-    finally:
-        signal.signal(signal.SIGINT, previous)
-    return bool(interrupted)
-
-
-def writable_folder(name) -> pathlib.Path:
-    """The folder, made if missing; UserError when nothing can be written there."""
-    folder = pathlib.Path(name)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=folder):
-            pass
-    except OSError as error:
-        raise UserError(f"cannot write to {folder}: {error.strerror}") from None
-    return folder
-
-
-def replace_file(path: pathlib.Path, content: bytes) -> None:
-    """Write the file whole or not at all."""
-    with tempfile.NamedTemporaryFile(dir=path.parent, prefix=path.name, delete=False) as handle:
-        temporary = pathlib.Path(handle.name)
-        try:
-            handle.write(content)
-            handle.close()
-            temporary.chmod(0o644)
-            temporary.replace(path)
-        except BaseException:
-            temporary.unlink(missing_ok=True)
-            raise
+        progress.update(
+            task,
+            completed=robot.fraction_done(stop),
+            steps=robot.steps,
+            distance=robot.distance_m,
+            speed=robot.mean_speed_m_per_s(),
+            factor=robot.realtime_factor(),
+        )
 
 
 def write_files(robot: Ranger, summary: dict, folder: pathlib.Path, console: Console) -> None:
@@ -206,10 +199,11 @@ def write_frames(robot: Ranger, folder: pathlib.Path) -> None:
 def print_summary(summary: dict, console: Console) -> None:
     """The walk in a few lines."""
     end = f"fell: {summary['fall_cause']}" if summary["fell"] else "on its feet"
+    tcot = "none" if summary["tcot"] is None else f"{summary['tcot']:.3f}"
     console.print(
         f"{summary['steps']} steps, {summary['distance_m']:.2f} m in {summary['time_s']:.1f} s, {end}; "
         f"step {summary['mean_step_length_m']:.3f} m, {summary['mean_step_time_s']:.3f} s; "
-        f"{summary['total_power_W']:.1f} W, TCOT {summary['tcot']:.3f}; "
+        f"{summary['total_power_W']:.1f} W, TCOT {tcot}; "
         f"{summary['realtime_factor']:.1f} x real time {'compiled' if summary['compiled'] else 'interpreted'}; "
         f"trace {summary['trace_digest'][:16]}",
         highlight=False,

@@ -78,8 +78,12 @@ def tiles(summary: dict) -> list[dict]:
         ("speed", f"{summary['speed_m_per_s']:.2f} m/s", ROBOT["speed"]),
         ("motors", f"{summary['motor_power_W']:.1f} W", ROBOT["motors"]),
         ("in all", f"{summary['total_power_W']:.1f} W", ROBOT["total"]),
-        ("cost of transport", f"{summary['tcot']:.3f}", ROBOT["tcot"]),
-        ("heel-strike delay", f"{delay['mean']:.1f} ± {delay['std']:.1f} ms", ROBOT["delay"]),
+        ("cost of transport", "none" if summary["tcot"] is None else f"{summary['tcot']:.3f}", ROBOT["tcot"]),
+        (
+            "heel-strike delay",
+            "none" if delay["mean"] is None else f"{delay['mean']:.1f} ± {delay['std']:.1f} ms",
+            ROBOT["delay"],
+        ),
     )
     return [{"name": name, "value": value, "real": real} for name, value, real in rows]
 

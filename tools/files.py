@@ -1,0 +1,45 @@
+"""Files that a command writes: checked before the work begins, written whole or not at all."""
+
+import pathlib
+import tempfile
+
+from foundation.user_error import UserError
+
+
+def writable_folder(name: str | pathlib.Path) -> pathlib.Path:
+    """The folder, made if missing; UserError when nothing can be written there."""
+    folder = pathlib.Path(name)
+    if folder.exists() and not folder.is_dir():
+        raise UserError(f"cannot write to {folder}: this is a file, a folder is needed")
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except OSError as error:
+        raise UserError(f"cannot write to {folder}: {error.strerror}") from None
+    return folder
+
+
+def json_target(option: str | None) -> pathlib.Path | None:
+    """The file that `--json` names, its folder made if missing; None without one and for `-`."""
+    if option in (None, "-"):
+        return None
+    path = pathlib.Path(option or "")
+    if path.is_dir():
+        raise UserError(f"--json {option!r}: this is a folder, give a file or -")
+    writable_folder(path.parent)
+    return path
+
+
+def replace_file(path: pathlib.Path, content: bytes) -> None:
+    """Write the file whole or not at all."""
+    with tempfile.NamedTemporaryFile(dir=path.parent, prefix=path.name, delete=False) as handle:
+        temporary = pathlib.Path(handle.name)
+        try:
+            handle.write(content)
+            handle.close()
+            temporary.chmod(0o644)
+            temporary.replace(path)
+        except BaseException:
+            temporary.unlink(missing_ok=True)
+            raise
