@@ -30,12 +30,13 @@ PACKAGES = (
 )
 RECORD = "build_record.json"  # in the package foundation
 # no fused multiply-add, no fast-math: both change the last bit of a trajectory
-COMPILE_ARGUMENTS = ["-O2", "-ffp-contract=off", "-fno-fast-math", "-w"]
+COMPILE_ARGUMENTS = ["-O2", "-g0", "-ffp-contract=off", "-fno-fast-math", "-w"]
 DIRECTIVES = {
     "binding": False,  # bound methods in schedule tables are then called in about 10 ns
     "boundscheck": True,
     "wraparound": True,
     "cdivision": False,
+    "initializedcheck": False,  # every array field is set in __init__
     "embedsignature": True,
 }
 

@@ -1,5 +1,6 @@
 from foundation.numbers cimport float_of_word, word_of_float, wrap_i32
 
+cdef long long _MASK
 
 cdef class DataStore:
     cdef public long long size

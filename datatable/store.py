@@ -23,6 +23,8 @@ FSM = 6
 SUBSCRIBERS = ("BLUETOOTH", "SSP", "LABVIEW", "LCD", "MB_ERR_DIST", "ESTIMATOR", "FSM")
 
 TIMESTAMP = 0  # the id whose stamp is the network time
+# A C variable when compiled (.pxd): Cython makes a Python object of every literal above 31 bits.
+_MASK = 0xFFFFFFFF
 
 
 class DataStore:
@@ -52,8 +54,8 @@ class DataStore:
     def set_word(self, number: cython.longlong, word: cython.longlong, stamp: cython.longlong) -> cython.void:
         """Store the two words of a frame as they are; new for every subscriber."""
         if 0 <= number < self.size or self.has(number):
-            self.words[number] = word & 0xFFFFFFFF
-            self.stamps[number] = stamp & 0xFFFFFFFF
+            self.words[number] = word & _MASK
+            self.stamps[number] = stamp & _MASK
             self.unread[number] = 0x7F
 
     def get_word(self, number: cython.longlong) -> cython.longlong:
@@ -80,7 +82,7 @@ class DataStore:
     def set_int(self, number: cython.longlong, value: cython.longlong) -> cython.void:
         """Store a signed integer; only its low 32 bits are kept."""
         if 0 <= number < self.size or self.has(number):
-            self.words[number] = value & 0xFFFFFFFF
+            self.words[number] = value & _MASK
             self.stamps[number] = self.stamps[0]
             self.unread[number] = 0x7F
 
@@ -113,7 +115,7 @@ class DataStore:
     def age_ms(self, number: cython.longlong, now: cython.longlong) -> cython.longlong:
         """How long before `now` (ms) the value was written; right across one wrap of the 32-bit count."""
         if 0 <= number < self.size or self.has(number):
-            return (now - self.stamps[number]) & 0xFFFFFFFF
+            return (now - self.stamps[number]) & _MASK
         return 0
 
     # ---- read flags

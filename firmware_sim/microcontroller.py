@@ -445,7 +445,16 @@ class Microcontroller:
                     if result is not None:
                         items = result
                         cycles += task.per_item * items
-                    self._charge(task, cycles + self.extra_cycles)
+                    cycles += self.extra_cycles
+                    if cycles > task.limit or scheduler.recording:
+                        self._charge(task, cycles)
+                    else:  # the common case, as `_charge` does it
+                        self.code_time += int(cycles * self.ns_per_cycle)
+                        task.calls += 1
+                        task.last_cycles = cycles
+                        task.total_cycles += cycles
+                        if cycles > task.max_cycles:
+                            task.max_cycles = cycles
                 elif task.kind == 1:
                     occasional = task
                     entry = occasional.next_task()

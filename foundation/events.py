@@ -1,3 +1,5 @@
+# cython: boundscheck=False, wraparound=False, initializedcheck=False
+# (every index below is a slot of the pool)
 """Stamped messages: everything that passes between a board and the rest of the world.
 
 A message is (time, order, kind, six integers, one object). Time is virtual, in ns since the robot's
@@ -80,7 +82,14 @@ class EventQueue:
         self.e = 0
         self.f = 0
         self.ref = None
+        self.wakes = array.array("q", [0])
+        self.wake_place = 0
         self._grow(capacity)
+
+    def wake(self, wakes, place) -> None:
+        """From now on a new first message lowers `wakes[place]` (an array of instants in ns) to its time."""
+        self.wakes = wakes
+        self.wake_place = place
 
     def _grow(self, capacity) -> None:
         """Enlarge the pool to `capacity` slots, keeping what is queued."""
@@ -147,6 +156,8 @@ class EventQueue:
             after = self.head
             self.head = slot
             self.head_time = time
+            if time < self.wakes[self.wake_place]:
+                self.wakes[self.wake_place] = time
         else:
             after = self.nexts[before]
             self.nexts[before] = slot

@@ -1,3 +1,4 @@
+cdef long long _MASK, _SIGN
 cpdef double float32(double value)
 cpdef long long word_of_float(double value)
 cpdef double float_of_word(long long word)

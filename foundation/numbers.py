@@ -10,6 +10,10 @@ if not cython.compiled:
     from struct import pack, unpack
 
 WORD_MASK = 0xFFFFFFFF
+# The same for the functions below: C variables when compiled (numbers.pxd), because Cython makes a Python object of
+# every literal above 31 bits.
+_MASK = 0xFFFFFFFF
+_SIGN = 0x80000000
 
 
 def float32(value: cython.double) -> cython.double:
@@ -37,7 +41,7 @@ def word_of_float(value: cython.double) -> cython.longlong:
 def float_of_word(word: cython.longlong) -> cython.double:
     """The single-precision float whose 32 bits are `word` (only the low 32 bits count)."""
     if cython.compiled:
-        bits: cython.uint = cython.cast(cython.uint, word & 0xFFFFFFFF)
+        bits: cython.uint = cython.cast(cython.uint, word & _MASK)
         return cython.cast(cython.double, cython.cast(cython.pointer(cython.float), cython.address(bits))[0])
     else:
         return unpack("<f", pack("<I", word & 0xFFFFFFFF))[0]
@@ -45,22 +49,22 @@ def float_of_word(word: cython.longlong) -> cython.double:
 
 def wrap_u32(value: cython.longlong) -> cython.longlong:
     """`value` modulo 2^32, 0 ... 2^32-1."""
-    return value & 0xFFFFFFFF
+    return value & _MASK
 
 
 def wrap_i32(value: cython.longlong) -> cython.longlong:
     """`value` modulo 2^32 as a signed 32-bit integer, -2^31 ... 2^31-1."""
-    return ((value + 0x80000000) & 0xFFFFFFFF) - 0x80000000
+    return ((value + _SIGN) & _MASK) - _SIGN
 
 
 def word_of_i32(value: cython.longlong) -> cython.longlong:
     """The 32-bit pattern of a signed integer, 0 ... 2^32-1."""
-    return value & 0xFFFFFFFF
+    return value & _MASK
 
 
 def elapsed_u32(now: cython.longlong, then: cython.longlong) -> cython.longlong:
     """Ticks from `then` to `now` on a counter of 32 bits that may have wrapped once."""
-    return (now - then) & 0xFFFFFFFF
+    return (now - then) & _MASK
 
 
 def fixed_of_float(value: cython.double) -> cython.longlong:
@@ -85,7 +89,7 @@ def float_of_fixed(value: cython.longlong) -> cython.double:
 
 def fixed_multiply(a: cython.longlong, b: cython.longlong) -> cython.longlong:
     """Product of two 16.16 numbers, floored, wrapped to 32 bits as the firmware's arithmetic does."""
-    return ((((a * b) >> 16) + 0x80000000) & 0xFFFFFFFF) - 0x80000000
+    return ((((a * b) >> 16) + _SIGN) & _MASK) - _SIGN
 
 
 def divide_toward_zero(numerator: cython.longlong, denominator: cython.longlong) -> cython.longlong:

@@ -3,6 +3,8 @@ from foundation.numbers cimport word_of_float
 from foundation.random_stream cimport RandomStream
 from plant.edge_buffer cimport ByteBuffer
 
+cdef long long _MASK, _TEN_BITS
+
 cdef class Imu:
     cdef public double bias_rad_s, noise_rad_s, roll_bias_rad, roll_noise_rad, rate_scale, lag_s, cross_x_from_z
     cdef public long long filter_samples, latency_ns, baud, sample_ns, fusion_divider, ppb, phase_ns

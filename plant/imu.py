@@ -34,6 +34,9 @@ HEADER_ANGLES_AND_RATES = 0xCF
 HEADER_RATES = 0xC2
 PACKET_BYTES = 31
 MAX_FILTER = 64
+# C variables when compiled (.pxd): Cython makes a Python object of every literal above 31 bits.
+_MASK = 0xFFFFFFFF
+_TEN_BITS = 10000000000  # ns times baud
 
 
 class Imu:
@@ -173,7 +176,7 @@ class Imu:
     def _send(self, byte: cython.longlong) -> cython.void:
         """One byte on the line, from `line_free_ns` on; 10 bits at the baud rate."""
         self.checksum += byte
-        self.line_free_ns += 10000000000 // self.baud
+        self.line_free_ns += _TEN_BITS // self.baud
         self.bytes.push(self.line_free_ns, byte)
 
     def _word(self, word: cython.longlong) -> cython.void:
@@ -207,7 +210,7 @@ class Imu:
         self._word(word_of_float(self.rate_x))
         self._word(word_of_float(self.bias_rad_s))  # about y the legs do not turn
         self._word(word_of_float(yaw_rate + self.bias_rad_s))
-        self._word(self.next_sample_ns // 16000 & 0xFFFFFFFF)
+        self._word(self.next_sample_ns // 16000 & _MASK)
         self._sum()
         self.packets += 1
 
@@ -219,6 +222,6 @@ class Imu:
         self.checksum = 0
         self._send(0xC4)
         self._send(self.acknowledge)
-        self._word(self.acknowledge_ns // 16000 & 0xFFFFFFFF)
+        self._word(self.acknowledge_ns // 16000 & _MASK)
         self._sum()
         self.acknowledge = -1

@@ -144,7 +144,7 @@ class MainBrainBoard(Microcontroller):
         if bit == 1 and self.heartbeat_bit == 0:
             self.heartbeat_on = True
             self.heartbeat_until = self.time.ms + 50
-        elif self.heartbeat_on and (self.time.ms - self.heartbeat_until) & 0x80000000 == 0:
+        elif self.heartbeat_on and (self.time.ms - self.heartbeat_until) >> 31 & 1 == 0:
             self.heartbeat_on = False
         self.heartbeat_bit = bit
 

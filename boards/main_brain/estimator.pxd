@@ -4,6 +4,8 @@ from boards.main_brain.filters cimport ButterworthFilter
 from boards.main_brain.geometry cimport FloorGeometry
 from datatable.store cimport DataStore
 
+cdef long long _MASK
+
 cdef class EnergyMeter:
     cdef public bint started
     cdef public long long stamp

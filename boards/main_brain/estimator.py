@@ -19,6 +19,9 @@ from datatable.store import DataStore
 if not cython.compiled:
     from math import cos
 
+# A C variable when compiled (.pxd): Cython makes a Python object of every literal above 31 bits.
+_MASK = 0xFFFFFFFF
+
 READS = (
     "TIMESTAMP",
     "MCH_ANGLE",
@@ -100,7 +103,7 @@ class EnergyMeter:
             self.stamp = stamp_ms
             self.power_W = power_W
             return True
-        gap = (stamp_ms - self.stamp) & 0xFFFFFFFF
+        gap = (stamp_ms - self.stamp) & _MASK
         if gap == 0:
             return False
         if gap <= 1000:
@@ -228,7 +231,7 @@ class Estimator:
         store.set_float(self.E_LI_ANGLE, self.outer_angle - hip)
         store.set_float(self.E_FO_ABSANG, self.outer_angle + outer_ankle + self.foot_offset)
         store.set_float(self.E_FI_ABSANG, self.outer_angle - hip + inner_ankle + self.foot_offset)
-        store.set_int(self.E_T_AFTER_HS, (store.stamp(self.TIMESTAMP) - self.strike_time) & 0xFFFFFFFF)
+        store.set_int(self.E_T_AFTER_HS, (store.stamp(self.TIMESTAMP) - self.strike_time) & _MASK)
         self.update_heights(hip, outer_ankle, inner_ankle)
         self.update_energy()
         if reset == 2:
@@ -264,7 +267,7 @@ class Estimator:
             # roll is positive with the foot ahead of the hip, so the lean is its opposite (facts 1.1, 3.2)
             self.outer_angle = -(self.roll.push(store.get_float(self.UI_ROLL)) - store.get_float(self.P_E_ROLL_BIAS))
             return
-        gap = (stamp - self.gyro_stamp) & 0xFFFFFFFF
+        gap = (stamp - self.gyro_stamp) & _MASK
         if gap == 0:
             return
         rate = -(store.get_float(self.UI_ANG_RATE_X) - store.get_float(self.P_E_GYRO_BIAS))
@@ -351,7 +354,7 @@ class Estimator:
         """A heel strike: exchange the legs, correct the angle, count the step."""
         store: DataStore = self.store
         now: cython.longlong = store.stamp(self.TIMESTAMP)
-        lasted: cython.longlong = (now - self.strike_time) & 0xFFFFFFFF
+        lasted: cython.longlong = (now - self.strike_time) & _MASK
         error: float
         geometric: float
         length: float

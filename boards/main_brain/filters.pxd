@@ -1,5 +1,7 @@
 from libc.math cimport M_PI as pi, sqrt, tan
 
+cdef long long _MASK
+
 cdef class ButterworthFilter:
     cdef public double b0, b1, b2, a1, a2
     cdef public long long longest_gap, violations, stamp

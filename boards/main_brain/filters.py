@@ -10,6 +10,9 @@ import cython
 if not cython.compiled:
     from math import pi, sqrt, tan
 
+# A C variable when compiled (.pxd): Cython makes a Python object of every literal above 31 bits.
+_MASK = 0xFFFFFFFF
+
 
 class ButterworthFilter:
     """A filter for data that arrive with ms stamps or once per tick.
@@ -71,7 +74,7 @@ class ButterworthFilter:
             self.stamp = stamp_ms
             self.rest_at(value)
             return value
-        gap = (stamp_ms - self.stamp) & 0xFFFFFFFF
+        gap = (stamp_ms - self.stamp) & _MASK
         if gap == 0:
             return self.output
         self.stamp = stamp_ms

@@ -2,6 +2,8 @@ from boards.modules.can_load cimport CanLoad
 from boards.modules.network_time cimport NetworkTime
 from firmware_sim.peripherals.can_controller cimport CanController
 
+cdef long long _MASK
+
 cdef class NetworkClock:
     cdef public NetworkTime time
     cdef public CanLoad load

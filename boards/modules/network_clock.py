@@ -16,6 +16,8 @@ from firmware_sim.peripherals.can_controller import CanController
 TICKS_PER_MS = 5
 SYNC_BUFFER = 3
 CYCLES_PER_SYNC = 60  # four register writes and a command per controller: chosen by us, no listing says
+# A C variable when compiled (.pxd): Cython makes a Python object of every literal above 31 bits.
+_MASK = 0xFFFFFFFF
 
 
 class NetworkClock:
@@ -40,7 +42,7 @@ class NetworkClock:
         if self.divider < 5:
             return False
         self.divider = 0
-        self.time.ms = (self.time.ms + 1) & 0xFFFFFFFF
+        self.time.ms = (self.time.ms + 1) & _MASK
         self.send_sync()
         return True
 

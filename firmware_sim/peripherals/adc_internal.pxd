@@ -1,6 +1,8 @@
 from firmware_sim.microcontroller cimport Peripheral
 from firmware_sim.vic cimport InterruptSource
 
+cdef long long _DONE
+
 cdef class AdcInternal(Peripheral):
     cdef public long long clkdiv, hz, conversion_ns, alarm, CR, GDR, result, channel
     cdef public double reference_V, scale

@@ -14,6 +14,8 @@ import cython
 from firmware_sim.microcontroller import Peripheral
 from firmware_sim.vic import ADC_DONE
 from foundation.user_error import UserError
+# A C variable when compiled (.pxd): Cython makes a Python object of every literal above 31 bits.
+_DONE = 1 << 31
 
 
 class AdcInternal(Peripheral):
@@ -75,7 +77,7 @@ class AdcInternal(Peripheral):
     def on_alarm(self, alarm: cython.longlong, time: cython.longlong) -> cython.void:
         """The conversion is over: ADGDR holds result, channel and the DONE bit."""
         self.result = self.convert(self.chip.analog.volts(self.inputs[self.channel], self.started_time))
-        self.GDR = self.result << 6 | self.channel << 24 | 1 << 31
+        self.GDR = self.result << 6 | self.channel << 24 | _DONE
         self.busy = False
         self.conversions += 1
         self.chip.vic.raise_source(self.source)
