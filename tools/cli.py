@@ -3,7 +3,7 @@
 import argparse
 import os
 import sys
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from foundation.user_error import UserError
 
@@ -24,17 +24,18 @@ class OneLineParser(argparse.ArgumentParser):
 def parser() -> argparse.ArgumentParser:
     """The whole command line."""
     from datatable import cli as table_command
-    from tools import bench, info, walk
+    from tools import bench, info, tune, walk
 
     top = OneLineParser(
         prog="ranger-sim",
         description="The Cornell Ranger biped emulated whole: seven boards' firmware, four CAN buses, one body.",
     )
-    commands = top.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    commands: Any = top.add_subparsers(dest="command", required=True, metavar="COMMAND")
     walk.register(commands)
     info.register(commands)
     table_command.register(commands)
     bench.register(commands)
+    tune.register(commands)
     return top
 
 
