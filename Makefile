@@ -15,6 +15,7 @@ test: $(VENV)/.built
 
 lint: $(VENV)/.built
 	$(RUN) -m ruff check .
+	$(RUN) -m ruff format --check --quiet .
 	$(RUN) -m mypy
 
 bench: $(VENV)/.built
@@ -30,13 +31,13 @@ $(VENV)/.installed: requirements.lock
 	$(RUN) -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
 	@touch $@
 
-# Compiled where a C compiler is found, interpreted otherwise; only changed modules are rebuilt.
+# Compiled where a C compiler is found, interpreted otherwise (told, with the reason); only changed modules are rebuilt.
+# Installing it as editable builds as well: it comes second, finds everything built, and can be quiet.
 $(VENV)/.built: $(VENV)/.installed pyproject.toml setup.py $(SOURCES)
-	@echo "Building (compiled where a C compiler is found) ..."
-	@test -f $(VENV)/.linked || $(RUN) -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
-	@touch $(VENV)/.linked
+	@echo "Building (compiled where a C compiler is found; the first time takes some minutes) ..."
 	@$(RUN) setup.py -q build_ext --inplace
-	@touch $@
+	@test -f $(VENV)/.linked || $(RUN) -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
+	@touch $(VENV)/.linked $@
 
 lock:
 	uv pip compile pyproject.toml --extra dev --universal --generate-hashes --no-emit-index-url --no-header --python-version 3.11 -o requirements.lock
@@ -45,3 +46,4 @@ clean:
 	rm -rf $(VENV) build *.egg-info
 	find . -name '*.so' -not -path './$(VENV)/*' -delete
 	find . -name '*.c' -not -path './$(VENV)/*' -not -path './datatable/generated/*' -delete
+	rm -f foundation/build_record.json

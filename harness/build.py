@@ -10,7 +10,8 @@ import foundation
 def compiled_modules() -> tuple[list[str], list[str]]:
     """(compiled, interpreted): names of the modules that have a .pxd, by how they were loaded."""
     root = pathlib.Path(foundation.__file__).resolve().parent.parent
-    compiled, interpreted = [], []
+    compiled: list[str] = []
+    interpreted: list[str] = []
     for package in foundation.OUR_PACKAGES:
         for declaration in sorted((root / package).rglob("*.pxd")):
             name = ".".join(declaration.relative_to(root).with_suffix("").parts)

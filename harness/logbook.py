@@ -2,6 +2,8 @@
 
 import collections
 import tempfile
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
@@ -9,7 +11,7 @@ from foundation.user_error import UserError
 from harness.recorder import Recorder
 
 STREAMS = ("frames", "samples", "words")
-WINDOW_S = 10.0  # default window of the logs; the issue of the day asks for the last 10 s
+WINDOW_S = 10.0  # default window of the logs: some 16 steps
 
 
 class Logbook:
@@ -24,8 +26,8 @@ class Logbook:
             raise UserError(f"log mode is {mode!r}, allowed are full, window, none")
         self.mode = mode
         self.window_ns = int(window_s * 1e9)
-        self.blocks = {name: collections.deque() for name in STREAMS}
-        self.spools = {}
+        self.blocks: dict[str, collections.deque[tuple[int, bytes]]] = {name: collections.deque() for name in STREAMS}
+        self.spools: dict[str, Any] = {}
         self.streams = {name: getattr(recorder, name) for name in STREAMS}
         if mode == "none":
             return
@@ -36,20 +38,20 @@ class Logbook:
             else:
                 stream.sink = self._window(name)
 
-    def _window(self, name):
+    def _window(self, name: str) -> Callable[[int, bytes], None]:
         blocks = self.blocks[name]
 
-        def keep(last_time_ns, block):
+        def keep(last_time_ns: int, block: bytes) -> None:
             blocks.append((last_time_ns, block))
             while blocks[0][0] < last_time_ns - self.window_ns:
                 blocks.popleft()
 
         return keep
 
-    def _spooler(self, name):
+    def _spooler(self, name: str) -> Callable[[int, bytes], None]:
         spool = self.spools[name]
 
-        def write(_last_time_ns, block):
+        def write(_last_time_ns: int, block: bytes) -> None:
             spool.write(block)
 
         return write
@@ -59,7 +61,7 @@ class Logbook:
         """True when the variables are kept (the recorder then samples the data table)."""
         return self.mode != "none"
 
-    def _rows(self, name):
+    def _rows(self, name: str) -> Any:
         stream = self.streams[name]
         stream.flush()
         kind = np.float64 if stream.is_real else np.int64
@@ -77,7 +79,7 @@ class Logbook:
             rows = rows[times_ns >= times_ns[-1] - self.window_ns]
         return rows
 
-    def frames(self):
+    def frames(self) -> dict:
         """Frames seen on the buses: dict of arrays time_ns, bus (0..3), identifier, flags, word0, word1."""
         rows = self._rows("frames")
         first, second, third = rows[:, 0], rows[:, 1], rows[:, 2]
@@ -90,11 +92,11 @@ class Logbook:
             "word1": third >> 29,
         }
 
-    def samples(self):
+    def samples(self) -> Any:
         """Samples of the plant: array (rows, columns), time in s in column 0."""
         return self._rows("samples")
 
-    def words(self):
+    def words(self) -> tuple:
         """(time_ns, words): the main brain's table, int64 arrays (rows,) and (rows, variables)."""
         rows = self._rows("words")
         return rows[:, 0], rows[:, 1:]

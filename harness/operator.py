@@ -3,6 +3,8 @@
 What the person does comes from the parameter set's [operator] table; times count from power-up.
 """
 
+from typing import Any
+
 from foundation.events import PIN_EDGE, STAGE_PINS
 from harness import wiring
 
@@ -17,7 +19,7 @@ CENTRE_NS, REACH_NS, FRAME_NS = 1_416_667, 416_667, 20_000_000
 class Operator:
     """Plays a script against the plant and the key pins. `script`: boards.main_brain.controllers.Operator."""
 
-    def __init__(self, script, plant, ui_board, start_ns: int) -> None:
+    def __init__(self, script: Any, plant: Any, ui_board: Any, start_ns: int) -> None:
         self.script = script
         self.plant = plant
         self.inbox = ui_board.inbox

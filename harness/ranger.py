@@ -4,6 +4,9 @@ Follow the loop here: `Ranger.__init__` builds the plant, the boards and the bus
 tables of harness/wiring.py; `harness/lockstep.py` then passes time and carries what goes over the wires.
 """
 
+from collections.abc import Callable
+from typing import Any
+
 from boards.can_router import CanRouterBoard
 from boards.hip import HipBoard
 from boards.inner_feet import InnerFeetBoard
@@ -52,7 +55,7 @@ class Ranger:
             start_ns=self.start_ns,
         )
         # interrupts and slots: each board on its own crystal, powered up in its own moment
-        self.boards = {
+        self.boards: dict[str, Any] = {  # each its own class: see boards/
             "MCH": HipBoard(*self._clock("MCH")),
             "MCFO": OuterFeetBoard(*self._clock("MCFO")),
             "MCFI": InnerFeetBoard(*self._clock("MCFI")),
@@ -68,7 +71,7 @@ class Ranger:
             bus.reset_statistics(self.start_ns)  # loads count from the start of the run
         self.recorder = Recorder(len(self.plant.sample_names), all_variables.TABLE_SIZE)
         self.logbook = Logbook(self.recorder, log)
-        self.loop = lockstep.Lockstep(
+        self.loop: Any = lockstep.Lockstep(
             self.plant, [self.boards[name] for name in wiring.BOARDS], self.buses, self.recorder, self.start_ns
         )
         self._connect()
@@ -77,7 +80,7 @@ class Ranger:
         self.wall_s = 0.0
         self.ended = ""
 
-    def _clock(self, board: str):
+    def _clock(self, board: str) -> tuple[Any, Quirks, int]:
         """(crystal, quirks, power-up instant) of a board, drawn from the scenario's seed."""
         stream = RandomStream(self.scenario.seed, f"board {board}")
         crystal = seeded_crystal(stream)
@@ -92,20 +95,23 @@ class Ranger:
             loop.encoder_wires.append(
                 lockstep.Wire(self.plant.encoders[wire.encoder], boards[wire.board], pins[wire.pin_a], pins[wire.pin_b])
             )
-        for wire in wiring.ANALOG:
-            channel = wiring.ANALOG_INPUTS[wire.board][wire.input]
-            loop.analog_wires.append(lockstep.AnalogWire(wire.voltage, boards[wire.board], channel))
-        for wire in wiring.WORDS:
+        for analog in wiring.ANALOG:
+            channel = wiring.ANALOG_INPUTS[analog.board][analog.input]
+            loop.analog_wires.append(lockstep.AnalogWire(analog.voltage, boards[analog.board], channel))
+        for word in wiring.WORDS:
             loop.word_wires.append(
-                lockstep.WordWire(wire.word, boards[wire.board], wiring.WORD_REGISTERS[wire.register])
+                lockstep.WordWire(word.word, boards[word.board], wiring.WORD_REGISTERS[word.register])
             )
-        for wire in wiring.CAN:
-            board, bus = boards[wire.board], self.buses[wire.bus - 1]
+        for can_wire in wiring.CAN:
+            board, bus = boards[can_wire.board], self.buses[can_wire.bus - 1]
             node = bus.add_node(
-                wire.board, board.inbox, wire.controller, STAGE_BUS * 256 + 16 * place[wire.board] + wire.controller
+                can_wire.board,
+                board.inbox,
+                can_wire.controller,
+                STAGE_BUS * 256 + 16 * place[can_wire.board] + can_wire.controller,
             )
-            loop.bus_of[4 * place[wire.board] + wire.controller - 1] = wire.bus - 1
-            loop.node_of[4 * place[wire.board] + wire.controller - 1] = node
+            loop.bus_of[4 * place[can_wire.board] + can_wire.controller - 1] = can_wire.bus - 1
+            loop.node_of[4 * place[can_wire.board] + can_wire.controller - 1] = node
         pins = wiring.MOTOR_PINS
         for name, motor in wiring.MOTORS.items():
             loop.motors[place[name]] = self.plant.motors[motor]
@@ -185,18 +191,20 @@ class Ranger:
 
     # --- looking in, reaching in --------------------------------------------------------------------------
 
-    def board(self, name: str):
+    def board(self, name: str) -> Any:
         """The board MCH, MCFO, MCFI, MCSI, UI, CSR or MB."""
         return self.boards[name]
 
-    def variable(self, name: str):
+    def variable(self, name: str) -> float:
         """Value of a variable as the main brain's data table has it."""
         from datatable.packing import value_of_word
 
         number = all_variables.ID_OF[name]
         return value_of_word(all_variables.TYPES[number], self.boards["MB"].store.get_word(number))
 
-    def replace(self, board: str, task: str, function, cost: int, limit: int | None = None) -> None:
+    def replace(
+        self, board: str, task: str, function: Callable[[], int | None], cost: int, limit: int | None = None
+    ) -> None:
         """Put your own function in a schedule entry; it declares its cost in cycles."""
         self.boards[board].scheduler.replace(task, function, cost=cost, limit=limit)
 
@@ -204,7 +212,7 @@ class Ranger:
         """SHA-256 of the canonical trace so far."""
         return self.recorder.trace_digest()
 
-    def recorded(self):
+    def recorded(self) -> Any:
         """What the log kept, as arrays: a `harness.recorded.Recorded`."""
         from harness.recorded import Recorded
 

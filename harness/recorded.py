@@ -1,6 +1,8 @@
 """What a run kept, as arrays for reports and files. Times are s since power-up."""
 
 import dataclasses
+from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 
@@ -36,7 +38,7 @@ class Recorded:
     (percent of the slot, count)}.
     """
 
-    def __init__(self, robot) -> None:
+    def __init__(self, robot: Any) -> None:
         self.robot = robot
         rows = robot.logbook.samples()
         self.samples = {"time_s": rows[:, 0] - robot.start_ns * 1e-9}
@@ -48,23 +50,23 @@ class Recorded:
         self.slot_histograms = {name: self._histogram(board) for name, board in robot.boards.items()}
         self.footholds = robot.plant.recent_footholds()
 
-    def _load(self, bus):
+    def _load(self, bus: Any) -> Any:
         windows = np.array(bus.load_windows())
         last = bus.window_count * 0.01
         return last - 0.01 * np.arange(len(windows), 0, -1) + 0.005, windows
 
     @staticmethod
-    def _histogram(board):
+    def _histogram(board: Any) -> Any:
         counts = np.array(board.scheduler.histogram)
         return 5.0 * np.arange(len(counts)), counts
 
-    def machine_states(self, machine: str):
+    def machine_states(self, machine: str) -> Any:
         """(time_s, state numbers, {number: name}) of one of the main brain's machines."""
         number = all_variables.ID_OF[STATE_VARIABLES[machine]]
         names = {state.number: state.name for state in getattr(self.robot.boards["MB"].modes, machine).machine.states}
         return self._seconds(self.word_times_ns), self.words[:, number].astype(int), names
 
-    def state_text(self, times_s) -> list[list[str]]:
+    def state_text(self, times_s: Any) -> list[list[str]]:
         """The states of hip and feet at the given times, three lines each."""
         parts = []
         for machine in ("hip", "outer_foot", "inner_foot"):
@@ -73,10 +75,10 @@ class Recorded:
             parts.append([f"{machine.replace('_', ' ')}: {names.get(int(states[i]), '?')}" for i in at])
         return [list(row) for row in zip(*parts, strict=True)]
 
-    def _seconds(self, time_ns):
+    def _seconds(self, time_ns: Any) -> Any:
         return (time_ns - self.robot.start_ns) * 1e-9
 
-    def variables(self):
+    def variables(self) -> Iterator[Any]:
         """Yield a Series for every variable that was ever written, at the instants when it changed."""
         time_s = self._seconds(self.word_times_ns)
         descriptions = {row.id: row.description for row in datatable.load().variables}

@@ -1,6 +1,7 @@
 """The walk in numbers."""
 
 import math
+from typing import Any
 
 from datatable.generated import errors as error_table
 from harness import build
@@ -9,7 +10,7 @@ MASS_KG, GRAVITY = 9.91, 9.81  # total cost of transport: appendix 1, table of t
 SKIPPED_STEPS = 5  # the start is left out of means
 
 
-def of(robot) -> dict:
+def of(robot: Any) -> dict:
     """Everything `--json` prints; units are in the names. Means leave out the first 5 steps."""
     plant = robot.plant
     record = plant.record
@@ -54,7 +55,7 @@ def of(robot) -> dict:
     }
 
 
-def motor_powers(robot) -> dict:
+def motor_powers(robot: Any) -> dict:
     """Mean power each motor drew at the battery since the robot was let go, W; what it gave back is not credited."""
     plant = robot.plant
     walked_s = (plant.time_ns - plant.record.begin_ns) * 1e-9
@@ -63,7 +64,7 @@ def motor_powers(robot) -> dict:
     return {motor.name: (motor.drawn_J - motor.drawn_before_J) / walked_s for motor in plant.motors}
 
 
-def oddities(plant) -> dict:
+def oddities(plant: Any) -> dict:
     """What the model met that a textbook gait has not; each is a count or a worst value of the walk."""
     record, body = plant.record, plant.body
     return {
@@ -81,7 +82,7 @@ def oddities(plant) -> dict:
     }
 
 
-def strike_delay(loop) -> dict:
+def strike_delay(loop: Any) -> dict:
     """From the plant's strike to the start of the main-brain slot that flips the swing flag."""
     n = loop.strike_count
     if n == 0:
@@ -95,7 +96,7 @@ def strike_delay(loop) -> dict:
     }
 
 
-def can(robot, bus) -> dict:
+def can(robot: Any, bus: Any) -> dict:
     """Traffic of one bus; loads as fractions 0-1 with stuff bits and intermission."""
     now = robot.loop.time
     return {
@@ -108,7 +109,7 @@ def can(robot, bus) -> dict:
     }
 
 
-def slots(board) -> dict:
+def slots(board: Any) -> dict:
     """How one board kept its slots; interrupts included."""
     scheduler = board.scheduler
     return {
@@ -119,13 +120,13 @@ def slots(board) -> dict:
     }
 
 
-def errors(board) -> dict:
+def errors(board: Any) -> dict:
     """Errors the board itself noted, by name."""
     totals = board.errors.totals
     return {name: totals[code] for code, name in error_table.NAMES.items() if totals[code]}
 
 
-def alive(robot, name: str, board) -> bool:
+def alive(robot: Any, name: str, board: Any) -> bool:
     """True when the board's slots are as recent as they should be."""
     silent_ns = robot.loop.time - board.scheduler.slot_time
     return robot.loop.time - robot.start_ns < 20_000_000 or silent_ns < 20 * board.scheduler.schedule.slot_ns

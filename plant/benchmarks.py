@@ -37,8 +37,11 @@ SIMPLEST_EIGENVALUE_TRUE = complex(-0.1901064148, 0.5575860809)  # Richardson
 def integrate_to(rhs, y0, event, slope, limit_s, armed_from_s):
     """State where `event` falls to 0 after `armed_from_s`, polished by Newton on the time with `slope` = d event/dt."""
     first = solve_ivp(rhs, (0.0, armed_from_s), y0, "DOP853", rtol=RTOL, atol=ATOL)
-    stop = lambda t, y: event(y)  # noqa: E731
-    stop.terminal = True
+
+    def stop(_t, y):
+        return event(y)
+
+    stop.terminal = True  # type: ignore[attr-defined]  # scipy wants it so
     done = solve_ivp(rhs, (armed_from_s, limit_s), first.y[:, -1], "DOP853", events=stop, rtol=RTOL, atol=ATOL)
     if not len(done.t_events[0]):
         raise ArithmeticError(f"the walker does not strike within {limit_s} s")

@@ -18,6 +18,7 @@ import dataclasses
 import math
 import pathlib
 import tomllib
+from typing import Any
 
 from foundation.user_error import UserError
 from plant import term_torques as torques
@@ -52,7 +53,7 @@ class Form:
     torque: int = -1  # row code of plant/term_torques.py, -1 when it acts elsewhere
 
 
-def _phase(name="phase_rad"):
+def _phase(name: str = "phase_rad") -> Parameter:
     return Parameter(name, "rad", -2.0 * math.pi, 2.0 * math.pi, 0.0)
 
 
@@ -322,11 +323,11 @@ def _check(place: str, table: object) -> Term:
 class Model:
     """The terms of one model file (or of `tables`, a list of dictionaries like the file's)."""
 
-    def __init__(self, tables, source="model") -> None:
+    def __init__(self, tables: Any, source: str = "model") -> None:
         self.source = source
         self.terms = [_check(f"{source}: term {number}", table) for number, table in enumerate(tables, 1)]
 
-    def apply(self, plant) -> None:
+    def apply(self, plant: Any) -> None:
         """Put every term into a RangerPlant, before its first step."""
         electrics = plant.electrics
         rows = None
@@ -358,7 +359,7 @@ class Model:
             plant.body.terms = rows
 
 
-def _apply_electric(unit, term: Term) -> None:
+def _apply_electric(unit: Any, term: Term) -> None:
     """A term of a winding or its bridge."""
     name, (value,) = term.form.name, term.values.values()
     if name == "resistance_temperature":
@@ -375,7 +376,7 @@ def _apply_electric(unit, term: Term) -> None:
         unit.dead_time_fraction += value
 
 
-def _apply_analog(electrics, i: int, term: Term) -> None:
+def _apply_analog(electrics: Any, i: int, term: Term) -> None:
     """A term of a voltage sensor, number i of the wiring points."""
     name, (value,) = term.form.name, term.values.values()
     if name == "sensor_noise":
@@ -390,7 +391,7 @@ def _apply_analog(electrics, i: int, term: Term) -> None:
     setattr(electrics, field, numbers)
 
 
-def _apply_angle(encoder, term: Term) -> None:
+def _apply_angle(encoder: Any, term: Term) -> None:
     """A term of an incremental or absolute encoder."""
     name, values = term.form.name, list(term.values.values())
     if name == "sensor_scale":
@@ -409,7 +410,7 @@ def _apply_angle(encoder, term: Term) -> None:
         encoder.eccentricity_1, encoder.phase_1, encoder.eccentricity_2, encoder.phase_2 = values
 
 
-def _apply_gyro(imu, term: Term) -> None:
+def _apply_gyro(imu: Any, term: Term) -> None:
     """A term of the inertial sensor's rate about the hip."""
     name, (value,) = term.form.name, term.values.values()
     if name == "sensor_scale":
@@ -422,7 +423,7 @@ def _apply_gyro(imu, term: Term) -> None:
         imu.cross_x_from_z += value
 
 
-def load(path) -> Model:
+def load(path: str | pathlib.Path) -> Model:
     """The model of a TOML file; UserError with file, term, field and limit for everything wrong in it."""
     path = pathlib.Path(path)
     try:

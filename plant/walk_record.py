@@ -1,6 +1,7 @@
 """What a walk looked like from outside: counts, last values and sums; memory does not grow with the walk."""
 
 import array
+from typing import Any
 
 RING = 4096  # strikes kept for whoever draws them later; chosen by us: 41 minutes of walking, 160 kB
 
@@ -25,7 +26,7 @@ class WalkRecord:
         self.strike_heights_m = array.array("d", [0.0]) * RING
         self.begin(0, 0.0)
 
-    def begin(self, time_ns, contact_x) -> None:
+    def begin(self, time_ns: int, contact_x: float) -> None:
         """Forget everything: the robot is put down at `contact_x`."""
         self.begin_ns = time_ns
         self.start_x = contact_x
@@ -65,7 +66,20 @@ class WalkRecord:
         self.time_squares = 0.0
         self.double_stance_sum_s = 0.0
 
-    def touch(self, time_ns, leg, strike, ahead, x, foot_rad, impulses, loss_J, double, gap, height) -> None:
+    def touch(
+        self,
+        time_ns: Any,
+        leg: int,
+        strike: Any,
+        ahead: Any,
+        x: Any,
+        foot_rad: Any,
+        impulses: Any,
+        loss_J: float,
+        double: Any,
+        gap: Any,
+        height: Any,
+    ) -> None:
         """A foot met the floor. `impulses`: stance x, y, swing x, y in N s; `gap`: lowest clearance at passing;
         `height`: of the foothold."""
         self.touch_time_ns = time_ns
@@ -107,14 +121,14 @@ class WalkRecord:
             self.time_sum_s += seconds
             self.time_squares += seconds * seconds
 
-    def brush(self, passed) -> None:
+    def brush(self, passed: Any) -> None:
         """The swing foot's sole touched the floor, before or after it passed the stance foot."""
         if passed:
             self.scuffs += 1
         else:
             self.brushes += 1
 
-    def leave(self, time_ns, leg, flight) -> None:
+    def leave(self, time_ns: int, leg: int, flight: Any) -> None:
         """A foot left the floor."""
         if flight:
             self.flights += 1
@@ -126,7 +140,7 @@ class WalkRecord:
             if self.steps > 5:
                 self.double_stance_sum_s += self.double_stance_ns * 1e-9
 
-    def fall(self, time_ns, cause) -> None:
+    def fall(self, time_ns: int, cause: str) -> None:
         self.fell = True
         self.fall_cause = cause
         self.fall_time_ns = time_ns
@@ -148,7 +162,7 @@ class WalkRecord:
     def step_time_deviation_s(self) -> float:
         return self._deviation(self.time_sum_s, self.time_squares)
 
-    def _deviation(self, total, squares) -> float:
+    def _deviation(self, total: float, squares: float) -> float:
         if self.counted < 2:
             return 0.0
         mean = total / self.counted

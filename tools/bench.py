@@ -12,6 +12,7 @@ import platform
 import statistics
 import subprocess
 import sys
+from typing import Any
 
 from rich.console import Console
 from rich.table import Table
@@ -22,7 +23,7 @@ from tools.files import json_target, replace_file
 from tools.units import whole_number
 
 
-def register(commands) -> None:
+def register(commands: Any) -> None:
     """Add the subcommand to the command line."""
     command = commands.add_parser("bench", help="times real time of the whole robot and of its parts")
     command.add_argument("--runs", type=whole_number(1), default=3, help="runs of each case (default 3)")

@@ -15,7 +15,7 @@ from can_bus.edge import interfaces
 from harness.build import compiled_modules, is_compiled, why_interpreted
 
 
-def register(commands) -> None:
+def register(commands: Any) -> None:
     """Add the subcommand to the command line."""
     command = commands.add_parser("info", help="version, compiled or not, CAN interfaces, data-table hash")
     command.add_argument("--json", action="store_true", help="print JSON instead of a table")

@@ -3,12 +3,13 @@
 import argparse
 import math
 import re
+from collections.abc import Callable
 
 LENGTHS = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "km": 1e3}
 TIMES = {"ms": 1e-3, "s": 1.0, "min": 60.0, "h": 3600.0}
 
 
-def quantity(units: dict, base: str, above: float | None = None):
+def quantity(units: dict, base: str, above: float | None = None) -> Callable[[str], float]:
     """An argparse type: a number with an optional unit of `units`, in SI. `above`: exclusive lower limit."""
 
     def parse(text: str) -> float:
@@ -25,7 +26,7 @@ def quantity(units: dict, base: str, above: float | None = None):
     return parse
 
 
-def whole_number(low: int):
+def whole_number(low: int) -> Callable[[str], int]:
     """An argparse type: a whole number of at least `low`."""
 
     def parse(text: str) -> int:

@@ -9,11 +9,13 @@ at 45 Hz has 45 samples a second.
 import pathlib
 import tempfile
 import warnings
+from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 
 
-def write(robot, path: pathlib.Path) -> None:
+def write(robot: Any, path: pathlib.Path) -> None:
     """Write `path` whole or not at all. `robot`: a `harness.ranger.Ranger` whose log was not "none"."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # asammdf's dependencies announce their own deprecations on import
@@ -35,7 +37,7 @@ def write(robot, path: pathlib.Path) -> None:
                 pathlib.Path(saved).replace(path)
 
 
-def groups(robot):
+def groups(robot: Any) -> Iterator[tuple[str, Any, list[tuple[str, str, str, Any]]]]:
     """(group name, time in s, [(channel, unit, description, samples)]) of everything that was kept."""
     kept = robot.recorded()
     yield (

@@ -8,7 +8,7 @@ import json
 import pathlib
 import signal
 import tempfile
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeRemainingColumn
@@ -29,7 +29,7 @@ DEFAULT_STEPS = 100
 SLICE_S = 0.05  # virtual seconds between two looks at the screen and at Ctrl-C
 
 
-def register(commands) -> None:
+def register(commands: Any) -> None:
     """Add the subcommand to the command line."""
     command = commands.add_parser(
         "walk",

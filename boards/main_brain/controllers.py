@@ -11,6 +11,7 @@ import math
 import pathlib
 import tomllib
 from dataclasses import dataclass, fields
+from typing import Any
 
 from datatable.generated import mb as table_ids
 from datatable.loader import load_table
@@ -78,7 +79,7 @@ class Controller:
     reasons: dict
     operator: Operator
 
-    def apply(self, store) -> None:
+    def apply(self, store: Any) -> None:
         """Write every parameter into the data table, as the computer's link would."""
         for name, value in self.values.items():
             store.set_float(getattr(table_ids, name), value)
@@ -99,12 +100,12 @@ def available() -> tuple:
     return tuple(sorted(path.stem for path in FOLDER.glob("*.toml")))
 
 
-def load(name) -> Controller:
+def load(name: str | pathlib.Path) -> Controller:
     """The set `name`, or the file at that path when it ends in .toml."""
     return _load(str(name), ())
 
 
-def _load(name, users) -> Controller:
+def _load(name: str, users: tuple) -> Controller:
     path = pathlib.Path(name) if name.endswith(".toml") else FOLDER / f"{name}.toml"
     if not name.endswith(".toml") and name not in available():
         raise UserError(f"controller {name!r}: unknown; there are {', '.join(available())}, or give a .toml file")
@@ -144,7 +145,7 @@ def _load(name, users) -> Controller:
     return Controller(path.stem, place, title, description, base_name, values, changes, reasons, operator)
 
 
-def _read(path):
+def _read(path: pathlib.Path) -> dict:
     try:
         text = path.read_bytes().decode()
     except OSError as error:
@@ -157,27 +158,27 @@ def _read(path):
         raise UserError(f"controller file {path}: not valid TOML: {error}") from None
 
 
-def _only(data, allowed, place) -> None:
+def _only(data: dict, allowed: tuple, place: str) -> None:
     for key in data:
         if key not in allowed:
             raise UserError(f"{place}: unknown key {key!r}; allowed are {', '.join(allowed)}")
 
 
-def _text(data, key, place, default):
+def _text(data: dict, key: str, place: str, default: Any) -> Any:
     value = data.get(key, default)
     if value is not default and not isinstance(value, str):
         raise UserError(f"{place}: {key} = {value!r}: text is expected")
     return value
 
 
-def _table(data, key, place):
+def _table(data: dict, key: str, place: str) -> dict:
     value = data.get(key, {})
     if not isinstance(value, dict):
         raise UserError(f"{place}: {key} = {value!r}: a table [{key}] is expected")
     return value
 
 
-def _number(value, key, limits, unit, place):
+def _number(value: Any, key: str, limits: tuple, unit: str, place: str) -> float:
     """`value` as a float within `limits` (either may be None)."""
     low, high = limits
     if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
@@ -187,7 +188,7 @@ def _number(value, key, limits, unit, place):
     return float(value)
 
 
-def _parameters(table, place):
+def _parameters(table: dict, place: str) -> dict:
     known = parameter_rows()
     values = {}
     for name, value in table.items():
@@ -198,7 +199,7 @@ def _parameters(table, place):
     return values
 
 
-def _operator(table, place):
+def _operator(table: dict, place: str) -> Operator:
     names = tuple(field.name for field in fields(Operator))
     _only(table, names, f"{place}: [operator]")
     for name in names:

@@ -8,6 +8,8 @@ is marked new while its ring is empty, and the display's ring is never emptied.
 Runs 45 times a second and mostly finds nothing, so it is plain Python.
 """
 
+from typing import Any
+
 from boards.modules.error_module import error_word
 from datatable.generated import mb as table
 from datatable.store import LABVIEW, MB_ERR_DIST, SSP
@@ -21,12 +23,12 @@ UNREAD_LIMIT_MS = 1000  # chosen by us: without a computer on the line the next 
 class ErrorRing:
     """Errors waiting for one reader, oldest first: {(board, code): [count, stamp]}; the oldest goes when full."""
 
-    def __init__(self, size) -> None:
+    def __init__(self, size: int) -> None:
         self.size = size
-        self.waiting = {}
+        self.waiting: dict[tuple[int, int], Any] = {}
         self.dropped = 0
 
-    def add(self, board, code, count, stamp) -> None:
+    def add(self, board: int, code: int, count: int, stamp: int) -> None:
         entry = self.waiting.get((board, code))
         if entry is not None:
             entry[0] += count
@@ -37,7 +39,7 @@ class ErrorRing:
             self.dropped += 1
         self.waiting[board, code] = [count, stamp]
 
-    def take(self):
+    def take(self) -> Any:
         """(word, stamp) of the oldest, or None."""
         if not self.waiting:
             return None
@@ -49,7 +51,7 @@ class ErrorRing:
 class ErrorDistribution:
     """`distribute()` is the task. `totals`: {(board number, code): count} of everything that came through."""
 
-    def __init__(self, store, errors, inverted) -> None:
+    def __init__(self, store: Any, errors: Any, inverted: Any) -> None:
         self.store = store
         self.errors = errors  # this board's own error module
         self.inverted = inverted
@@ -57,9 +59,9 @@ class ErrorDistribution:
         self.computer = ErrorRing(COMPUTER_RING)
         self.display = ErrorRing(DISPLAY_RING)
         self.computer_time_ms = None  # network time at which ERROR_LABVIEW was last renewed
-        self.totals = {}
+        self.totals: dict[Any, int] = {}
 
-    def distribute(self):
+    def distribute(self) -> int:
         """Own error into ERROR_MB, new frames into the rings, one error to each reader; returns frames read."""
         store = self.store
         if self.errors.take():

@@ -33,7 +33,7 @@ def one_clear_line(done, *words):
         (["walk", "--steps", "many"], ["--steps", "many", "whole number"]),
         (["walk", "--time", "0s"], ["--time", "above 0"]),
         (["walk", "--distance", "3 parsec"], ["--distance", "parsec", "km"]),
-        (["walk", "--floor-roughness", "-1mm"], ["floor_roughness_m", "-0.001"]),
+        (["walk", "--floor-roughness=-1mm"], ["floor_roughness_m", "-0.001"]),
         (["walk", "--slope", "nan"], ["slope_rad", "nan"]),
         (["walk", "--seed", "x"], ["--seed", "x"]),
         (["walk", "--model", "no-such-model.toml"], ["no-such-model.toml", "No such file"]),
@@ -43,7 +43,6 @@ def one_clear_line(done, *words):
         (["bench", "--runs", "0"], ["--runs", "0"]),
         (["table", "show", "NO_SUCH_VARIABLE"], ["NO_SUCH_VARIABLE"]),
         (["table", "list", "--board", "MOTHER"], ["MOTHER"]),
-        (["table", "list", "--master", "/no-such-folder"], ["/no-such-folder"]),
         (["dance"], ["dance", "walk"]),
         ([], ["COMMAND"]),
     ],
@@ -111,6 +110,12 @@ def test_a_bad_master_table_tells_every_fault_and_leaves_with_2(command, tmp_pat
     done = command("table", "list", "--master", tmp_path)
     assert done.returncode == 2
     assert "variables.csv" in done.stderr and "Traceback" not in done.stderr
+
+
+def test_a_master_folder_that_is_not_there_leaves_with_2(command):
+    done = command("table", "list", "--master", "/no-such-folder")
+    assert done.returncode == 2
+    assert "/no-such-folder/variables.csv" in done.stderr and "Traceback" not in done.stderr
 
 
 def test_a_reader_that_leaves_is_no_error():

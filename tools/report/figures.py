@@ -1,6 +1,7 @@
 """The plots of the report, each from what the robot recorded."""
 
 import dataclasses
+from typing import Any
 
 import numpy as np
 import plotly.graph_objects as go
@@ -31,13 +32,13 @@ class Figure:
     note: str = ""
 
 
-def thin(*arrays):
+def thin(*arrays: Any) -> Any:
     """Every n-th point, so that no line has more than MOST_POINTS."""
     step = max(1, len(arrays[0]) // MOST_POINTS)
     return [np.asarray(a)[::step] for a in arrays]
 
 
-def finished(figure, title, note="", height=420, **layout) -> Figure:
+def finished(figure: Any, title: str, note: str = "", height: int = 420, **layout: Any) -> Figure:
     """Common look, rendered without a copy of the library."""
     figure.update_layout(
         template="plotly_white",
@@ -54,7 +55,7 @@ def finished(figure, title, note="", height=420, **layout) -> Figure:
     )
 
 
-def phase_portraits(walk) -> Figure:
+def phase_portraits(walk: Any) -> Figure:
     """Angle against rate of both legs and the hip, as the body truly moved."""
     s = walk.samples
     figure = make_subplots(cols=3, subplot_titles=("outer leg", "inner leg", "hip (inner relative to outer)"))
@@ -78,7 +79,7 @@ def phase_portraits(walk) -> Figure:
     )
 
 
-def states_as_bands(figure, time_s, states, names, row):
+def states_as_bands(figure: Any, time_s: Any, states: Any, names: Any, row: int) -> None:
     """Colour the background of one subplot by a state machine's state."""
     if len(time_s) == 0:
         return
@@ -110,7 +111,7 @@ def states_as_bands(figure, time_s, states, names, row):
             )
 
 
-def joint_angles(walk, seconds=2.6) -> Figure:
+def joint_angles(walk: Any, seconds: float = 2.6) -> Figure:
     """Hip and ankle angles over the last steps, with the states of their machines behind them."""
     s = walk.samples
     keep = s["time_s"] >= s["time_s"][-1] - seconds
@@ -155,7 +156,7 @@ def joint_angles(walk, seconds=2.6) -> Figure:
     )
 
 
-def currents_and_power(walk, seconds=2.6) -> Figure:
+def currents_and_power(walk: Any, seconds: float = 2.6) -> Figure:
     """Motor currents, and the power each motor draws from the battery."""
     s = walk.samples
     keep = s["time_s"] >= s["time_s"][-1] - seconds
@@ -183,7 +184,7 @@ def currents_and_power(walk, seconds=2.6) -> Figure:
     return finished(figure, "Currents and power", height=720)
 
 
-def bus_load(walk) -> Figure:
+def bus_load(walk: Any) -> Figure:
     """Share of the time each bus was busy, in windows of 10 ms."""
     figure = go.Figure()
     for name, (time, load) in walk.bus_load.items():
@@ -199,7 +200,7 @@ def bus_load(walk) -> Figure:
     )
 
 
-def slot_times(walk) -> Figure:
+def slot_times(walk: Any) -> Figure:
     """How long the slots of each board took, against their length."""
     boards = list(walk.slot_histograms)
     percent = walk.slot_histograms[boards[0]][0]
@@ -229,7 +230,7 @@ def slot_times(walk) -> Figure:
     )
 
 
-def steps(walk) -> Figure:
+def steps(walk: Any) -> Figure:
     """Length and time of every step."""
     figure = make_subplots(rows=2, shared_xaxes=True, vertical_spacing=0.08)
     number, length, time, outer = walk.steps
@@ -256,7 +257,7 @@ def steps(walk) -> Figure:
     return finished(figure, "Steps", height=420)
 
 
-def path(walk) -> Figure:
+def path(walk: Any) -> Figure:
     """The walk seen from above."""
     figure = go.Figure()
     s = walk.samples

@@ -3,6 +3,7 @@
 import json
 import pathlib
 import shlex
+from typing import Any
 
 import jinja2
 import numpy as np
@@ -28,7 +29,7 @@ ROBOT = {
 }
 
 
-def render(robot, summary: dict) -> str:
+def render(robot: Any, summary: dict) -> str:
     """The page as text. `robot`: a `harness.ranger.Ranger` that kept a log; `summary`: its summary."""
     walk = robot.recorded()
     environment = jinja2.Environment(
@@ -88,7 +89,7 @@ def tiles(summary: dict) -> list[dict]:
     return [{"name": name, "value": value, "real": real} for name, value, real in rows]
 
 
-def animation(robot, walk) -> dict:
+def animation(robot: Any, walk: Any) -> dict:
     """Arrays for walker.js, thinned to ANIMATION_HZ over the last ANIMATION_S seconds."""
     s = walk.samples
     time = s["time_s"]
