@@ -349,12 +349,7 @@ class CanRouterBoard(Microcontroller):
             self.flush_next += 1
             if self.flush_next == 4:
                 self.flush_next = 0
-            if (
-                at >= self.horizon
-                or at >= self.alarm_time
-                or at >= self.tick_time
-                or at >= self.inbox.head_time
-            ):
+            if at >= self.horizon or at >= self.alarm_time or at >= self.tick_time or at >= self.inbox.head_time:
                 return at
             if not (self.router.has_work() or self.can_flush()):
                 self.idle = True

@@ -93,9 +93,7 @@ class UserInterfaceBoard(Microcontroller):
         self.imu_command = start_command(header)
         self.imu_start_slots = IMU_START_SLOTS
         self.slots = 0
-        self.vic.attach(
-            UART_BYTE, IMU_UART, self.on_uart, UART_CYCLES, UART_BYTE_CYCLES, slot=UART_SLOT, name="uart1"
-        )
+        self.vic.attach(UART_BYTE, IMU_UART, self.on_uart, UART_CYCLES, UART_BYTE_CYCLES, slot=UART_SLOT, name="uart1")
         # radio control: one interrupt of the timer for its four captures
         self.timer0 = TimerCapture(self, 0, period=600_000, phase_ns=phase_ns)
         self.rc = RcReceiver(self.report)
@@ -196,9 +194,7 @@ class UserInterfaceBoard(Microcontroller):
         channel: cython.longlong
         for channel in range(4):
             if flags & (16 << channel):
-                self.rc.capture(
-                    channel, self.gpio.level(self.timer0.pins[channel]), self.timer0.CR(channel)
-                )
+                self.rc.capture(channel, self.gpio.level(self.timer0.pins[channel]), self.timer0.CR(channel))
         self.timer0.clear(flags & 240)
         return None
 

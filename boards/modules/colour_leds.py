@@ -33,9 +33,7 @@ class ColourLeds:
         self.write(0, 0x0A, 1)
         self.write(1, 0x0A, 1)
 
-    def write(
-        self, device: cython.longlong, register: cython.longlong, value: cython.longlong
-    ) -> cython.void:
+    def write(self, device: cython.longlong, register: cython.longlong, value: cython.longlong) -> cython.void:
         """One transfer: `register` of one device gets `value`, the other device a no-operation."""
         self.writes += 1
         if 0 <= register <= 8:
@@ -43,9 +41,7 @@ class ColourLeds:
         elif register == 0x10:
             self.configuration[device] = value & 0xFF
 
-    def set_colour(
-        self, led: cython.longlong, colour: cython.longlong, level: cython.longlong
-    ) -> cython.longlong:
+    def set_colour(self, led: cython.longlong, colour: cython.longlong, level: cython.longlong) -> cython.longlong:
         """Brightness 0-255 of one colour of light 0-5; returns the number of transfers, 1."""
         value: cython.longlong = level
         if level < 3:

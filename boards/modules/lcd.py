@@ -72,9 +72,7 @@ class CharacterDisplay:
             return (" " * 8, " " * 8)
         shown = []
         for start in (0x00, 0x40):
-            shown.append(
-                "".join(chr(b) if 0x20 <= b < 0x7F else " " for b in self.memory[start : start + 8])
-            )
+            shown.append("".join(chr(b) if 0x20 <= b < 0x7F else " " for b in self.memory[start : start + 8]))
         return tuple(shown)
 
 

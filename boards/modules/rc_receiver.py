@@ -30,9 +30,7 @@ class RcReceiver:
         self.code_channel = errors.RCX_BAD_CHAN
         self.bad_levels = 0
 
-    def capture(
-        self, channel: cython.longlong, level: cython.longlong, ticks: cython.longlong
-    ) -> cython.longlong:
+    def capture(self, channel: cython.longlong, level: cython.longlong, ticks: cython.longlong) -> cython.longlong:
         """An edge of `channel` 0-3 at timer count `ticks`; `level` is the pin after it. Returns 1.
 
         The first pulse of a channel sets the filter (a start at 0 would take some 60 pulses to arrive;

@@ -61,9 +61,7 @@ class Router:
     and its reader takes before advancing, so a frame is read only when the next one has come.
     """
 
-    def __init__(
-        self, table: RoutingTable, ssp: RouterSspLink, load: CanLoad, report, one_frame_lag=False
-    ) -> None:
+    def __init__(self, table: RoutingTable, ssp: RouterSspLink, load: CanLoad, report, one_frame_lag=False) -> None:
         self.table = table
         self.ssp = ssp
         self.load = load
@@ -128,9 +126,7 @@ class Router:
         self.rx_write = following
         return True
 
-    def send(
-        self, identifier: cython.longlong, word0: cython.longlong, word1: cython.longlong
-    ) -> cython.bint:
+    def send(self, identifier: cython.longlong, word0: cython.longlong, word1: cython.longlong) -> cython.bint:
         """A frame of the router itself into its own ring (7 fit); False when it is lost."""
         following: cython.longlong = (self.own_write + 1) & 7
         if following == self.own_read:
@@ -145,9 +141,7 @@ class Router:
 
     def has_work(self) -> cython.bint:
         """True while a frame waits at any of the three sources."""
-        return (
-            self.rx_read != self.rx_write or self.own_read != self.own_write or self.ssp.has_segments()
-        )
+        return self.rx_read != self.rx_write or self.own_read != self.own_write or self.ssp.has_segments()
 
     def route_step(self, now: cython.longlong) -> cython.longlong:
         """At most one frame from each of SSP, the CAN ring and the own ring; return frames moved."""
@@ -172,9 +166,7 @@ class Router:
         read = self.own_read
         if read != self.own_write:
             self.own_read = (read + 1) & 7
-            self.route(
-                5, self.own_id[read], self.own_flags[read], self.own_word0[read], self.own_word1[read], now
-            )
+            self.route(5, self.own_id[read], self.own_flags[read], self.own_word0[read], self.own_word1[read], now)
             moved += 1
         return moved
 

@@ -53,9 +53,7 @@ def empty_segment() -> SspSegment:
     return segment
 
 
-def corrupted_copy(
-    segment: SspSegment, index: cython.longlong, flipped_bits: cython.longlong
-) -> SspSegment:
+def corrupted_copy(segment: SspSegment, index: cython.longlong, flipped_bits: cython.longlong) -> SspSegment:
     """A copy of `segment` with bits of half-word `index` (0-30) flipped: a disturbance on the wires."""
     copy: SspSegment = SspSegment()
     i: cython.longlong
@@ -198,9 +196,7 @@ class MainBrainSspLink:
         self.frames_received += n
         return segments
 
-    def send(
-        self, identifier: cython.longlong, word0: cython.longlong, word1: cython.longlong
-    ) -> cython.bint:
+    def send(self, identifier: cython.longlong, word0: cython.longlong, word1: cython.longlong) -> cython.bint:
         """Pack one frame; False (and MB_SSP_TX_FULL) when all 16 segments are queued.
 
         Call `flush` after the last frame of a slot.

@@ -14,6 +14,7 @@ import cython
 from firmware_sim.microcontroller import Peripheral
 from firmware_sim.vic import ADC_DONE
 from foundation.user_error import UserError
+
 # A C variable when compiled (.pxd): Cython makes a Python object of every literal above 31 bits.
 _DONE = 1 << 31
 

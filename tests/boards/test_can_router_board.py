@@ -319,11 +319,7 @@ def test_the_heartbeat_flashes_every_512_milliseconds():
 
 
 def error_frames(wires):
-    return [
-        (w0 & 0xFFFF, w0 >> 16 & 63, w0 >> 22)
-        for i, w0, _ in wires.heard
-        if i == table.ERROR_VARIABLE
-    ]
+    return [(w0 & 0xFFFF, w0 >> 16 & 63, w0 >> 22) for i, w0, _ in wires.heard if i == table.ERROR_VARIABLE]
 
 
 def break_checksums(wires, times):

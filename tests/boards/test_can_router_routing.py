@@ -51,9 +51,7 @@ def test_an_identifier_that_no_table_names_goes_to_the_main_brain():
     assert to_main_brain(router) == [1999]
 
 
-@pytest.mark.parametrize(
-    ("identifier", "channel"), [(16, 1), (36, 3), (64, 4), (113 + 2, 4), (134, 2), (173, 2)]
-)
+@pytest.mark.parametrize(("identifier", "channel"), [(16, 1), (36, 3), (64, 4), (113 + 2, 4), (134, 2), (173, 2)])
 def test_a_command_from_the_main_brain_goes_to_the_bus_of_its_board(identifier, channel):
     router, _ = build()
     assert routes.DESTINATIONS[identifier] == 1 << channel

@@ -86,9 +86,7 @@ class Wires:
 
     def of(self, identifier, bus=None):
         """What was sent of `identifier`: (time, word0, word1)."""
-        return [
-            (s[0], s[4], s[5]) for s in self.sent if s[2] == identifier and (bus is None or s[1] == bus)
-        ]
+        return [(s[0], s[4], s[5]) for s in self.sent if s[2] == identifier and (bus is None or s[1] == bus)]
 
 
 def quiet_brain():

@@ -1,0 +1,276 @@
+"""What is built, what is shipped, and what happens where there is no compiler."""
+
+import json
+import os
+import pathlib
+import re
+import shutil
+import subprocess
+import sys
+import sysconfig
+import tomllib
+
+import pytest
+
+import foundation
+from harness import build
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+BUILT = (".so", ".pyd")
+COMPILER = (os.environ.get("CC") or sysconfig.get_config_var("CC") or "cc").split()[0]
+needs_compiler = pytest.mark.skipif(shutil.which(COMPILER) is None, reason="no C compiler here")
+WHERE_FROM = (
+    "import importlib, json, sys\n"
+    "print(json.dumps({name: importlib.import_module(name).__file__ for name in sys.argv[1:]}))"
+)
+
+
+def declared_modules():
+    """Names of the modules that have a .pxd, of every package."""
+    for package in foundation.OUR_PACKAGES:
+        for path in sorted((ROOT / package).rglob("*.pxd")):
+            yield ".".join(path.relative_to(ROOT).with_suffix("").parts)
+
+
+def run(arguments, cwd, **environment):
+    """A child process of this Python in a folder, with a clean environment but for what is given."""
+    kept = {name: value for name, value in os.environ.items() if name in ("PATH", "HOME", "LANG", "TMPDIR")}
+    return subprocess.run(
+        [sys.executable, *map(str, arguments)],
+        cwd=cwd,
+        env={**kept, **environment},
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=500,
+    )
+
+
+def files_of(names, folder, **environment):
+    """{module: file it was loaded from}, imported in a process that stands in `folder`."""
+    done = run(["-c", WHERE_FROM, *names], folder, **environment)
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
+# --- this tree --------------------------------------------------------------------------------------------
+
+
+def test_every_declared_module_is_compiled_where_a_compiler_is():
+    compiled, interpreted = build.compiled_modules()
+    assert sorted(compiled + interpreted) == sorted(declared_modules())
+    if foundation.interpreted_is_forced():
+        assert not compiled
+    elif shutil.which(COMPILER):
+        assert not interpreted, f"run `make setup`; {build.why_interpreted()}"
+    else:
+        assert "C compiler" in build.why_interpreted()
+
+
+def test_interpreted_is_forced_for_every_package_by_plain_imports(tmp_path):
+    """In the tree where built modules lie beside the sources, and from elsewhere through the installation."""
+    names = list(declared_modules())
+    files = files_of(names, ROOT, RANGER_SIM_INTERPRETED="1")
+    assert [file for file in files.values() if not file.endswith(".py")] == []
+    files = files_of(names, tmp_path, RANGER_SIM_INTERPRETED="1", PYTHONPATH=str(ROOT))
+    assert [file for file in files.values() if not file.endswith(".py")] == []
+
+
+def test_interpreted_is_forced_under_pytest(tmp_path):
+    test = tmp_path / "test_inside.py"
+    names = list(declared_modules())
+    test.write_text(
+        "import importlib, pytest\n"
+        f"@pytest.mark.parametrize('name', {names!r})\n"
+        "def test_source(name):\n"
+        "    assert importlib.import_module(name).__file__.endswith('.py')\n",
+        encoding="utf-8",
+    )
+    done = run(
+        ["-m", "pytest", "-q", "-p", "no:cacheprovider", "--rootdir", tmp_path, test],
+        ROOT,
+        RANGER_SIM_INTERPRETED="1",
+    )
+    assert done.returncode == 0, done.stdout
+    assert f"{len(names)} passed" in done.stdout
+
+
+# --- what is shipped --------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def shipped(tmp_path_factory):
+    """The folder of packages that a wheel holds, with this tree's built modules."""
+    folder = tmp_path_factory.mktemp("shipped")
+    done = run(["setup.py", "-q", "build_py", "--build-lib", folder], ROOT)
+    assert done.returncode == 0, done.stderr
+    for name in declared_modules():
+        place = pathlib.Path(*name.split("."))
+        for built in (ROOT / place.parent).glob(f"{place.name}.*"):
+            if built.suffix in BUILT:
+                shutil.copy(built, folder / place.parent)
+    record = ROOT / "foundation" / "build_record.json"
+    if record.exists():
+        shutil.copy(record, folder / "foundation")
+    return folder
+
+
+def test_every_file_of_the_packages_is_shipped_and_nothing_else(shipped):
+    def kept(root):
+        return {
+            path.relative_to(root).as_posix()
+            for package in foundation.OUR_PACKAGES
+            for path in (root / package).rglob("*")
+            if path.is_file() and "__pycache__" not in path.parts and path.suffix not in BUILT
+        }
+
+    in_tree = {
+        name for name in kept(ROOT) if not name.endswith(".c") or name.startswith("datatable/generated/")
+    }  # earlier builds left C files beside the sources
+    assert kept(shipped) == in_tree
+    assert {path.name for path in shipped.iterdir()} == set(foundation.OUR_PACKAGES)
+
+
+def test_the_shipped_robot_walks_from_another_folder_both_ways(shipped, tmp_path):
+    digests = set()
+    for interpreted in ("", "1"):
+        setting = {"PYTHONPATH": str(shipped), "RANGER_SIM_INTERPRETED": interpreted}
+        files = files_of(list(declared_modules()), tmp_path, **setting)
+        assert all(file.startswith(str(shipped)) for file in files.values())
+        if interpreted:
+            assert all(file.endswith(".py") for file in files.values())
+        out = tmp_path / f"out{interpreted}"
+        done = run(["-m", "tools.cli", "walk", "--time", "200ms", "--out", out, "--json", "-"], tmp_path, **setting)
+        assert done.returncode == 0, done.stderr
+        digests.add(json.loads(done.stdout)["trace_digest"])
+        assert (out / "report.html").stat().st_size > 100_000
+        done = run(["-m", "tools.cli", "table", "generate", "--check"], tmp_path, **setting)
+        assert done.returncode == 0, done.stderr
+    assert len(digests) == 1
+
+
+# --- the build itself, on a small house -------------------------------------------------------------------
+
+
+@pytest.fixture
+def small_house(tmp_path):
+    """setup.py and the package `foundation` alone, not built."""
+    for name in ("setup.py", "pyproject.toml", "README.md", "LICENSE"):
+        shutil.copy(ROOT / name, tmp_path)
+    shutil.copytree(
+        ROOT / "foundation",
+        tmp_path / "foundation",
+        ignore=shutil.ignore_patterns("*.so", "*.pyd", "*.c", "__pycache__", "build_record.json"),
+    )
+    return tmp_path
+
+
+def build_in(folder, **environment):
+    done = run(["setup.py", "-q", "build_ext", "--inplace"], folder, **environment)
+    assert done.returncode == 0, done.stderr
+    return done
+
+
+def how_it_runs(folder):
+    """(files of the compiled modules, the reason for running interpreted)."""
+    names = ["foundation.events", "foundation.numbers", "foundation.random_stream"]
+    done = run(["-c", "import foundation; print(foundation.RUNS_INTERPRETED_BECAUSE)"], folder)
+    assert done.returncode == 0, done.stderr
+    return list(files_of(names, folder).values()), done.stdout.strip()
+
+
+@needs_compiler
+def test_a_build_compiles_rebuilds_only_what_changed_and_survives_a_broken_declaration(small_house):
+    build_in(small_house)
+    files, reason = how_it_runs(small_house)
+    assert all(file.endswith(BUILT) for file in files) and reason == ""
+    assert not list((small_house / "foundation").glob("*.c"))
+
+    # "touched": one second ahead of what was built, so that no clock resolution matters
+    built = {file: pathlib.Path(file).stat().st_mtime_ns for file in files}
+    source = small_house / "foundation" / "numbers.py"
+    ahead = max(built.values()) + 1_000_000_000
+    os.utime(source, ns=(ahead, ahead))
+    told = build_in(small_house).stdout
+    assert re.findall(r"Cythonizing (\S+)", told) == ["foundation/numbers.py"]
+
+    # a declaration that does not translate: loud, and nothing compiled is mixed with what is not
+    declaration = small_house / "foundation" / "numbers.pxd"
+    declaration.write_text(declaration.read_text(encoding="utf-8") + "cdef class (\n", encoding="utf-8")
+    ahead += 1_000_000_000
+    os.utime(declaration, ns=(ahead, ahead))
+    told = build_in(small_house).stderr
+    assert "NOT COMPILED" in told and "numbers" in told
+    files, reason = how_it_runs(small_house)
+    assert all(file.endswith(".py") for file in files)
+    assert "could not translate" in reason
+
+
+def test_without_a_compiler_the_sources_run_and_the_reason_is_told(small_house):
+    told = build_in(small_house, CC="/bin/false").stderr
+    assert "NOT COMPILED" in told and "/bin/false" in told
+    files, reason = how_it_runs(small_house)
+    assert all(file.endswith(".py") for file in files)
+    assert "C compiler '/bin/false'" in reason
+
+
+def test_a_build_can_be_told_not_to_compile(small_house):
+    told = build_in(small_house, RANGER_SIM_INTERPRETED="1").stderr
+    assert "NOT COMPILED: RANGER_SIM_INTERPRETED was set" in told
+    assert all(file.endswith(".py") for file in how_it_runs(small_house)[0])
+
+
+# --- the papers -------------------------------------------------------------------------------------------
+
+
+def requirement_name(text):
+    """The normalised name of a requirement such as `python-can>=4.5`."""
+    return re.sub(r"[-_.]+", "-", re.match(r"[A-Za-z0-9._-]+", text).group(0)).lower()
+
+
+def locked():
+    """{name: lines} of requirements.lock."""
+    entries, name = {}, None
+    for line in (ROOT / "requirements.lock").read_text(encoding="utf-8").splitlines():
+        if line and not line.startswith((" ", "#")):
+            name = requirement_name(line)
+        if name:
+            entries.setdefault(name, []).append(line)
+    return entries
+
+
+def test_the_lock_has_every_direct_dependency_with_hashes_and_names_no_index():
+    entries = locked()
+    direct = PROJECT["project"]["dependencies"] + PROJECT["project"]["optional-dependencies"]["dev"]
+    direct += PROJECT["build-system"]["requires"]
+    assert [text for text in direct if requirement_name(text) not in entries] == []
+    assert [name for name, lines in entries.items() if not any("--hash=sha256:" in line for line in lines)] == []
+    text = (ROOT / "requirements.lock").read_text(encoding="utf-8")
+    assert "://" not in text and "--index" not in text and "--find-links" not in text
+    for wanted in direct:  # what the lock says it is there for
+        if wanted not in PROJECT["build-system"]["requires"]:
+            assert any("ranger-sim (pyproject.toml)" in line for line in entries[requirement_name(wanted)]), wanted
+
+
+def test_every_dependency_has_its_reason_beside_it():
+    text = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
+    listed = re.findall(r'^  "[A-Za-z][\w.-]*>=[^"]*",(.*)$', text, re.MULTILINE)
+    wanted = PROJECT["project"]["dependencies"] + PROJECT["project"]["optional-dependencies"]["dev"]
+    assert len(listed) == len(wanted) + len(PROJECT["build-system"]["requires"])
+    assert all(re.fullmatch(r"\s+# \w.{10,}", rest) for rest in listed)
+
+
+def test_packages_are_listed_alike_everywhere():
+    source = (ROOT / "setup.py").read_text(encoding="utf-8")
+    in_setup = re.search(r"PACKAGES = \((.*?)\)", source, re.DOTALL).group(1)
+    assert tuple(re.findall(r'"(\w+)"', in_setup)) == foundation.OUR_PACKAGES
+    found = PROJECT["tool"]["setuptools"]["packages"]["find"]["include"]
+    assert tuple(name.removesuffix("*") for name in found) == foundation.OUR_PACKAGES
+    assert tuple(PROJECT["tool"]["mypy"]["packages"]) == foundation.OUR_PACKAGES
+
+
+def test_only_compiled_modules_are_left_out_of_type_checking():
+    left_out = [each for each in PROJECT["tool"]["mypy"]["overrides"] if each.get("ignore_errors")]
+    assert len(left_out) == 1
+    assert left_out[0]["module"] == list(declared_modules())
