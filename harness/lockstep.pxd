@@ -15,10 +15,6 @@ cdef class Wire:
     cdef public long long pin_a, pin_b
     cpdef void deliver(self)
 
-cdef class AnalogWire:
-    cdef public long long source, channel
-    cdef public Microcontroller board
-
 cdef class WordWire:
     cdef public long long source, word
     cdef public Microcontroller board
@@ -32,7 +28,7 @@ cdef class SspWire:
 
 cdef class Lockstep:
     cdef public RangerPlant plant
-    cdef public list boards, buses, encoder_wires, analog_wires, word_wires, motors
+    cdef public list boards, buses, encoder_wires, word_wires, motors
     cdef public Recorder recorder
     cdef public long long time, next_sample, sample_count, stop_steps
     cdef public double stop_distance_m
@@ -44,7 +40,7 @@ cdef class Lockstep:
     cdef public long long imu_index, imu_uart
     cdef public long long swing_leg, strike_seen_ns, strike_count, strikes_unmatched
     cdef public double strike_sum_ms, strike_squares_ms2
-    cdef public long long[::1] main_brain_words, bus_of, node_of, watchdog_pin, enable_pins, enables
+    cdef public long long[::1] due, step_times, main_brain_words, bus_of, node_of, watchdog_pin, enable_pins, enables
     cdef public bint records_words
     cdef public double[::1] sample_row
     cpdef long long run(self, long long until)

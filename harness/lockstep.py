@@ -3,10 +3,11 @@
     plant -> sensors -> pins -> interrupts and slots -> data table -> CAN -> router -> main brain
           -> CAN -> slots -> PWM -> plant
 
-Virtual time advances in quanta of 25 us. That is shorter than the shortest frame on Ranger's buses (36 us),
-so a frame requested within a quantum ends after it: boards that are advanced one after the other never miss
-what another one sends, and the result does not depend on the order in which they are advanced. Within a
-quantum: plant, pins, buses, then the boards with their interrupts and slots, then their outputs.
+Virtual time advances in quanta of 31.25 us, a quarter of the plant's step. That is shorter than the shortest
+frame on Ranger's buses (36 us), so a frame requested within a quantum ends after it: boards that are advanced
+one after the other never miss what another one sends, and the result does not depend on the order in which
+they are advanced. Within a quantum: plant, pins, buses, then the boards with their interrupts and slots, then
+their outputs. A board with nothing to do before the end of the quantum is passed over.
 """
 
 import array
@@ -22,7 +23,7 @@ from plant.incremental_encoder import IncrementalEncoder
 from plant.motor_unit import MotorUnit
 from plant.ranger import RangerPlant
 
-QUANTUM_NS = 25_000
+QUANTUM_NS = 31_250
 SAMPLE_NS = 2_000_000  # the canonical trace samples body and data table at the main brain's rate
 
 # Why `run` returned.
@@ -58,15 +59,6 @@ class Wire:
                 self.pin_b,
                 encoder.edges.levels_b[i],
             )
-
-
-class AnalogWire:
-    """One analog value of the plant on one analog input of a board."""
-
-    def __init__(self, source, board, channel) -> None:
-        self.source = source
-        self.board = board
-        self.channel = channel
 
 
 class WordWire:
@@ -112,13 +104,17 @@ class Lockstep:
         self.next_sample = start_ns
         self.main_brain = None
         self.encoder_wires = []
-        self.analog_wires = []
+        self.step_times = array.array("q", [start_ns, start_ns])  # ns, of the step that the sensors show
         self.word_wires = []
         self.ssp = None
         self.main_brain_words = array.array("q")
         self.records_words = False
         self.sample_row = array.array("d", [0.0]) * 64
         self.sample_count = 0
+        # per board the instant (ns) at which it must run; its inbox lowers it when something comes in earlier
+        self.due = array.array("q", [start_ns]) * len(boards)
+        for place, board in enumerate(boards):
+            board.inbox.wake(self.due, place)
         # routing tables, index board * 4 + controller - 1; -1 where nothing is connected
         self.bus_of = array.array("q", [-1]) * (4 * len(boards))
         self.node_of = array.array("q", [-1]) * (4 * len(boards))
@@ -148,6 +144,10 @@ class Lockstep:
         self.imu_index = index
         self.imu_uart = uart
 
+    def connect_voltage(self, source, board, channel) -> None:
+        """Voltage `source` of the plant on analog input `channel` of `board`."""
+        board.analog.follow(channel, self.step_times, self.plant.analog_start, self.plant.analog_end, source)
+
     def watch_strikes(self, main_brain) -> None:
         """Time from the body's heel strikes to the main-brain slots that notice them."""
         self.main_brain = main_brain
@@ -163,9 +163,14 @@ class Lockstep:
         now: cython.longlong
         then: cython.longlong
         board_count: cython.longlong = len(self.boards)
+        due: cython.longlong[::1] = self.due
+        for i in range(board_count):
+            # between two runs anything may have been done to a board
+            board = self.boards[i]
+            due[i] = min(board.next_time, board.inbox.head_time)
         while self.time < until:
             now = self.time
-            then = now + 25_000
+            then = now + 31_250
             if plant.time_ns <= now:
                 if now >= self.next_sample:
                     self._sample(now)
@@ -182,9 +187,10 @@ class Lockstep:
                 if bus.next_time <= now:
                     bus.advance(now)
             for i in range(board_count):
-                board = self.boards[i]
-                if board.due(then):
-                    board.advance(then)
+                if due[i] < then:
+                    board = self.boards[i]
+                    due[i] = 1 << 62
+                    due[i] = min(board.advance(then), board.inbox.head_time)
                     if board.outbox.count:
                         self._route(i, board)
             if self.estimator is not None and self.estimator.swing_leg != self.swing_leg:
@@ -212,24 +218,17 @@ class Lockstep:
         """What the plant's sensors showed during the step that was just integrated."""
         plant: RangerPlant = self.plant
         wire: Wire
-        analog: AnalogWire
         word: WordWire
         board: Microcontroller
         end: cython.longlong = plant.time_ns
         start: cython.longlong = end - plant.step_ns
+        self.step_times[0] = start
+        self.step_times[1] = end
         for wire in self.encoder_wires:
-            wire.deliver()
+            if wire.encoder.edges.count:
+                wire.deliver()
         if self.imu is not None and self.imu.bytes.count:
             self._deliver_bytes()
-        for analog in self.analog_wires:
-            board = analog.board
-            board.analog.set_pair(
-                analog.channel,
-                start,
-                plant.analog_start[analog.source],
-                end,
-                plant.analog_end[analog.source],
-            )
         for word in self.word_wires:
             board = word.board
             board.words[word.word] = plant.words[word.source]
