@@ -32,11 +32,11 @@ $(VENV)/.installed: requirements.lock
 	@touch $@
 
 # Compiled where a C compiler is found, interpreted otherwise (told, with the reason); only changed modules are rebuilt.
-# Installing it as editable builds as well: it comes second, finds everything built, and can be quiet.
+# Installing it as editable would build everything a second time, in a folder of its own: RANGER_SIM_BUILT=1 stops that.
 $(VENV)/.built: $(VENV)/.installed pyproject.toml setup.py $(SOURCES)
 	@echo "Building (compiled where a C compiler is found; the first time takes some minutes) ..."
 	@$(RUN) setup.py -q build_ext --inplace
-	@test -f $(VENV)/.linked || $(RUN) -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
+	@test -f $(VENV)/.linked || RANGER_SIM_BUILT=1 $(RUN) -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
 	@touch $(VENV)/.linked $@
 
 lock:

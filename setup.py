@@ -5,6 +5,7 @@ modules must not be mixed. When anything fails, this is told, the reason is writ
 and the whole robot runs interpreted (foundation/__init__.py reads the record).
 
 RANGER_SIM_BUILD_JOBS: how many modules are translated and compiled at once (default: one per processor).
+RANGER_SIM_BUILT=1: an editable install does not build again what `make` has just built in place.
 """
 
 import json
@@ -49,6 +50,8 @@ class OptionalBuild(build_ext):
     """Translates and compiles; a failure is told, recorded and survived: the interpreted run needs no compiler."""
 
     def run(self):
+        if self.editable_mode and os.environ.get("RANGER_SIM_BUILT", "") not in ("", "0"):
+            return
         in_place, reason = self.inplace, ""
         jobs = int(os.environ.get("RANGER_SIM_BUILD_JOBS", "0")) or os.cpu_count() or 1
         try:
