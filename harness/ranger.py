@@ -97,7 +97,7 @@ class Ranger:
             )
         for analog in wiring.ANALOG:
             channel = wiring.ANALOG_INPUTS[analog.board][analog.input]
-            loop.analog_wires.append(lockstep.AnalogWire(analog.voltage, boards[analog.board], channel))
+            loop.connect_voltage(analog.voltage, boards[analog.board], channel)
         for word in wiring.WORDS:
             loop.word_wires.append(
                 lockstep.WordWire(word.word, boards[word.board], wiring.WORD_REGISTERS[word.register])
