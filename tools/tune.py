@@ -66,7 +66,7 @@ class Task:
     floors: tuple
 
 
-def register(commands) -> None:
+def register(commands: argparse._SubParsersAction) -> None:
     """Add the subcommand to the command line."""
     command = commands.add_parser(
         "tune",
@@ -190,7 +190,9 @@ def cost_of(summary: dict, steps: int) -> float:
     return cost + LOST_COST * (lost + overruns)
 
 
-def search(judge, values: dict, changes: dict, steps: dict, rounds: int, worth: float):
+def search(
+    judge: Judge, values: dict, changes: dict, steps: dict, rounds: int, worth: float
+) -> tuple[dict, float, int]:
     """The pattern search: (changes, cost, falls). `values`: those of the base; `steps`: name -> first step."""
     rows = controllers.parameter_rows()
     steps = dict(steps)
