@@ -38,7 +38,7 @@ cdef class Lockstep:
     cdef public Microcontroller imu_board, main_brain
     cdef public Estimator estimator
     cdef public long long imu_index, imu_uart
-    cdef public long long swing_leg, strike_seen_ns, strike_count, strikes_unmatched
+    cdef public long long swing_leg, strike_seen_ns, strike_count, strikes_unmatched, strikes_missed, steps_noticed
     cdef public double strike_sum_ms, strike_squares_ms2
     cdef public long long[::1] due, step_times, main_brain_words, bus_of, node_of, watchdog_pin, enable_pins, enables
     cdef public bint records_words
@@ -46,6 +46,7 @@ cdef class Lockstep:
     cpdef long long run(self, long long until)
     cdef void _notice_strike(self)
     cdef void _sense(self)
+    cdef void _show_words(self)
     cdef void _deliver_bytes(self)
     cdef void _collect_frames(self)
     cdef void _route(self, long long index, Microcontroller board)

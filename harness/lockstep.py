@@ -8,6 +8,9 @@ frame on Ranger's buses (36 us), so a frame requested within a quantum ends afte
 one after the other never miss what another one sends, and the result does not depend on the order in which
 they are advanced. Within a quantum: plant, pins, buses, then the boards with their interrupts and slots, then
 their outputs. A board with nothing to do before the end of the quantum is passed over.
+
+ROBOT PARITY: the plant moves in steps of 125 us. What a board writes to its bridge acts from the next step on, so up
+to 125 us late; what sensors show is a straight line over a step (voltages) or stands through it (words).
 """
 
 import array
@@ -134,6 +137,8 @@ class Lockstep:
         self.strike_seen_ns = -1
         self.strike_count = 0
         self.strikes_unmatched = 0
+        self.strikes_missed = 0
+        self.steps_noticed = 0
         self.strike_sum_ms = 0.0
         self.strike_squares_ms2 = 0.0
 
@@ -180,6 +185,7 @@ class Lockstep:
                     return 1
                 if plant.distance_m >= self.stop_distance_m:
                     return 2
+                self._show_words()
                 plant.step()
                 self._sense()
                 self._collect_frames()
@@ -208,6 +214,9 @@ class Lockstep:
         if struck == self.strike_seen_ns:
             self.strikes_unmatched += 1
             return
+        if self.plant.steps > self.steps_noticed + 1:
+            self.strikes_missed += self.plant.steps - self.steps_noticed - 1
+        self.steps_noticed = self.plant.steps
         self.strike_seen_ns = struck
         delay_ms = (self.main_brain.scheduler.slot_time - struck) * 1e-6
         self.strike_count += 1
@@ -218,8 +227,6 @@ class Lockstep:
         """What the plant's sensors showed during the step that was just integrated."""
         plant: RangerPlant = self.plant
         wire: Wire
-        word: WordWire
-        board: Microcontroller
         end: cython.longlong = plant.time_ns
         start: cython.longlong = end - plant.step_ns
         self.step_times[0] = start
@@ -229,6 +236,12 @@ class Lockstep:
                 wire.deliver()
         if self.imu is not None and self.imu.bytes.count:
             self._deliver_bytes()
+
+    def _show_words(self) -> cython.void:
+        """What the absolute encoders hold at the start of the step: their words stand until the next one."""
+        plant: RangerPlant = self.plant
+        word: WordWire
+        board: Microcontroller
         for word in self.word_wires:
             board = word.board
             board.words[word.word] = plant.words[word.source]

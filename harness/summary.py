@@ -4,7 +4,7 @@ import math
 from typing import Any
 
 from datatable.generated import errors as error_table
-from harness import build
+from harness import build, wiring
 
 MASS_KG, GRAVITY = 9.91, 9.81  # total cost of transport: appendix 1, table of the walk
 SKIPPED_STEPS = 5  # the start is left out of means
@@ -47,7 +47,8 @@ def of(robot: Any) -> dict:
         "realtime_factor": robot.realtime_factor(),
         "cpu_factor": robot.time_s / robot.cpu_s if robot.cpu_s > 0.0 else None,
         "compiled": build.is_compiled(),
-        "controller": robot.controller.name,
+        "controller": robot.scenario.controller,
+        "model_file": robot.scenario.model_file,
         "seed": robot.scenario.seed,
         "slope_rad": robot.scenario.slope_rad,
         "floor_roughness_m": robot.scenario.floor_roughness_m,
@@ -86,25 +87,50 @@ def strike_delay(loop: Any) -> dict:
     """From the plant's strike to the start of the main-brain slot that flips the swing flag."""
     n = loop.strike_count
     if n == 0:
-        return {"mean": None, "std": None, "count": 0, "unmatched": loop.strikes_unmatched}
+        return {
+            "mean": None,
+            "std": None,
+            "count": 0,
+            "unmatched": loop.strikes_unmatched,
+            "missed": loop.strikes_missed,
+        }
     mean = loop.strike_sum_ms / n
     return {
         "mean": mean,
         "std": math.sqrt(max(0.0, loop.strike_squares_ms2 / n - mean * mean)),
         "count": n,
         "unmatched": loop.strikes_unmatched,
+        "missed": loop.strikes_missed,
     }
 
 
 def can(robot: Any, bus: Any) -> dict:
-    """Traffic of one bus; loads as fractions 0-1 with stuff bits and intermission."""
+    """Traffic of one bus; loads as fractions 0-1 with stuff bits and intermission.
+
+    lost: frames accepted for sending that a listening node did not get, on the wire or in its receive buffers.
+    queue_full: frames that a full transmit ring of a board or of the router did not accept.
+    """
     now = robot.loop.time
+    lost, queue_full, skipped = bus.lost, 0, bus.single_shot_skipped
+    for wire in wiring.CAN:
+        if f"can{wire.bus}" != bus.name:
+            continue
+        board = robot.boards[wire.board]
+        if wire.board == "CSR":
+            lost += board.controllers[wire.controller - 1].data_overruns
+            lost += board.router.receive_lost_from[wire.controller]
+            queue_full += board.router.transmit_lost[wire.controller]
+            skipped += board.clock.skipped[wire.controller]
+        else:
+            lost += board.can.controller.data_overruns + board.can.receive_lost
+            queue_full += board.can.send_lost
     return {
         "frames": bus.frames,
         "load_mean": bus.load_mean(now),
         "load_max": bus.load_max(),
-        "lost": bus.lost,
-        "single_shot_skipped": bus.single_shot_skipped,
+        "lost": lost,
+        "queue_full": queue_full,
+        "single_shot_skipped": skipped,
         "errors": bus.errors,
     }
 

@@ -108,7 +108,7 @@ def run_scenario(scenario: Scenario, stop: StopRule, options: argparse.Namespace
             print(text)
         else:
             print_summary(summary, console)
-            if folder is not None:
+            if folder is not None and options.log != "none":
                 console.print(f"report: {folder / 'report.html'}", soft_wrap=True)
     if interrupted:
         return 130
@@ -168,15 +168,17 @@ def walk(robot: Ranger, stop: StopRule, console: Console, interrupted: list[bool
 
 
 def write_files(robot: Ranger, summary: dict, folder: pathlib.Path, console: Console) -> None:
-    """Candump logs, variables, summary and report."""
+    """Summary first, then candump logs, variables and report, as far as the log kept something to show."""
     from tools import variables_file
     from tools.report import page
 
+    replace_file(folder / "summary.json", (json.dumps(summary, indent=2) + "\n").encode())
+    if robot.logbook.mode == "none":
+        return
     with console.status("writing logs and report ..."):
         write_frames(robot, folder)
         variables_file.write(robot, folder / "variables.mf4")
         replace_file(folder / "report.html", page.render(robot, summary).encode())
-        replace_file(folder / "summary.json", (json.dumps(summary, indent=2) + "\n").encode())
 
 
 def write_frames(robot: Ranger, folder: pathlib.Path) -> None:

@@ -21,7 +21,7 @@ cdef class Router:
     cdef public long long own_write, own_read
     cdef public long long[::1] receive_full_codes
     cdef public long long routed, copies, receive_lost, own_lost, unroutable
-    cdef public long long[::1] transmit_lost
+    cdef public long long[::1] transmit_lost, receive_lost_from
     cpdef bint receive(self, long long channel, long long identifier, long long flags, long long word0, long long word1)
     cpdef bint send(self, long long identifier, long long word0, long long word1)
     cpdef long long route_step(self, long long now)

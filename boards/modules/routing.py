@@ -93,6 +93,7 @@ class Router:
         self.routed = 0
         self.copies = 0
         self.receive_lost = 0
+        self.receive_lost_from = array.array("q", [0]) * 5  # by channel
         self.own_lost = 0
         self.unroutable = 0
         self.transmit_lost = array.array("q", [0]) * 5
@@ -114,6 +115,7 @@ class Router:
         self.load.count(channel)
         if following == self.rx_read:
             self.receive_lost += 1
+            self.receive_lost_from[channel] += 1
             self.report(self.receive_full_codes[channel])
             return False
         if self.one_frame_lag:

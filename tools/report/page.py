@@ -129,6 +129,8 @@ def command(summary: dict) -> str:
     ]
     if summary["floor_roughness_m"]:
         parts += ["--floor-roughness", f"{summary['floor_roughness_m']:g}m"]
+    if summary["model_file"]:
+        parts += ["--model", summary["model_file"]]
     if summary["slope_rad"]:
         parts += ["--slope", f"{summary['slope_rad']:g}"]
     return shlex.join(parts)
