@@ -417,6 +417,7 @@ class Microcontroller:
         occasional: Occasional
         cycles: cython.longlong
         items: cython.longlong
+        busy: cython.longlong
         while True:
             self.now = self.code_time
             self.extra_cycles = 0
@@ -449,7 +450,8 @@ class Microcontroller:
                     if cycles > task.limit or scheduler.recording:
                         self._charge(task, cycles)
                     else:  # the common case, as `_charge` does it
-                        self.code_time += int(cycles * self.ns_per_cycle)
+                        busy = int(cycles * self.ns_per_cycle)
+                        self.code_time += busy
                         task.calls += 1
                         task.last_cycles = cycles
                         task.total_cycles += cycles

@@ -40,7 +40,7 @@ cdef class Lockstep:
     cdef public long long imu_index, imu_uart
     cdef public long long swing_leg, strike_seen_ns, strike_count, strikes_unmatched, strikes_missed, steps_noticed
     cdef public double strike_sum_ms, strike_squares_ms2
-    cdef public long long[::1] due, step_times, main_brain_words, bus_of, node_of, watchdog_pin, enable_pins, enables
+    cdef public long long[::1] due, bus_due, step_times, main_brain_words, bus_of, node_of, watchdog_pin, enable_pins, enables
     cdef public bint records_words
     cdef public double[::1] sample_row
     cpdef long long run(self, long long until)

@@ -118,6 +118,7 @@ class Lockstep:
         self.due = array.array("q", [start_ns]) * len(boards)
         for place, board in enumerate(boards):
             board.inbox.wake(self.due, place)
+        self.bus_due = array.array("q", [start_ns]) * len(buses)  # the same of each bus
         # routing tables, index board * 4 + controller - 1; -1 where nothing is connected
         self.bus_of = array.array("q", [-1]) * (4 * len(boards))
         self.node_of = array.array("q", [-1]) * (4 * len(boards))
@@ -169,6 +170,11 @@ class Lockstep:
         then: cython.longlong
         board_count: cython.longlong = len(self.boards)
         due: cython.longlong[::1] = self.due
+        bus_due: cython.longlong[::1] = self.bus_due
+        bus_count: cython.longlong = len(self.buses)
+        for i in range(bus_count):
+            bus = self.buses[i]
+            bus_due[i] = bus.next_time
         for i in range(board_count):
             # between two runs anything may have been done to a board
             board = self.boards[i]
@@ -189,9 +195,10 @@ class Lockstep:
                 plant.step()
                 self._sense()
                 self._collect_frames()
-            for bus in self.buses:
-                if bus.next_time <= now:
-                    bus.advance(now)
+            for i in range(bus_count):
+                if bus_due[i] <= now:
+                    bus = self.buses[i]
+                    bus_due[i] = bus.advance(now)
             for i in range(board_count):
                 if due[i] < then:
                     board = self.boards[i]
@@ -316,6 +323,7 @@ class Lockstep:
                 if self.bus_of[place] >= 0:
                     bus = self.buses[self.bus_of[place]]
                     bus.request(self.node_of[place], out.b, out.time, out.c, out.d, out.e, out.f)
+                    self.bus_due[self.bus_of[place]] = bus.next_time
             elif out.kind == 37:  # SSP_START
                 ssp = self.ssp
                 ssp.start(out.time, out.ref)
@@ -327,11 +335,13 @@ class Lockstep:
                 if self.bus_of[place] >= 0:
                     bus = self.buses[self.bus_of[place]]
                     bus.abort(self.node_of[place], out.b, out.time)
+                    self.bus_due[self.bus_of[place]] = bus.next_time
             elif out.kind == 34:  # CAN_MODE
                 place = 4 * index + out.a - 1
                 if self.bus_of[place] >= 0:
                     bus = self.buses[self.bus_of[place]]
                     bus.set_mode(self.node_of[place], out.b, out.time)
+                    self.bus_due[self.bus_of[place]] = bus.next_time
             elif out.kind == 39 and index == self.imu_index and out.a == self.imu_uart:  # UART_OUTPUT
                 self.imu.receive_byte(out.time, out.b)
 

@@ -217,7 +217,8 @@ class IncrementalEncoder:
             x = s * (g0 + s * (b + s * c))
             if self.jitter > 0.0:
                 x += self.stream.normal() * self.jitter * (inverse if inverse > 0.0 else -inverse)
-            time = t0 + int(x * span)
+            time = int(x * span)
+            time += t0
             if time < last:
                 time = last
             if time >= t1:
