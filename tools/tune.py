@@ -212,7 +212,7 @@ def search(
                     changes, cost, falls, improved = candidate, new_cost, new_falls, True
                     break
         # a change that no longer earns its keep is taken back
-        for name in sorted(changes):
+        for name in sorted(set(changes) - set(TOGETHER.values())):
             candidate = with_value(changes, values, name, values[name])
             new_cost, new_falls = judge(candidate)
             if new_cost < cost + worth:

@@ -49,6 +49,19 @@ def test_the_push_triggers_of_both_foot_pairs_move_together():
     assert tune.with_value(changes, BASE, "P_FO_PP_THEIGHT", BASE["P_FO_PP_THEIGHT"]) == {}
 
 
+def test_a_pair_that_gains_nothing_is_taken_back_as_a_pair():
+    tried = []
+
+    def judge(changes):
+        tried.append(set(changes))
+        return 0.0, 0
+
+    begin = {"P_FO_PP_THEIGHT": 0.02, "P_FI_PP_THEIGHT": 0.02}
+    changes, _, _ = tune.search(judge, BASE, begin, {}, rounds=1, worth=0.001)
+    assert changes == {}
+    assert all(len(each) in (0, 2) for each in tried)
+
+
 def test_values_stay_within_the_ranges_of_the_data_table():
     seen = []
 
