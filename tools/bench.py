@@ -12,6 +12,7 @@ import platform
 import statistics
 import subprocess
 import sys
+from collections.abc import Callable
 from typing import Any
 
 from rich.console import Console
@@ -33,16 +34,14 @@ def register(commands: Any) -> None:
     command.set_defaults(run=run)
 
 
-def robot_case(seconds: float, log: str = "none", swap: bool = False, uptime_ms: int = 0) -> dict:
+def robot_case(seconds: float, log: str = "none", swap: bool = False) -> dict:
     """Run the whole robot for so long; CPU seconds of the stepping loop only."""
     from harness.ranger import Ranger
     from harness.scenario import Scenario, StopRule
 
-    robot = Ranger(Scenario(start_uptime_ms=uptime_ms), log=log)
+    robot = Ranger(Scenario(), log=log)
     if swap:
-        law = robot.board("MCH").scheduler.find("mc_compliant_control")
-        original = law.function
-        robot.replace("MCH", law.name, lambda: original(), cost=law.cost, limit=law.limit)
+        robot.replace("MCH", "mc_compliant_control", users_law(robot.board("MCH")), cost=4200, limit=6000)
     robot.run(StopRule(time_s=1.0), 1.0)
     started = wallclock.process_cpu_s()
     robot.run(StopRule(time_s=1.0 + seconds), seconds)
@@ -50,6 +49,20 @@ def robot_case(seconds: float, log: str = "none", swap: bool = False, uptime_ms:
     steps = robot.steps
     robot.close()
     return {"figure": seconds / used, "unit": "simulated s per CPU s", "steps": steps}
+
+
+def users_law(board: Any) -> Callable[[], None]:
+    """What a user might write: the hip's spring-damper law in plain floating-point Python, in place of the firmware's."""
+    law, limits, loop, readings = board.compliance, board.limits, board.current_control, board.readings
+
+    def control() -> None:
+        position = board.controlled_position() / 65536.0
+        velocity = board.controlled_velocity() / 65536.0
+        current = law.command / 65536.0 - law.stiffness / 65536.0 * position - law.dampness / 65536.0 * velocity
+        target = limits.limit_target(int(current * 65536.0), int(velocity * 65536.0))
+        loop.update(target, readings.motor_current_fixed())
+
+    return control
 
 
 def plant_case(seconds: float) -> dict:
