@@ -52,7 +52,7 @@ def robot_case(seconds: float, log: str = "none", swap: bool = False) -> dict:
 
 
 def users_law(board: Any) -> Callable[[], None]:
-    """What a user might write: the hip's spring-damper law in plain floating-point Python, in place of the firmware's."""
+    """What a user might write: the hip's spring-damper law in floating-point Python, for the firmware's own."""
     law, limits, loop, readings = board.compliance, board.limits, board.current_control, board.readings
 
     def control() -> None:
