@@ -7,7 +7,7 @@ cdef long long CENTRE_COUNTS, LIMIT_COUNTS, SENSOR
 cdef class SteeringBoard(MotorBoard):
     cdef public long long zero
     cdef public bint direct, closed_loop, check_limits
-    cdef public long long code_left, code_right, id_steer_angle
+    cdef public long long code_left, code_right, code_stopped, id_steer_angle
     cpdef Schedule schedule(self)
     cpdef void read_sensors_once(self)
     cpdef void set_start_values(self)

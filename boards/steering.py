@@ -63,6 +63,7 @@ class SteeringBoard(MotorBoard):
         self.check_limits = self.quirks.steering_limit_check
         self.code_left = codes.MCSI_LEFT
         self.code_right = codes.MCSI_RIGHT
+        self.code_stopped = codes.MC_NOT_RUNNING
         self.id_steer_angle = table.MCSI_STEER_ANGLE
         self.begin(phase_ns)
 
@@ -138,11 +139,15 @@ class SteeringBoard(MotorBoard):
         self.output.write(duty)
 
     def steering_control(self) -> cython.void:
-        """mc_compliant_control: the loops if they are wanted, otherwise only watchdog and monitors."""
+        """mc_compliant_control: the loops if they are wanted, otherwise only watchdog and monitors.
+
+        Either way a motor that may not run is an error in every slot (facts 4.3), so a board that the main
+        brain has shut down reports MC_NOT_RUNNING 2000 times a second, as on the robot.
+        """
         if self.closed_loop:
             self.compliant_control()
-        else:
-            self.current_control.supervise(self.readings.motor_current_fixed())
+        elif self.current_control.supervise(self.readings.motor_current_fixed()) and not self.output.running():
+            self.errors.report(self.code_stopped)
 
     def check(self) -> cython.void:
         """The limit check of the firmware, which never calls it: +/-200 counts about 4803.

@@ -454,14 +454,15 @@ def test_the_stick_is_centred_at_85000_clipped_and_straight_when_the_radio_is_si
     assert bench.modes.steering.radio_command() == pytest.approx(command, abs=1e-9)
 
 
-def test_within_the_dead_band_the_motor_gets_no_duty(bench):
+def test_within_the_dead_band_the_motor_gets_no_duty_and_by_parameter_is_not_shut_down(bench):
+    bench.set(D_S_SHUT_DOWN=0.0)
     sent = steer_through_a_stride(bench, 85_400.0)  # 0.016
     assert {counts for _, counts in sent} == {0.0}
     assert bench.get("MCSI_SHUTDOWN") == 0
 
 
-def test_by_parameter_the_dead_band_shuts_the_motor_down_as_on_the_robot(bench):
-    bench.set(D_S_SHUT_DOWN=1.0)
+def test_in_the_record_walks_set_the_dead_band_shuts_the_motor_down_as_on_the_robot(bench):
+    assert bench.get("D_S_SHUT_DOWN") == 1.0
     steer_through_a_stride(bench, 85_000.0)
     assert bench.get("MCSI_SHUTDOWN") == 1
     steer_through_a_stride(bench, 97_500.0)

@@ -302,6 +302,17 @@ def test_shutdown_starves_the_watchdog_and_drives_nothing():
     assert bench.board.output.running()
 
 
+@pytest.mark.parametrize("output", ["duty", "duty_then_current", "current"])
+def test_a_steering_board_that_is_shut_down_notes_one_error_in_every_slot(output):
+    bench = Bench("MCSI", Quirks(steering_output=output)).run(ms=3)
+    bench.command("SHUTDOWN", 1)
+    bench.run(ms=2)
+    before = bench.errors()["MC_NOT_RUNNING"]
+    bench.run(slots=20)
+    assert bench.errors()["MC_NOT_RUNNING"] - before == 20
+    assert bench.pwm == (0, 0)
+
+
 def test_sleep_opens_the_bridge_and_feeds_the_watchdog():
     bench = Bench("MCFI").run(ms=5)
     bench.command("COMMAND_CURRENT", 1.0)
