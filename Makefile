@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV   ?= .venv
 STEPS  ?= 100
 RUN    := $(VENV)/bin/python
-SOURCES := $(shell find foundation datatable can_bus plant firmware_sim boards harness sysid tools \( -name '*.py' -o -name '*.pxd' \) -not -name '_*' 2>/dev/null)
+SOURCES := $(shell find foundation datatable can_bus plant firmware_sim boards harness tools \( -name '*.py' -o -name '*.pxd' \) -not -name '_*' 2>/dev/null)
 
 .PHONY: walk test lint setup bench lock clean
 

@@ -26,7 +26,6 @@ PACKAGES = (
     "firmware_sim",
     "boards",
     "harness",
-    "sysid",
     "tools",
 )
 RECORD = "build_record.json"  # in the package foundation

@@ -21,7 +21,6 @@ OUR_PACKAGES = (
     "firmware_sim",
     "boards",
     "harness",
-    "sysid",
     "tools",
 )
 BUILD_RECORD = os.path.join(os.path.dirname(os.path.abspath(__file__)), "build_record.json")

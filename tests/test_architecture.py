@@ -21,8 +21,7 @@ MAY_IMPORT = {
     "firmware_sim": {"foundation", "can_bus"},
     "boards": {"foundation", "firmware_sim", "datatable"},
     "harness": {"foundation", "datatable", "can_bus", "plant", "firmware_sim", "boards"},
-    "sysid": {"foundation", "plant"},
-    "tools": {"foundation", "datatable", "can_bus", "plant", "firmware_sim", "boards", "harness", "sysid"},
+    "tools": {"foundation", "datatable", "can_bus", "plant", "firmware_sim", "boards", "harness"},
 }
 # Libraries that belong to one place of the house.
 ONLY_IN = {

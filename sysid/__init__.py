@@ -1,1 +1,0 @@
-import foundation  # noqa: F401  (first: it chooses compiled or interpreted modules)
