@@ -100,7 +100,7 @@ class Quirks:
 
     # --- router -------------------------------------------------------------------------------------
     router_one_frame_lag: bool = switch(False, True, YES_OR_NO)
-    """Firmware: a received frame is forwarded only when the next one arrives."""
+    """Firmware: a frame stays in the receive ring until another one follows it."""
 
     ssp_frames_may_straddle: bool = switch(False, True, YES_OR_NO)
     """Firmware: with the ring never empty a frame may lie across two segments of the link."""
@@ -113,7 +113,7 @@ class Quirks:
     """Firmware: MB_EXECUTION_TIME is the timer within the last 1 ms tick, so 1.2 ms reads 0.2."""
 
     error_distribution_inverted: bool = switch(False, True, YES_OR_NO)
-    """Firmware: PC error marked new when the ring is empty; the LCD's ring is never emptied."""
+    """Firmware: the PC's error counts as new while nothing waits in its ring; the LCD's ring is never emptied."""
 
     heel_strike: str = switch("baseline", "filtered_sum", ("baseline", "filtered_sum"))
     """Appendix 4.3: voltage above its swing baseline for 2 ms. Firmware: two filtered sensors above 850."""
@@ -128,7 +128,7 @@ class Quirks:
     """Appendix: 10 % per step. May 2011 estimator: the first step resets the whole error."""
 
     hip_mid_rate_of_previous_step: bool = switch(True, True, YES_OR_NO)
-    """May 2011 leg machine: the mid-stance hip rate uses the angle of that leg's previous step."""
+    """May 2011 leg machine: the mid-stance hip rate is worked out with the angle one stride old."""
 
     push_correction_after_strike: bool = switch(False, False, YES_OR_NO)
     """An option found in a neighbouring version of the record controller: push gain after the strike only."""

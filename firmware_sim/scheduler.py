@@ -2,8 +2,8 @@
 
 A timer tick starts a slot and steps to the next row of the table. A slot runs the every-slot tasks, the
 row's own tasks and the closing tasks, one after another, each to its end. A tick that finds the row
-unfinished is an overrun: the task in progress finishes, the rest of its row is dropped, the new row
-starts at once. Nothing runs before the first tick.
+unfinished is an overrun: the task that was running is completed, what remained of its row is skipped,
+and the new row follows immediately. Before the first tick the processor has nothing to do.
 
 Cost and limit are two things: a task spends `cost + per_item * items` modelled cycles, and is held
 against `limit`. The event loop that spends the time is in microcontroller.py; here is the book-keeping.

@@ -18,7 +18,7 @@ from plant.parameters import BodyParameters
 RTOL = 2.3e-14  # about 100 roundings, the least scipy accepts
 ATOL = 1e-15
 
-# Table 1 of the appendix; J_l = 0.25 is per leg, so the wheel's inertia is 0.5 (facts on the plant, section 2).
+# Table 1 of the appendix; its J_l is one leg's, hence 0.5 for the wheel (facts on the plant, section 2).
 WHEEL = pm.PaperParameters(
     el=1.0, r=0.0, d=0.0, c=0.0, kh=0.0, ks=0.0, Jl=0.25, m=0.0, M=1.0, g=1.0, gamma=0.2, C1=0.0, C2=0.0, JH=0.0
 )

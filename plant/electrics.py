@@ -5,7 +5,7 @@ then the body moves, then `sense` with what the feet and the steering show at it
 `analog_start` and `analog_end` (V, by plant/wiring_points.py), to be read as straight lines over the step.
 
 Sensor constants are those with which each board's firmware turns counts back (facts network-and-boards 5), so a
-nominal sensor is inverted exactly: motor current A = -g (raw - off), battery current A = g (raw - off), both by
+nominal sensor is inverted exactly: -g (raw - off) is the motor's current in A, g (raw - off) the battery's, both by
 the 14-bit converter with 2.5 V reference and the board's gain; battery voltage V = g x raw of the 10-bit one
 with 3.3 V.
 

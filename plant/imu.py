@@ -2,7 +2,7 @@
 
 It is silent until the command C4 C1 29 xx arrives, acknowledges it and then sends packet xx for ever (00 stops
 it). Both packets known here have 31 bytes: header, six big-endian singles, a four-byte timer in ticks of
-1/62 500 s, and the 16-bit sum of the first 29 bytes.
+1/62 500 s, and the 16-bit sum of all 29 before it.
 
 - CF: roll, pitch, yaw (rad), rates about x, y, z (rad/s), at the rate of its sensor fusion (200-250 Hz, appendix
   3.8; one packet per `fusion_divider` samples).

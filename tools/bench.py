@@ -30,6 +30,9 @@ def register(commands: Any) -> None:
     command.add_argument("--runs", type=whole_number(1), default=3, help="runs of each case (default 3)")
     command.add_argument("--seconds", type=whole_number(1), default=20, help="virtual seconds per compiled run")
     command.add_argument("--json", metavar="FILE|-", help="figures as JSON; - prints them and nothing else")
+    command.add_argument(
+        "--walks", action="store_true", help="instead: how far and how the parameter sets walk, over seeds and floors"
+    )
     command.add_argument("--case", choices=sorted(CASES), help=argparse.SUPPRESS)
     command.set_defaults(run=run)
 
@@ -127,6 +130,62 @@ def measured(case: str, seconds: float, interpreted: bool) -> dict:
     return json.loads(done.stdout)
 
 
+# What `--walks` walks: parameter set, seeds, steps, roughness in m.
+WALKS = (
+    ("robust", range(1, 4), 1000, 0.0),
+    ("robust", range(1, 4), 200, 0.001),
+    ("record-2011", range(1, 21), 1000, 0.0),
+)
+KEPT = (
+    "controller",
+    "seed",
+    "floor_roughness_m",
+    "steps",
+    "fell",
+    "fall_cause",
+    "mean_step_length_m",
+    "std_step_length_m",
+    "mean_step_time_s",
+    "motor_power_W",
+    "tcot",
+    "heel_strike_delay_ms",
+    "trace_digest",
+)
+
+
+def walks(options: argparse.Namespace) -> int:
+    """Walk every case of WALKS; a line each, and everything as JSON."""
+    from harness.ranger import Ranger
+    from harness.scenario import Scenario, StopRule
+
+    console = Console(stderr=True, quiet=options.json == "-")
+    rows = []
+    for controller, seeds, steps, roughness in WALKS:
+        for seed in seeds:
+            robot = Ranger(Scenario(controller=controller, seed=seed, floor_roughness_m=roughness))
+            while not robot.run(StopRule(steps=steps), 10.0):
+                pass
+            summary = robot.summary()
+            robot.close()
+            row = {key: summary[key] for key in KEPT}
+            row["lost"] = sum(bus["lost"] for bus in summary["can"].values())
+            row["overruns"] = sum(board["overruns"] for board in summary["slots"].values())
+            rows.append(row)
+            console.print(
+                f"{controller}, seed {seed}, {1000 * roughness:g} mm: {row['steps']} of {steps} steps"
+                f"{', ' + row['fall_cause'] if row['fell'] else ''}; {row['mean_step_length_m']:.3f} m, "
+                f"{row['mean_step_time_s']:.3f} s, {row['motor_power_W']:.1f} W, "
+                f"lost {row['lost']}, overruns {row['overruns']}",
+                highlight=False,
+            )
+    result = {"date": wallclock.today_iso(), "machine": machine(), "walks": rows}
+    if options.json == "-":
+        print(json.dumps(result, indent=2))
+    elif options.json:
+        replace_file(pathlib.Path(options.json), (json.dumps(result, indent=2) + "\n").encode())
+    return 0
+
+
 def machine() -> dict:
     """What the figures were taken on."""
     model = platform.processor() or platform.machine()
@@ -145,6 +204,8 @@ def machine() -> dict:
 
 def run(options: argparse.Namespace) -> int:
     """Measure every case `--runs` times in turn; print medians and the ratio to the whole robot."""
+    if options.walks:
+        return walks(options)
     if options.case:
         print(json.dumps(CASES[options.case][1](options.seconds)))
         return 0

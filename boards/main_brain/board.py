@@ -149,7 +149,7 @@ class MainBrainBoard(Microcontroller):
         self.heartbeat_bit = bit
 
     def store_execution_time(self) -> cython.void:
-        """Seconds since the slot began, by Timer0; with the firmware's quirk since the last 1 ms tick."""
+        """Seconds since the slot began, by Timer0; with the firmware's quirk since the latest tick of 1 ms."""
         since: cython.longlong = self.scheduler.slot_time
         counts: cython.longlong
         if self.execution_time_folds:

@@ -2,9 +2,9 @@
 
 One tick of a machine (facts control-and-data 1.0): of the transitions declared for the present state,
 the first one whose condition holds is taken; with none, the state's main action runs (after its entry
-action, the first time). Taking a transition runs, in the same tick, the exit action of the old state,
-then entry and main of the new one; an old state that was entered but never ran gets its entry and main
-first. There is one transition per tick at most, and a transition to the present state is no change.
+action, the first time). A transition is complete within its tick: the old state's exit action, then both entry
+and main action of the new state; an old state that was entered but never ran gets its entry and main
+first. A machine takes no second transition in the same tick, and a transition to the present state is no change.
 
 A state may hold machines of its own. They are stepped after its main action, in their written order,
 so a state of an outer machine (walking) contains machines that run concurrently (one per motor).

@@ -1,7 +1,7 @@
 """The piezo buzzer on PWM5 (P0.21): tones, one short tune, and beeps on errors.
 
-Period 60e6 / Hz counts in MR0, half of it in MR5. A non-zero UI_SET_BUZZER_AMPL or UI_EMPTY_TX2 starts the
-tune. The firmware of 2016 then never stops it, and silences the buzzer in every millisecond without a tune,
+Period 60e6 / Hz counts in MR0, half of it in MR5. UI_EMPTY_TX2 or UI_SET_BUZZER_AMPL, when not 0, starts
+the tune. The firmware of 2016 then never stops it, and silences the buzzer in every millisecond without a tune,
 so that a frequency alone is not heard (facts network-and-boards 4.11). Appendix 3.8 has beeps on errors and
 own sounds for the common ones; `beeps` and `repeats` are the switches buzzer_beeps, song_repeats_for_ever.
 """

@@ -3,7 +3,7 @@
 
 Receiving: the interrupt copies the controller's registers into a ring, a slot task delivers what waits.
 Sending: frames are built with the last network time, wait in a ring of 8 and go into the hardware transmit
-buffers 1 and 2 as these fall free, after each queued frame and once per slot.
+buffers 1 and 2 as these fall free: looked after whenever a frame is queued, and in every slot.
 """
 
 import array

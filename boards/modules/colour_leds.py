@@ -68,7 +68,7 @@ class ColourLeds:
         return value
 
     def colour(self, led: cython.longlong) -> cython.longlong:
-        """What light 0-5 shows, as a command word: red byte 0, green byte 1, blue byte 2."""
+        """What light 0-5 shows, as a command word: 8 bits each of red (lowest), green and blue."""
         return self.level(led, 2) | (self.level(led, 1) << 8) | (self.level(led, 0) << 16)
 
 

@@ -1,8 +1,8 @@
-"""The IMU's packets: a receive ring of 128 bytes and a parser that takes at most one packet per call.
+"""The IMU's packets: a receive ring of 128 bytes and a parser that takes one packet or none per call.
 
 Both packets the board can ask for have 31 bytes: a header byte, six big-endian singles, a four-byte timer
 (1/62 500 s per tick in the data sheet of the 3DM-GX3-25; not used here) and a 16-bit big-endian checksum,
-the sum of the first 29 bytes.
+the sum of the 29 bytes before it.
 
 - 0xCF: roll, pitch, yaw (rad), then rates about x, y, z (rad/s). What the 2016 firmware asks for (facts
   network-and-boards 4.10).
@@ -33,7 +33,7 @@ class ImuParser:
     """Bytes in by `push`, one packet out per `update`; values stay until the next good packet.
 
     `report(code)` hears MSIMU_RX_OF when the ring is full. `late_by_one_byte`: the firmware waits for
-    more than 31 bytes, so a packet is read only when the next one has begun.
+    more than 31 bytes, so a packet stays unread until its successor has begun.
     """
 
     def __init__(self, report, header=0xCF, late_by_one_byte=False) -> None:

@@ -28,7 +28,7 @@ class Keypad:
         return self.gpio.level(self.pins[key]) != 0
 
     def buttons(self) -> cython.longlong:
-        """Bit mask of UI_BUTTONS: bit i set while key i is down."""
+        """Bit mask of UI_BUTTONS: a key that is held sets the bit of its number."""
         mask: cython.longlong = 0
         i: cython.longlong
         for i in range(6):

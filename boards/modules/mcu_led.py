@@ -78,7 +78,7 @@ class McuLed:
 
 
 class Heartbeat:
-    """The blue LED flashes 50 ms each time bit 8 of the network time rises: every 512 ms while time runs."""
+    """A flash of 50 ms of the blue LED whenever the network time's bit 8 goes from 0 to 1, so every 512 ms."""
 
     def __init__(self, time: NetworkTime, leds: McuLed) -> None:
         self.time = time

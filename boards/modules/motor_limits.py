@@ -116,7 +116,12 @@ class MotorLimits:
             self.errors.report(self.code_excess_over)
 
     def limit_target(self, target: cython.longlong, velocity: cython.longlong) -> cython.longlong:
-        """The target current the motor may have now, at `velocity` (rad/s x 65536, joint side)."""
+        """The target current the motor may have now, at `velocity` (rad/s x 65536, joint side).
+
+        MC_TCURR_OOB is part of every step: flip-up asks for 1.5 A/rad x (0.2 - 1.85) rad = -2.5 A where an
+        ankle is clipped at -1 A (facts network-and-boards 4.2, control-and-data 1.8), for the 0.1 s that the foot
+        takes to come up. At one note per slot that is 190 per stride and board, on the robot too.
+        """
         low: cython.longlong = self.target_min
         high: cython.longlong = self.target_max
         speed: cython.longlong

@@ -1,6 +1,6 @@
 """The robot's time as this board last heard it: the router's millisecond count, from identifier 0.
 
-It is a board's only clock (no drift correction, no phase lock): when the sync frames stop, it stops
+A board has no other clock and neither corrects its crystal nor shifts its slots: without sync frames it stops
 (facts network-and-boards 1.4).
 """
 

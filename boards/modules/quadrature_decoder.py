@@ -108,8 +108,9 @@ class QuadratureDecoder:
     def update_rate(self):
         """Slot task: rate from the edge times that came since the last slot. Returns how many came.
 
-        A time of the other sign is believed when the next one has that sign too; alone at the end of the
-        ring it waits. Zeros and lone changes of sign are glitches and take the following time with them.
+        A change of direction needs two times in a row to be believed: if the second has not come yet, the
+        first is left for the next slot. A zero or a single time of the other sign is a glitch, and the time
+        that follows it is not used either.
         """
         total: cython.longlong = 0
         valid: cython.longlong = 0
@@ -153,7 +154,7 @@ class QuadratureDecoder:
             here = after
         self.read = here
         if valid == 0:
-            # the longer the silence, the slower it must be: the estimate decays as 1/t
+            # the longer the silence, the slower it must be: the rate falls with the inverse of the silence
             valid = 1
             self.idle += 30000  # cycles per slot
             if self.idle > 0x7FFFFFFF:

@@ -1,7 +1,7 @@
 """Radio-control pulses: high time of four channels in 1/60 us, smoothed by 1/16 per pulse.
 
 A timer that wraps every 10 ms (600 000 ticks of 60 MHz) is captured at both edges; a pulse of 1.5 ms is
-90 000 ticks. Two equal levels in a row at one channel raise RCX_BAD_LVLS and forget the pulse. Source:
+90 000 ticks. A channel that shows the same level at two captures raises RCX_BAD_LVLS and forgets the pulse. Source:
 facts network-and-boards 4.11.
 """
 

@@ -58,7 +58,7 @@ class Router:
     """The rings and the moves. `report(code)` hears errors.
 
     `one_frame_lag` is the firmware's quirk: its receive interrupt advances the write index before storing
-    and its reader takes before advancing, so a frame is read only when the next one has come.
+    and its reader takes before advancing, so a frame waits for its successor.
     """
 
     def __init__(self, table: RoutingTable, ssp: RouterSspLink, load: CanLoad, report, one_frame_lag=False) -> None:
@@ -146,7 +146,7 @@ class Router:
         return self.rx_read != self.rx_write or self.own_read != self.own_write or self.ssp.has_segments()
 
     def route_step(self, now: cython.longlong) -> cython.longlong:
-        """At most one frame from each of SSP, the CAN ring and the own ring; return frames moved."""
+        """Move up to three frames, one each from the link, the CAN ring and the own ring; return how many."""
         moved: cython.longlong = 0
         read: cython.longlong
         if self.ssp.has_segments() and self.ssp.take():

@@ -1,7 +1,7 @@
 """The light that lines up video with the log: a pattern of flashes, started and stopped by key 4.
 
 Key 4 down for 100 slots in all, also with pauses, toggles it. The time is cut into cells of 125 ms, a
-flash lasts 50 ms, and ten patterns follow each other. The light hangs on P0.16, active low, and light 2
+flash lasts 50 ms, and ten patterns follow each other. A low level at P0.16 lights it, and light 2
 shows the same. Source: facts network-and-boards 4.11. The patterns are ours: pattern n is ten cells with
 flashes in the first n + 1, so the run of flashes tells where in the cycle a video frame lies.
 """

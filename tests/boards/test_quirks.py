@@ -39,12 +39,21 @@ def test_every_line_tells_what_the_appendix_says_and_what_the_firmware_does():
 
 
 def test_lines_without_a_switch_tell_why():
-    text = TABLE.read_text().split("## Without a switch")[1]
+    text = TABLE.read_text().split("## Without a switch")[1].split("## Our own departures")[0]
     lines = [line for line in text.splitlines() if line.startswith("|")][2:]
     assert len(lines) >= 10
     for line in lines:
         cells = [cell.strip() for cell in line.strip("|").split("|")]
         assert len(cells) == 4 and all(cells), line
+
+
+def test_our_own_departures_are_told_with_the_reason():
+    text = TABLE.read_text().split("## Our own departures")[1]
+    lines = [line for line in text.splitlines() if line.startswith("|")][2:]
+    assert len(lines) >= 7
+    for line in lines:
+        cells = [cell.strip() for cell in line.strip("|").split("|")]
+        assert len(cells) == 3 and all(cells), line
 
 
 def test_every_switch_sets_the_value_of_2016():

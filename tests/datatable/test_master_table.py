@@ -176,7 +176,7 @@ def test_the_hash_does_not_depend_on_line_endings_but_on_every_character(tmp_pat
         (tmp_path / path.name).write_bytes(path.read_bytes().replace(b"\n", b"\r\n"))
     assert datatable.table_hash(tmp_path) == datatable.table_hash()
     path = tmp_path / "errors.csv"
-    path.write_bytes(path.read_bytes().replace(b"no error", b"no Error"))
+    path.write_bytes(path.read_bytes().replace(b"nothing wrong", b"nothing Wrong"))
     assert datatable.table_hash(tmp_path) != datatable.table_hash()
 
 

@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
+import datatable
 from datatable.generated import all_variables
+from datatable.schedule import scheduled_frames_per_s
 from harness.ranger import Ranger
 from harness.scenario import Scenario, StopRule
 
@@ -53,14 +55,16 @@ def test_traffic_is_that_of_the_robots_tables(hundred_steps):
 
 
 def test_total_load_is_that_of_our_schedules_and_controller(hundred_steps):
-    # Down: per motor board the three commands of the compliant law in every slot of 2 ms while the machines rewrite
-    # them; steering is written once per change. A frame of 8 bytes has 108 bits, 3 of intermission and, with mixed
-    # contents, about 8 stuff bits: 119 (measured bounds are 111 and 135).
+    # Up: what boards.toml says each board sends. Sync: one a millisecond. Down: the machines rewrite command current,
+    # stiffness and dampness of hip and ankles in every slot of the main brain; steering and lights only on change.
+    # A frame of 8 bytes has 108 bits, 3 of intermission and, with mixed contents, about 8 stuff bits (0 ... 24).
+    table = datatable.load()
+    slots_per_s = 1e6 / table.board("MB").slot_us
+    commands = {"can1": 3, "can2": 0, "can3": 3, "can4": 3}
     summary = hundred_steps.summary()
     for bus in BUSES:
-        down = 1500.0 if bus != "can2" else 0.0
-        expected = (SYNC_FRAMES_PER_S + UP_FRAMES_PER_S[bus] + down) * 119 / 3e6
-        assert summary["can"][bus]["load_mean"] == pytest.approx(expected, rel=0.20), bus
+        frames = SYNC_FRAMES_PER_S + scheduled_frames_per_s(table, bus.upper()) + commands[bus] * slots_per_s
+        assert summary["can"][bus]["load_mean"] == pytest.approx(frames * (108 + 3 + 8) / 3e6, rel=0.20), bus
 
 
 def test_the_detection_chain_alone_takes_about_5_ms(walking):

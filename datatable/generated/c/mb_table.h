@@ -459,21 +459,21 @@ struct mb_data {
     uint32_t error_mcsi; /* 7 waiting error of the steering board: code bits 0-15, board 16-21, count 22-31; sent only while one waits */
     uint32_t error_ui; /* 8 waiting error of the user interface board: code bits 0-15, board 16-21, count 22-31; sent only while one waits */
     float mb_status; /* 9 main brain alive flag to all boards */
-    float mch_motor_velocity; /* 10 [rad/s] hip: rate of the motor shaft referred to the joint */
+    float mch_motor_velocity; /* 10 [rad/s] hip: rate of the motor shaft in terms of the joint (divided by the gear) */
     float mch_motor_current; /* 11 [A] hip: motor current as measured */
-    float mch_motor_position; /* 12 [rad] hip: angle of the motor shaft referred to the joint */
+    float mch_motor_position; /* 12 [rad] hip: angle of the motor shaft in terms of the joint (divided by the gear) */
     float mch_motor_target_current; /* 13 [A] hip: current asked for directly; the compliant law replaces it in the same slot */
     float mch_angle; /* 14 [rad] angle between the legs from the absolute encoder, inner leg forward positive */
     float mch_batt_power; /* 15 [W] hip: power the motor stage takes from the battery */
     int32_t mch_shutdown; /* 16 hip: non-zero stops feeding the motor watchdog and drives nothing */
-    int32_t mch_sleep; /* 17 hip: non-zero opens the bridge, the watchdog stays fed */
-    float mch_command_current; /* 18 [A] hip: constant term of the compliant law; its arrival puts both gains into force */
-    float mch_stiffness; /* 19 [A/rad] hip: current per angle in the compliant law */
-    float mch_dampness; /* 20 [A s/rad] hip: current per rate in the compliant law */
+    int32_t mch_sleep; /* 17 hip: any value but 0 lets the motor coast while the watchdog is fed */
+    float mch_command_current; /* 18 [A] hip: current at angle 0 and rate 0; by a switch the gains wait for it */
+    float mch_stiffness; /* 19 [A/rad] hip: how strongly the current opposes the angle */
+    float mch_dampness; /* 20 [A s/rad] hip: how strongly the current opposes the rate */
     float mch_ang_rate; /* 21 [rad/s] rate of the angle between the legs from the incremental encoder */
     float mch_status; /* 22 hip board alive flag, 1 once it runs */
     float mch_execution_time; /* 23 [s] hip board: longest slot of about the last quarter second */
-    float mch_max_execution_time; /* 24 [s] hip board: longest slot since power-up */
+    float mch_max_execution_time; /* 24 [s] hip board: longest slot of all */
     float mch_empty_tx1; /* 25 spare to the hip board: rename it to add a variable */
     float mch_empty_tx2; /* 26 spare to the hip board: rename it to add a variable */
     float mch_batt_current; /* 27 [A] hip: current the motor stage takes from the battery */
@@ -482,8 +482,8 @@ struct mb_data {
     float mch_empty_rx1; /* 30 spare from the hip board: rename it to add a variable */
     float mch_empty_rx2; /* 31 spare from the hip board: rename it to add a variable */
     float mch_empty_rx3; /* 32 spare from the hip board: rename it to add a variable */
-    float mcfo_motor_position; /* 33 [rad] outer ankle: angle of the motor shaft referred to the joint */
-    float mcfo_motor_velocity; /* 34 [rad/s] outer ankle: rate of the motor shaft referred to the joint */
+    float mcfo_motor_position; /* 33 [rad] outer ankle: angle of the motor shaft in terms of the joint (divided by the gear) */
+    float mcfo_motor_velocity; /* 34 [rad/s] outer ankle: rate of the motor shaft in terms of the joint (divided by the gear) */
     float mcfo_motor_current; /* 35 [A] outer ankle: motor current as measured */
     float mcfo_motor_target_current; /* 36 [A] outer ankle: current asked for directly; the compliant law replaces it in the same slot */
     float mcfo_right_ankle_angle; /* 37 [rad] outer ankle angle from the absolute encoder, 0 at the flipped-up stop */
@@ -492,16 +492,16 @@ struct mb_data {
     float mcfo_right_hs; /* 40 outer ankle: right foot on the ground after debouncing */
     float mcfo_left_hs; /* 41 outer ankle: left foot on the ground after debouncing */
     int32_t mcfo_shutdown; /* 42 outer ankle: non-zero stops feeding the motor watchdog and drives nothing */
-    int32_t mcfo_sleep; /* 43 outer ankle: non-zero opens the bridge, the watchdog stays fed */
+    int32_t mcfo_sleep; /* 43 outer ankle: any value but 0 lets the motor coast while the watchdog is fed */
     float mcfo_batt_power; /* 44 [W] outer ankle: power the motor stage takes from the battery */
-    float mcfo_command_current; /* 45 [A] outer ankle: constant term of the compliant law; its arrival puts both gains into force */
-    float mcfo_stiffness; /* 46 [A/rad] outer ankle: current per angle in the compliant law */
-    float mcfo_dampness; /* 47 [A s/rad] outer ankle: current per rate in the compliant law */
+    float mcfo_command_current; /* 45 [A] outer ankle: current at angle 0 and rate 0; by a switch the gains wait for it */
+    float mcfo_stiffness; /* 46 [A/rad] outer ankle: how strongly the current opposes the angle */
+    float mcfo_dampness; /* 47 [A s/rad] outer ankle: how strongly the current opposes the rate */
     float mcfo_status; /* 48 outer feet board alive flag, 1 once it runs */
     float mcfo_left_heel_sense; /* 49 [counts] outer ankle: left foot contact sensor as converted */
     float mcfo_right_heel_sense; /* 50 [counts] outer ankle: right foot contact sensor as converted */
     float mcfo_execution_time; /* 51 [s] outer feet board: longest slot of about the last quarter second */
-    float mcfo_max_execution_time; /* 52 [s] outer feet board: longest slot since power-up */
+    float mcfo_max_execution_time; /* 52 [s] outer feet board: longest slot of all */
     float mcfo_hs_state; /* 53 outer ankle: reserved command that no board hears */
     float mcfo_empty_tx2; /* 54 spare to the outer feet board: rename it to add a variable */
     float mcfo_batt_current; /* 55 [A] outer ankle: current the motor stage takes from the battery */
@@ -510,9 +510,9 @@ struct mb_data {
     float mcfo_outer_hs; /* 58 outer feet: reserved contact flag, never sent */
     float mcfo_right_ankle_rate; /* 59 [rad/s] outer ankle rate from the incremental encoder */
     float mcfo_empty_rx3; /* 60 spare from the outer feet board: rename it to add a variable */
-    float mcfi_motor_velocity; /* 61 [rad/s] inner ankle: rate of the motor shaft referred to the joint */
+    float mcfi_motor_velocity; /* 61 [rad/s] inner ankle: rate of the motor shaft in terms of the joint (divided by the gear) */
     float mcfi_motor_current; /* 62 [A] inner ankle: motor current as measured */
-    float mcfi_motor_position; /* 63 [rad] inner ankle: angle of the motor shaft referred to the joint */
+    float mcfi_motor_position; /* 63 [rad] inner ankle: angle of the motor shaft in terms of the joint (divided by the gear) */
     float mcfi_motor_target_current; /* 64 [A] inner ankle: current asked for directly; the compliant law replaces it in the same slot */
     float mcfi_mid_ankle_angle; /* 65 [rad] inner ankle angle from the absolute encoder, 0 at the flipped-up stop */
     float mcfi_right_ls; /* 66 inner ankle: right end switch after debouncing, 1 closed */
@@ -521,15 +521,15 @@ struct mb_data {
     float mcfi_left_hs; /* 69 inner ankle: left foot on the ground after debouncing */
     float mcfi_batt_power; /* 70 [W] inner ankle: power the motor stage takes from the battery */
     int32_t mcfi_shutdown; /* 71 inner ankle: non-zero stops feeding the motor watchdog and drives nothing */
-    int32_t mcfi_sleep; /* 72 inner ankle: non-zero opens the bridge, the watchdog stays fed */
-    float mcfi_command_current; /* 73 [A] inner ankle: constant term of the compliant law; its arrival puts both gains into force */
-    float mcfi_stiffness; /* 74 [A/rad] inner ankle: current per angle in the compliant law */
-    float mcfi_dampness; /* 75 [A s/rad] inner ankle: current per rate in the compliant law */
+    int32_t mcfi_sleep; /* 72 inner ankle: any value but 0 lets the motor coast while the watchdog is fed */
+    float mcfi_command_current; /* 73 [A] inner ankle: current at angle 0 and rate 0; by a switch the gains wait for it */
+    float mcfi_stiffness; /* 74 [A/rad] inner ankle: how strongly the current opposes the angle */
+    float mcfi_dampness; /* 75 [A s/rad] inner ankle: how strongly the current opposes the rate */
     float mcfi_status; /* 76 inner feet board alive flag, 1 once it runs */
     float mcfi_left_heel_sense; /* 77 [counts] inner ankle: left foot contact sensor as converted */
     float mcfi_right_heel_sense; /* 78 [counts] inner ankle: right foot contact sensor as converted */
     float mcfi_execution_time; /* 79 [s] inner feet board: longest slot of about the last quarter second */
-    float mcfi_max_execution_time; /* 80 [s] inner feet board: longest slot since power-up */
+    float mcfi_max_execution_time; /* 80 [s] inner feet board: longest slot of all */
     float mcfi_hs_state; /* 81 inner ankle: reserved command that no board hears */
     float mcfi_empty_tx2; /* 82 spare to the inner feet board: rename it to add a variable */
     float mcfi_batt_current; /* 83 [A] inner ankle: current the motor stage takes from the battery */
@@ -544,7 +544,7 @@ struct mb_data {
     float col_front_green; /* 92 front colour sensor, green */
     float col_front_blue; /* 93 front colour sensor, blue */
     float col_execution_time; /* 94 [s] colour board: longest slot of about the last quarter second */
-    float col_max_execution_time; /* 95 [s] colour board: longest slot since power-up */
+    float col_max_execution_time; /* 95 [s] colour board: longest slot of all */
     uint32_t error_col; /* 96 waiting error of the colour board: code bits 0-15, board 16-21, count 22-31 */
     float col_empty2; /* 97 spare from the colour board: rename it to add a variable */
     float col_empty3; /* 98 spare from the colour board: rename it to add a variable */
@@ -558,19 +558,19 @@ struct mb_data {
     float mcso_color_back_green; /* 106 rear colour sensor, green */
     float mcso_color_back_blue; /* 107 rear colour sensor, blue */
     float mcso_execution_time; /* 108 [s] old steering board: longest slot of about the last quarter second */
-    float mcso_max_execution_time; /* 109 [s] old steering board: longest slot since power-up */
+    float mcso_max_execution_time; /* 109 [s] old steering board: longest slot of all */
     float mcsi_motor_current; /* 110 [A] steering: motor current as measured */
     float mcsi_motor_target_current; /* 111 [A] steering: current asked for directly; the compliant law replaces it in the same slot */
-    float mcsi_steer_angle; /* 112 [counts] steering sensor as converted, less its reading at power-up */
+    float mcsi_steer_angle; /* 112 [counts] steering sensor as converted, counted from where it stood at the start */
     float mcsi_batt_power; /* 113 [W] steering: power the motor stage takes from the battery */
     int32_t mcsi_shutdown; /* 114 steering: non-zero stops feeding the motor watchdog and drives nothing */
-    int32_t mcsi_sleep; /* 115 steering: non-zero opens the bridge, the watchdog stays fed */
-    float mcsi_command_current; /* 116 [A] steering: constant term of the compliant law; its arrival puts both gains into force */
-    float mcsi_stiffness; /* 117 [A/rad] steering: current per angle in the compliant law */
-    float mcsi_dampness; /* 118 [A s/rad] steering: current per rate in the compliant law */
+    int32_t mcsi_sleep; /* 115 steering: any value but 0 lets the motor coast while the watchdog is fed */
+    float mcsi_command_current; /* 116 [A] steering: current at angle 0 and rate 0; by a switch the gains wait for it */
+    float mcsi_stiffness; /* 117 [A/rad] steering: how strongly the current opposes the angle */
+    float mcsi_dampness; /* 118 [A s/rad] steering: how strongly the current opposes the rate */
     float mcsi_status; /* 119 steering board alive flag, 1 once it runs */
     float mcsi_execution_time; /* 120 [s] steering board: longest slot of about the last quarter second */
-    float mcsi_max_execution_time; /* 121 [s] steering board: longest slot since power-up */
+    float mcsi_max_execution_time; /* 121 [s] steering board: longest slot of all */
     float mcsi_empty_tx1; /* 122 spare to the steering board: rename it to add a variable */
     float mcsi_empty_tx2; /* 123 spare to the steering board: rename it to add a variable */
     float mcsi_batt_current; /* 124 [A] steering: current the motor stage takes from the battery */
@@ -579,33 +579,33 @@ struct mb_data {
     float mcsi_empty_rx1; /* 127 spare from the steering board: rename it to add a variable */
     float mcsi_empty_rx2; /* 128 spare from the steering board: rename it to add a variable */
     float mcsi_empty_rx3; /* 129 spare from the steering board: rename it to add a variable */
-    int32_t ui_set_lcd_quad_1; /* 130 four characters for quarter 1 of the display, first in the low byte */
-    int32_t ui_set_lcd_quad_2; /* 131 four characters for quarter 2 of the display, first in the low byte */
-    int32_t ui_set_lcd_quad_3; /* 132 four characters for quarter 3 of the display, first in the low byte */
-    int32_t ui_set_lcd_quad_4; /* 133 four characters for quarter 4 of the display, first in the low byte */
-    int32_t ui_set_led_1; /* 134 colour of light 1: red in byte 0, green in byte 1, blue in byte 2 */
-    int32_t ui_set_led_2; /* 135 colour of light 2: red in byte 0, green in byte 1, blue in byte 2 */
-    int32_t ui_set_led_3; /* 136 colour of light 3: red in byte 0, green in byte 1, blue in byte 2 */
-    int32_t ui_set_led_4; /* 137 colour of light 4: red in byte 0, green in byte 1, blue in byte 2 */
-    int32_t ui_set_led_5; /* 138 colour of light 5: red in byte 0, green in byte 1, blue in byte 2 */
-    int32_t ui_set_led_6; /* 139 colour of light 6: red in byte 0, green in byte 1, blue in byte 2 */
+    int32_t ui_set_lcd_quad_1; /* 130 text of quarter 1 of the display, four bytes, read from the lowest */
+    int32_t ui_set_lcd_quad_2; /* 131 text of quarter 2 of the display, four bytes, read from the lowest */
+    int32_t ui_set_lcd_quad_3; /* 132 text of quarter 3 of the display, four bytes, read from the lowest */
+    int32_t ui_set_lcd_quad_4; /* 133 text of quarter 4 of the display, four bytes, read from the lowest */
+    int32_t ui_set_led_1; /* 134 colour of light 1: 8 bits each of red (lowest), green and blue */
+    int32_t ui_set_led_2; /* 135 colour of light 2: 8 bits each of red (lowest), green and blue */
+    int32_t ui_set_led_3; /* 136 colour of light 3: 8 bits each of red (lowest), green and blue */
+    int32_t ui_set_led_4; /* 137 colour of light 4: 8 bits each of red (lowest), green and blue */
+    int32_t ui_set_led_5; /* 138 colour of light 5: 8 bits each of red (lowest), green and blue */
+    int32_t ui_set_led_6; /* 139 colour of light 6: 8 bits each of red (lowest), green and blue */
     int32_t ui_set_buzzer_freq; /* 140 [Hz] tone of the buzzer */
-    int32_t ui_set_buzzer_ampl; /* 141 non-zero starts the stored song */
+    int32_t ui_set_buzzer_ampl; /* 141 any value but 0 plays the tune */
     float ui_roll; /* 142 [rad] roll of the outer legs from the inertial sensor (the robot's pitch of walking) */
     float ui_pitch; /* 143 [rad] pitch from the inertial sensor */
     float ui_yaw; /* 144 [rad] yaw from the inertial sensor */
     float ui_ang_rate_x; /* 145 [rad/s] angular rate about the walking axis from the gyro */
     float ui_ang_rate_y; /* 146 [rad/s] angular rate about the sensor's y axis */
     float ui_ang_rate_z; /* 147 [rad/s] angular rate about the sensor's z axis */
-    int32_t ui_buttons; /* 148 keys: bit n is set while key n is down */
+    int32_t ui_buttons; /* 148 keys: 2^n counts for key n as long as it is held */
     float ui_rc_0; /* 149 [ticks] radio control channel 0: smoothed pulse width in 1/60 us */
     float ui_rc_1; /* 150 [ticks] radio control channel 1: smoothed pulse width in 1/60 us */
     float ui_rc_2; /* 151 [ticks] radio control channel 2: smoothed pulse width in 1/60 us (its pin drives a light, so 0) */
     float ui_rc_3; /* 152 [ticks] radio control channel 3: smoothed pulse width in 1/60 us */
     float ui_execution_time; /* 153 [s] user interface board: longest slot of about the last quarter second */
-    float ui_max_execution_time; /* 154 [s] user interface board: longest slot since power-up */
+    float ui_max_execution_time; /* 154 [s] user interface board: longest slot of all */
     float ui_audio; /* 155 reserved sound command that no board hears */
-    int32_t ui_empty_tx2; /* 156 non-zero starts the stored song (a renamed spare) */
+    int32_t ui_empty_tx2; /* 156 any value but 0 plays the tune as well (a renamed spare) */
     float ui_status; /* 157 user interface board alive flag, 1 once it runs */
     float ui_empty_rx4; /* 158 spare from the user interface board: rename it to add a variable */
     float ui_empty_rx5; /* 159 spare from the user interface board: rename it to add a variable */
@@ -701,16 +701,16 @@ struct mb_data {
     float ctrl_test_r7; /* 249 free number 7 from the PC to a test */
     float ctrl_test_r8; /* 250 free number 8 from the PC to a test */
     float ctrl_test_r9; /* 251 free number 9 from the PC to a test */
-    float ctrl_test_w0; /* 252 free number 0 from a test to the PC */
-    float ctrl_test_w1; /* 253 free number 1 from a test to the PC */
-    float ctrl_test_w2; /* 254 free number 2 from a test to the PC */
-    float ctrl_test_w3; /* 255 free number 3 from a test to the PC */
-    float ctrl_test_w4; /* 256 free number 4 from a test to the PC */
-    float ctrl_test_w5; /* 257 free number 5 from a test to the PC */
-    float ctrl_test_w6; /* 258 free number 6 from a test to the PC */
-    float ctrl_test_w7; /* 259 free number 7 from a test to the PC */
-    float ctrl_test_w8; /* 260 free number 8 from a test to the PC */
-    float ctrl_test_w9; /* 261 free number 9 from a test to the PC */
+    float ctrl_test_w0; /* 252 result 0 of a test, for the PC */
+    float ctrl_test_w1; /* 253 result 1 of a test, for the PC */
+    float ctrl_test_w2; /* 254 result 2 of a test, for the PC */
+    float ctrl_test_w3; /* 255 result 3 of a test, for the PC */
+    float ctrl_test_w4; /* 256 result 4 of a test, for the PC */
+    float ctrl_test_w5; /* 257 result 5 of a test, for the PC */
+    float ctrl_test_w6; /* 258 result 6 of a test, for the PC */
+    float ctrl_test_w7; /* 259 result 7 of a test, for the PC */
+    float ctrl_test_w8; /* 260 result 8 of a test, for the PC */
+    float ctrl_test_w9; /* 261 result 9 of a test, for the PC */
     float gait_use_mdp_data; /* 262 non-zero: the gait takes its numbers from the optimised data set */
     float lv_start; /* 263 begin of the logging slots */
     float lv_ch_0; /* 264 logging slot 0: id wanted at a higher rate, plus 65536 for medium or 131072 for fast */

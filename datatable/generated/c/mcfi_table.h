@@ -50,9 +50,9 @@ struct mcfi_data {
     uint32_t timestamp; /* 0 [ms] network time: counts ms since the router started; wraps after 2^32; its frame carries it in both words */
     uint32_t error_mcfi; /* 5 waiting error of the inner feet board: code bits 0-15, board 16-21, count 22-31; sent only while one waits */
     float mb_status; /* 9 main brain alive flag to all boards */
-    float mcfi_motor_velocity; /* 61 [rad/s] inner ankle: rate of the motor shaft referred to the joint */
+    float mcfi_motor_velocity; /* 61 [rad/s] inner ankle: rate of the motor shaft in terms of the joint (divided by the gear) */
     float mcfi_motor_current; /* 62 [A] inner ankle: motor current as measured */
-    float mcfi_motor_position; /* 63 [rad] inner ankle: angle of the motor shaft referred to the joint */
+    float mcfi_motor_position; /* 63 [rad] inner ankle: angle of the motor shaft in terms of the joint (divided by the gear) */
     float mcfi_motor_target_current; /* 64 [A] inner ankle: current asked for directly; the compliant law replaces it in the same slot */
     float mcfi_mid_ankle_angle; /* 65 [rad] inner ankle angle from the absolute encoder, 0 at the flipped-up stop */
     float mcfi_right_ls; /* 66 inner ankle: right end switch after debouncing, 1 closed */
@@ -61,15 +61,15 @@ struct mcfi_data {
     float mcfi_left_hs; /* 69 inner ankle: left foot on the ground after debouncing */
     float mcfi_batt_power; /* 70 [W] inner ankle: power the motor stage takes from the battery */
     int32_t mcfi_shutdown; /* 71 inner ankle: non-zero stops feeding the motor watchdog and drives nothing */
-    int32_t mcfi_sleep; /* 72 inner ankle: non-zero opens the bridge, the watchdog stays fed */
-    float mcfi_command_current; /* 73 [A] inner ankle: constant term of the compliant law; its arrival puts both gains into force */
-    float mcfi_stiffness; /* 74 [A/rad] inner ankle: current per angle in the compliant law */
-    float mcfi_dampness; /* 75 [A s/rad] inner ankle: current per rate in the compliant law */
+    int32_t mcfi_sleep; /* 72 inner ankle: any value but 0 lets the motor coast while the watchdog is fed */
+    float mcfi_command_current; /* 73 [A] inner ankle: current at angle 0 and rate 0; by a switch the gains wait for it */
+    float mcfi_stiffness; /* 74 [A/rad] inner ankle: how strongly the current opposes the angle */
+    float mcfi_dampness; /* 75 [A s/rad] inner ankle: how strongly the current opposes the rate */
     float mcfi_status; /* 76 inner feet board alive flag, 1 once it runs */
     float mcfi_left_heel_sense; /* 77 [counts] inner ankle: left foot contact sensor as converted */
     float mcfi_right_heel_sense; /* 78 [counts] inner ankle: right foot contact sensor as converted */
     float mcfi_execution_time; /* 79 [s] inner feet board: longest slot of about the last quarter second */
-    float mcfi_max_execution_time; /* 80 [s] inner feet board: longest slot since power-up */
+    float mcfi_max_execution_time; /* 80 [s] inner feet board: longest slot of all */
     float mcfi_hs_state; /* 81 inner ankle: reserved command that no board hears */
     float mcfi_empty_tx2; /* 82 spare to the inner feet board: rename it to add a variable */
     float mcfi_batt_current; /* 83 [A] inner ankle: current the motor stage takes from the battery */

@@ -51,8 +51,8 @@ struct mcfo_data {
     uint32_t timestamp; /* 0 [ms] network time: counts ms since the router started; wraps after 2^32; its frame carries it in both words */
     uint32_t error_mcfo; /* 4 waiting error of the outer feet board: code bits 0-15, board 16-21, count 22-31; sent only while one waits */
     float mb_status; /* 9 main brain alive flag to all boards */
-    float mcfo_motor_position; /* 33 [rad] outer ankle: angle of the motor shaft referred to the joint */
-    float mcfo_motor_velocity; /* 34 [rad/s] outer ankle: rate of the motor shaft referred to the joint */
+    float mcfo_motor_position; /* 33 [rad] outer ankle: angle of the motor shaft in terms of the joint (divided by the gear) */
+    float mcfo_motor_velocity; /* 34 [rad/s] outer ankle: rate of the motor shaft in terms of the joint (divided by the gear) */
     float mcfo_motor_current; /* 35 [A] outer ankle: motor current as measured */
     float mcfo_motor_target_current; /* 36 [A] outer ankle: current asked for directly; the compliant law replaces it in the same slot */
     float mcfo_right_ankle_angle; /* 37 [rad] outer ankle angle from the absolute encoder, 0 at the flipped-up stop */
@@ -61,16 +61,16 @@ struct mcfo_data {
     float mcfo_right_hs; /* 40 outer ankle: right foot on the ground after debouncing */
     float mcfo_left_hs; /* 41 outer ankle: left foot on the ground after debouncing */
     int32_t mcfo_shutdown; /* 42 outer ankle: non-zero stops feeding the motor watchdog and drives nothing */
-    int32_t mcfo_sleep; /* 43 outer ankle: non-zero opens the bridge, the watchdog stays fed */
+    int32_t mcfo_sleep; /* 43 outer ankle: any value but 0 lets the motor coast while the watchdog is fed */
     float mcfo_batt_power; /* 44 [W] outer ankle: power the motor stage takes from the battery */
-    float mcfo_command_current; /* 45 [A] outer ankle: constant term of the compliant law; its arrival puts both gains into force */
-    float mcfo_stiffness; /* 46 [A/rad] outer ankle: current per angle in the compliant law */
-    float mcfo_dampness; /* 47 [A s/rad] outer ankle: current per rate in the compliant law */
+    float mcfo_command_current; /* 45 [A] outer ankle: current at angle 0 and rate 0; by a switch the gains wait for it */
+    float mcfo_stiffness; /* 46 [A/rad] outer ankle: how strongly the current opposes the angle */
+    float mcfo_dampness; /* 47 [A s/rad] outer ankle: how strongly the current opposes the rate */
     float mcfo_status; /* 48 outer feet board alive flag, 1 once it runs */
     float mcfo_left_heel_sense; /* 49 [counts] outer ankle: left foot contact sensor as converted */
     float mcfo_right_heel_sense; /* 50 [counts] outer ankle: right foot contact sensor as converted */
     float mcfo_execution_time; /* 51 [s] outer feet board: longest slot of about the last quarter second */
-    float mcfo_max_execution_time; /* 52 [s] outer feet board: longest slot since power-up */
+    float mcfo_max_execution_time; /* 52 [s] outer feet board: longest slot of all */
     float mcfo_hs_state; /* 53 outer ankle: reserved command that no board hears */
     float mcfo_empty_tx2; /* 54 spare to the outer feet board: rename it to add a variable */
     float mcfo_batt_current; /* 55 [A] outer ankle: current the motor stage takes from the battery */

@@ -45,21 +45,21 @@ struct mch_data {
     uint32_t timestamp; /* 0 [ms] network time: counts ms since the router started; wraps after 2^32; its frame carries it in both words */
     uint32_t error_mch; /* 3 waiting error of the hip board: code bits 0-15, board 16-21, count 22-31; sent only while one waits */
     float mb_status; /* 9 main brain alive flag to all boards */
-    float mch_motor_velocity; /* 10 [rad/s] hip: rate of the motor shaft referred to the joint */
+    float mch_motor_velocity; /* 10 [rad/s] hip: rate of the motor shaft in terms of the joint (divided by the gear) */
     float mch_motor_current; /* 11 [A] hip: motor current as measured */
-    float mch_motor_position; /* 12 [rad] hip: angle of the motor shaft referred to the joint */
+    float mch_motor_position; /* 12 [rad] hip: angle of the motor shaft in terms of the joint (divided by the gear) */
     float mch_motor_target_current; /* 13 [A] hip: current asked for directly; the compliant law replaces it in the same slot */
     float mch_angle; /* 14 [rad] angle between the legs from the absolute encoder, inner leg forward positive */
     float mch_batt_power; /* 15 [W] hip: power the motor stage takes from the battery */
     int32_t mch_shutdown; /* 16 hip: non-zero stops feeding the motor watchdog and drives nothing */
-    int32_t mch_sleep; /* 17 hip: non-zero opens the bridge, the watchdog stays fed */
-    float mch_command_current; /* 18 [A] hip: constant term of the compliant law; its arrival puts both gains into force */
-    float mch_stiffness; /* 19 [A/rad] hip: current per angle in the compliant law */
-    float mch_dampness; /* 20 [A s/rad] hip: current per rate in the compliant law */
+    int32_t mch_sleep; /* 17 hip: any value but 0 lets the motor coast while the watchdog is fed */
+    float mch_command_current; /* 18 [A] hip: current at angle 0 and rate 0; by a switch the gains wait for it */
+    float mch_stiffness; /* 19 [A/rad] hip: how strongly the current opposes the angle */
+    float mch_dampness; /* 20 [A s/rad] hip: how strongly the current opposes the rate */
     float mch_ang_rate; /* 21 [rad/s] rate of the angle between the legs from the incremental encoder */
     float mch_status; /* 22 hip board alive flag, 1 once it runs */
     float mch_execution_time; /* 23 [s] hip board: longest slot of about the last quarter second */
-    float mch_max_execution_time; /* 24 [s] hip board: longest slot since power-up */
+    float mch_max_execution_time; /* 24 [s] hip board: longest slot of all */
     float mch_empty_tx1; /* 25 spare to the hip board: rename it to add a variable */
     float mch_empty_tx2; /* 26 spare to the hip board: rename it to add a variable */
     float mch_batt_current; /* 27 [A] hip: current the motor stage takes from the battery */

@@ -44,16 +44,16 @@ struct mcsi_data {
     float mb_status; /* 9 main brain alive flag to all boards */
     float mcsi_motor_current; /* 110 [A] steering: motor current as measured */
     float mcsi_motor_target_current; /* 111 [A] steering: current asked for directly; the compliant law replaces it in the same slot */
-    float mcsi_steer_angle; /* 112 [counts] steering sensor as converted, less its reading at power-up */
+    float mcsi_steer_angle; /* 112 [counts] steering sensor as converted, counted from where it stood at the start */
     float mcsi_batt_power; /* 113 [W] steering: power the motor stage takes from the battery */
     int32_t mcsi_shutdown; /* 114 steering: non-zero stops feeding the motor watchdog and drives nothing */
-    int32_t mcsi_sleep; /* 115 steering: non-zero opens the bridge, the watchdog stays fed */
-    float mcsi_command_current; /* 116 [A] steering: constant term of the compliant law; its arrival puts both gains into force */
-    float mcsi_stiffness; /* 117 [A/rad] steering: current per angle in the compliant law */
-    float mcsi_dampness; /* 118 [A s/rad] steering: current per rate in the compliant law */
+    int32_t mcsi_sleep; /* 115 steering: any value but 0 lets the motor coast while the watchdog is fed */
+    float mcsi_command_current; /* 116 [A] steering: current at angle 0 and rate 0; by a switch the gains wait for it */
+    float mcsi_stiffness; /* 117 [A/rad] steering: how strongly the current opposes the angle */
+    float mcsi_dampness; /* 118 [A s/rad] steering: how strongly the current opposes the rate */
     float mcsi_status; /* 119 steering board alive flag, 1 once it runs */
     float mcsi_execution_time; /* 120 [s] steering board: longest slot of about the last quarter second */
-    float mcsi_max_execution_time; /* 121 [s] steering board: longest slot since power-up */
+    float mcsi_max_execution_time; /* 121 [s] steering board: longest slot of all */
     float mcsi_empty_tx1; /* 122 spare to the steering board: rename it to add a variable */
     float mcsi_empty_tx2; /* 123 spare to the steering board: rename it to add a variable */
     float mcsi_batt_current; /* 124 [A] steering: current the motor stage takes from the battery */

@@ -2,7 +2,7 @@
 #ifndef RANGER_ERRORS_H
 #define RANGER_ERRORS_H
 
-#define ERR_DEFAULT 0 /* no error */
+#define ERR_DEFAULT 0 /* nothing wrong */
 #define ERR_ADCI_BAD_CHAN 1 /* internal converter: channel unknown or switched off */
 #define ERR_ADCI_DNF 2 /* internal converter: started before the last sequence ended */
 #define ERR_ADCI_FILT_OOB 3 /* internal converter: number out of the filter's range */
@@ -11,38 +11,38 @@
 #define ERR_CAN_DUP_RX_IDS 6 /* CAN: one identifier has two receivers */
 #define ERR_CAN_RXLST_OF 7 /* CAN: more receivers than the list holds */
 #define ERR_CAN_RTRLST_OF 8 /* CAN: more remote requests than the list holds */
-#define ERR_CAN1_TX_BUSOFF 9 /* CAN controller 1: controller went bus-off */
+#define ERR_CAN1_TX_BUSOFF 9 /* CAN controller 1: dropped off the bus after too many errors */
 #define ERR_CAN1_ERR_WARN 10 /* CAN controller 1: error warning level crossed */
 #define ERR_CAN1_DATA_OVRN 11 /* CAN controller 1: frame lost in the controller, not read in time */
 #define ERR_CAN1_ERR_PASS 12 /* CAN controller 1: error passive level crossed */
-#define ERR_CAN1_BUS_RX 13 /* CAN controller 1: bus error while receiving */
-#define ERR_CAN1_BUS_TX 14 /* CAN controller 1: bus error while sending */
-#define ERR_CAN1_LOCKUP 15 /* CAN controller 1: controller hangs */
-#define ERR_CAN1_RX_BUF_OF 16 /* CAN controller 1: receive ring full */
-#define ERR_CAN2_TX_BUSOFF 17 /* CAN controller 2: controller went bus-off */
+#define ERR_CAN1_BUS_RX 13 /* CAN controller 1: a frame coming in was faulty */
+#define ERR_CAN1_BUS_TX 14 /* CAN controller 1: a frame going out failed */
+#define ERR_CAN1_LOCKUP 15 /* CAN controller 1: no longer answers */
+#define ERR_CAN1_RX_BUF_OF 16 /* CAN controller 1: frames came faster than the board took them */
+#define ERR_CAN2_TX_BUSOFF 17 /* CAN controller 2: dropped off the bus after too many errors */
 #define ERR_CAN2_ERR_WARN 18 /* CAN controller 2: error warning level crossed */
 #define ERR_CAN2_DATA_OVRN 19 /* CAN controller 2: frame lost in the controller, not read in time */
 #define ERR_CAN2_ERR_PASS 20 /* CAN controller 2: error passive level crossed */
-#define ERR_CAN2_BUS_RX 21 /* CAN controller 2: bus error while receiving */
-#define ERR_CAN2_BUS_TX 22 /* CAN controller 2: bus error while sending */
-#define ERR_CAN2_LOCKUP 23 /* CAN controller 2: controller hangs */
-#define ERR_CAN2_RX_BUF_OF 24 /* CAN controller 2: receive ring full */
-#define ERR_CAN3_TX_BUSOFF 25 /* CAN controller 3: controller went bus-off */
+#define ERR_CAN2_BUS_RX 21 /* CAN controller 2: a frame coming in was faulty */
+#define ERR_CAN2_BUS_TX 22 /* CAN controller 2: a frame going out failed */
+#define ERR_CAN2_LOCKUP 23 /* CAN controller 2: no longer answers */
+#define ERR_CAN2_RX_BUF_OF 24 /* CAN controller 2: frames came faster than the board took them */
+#define ERR_CAN3_TX_BUSOFF 25 /* CAN controller 3: dropped off the bus after too many errors */
 #define ERR_CAN3_ERR_WARN 26 /* CAN controller 3: error warning level crossed */
 #define ERR_CAN3_DATA_OVRN 27 /* CAN controller 3: frame lost in the controller, not read in time */
 #define ERR_CAN3_ERR_PASS 28 /* CAN controller 3: error passive level crossed */
-#define ERR_CAN3_BUS_RX 29 /* CAN controller 3: bus error while receiving */
-#define ERR_CAN3_BUS_TX 30 /* CAN controller 3: bus error while sending */
-#define ERR_CAN3_LOCKUP 31 /* CAN controller 3: controller hangs */
-#define ERR_CAN3_RX_BUF_OF 32 /* CAN controller 3: receive ring full */
-#define ERR_CAN4_TX_BUSOFF 33 /* CAN controller 4: controller went bus-off */
+#define ERR_CAN3_BUS_RX 29 /* CAN controller 3: a frame coming in was faulty */
+#define ERR_CAN3_BUS_TX 30 /* CAN controller 3: a frame going out failed */
+#define ERR_CAN3_LOCKUP 31 /* CAN controller 3: no longer answers */
+#define ERR_CAN3_RX_BUF_OF 32 /* CAN controller 3: frames came faster than the board took them */
+#define ERR_CAN4_TX_BUSOFF 33 /* CAN controller 4: dropped off the bus after too many errors */
 #define ERR_CAN4_ERR_WARN 34 /* CAN controller 4: error warning level crossed */
 #define ERR_CAN4_DATA_OVRN 35 /* CAN controller 4: frame lost in the controller, not read in time */
 #define ERR_CAN4_ERR_PASS 36 /* CAN controller 4: error passive level crossed */
-#define ERR_CAN4_BUS_RX 37 /* CAN controller 4: bus error while receiving */
-#define ERR_CAN4_BUS_TX 38 /* CAN controller 4: bus error while sending */
-#define ERR_CAN4_LOCKUP 39 /* CAN controller 4: controller hangs */
-#define ERR_CAN4_RX_BUF_OF 40 /* CAN controller 4: receive ring full */
+#define ERR_CAN4_BUS_RX 37 /* CAN controller 4: a frame coming in was faulty */
+#define ERR_CAN4_BUS_TX 38 /* CAN controller 4: a frame going out failed */
+#define ERR_CAN4_LOCKUP 39 /* CAN controller 4: no longer answers */
+#define ERR_CAN4_RX_BUF_OF 40 /* CAN controller 4: frames came faster than the board took them */
 #define ERR_QDC_CH01_GLTCH 41 /* encoder on captures 0 and 1: edge at the wrong level, or a single step back */
 #define ERR_QDC_CH23_GLTCH 42 /* encoder on captures 2 and 3: edge at the wrong level, or a single step back */
 #define ERR_MC_TCURR_OOB 43 /* motor: target current cut to its limits */
@@ -50,16 +50,16 @@
 #define ERR_MC_PWM_UF 45 /* motor: duty below its range */
 #define ERR_MC_CURR_OOB 46 /* motor: measured current beyond its limits */
 #define ERR_MC_SHUTOFF 47 /* motor: switched off for safety */
-#define ERR_MC_TEMP_SAFE 48 /* motor: warm, thermal state above the soft limit */
+#define ERR_MC_TEMP_SAFE 48 /* motor: warm, within a quarter of its thermal limit */
 #define ERR_ADCX_DNF 49 /* external converter: started before the last sequence ended */
 #define ERR_ADCX_TX_FULL 50 /* external converter: no room to send */
 #define ERR_ADCX_RX_EMPTY 51 /* external converter: nothing there to read */
 #define ERR_ADCX_NUM_CFGS 52 /* external converter: too many channels set up */
 #define ERR_BUTTON_OOB 53 /* keys: no key has this number */
 #define ERR_LCD_STR_OF 54 /* display: too many characters waiting */
-#define ERR_LCD_POS_OOB 55 /* display: position off the display */
-#define ERR_AE_INVALID_ID 56 /* absolute encoder: unknown number */
-#define ERR_LS_INVALID_ID 57 /* switches: unknown number */
+#define ERR_LCD_POS_OOB 55 /* display: no such place, of 16 */
+#define ERR_AE_INVALID_ID 56 /* absolute encoder: asked for one that the board lacks */
+#define ERR_LS_INVALID_ID 57 /* switches: asked for one that the board lacks */
 #define ERR_LS_NUM_SWITCH 58 /* switches: more than the module holds */
 #define ERR_SCHED_ASYNC 59 /* scheduler: out of step with the network */
 #define ERR_SCHED_RESYNC 60 /* scheduler: in step with the network again */
@@ -67,54 +67,54 @@
 #define ERR_ASCHED_DNF 62 /* scheduler: slot not finished at the next tick, its remaining work dropped */
 #define ERR_MSIMU_TX_FULL 63 /* inertial sensor: no room to send */
 #define ERR_MSIMU_NUM_BYT 64 /* inertial sensor: message too long for the FIFO */
-#define ERR_MSIMU_RX_OF 65 /* inertial sensor: bytes lost, receive ring full */
+#define ERR_MSIMU_RX_OF 65 /* inertial sensor: no room for a byte that came */
 #define ERR_UTIL_DUMMY 66 /* a placeholder function was called */
 #define ERR_STATE_INVALID 67 /* state machine in an unknown state */
-#define ERR_MCFI_ANKL_LS 68 /* inner ankle: end switch closed */
-#define ERR_MCFI_ANKL_HI 69 /* inner ankle: angle above the upper bound, 2.9 rad */
-#define ERR_MCFI_ANKL_LO 70 /* inner ankle: angle below the lower bound, 0.2 rad */
-#define ERR_MCFO_ANKL_LS 71 /* outer ankle: end switch closed */
-#define ERR_MCFO_ANKL_HI 72 /* outer ankle: angle above the upper bound, 2.9 rad */
-#define ERR_MCFO_ANKL_LO 73 /* outer ankle: angle below the lower bound, 0.2 rad */
+#define ERR_MCFI_ANKL_LS 68 /* inner ankle: an end switch is pressed */
+#define ERR_MCFI_ANKL_HI 69 /* inner ankle: pushed down beyond 2.9 rad */
+#define ERR_MCFI_ANKL_LO 70 /* inner ankle: flipped up beyond 0.2 rad */
+#define ERR_MCFO_ANKL_LS 71 /* outer ankle: an end switch is pressed */
+#define ERR_MCFO_ANKL_HI 72 /* outer ankle: pushed down beyond 2.9 rad */
+#define ERR_MCFO_ANKL_LO 73 /* outer ankle: flipped up beyond 0.2 rad */
 #define ERR_MCSI_LEFT 74 /* steering: left bound reached */
 #define ERR_MCSI_RIGHT 75 /* steering: right bound reached */
 #define ERR_MB_SSP_TX_FULL 76 /* main brain link: no segment free to send */
 #define ERR_MB_SSP_CHKSUM 77 /* main brain link: segment with a wrong checksum */
-#define ERR_MB_SSP_DMA_JAM 78 /* main brain link: transfer channel would not halt */
+#define ERR_MB_SSP_DMA_JAM 78 /* main brain link: DMA did not stop when told */
 #define ERR_MB_SSP_RX_FULL 79 /* main brain link: no segment free to receive */
-#define ERR_MB_SER_DMA_JAM 80 /* PC line: transfer channel would not halt */
-#define ERR_MB_SER_RX_FULL 81 /* PC line: receive ring full */
-#define ERR_MB_SER_DMA_FLL 82 /* PC line: receive array filled up */
+#define ERR_MB_SER_DMA_JAM 80 /* PC line: DMA did not stop when told */
+#define ERR_MB_SER_RX_FULL 81 /* PC line: bytes came faster than they were taken */
+#define ERR_MB_SER_DMA_FLL 82 /* PC line: array of received bytes has no room left */
 #define ERR_MB_SER_DMA_OFF 83 /* PC line: receive transfer was not running */
 #define ERR_MB_SER_CHKSUM 84 /* PC line: packet with a wrong checksum */
 #define ERR_SSP_RX_BUF_OF 85 /* router link: receive segments overwritten */
 #define ERR_SSP_LOW_RATE 86 /* router link: segment not exchanged in its 200 us */
-#define ERR_SSP_TX_BUF_IDX 87 /* router link: send index out of range */
-#define ERR_SSP_RX_FIFO 88 /* router link: hardware FIFO overflowed */
+#define ERR_SSP_TX_BUF_IDX 87 /* router link: index of the segment to send is impossible */
+#define ERR_SSP_RX_FIFO 88 /* router link: FIFO of the port ran over */
 #define ERR_SSP_BAD_CHKSM 89 /* router link: segment with a wrong checksum */
-#define ERR_SSP_RX_BUF_IDX 90 /* router link: receive index out of range */
-#define ERR_SSP_TX_BUF_OF 91 /* router link: send ring full, frame dropped */
+#define ERR_SSP_RX_BUF_IDX 90 /* router link: index of the segment received is impossible */
+#define ERR_SSP_TX_BUF_OF 91 /* router link: no room in the ring to the main brain, frame lost */
 #define ERR_RCX_BAD_CHAN 92 /* radio control: channel unknown or switched off */
 #define ERR_RCX_NINIT 93 /* radio control: used before its set-up */
-#define ERR_RCX_BAD_LVLS 94 /* radio control: same level twice in a row */
+#define ERR_RCX_BAD_LVLS 94 /* radio control: two edges of one kind follow each other */
 #define ERR_MB_IO_ID_OOR 95 /* data store: id beyond the table */
 #define ERR_MB_SSP_ID_OOR 96 /* main brain link: id beyond the table */
 #define ERR_MC_TEMP_OFF 97 /* motor: switched off, thermal limit reached */
 #define ERR_MC_MECH_OFF 98 /* motor: switched off, over-current integral reached its limit */
 #define ERR_MC_TEMP_ON 99 /* motor: back on after cooling */
 #define ERR_MC_MECH_ON 100 /* motor: back on after over-current */
-#define ERR_QDC_CH01_BUF_F 101 /* encoder on captures 0 and 1: ring of edge times full */
-#define ERR_QDC_CH23_BUF_F 102 /* encoder on captures 2 and 3: ring of edge times full */
-#define ERR_MCFI_CBL_STRCH 103 /* inner ankle: cable stretched, joint and motor more than 0.3 rad apart */
-#define ERR_MCFO_CBL_STRCH 104 /* outer ankle: cable stretched, joint and motor more than 0.3 rad apart */
+#define ERR_QDC_CH01_BUF_F 101 /* encoder on captures 0 and 1: more edges in a slot than it can time */
+#define ERR_QDC_CH23_BUF_F 102 /* encoder on captures 2 and 3: more edges in a slot than it can time */
+#define ERR_MCFI_CBL_STRCH 103 /* inner ankle: joint leads its motor by over 0.3 rad, the cable gives way */
+#define ERR_MCFO_CBL_STRCH 104 /* outer ankle: joint leads its motor by over 0.3 rad, the cable gives way */
 #define ERR_MC_INTEG_SATUR 105 /* motor: current integrator at its limit */
-#define ERR_MC_FIXED_LIMIT 106 /* motor: sum beyond the fixed-point range */
+#define ERR_MC_FIXED_LIMIT 106 /* motor: controller's sum does not fit 32 bits */
 #define ERR_MC_PWM_LIMIT 107 /* motor: duty cut to its limit */
-#define ERR_MC_NOT_RUNNING 108 /* motor: asked to run while off, asleep or shut down */
+#define ERR_MC_NOT_RUNNING 108 /* motor: its controller is called although it may not drive */
 #define ERR_AE_SPIKE 109 /* absolute encoder: step cut to what the joint can do */
-#define ERR_EST_FILTER_TIME_VIOLATION 110 /* estimator: filter given a time that does not advance */
-#define ERR_EST_ROBOT_FALL 111 /* estimator: robot has fallen */
-#define ERR_EST_INCOMPLETE_TRIAL 112 /* gait optimiser: trial accepted before it had enough steps */
+#define ERR_EST_FILTER_TIME_VIOLATION 110 /* estimator: a filter's datum is older than the one before */
+#define ERR_EST_ROBOT_FALL 111 /* estimator: a leg leans so far that this is a fall */
+#define ERR_EST_INCOMPLETE_TRIAL 112 /* gait optimiser: too few steps to judge the trial */
 #define ERR_EST_STUTTER_STEP 113 /* estimator: step shorter than a step can be */
 #define ERR_SCHED_SLOT_NEAR_LIMIT 114 /* scheduler: slot used more than 90 % of its length */
 #define ERR_SCHED_TASK_LIMIT 115 /* scheduler: a function took longer than its own limit */

@@ -53,33 +53,33 @@ struct ui_data {
     uint32_t timestamp; /* 0 [ms] network time: counts ms since the router started; wraps after 2^32; its frame carries it in both words */
     uint32_t error_ui; /* 8 waiting error of the user interface board: code bits 0-15, board 16-21, count 22-31; sent only while one waits */
     float mb_status; /* 9 main brain alive flag to all boards */
-    int32_t ui_set_lcd_quad_1; /* 130 four characters for quarter 1 of the display, first in the low byte */
-    int32_t ui_set_lcd_quad_2; /* 131 four characters for quarter 2 of the display, first in the low byte */
-    int32_t ui_set_lcd_quad_3; /* 132 four characters for quarter 3 of the display, first in the low byte */
-    int32_t ui_set_lcd_quad_4; /* 133 four characters for quarter 4 of the display, first in the low byte */
-    int32_t ui_set_led_1; /* 134 colour of light 1: red in byte 0, green in byte 1, blue in byte 2 */
-    int32_t ui_set_led_2; /* 135 colour of light 2: red in byte 0, green in byte 1, blue in byte 2 */
-    int32_t ui_set_led_3; /* 136 colour of light 3: red in byte 0, green in byte 1, blue in byte 2 */
-    int32_t ui_set_led_4; /* 137 colour of light 4: red in byte 0, green in byte 1, blue in byte 2 */
-    int32_t ui_set_led_5; /* 138 colour of light 5: red in byte 0, green in byte 1, blue in byte 2 */
-    int32_t ui_set_led_6; /* 139 colour of light 6: red in byte 0, green in byte 1, blue in byte 2 */
+    int32_t ui_set_lcd_quad_1; /* 130 text of quarter 1 of the display, four bytes, read from the lowest */
+    int32_t ui_set_lcd_quad_2; /* 131 text of quarter 2 of the display, four bytes, read from the lowest */
+    int32_t ui_set_lcd_quad_3; /* 132 text of quarter 3 of the display, four bytes, read from the lowest */
+    int32_t ui_set_lcd_quad_4; /* 133 text of quarter 4 of the display, four bytes, read from the lowest */
+    int32_t ui_set_led_1; /* 134 colour of light 1: 8 bits each of red (lowest), green and blue */
+    int32_t ui_set_led_2; /* 135 colour of light 2: 8 bits each of red (lowest), green and blue */
+    int32_t ui_set_led_3; /* 136 colour of light 3: 8 bits each of red (lowest), green and blue */
+    int32_t ui_set_led_4; /* 137 colour of light 4: 8 bits each of red (lowest), green and blue */
+    int32_t ui_set_led_5; /* 138 colour of light 5: 8 bits each of red (lowest), green and blue */
+    int32_t ui_set_led_6; /* 139 colour of light 6: 8 bits each of red (lowest), green and blue */
     int32_t ui_set_buzzer_freq; /* 140 [Hz] tone of the buzzer */
-    int32_t ui_set_buzzer_ampl; /* 141 non-zero starts the stored song */
+    int32_t ui_set_buzzer_ampl; /* 141 any value but 0 plays the tune */
     float ui_roll; /* 142 [rad] roll of the outer legs from the inertial sensor (the robot's pitch of walking) */
     float ui_pitch; /* 143 [rad] pitch from the inertial sensor */
     float ui_yaw; /* 144 [rad] yaw from the inertial sensor */
     float ui_ang_rate_x; /* 145 [rad/s] angular rate about the walking axis from the gyro */
     float ui_ang_rate_y; /* 146 [rad/s] angular rate about the sensor's y axis */
     float ui_ang_rate_z; /* 147 [rad/s] angular rate about the sensor's z axis */
-    int32_t ui_buttons; /* 148 keys: bit n is set while key n is down */
+    int32_t ui_buttons; /* 148 keys: 2^n counts for key n as long as it is held */
     float ui_rc_0; /* 149 [ticks] radio control channel 0: smoothed pulse width in 1/60 us */
     float ui_rc_1; /* 150 [ticks] radio control channel 1: smoothed pulse width in 1/60 us */
     float ui_rc_2; /* 151 [ticks] radio control channel 2: smoothed pulse width in 1/60 us (its pin drives a light, so 0) */
     float ui_rc_3; /* 152 [ticks] radio control channel 3: smoothed pulse width in 1/60 us */
     float ui_execution_time; /* 153 [s] user interface board: longest slot of about the last quarter second */
-    float ui_max_execution_time; /* 154 [s] user interface board: longest slot since power-up */
+    float ui_max_execution_time; /* 154 [s] user interface board: longest slot of all */
     float ui_audio; /* 155 reserved sound command that no board hears */
-    int32_t ui_empty_tx2; /* 156 non-zero starts the stored song (a renamed spare) */
+    int32_t ui_empty_tx2; /* 156 any value but 0 plays the tune as well (a renamed spare) */
     float ui_status; /* 157 user interface board alive flag, 1 once it runs */
     float ui_empty_rx4; /* 158 spare from the user interface board: rename it to add a variable */
     float ui_empty_rx5; /* 159 spare from the user interface board: rename it to add a variable */
