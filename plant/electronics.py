@@ -2,7 +2,7 @@
 
 The total is the appendix's P_fixed (1.1.2). It is what the router board measures: it feeds all of the electronics
 "except for the motors and motor drivers" (3.8), through a converter from the battery to 5.5 V (3.6). The 65 km
-walk ran at 4.7 W because the left outer ankle's sensor and its board were off (3.8). These two are 0.2 W each,
+walk ran at 4.7 W because the left outer ankle was switched off, board and sensor (3.8). These two are 0.2 W each,
 so the 0.45 W saved put the converter's efficiency at 0.40 / 0.45 = 8/9, and everything else sums to that.
 """
 

@@ -15,7 +15,7 @@ TARGET = 3
 
 
 class CompliantControl:
-    """target = command + sign (stiffness x position + dampness x velocity), all 16.16: A, A/rad, A s/rad.
+    """command + sign (K position + D velocity), K the stiffness, D the dampness; all 16.16: A, A/rad, A s/rad.
 
     `sign` is -1 on the robot. `latch_with_current`: the two gains come into force only when the next command
     current arrives (firmware of 2016), otherwise at once.

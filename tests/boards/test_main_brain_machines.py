@@ -131,7 +131,7 @@ def test_the_mid_stance_rate_is_kept_between_001_and_15(bench, angle, published)
     assert bench.get("E_AM_L_ABSRATE") == pytest.approx(published)
 
 
-def test_a_strike_before_mid_stance_leaves_leg_and_hip_in_premid(bench):
+def test_after_an_early_strike_leg_and_hip_machine_stay_in_premid(bench):
     inner_stance_premid(bench)
     bench.machines_only(E_SWING_LEG=1, E_T_AFTER_HS=0, E_LI_ANGLE=-0.02, MCH_ANGLE=-0.1)
     assert bench.states()[1:3] == ("LI_premid", "HO_premid")

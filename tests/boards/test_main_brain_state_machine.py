@@ -65,7 +65,7 @@ def test_a_state_left_before_it_ever_ran_runs_entry_and_main_first(script):
     assert script.took() == ["a entry", "a main", "a exit", "b entry", "b main"]
 
 
-def test_there_is_one_transition_per_tick_at_most(script):
+def test_a_tick_takes_no_second_transition(script):
     machine = two_states(script)
     machine.step()
     script.flags = {"go", "back"}

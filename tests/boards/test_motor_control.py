@@ -332,7 +332,7 @@ def test_sleep_opens_the_bridge_and_feeds_the_watchdog():
 
 
 @pytest.mark.parametrize(("value", "stopped"), [(0x8000, False), (0x10000, False), (0x7FFF, True), (2, True)])
-def test_only_the_low_15_bits_of_shutdown_count(value, stopped):
+def test_bits_15_and_above_of_shutdown_are_ignored(value, stopped):
     bench = Bench("MCH").run(ms=2)
     bench.command("SHUTDOWN", value)
     bench.run(ms=1)

@@ -57,7 +57,7 @@ def test_the_start_command_asks_for_the_packet_continuously():
     assert start_command(0xCF) == bytes.fromhex("c4c129cf")
 
 
-def test_at_most_one_packet_per_call(said):
+def test_a_call_takes_a_single_packet_although_more_wait(said):
     parser = ImuParser(said.append)
     feed(parser, packet(0xCF, (1.0,) * 6) + packet(0xCF, (2.0,) * 6))
     parser.update()

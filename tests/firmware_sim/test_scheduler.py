@@ -9,7 +9,7 @@ from foundation.user_error import UserError
 from tests.firmware_sim.board import TICK_CYCLES, TICK_NS, Log, raise_at
 
 
-def test_nothing_runs_before_the_first_tick():
+def test_before_its_first_tick_a_board_is_idle():
     log = Log()
     log.start(phase_ns=700_000, every=(log.task("a", 60),))
     assert log.chip.advance(700_000) == 700_000

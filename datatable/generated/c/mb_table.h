@@ -875,7 +875,7 @@ struct mb_data {
     int32_t e_fo_pp_missed; /* 423 outer push-offs that began after heel strike */
     int32_t e_fi_pp_missed; /* 424 inner push-offs that began after heel strike */
     float e_rc_steer; /* 425 steering command of the radio, -1 to 1 */
-    int32_t fsm_reset; /* 426 1 holds all machines in their start states, 2 lets them walk */
+    int32_t fsm_reset; /* 426 1 keeps every machine where it starts, 2 lets them walk */
     int32_t fsm_ui; /* 427 mode: 0 calibrate, 1 standby, 2 walk, 3 stop */
     int32_t fsm_leg; /* 428 state of the leg machine */
     int32_t fsm_hip; /* 429 state of the hip machine */
