@@ -177,6 +177,7 @@ def walks(options: argparse.Namespace) -> int:
                 f"{row['mean_step_time_s']:.3f} s, {row['motor_power_W']:.1f} W, "
                 f"lost {row['lost']}, overruns {row['overruns']}",
                 highlight=False,
+                soft_wrap=True,
             )
     result = {"date": wallclock.today_iso(), "machine": machine(), "walks": rows}
     if options.json == "-":
