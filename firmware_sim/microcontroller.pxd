@@ -1,7 +1,7 @@
 from foundation.events cimport EventQueue
 from firmware_sim.analog cimport AnalogPins
 from firmware_sim.clock cimport Crystal
-from firmware_sim.scheduler cimport Occasional, Schedule, SlotScheduler, Task, Wait
+from firmware_sim.scheduler cimport Occasional, Schedule, SlotScheduler, Task, Wait, call, call_with
 from firmware_sim.vic cimport InterruptController, InterruptSource
 
 cdef class Peripheral:
@@ -44,7 +44,7 @@ cdef class Microcontroller:
     cdef public long long horizon
     cpdef long long advance(self, long long until)
     cpdef bint due(self, long long until)
-    cpdef void spend(self, long long cycles)
+    cpdef void spend(self, long long cycles) noexcept
     cpdef long long cycles_since_tick(self)
     cpdef long long request(self, InterruptSource source)
     cpdef long long set_alarm(self, long long index, long long time)

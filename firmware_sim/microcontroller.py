@@ -23,6 +23,9 @@ from firmware_sim.vic import SLOT_TIMER, InterruptController, InterruptSource
 from foundation.events import NEVER, EventQueue
 from foundation.user_error import UserError
 
+if not cython.compiled:
+    from firmware_sim.calls import call, call_with
+
 PINS = 64  # P0.0 ... P0.31 are 0 ... 31, P1.0 ... P1.31 are 32 ... 63
 MESSAGE_KINDS = 32
 INDICES_PER_KIND = 16
@@ -273,6 +276,8 @@ class Microcontroller:
         self.next_time = time
         return time
 
+    @cython.boundscheck(False)
+    @cython.wraparound(False)
     def _input(self) -> cython.longlong:
         """The message just taken: hardware first; its interrupt line is raised by the peripheral."""
         inbox: EventQueue = self.inbox
@@ -288,11 +293,11 @@ class Microcontroller:
                 self.pins[inbox.c] = inbox.d
             channel = self.pin_channels[pin]
             if channel >= 0:
-                peripheral = self.pin_owners[pin]
+                peripheral = cython.cast(Peripheral, self.pin_owners[pin])
                 peripheral.on_pin(channel, inbox.b, inbox.time)
                 return 0
         elif 0 <= inbox.kind < 32 and 0 <= inbox.a < 16:
-            peripheral = self.message_table[inbox.kind * 16 + inbox.a]
+            peripheral = cython.cast(Peripheral, self.message_table[inbox.kind * 16 + inbox.a])
             if peripheral is not None:
                 peripheral.on_message(inbox)
                 return 0
@@ -314,10 +319,12 @@ class Microcontroller:
         self.vic.raise_source(source)
         return 0
 
+    @cython.boundscheck(False)
+    @cython.wraparound(False)
     def _alarm(self, time: cython.longlong) -> cython.longlong:
         """The first alarm is due."""
         i: cython.longlong = self.alarm_first
-        peripheral: Peripheral = self.alarm_owners[i]
+        peripheral: Peripheral = cython.cast(Peripheral, self.alarm_owners[i])
         self.now = time
         self.set_alarm(i, 1 << 62)
         peripheral.on_alarm(self.alarm_numbers[i], time)
@@ -338,7 +345,7 @@ class Microcontroller:
     def on_slot_timer(self, queue: EventQueue) -> object:
         """Handler of the slot timer: publish the next row."""
         if self.on_timer_tick is not None:
-            self.on_timer_tick()
+            call(self.on_timer_tick)
         if self.scheduler.tick(self.match_time) and self.scheduler.schedule.completion_flag:
             if self.on_overrun is not None:
                 self.on_overrun()
@@ -350,7 +357,7 @@ class Microcontroller:
         if self.code_time < self.instant:
             self.code_time = self.instant
         self.now = self.code_time
-        done = self.background()
+        done = call(self.background)
         if done <= self.code_time:
             self.background_wanted = False
             return done
@@ -379,7 +386,7 @@ class Microcontroller:
             inbox.ref = source.ref
             source.ref = None
         self.extra_cycles = 0
-        result = source.handler(inbox)
+        result = call_with(source.handler, inbox)
         if result is not None:
             items = result
             cycles += source.per_item * items
@@ -406,6 +413,8 @@ class Microcontroller:
             self.scheduler.note_interrupt(source.name, cycles)
         return cycles
 
+    @cython.boundscheck(False)
+    @cython.wraparound(False)
     def _code(self, until: cython.longlong) -> cython.longlong:
         """Run tasks from `code_time` on, until something else comes first."""
         scheduler: SlotScheduler = self.scheduler
@@ -423,7 +432,7 @@ class Microcontroller:
             self.extra_cycles = 0
             if self.waiting:
                 self.check_wait = False
-                if not self.wait_task.function():
+                if not call(self.wait_task.function):
                     return 0
                 self._wait_over()
             else:
@@ -437,12 +446,12 @@ class Microcontroller:
                     scheduler.finished_time = self.code_time
                     self._close_slot(scheduler.slot_time)
                     return 0
-                task = scheduler.tasks[scheduler.position]
+                task = cython.cast(Task, scheduler.tasks[scheduler.position])
                 scheduler.position += 1
                 scheduler.run_tasks += 1
                 cycles = task.cost
                 if task.kind == 0:
-                    result = task.function()
+                    result = call(task.function)
                     if result is not None:
                         items = result
                         cycles += task.per_item * items
@@ -458,12 +467,12 @@ class Microcontroller:
                         if cycles > task.max_cycles:
                             task.max_cycles = cycles
                 elif task.kind == 1:
-                    occasional = task
+                    occasional = cython.cast(Occasional, task)
                     entry = occasional.next_task()
                     if entry is None:
                         self._charge(task, cycles)
                     else:
-                        result = entry.function()
+                        result = call(entry.function)
                         items = 0
                         if result is not None:
                             items = result
@@ -471,11 +480,11 @@ class Microcontroller:
                         self._charge(task, cycles)
                         self._charge(entry, items)
                 else:
-                    wait = task
+                    wait = cython.cast(Wait, task)
                     self.wait_task = wait
                     self.wait_start = self.code_time
                     self.wait_stolen = self.stolen_cycles
-                    if wait.function():
+                    if call(wait.function):
                         self._wait_over()
                     else:
                         wait.waits += 1

@@ -1,3 +1,27 @@
+cdef extern from "Python.h":
+    ctypedef struct PyObject
+    ctypedef object (*plain_call "PyCFunction")(PyObject*, PyObject*)
+    ctypedef object (*fast_call "_PyCFunctionFastWithKeywords")(PyObject*, PyObject**, Py_ssize_t, PyObject*)
+    bint PyCFunction_CheckExact(object)
+    plain_call PyCFunction_GET_FUNCTION(object)
+    PyObject* PyCFunction_GET_SELF(object)
+    int PyCFunction_GET_FLAGS(object)
+    int METH_NOARGS, METH_FASTCALL, METH_KEYWORDS
+
+# What stands in a schedule is mostly a bound method of a compiled class. Its C function is then called without the
+# general machinery of Python calls; anything else is called in the ordinary way.
+cdef inline object call(object function):
+    if PyCFunction_CheckExact(function) and PyCFunction_GET_FLAGS(function) == METH_NOARGS:
+        return PyCFunction_GET_FUNCTION(function)(PyCFunction_GET_SELF(function), NULL)
+    return function()
+
+cdef inline object call_with(object function, object argument):
+    cdef PyObject* arguments
+    if PyCFunction_CheckExact(function) and PyCFunction_GET_FLAGS(function) == METH_FASTCALL | METH_KEYWORDS:
+        arguments = <PyObject*>argument
+        return (<fast_call>PyCFunction_GET_FUNCTION(function))(PyCFunction_GET_SELF(function), &arguments, 1, NULL)
+    return function(argument)
+
 cdef class Task:
     cdef public object function
     cdef public long long cost, per_item, limit, kind

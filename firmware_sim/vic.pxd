@@ -17,5 +17,5 @@ cdef class InterruptController:
     cpdef InterruptSource source(self, long long kind, long long index)
     cpdef InterruptSource next_fiq(self)
     cpdef InterruptSource next_irq(self)
-    cpdef bint raise_source(self, InterruptSource source)
-    cpdef long long accept(self, InterruptSource source)
+    cpdef bint raise_source(self, InterruptSource source) noexcept
+    cpdef long long accept(self, InterruptSource source) noexcept

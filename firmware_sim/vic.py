@@ -159,16 +159,20 @@ class InterruptController:
         source.served += 1
         return source.served
 
+    @cython.boundscheck(False)
+    @cython.wraparound(False)
     def next_fiq(self):
         """First pending FIQ source in attaching order; only while `fiq_pending` is not 0."""
         place: cython.longlong = 0
         while self.fiq_pending >> place & 1 == 0:
             place += 1
-        return self.fiq_list[place]
+        return cython.cast(InterruptSource, self.fiq_list[place])
 
+    @cython.boundscheck(False)
+    @cython.wraparound(False)
     def next_irq(self):
         """Pending IRQ source with the lowest slot; only while `irq_pending` is not 0."""
         place: cython.longlong = 0
         while self.irq_pending >> place & 1 == 0:
             place += 1
-        return self.irq_list[place]
+        return cython.cast(InterruptSource, self.irq_list[place])

@@ -1,3 +1,5 @@
+# cython: boundscheck=False, wraparound=False
+# (every index below counts boards, buses or wires, or stands in a table filled when the robot is wired)
 """The loop that everything serves, in virtual time and in one process.
 
     plant -> sensors -> pins -> interrupts and slots -> data table -> CAN -> router -> main brain
@@ -168,10 +170,12 @@ class Lockstep:
         i: cython.longlong
         now: cython.longlong
         then: cython.longlong
-        board_count: cython.longlong = len(self.boards)
+        boards: list = self.boards
+        buses: list = self.buses
+        board_count: cython.longlong = len(boards)
         due: cython.longlong[::1] = self.due
         bus_due: cython.longlong[::1] = self.bus_due
-        bus_count: cython.longlong = len(self.buses)
+        bus_count: cython.longlong = len(buses)
         for i in range(bus_count):
             bus = self.buses[i]
             bus_due[i] = bus.next_time
@@ -197,11 +201,11 @@ class Lockstep:
                 self._collect_frames()
             for i in range(bus_count):
                 if bus_due[i] <= now:
-                    bus = self.buses[i]
+                    bus = cython.cast(Bus, buses[i])
                     bus_due[i] = bus.advance(now)
             for i in range(board_count):
                 if due[i] < then:
-                    board = self.boards[i]
+                    board = cython.cast(Microcontroller, boards[i])
                     due[i] = 1 << 62
                     due[i] = min(board.advance(then), board.inbox.head_time)
                     if board.outbox.count:
@@ -233,12 +237,15 @@ class Lockstep:
     def _sense(self) -> cython.void:
         """What the plant's sensors showed during the step that was just integrated."""
         plant: RangerPlant = self.plant
+        i: cython.longlong
         wire: Wire
         end: cython.longlong = plant.time_ns
         start: cython.longlong = end - plant.step_ns
         self.step_times[0] = start
         self.step_times[1] = end
-        for wire in self.encoder_wires:
+        wires: list = self.encoder_wires
+        for i in range(len(wires)):
+            wire = cython.cast(Wire, wires[i])
             if wire.encoder.edges.count:
                 wire.deliver()
         if self.imu is not None and self.imu.bytes.count:
@@ -247,9 +254,12 @@ class Lockstep:
     def _show_words(self) -> cython.void:
         """What the absolute encoders hold at the start of the step: their words stand until the next one."""
         plant: RangerPlant = self.plant
+        i: cython.longlong
         word: WordWire
         board: Microcontroller
-        for word in self.word_wires:
+        wires: list = self.word_wires
+        for i in range(len(wires)):
+            word = cython.cast(WordWire, wires[i])
             board = word.board
             board.words[word.word] = plant.words[word.source]
 
@@ -284,7 +294,9 @@ class Lockstep:
         i: cython.longlong
         at: cython.longlong
         for b in range(len(self.buses)):
-            bus = self.buses[b]
+            bus = cython.cast(Bus, self.buses[b])
+            if bus.log_count == 0:
+                continue
             for i in range(bus.log_count):
                 at = i * 6
                 self.recorder.frame(bus.log[at], b, bus.log[at + 1], bus.log[at + 2], bus.log[at + 3], bus.log[at + 4])
@@ -299,7 +311,7 @@ class Lockstep:
         ssp: SspWire
         while out.take():
             if out.kind == 36:  # PIN_OUTPUT
-                motor = self.motors[index]
+                motor = cython.cast(MotorUnit, self.motors[index])
                 if motor is not None:
                     if out.a == self.watchdog_pin[index]:
                         motor.drive.watchdog_edge(out.time)
@@ -315,13 +327,13 @@ class Lockstep:
                 if self.pin_watch is not None:
                     self.pin_watch(index, out.time, out.a, out.b)
             elif out.kind == 35:  # PWM_UPDATE
-                motor = self.motors[index]
+                motor = cython.cast(MotorUnit, self.motors[index])
                 if motor is not None:
                     motor.drive.write_pwm(out.time, out.a, out.b, out.c)
             elif out.kind == 32:  # CAN_REQUEST
                 place = 4 * index + out.a - 1
                 if self.bus_of[place] >= 0:
-                    bus = self.buses[self.bus_of[place]]
+                    bus = cython.cast(Bus, self.buses[self.bus_of[place]])
                     bus.request(self.node_of[place], out.b, out.time, out.c, out.d, out.e, out.f)
                     self.bus_due[self.bus_of[place]] = bus.next_time
             elif out.kind == 37:  # SSP_START
@@ -333,13 +345,13 @@ class Lockstep:
             elif out.kind == 33:  # CAN_ABORT
                 place = 4 * index + out.a - 1
                 if self.bus_of[place] >= 0:
-                    bus = self.buses[self.bus_of[place]]
+                    bus = cython.cast(Bus, self.buses[self.bus_of[place]])
                     bus.abort(self.node_of[place], out.b, out.time)
                     self.bus_due[self.bus_of[place]] = bus.next_time
             elif out.kind == 34:  # CAN_MODE
                 place = 4 * index + out.a - 1
                 if self.bus_of[place] >= 0:
-                    bus = self.buses[self.bus_of[place]]
+                    bus = cython.cast(Bus, self.buses[self.bus_of[place]])
                     bus.set_mode(self.node_of[place], out.b, out.time)
                     self.bus_due[self.bus_of[place]] = bus.next_time
             elif out.kind == 39 and index == self.imu_index and out.a == self.imu_uart:  # UART_OUTPUT
