@@ -307,7 +307,9 @@ class CanRouterBoard(Microcontroller):
         """True when a frame waits for a bus that has a free transmit buffer and is not in reset."""
         router: Router = self.router
         controller: CanController
-        for controller in self.controllers:
+        i: cython.longlong
+        for i in range(4):
+            controller = cython.cast(CanController, self.controllers[i])
             if router.tx_read[controller.number] != router.tx_write[controller.number]:
                 if (controller.tx_free[1] != 0 or controller.tx_free[2] != 0) and not controller.MOD & 1:
                     return True
@@ -343,7 +345,7 @@ class CanRouterBoard(Microcontroller):
             passed = int((self.route_idle + self.route_frame * moved) * self.ns_per_cycle)
             at += passed
             self.now = at
-            moved = self.flush(self.controllers[self.flush_next])
+            moved = self.flush(cython.cast(CanController, self.controllers[self.flush_next]))
             passed = int((self.flush_idle + self.flush_frame * moved) * self.ns_per_cycle)
             at += passed
             self.flush_next += 1

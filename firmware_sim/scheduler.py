@@ -93,7 +93,7 @@ class Occasional(Task):
             self.position = 0
             if self.extra_idle_call or count == 0:
                 return None
-        task: Task = self.tasks[self.position]
+        task: Task = cython.cast(Task, self.tasks[self.position])
         self.position += 1
         return task
 

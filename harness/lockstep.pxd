@@ -13,7 +13,7 @@ cdef class Wire:
     cdef public IncrementalEncoder encoder
     cdef public Microcontroller board
     cdef public long long pin_a, pin_b
-    cpdef void deliver(self)
+    cpdef void deliver(self) noexcept
 
 cdef class WordWire:
     cdef public long long source, word
@@ -23,8 +23,8 @@ cdef class SspWire:
     cdef public Microcontroller master, slave
     cdef public long long exchange_ns, exchanges
     cdef public object loaded
-    cpdef void start(self, long long time_ns, object segment)
-    cpdef void load(self, object segment)
+    cpdef void start(self, long long time_ns, object segment) noexcept
+    cpdef void load(self, object segment) noexcept
 
 cdef class Lockstep:
     cdef public RangerPlant plant
@@ -45,9 +45,9 @@ cdef class Lockstep:
     cdef public double[::1] sample_row
     cpdef long long run(self, long long until)
     cdef void _notice_strike(self)
-    cdef void _sense(self)
-    cdef void _show_words(self)
-    cdef void _deliver_bytes(self)
+    cdef void _sense(self) noexcept
+    cdef void _show_words(self) noexcept
+    cdef void _deliver_bytes(self) noexcept
     cdef void _collect_frames(self)
     cdef void _route(self, long long index, Microcontroller board)
     cdef void _sample(self, long long now)

@@ -4,9 +4,9 @@ cdef class Drive:
     cdef public bint enable2, enable6, powered, is_open, sensed_lead_switches
     cdef public double duty
     cdef public long long[::1] times, kinds, values
-    cpdef void write_pwm(self, long long time, long long mr2, long long mr6, long long mr0)
-    cpdef void watchdog_edge(self, long long time)
-    cpdef void low_side(self, long long time, bint enable2, bint enable6)
-    cpdef void _queue(self, long long time, long long kind, long long a, long long b, long long c)
-    cpdef void apply(self, long long time)
-    cpdef void _update(self)
+    cpdef void write_pwm(self, long long time, long long mr2, long long mr6, long long mr0) noexcept
+    cpdef void watchdog_edge(self, long long time) noexcept
+    cpdef void low_side(self, long long time, bint enable2, bint enable6) noexcept
+    cpdef void _queue(self, long long time, long long kind, long long a, long long b, long long c) noexcept
+    cpdef void apply(self, long long time) noexcept
+    cpdef void _update(self) noexcept

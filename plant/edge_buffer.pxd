@@ -1,13 +1,13 @@
 cdef class EdgeBuffer:
     cdef public long long capacity, count
     cdef public long long[::1] times, levels_a, levels_b
-    cpdef void clear(self)
+    cpdef void clear(self) noexcept
     cpdef void grow(self)
-    cpdef void push(self, long long time, long long level_a, long long level_b)
+    cpdef void push(self, long long time, long long level_a, long long level_b) noexcept
 
 cdef class ByteBuffer:
     cdef public long long capacity, count
     cdef public long long[::1] times, values
-    cpdef void clear(self)
+    cpdef void clear(self) noexcept
     cpdef void grow(self)
-    cpdef void push(self, long long time, long long value)
+    cpdef void push(self, long long time, long long value) noexcept

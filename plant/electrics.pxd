@@ -25,4 +25,4 @@ cdef class Electrics:
         self, bint outer_contact, double outer_load_N, bint inner_contact, double inner_load_N, double steering_rad,
     )
     cpdef void _read(self, double h, double steering_rad)
-    cpdef void _motor(self, long long motor, MotorUnit unit, double battery_V)
+    cpdef void _motor(self, long long motor, MotorUnit unit, double battery_V) noexcept

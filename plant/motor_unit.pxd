@@ -18,7 +18,7 @@ cdef class MotorUnit:
     cpdef double magnetic_J(self)
     cpdef double battery_J(self)
     cpdef double torque_Nm(self, double current_A, double rate_rad_s)
-    cpdef void load(self, double current_A)
+    cpdef void load(self, double current_A) noexcept
     cpdef void step_electrical(self, long long t0, long long t1, double rate_rad_s, double battery_V)
     cpdef void _current(self, double seconds, double x, double drop)
-    cpdef void _warm(self, double h)
+    cpdef void _warm(self, double h) noexcept

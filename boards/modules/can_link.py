@@ -156,7 +156,7 @@ class CanLink:
             place = self.rx_read
             # DLC 8 and neither remote nor extended, as the bits stand in RFS
             if self.rx_frames[place] == 524288 and 0 <= self.rx_ids[place] < 2048:
-                receiver = self.receivers[self.rx_ids[place]]
+                receiver = cython.cast(Receiver, self.receivers[self.rx_ids[place]])
                 if receiver is not None:
                     receiver.deliver(self.rx_values[place], self.rx_times[place])
                     self.delivered += 1

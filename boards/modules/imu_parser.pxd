@@ -1,3 +1,5 @@
+from foundation.numbers cimport float_of_word
+
 cdef class ImuParser:
     cdef public object report
     cdef public long long header, needed, code_ring_full

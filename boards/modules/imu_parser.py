@@ -16,7 +16,9 @@ import array
 import cython
 
 from datatable.generated import errors
-from foundation.numbers import float_of_word
+
+if not cython.compiled:
+    from foundation.numbers import float_of_word
 
 HEADER_ANGLES_AND_RATES = 0xCF
 HEADER_RATES_ONLY = 0xC2
