@@ -3,12 +3,15 @@
 Compiled, the functions of the same names in scheduler.pxd are used: they call compiled methods directly.
 """
 
+from collections.abc import Callable
+from typing import Any
 
-def call(function):
+
+def call(function: Callable[[], Any]) -> Any:
     """What `function()` returns."""
     return function()
 
 
-def call_with(function, argument):
+def call_with(function: Callable[[Any], Any], argument: Any) -> Any:
     """What `function(argument)` returns."""
     return function(argument)

@@ -115,8 +115,14 @@ class Microcontroller:
 
     # --- set-up -------------------------------------------------------------------------------------------
 
+    def _check_peripheral(self, peripheral) -> None:
+        """The compiled loop takes what is claimed for a Peripheral without asking again."""
+        if not isinstance(peripheral, Peripheral):
+            raise UserError(f"{self.name}: {peripheral!r} is no Peripheral, so nothing can be delivered to it")
+
     def claim(self, kind, index, peripheral) -> None:
         """Messages of `kind` whose field a is `index` (0 ... 15) go to `peripheral.on_message`."""
+        self._check_peripheral(peripheral)
         place = kind * INDICES_PER_KIND + index
         if self.message_table[place] is not None:
             raise UserError(f"{self.name}: messages of kind {kind}, index {index} are claimed twice")
@@ -124,6 +130,7 @@ class Microcontroller:
 
     def claim_pin(self, pin, channel, peripheral) -> None:
         """Edges of `pin` go to `peripheral.on_pin(channel, level, time)`."""
+        self._check_peripheral(peripheral)
         if not 0 <= pin < PINS:
             raise UserError(f"{self.name}: pin {pin} is not 0 ... {PINS - 1}")
         if self.pin_owners[pin] is not None:
@@ -133,6 +140,7 @@ class Microcontroller:
 
     def new_alarm(self, peripheral, number) -> int:
         """An alarm slot; when due, `peripheral.on_alarm(number, time)` runs. Returns the slot."""
+        self._check_peripheral(peripheral)
         index = self.alarm_count
         if index >= 16:
             raise UserError(f"{self.name}: more than 16 peripheral alarms")

@@ -22,6 +22,7 @@ import cython
 from can_bus.bus import Bus
 from firmware_sim.microcontroller import Microcontroller
 from foundation.events import EventQueue
+from foundation.user_error import UserError
 from harness.recorder import RowStream
 from plant.edge_buffer import ByteBuffer
 from plant.incremental_encoder import IncrementalEncoder
@@ -101,6 +102,10 @@ class Lockstep:
     """Boards, buses and plant on one clock. Built by `harness.ranger.Ranger`, which wires it."""
 
     def __init__(self, plant, boards, buses, recorder, start_ns) -> None:
+        # the compiled loop takes these for what they should be without asking again
+        for thing, kind in (*((b, Microcontroller) for b in boards), *((b, Bus) for b in buses)):
+            if not isinstance(thing, kind):
+                raise UserError(f"lockstep: {thing!r} is no {kind.__name__}")
         self.plant = plant
         self.boards = boards
         self.buses = buses
