@@ -33,7 +33,6 @@ cdef class Lockstep:
     cdef public long long time, next_sample, sample_count, stop_steps
     cdef public double stop_distance_m
     cdef public SspWire ssp
-    cdef public object pin_watch
     cdef public Imu imu
     cdef public Microcontroller imu_board, main_brain
     cdef public Estimator estimator

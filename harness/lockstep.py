@@ -135,7 +135,6 @@ class Lockstep:
         self.enables = array.array("q", [0]) * (2 * len(boards))
         self.stop_steps = 1 << 62
         self.stop_distance_m = 1e300
-        self.pin_watch = None
         self.imu = None
         self.imu_board = None
         self.imu_index = -1
@@ -177,6 +176,7 @@ class Lockstep:
         then: cython.longlong
         boards: list = self.boards
         buses: list = self.buses
+        quantum: cython.longlong = QUANTUM_NS
         board_count: cython.longlong = len(boards)
         due: cython.longlong[::1] = self.due
         bus_due: cython.longlong[::1] = self.bus_due
@@ -190,7 +190,7 @@ class Lockstep:
             due[i] = min(board.next_time, board.inbox.head_time)
         while self.time < until:
             now = self.time
-            then = now + 31_250
+            then = now + quantum
             if plant.time_ns <= now:
                 if now >= self.next_sample:
                     self._sample(now)
@@ -329,8 +329,6 @@ class Lockstep:
                         self.enables[2 * index + 1] = out.b
                         motor.drive.low_side(out.time, self.enables[2 * index], self.enables[2 * index + 1])
                         continue
-                if self.pin_watch is not None:
-                    self.pin_watch(index, out.time, out.a, out.b)
             elif out.kind == 35:  # PWM_UPDATE
                 motor = cython.cast(MotorUnit, self.motors[index])
                 if motor is not None:
@@ -381,4 +379,4 @@ class Lockstep:
                 stream.integers[at + 1 + i] = self.main_brain_words[i]
             stream.used = at + stream.columns
             stream.finish_row(now)
-        self.next_sample += 2_000_000
+        self.next_sample += SAMPLE_NS

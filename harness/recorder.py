@@ -11,7 +11,6 @@ import hashlib
 import cython
 
 FRAME_COLUMNS = 3
-BLOCK_ROWS = 512
 
 
 class RowStream:
@@ -84,8 +83,3 @@ class Recorder:
         total.update(self.frames.digest.digest())
         total.update(self.samples.digest.digest())
         return total.hexdigest()
-
-
-def unpack_frame(first, second, third):
-    """(time_ns, bus, identifier, flags, word0, word1) of a row of the frame stream."""
-    return first, second & 15, third & 0x1FFFFFFF, (second >> 4) & 255, second >> 12, third >> 29

@@ -16,7 +16,7 @@ from firmware_sim.clock import Crystal
 from firmware_sim.scheduler import Occasional
 from foundation.events import CAN_REQUEST, CAN_TX_DONE, SSP_START, STAGE_BUS, TX_SENT
 
-QUANTUM_NS = 25_000  # as the assembled robot runs
+QUANTUM_NS = 25_000  # below the 36 us of the shortest frame, as in the assembled robot
 FRAME_NS = 37_000  # a frame of 8 bytes with intermission at 3 Mbit/s: 111 bits
 SATELLITES = {
     "MCH": "boards.hip.HipBoard",
