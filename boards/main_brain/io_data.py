@@ -24,6 +24,19 @@ class IoData:
         self.send_ids = array.array("q", send_ids)
         self.subscriber = 1  # SSP, bit of the store's read flags
         self.timestamp = 0  # id of TIMESTAMP
+        # for buses slower than the robot's: the first list goes out in every n-th slot (n per entry), of the second one
+        # entry per slot, in turn
+        self.dividers = array.array("q", [1]) * len(self.send_ids)
+        self.turn_ids = array.array("q")
+        self.turn = 0
+        self.slots = 0
+
+    def thin(self, send_ids, dividers, turn_ids) -> None:
+        """Send `send_ids` in every n-th slot only, n in `dividers`; of `turn_ids` one per slot, in turn."""
+        self.send_ids = array.array("q", send_ids)
+        self.dividers = array.array("q", dividers)
+        self.turn_ids = array.array("q", turn_ids)
+        self.turn = 0
 
     def receive(self) -> object:
         """All waiting segments into the table; returns the number of frames."""
@@ -44,12 +57,24 @@ class IoData:
         sent: cython.longlong = 0
         number: cython.longlong
         place: cython.longlong = store.next_unread(self.send_ids, 0, self.subscriber)
+        self.slots += 1
         while place >= 0:
-            number = self.send_ids[place]
-            if not link.send(number, store.get_word(number), store.stamp(number)):
-                break
-            store.mark_read(number, self.subscriber)
-            sent += 1
+            if self.slots % self.dividers[place] == 0:
+                number = self.send_ids[place]
+                if not link.send(number, store.get_word(number), store.stamp(number)):
+                    break
+                store.mark_read(number, self.subscriber)
+                sent += 1
             place = store.next_unread(self.send_ids, place + 1, self.subscriber)
+        if len(self.turn_ids) > 0:
+            place = store.next_unread(self.turn_ids, self.turn + 1, self.subscriber)
+            if place < 0:
+                place = store.next_unread(self.turn_ids, 0, self.subscriber)
+            if place >= 0:
+                number = self.turn_ids[place]
+                if link.send(number, store.get_word(number), store.stamp(number)):
+                    store.mark_read(number, self.subscriber)
+                    self.turn = place
+                    sent += 1
         link.flush()
         return sent
