@@ -1,0 +1,77 @@
+"""`ranger-sim vm -- COMMAND`: run something where SocketCAN is, on a host that has none."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import pathlib
+import sys
+from typing import Any
+
+from foundation.user_error import UserError
+from tools.units import TIMES, quantity, whole_number
+from tools.vm import machine
+
+
+def register(commands: Any) -> None:
+    """Add the subcommand to the command line."""
+    default = machine.Guest()
+    command = commands.add_parser(
+        "vm",
+        help="run a command in a small virtual machine that has SocketCAN",
+        usage="ranger-sim vm [options] -- COMMAND [ARGUMENT ...]",
+        description="Boots Debian's kernel under software emulation and runs COMMAND in it, in this folder and among "
+        "the files of this machine, with vcan0 ... vcan3 up and two Kvaser adapters on one bus as can0 and can1. "
+        "What COMMAND writes into files is gone afterwards, except below --shared.",
+    )
+    command.add_argument(
+        "--time-limit",
+        type=quantity(TIMES, "s", 0.0),
+        default=default.time_limit_s,
+        metavar="10min",
+        help="then it is switched off, exit code 124 (default 10min)",
+    )
+    command.add_argument("--memory", type=whole_number(256), default=default.memory_MiB, metavar="MiB")
+    command.add_argument("--processors", type=whole_number(1), default=default.processors, metavar="N")
+    command.add_argument(
+        "--shared",
+        action="append",
+        default=[],
+        metavar="DIR",
+        help="a folder that COMMAND may write to; may be repeated",
+    )
+    command.add_argument(
+        "--kvm", action="store_true", help="use /dev/kvm instead of emulation: far faster where it works"
+    )
+    command.add_argument("--console", action="store_true", help="show the machine's console on standard error")
+    command.add_argument("command_line", nargs="+", metavar="COMMAND", help="what to run, after --")
+    command.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run it; the exit code is the command's."""
+    for name in options.shared:
+        if not pathlib.Path(name).is_dir():
+            raise UserError(f"--shared {name!r}: this is no folder")
+    if options.kvm and not os.access("/dev/kvm", os.R_OK | os.W_OK):
+        raise UserError("--kvm: /dev/kvm is not there or may not be used; leave --kvm out for software emulation")
+    guest = machine.Guest(
+        memory_MiB=options.memory,
+        processors=options.processors,
+        time_limit_s=options.time_limit,
+        shared=tuple(pathlib.Path(name).resolve() for name in options.shared),
+        accelerator="kvm" if options.kvm else machine.ACCELERATOR,
+        shows_console=options.console,
+    )
+    sys.stdout.flush()
+    ended = machine.run(options.command_line, os.environ, pathlib.Path.cwd(), guest, write_all)
+    if ended.code == machine.EXIT_TIME_LIMIT and ended.total_s >= options.time_limit:
+        what = "the machine had not come up" if ended.boot_s is None else "the command had not ended"
+        print(f"ranger-sim: vm: {what} after {options.time_limit:g} s (--time-limit); switched off", file=sys.stderr)
+    return ended.code
+
+
+def write_all(number: int, data: bytes) -> None:
+    """Write everything to a file descriptor."""
+    while data:
+        data = data[os.write(number, data) :]
