@@ -33,10 +33,11 @@ $(VENV)/.installed: requirements.lock
 
 # Compiled where a C compiler is found, interpreted otherwise (told, with the reason); only changed modules are rebuilt.
 # Installing it as editable would build everything a second time, in a folder of its own: RANGER_SIM_BUILT=1 stops that.
+# It is linked again when pyproject.toml changes: the commands and python-can's entry point are found through it.
 $(VENV)/.built: $(VENV)/.installed pyproject.toml setup.py $(SOURCES)
 	@echo "Building (compiled where a C compiler is found; the first time takes some minutes) ..."
 	@$(RUN) setup.py -q build_ext --inplace
-	@test -f $(VENV)/.linked || RANGER_SIM_BUILT=1 $(RUN) -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
+	@test -f $(VENV)/.linked -a ! pyproject.toml -nt $(VENV)/.linked || RANGER_SIM_BUILT=1 $(RUN) -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
 	@touch $(VENV)/.linked $@
 
 lock:

@@ -9,6 +9,16 @@ def monotonic_s() -> float:
     return time.perf_counter()
 
 
+def monotonic_ns() -> int:
+    """The same clock in whole nanoseconds."""
+    return time.perf_counter_ns()
+
+
+def epoch_ns() -> int:
+    """Nanoseconds since 1970 in UTC, for the stamps of frames that leave for programs of the CAN world."""
+    return time.time_ns()
+
+
 def process_cpu_s() -> float:
     """Seconds of processor time this process has used (user and system)."""
     return time.process_time()

@@ -1,0 +1,113 @@
+"""The attach protocol on the wire: records over a stream. ATTACH.md is its description for other languages.
+
+A record is `length` (unsigned 32 bits, of what follows), `type` (one byte), body. All numbers are little-endian.
+"""
+
+import struct
+import sys
+from collections.abc import Iterator
+from typing import Any
+
+from foundation.user_error import UserError
+
+VERSION = 1
+MAGIC = b"RNGR"
+SOCKET_PREFIX = "\0ranger-sim/"
+DEFAULT_NAME = "ranger"
+NAME_LIMIT = 64  # characters; an abstract address has room for 107 bytes (unix(7))
+RECORD_LIMIT = 1024  # bytes of type and body; chosen by us: the longest is a list of channels or a reason
+
+HELLO = 1  # client: magic, version (u16), options (u16), name of the channel in UTF-8; none: only tell me the channels
+WELCOME = 2  # server: version (u16), window (u16), bit rate (u32), epoch (i64 ns), channels in UTF-8, one per line
+REFUSED = 3  # server: reason in UTF-8; the connection ends
+SEND = 4  # client: identifier (u32), flags (u16), data bytes 0-3 and 4-7 (u32 each)
+FRAME = 5  # server: time (i64 ns), then as SEND
+SENT = 6  # server: your oldest frame is on the bus whole; body as FRAME
+DROPPED = 7  # server: your oldest frame never will be; body as FRAME
+STATE = 8  # server: time (i64 ns), state (u16), transmit errors (u16), receive errors (u16)
+CONTROL = 9  # client: one byte, ACTIVATE, LISTEN or FLUSH
+OVERFLOW = 10  # server: time (i64 ns), how many frames you have missed so far (u64)
+
+OPTION_LISTEN = 1  # HELLO: begin listening only
+ACTIVATE, LISTEN, FLUSH = 1, 2, 3
+
+HEAD = struct.Struct("<IB")
+HELLO_BODY = struct.Struct("<4sHH")
+WELCOME_BODY = struct.Struct("<HHIq")
+SEND_BODY = struct.Struct("<IHII")
+FRAME_BODY = struct.Struct("<qIHII")
+STATE_BODY = struct.Struct("<qHHH")
+OVERFLOW_BODY = struct.Struct("<qQ")
+SEND_RECORD = struct.Struct("<IBIHII")
+FRAME_RECORD = struct.Struct("<IBqIHII")
+LENGTH = struct.Struct("<I")
+
+
+class MalformedError(Exception):
+    """What arrived is not a record of this protocol; the text says why."""
+
+
+def record(kind: int, body: bytes = b"") -> bytes:
+    """One record."""
+    return HEAD.pack(1 + len(body), kind) + body
+
+
+def send_record(identifier: int, flags: int, lo: int, hi: int) -> bytes:
+    """A SEND record."""
+    return SEND_RECORD.pack(1 + SEND_BODY.size, SEND, identifier, flags, lo, hi)
+
+
+def frame_record(kind: int, time_ns: int, identifier: int, flags: int, lo: int, hi: int) -> bytes:
+    """A FRAME, SENT or DROPPED record."""
+    return FRAME_RECORD.pack(1 + FRAME_BODY.size, kind, time_ns, identifier, flags, lo, hi)
+
+
+def records_of(buffer: bytearray) -> Iterator[tuple[int, bytes]]:
+    """(type, body) of every whole record in the buffer, which they leave. MalformedError for a senseless length."""
+    at = 0
+    try:
+        while len(buffer) - at >= HEAD.size:
+            length, kind = HEAD.unpack_from(buffer, at)
+            if not 1 <= length <= RECORD_LIMIT:
+                raise MalformedError(f"a record of {length} bytes is outside 1 ... {RECORD_LIMIT}")
+            end = at + LENGTH.size + length
+            if end > len(buffer):
+                return
+            body = bytes(buffer[at + HEAD.size : end])
+            at = end
+            yield kind, body
+    finally:
+        del buffer[:at]
+
+
+def unpacked(layout: struct.Struct, body: bytes) -> tuple[Any, ...]:
+    """The numbers of a body of exactly this layout; MalformedError otherwise."""
+    if len(body) != layout.size:
+        raise MalformedError(f"a body of {len(body)} bytes where {layout.size} belong")
+    return layout.unpack(body)
+
+
+def address_of(name: str) -> str:
+    """The abstract socket address of a robot or a host of private buses. UserError for an impossible name."""
+    if not sys.platform.startswith("linux"):
+        raise UserError(f"attaching to {name!r}: abstract unix sockets exist on Linux only, this is {sys.platform}")
+    if not 1 <= len(name) <= NAME_LIMIT or not all(c.isascii() and (c.isalnum() or c in "._-") for c in name):
+        raise UserError(f"name {name!r} is not 1 ... {NAME_LIMIT} letters, digits, dots, hyphens or underscores")
+    return SOCKET_PREFIX + name
+
+
+def names_running() -> list[str]:
+    """Names of the robots and hosts on this machine that listen now, from the kernel's list of sockets."""
+    try:
+        with open("/proc/net/unix", encoding="ascii", errors="replace") as table:
+            rows = [line.split() for line in table]
+    except OSError:
+        return []
+    shown = SOCKET_PREFIX.replace("\0", "@")  # so the kernel writes it
+    listening = 0x10000  # __SO_ACCEPTCON, linux/net.h: the sockets that accept, not those accepted
+    found = {
+        row[7].removeprefix(shown)
+        for row in rows
+        if len(row) == 8 and row[7].startswith(shown) and int(row[3], 16) & listening
+    }
+    return sorted(found)

@@ -1,0 +1,127 @@
+"""A bus of its own clock: private buses are released by the wall clock, or run as fast as frames are offered."""
+
+from can_bus.bus import Bus
+from can_bus.edge.taps import TRANSMIT_QUEUE, Tap, Taps
+from foundation import wallclock
+from foundation.events import NEVER
+from foundation.user_error import UserError
+
+# bit/s; chosen by us, because it is the fastest that classic CAN adapters do (ISO 11898-2)
+DEFAULT_BITRATE = 1_000_000
+MAX = "max"
+BURST = 1024  # events per call at most, so that whoever calls can look after its clients; chosen by us
+
+
+def speed_of(text: str | float) -> float:
+    """Times real time of "1", 0.05 or "max" (0.0: as fast as it goes). UserError for anything else."""
+    if isinstance(text, str) and text.strip().lower() == MAX:
+        return 0.0
+    try:
+        speed = float(text)
+    except (TypeError, ValueError):
+        speed = -1.0
+    if not 0.001 <= speed <= 1000.0:
+        raise UserError(f"speed {text!r} is neither a number in 0.001 ... 1000 nor 'max'")
+    return speed
+
+
+class PacedBus:
+    """A bus with clients only, that passes its own time.
+
+    `speed`: virtual over wall time; 0.0 passes time only while there is something to send, at once. Stamps plus
+    `epoch_ns` are nanoseconds since 1970 (at another speed than 1: of when it was opened, plus virtual time).
+    """
+
+    def __init__(
+        self,
+        channel: str,
+        bitrate: int = DEFAULT_BITRATE,
+        speed: float = 1.0,
+        seed: int = 0,
+        bit_error_rate: float = 0.0,
+        depth: int = TRANSMIT_QUEUE,
+    ) -> None:
+        try:
+            self.bus = Bus(channel, bitrate, seed, log_capacity=0)
+            if bit_error_rate:
+                self.bus.set_bit_error_rate(bit_error_rate)
+        except ValueError as fault:
+            raise UserError(str(fault)) from None
+        self.channel = channel
+        self.bitrate = bitrate
+        self.speed = speed
+        self.bit_error_rate = bit_error_rate
+        self.taps = Taps(self.bus, depth)
+        self.time = 0
+        self.epoch_ns = wallclock.epoch_ns()
+        self.started_ns = wallclock.monotonic_ns()
+
+    def add(self, name: str) -> Tap:
+        """A new client, from now on."""
+        self.advance()
+        return self.taps.add(name)
+
+    def now(self) -> int:
+        """Virtual time that the wall clock allows, ns."""
+        if self.speed == 0.0:
+            return NEVER - 1
+        return int((wallclock.monotonic_ns() - self.started_ns) * self.speed)
+
+    def seconds_until(self, virtual_ns: int) -> float:
+        """Wall-clock seconds until a virtual instant is allowed; 0 when it is, and at full speed."""
+        if self.speed == 0.0:
+            return 0.0
+        return max(virtual_ns - self.now(), 0) * 1e-9 / self.speed
+
+    def advance(self) -> int:
+        """Pass time up to now (at most BURST events); returns the next virtual instant of interest, or NEVER.
+
+        Where nobody is left who could acknowledge, an error-passive sender repeats for ever without any change:
+        such repetitions are passed over, and the frame goes out as soon as somebody joins.
+        """
+        bus, taps = self.bus, self.taps
+        until = self.now()
+        bit_ns = 1_000_000_000 // self.bitrate
+        for _ in range(BURST):
+            taps.poll(self.time)
+            due = min(bus.next_time, taps.due())
+            if due <= until and bus.pending_count and self._nobody_acknowledges():
+                if self.speed == 0.0:
+                    return NEVER
+                self._pass_over(until)
+                due = taps.due()
+            if due > until or self._held():
+                break
+            # one bit more: what ends within it belongs to the same frame, and no frame starts so soon after another
+            self.time = max(self.time, min(due + bit_ns, until))
+            if bus.next_time <= self.time:
+                bus.advance(self.time)
+        else:
+            return self.time
+        if self.speed != 0.0 and not self._held():
+            self.time = max(self.time, until)
+            bus.advance(self.time)
+            taps.poll(self.time)
+        return min(bus.next_time, taps.due()) if not self._alone() else taps.due()
+
+    def _alone(self) -> bool:
+        """True while what waits on the bus cannot be acknowledged and nothing will change that."""
+        return self.bus.pending_count > 0 and self._nobody_acknowledges()
+
+    def _held(self) -> bool:
+        """At full speed the bus waits for its slowest reader; by the clock it does not."""
+        return self.speed == 0.0 and any(tap.held for tap in self.taps.taps)
+
+    def _nobody_acknowledges(self) -> bool:
+        bus = self.bus
+        if bus.operating >= 2 or bus.joining or bus.commands.count:
+            return False
+        return all(bus.nodes[bus.pending[i] // 3].passive for i in range(bus.pending_count))
+
+    def _pass_over(self, until: int) -> None:
+        """No attempt up to `until`: every waiting frame is ready from the bit after it."""
+        bus = self.bus
+        first = bus.bit_of(until) + 1
+        for i in range(bus.pending_count):
+            bus.ready[bus.pending[i]] = max(bus.ready[bus.pending[i]], first)
+        bus.next_time = max(bus.next_time, bus.edge_ns(first))

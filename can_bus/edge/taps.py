@@ -1,0 +1,378 @@
+"""Clients of an emulated bus: each is a node of it, with a queue of frames to send and a list of what came in.
+
+Whatever brings a client here (python-can, the attach protocol, slcan, socketcand), behind it stands a `Tap`.
+"""
+
+import functools
+from collections import deque
+from typing import Any
+
+from can_bus.bus import (
+    BUS_OFF,
+    ICR_BUS_ERROR,
+    ICR_ERROR_PASSIVE,
+    ICR_ERROR_WARNING,
+    ICR_FIELD_SHIFT,
+    ICR_KIND_SHIFT,
+    ICR_RECEIVING,
+    KIND_BIT,
+    KIND_FORM,
+    KIND_OTHER,
+    KIND_STUFF,
+    OPERATING,
+    PASSIVE_LIMIT,
+    RESET,
+    WARNING_LIMIT,
+    Bus,
+)
+from can_bus.frame import FIELD_ACK_SLOT, arbitration_key
+from foundation.events import (
+    CAN_RX,
+    CAN_STATUS,
+    CAN_TX_DONE,
+    FLAG_ERROR,
+    FLAG_EXTENDED,
+    FLAG_REMOTE,
+    FLAG_SINGLE_SHOT,
+    NEVER,
+    STAGE_BUS,
+    TX_SENT,
+    EventQueue,
+)
+
+# Kinds of event, the first field of each entry of `Tap.events`.
+RECEIVED = 1  # time_ns, identifier, flags, lo, hi; with FLAG_ERROR an error frame, see `error_frame`
+SENT = 2  # the same of a frame of ours that is on the bus whole
+DROPPED = 3  # the same of a frame of ours that never went out whole
+STATE = 4  # time_ns, state, transmit errors, receive errors, 0
+
+# States of a tap: what ISO 11898-1 calls them, and two that a client chooses or waits for.
+ERROR_ACTIVE = 0
+ERROR_PASSIVE = 1
+OFF = 2  # bus-off
+LISTENING = 3  # receives without acknowledging, sends nothing
+
+# What `Tap.offer` answers.
+QUEUED = 0
+FULL = 1
+NOT_ON_BUS = 2  # bus-off or listening only
+
+TRANSMIT_QUEUE = 64  # frames; chosen by us, because at 3 Mbit/s it holds 3 ms: more than a poll every 1 ms needs
+LINGER_NS = 1_000_000_000  # how long a client that left may still send what it had queued; chosen by us
+ORDER = STAGE_BUS * 256 + 255  # after every board's controller; a tap's inbox has no other source
+BUFFERS = (1, 2, 3)
+
+# Error frames as Linux shows them: classes in the identifier, details in eight bytes (linux/can/error.h).
+CAN_ERR_CRTL = 0x004
+CAN_ERR_PROT = 0x008
+CAN_ERR_ACK = 0x020
+CAN_ERR_BUSOFF = 0x040
+CAN_ERR_BUSERROR = 0x080
+CAN_ERR_RESTARTED = 0x100
+CAN_ERR_CNT = 0x200  # bytes 6 and 7 hold the counters
+CRTL_RX_OVERFLOW = 0x01
+CRTL_RX_WARNING, CRTL_TX_WARNING, CRTL_RX_PASSIVE, CRTL_TX_PASSIVE, CRTL_ACTIVE = 0x04, 0x08, 0x10, 0x20, 0x40
+PROT_OF_KIND = {KIND_BIT: 0x01, KIND_FORM: 0x02, KIND_STUFF: 0x04, KIND_OTHER: 0x00}
+PROT_TX = 0x80
+
+Event = tuple[int, int, int, int, int, int]
+
+
+@functools.lru_cache(maxsize=4096)
+def _key(identifier: int, kind: int) -> int:
+    """Arbitration field of a frame, remembered: a client mostly sends the same identifiers again."""
+    key: int = arbitration_key(identifier, kind)
+    return key
+
+
+def error_frame(time_ns: int, classes: int, data: bytes) -> Event:
+    """An error frame as an event: identifier = classes (CAN_ERR_*), eight data bytes."""
+    lo, hi = int.from_bytes(data[:4], "little"), int.from_bytes(data[4:], "little")
+    return (RECEIVED, time_ns, classes, FLAG_ERROR | 8, lo, hi)
+
+
+def overflow_frame(time_ns: int) -> Event:
+    """The error frame that says: here frames are missing, the reader was too slow."""
+    return error_frame(time_ns, CAN_ERR_CRTL, bytes([0, CRTL_RX_OVERFLOW, 0, 0, 0, 0, 0, 0]))
+
+
+def fault_of_frame(identifier: int, flags: int, lo: int, hi: int) -> str:
+    """What is wrong with a frame that a client wants to send; empty when nothing is."""
+    limit = 0x1FFFFFFF if flags & FLAG_EXTENDED else 0x7FF
+    if not 0 <= identifier <= limit:
+        return f"identifier {identifier:#x} is above {limit:#x}"
+    if flags & ~(15 | FLAG_REMOTE | FLAG_EXTENDED) or flags & 15 > 8:
+        return f"flags {flags:#x} are not a classic data or remote frame of 0 ... 8 bytes"
+    if lo >> 32 or hi >> 32:
+        return "a data word has more than 32 bits"
+    return ""
+
+
+class Tap:
+    """One client's controller on a bus. Frames leave in the order in which they were offered.
+
+    `events` grows with what happened, oldest first: (kind, time_ns, identifier, flags, lo, hi); its owner
+    empties it. `poll` must be called with times that never fall behind the bus.
+    """
+
+    def __init__(self, bus: Bus, name: str, depth: int = TRANSMIT_QUEUE) -> None:
+        self.bus = bus
+        self.depth = depth
+        self.inbox = EventQueue(64)
+        self.node = bus.add_node(name, self.inbox, 1, ORDER)
+        self.controller: Any = bus.nodes[self.node]
+        self.refresh(name)
+
+    def refresh(self, name: str) -> None:
+        """As new: nothing queued, error counters zero."""
+        controller = self.controller
+        controller.name = name
+        controller.transmit_errors = controller.receive_errors = 0
+        controller.passive = controller.warning = False
+        controller.suspend_bit = 0
+        self.inbox.clear()
+        self.name = name
+        self.waiting: deque[tuple[int, int, int, int]] = deque()
+        self.loaded: deque[tuple[int, int, tuple[int, int, int, int]]] = deque()  # buffer, arbitration key, frame
+        self.events: list[Event] = []
+        self.off = False
+        self.silent = False
+        self.counters = (0, 0)
+        self.leaving = False
+        self.leave_by = NEVER
+        self.held = False  # its reader is behind: a bus without a clock waits for it
+        self.sent = 0
+        self.received = 0
+        self.dropped = 0
+
+    @property
+    def state(self) -> int:
+        """ERROR_ACTIVE, ERROR_PASSIVE, OFF or LISTENING."""
+        if self.off:
+            return OFF
+        if self.silent:
+            return LISTENING
+        return ERROR_PASSIVE if max(self.counters) >= PASSIVE_LIMIT else ERROR_ACTIVE
+
+    @property
+    def queued(self) -> int:
+        """Frames offered and not yet on the bus."""
+        return len(self.waiting) + len(self.loaded)
+
+    def offer(self, identifier: int, flags: int, lo: int, hi: int) -> int:
+        """Queue a frame (`fault_of_frame` has been asked): QUEUED, FULL or NOT_ON_BUS."""
+        if self.off or self.silent:
+            return NOT_ON_BUS
+        if len(self.waiting) + len(self.loaded) >= self.depth:
+            return FULL
+        self.waiting.append((identifier, flags, lo, hi))
+        return QUEUED
+
+    def poll(self, now: int) -> None:
+        """Take what the bus has for us up to `now` (ns) and fill free transmit buffers."""
+        inbox = self.inbox
+        while inbox.head_time <= now:
+            inbox.take()
+            if inbox.kind == CAN_RX:
+                flags = inbox.c & ~FLAG_SINGLE_SHOT  # that flag is the sender's own business
+                self.events.append((RECEIVED, inbox.time, inbox.b, flags, inbox.d, inbox.e))
+                self.received += 1
+            elif inbox.kind == CAN_TX_DONE:
+                self._done(inbox.time, inbox.b, inbox.c)
+            elif inbox.kind == CAN_STATUS:
+                self._status(inbox.time, inbox.b, inbox.c, inbox.d, bool(inbox.e))
+        if self.waiting and len(self.loaded) < 3:
+            self._load(now)
+
+    def _load(self, now: int) -> None:
+        """Move waiting frames into transmit buffers as far as that keeps their order.
+
+        A controller offers its lowest identifier first, and of equal ones the lowest buffer.
+        """
+        loaded, waiting = self.loaded, self.waiting
+        if self.controller.mode == RESET or self.controller.mode == BUS_OFF:
+            return  # just plugged in, or about to hear that it is off
+        while waiting and len(loaded) < 3:
+            frame = waiting[0]
+            key = _key(frame[0], frame[1] & (FLAG_REMOTE | FLAG_EXTENDED))
+            buffer = 1
+            if loaded:
+                last_buffer, last_key, _ = loaded[-1]
+                if key < last_key:
+                    return
+                used = [entry[0] for entry in loaded]
+                above = last_buffer if key == last_key else 0
+                buffer = next((b for b in BUFFERS if b > above and b not in used), 0)
+                if buffer == 0:
+                    return
+            waiting.popleft()
+            loaded.append((buffer, key, frame))
+            self.bus.request(self.node, buffer, now, *frame)
+
+    def _done(self, time: int, buffer: int, status: int) -> None:
+        """The frame in a buffer is through, or will not be."""
+        if self.loaded and self.loaded[0][0] == buffer:
+            frame = self.loaded.popleft()[2]
+        else:
+            entry = next((entry for entry in self.loaded if entry[0] == buffer), None)
+            if entry is None:
+                return
+            self.loaded.remove(entry)
+            frame = entry[2]
+        if status == TX_SENT:
+            self.sent += 1
+            self.events.append((SENT, time, *frame))
+        else:
+            self._drop(time, frame)
+
+    def _drop(self, time: int, frame: tuple[int, int, int, int]) -> None:
+        self.dropped += 1
+        self.events.append((DROPPED, time, *frame))
+
+    def _status(self, time: int, interrupts: int, transmit_errors: int, receive_errors: int, off: bool) -> None:
+        """Counters moved, a state changed or an error frame passed: told as one error frame and a state.
+
+        Nothing is told of a repeated attempt that changes neither: a sender that nobody acknowledges, once it is
+        error passive, repeats for ever, and its passive flags are not seen on the wire.
+        """
+        counters = (transmit_errors, receive_errors)
+        if counters == self.counters and off == self.off:
+            return
+        classes, data = CAN_ERR_CNT, bytearray(8)
+        data[6], data[7] = min(transmit_errors, 255), min(receive_errors, 255)
+        if interrupts & ICR_BUS_ERROR:
+            field, kind = interrupts >> ICR_FIELD_SHIFT & 31, interrupts >> ICR_KIND_SHIFT & 3
+            classes |= CAN_ERR_BUSERROR
+            if kind == KIND_OTHER and field == FIELD_ACK_SLOT:
+                classes |= CAN_ERR_ACK
+            else:
+                classes |= CAN_ERR_PROT
+                data[2] = PROT_OF_KIND[kind] | (0 if interrupts & ICR_RECEIVING else PROT_TX)
+            data[3] = field  # the codes of the SJA1000, which linux/can/error.h has taken over
+        if off and not self.off:
+            classes |= CAN_ERR_BUSOFF
+        elif self.off and not off:
+            classes |= CAN_ERR_RESTARTED
+        elif interrupts & (ICR_ERROR_WARNING | ICR_ERROR_PASSIVE):
+            classes |= CAN_ERR_CRTL
+            for count, warning, passive in (
+                (transmit_errors, CRTL_TX_WARNING, CRTL_TX_PASSIVE),
+                (receive_errors, CRTL_RX_WARNING, CRTL_RX_PASSIVE),
+            ):
+                data[1] |= passive if count >= PASSIVE_LIMIT else warning if count >= WARNING_LIMIT else 0
+            if max(counters) < WARNING_LIMIT:
+                data[1] = CRTL_ACTIVE
+        self.counters, self.off = counters, off
+        if classes != CAN_ERR_CNT:
+            self.events.append(error_frame(time, classes, bytes(data)))
+        self.tell_state(time)
+        if off:
+            while self.waiting:
+                self._drop(time, self.waiting.popleft())
+
+    def tell_state(self, time: int) -> None:
+        """Put the present state among the events."""
+        self.events.append((STATE, time, self.state, *self.counters, 0))
+
+    # ---- what a client may ask for
+
+    def activate(self, now: int) -> None:
+        """Take part again: out of listening only at once, out of bus-off after its 128 recessive sequences."""
+        if self.silent:
+            self._unmute()
+            self.tell_state(now)
+        elif self.off:
+            self.bus.set_mode(self.node, OPERATING, now)
+
+    def listen(self, now: int) -> None:
+        """Receive without acknowledging and without sending. What was queued is dropped."""
+        if self.silent or self.controller.mode != OPERATING:
+            return
+        self.flush(now)
+        self.silent = True
+        self.bus.operating -= 1  # the bus counts who would acknowledge
+        self.tell_state(now)
+
+    def _unmute(self) -> None:
+        self.silent = False
+        self.bus.operating += 1
+
+    def flush(self, now: int) -> None:
+        """Drop what waits; a frame under way is completed."""
+        while self.waiting:
+            self._drop(now, self.waiting.popleft())
+        for buffer, _, _ in self.loaded:
+            self.bus.abort(self.node, buffer, now)
+
+    def leave(self, now: int) -> None:
+        """Off the bus, whatever waits."""
+        if self.silent:
+            self._unmute()
+        if self.controller.mode == BUS_OFF:
+            self.controller.mode = RESET  # unplugged: the next client is a fresh controller
+        else:
+            self.bus.set_mode(self.node, RESET, now)
+
+
+class Taps:
+    """All clients of one bus. `time`: the virtual instant (ns) of the last poll."""
+
+    def __init__(self, bus: Bus, depth: int = TRANSMIT_QUEUE) -> None:
+        self.bus = bus
+        self.depth = depth
+        self.time = 0
+        self.taps: list[Tap] = []
+        self.spare: list[Tap] = []  # nodes whose clients left: a bus cannot lose a node
+
+    def add(self, name: str) -> Tap:
+        """A new client; it is on the bus at once, or after 11 recessive bits when it takes the place of another."""
+        for tap in self.spare:
+            if tap.controller.mode == RESET:
+                self.spare.remove(tap)
+                tap.refresh(name)
+                self.bus.set_mode(tap.node, OPERATING, self.time)
+                break
+        else:
+            tap = Tap(self.bus, name, self.depth)
+        self.taps.append(tap)
+        return tap
+
+    def remove(self, tap: Tap) -> None:
+        """The client is gone: what it had queued is still sent, if anybody is there to acknowledge it."""
+        if tap not in self.taps or tap.leaving:
+            return
+        tap.leaving = True
+        tap.leave_by = self.time + LINGER_NS
+        self._see_off(tap)
+
+    def _see_off(self, tap: Tap) -> None:
+        tap.events.clear()
+        if not tap.queued or tap.off or self.bus.operating < 2 or self.time > tap.leave_by:
+            tap.leave(self.time)
+            self.taps.remove(tap)
+            self.spare.append(tap)
+
+    def poll(self, now: int) -> None:
+        """Every client's `poll`; those who left and have nothing more to send are taken off the bus."""
+        self.time = now
+        for tap in self.taps:
+            tap.poll(now)
+        if any(tap.leaving for tap in self.taps):
+            for tap in [tap for tap in self.taps if tap.leaving]:
+                self._see_off(tap)
+
+    def due(self) -> int:
+        """The first instant (ns) at which a client has something to hear, or NEVER."""
+        return min((tap.inbox.head_time for tap in self.taps), default=NEVER)
+
+    @property
+    def queued(self) -> bool:
+        """True while a client has frames to send."""
+        return any(tap.waiting or tap.loaded for tap in self.taps)
+
+
+def taps_of(bus: "Bus | Taps") -> tuple[Taps, bool]:
+    """(the clients of a bus, whether they were made here and so need polling by whoever asked)."""
+    if isinstance(bus, Taps):
+        return bus, False
+    return Taps(bus), True
