@@ -20,6 +20,7 @@ SPI_DONE = 67  # index: SPI number
 UART_TRANSMIT = 68  # index: UART number; transmit FIFO empty (THRE)
 SLOT_TIMER = 69  # the scheduler's own timer
 SOFTWARE = 70  # index free: VICSoftInt
+DMA_DONE = 71  # index: DMA channel; transfer complete
 
 # ARM7TDMI technical reference manual: an interrupt waits 5 ... 29 cycles for the instruction in progress.
 # Chosen by us within that: FIQ with its banked registers 12, IRQ with the read of VICVectAddr 25.
