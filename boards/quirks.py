@@ -115,6 +115,15 @@ class Quirks:
     error_distribution_inverted: bool = switch(False, True, YES_OR_NO)
     """Firmware: the PC's error counts as new while nothing waits in its ring; the LCD's ring is never emptied."""
 
+    computer_link: str = switch("wired", "wired", ("wired", "bluetooth"))
+    """Appendix 4.10, 4.11: wired or Bluetooth. Firmware: chosen when it is built, the last one wired."""
+
+    parameter_writes_checked: bool = switch(True, False, YES_OR_NO)
+    """A packet that writes what is no parameter raises an error. Firmware: any variable is overwritten."""
+
+    serial_dma_off_at_start: bool = switch(False, True, YES_OR_NO)
+    """Firmware: the first look at the serial line finds its receive transfer off and reports an error."""
+
     heel_strike: str = switch("baseline", "filtered_sum", ("baseline", "filtered_sum"))
     """Appendix 4.3: voltage above its swing baseline for 2 ms. Firmware: two filtered sensors above 850."""
 

@@ -1,3 +1,4 @@
+from boards.main_brain.data_link cimport DataLink
 from boards.main_brain.estimator cimport Estimator
 from boards.main_brain.io_data cimport IoData
 from boards.main_brain.mode_machine cimport ModeMachine
@@ -7,6 +8,7 @@ from boards.modules.ssp_link cimport MainBrainSspLink
 from datatable.store cimport DataStore
 from firmware_sim.microcontroller cimport Microcontroller
 from firmware_sim.peripherals.ssp cimport SspPort, SspSegment
+from firmware_sim.peripherals.uart_hs cimport HsUart
 from firmware_sim.scheduler cimport Schedule, Task
 from foundation.events cimport EventQueue
 
@@ -18,6 +20,8 @@ cdef class MainBrainBoard(Microcontroller):
     cdef public SspPort ssp
     cdef public MainBrainSspLink link
     cdef public IoData io
+    cdef public HsUart computer_uart
+    cdef public DataLink computer
     cdef public Estimator estimator
     cdef public ModeMachine modes
     cdef public bint errors_one_late, heartbeat_on, execution_time_folds

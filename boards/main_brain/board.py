@@ -4,14 +4,16 @@ Facts network-and-boards 1.6, 3.1, 3.8, 4.12, 4.13; appendix 4.3, 4.4. Its tick 
 not from the router: phase and drift against the rest of the robot are arbitrary; its time is that of the
 last frame of identifier 0.
 
-ROBOT PARITY: the serial line to the computer is not part of this board yet (parse packets, swap receive
-DMA, rebuild lists, send data: facts 3.8, rows 0-2 and the end of every slot): parameters are put into the
-data table by `load_controller`, logs are taken from it from outside.
+The line to the computer is one of two ports (facts 4.15): HS-UART1 with a wire, 928.6 kbaud, or HS-UART2 with the
+Bluetooth module, 464.3 kbaud and hardware flow control; `quirks.computer_link` says which.
 """
+
+from typing import NamedTuple
 
 import cython
 
 from boards.main_brain import controllers
+from boards.main_brain.data_link import DataLink
 from boards.main_brain.error_distribution import ErrorDistribution
 from boards.main_brain.estimator import Estimator
 from boards.main_brain.io_data import IoData
@@ -25,13 +27,31 @@ from datatable.generated.all_variables import ID_OF_LAST, TABLE_SIZE
 from datatable.store import DataStore
 from firmware_sim.microcontroller import Microcontroller
 from firmware_sim.peripherals.ssp import SspPort, SspSegment
+from firmware_sim.peripherals.uart_hs import HsUart
 from firmware_sim.scheduler import Schedule, Task
-from firmware_sim.vic import FIQ
+from firmware_sim.vic import DMA_DONE, FIQ, SOFTWARE
 from foundation.events import SSP_SEGMENT, EventQueue
 
 # Both edges of slave select: stop and restart two DMA channels; about 300 instructions of C (chosen by us).
 SEGMENT_CYCLES = 450
 EXECUTION_TIMER_HZ = 13_000_000  # Timer0 counts the peripheral clock (facts 3.8)
+
+
+class ComputerPort(NamedTuple):
+    """One of the two ports for the computer. `cts_pin`: clear to send, low; -1: no flow control."""
+
+    uart: int
+    rate: int  # HSU_RATE
+    cts_pin: int
+
+
+COMPUTER_PORTS = {"wired": ComputerPort(1, 0, -1), "bluetooth": ComputerPort(2, 1, 0)}
+TRANSMIT_CHANNEL = 3  # GPDMA (facts 4.15)
+RESTART_SLOT, DMA_SLOT = 1, 2  # after the timer; tested in this order (facts 4.16)
+# Acknowledge, find the next segment, write four registers of the channel: about as many instructions as an exchange
+# of the link to the router takes (chosen by us).
+DMA_CYCLES = 450
+RESTART_CYCLES = 500
 
 
 class MainBrainBoard(Microcontroller):
@@ -64,6 +84,16 @@ class MainBrainBoard(Microcontroller):
         self.ssp = SspPort(self, 0)
         self.link = MainBrainSspLink(self.report, ID_OF_LAST)
         self.io = IoData(self.store, self.link, self.time, table.SEND)
+        port = COMPUTER_PORTS[quirks.computer_link]
+        self.computer_uart = HsUart(self, port.uart, TRANSMIT_CHANNEL, port.rate, cts_pin=port.cts_pin)
+        self.computer = DataLink(
+            self,
+            self.computer_uart,
+            self.store,
+            self.report,
+            checked=quirks.parameter_writes_checked,
+            dma_off_at_start=quirks.serial_dma_off_at_start,
+        )
         self.estimator = Estimator(self.store, quirks, self.report)
         self.modes = ModeMachine(self.store, quirks, self.estimator)
         self.distribution = ErrorDistribution(self.store, self.errors, quirks.error_distribution_inverted)
@@ -76,6 +106,11 @@ class MainBrainBoard(Microcontroller):
         self.execution_time_folds = quirks.main_brain_execution_time_folds
         self.execution_time_id = table.MB_EXECUTION_TIME
         self.vic.attach(SSP_SEGMENT, 0, self.on_segment, SEGMENT_CYCLES, slot=FIQ, name="ssp")
+        self.vic.attach(SOFTWARE, 0, self.computer.on_restart, RESTART_CYCLES, slot=RESTART_SLOT, name="serial restart")
+        self.vic.attach(
+            DMA_DONE, TRANSMIT_CHANNEL, self.computer.on_sent, DMA_CYCLES, slot=DMA_SLOT, name="serial sent"
+        )
+        self.computer.build_lists()
         if quirks.main_brain_overrun_check:
             self.on_overrun = self.slot_exceeded
         self.on_limit = self.task_limit
@@ -92,7 +127,7 @@ class MainBrainBoard(Microcontroller):
         controller.apply(self.store)
 
     def schedule(self) -> Schedule:
-        """Facts 3.8 without the serial line.
+        """Facts 3.8.
 
         Costs are chosen by us, because no execution times of this board are known: the ARM926 has no
         floating point unit, so about 60 cycles per operation, 1500 per sine or root, 30 per table access.
@@ -100,6 +135,7 @@ class MainBrainBoard(Microcontroller):
         # untyped names: a compiled class would hand out wrappers of its parts' methods instead of the methods
         errors: object = self.errors
         io: object = self.io
+        computer: object = self.computer
         estimator: object = self.estimator
         modes: object = self.modes
         errors_of_all: object = self.distribution.distribute
@@ -117,9 +153,12 @@ class MainBrainBoard(Microcontroller):
                 Task(estimator.update,   name="estimator",         cost=38000, limit=60000),
                 Task(modes.update,       name="controller",        cost=16000, limit=30000),
                 Task(io.send,            name="send_ssp",          cost=2000,  limit=12000, per_item=160, item="frame"),
+                Task(computer.send_data, name="send_data",         cost=300,   limit=4000,  per_item=250, item="step"),
             ),
             rows=(
-                (), (), (),  # serial line: parse packets; swap receive DMA; rebuild lists
+                (Task(computer.parse,    name="parse_packets",     cost=200,  limit=60000, per_item=110, item="place"),),
+                (Task(computer.swap_buffers, name="swap_receive_dma", cost=400, limit=9000, per_item=15, item="byte"),),
+                (Task(computer.build_lists, name="build_lists",    cost=6000, limit=9000),),
                 (Task(errors_of_all,     name="distribute_errors", cost=900,  limit=6000, per_item=500, item="error"),),
                 (),  # test of the user interface: empty on the robot as well
                 (), (), (), (), (),

@@ -107,9 +107,15 @@ def test_the_schedule_is_that_of_facts_38(board):
     assert schedule.divider == 2
     assert len(schedule.rows) == 11 == table.ROWS
     every = [task.name for task in schedule.every]
-    assert every == ["update_errors", "heartbeat", "parse_ssp", "estimator", "controller", "send_ssp"]
+    assert every == ["update_errors", "heartbeat", "parse_ssp", "estimator", "controller", "send_ssp", "send_data"]
     extras = {row: [task.name for task in tasks] for row, tasks in enumerate(schedule.rows) if tasks}
-    assert extras == {3: ["distribute_errors"], 10: ["execution_time"]}
+    assert extras == {
+        0: ["parse_packets"],
+        1: ["swap_receive_dma"],
+        2: ["build_lists"],
+        3: ["distribute_errors"],
+        10: ["execution_time"],
+    }
 
 
 def test_slots_come_every_2_ms_and_stay_far_below_their_length(board, router):

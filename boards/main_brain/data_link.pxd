@@ -1,0 +1,35 @@
+from datatable.store cimport DataStore
+from firmware_sim.microcontroller cimport Microcontroller
+from firmware_sim.peripherals.uart_hs cimport HsUart
+from firmware_sim.vic cimport InterruptSource
+from foundation.events cimport EventQueue
+
+cdef class DataLink:
+    cdef public Microcontroller chip
+    cdef public HsUart uart
+    cdef public DataStore store
+    cdef public object report
+    cdef public bint checked, dma_was_off
+    cdef public InterruptSource restart_source
+    cdef public long long code_full, code_buffer_full, code_dma_off, code_checksum, code_no_parameter
+    cdef public long long code_id_out_of_range, last_id, first_channel
+    cdef public long long[::1] is_parameter, fast, medium, ring
+    cdef public unsigned char[::1] segments
+    cdef public long long filling, sending, used, in_segment, checksum
+    cdef public long long fast_count, medium_count, phase, fast_place, medium_place, slow_id
+    cdef public long long rate_sum, calls_without_step, points, segments_sent, steps
+    cdef public long long ring_write, ring_read, packets, bad_packets, refused, ring_full
+    cpdef void build_lists(self)
+    cpdef long long allowed_steps(self)
+    cpdef object send_data(self)
+    cdef void _step(self)
+    cdef void _put(self, long long number)
+    cdef void _byte(self, long long at, long long byte)
+    cdef void _word(self, long long at, long long word)
+    cpdef object on_restart(self, EventQueue queue)
+    cpdef object on_sent(self, EventQueue queue)
+    cdef void _start(self)
+    cpdef object swap_buffers(self)
+    cpdef long long waiting(self)
+    cpdef object parse(self)
+    cdef void _write(self, long long number, long long word)

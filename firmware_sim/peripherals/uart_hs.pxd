@@ -1,0 +1,16 @@
+from firmware_sim.microcontroller cimport Peripheral
+from firmware_sim.vic cimport InterruptSource
+
+cdef class HsUart(Peripheral):
+    cdef public long long number, rate, byte_ns, done_alarm
+    cdef public double baud
+    cdef public InterruptSource source
+    cdef public bint busy, waits_for_cts, clear_to_send, overrun
+    cdef public object held
+    cdef public long long sent, buffer_bytes, active, filled, received, lost
+    cdef public long long[::1] buffers
+    cpdef bint transmit(self, object data)
+    cdef void _begin(self, object data, long long time)
+    cdef void _store(self, long long byte)
+    cpdef long long swap(self)
+    cpdef long long taken(self, long long place)
