@@ -156,9 +156,10 @@ class MainBrainBoard(Microcontroller):
                 Task(computer.send_data, name="send_data",         cost=300,   limit=4000,  per_item=250, item="step"),
             ),
             rows=(
-                (Task(computer.parse,    name="parse_packets",     cost=200,  limit=60000, per_item=110, item="place"),),
+                (Task(computer.parse,    name="parse_packets",     cost=200,   limit=60000, per_item=110,
+                      item="place"),),
                 (Task(computer.swap_buffers, name="swap_receive_dma", cost=400, limit=9000, per_item=15, item="byte"),),
-                (Task(computer.build_lists, name="build_lists",    cost=6000, limit=9000),),
+                (Task(computer.build_lists, name="build_lists",    cost=6000,  limit=9000),),
                 (Task(errors_of_all,     name="distribute_errors", cost=900,  limit=6000, per_item=500, item="error"),),
                 (),  # test of the user interface: empty on the robot as well
                 (), (), (), (), (),

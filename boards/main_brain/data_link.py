@@ -18,7 +18,6 @@ import cython
 
 from datatable.generated import all_variables, errors
 from datatable.generated import mb as table
-from datatable.store import DataStore
 from firmware_sim.peripherals.uart_hs import HsUart
 from firmware_sim.vic import SOFTWARE
 from foundation.events import EventQueue
