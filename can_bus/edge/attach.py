@@ -4,6 +4,7 @@ It has no thread and never blocks: the process that owns the buses polls it. Not
 end that client's own connection.
 """
 
+import math
 import os
 import socket
 import struct
@@ -109,6 +110,10 @@ class AttachServer:
     def filenos_to_write(self) -> list[int]:
         """Descriptors on which something waits until the client takes more."""
         return [client.connection.fileno() for client in self.clients if client.outgoing]
+
+    def patience_s(self) -> float:
+        """Wall-clock seconds after which a poll has something to do even if nothing else happens."""
+        return math.inf
 
     def counters(self) -> dict[str, int]:
         """Whole numbers by name: clients now, clients seen, frames in, out and dropped, malformed, refused."""

@@ -90,7 +90,7 @@ class PacedBus:
                     return NEVER
                 self._pass_over(until)
                 due = taps.due()
-            if due > until or self._held():
+            if due > until or self.held():
                 break
             # one bit more: what ends within it belongs to the same frame, and no frame starts so soon after another
             self.time = max(self.time, min(due + bit_ns, until))
@@ -98,7 +98,7 @@ class PacedBus:
                 bus.advance(self.time)
         else:
             return self.time
-        if self.speed != 0.0 and not self._held():
+        if self.speed != 0.0 and not self.held():
             self.time = max(self.time, until)
             bus.advance(self.time)
             taps.poll(self.time)
@@ -108,7 +108,7 @@ class PacedBus:
         """True while what waits on the bus cannot be acknowledged and nothing will change that."""
         return self.bus.pending_count > 0 and self._nobody_acknowledges()
 
-    def _held(self) -> bool:
+    def held(self) -> bool:
         """At full speed the bus waits for its slowest reader; by the clock it does not."""
         return self.speed == 0.0 and any(tap.held for tap in self.taps.taps)
 

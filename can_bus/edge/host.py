@@ -1,0 +1,49 @@
+"""A host of private buses: passes their time and looks after who attaches, in one thread and without busy waiting."""
+
+import select
+from typing import Any
+
+from can_bus.edge.paced import PacedBus
+from foundation import wallclock
+from foundation.events import NEVER
+
+LONGEST_NAP_S = 1.0  # so that an interrupt by the user is never late; chosen by us
+
+
+class BusHost:
+    """Some buses and their servers (`AttachServer`, `SlcanServer`, `SocketcandServer`, given by `serve`)."""
+
+    def __init__(self, buses: list[PacedBus]) -> None:
+        self.buses = buses
+        self.servers: list[Any] = []
+        now, epoch = wallclock.monotonic_ns(), wallclock.epoch_ns()
+        for bus in buses:  # one clock for all
+            bus.started_ns, bus.epoch_ns = now, epoch
+
+    def serve(self, server: Any) -> None:
+        """Look after this server from now on; it was made with the buses' `taps`."""
+        self.servers.append(server)
+
+    def turn(self, patience_s: float = LONGEST_NAP_S) -> None:
+        """Once round: what clients want, the time that has passed, what clients get; then wait for the next thing."""
+        due = NEVER
+        for bus in self.buses:
+            bus.advance()
+        for server in self.servers:
+            server.poll(0)
+        for bus in self.buses:
+            due = min(due, bus.advance())
+        if any(tap.events for bus in self.buses for tap in bus.taps.taps):
+            for server in self.servers:
+                server.poll(0)
+        nap = min([patience_s, *(server.patience_s() for server in self.servers)])
+        if due < NEVER and not any(bus.held() for bus in self.buses):
+            nap = min(nap, self.buses[0].seconds_until(due))
+        readable = [fd for server in self.servers for fd in server.filenos()]
+        writable = [fd for server in self.servers for fd in server.filenos_to_write()]
+        select.select(readable, writable, [], nap)
+
+    def close(self) -> None:
+        """End every server."""
+        for server in self.servers:
+            server.close()
