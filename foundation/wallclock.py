@@ -9,11 +9,6 @@ def monotonic_s() -> float:
     return time.perf_counter()
 
 
-def monotonic_ns() -> int:
-    """The same clock in whole nanoseconds."""
-    return time.perf_counter_ns()
-
-
 def epoch_ns() -> int:
     """Nanoseconds since 1970 in UTC, for the stamps of frames that leave for programs of the CAN world."""
     return time.time_ns()
@@ -32,3 +27,8 @@ def today_iso() -> str:
 def sleep_s(seconds: float) -> None:
     """Give the processor away for about this long."""
     time.sleep(seconds)
+
+
+def monotonic_ns() -> int:
+    """The same clock for every process of the machine, in ns; only differences mean anything."""
+    return time.monotonic_ns()

@@ -97,7 +97,7 @@ class SocketcandServer:
         return QUIET_AFTER_RAWMODE_S if any(client.kept for client in self.clients) else math.inf
 
     def counters(self) -> dict[str, int]:
-        """Whole numbers by name: clients now, clients seen, frames in, out, dropped and not carried, malformed, refused."""
+        """Whole numbers by name, as the other servers have them, and frames not carried."""
         return {"clients": sum(client.tap is not None for client in self.clients), **self.totals}
 
     def close(self) -> None:
@@ -143,7 +143,8 @@ class SocketcandServer:
             text = found.group(1).decode("latin-1")
             del client.incoming[: found.end()]
             self._command(client, text.split())
-        if not client.ending and (len(client.incoming) > TEXT_LIMIT or client.incoming.lstrip()[:1] not in (b"", b"<")):
+        rest = bytes(client.incoming).strip()
+        if not client.ending and (len(client.incoming) > TEXT_LIMIT or rest and not rest.startswith(b"<")):
             self._refuse(client, "that is no message in angle brackets")
             client.ending = True
         if gone:
