@@ -2,6 +2,7 @@ from boards.main_brain.estimator cimport Estimator
 from can_bus.bus cimport Bus
 from firmware_sim.microcontroller cimport Microcontroller
 from foundation.events cimport EventQueue
+from harness.processes.remote_board cimport RemoteBoard
 from harness.recorder cimport Recorder, RowStream
 from plant.edge_buffer cimport ByteBuffer
 from plant.imu cimport Imu
@@ -40,7 +41,7 @@ cdef class Lockstep:
     cdef public long long swing_leg, strike_seen_ns, strike_count, strikes_unmatched, strikes_missed, steps_noticed
     cdef public double strike_sum_ms, strike_squares_ms2
     cdef public long long[::1] due, bus_due, step_times, main_brain_words, bus_of, node_of, watchdog_pin, enable_pins, enables
-    cdef public bint records_words
+    cdef public bint records_words, remote
     cdef public double[::1] sample_row
     cpdef long long run(self, long long until)
     cdef void _notice_strike(self)

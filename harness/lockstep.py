@@ -23,6 +23,7 @@ from can_bus.bus import Bus
 from firmware_sim.microcontroller import Microcontroller
 from foundation.events import EventQueue
 from foundation.user_error import UserError
+from harness.processes.remote_board import RemoteBoard
 from harness.recorder import RowStream
 from plant.edge_buffer import ByteBuffer
 from plant.incremental_encoder import IncrementalEncoder
@@ -108,6 +109,7 @@ class Lockstep:
                 raise UserError(f"lockstep: {thing!r} is no {kind.__name__}")
         self.plant = plant
         self.boards = boards
+        self.remote = all(isinstance(board, RemoteBoard) for board in boards)  # each in a process of its own
         self.buses = buses
         self.recorder = recorder
         self.time = start_ns
@@ -170,6 +172,7 @@ class Lockstep:
         """Advance to `until` (ns) or until the walk is over; returns one of the reasons above."""
         plant: RangerPlant = self.plant
         board: Microcontroller
+        away: RemoteBoard
         bus: Bus
         i: cython.longlong
         now: cython.longlong
@@ -208,6 +211,11 @@ class Lockstep:
                 if bus_due[i] <= now:
                     bus = cython.cast(Bus, buses[i])
                     bus_due[i] = bus.advance(now)
+            if self.remote:
+                for i in range(board_count):
+                    if due[i] < then:
+                        away = cython.cast(RemoteBoard, boards[i])
+                        away.begin(then)
             for i in range(board_count):
                 if due[i] < then:
                     board = cython.cast(Microcontroller, boards[i])

@@ -1,0 +1,23 @@
+from firmware_sim.microcontroller cimport Microcontroller
+from foundation.events cimport EventQueue
+from harness.processes.channel cimport Bell, Mailbox
+from harness.processes.stage cimport Audience
+
+cdef class Endpoint:
+    cdef public Microcontroller board
+    cdef public object estimator, clock, shared
+    cdef public long long[::1] block, stage
+    cdef public double[::1] stage_doubles
+    cdef public Bell ask, answer
+    cdef public Mailbox to_board, from_board
+    cdef public Audience audience
+    cdef public EventQueue pending
+    cdef public long long slots_seen, turns, reached
+    cdef public bint asks_board
+    cpdef void serve(self)
+    cdef void _advance(self)
+    cdef void _run_to(self, long long until)
+    cdef void _late(self)
+    cdef bint _put_out(self)
+    cdef void _show(self)
+    cdef long long _next_output(self)

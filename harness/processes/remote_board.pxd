@@ -1,0 +1,19 @@
+from firmware_sim.microcontroller cimport Microcontroller
+from harness.processes.channel cimport Bell, Mailbox, load
+from harness.processes.stage cimport Stage
+
+cdef class RemoteBoard(Microcontroller):
+    cdef public Microcontroller shadow
+    cdef public object estimator
+    cdef public long long[::1] block
+    cdef public Bell ask, answer
+    cdef public Mailbox to_board, from_board
+    cdef public Stage stage
+    cdef public bint posted, gone, follows_steps
+    cdef public long long place, quiet_until, urgent_kinds, turns, reached
+    cpdef void begin(self, long long until)
+    cpdef long long advance(self, long long until)
+    cdef bint _urgent(self, long long until) noexcept
+    cdef void _post(self, long long command, long long until)
+    cdef void _ring(self, long long command, long long until)
+    cdef bint _collect(self)

@@ -1,0 +1,98 @@
+"""What the sensors show, from the plant's process to the boards': one row of shared memory per step of the plant.
+
+The last 64 rows (8 ms) stay, so a board may be behind the plant and still read what its sensors showed then.
+"""
+
+import array
+
+import cython
+
+from firmware_sim.microcontroller import Microcontroller
+from foundation.user_error import UserError
+from harness.processes.block import MOST_VOLTAGES, MOST_WORDS
+from plant.ranger import RangerPlant
+
+# Places of block.py as C numbers
+FIRST, RING, SIZE = 64, 64, 80
+
+
+class Stage:
+    """The plant's side. `step_times`: start and end of the step that is shown (ns), as the lockstep keeps them.
+
+    `wires`: (board, register) of the digital sensors, in the order of the rows' words.
+    """
+
+    def __init__(self, words, doubles, plant, step_times, wires) -> None:
+        self.words = words
+        self.doubles = doubles
+        self.plant = plant
+        self.step_times = step_times
+        self.rows = 0
+        self.shown_end = -1
+        self.boards = [board for board, _ in wires]
+        self.registers = array.array("q", [register for _, register in wires])
+        self.word_count = len(wires)
+        self.voltage_count = len(plant.analog_start)
+        if self.word_count > MOST_WORDS or self.voltage_count > MOST_VOLTAGES:
+            raise UserError(
+                f"stage: {self.word_count} words and {self.voltage_count} voltages do not fit in its rows "
+                f"({MOST_WORDS}, {MOST_VOLTAGES})"
+            )
+
+    def update(self) -> cython.void:
+        """Write a row if the plant has moved since the last one."""
+        at: cython.longlong
+        i: cython.longlong
+        plant: RangerPlant = self.plant
+        board: Microcontroller
+        if self.step_times[1] == self.shown_end:
+            return
+        self.shown_end = self.step_times[1]
+        at = FIRST + (self.rows % RING) * SIZE
+        self.words[at] = self.step_times[0]
+        self.words[at + 1] = self.shown_end
+        for i in range(self.word_count):
+            board = cython.cast(Microcontroller, self.boards[i])
+            self.words[at + 2 + i] = board.words[self.registers[i]]
+        for i in range(self.voltage_count):
+            self.doubles[at + 16 + i] = plant.analog_start[i]
+            self.doubles[at + 48 + i] = plant.analog_end[i]
+        self.rows += 1
+        self.words[2] = self.rows
+
+
+class Audience:
+    """A board's side: copies a row into the arrays that the board's pins follow.
+
+    `wires`: (place among the row's words, register) of its digital sensors.
+    """
+
+    def __init__(self, words, doubles, step_times, analog_start, analog_end, board_words, wires) -> None:
+        self.words = words
+        self.doubles = doubles
+        self.step_times = step_times
+        self.analog_start = analog_start
+        self.analog_end = analog_end
+        self.board_words = board_words
+        self.sources = array.array("q", [source for source, _ in wires])
+        self.registers = array.array("q", [register for _, register in wires])
+        self.word_count = len(wires)
+        self.voltage_count = len(analog_start)
+        self.rows = 0
+
+    def row_start(self, row: cython.longlong) -> cython.longlong:
+        """Start of the step of a row (ns)."""
+        return self.words[FIRST + (row % RING) * SIZE]
+
+    def show(self, row: cython.longlong) -> cython.void:
+        """From now on the board's pins show this row."""
+        at: cython.longlong = FIRST + (row % RING) * SIZE
+        i: cython.longlong
+        self.step_times[0] = self.words[at]
+        self.step_times[1] = self.words[at + 1]
+        for i in range(self.word_count):
+            self.board_words[self.registers[i]] = self.words[at + 2 + self.sources[i]]
+        for i in range(self.voltage_count):
+            self.analog_start[i] = self.doubles[at + 16 + i]
+            self.analog_end[i] = self.doubles[at + 48 + i]
+        self.rows = row + 1
