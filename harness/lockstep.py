@@ -141,6 +141,8 @@ class Lockstep:
         self.imu_board = None
         self.imu_index = -1
         self.imu_uart = 0
+        self.serial_lines = None  # {(board, UART): what hears it}, when something outside is connected
+        self.imu_tap = None  # hears what the inertial unit sends, beside its board
         self.estimator = None
         self.swing_leg = 1
         self.strike_seen_ns = -1
@@ -262,6 +264,8 @@ class Lockstep:
             if wire.encoder.edges.count:
                 wire.deliver()
         if self.imu is not None and self.imu.bytes.count:
+            if self.imu_tap is not None:
+                self.imu_tap.bytes_sent(self.imu.bytes.times, self.imu.bytes.values, self.imu.bytes.count)
             self._deliver_bytes()
 
     def _show_words(self) -> cython.void:
@@ -365,8 +369,17 @@ class Lockstep:
                     bus = cython.cast(Bus, self.buses[self.bus_of[place]])
                     bus.set_mode(self.node_of[place], out.b, out.time)
                     self.bus_due[self.bus_of[place]] = bus.next_time
-            elif out.kind == 39 and index == self.imu_index and out.a == self.imu_uart:  # UART_OUTPUT
-                self.imu.receive_byte(out.time, out.b)
+            elif out.kind == 39:  # UART_OUTPUT
+                if index == self.imu_index and out.a == self.imu_uart and self.imu is not None:
+                    self.imu.receive_byte(out.time, out.b)
+                elif self.serial_lines is not None:
+                    self._serial_output(index, out)
+
+    def _serial_output(self, index: cython.longlong, out: EventQueue) -> cython.void:
+        """A UART has put something out: to the outside, if it is connected there."""
+        line = self.serial_lines.get((index, out.a))
+        if line is not None:
+            line.from_board(out.time, out.b, out.c, out.ref)
 
     def _sample(self, now: cython.longlong) -> cython.void:
         """One row of the trace: the body, and when a log is kept the main brain's data table."""

@@ -76,6 +76,8 @@ class Ranger:
         )
         self._connect()
         self.operator = Operator(self.controller.operator, self.plant, self.boards["UI"], self.start_ns)
+        self.polled: list[Any] = []  # ends of wires that lead out of the simulation
+        self.next_poll_ns = self.start_ns
         self.cpu_s = 0.0
         self.wall_s = 0.0
         self.ended = ""
@@ -141,6 +143,8 @@ class Ranger:
         while loop.time < until and reason == lockstep.REACHED_TIME:
             end = self.start_ns + ((loop.time - self.start_ns) // GRID_NS + 1) * GRID_NS
             self.operator.act(end)
+            if self.polled:
+                end = min(end, self._poll())
             reason = loop.run(min(end, until))
         self.cpu_s += wallclock.process_cpu_s() - cpu
         self.wall_s += wallclock.monotonic_s() - wall
@@ -149,6 +153,18 @@ class Ranger:
         elif reason != lockstep.REACHED_TIME or loop.time >= limit:
             return True
         return bool(self.ended)
+
+    def attach(self, end: Any) -> None:
+        """From now on `end.poll(now_ns)` is called as often as it asks for; it returns when it wants to be next."""
+        self.polled.append(end)
+        self.next_poll_ns = self.loop.time
+
+    def _poll(self) -> int:
+        """Poll every end that leads outside, when it is time; returns until when the loop may run."""
+        now: int = self.loop.time
+        if now >= self.next_poll_ns:
+            self.next_poll_ns = max(now + lockstep.QUANTUM_NS, min(end.poll(now) for end in self.polled))
+        return self.next_poll_ns
 
     def run_for(self, seconds: float) -> None:
         """Pass `seconds` of virtual time, or less when the robot falls."""
@@ -225,8 +241,10 @@ class Ranger:
         return next((row.description for row in datatable.load().errors if row.name == name), "")
 
     def close(self) -> None:
-        """Give back the log's files."""
+        """Give back the log's files and the ends that lead outside."""
         self.logbook.close()
+        for end in self.polled:
+            end.close()
 
     def summary(self) -> dict:
         """The walk in numbers: what `--json` prints."""
