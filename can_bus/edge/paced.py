@@ -85,38 +85,37 @@ class PacedBus:
         for _ in range(BURST):
             taps.poll(self.time)
             due = min(bus.next_time, taps.due())
-            if due <= until and bus.pending_count and self._nobody_acknowledges():
-                if self.speed == 0.0:
-                    return NEVER
-                self._pass_over(until)
-                due = taps.due()
+            waits = due <= until and self._alone()
+            if waits:
+                due = taps.due()  # what happened before is still told
             if due > until or self.held():
                 break
             # one bit more: what ends within it belongs to the same frame, and no frame starts so soon after another
             self.time = max(self.time, min(due + bit_ns, until))
-            if bus.next_time <= self.time:
+            if not waits and bus.next_time <= self.time:
                 bus.advance(self.time)
         else:
             return self.time
-        if self.speed != 0.0 and not self.held():
+        alone = self._alone()
+        if self.speed != 0.0:
             self.time = max(self.time, until)
+        if alone:
+            self._pass_over(self.time)
+        if self.speed != 0.0:
             bus.advance(self.time)
             taps.poll(self.time)
-        return min(bus.next_time, taps.due()) if not self._alone() else taps.due()
+        return taps.due() if alone else min(bus.next_time, taps.due())
 
     def _alone(self) -> bool:
-        """True while what waits on the bus cannot be acknowledged and nothing will change that."""
-        return self.bus.pending_count > 0 and self._nobody_acknowledges()
-
-    def held(self) -> bool:
-        """At full speed the bus waits for its slowest reader; by the clock it does not."""
-        return self.speed == 0.0 and any(tap.held for tap in self.taps.taps)
-
-    def _nobody_acknowledges(self) -> bool:
+        """True while what waits cannot be acknowledged, by nobody, and only repeats."""
         bus = self.bus
-        if bus.operating >= 2 or bus.joining or bus.commands.count:
+        if not bus.pending_count or bus.operating >= 2 or bus.joining or bus.commands.count:
             return False
         return all(bus.nodes[bus.pending[i] // 3].passive for i in range(bus.pending_count))
+
+    def held(self) -> bool:
+        """True when time waits: at full speed the bus waits for its slowest reader; by the clock it does not."""
+        return self.speed == 0.0 and any(tap.held for tap in self.taps.taps)
 
     def _pass_over(self, until: int) -> None:
         """No attempt up to `until`: every waiting frame is ready from the bit after it."""

@@ -34,6 +34,7 @@ from can_bus.edge.taps import (
     fault_of_frame,
 )
 from can_bus.frame import data_length
+from foundation import wallclock
 from foundation.events import FLAG_ERROR, FLAG_EXTENDED, FLAG_REMOTE
 from foundation.user_error import UserError
 
@@ -192,11 +193,20 @@ class RangerSimBus(can.BusABC):
             raise can.CanOperationError(str(fault_of_link)) from None
 
     def _recv_internal(self, timeout: float | None) -> tuple[can.Message | None, bool]:
-        try:
-            event = self._link.receive(timeout)
-        except LinkError as fault:
-            raise can.CanOperationError(str(fault)) from None
-        return (None if event is None else message_of_event(event, self.channel)), False
+        end = None if timeout is None or self._filters is None else wallclock.monotonic_s() + timeout
+        while True:
+            try:
+                event = self._link.receive(timeout)
+            except LinkError as fault:
+                raise can.CanOperationError(str(fault)) from None
+            if event is None:
+                return None, False
+            message = message_of_event(event, self.channel)
+            # filtered here: python-can's own loop gives up after one message that does not match when asked not to wait
+            if self._filters is None or self._matches_filters(message):
+                return message, True
+            if end is not None:
+                timeout = max(end - wallclock.monotonic_s(), 0.0)
 
     def fileno(self) -> int:
         """A descriptor to wait on, as asyncio and select want it."""
