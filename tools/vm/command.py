@@ -31,8 +31,16 @@ def register(commands: Any) -> None:
         metavar="10min",
         help="then it is switched off, exit code 124 (default 10min)",
     )
-    command.add_argument("--memory", type=whole_number(256), default=default.memory_MiB, metavar="MiB")
-    command.add_argument("--processors", type=whole_number(1), default=default.processors, metavar="N")
+    command.add_argument(
+        "--memory", type=whole_number(256), default=default.memory_MiB, metavar="MiB", help="default 2048"
+    )
+    command.add_argument(
+        "--processors",
+        type=whole_number(1),
+        default=default.processors,
+        metavar="N",
+        help="default 1, best for many processes that wait for each other; more for work that runs side by side",
+    )
     command.add_argument(
         "--shared",
         action="append",
