@@ -35,6 +35,16 @@ BUS_BIT_RATE = 3_000_000  # bit/s, appendix 3.11
 POWER_UP_SPREAD_NS = 2_000_000
 GRID_NS = 20_000_000  # the operator acts on this grid, so that a run does not depend on how it is sliced
 
+BOARD_CLASSES: dict[str, Any] = {
+    "MCH": HipBoard,
+    "MCFO": OuterFeetBoard,
+    "MCFI": InnerFeetBoard,
+    "MCSI": SteeringBoard,
+    "UI": UserInterfaceBoard,
+    "CSR": CanRouterBoard,
+    "MB": MainBrainBoard,
+}
+
 
 class Ranger:
     """One robot in one scenario. Same scenario, same bytes. Close it when done (or use contextlib.closing)."""
@@ -55,14 +65,8 @@ class Ranger:
             start_ns=self.start_ns,
         )
         # interrupts and slots: each board on its own crystal, powered up in its own moment
-        self.boards: dict[str, Any] = {  # each its own class: see boards/
-            "MCH": HipBoard(*self._clock("MCH")),
-            "MCFO": OuterFeetBoard(*self._clock("MCFO")),
-            "MCFI": InnerFeetBoard(*self._clock("MCFI")),
-            "MCSI": SteeringBoard(*self._clock("MCSI")),
-            "UI": UserInterfaceBoard(*self._clock("UI")),
-            "CSR": CanRouterBoard(*self._clock("CSR")),
-            "MB": MainBrainBoard(*self._clock("MB"), controller=self.controller),
+        self.boards: dict[str, Any] = {
+            name: self.new_board(name, self.start_ns + self._stream(name)[1]) for name in BOARD_CLASSES
         }
         self.boards["CSR"].time.ms = self.scenario.start_uptime_ms
         # CAN
@@ -82,11 +86,17 @@ class Ranger:
         self.wall_s = 0.0
         self.ended = ""
 
-    def _clock(self, board: str) -> tuple[Any, Quirks, int]:
-        """(crystal, quirks, power-up instant) of a board, drawn from the scenario's seed."""
+    def _stream(self, board: str) -> tuple[Any, int]:
+        """(crystal, power-up instant after the robot's in ns) of a board, drawn from the scenario's seed."""
         stream = RandomStream(self.scenario.seed, f"board {board}")
-        crystal = seeded_crystal(stream)
-        return crystal, self.quirks, self.start_ns + stream.integer(POWER_UP_SPREAD_NS)
+        return seeded_crystal(stream), stream.integer(POWER_UP_SPREAD_NS)
+
+    def new_board(self, name: str, power_up_ns: int) -> Any:
+        """A board fresh from the shelf, with its own crystal, powered up at `power_up_ns`; not wired."""
+        crystal = self._stream(name)[0]
+        if name == "MB":
+            return MainBrainBoard(crystal, self.quirks, power_up_ns, controller=self.controller)
+        return BOARD_CLASSES[name](crystal, self.quirks, power_up_ns)
 
     def _connect(self) -> None:
         """Solder every wire of the tables."""

@@ -1,0 +1,44 @@
+"""What runs in the process of one board."""
+
+import os
+import signal
+import traceback
+from typing import Any
+
+from harness import wiring
+from harness.processes import kernel
+from harness.processes.block import Block
+from harness.processes.endpoint import Endpoint
+from harness.processes.stage import Audience
+
+FAILED = 4  # exit code: the board's program raised
+
+
+def serve(robot: Any, board: Any, block: Block, stage: tuple, real_time: bool) -> int:
+    """Run `board` of the wired, never run `robot` until told to stop; returns the exit code."""
+    name = board.name
+    kernel.name_process(f"ranger-{name}")
+    kernel.sharp_timers()
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.SIG_IGN)  # the supervisor decides when it is over
+    if real_time:
+        kernel.lock_memory()
+        kernel.real_time_scheduling()
+    place = wiring.BOARDS.index(name)
+    if block.table_words:
+        table = block.table()
+        table[:] = memoryview(board.store.words)
+        board.store.words = table
+    wires = [
+        (number, wire.word) for number, wire in enumerate(robot.loop.word_wires) if wire.board is robot.boards[name]
+    ]
+    plant = robot.plant
+    audience = Audience(*stage, robot.loop.step_times, plant.analog_start, plant.analog_end, board.words, wires)
+    try:
+        Endpoint(board, block, stage, audience, place).serve()
+    except BaseException as error:  # noqa: BLE001  (whatever a program on a board raises is said by the supervisor)
+        where = traceback.extract_tb(error.__traceback__)[-1:]
+        place_text = f" ({os.path.basename(where[0].filename)}:{where[0].lineno})" if where else ""
+        block.leave_fault(f"{type(error).__name__}: {error}{place_text}")
+        return FAILED
+    return 0
