@@ -9,7 +9,10 @@ reproducible, and `asynchronous` says so. What goes out changes nothing.
 from __future__ import annotations
 
 import collections
+import errno
+import math
 import os
+import select
 import tty
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Protocol
@@ -99,7 +102,10 @@ class RealPort:
 
     def read(self, limit: int) -> bytes:
         if self.number >= 0:
-            return read_ready(self.number, limit)
+            data = read_ready(self.number, limit)
+            if not data and limit > 0 and hung_up(self.number):
+                raise OSError(errno.EIO, os.strerror(errno.EIO))
+            return data
         return bytes(self.serial.read(min(limit, self.serial.in_waiting)))
 
     def write(self, data: bytes) -> int:
@@ -120,6 +126,13 @@ def read_ready(number: int, limit: int) -> bytes:
         return os.read(number, limit) if limit > 0 else b""
     except (BlockingIOError, InterruptedError):
         return b""
+
+
+def hung_up(number: int) -> bool:
+    """True when the other side of a terminal is gone: reading it then only looks as if nothing came."""
+    watch = select.poll()
+    watch.register(number, select.POLLIN)
+    return any(events & (select.POLLHUP | select.POLLERR | select.POLLNVAL) for _, events in watch.poll(0))
 
 
 def write_ready(number: int, data: bytes) -> int:
@@ -160,8 +173,6 @@ class Dropouts:
         self.switch_ns = start_ns + self._distance_ns()
 
     def _distance_ns(self) -> int:
-        import math
-
         return round(-1e9 * self.MEAN_DISTANCE_S * math.log(1.0 - self.stream.uniform()))
 
     def advance(self, now_ns: int) -> bool:

@@ -24,7 +24,7 @@ class OneLineParser(argparse.ArgumentParser):
 def parser() -> argparse.ArgumentParser:
     """The whole command line."""
     from datatable import cli as table_command
-    from tools import bench, bus, info, tune, walk
+    from tools import bench, bus, daq, info, tune, walk
     from tools.vm import command as vm
 
     top = OneLineParser(
@@ -38,6 +38,7 @@ def parser() -> argparse.ArgumentParser:
     bench.register(commands)
     tune.register(commands)
     bus.register(commands)
+    daq.register(commands)
     vm.register(commands)
     return top
 

@@ -9,21 +9,28 @@ at 45 Hz has 45 samples a second.
 import pathlib
 import tempfile
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 import numpy as np
 
+# (group name, time in s, [(channel, unit, description, samples)])
+Group = tuple[str, Any, list[tuple[str, str, str, Any]]]
+
 
 def write(robot: Any, path: pathlib.Path) -> None:
     """Write `path` whole or not at all. `robot`: a `harness.ranger.Ranger` whose log was not "none"."""
+    write_groups(groups(robot), path)
+
+
+def write_groups(groups: Iterable[Group], path: pathlib.Path) -> None:
+    """The same with groups of channels from elsewhere."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # asammdf's dependencies announce their own deprecations on import
         from asammdf import MDF, Signal
 
         with MDF(version="4.10") as file:
-            for group in groups(robot):
-                name, time_s, channels = group
+            for name, time_s, channels in groups:
                 file.append(
                     [
                         Signal(samples=values, timestamps=time_s, name=channel, unit=unit, comment=comment)
@@ -37,8 +44,8 @@ def write(robot: Any, path: pathlib.Path) -> None:
                 pathlib.Path(saved).replace(path)
 
 
-def groups(robot: Any) -> Iterator[tuple[str, Any, list[tuple[str, str, str, Any]]]]:
-    """(group name, time in s, [(channel, unit, description, samples)]) of everything that was kept."""
+def groups(robot: Any) -> Iterator[Group]:
+    """Everything that was kept."""
     kept = robot.recorded()
     yield (
         "plant",

@@ -16,6 +16,7 @@ from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeRe
 from foundation import wallclock
 from harness import build
 from harness.scenario import Scenario, StopRule
+from tools import serial_options
 from tools.files import json_target, replace_file, writable_folder
 from tools.units import LENGTHS, TIMES, quantity, whole_number
 
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
 
 DEFAULT_STEPS = 100
 SLICE_S = 0.05  # virtual seconds between two looks at the screen and at Ctrl-C
+PACED_SLICE_S = 0.005  # the same when a serial port is connected: so long at most a byte waits
 
 
 def register(commands: Any) -> None:
@@ -65,6 +67,7 @@ def register(commands: Any) -> None:
     )
     command.add_argument("--out", metavar="DIR", help="folder for logs, summary and report (made if missing)")
     command.add_argument("--json", metavar="FILE|-", help="the summary as JSON; - prints it and nothing else")
+    serial_options.add_options(command)
     command.set_defaults(run=run)
 
 
@@ -94,10 +97,16 @@ def run_scenario(scenario: Scenario, stop: StopRule, options: argparse.Namespace
     json_file = json_target(options.json)
     quiet = options.json == "-"
     console = Console(stderr=True, quiet=quiet)
-    with contextlib.closing(Ranger(scenario, log=options.log if folder else "none")) as robot:
+    quirks = serial_options.quirks_of(options)
+    with contextlib.closing(Ranger(scenario, log=options.log if folder else "none", quirks=quirks)) as robot:
+        ends, places = serial_options.connect(robot, options)
+        for place in places:
+            console.print(place, highlight=False, soft_wrap=True)
         if not build.is_compiled():
             console.print(f"running interpreted, slowly: {build.why_interpreted()}", highlight=False, soft_wrap=True)
-        walk(robot, stop, console, interrupted)
+        walk(robot, stop, console, interrupted, paced=bool(ends))
+        for line in serial_options.report(ends):
+            console.print(line, highlight=False, soft_wrap=True)
         summary = robot.summary()
         if folder is not None:
             write_files(robot, summary, folder, console)
@@ -132,8 +141,11 @@ def ctrl_c_noted() -> Iterator[list[bool]]:
         signal.signal(signal.SIGINT, previous)
 
 
-def walk(robot: Ranger, stop: StopRule, console: Console, interrupted: list[bool]) -> None:
-    """Run until the stop rule, a fall, or Ctrl-C (at least one slice, so that there is something to write)."""
+def walk(robot: Ranger, stop: StopRule, console: Console, interrupted: list[bool], paced: bool = False) -> None:
+    """Run until the stop rule, a fall, or Ctrl-C (at least one slice, so that there is something to write).
+
+    paced: not faster than the wall clock, because something outside takes part.
+    """
     started = wallclock.monotonic_s()
     with Progress(
         SpinnerColumn(),
@@ -147,8 +159,10 @@ def walk(robot: Ranger, stop: StopRule, console: Console, interrupted: list[bool
         transient=False,
     ) as progress:
         task = progress.add_task("walk", total=1.0, steps=0, distance=0.0, speed=0.0, factor=0.0)
-        while not robot.run(stop, SLICE_S) and not interrupted:
+        while not robot.run(stop, PACED_SLICE_S if paced else SLICE_S) and not interrupted:
             wall = wallclock.monotonic_s() - started
+            if paced and robot.time_s > wall:
+                wallclock.sleep_s(robot.time_s - wall)
             progress.update(
                 task,
                 completed=robot.fraction_done(stop),

@@ -1,0 +1,99 @@
+"""Options of every command that runs a robot: its serial lines on pseudo-terminals or real ports."""
+
+from __future__ import annotations
+
+import argparse
+from typing import TYPE_CHECKING, Any
+
+from boards.quirks import Quirks
+from foundation.user_error import UserError
+from harness import serial_ports
+
+if TYPE_CHECKING:
+    from harness.ranger import Ranger
+
+
+def add_options(command: Any) -> None:
+    """The options `--daq-...` and `--imu-...`."""
+    group = command.add_argument_group(
+        "serial lines", "PORT: a serial port, a URL that pyserial knows, or pty for a pseudo-terminal of its own"
+    )
+    group.add_argument("--daq-port", metavar="PORT", help="the main brain's data link, for `ranger-sim daq`")
+    group.add_argument(
+        "--daq-link",
+        choices=("wired", "bluetooth"),
+        help="928.6 kbaud (default), or 464.3 kbaud with flow control",
+    )
+    group.add_argument(
+        "--daq-dropouts",
+        action="store_true",
+        help="silences of 50 to 180 ms every 3.7 s on average, as the real robot's Bluetooth logs have them; seeded",
+    )
+    group.add_argument("--imu-port", metavar="PORT", help="a real inertial unit there, instead of the plant's")
+    group.add_argument("--imu-offer", metavar="PORT", help="the plant's inertial unit, for a real host to read")
+
+
+def quirks_of(options: argparse.Namespace) -> Quirks:
+    """The switches that these options ask for: drop-outs without a word on the link mean Bluetooth.
+
+    UserError for options that contradict each other.
+    """
+    if (options.daq_dropouts or options.daq_link) and not options.daq_port:
+        raise UserError("--daq-link and --daq-dropouts need --daq-port")
+    if options.imu_port and options.imu_offer:
+        raise UserError("--imu-port and --imu-offer exclude each other: one replaces the plant's unit, one shows it")
+    link = options.daq_link or ("bluetooth" if options.daq_dropouts else "wired")
+    return Quirks(computer_link=link)
+
+
+def wanted(options: argparse.Namespace) -> bool:
+    """True when something outside is to be connected: the robot then runs at the pace of the wall clock."""
+    return bool(options.daq_port or options.imu_port or options.imu_offer)
+
+
+def ports_of(options: argparse.Namespace) -> dict[str, serial_ports.Port]:
+    """Opened ports by what they are for: daq, imu, imu-offer. UserError when one cannot be opened."""
+    bluetooth = quirks_of(options).computer_link == "bluetooth"
+    daq_baud = serial_ports.BLUETOOTH_BAUD if bluetooth else serial_ports.DAQ_BAUD
+    ports: dict[str, serial_ports.Port] = {}
+    if options.daq_port:
+        ports["daq"] = serial_ports.open_port(options.daq_port, daq_baud, bluetooth)
+    if options.imu_port:
+        ports["imu"] = serial_ports.open_port(options.imu_port, serial_ports.IMU_BAUD)
+    if options.imu_offer:
+        ports["imu-offer"] = serial_ports.open_port(options.imu_offer, serial_ports.IMU_BAUD)
+    return ports
+
+
+MEANINGS = {
+    "daq": "data link: ranger-sim daq --port {}",
+    "imu": "inertial unit at {}",
+    "imu-offer": "the plant's inertial unit: {}",
+}
+
+
+def connect(robot: Ranger, options: argparse.Namespace) -> tuple[dict[str, Any], list[str]]:
+    """Open the ports and connect them to a robot in lockstep: (ends by name, lines that say where they are)."""
+    ports = ports_of(options)
+    ends: dict[str, Any] = {}
+    if "daq" in ports:
+        dropouts = None
+        if options.daq_dropouts:
+            dropouts = serial_ports.Dropouts(robot.scenario.seed, robot.start_ns)
+        ends["daq"] = serial_ports.connect_daq(robot, ports["daq"], dropouts)
+    if "imu" in ports:
+        ends["imu"] = serial_ports.connect_imu(robot, ports["imu"])
+    if "imu-offer" in ports:
+        ends["imu-offer"] = serial_ports.offer_imu(robot, ports["imu-offer"])
+    return ends, [MEANINGS[name].format(port.path) for name, port in ports.items()]
+
+
+def report(ends: dict[str, Any]) -> list[str]:
+    """Lines for the end of a run: traffic, what was lost, and whether the run can be repeated."""
+    lines = []
+    for name, end in ends.items():
+        counts = ", ".join(f"{key.replace('_', ' ')} {count}" for key, count in end.counters().items() if count)
+        lines.append(f"{name}: {counts or 'no traffic'}" + (f"; the port is gone: {end.gone}" if end.gone else ""))
+    if any(end.asynchronous for end in ends.values()):
+        lines.append("bytes came in at the wall clock's pace: this run cannot be repeated byte for byte")
+    return lines
