@@ -16,7 +16,7 @@ from can_bus.edge.host import BusHost
 from can_bus.edge.paced import PacedBus
 
 NUMBERS = itertools.count()
-PATIENCE_S = 120.0  # a guard against waiting for ever; nothing asserts on it
+PATIENCE_S = 60.0  # a guard against waiting for ever; nothing asserts on it
 
 
 def fresh_name():
