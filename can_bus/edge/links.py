@@ -142,6 +142,8 @@ class AttachedLink(Link):
         self.waiter = select.poll()
         self.waiter.register(self.socket, select.POLLIN)
         self.epoll: select.epoll | None = None
+        with self.changed:
+            self._understand()  # frames may have come directly behind the welcome
 
     def send(self, identifier: int, flags: int, lo: int, hi: int, timeout: float | None) -> None:
         """Queue a frame, waiting up to `timeout` s for a place (None: for ever)."""
