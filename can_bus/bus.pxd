@@ -1,9 +1,14 @@
 from foundation.events cimport EventQueue
 from foundation.random_stream cimport RandomStream
-from can_bus.frame cimport arbitration_key, frame_bits
+from can_bus.frame cimport arbitration_key, measure
 
 from libc.math cimport log
 
+cimport cython
+
+cdef long long _MASK, _NEVER
+
+@cython.final
 cdef class Node:
     cdef public str name
     cdef public long long index, controller, order
@@ -14,6 +19,7 @@ cdef class Node:
     cdef public long long accepted, refused, sent, received, aborted, single_shot_skipped, flushed
     cdef public long long arbitrations_lost, retries
 
+@cython.final
 cdef class Bus:
     cdef public str name
     cdef public long long bitrate
@@ -21,7 +27,7 @@ cdef class Bus:
     cdef public list nodes
     cdef public EventQueue commands
     # the bus in absolute bits since power-up
-    cdef public long long free_bit, quiet_bit, advanced, next_time
+    cdef public long long free_bit, free_time, quiet_bit, advanced, next_bit, next_time
     cdef public long long operating, joining
     # transmit buffers, index node * 3 + buffer - 1
     cdef public long long[::1] keys, ready, asked, asked_time, identifiers, flags, lows, highs, busy_until
@@ -44,8 +50,8 @@ cdef class Bus:
     cdef public long long log_capacity, log_count, log_dropped
     cdef public object log_sink
 
-    cpdef long long bit_of(self, long long time)
-    cpdef long long edge_ns(self, long long bit)
+    cpdef long long bit_of(self, long long time) noexcept
+    cpdef long long edge_ns(self, long long bit) noexcept
     cpdef bint request(
         self, long long node, long long buffer, long long time, long long identifier, long long flags,
         long long lo, long long hi,
@@ -53,17 +59,18 @@ cdef class Bus:
     cpdef void abort(self, long long node, long long buffer, long long time)
     cpdef void set_mode(self, long long node, long long mode, long long time)
     cpdef long long advance(self, long long until)
-    cpdef long long pending_of(self, long long node)
-    cdef long long _next_start(self)
+    cpdef long long pending_of(self, long long node) noexcept
+    cdef bint _change(self, long long until)
     cdef long long _next_join(self)
-    cdef void _look_ahead(self)
-    cdef void _remove(self, long long slot)
-    cdef void _attempt(self, long long k)
+    cdef void _look_ahead(self) noexcept
+    cdef void _start_at(self, long long first) noexcept
+    cdef void _remove(self, long long slot) noexcept
+    cdef long long _attempt(self, long long k)
     cdef bint _contend(self, long long k, long long best)
-    cdef void _succeed(self, long long k, long long slot, long long bits, bint merged)
-    cdef void _finish_sender(self, Node node, long long slot, long long end, long long done)
-    cdef void _account(self, long long first, long long last)
-    cdef void _roll(self, long long bit)
-    cdef void _record(
+    cdef long long _succeed(self, long long k, long long slot, long long bits, bint merged)
+    cdef long long _finish_sender(self, Node node, long long slot, long long end, long long done)
+    cdef void _account(self, long long first) noexcept
+    cdef void _roll(self, long long bit) noexcept
+    cdef long long _record(
         self, long long time, long long identifier, long long flags, long long lo, long long hi, long long node
     )

@@ -1,3 +1,5 @@
+# cython: boundscheck=False, wraparound=False
+# (every index below counts nodes, transmit buffers or logged frames, or is an identifier that `request` has checked)
 """One CAN bus to the bit: arbitration, timing, acknowledgement, errors and load.
 
 Time. Inside, the bus counts absolute bits since power-up; an instant in ns is made from such a count only
@@ -20,7 +22,7 @@ import array
 
 import cython
 
-from can_bus.frame import INTERMISSION_BITS, arbitration_key, frame_bits, wire
+from can_bus.frame import INTERMISSION_BITS, arbitration_key, measure, wire
 from foundation.events import (
     CAN_STATUS,
     CAN_TX_DONE,
@@ -65,6 +67,10 @@ WINDOW_RING = 1024  # closed load windows kept, 10.24 s
 
 COMMAND_ABORT = 1
 COMMAND_MODE = 2
+
+# C variables when compiled (.pxd): Cython makes a Python object of every literal above 31 bits.
+_MASK = 0xFFFFFFFF
+_NEVER = NEVER
 
 
 class Node:
@@ -122,9 +128,11 @@ class Bus:
         self.seed = seed
         self.nodes = []
         self.commands = EventQueue(16)
-        self.free_bit = 0
+        self.free_bit = 0  # after the intermission of the last frame; its instant:
+        self.free_time = 0
         self.quiet_bit = 0
         self.advanced = -1
+        self.next_bit = NEVER  # where the next frame starts, as far as known
         self.next_time = NEVER
         self.operating = 0
         self.joining = 0
@@ -190,6 +198,7 @@ class Bus:
         seconds: cython.longlong = time // billion
         return seconds * self.bitrate + (time - seconds * billion) * self.bitrate // billion
 
+    @cython.cdivision(True)  # bits are not negative
     def edge_ns(self, bit: cython.longlong) -> cython.longlong:
         """First whole ns at which bit number `bit` has begun: ceil(bit * 10^9 / bitrate)."""
         billion: cython.longlong = 1000000000
@@ -244,9 +253,8 @@ class Bus:
         """
         owner: Node
         slot: cython.longlong
-        length: cython.longlong
+        length: cython.longlong = flags & 15
         first: cython.longlong
-        mask: cython.longlong = 0xFFFFFFFF
         if node < 0 or node >= len(self.nodes):
             raise ValueError(f"bus {self.name}: node {node} does not exist")
         if buffer < 1 or buffer > 3:
@@ -267,23 +275,24 @@ class Bus:
             self._refuse(owner, flags)
             owner.inbox.push(time, owner.order, CAN_TX_DONE, owner.controller, buffer, TX_ABORTED)
             return False
-        length = flags & 15
-        if flags & 16 or length == 0:  # a remote frame carries no data
+        if length >= 8 and not flags & 16:
+            lo &= _MASK
+            hi &= _MASK
+        elif length == 0 or flags & 16:  # a remote frame carries no data
             lo = 0
             hi = 0
         elif length < 4:
-            lo = lo & ((1 << 8 * length) - 1)
+            lo &= (1 << 8 * length) - 1
             hi = 0
-        elif length < 8:
-            lo = lo & mask
-            hi = hi & ((1 << 8 * (length - 4)) - 1)
         else:
-            lo = lo & mask
-            hi = hi & mask
+            lo &= _MASK
+            hi &= (1 << 8 * (length - 4)) - 1
         if time < self.advanced:
             # stamped before what has been decided: it takes part from here on
             self.late_requests += 1
             first = self.bit_of(self.advanced) + 1
+        elif time < self.free_time:
+            first = self.free_bit
         else:
             first = self.bit_of(time) + 1
         self.asked[slot] = first
@@ -295,20 +304,17 @@ class Bus:
         self.flags[slot] = flags
         self.lows[slot] = lo
         self.highs[slot] = hi
-        self.busy_until[slot] = NEVER
+        self.busy_until[slot] = _NEVER
         self.pending[self.pending_count] = slot
         self.pending_count += 1
         self.accepted += 1
         owner.accepted += 1
         if owner.mode == 3:  # JOINING: held until the node takes part
-            self.ready[slot] = NEVER
+            self.ready[slot] = _NEVER
             return True
         self.ready[slot] = first
-        if first < self.free_bit:
-            first = self.free_bit
-        first = self.edge_ns(first)
-        if first < self.next_time:
-            self.next_time = first
+        if first < self.next_bit:
+            self._start_at(first)
         return True
 
     def _refuse(self, owner, flags) -> None:
@@ -427,45 +433,32 @@ class Bus:
         (also in the field `next_time`) is the start of the next frame as far as known, or NEVER; a
         call before that instant returns at once.
         """
-        k: cython.longlong
-        join: cython.longlong
-        last: cython.longlong
-        first: cython.longlong
         if until > self.advanced:
-            self.advanced = until
-        if until < self.next_time:
-            # decided all the same: nothing may start up to here any more
-            return self.next_time
-        last = self.bit_of(until)
-        while True:
-            k = self._next_start()
-            if self.commands.count > 0 or self.joining > 0:
-                join = self._next_join()
-                first = self.edge_ns(min(k, join, last + 1))
-                if self.commands.head_time <= until and self.commands.head_time < first:
-                    self._execute()
-                    continue
-                if join <= last and join <= k:
-                    self._join(join)
-                    continue
-            if k > last:
-                break
-            self._attempt(k)
-        self._look_ahead()
+            self.advanced = until  # decided, also where nothing starts
+        while self.next_time <= until:
+            if self.commands.count == 0 and self.joining == 0:
+                self._attempt(self.next_bit)
+            elif not self._change(until):
+                self._attempt(self.next_bit)
+            if self.pending_count == 0 and self.commands.count == 0 and self.joining == 0:
+                self.next_bit = _NEVER
+                self.next_time = _NEVER
+            else:
+                self._look_ahead()
         return self.next_time
 
-    def _next_start(self) -> cython.longlong:
-        """Bit at which the next frame starts, from what is known; NEVER when nothing waits."""
-        first: cython.longlong = 1 << 62
-        i: cython.longlong
-        ready: cython.longlong
-        for i in range(self.pending_count):
-            ready = self.ready[self.pending[i]]
-            if ready < first:
-                first = ready
-        if first < self.free_bit:
-            return self.free_bit
-        return first
+    def _change(self, until: cython.longlong) -> cython.bint:
+        """Carry out the abort or mode change, or let the nodes join, that come before the next frame, if any do."""
+        last: cython.longlong = self.bit_of(until)
+        join: cython.longlong = self._next_join()
+        first: cython.longlong = self.edge_ns(min(self.next_bit, join, last + 1))
+        if self.commands.head_time <= until and self.commands.head_time < first:
+            self._execute()
+            return True
+        if join <= last and join <= self.next_bit:
+            self._join(join)
+            return True
+        return False
 
     def _next_join(self) -> cython.longlong:
         """Bit at which the next joining node has seen its recessive sequences, if no frame comes before."""
@@ -482,14 +475,36 @@ class Bus:
         return first
 
     def _look_ahead(self) -> cython.void:
-        """Set `next_time` from what waits."""
-        k: cython.longlong = self._next_start()
-        never: cython.longlong = 1 << 62
+        """Set `next_bit` and `next_time` from what waits."""
+        first: cython.longlong = _NEVER
+        ready: cython.longlong
+        i: cython.longlong
+        for i in range(self.pending_count):
+            ready = self.ready[self.pending[i]]
+            if ready < first:
+                first = ready
+        self.next_time = _NEVER
+        self.next_bit = _NEVER
+        if first < _NEVER:
+            self._start_at(first)
         if self.joining > 0:
-            k = min(k, self._next_join())
-        self.next_time = self.edge_ns(k) if k < never else never
+            first = self._next_join()
+            if first < self.next_bit:
+                self.next_time = self.edge_ns(first)
         if self.commands.head_time < self.next_time:
             self.next_time = self.commands.head_time
+
+    def _start_at(self, first: cython.longlong) -> cython.void:
+        """The next frame starts at bit `first`, or as soon as the bus is free."""
+        time: cython.longlong
+        if first <= self.free_bit:
+            self.next_bit = self.free_bit
+            time = self.free_time
+        else:
+            self.next_bit = first
+            time = self.edge_ns(first)
+        if time < self.next_time:
+            self.next_time = time
 
     def _execute(self) -> None:
         """Carry out the first abort or mode change."""
@@ -579,9 +594,9 @@ class Bus:
 
     # ---- one frame
 
-    def _attempt(self, k: cython.longlong) -> cython.void:
-        """The frame that starts at bit k: arbitration, then success or an error frame."""
-        best: cython.longlong = -1
+    def _attempt(self, k: cython.longlong) -> cython.longlong:
+        """The frame that starts at bit k: arbitration, then success or an error frame. Returns when the bus is free."""
+        best: cython.longlong = self.pending[0]
         best_key: cython.longlong = 0
         contenders: cython.longlong = 0
         merged: cython.bint = False
@@ -590,19 +605,20 @@ class Bus:
         key: cython.longlong
         bits: cython.longlong
         vulnerable: cython.longlong
-        for i in range(self.pending_count):
-            slot = self.pending[i]
-            if self.ready[slot] <= k:
-                key = self.keys[slot]
-                if contenders == 0 or key < best_key or (key == best_key and slot < best):
-                    best = slot
-                    best_key = key
-                contenders += 1
+        if self.pending_count > 1:
+            for i in range(self.pending_count):
+                slot = self.pending[i]
+                if self.ready[slot] <= k:
+                    key = self.keys[slot]
+                    if contenders == 0 or key < best_key or (key == best_key and slot < best):
+                        best = slot
+                        best_key = key
+                    contenders += 1
         if self.joining > 0:
             self._count_sequences(k)
         if contenders > 1:
             merged = self._contend(k, best)
-        bits = frame_bits(self.identifiers[best], self.flags[best], self.lows[best], self.highs[best])
+        bits = measure(self.identifiers[best], self.flags[best], self.lows[best], self.highs[best]) & 0xFFFF
         if merged or self.operating < 2 or self.strikes_left > 0 or self.next_strike < k + bits - 1:
             senders = self._senders(k, best) if merged else [best]
             position = -1
@@ -616,13 +632,14 @@ class Bus:
                 position = bits - 9  # the ACK slot stays recessive
             if position >= 0:
                 self._fail(k, senders, position, acknowledged)
-                return
+                return self.free_bit
             for slot in senders:
                 if slot != best:
                     self.merged += 1
                     self._finish_sender(self.nodes[slot // 3], slot, k + bits, self.edge_ns(k + bits))
-        self._succeed(k, best, bits, merged)
+        return self._succeed(k, best, bits, merged)
 
+    @cython.cdivision(True)  # slots are not negative
     def _contend(self, k: cython.longlong, best: cython.longlong) -> cython.bint:
         """Settle with the losers of an arbitration; True when another node offers the very same field."""
         i: cython.longlong
@@ -693,27 +710,32 @@ class Bus:
                 return position
         return -1
 
+    @cython.cdivision(True)  # bits and slots are not negative
     def _succeed(
         self, k: cython.longlong, slot: cython.longlong, bits: cython.longlong, merged: cython.bint
-    ) -> cython.void:
-        """A whole frame on bits k ... k + bits - 1: results to everybody."""
+    ) -> cython.longlong:
+        """A whole frame on bits k ... k + bits - 1: results to everybody. Returns the bit at which the bus is free."""
         end: cython.longlong = k + bits
-        received: cython.longlong = self.edge_ns(end - 1)  # end of the sixth bit of EOF
-        done: cython.longlong = self.edge_ns(end)
+        # edge_ns of end - 1 (the end of the sixth bit of EOF), of end, and of the end of the intermission
+        rate: cython.longlong = self.bitrate
+        billion: cython.longlong = 1000000000
+        second: cython.longlong = k // rate
+        rest: cython.longlong = (end - second * rate) * billion + rate - 1
+        received: cython.longlong = second * billion + (rest - billion) // rate
+        done: cython.longlong = second * billion + rest // rate
         sender: cython.longlong = slot // 3
         identifier: cython.longlong = self.identifiers[slot]
         flags: cython.longlong = self.flags[slot] & 0x5F  # single shot is not on the wire
         lo: cython.longlong = self.lows[slot]
         hi: cython.longlong = self.highs[slot]
         heard: cython.bint = False
-        i: cython.longlong
         node: Node
         inbox: EventQueue
         self.free_bit = end + 3  # INTERMISSION_BITS
+        self.free_time = second * billion + (rest + 3 * billion) // rate
         self.quiet_bit = end - 8  # ACK delimiter and EOF are recessive
-        for i in range(len(self.nodes)):
-            node = self.nodes[i]
-            if i == sender:
+        for node in self.nodes:
+            if node.index == sender:
                 self._finish_sender(node, slot, end, done)
             elif node.mode == 0 and not (merged and node.sending_end == end):  # OPERATING
                 if node.receive_errors > 0:
@@ -734,13 +756,14 @@ class Bus:
             self.frames_by_identifier[identifier] += 1
             if done - self.asked_time[slot] > self.response_max_ns[identifier]:
                 self.response_max_ns[identifier] = done - self.asked_time[slot]
-        self._account(k, self.free_bit)
+        self._account(k)
         self._record(received, identifier, flags, lo, hi, sender)
+        return self.free_bit
 
     def _finish_sender(
         self, node: Node, slot: cython.longlong, end: cython.longlong, done: cython.longlong
-    ) -> cython.void:
-        """The sender of a whole frame that ended at bit `end`, `done` in ns: its buffer is free again."""
+    ) -> cython.longlong:
+        """The sender of a whole frame that ended at bit `end`, `done` in ns: its buffer is free from `done` on."""
         inbox: EventQueue = node.inbox
         self._remove(slot)
         self.busy_until[slot] = done
@@ -752,6 +775,7 @@ class Bus:
         if node.transmit_errors > 0:
             node.transmit_errors -= 1
             self._confine(node, done, 0)
+        return done
 
     def _suspend(self, node, free) -> None:
         """An error-passive sender waits eight bits more after the intermission (ISO 11898-1)."""
@@ -790,9 +814,10 @@ class Bus:
             delay = 6 - run
         over = k + position + 1 + 6 + delay + 8
         self.free_bit = over + INTERMISSION_BITS
+        self.free_time = self.edge_ns(self.free_bit)
         self.quiet_bit = over - 8
         self.errors += 1
-        self._account(k, self.free_bit)
+        self._account(k)
         capture = ICR_BUS_ERROR | fields[position] << ICR_FIELD_SHIFT
         for node in self.nodes:
             if node.mode != OPERATING:
@@ -870,8 +895,9 @@ class Bus:
         counts = self.frames_by_extended_identifier
         counts[identifier] = counts.get(identifier, 0) + 1
 
-    def _account(self, first: cython.longlong, last: cython.longlong) -> cython.void:
-        """Bits first ... last - 1 were taken."""
+    def _account(self, first: cython.longlong) -> cython.void:
+        """The bits from `first` until the bus is free were taken."""
+        last: cython.longlong = self.free_bit
         self.bits += last - first
         if first >= self.window_end:
             self._roll(first)
@@ -938,15 +964,15 @@ class Bus:
         lo: cython.longlong,
         hi: cython.longlong,
         node: cython.longlong,
-    ) -> cython.void:
-        """Append to the frame log. When it is full `log_sink(bus)` is called, which may take it."""
+    ) -> cython.longlong:
+        """Append to the frame log; returns how many it holds. A full one is first offered to `log_sink(bus)`."""
         base: cython.longlong
         if self.log_count >= self.log_capacity:
             if self.log_sink is not None:
                 self.log_sink(self)
             if self.log_count >= self.log_capacity:
                 self.log_dropped += 1
-                return
+                return self.log_count
         base = self.log_count * 6  # LOG_FIELDS
         self.log[base] = time
         self.log[base + 1] = identifier
@@ -955,6 +981,7 @@ class Bus:
         self.log[base + 4] = hi
         self.log[base + 5] = node
         self.log_count += 1
+        return self.log_count
 
     def clear_log(self) -> None:
         """Forget the logged frames (their reader has them)."""

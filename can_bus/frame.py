@@ -10,8 +10,6 @@ The three bits of intermission belong to the bus, not to the frame: `INTERMISSIO
 Both chains, CRC and stuffing, go byte by byte through tables; the tables are made from the bitwise rules.
 """
 
-import array
-
 import cython
 
 INTERMISSION_BITS = 3  # ISO 11898-1: recessive bits between two frames
@@ -77,10 +75,12 @@ def _stuff_of_byte(state: int, byte: int) -> int:
 
 
 # CRC_n: a byte that n - 1 further bytes follow; the CRC is linear, so four bytes go in at once.
+# HEADER_CRC, HEADER_STUFF: both chains after the start of frame and the upper ten bits of a standard identifier.
 # Compiled, the tables are C arrays (declared in the .pxd).
 if not cython.compiled:
-    CRC_1, CRC_2, CRC_3, CRC_4 = (array.array("h", [0]) * 256 for _ in range(4))
-    STUFF_STEP = array.array("h", [0]) * 2048
+    CRC_1, CRC_2, CRC_3, CRC_4 = ([0] * 256 for _ in range(4))
+    STUFF_STEP = [0] * 2048
+    HEADER_CRC, HEADER_STUFF = ([0] * 1024 for _ in range(2))
 
 
 def _fill_tables() -> None:
@@ -91,22 +91,24 @@ def _fill_tables() -> None:
         CRC_4[byte] = _crc_of_byte(byte, 24)
         for state in range(8):
             STUFF_STEP[state * 256 + byte] = _stuff_of_byte(state, byte)
+    for upper in range(1024):
+        # SOF id10-9 | id8-1, filled up in front as `measure` says
+        HEADER_CRC[upper] = CRC_2[upper >> 8] ^ CRC_1[upper & 0xFF]
+        first = STUFF_STEP[upper >> 8 | 0xA8]
+        HEADER_STUFF[upper] = STUFF_STEP[(first & 0x700) | (upper & 0xFF)] + (first & 0xFF)
 
 
 _fill_tables()
 
 
-@cython.boundscheck(False)  # table places are masked to 8 and 11 bits: no index can leave its table
+@cython.boundscheck(False)  # table places are masked to 8, 10 and 11 bits: no index can leave its table
 @cython.wraparound(False)
-def _frame(
-    identifier: cython.longlong,
-    flags: cython.longlong,
-    lo: cython.longlong,
-    hi: cython.longlong,
-    want_crc: cython.bint,
+def measure(
+    identifier: cython.longlong, flags: cython.longlong, lo: cython.longlong, hi: cython.longlong
 ) -> cython.longlong:
-    """The CRC (want_crc) or the number of stuff bits of a frame: one pass over the bytes.
+    """CRC-15 and length of a frame with this very content: crc << 16 | bits, in one pass over the bytes.
 
+    Bits: from start of frame to the end of EOF, stuff bits included, intermission not.
     The header is 19 bits (extended: 39). Its first byte is filled up in front: zeros leave an empty CRC
     register empty, and for the stuffing an alternating pattern that ends recessive, so that the dominant
     start of frame begins a new run.
@@ -119,12 +121,15 @@ def _frame(
     third: cython.longlong
     fourth: cython.longlong
     word: cython.longlong
+    bits: cython.longlong
     length: cython.longlong = flags & 15
     if length > 8:
         length = 8  # codes 9-15 also mean eight bytes (ISO 11898-1)
     if flags & 16:  # FLAG_REMOTE
         length = 0
+    bits = 44 + 8 * length
     if flags & 64:  # FLAG_EXTENDED: SOF id28-23 | id22-18 SRR IDE id17 | id16-9 | id8-1 | id0 RTR r1 r0 DLC
+        bits += 20
         byte = identifier >> 23 & 0x3F
         crc = CRC_1[byte]
         stuff = STUFF_STEP[byte | 0x80]
@@ -142,14 +147,9 @@ def _frame(
         stuff = STUFF_STEP[(stuff & 0x700) | byte]
         total += stuff
     else:  # SOF id10-9 | id8-1 | id0 RTR IDE r0 DLC
-        byte = identifier >> 9 & 3
-        crc = CRC_1[byte]
-        stuff = STUFF_STEP[byte | 0xA8]
+        crc = HEADER_CRC[identifier >> 1 & 0x3FF]
+        stuff = HEADER_STUFF[identifier >> 1 & 0x3FF]
         total = stuff
-        byte = identifier >> 1 & 0xFF
-        crc = ((crc << 8) ^ CRC_1[(crc >> 7) ^ byte]) & 0x7FFF
-        stuff = STUFF_STEP[(stuff & 0x700) | byte]
-        total += stuff
     byte = (identifier << 7 & 0x80) | (flags << 2 & 0x40) | (flags & 15)
     crc = ((crc << 8) ^ CRC_1[(crc >> 7) ^ byte]) & 0x7FFF
     stuff = STUFF_STEP[(stuff & 0x700) | byte]
@@ -179,27 +179,26 @@ def _frame(
             total += stuff
             word = word >> 8
             length -= 1
-    if want_crc:
-        return crc
     stuff = STUFF_STEP[(stuff & 0x700) | crc >> 7]
     total += stuff
     # the last 7 bits, filled up behind with the complement of the last one, which never adds a stuff bit
     total += STUFF_STEP[(stuff & 0x700) | (crc << 1 & 0xFE) | (crc & 1 ^ 1)]
-    return total & 0xFF  # the states summed above bit 8 do not matter; at most 29 stuff bits
+    # the states summed above bit 8 do not matter; at most 29 stuff bits
+    return crc << 16 | (bits + (total & 0xFF))
 
 
 def crc15(
     identifier: cython.longlong, flags: cython.longlong, lo: cython.longlong, hi: cython.longlong
 ) -> cython.longlong:
     """CRC-15 over start of frame ... data, 0 ... 0x7FFF (ISO 11898-1)."""
-    return _frame(identifier, flags, lo, hi, True)
+    return measure(identifier, flags, lo, hi) >> 16
 
 
 def stuff_bits(
     identifier: cython.longlong, flags: cython.longlong, lo: cython.longlong, hi: cython.longlong
 ) -> cython.longlong:
     """Number of stuff bits of this very content (one after every five equal bits, CRC included)."""
-    return _frame(identifier, flags, lo, hi, False)
+    return (measure(identifier, flags, lo, hi) & 0xFFFF) - unstuffed_bits(flags)
 
 
 def frame_bits(
@@ -209,14 +208,7 @@ def frame_bits(
 
     44 + 8 per byte (extended 64) without stuffing, so 108 for the robot's frames (facts 1.2).
     """
-    length: cython.longlong = flags & 15
-    if length > 8:
-        length = 8
-    if flags & 16:  # FLAG_REMOTE
-        length = 0
-    if flags & 64:  # FLAG_EXTENDED
-        return 64 + 8 * length + _frame(identifier, flags, lo, hi, False)
-    return 44 + 8 * length + _frame(identifier, flags, lo, hi, False)
+    return measure(identifier, flags, lo, hi) & 0xFFFF
 
 
 def arbitration_key(identifier: cython.longlong, flags: cython.longlong) -> cython.longlong:
