@@ -1,17 +1,21 @@
 # make walk: set up everything, then let Ranger walk 100 steps.   make test: set up everything, then run all tests.
+# make test-vm: the tests on real SocketCAN, in a virtual machine where this kernel has none (tools/vm/README.md).
 PYTHON ?= python3
 VENV   ?= .venv
 STEPS  ?= 100
 RUN    := $(VENV)/bin/python
 SOURCES := $(shell find foundation datatable can_bus plant firmware_sim boards harness tools \( -name '*.py' -o -name '*.pxd' \) -not -name '_*' 2>/dev/null)
 
-.PHONY: walk test lint setup bench lock clean
+.PHONY: walk test test-vm lint setup bench lock clean
 
 walk: $(VENV)/.built
 	$(RUN) -m tools.cli walk --steps $(STEPS) --out runs/walk
 
 test: $(VENV)/.built
-	$(RUN) -m pytest -q
+	$(RUN) -m pytest -q -rs
+
+test-vm: $(VENV)/.built
+	$(RUN) -m tests.vm.run
 
 lint: $(VENV)/.built
 	$(RUN) -m ruff check .

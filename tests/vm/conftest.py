@@ -1,0 +1,129 @@
+"""Fixtures of the tests on real SocketCAN. They run by `make test-vm`, and there none is skipped."""
+
+import contextlib
+import pathlib
+import signal
+import subprocess
+import sys
+
+import pytest
+
+from can_bus.edge.candump import read_candump
+from foundation import wallclock
+
+from . import places
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+FIGURES = []
+LAST = "1FFFFFFF#E0F0"  # closes a recording: nobody else sends this
+
+
+def pytest_configure(config):
+    config.addinivalue_line("markers", "machine: boots virtual machines, so it runs on the host")
+    config.addinivalue_line("markers", "adapters: needs two CAN adapters that may be reconfigured")
+
+
+@pytest.fixture(autouse=True)
+def only_where_asked():
+    """An ordinary run of the suite has neither the interfaces nor the time."""
+    if not places.run_by_make_test_vm():
+        pytest.skip("on real SocketCAN: `make test-vm` runs it")
+
+
+@pytest.fixture
+def figure():
+    """figure(text): a line of the summary."""
+    return FIGURES.append
+
+
+def pytest_terminal_summary(terminalreporter):
+    if FIGURES:
+        terminalreporter.section("figures")
+        for line in FIGURES:
+            terminalreporter.write_line(line)
+
+
+class Candump:
+    """`candump -L` on some interfaces, writing to a file. `frames()` after `stop()`."""
+
+    def __init__(self, path, interfaces):
+        self.path = path
+        self.interfaces = interfaces
+        self.file = path.open("wb")
+        # -d: tell dropped frames; -r: 8 MB of frames may wait (as root, beyond the kernel's limit)
+        self.process = subprocess.Popen(
+            ["candump", "-L", "-d", "-r", "8000000", *interfaces], stdout=self.file, stderr=subprocess.PIPE, text=True
+        )
+
+    def stop(self):
+        """End it when it has written everything that was sent before; what it said on standard error."""
+        for interface in self.interfaces:
+            subprocess.run(["cansend", interface, LAST], check=True)
+
+        def has_seen_the_last_frames():
+            lines = self.path.read_text().splitlines()
+            return {line.split()[1] for line in lines if line.endswith(LAST)} == set(self.interfaces)
+
+        await_condition(has_seen_the_last_frames)
+        self.process.send_signal(signal.SIGINT)
+        _, told = self.process.communicate(timeout=60)
+        self.file.close()
+        return told
+
+    def frames(self):
+        """{interface: [(identifier, flags, lo, hi), ...]} in the order of arrival."""
+        found = {}
+        for interface, _, *frame in read_candump(self.path):
+            found.setdefault(interface, []).append(tuple(frame))
+        return {interface: frames[:-1] for interface, frames in found.items()}
+
+
+def await_condition(condition, seconds=60.0):
+    """Look until it holds; AssertionError when it does not in time."""
+    end = wallclock.monotonic_s() + seconds
+    while not condition():
+        assert wallclock.monotonic_s() < end, f"not within {seconds:g} s: {condition.__name__}"
+        wallclock.sleep_s(0.02)
+
+
+def receivers(interface):
+    """How many receivers of all frames the kernel knows on an interface."""
+    lines = pathlib.Path("/proc/net/can/rcvlist_all").read_text().splitlines()
+    return sum(line.split()[:1] == [interface] for line in lines)
+
+
+@pytest.fixture
+def candump(tmp_path):
+    """candump(interface, ...): started, and listening already; ended with the test."""
+    with contextlib.ExitStack() as stack:
+
+        def start(*interfaces):
+            before = [receivers(interface) for interface in interfaces]
+            number = len(list(tmp_path.glob("candump*")))
+            watcher = Candump(tmp_path / f"candump{number}.log", interfaces)
+            stack.callback(watcher.process.wait)
+            stack.callback(watcher.process.kill)
+
+            def listening():
+                return all(receivers(interface) > had for interface, had in zip(interfaces, before, strict=True))
+
+            await_condition(listening)
+            return watcher
+
+        yield start
+
+
+@pytest.fixture
+def command():
+    """command("walk", ...) -> CompletedProcess of ranger-sim."""
+
+    def run(*arguments, timeout=600):
+        return subprocess.run(
+            [sys.executable, "-m", "tools.cli", *map(str, arguments)],
+            cwd=ROOT,
+            capture_output=True,
+            text=True,
+            timeout=timeout,
+        )
+
+    return run

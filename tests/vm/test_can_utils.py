@@ -1,0 +1,61 @@
+"""candump, cansend and canplayer from can-utils, python-can's socketcan, and our files and codes between them."""
+
+import contextlib
+import subprocess
+
+import can
+import cantools
+
+from can_bus.edge import interfaces
+from can_bus.edge.messages import frame_of_message, message_of_frame
+from datatable.generate import GENERATED_FOLDER
+from foundation.events import FLAG_EXTENDED, FLAG_REMOTE
+from harness.ranger import Ranger
+from harness.scenario import Scenario
+from tools import walk
+
+
+def test_python_can_finds_the_interfaces():
+    assert {"socketcan:vcan0", "socketcan:vcan3"} <= set(interfaces.available_interfaces())
+
+
+def test_cansend_writes_what_our_codes_read_and_candump_reads_what_they_write(candump):
+    watcher = candump("vcan0")
+    expected = [
+        (0x123, 4, 0x04030201, 0),
+        (0x7FF, 8, 0x33221100, 0x77665544),
+        (0x1F334455, 3 | FLAG_EXTENDED, 0x332211, 0),
+        (0x00E, FLAG_REMOTE, 0, 0),
+        (0, 0, 0, 0),
+    ]
+    with can.Bus(interface="socketcan", channel="vcan0") as bus:
+        for text in ("123#01020304", "7FF#0011223344556677", "1F334455#112233", "00E#R", "000#"):
+            subprocess.run(["cansend", "vcan0", text], check=True)
+        assert [frame_of_message(bus.recv(10)) for _ in expected] == expected
+        for frame in expected:
+            bus.send(message_of_frame(0, *frame))
+    assert watcher.stop() == ""
+    assert watcher.frames() == {"vcan0": 2 * expected}
+
+
+def test_canplayer_plays_the_log_of_a_walk_and_cantools_reads_what_candump_saw(candump, tmp_path, figure):
+    with contextlib.closing(Ranger(Scenario(), log="full")) as robot:
+        robot.run_for(0.1)
+        walk.write_frames(robot, tmp_path)
+    watcher = candump("vcan0", "vcan3")
+    for number, interface in ((1, "vcan0"), (4, "vcan3")):
+        log = tmp_path / f"can{number}.log"
+        subprocess.run(["canplayer", "-t", "-I", log, f"{interface}=can{number}"], check=True, timeout=120)
+    assert watcher.stop() == ""
+    seen = watcher.frames()
+    for number, interface in ((1, "vcan0"), (4, "vcan3")):
+        text = (tmp_path / f"can{number}.log").read_text()
+        played = [line.split()[2] for line in text.splitlines()]
+        dumped = [line.split()[2] for line in watcher.path.read_text().splitlines() if line.split()[1] == interface]
+        assert dumped[:-1] == played
+        assert len(seen[interface]) == len(played) > 100
+    database = cantools.database.load_file(GENERATED_FOLDER / "can1.dbc")
+    for identifier, _, lo, hi in seen["vcan0"]:
+        decoded = database.decode_message(identifier, lo.to_bytes(4, "little") + hi.to_bytes(4, "little"))
+        assert set(decoded) == {"value", "time_ms"}
+    figure(f"canplayer -> vcan -> candump: {sum(map(len, seen.values()))} frames of a walk, all equal")
