@@ -176,6 +176,11 @@ class Ranger:
             self.next_poll_ns = max(now + lockstep.QUANTUM_NS, min(end.poll(now) for end in self.polled))
         return self.next_poll_ns
 
+    def poll_now(self) -> None:
+        """Poll every end at once: something waits at one of them."""
+        self.next_poll_ns = self.loop.time
+        self._poll()
+
     def run_for(self, seconds: float) -> None:
         """Pass `seconds` of virtual time, or less when the robot falls."""
         self.run(StopRule(time_s=self.time_s + seconds), seconds)

@@ -24,7 +24,7 @@ class OneLineParser(argparse.ArgumentParser):
 def parser() -> argparse.ArgumentParser:
     """The whole command line."""
     from datatable import cli as table_command
-    from tools import bench, bus, daq, info, tune, walk
+    from tools import bench, bus, daq, info, tune, up, walk
     from tools.vm import command as vm
 
     top = OneLineParser(
@@ -37,6 +37,7 @@ def parser() -> argparse.ArgumentParser:
     table_command.register(commands)
     bench.register(commands)
     tune.register(commands)
+    up.register(commands)
     bus.register(commands)
     daq.register(commands)
     vm.register(commands)

@@ -38,6 +38,12 @@ def register(commands: Any) -> None:
         help="let Ranger walk",
         description="All seven boards, four buses and the body in virtual time. Without an end it walks 100 steps.",
     )
+    add_run_options(command)
+    command.set_defaults(run=run)
+
+
+def add_run_options(command: Any) -> None:
+    """The options of every command that lets the robot walk: which end, which scenario, which files."""
     command.add_argument("--steps", type=whole_number(1), help="stop after so many steps")
     command.add_argument("--time", type=quantity(TIMES, "s", 0.0), metavar="60s", help="stop after so much time")
     command.add_argument(
@@ -68,25 +74,31 @@ def register(commands: Any) -> None:
     command.add_argument("--out", metavar="DIR", help="folder for logs, summary and report (made if missing)")
     command.add_argument("--json", metavar="FILE|-", help="the summary as JSON; - prints it and nothing else")
     serial_options.add_options(command)
-    command.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:
     """Walk, write the files, print the summary; 0 done, 1 fell or a board failed, 130 interrupted."""
-    stop = (
-        StopRule(options.steps, options.time, options.distance)
-        if (options.steps or options.time or options.distance)
-        else StopRule(steps=DEFAULT_STEPS)
-    )
-    scenario = Scenario(
+    stop = stop_of(options) or StopRule(steps=DEFAULT_STEPS)
+    with ctrl_c_noted() as interrupted:
+        return run_scenario(scenario_of(options), stop, options, interrupted)
+
+
+def stop_of(options: argparse.Namespace) -> StopRule | None:
+    """The end that was asked for, if one was."""
+    if options.steps or options.time or options.distance:
+        return StopRule(options.steps, options.time, options.distance)
+    return None
+
+
+def scenario_of(options: argparse.Namespace) -> Scenario:
+    """The scenario that was asked for."""
+    return Scenario(
         **({"controller": options.controller} if options.controller else {}),
         seed=options.seed,
         slope_rad=options.slope,
         floor_roughness_m=options.floor_roughness,
         model_file=options.model,
     )
-    with ctrl_c_noted() as interrupted:
-        return run_scenario(scenario, stop, options, interrupted)
 
 
 def run_scenario(scenario: Scenario, stop: StopRule, options: argparse.Namespace, interrupted: list[bool]) -> int:
@@ -108,20 +120,32 @@ def run_scenario(scenario: Scenario, stop: StopRule, options: argparse.Namespace
         for line in serial_options.report(ends):
             console.print(line, highlight=False, soft_wrap=True)
         summary = robot.summary()
-        if folder is not None:
-            write_files(robot, summary, folder, console)
-        text = json.dumps(summary, indent=2)
-        if json_file is not None:
-            replace_file(json_file, (text + "\n").encode())
-        if quiet:
-            print(text)
-        else:
-            print_summary(summary, console)
-            if folder is not None and options.log != "none":
-                console.print(f"report: {folder / 'report.html'}", soft_wrap=True)
+        finish(robot, summary, options, folder, json_file, console)
     if interrupted:
         return 130
     return 1 if summary["fell"] or summary["failed_boards"] else 0
+
+
+def finish(
+    robot: Ranger,
+    summary: dict,
+    options: argparse.Namespace,
+    folder: pathlib.Path | None,
+    json_file: pathlib.Path | None,
+    console: Console,
+) -> None:
+    """Write the files that were asked for and print the summary."""
+    if folder is not None:
+        write_files(robot, summary, folder, console)
+    text = json.dumps(summary, indent=2)
+    if json_file is not None:
+        replace_file(json_file, (text + "\n").encode())
+    if options.json == "-":
+        print(text)
+        return
+    print_summary(summary, console)
+    if folder is not None and options.log != "none":
+        console.print(f"report: {folder / 'report.html'}", soft_wrap=True)
 
 
 @contextlib.contextmanager

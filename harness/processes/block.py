@@ -24,6 +24,7 @@ COMMAND = 18  # one of the COMMAND_* below
 UNTIL = 19  # ns: run everything before this instant
 ASK_USED = 20  # slots in use of the mailbox to the board
 ROWS = 21  # rows of the stage that were written so far
+POWER_UP = 22  # ns: when a restarted board gets its power
 # the board's words
 ANSWERED = 32  # how often the board has rung
 PLANT_SLEEPS = 33
@@ -58,8 +59,7 @@ PACED = 3  # 1 when virtual time follows the wall clock
 PACE_WALL_NS = 4  # monotonic clock when virtual time was PACE_TIME_NS
 PACE_TIME_NS = 5
 PACE_WALL_PER_TIME = 6  # a double: 1 / speed
-WAITS_FOR = 8  # 1 + place of the board the plant waits for, 0: none
-WAITS_SINCE_NS = 9
+HEARTBEAT_NS = 8  # monotonic clock when the plant process last went round its loop
 STAGE_FIRST, STAGE_RING = 64, 64
 ROW_START, ROW_END, ROW_WORDS, ROW_ANALOG_START, ROW_ANALOG_END, ROW_SIZE = 0, 1, 2, 16, 48, 80
 MOST_WORDS, MOST_VOLTAGES = 14, 32

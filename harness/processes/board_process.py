@@ -6,17 +6,22 @@ import traceback
 from typing import Any
 
 from harness import wiring
+from harness.processes import block as places
 from harness.processes import kernel
 from harness.processes.block import Block
+from harness.processes.channel import Bell
 from harness.processes.endpoint import Endpoint
+from harness.processes.fresh_board import wire_fresh_board
 from harness.processes.stage import Audience
 
 FAILED = 4  # exit code: the board's program raised
 
 
-def serve(robot: Any, board: Any, block: Block, stage: tuple, real_time: bool) -> int:
-    """Run `board` of the wired, never run `robot` until told to stop; returns the exit code."""
-    name = board.name
+def serve(robot: Any, name: str, block: Block, stage: tuple, real_time: bool, fresh: bool) -> int:
+    """Run board `name` of the wired, never run `robot` until told to stop; returns the exit code.
+
+    fresh: not the board that was built with the robot but a new one, powered up when the plant's process says.
+    """
     kernel.name_process(f"ranger-{name}")
     kernel.sharp_timers()
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
@@ -25,6 +30,15 @@ def serve(robot: Any, board: Any, block: Block, stage: tuple, real_time: bool) -
         kernel.lock_memory()
         kernel.real_time_scheduling()
     place = wiring.BOARDS.index(name)
+    board = robot.boards[name]
+    if fresh:
+        bell = Bell(block.words, places.ASKED, places.BOARD_SLEEPS, block.ask_descriptor)
+        turns = block.words[places.ASKED]
+        # a turn may have begun already: then the other side is one ahead of the answers
+        first = turns + 1 if turns == block.words[places.ANSWERED] else turns
+        while not bell.wait(first):
+            pass
+        board = wire_fresh_board(robot, name, block.words[places.POWER_UP])
     if block.table_words:
         table = block.table()
         table[:] = memoryview(board.store.words)

@@ -143,7 +143,7 @@ class Mailbox:
             self.words[at + 31] = segment.used
             return 32
         data = bytes(ref)
-        padded = array.array("q", data + bytes(-len(data) % 8))
+        padded = array.array("q", data + bytes(-len(data) % 8))  # the bytes themselves, eight to a word
         self.words[at] = len(data)
         for i in range(len(padded)):
             self.words[at + 1 + i] = padded[i]
@@ -187,7 +187,8 @@ class Mailbox:
             if payload > 0:
                 ref = self._read_payload(at + 12, payload, self.words[at] & 0xFF)
             if (self.words[at] & 0xFF) >= 64:
-                self.notes.append((self.words[at] & 0xFF, *self.words[at + 1 : at + 9], ref))
+                fields = [self.words[at + 1 + i] for i in range(8)]
+                self.notes.append((self.words[at] & 0xFF, *fields, ref))
                 return True
             queue.push(
                 self.words[at + 1],
@@ -214,7 +215,8 @@ class Mailbox:
                 segment.words[i] = self.words[at + i]
             segment.used = self.words[at + 31]
             return segment
-        return bytes(memoryview(self.words)[at + 1 : at + count])[: self.words[at]]
+        data = array.array("q", [self.words[at + i] for i in range(1, count)]).tobytes()
+        return data[: self.words[at]]
 
     # --- what is whole ------------------------------------------------------------------------------------
 

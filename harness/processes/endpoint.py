@@ -31,7 +31,7 @@ class Endpoint:
         self.ask = Bell(shared.words, places.ASKED, places.BOARD_SLEEPS, shared.ask_descriptor)
         self.answer = Bell(shared.words, places.ANSWERED, places.PLANT_SLEEPS, shared.answer_descriptor)
         # a board that takes another one's place goes on where that one's turns ended
-        self.turns = shared.words[places.ASKED]
+        self.turns = shared.words[places.ANSWERED]
         self.answer.rung = shared.words[places.ANSWERED]
         self.to_board = Mailbox(
             shared.words, f"to {board.name}", shared.to_board_first, places.SLOTS, places.ASK_USED, TO_BOARD

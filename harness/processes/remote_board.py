@@ -91,11 +91,18 @@ class RemoteBoard(Microcontroller):
         self._post(places.COMMAND_ADVANCE, until)
         self._collect()
 
-    def request(self, command) -> None:
+    def command(self, command) -> None:
         """One turn with another command; what the board answers lies in the notes of `from_board`."""
         if not self.gone:
             self._post(command, self.reached)
             self._collect()
+
+    def dismiss(self) -> None:
+        """Tell the board's process to end; nothing is answered."""
+        if not self.gone:
+            self._ring(places.COMMAND_STOP, self.reached)
+            self.posted = False
+            self.gone = True
 
     def send(self, kind, time, a, b) -> None:
         """A message of our own kind to the board, in the next turn."""
@@ -146,11 +153,13 @@ class RemoteBoard(Microcontroller):
         more: cython.bint = True
         self.posted = False
         while more:
-            while not self.answer.wait(self.ask.rung):
-                if load(self.block, 56) != 0:  # FATE
+            while True:
+                if load(self.block, 56) != 0:  # FATE: looked at before every sleep, as its ring wakes only once
                     self.gone = True
                     self.inbox.clear()
                     return False
+                if self.answer.wait(self.ask.rung):
+                    break
             self.from_board.until = self.reached
             self.from_board.open()
             while self.from_board.take(self.outbox):

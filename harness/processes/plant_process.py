@@ -1,0 +1,289 @@
+"""What runs in the plant's process: the lockstep, released by the wall clock, with boards that live elsewhere."""
+
+import json
+import os
+import select
+import signal
+import socket
+import struct
+from collections.abc import Callable
+from typing import Any
+
+from datatable.generated import all_variables
+from datatable.packing import word_of_value
+from foundation import wallclock
+from foundation.user_error import UserError
+from harness import wiring
+from harness.processes import block as places
+from harness.processes import kernel, snapshot
+from harness.processes.kinds import NOTE, NOTE_SNAPSHOT, SET_WORD
+from harness.processes.pace import Pace
+from harness.processes.remote_board import RemoteBoard
+from harness.processes.settings import Settings
+from harness.processes.stage import Stage
+from harness.scenario import StopRule
+
+SLICE_S = 0.0005  # virtual time between two looks at the wall clock: one slot of a motor board
+FAST_SLICE_S = 0.005  # the same when there is no pace to keep
+STATUS_S = 0.1  # wall clock between two reports to the supervisor
+LONGEST_WAIT_S = 0.1  # so that the supervisor sees that the process lives
+KEY_HOLD_NS = 200_000_000  # a firm press
+RESET, OPERATING = 1, 0  # modes of a bus node
+POWER_UP_NS = 1_000_000  # from a restarted process being there to its board's power
+
+# Message kinds (bits) that may make a board put something out at once. The motor boards and the user interface keep
+# edges, frames and bytes until a task of theirs looks; the router forwards, and the main brain loads its next segment.
+URGENT_EVERYTHING = 0xFFFF
+URGENT_FOR_SENDERS = URGENT_EVERYTHING & ~(1 << 1 | 1 << 2 | 1 << 5)  # PIN_EDGE, CAN_RX, UART_BYTE can wait
+
+
+class PlantRun:
+    """Runs the wired, never run `robot` against board processes; `link`: the socket to the supervisor."""
+
+    def __init__(self, robot: Any, blocks: dict, stage: tuple, settings: Settings, link: socket.socket) -> None:
+        self.robot = robot
+        self.blocks = blocks
+        self.settings = settings
+        self.link = link
+        self.pace = Pace(*stage, settings.speed)
+        self.stage_words = stage[0]
+        self.paused = False
+        self.stopping = False
+        self.mourned: set[str] = set()
+        self.deaths: list[dict] = []
+        self.next_status_s = 0.0
+        self.wall_s = 0.0  # wall clock since the pace began, pauses included
+        loop = robot.loop
+        show = Stage(*stage, robot.plant, loop.step_times, [(wire.board, wire.word) for wire in loop.word_wires])
+        self.remotes = {
+            name: RemoteBoard(
+                robot.boards[name],
+                blocks[name],
+                show,
+                place,
+                URGENT_EVERYTHING if name in ("CSR", "MB") else URGENT_FOR_SENDERS,
+                name == "MB",
+            )
+            for place, name in enumerate(wiring.BOARDS)
+        }
+        loop.boards = list(self.remotes.values())
+        loop.remote = True
+        loop.main_brain_words = blocks["MB"].table()
+        robot.boards["MB"].store.words = blocks["MB"].table()
+
+    # --- passing time -------------------------------------------------------------------------------------
+
+    def run(self, stop: StopRule) -> None:
+        """Until the stop rule, a fall, or the supervisor says so; pausing stops virtual time."""
+        robot = self.robot
+        slice_s = FAST_SLICE_S if self.settings.speed is None else SLICE_S
+        self.pace.start(robot.loop.time)
+        if robot.run(stop, slice_s):
+            return
+        while not self.stopping:
+            ahead_s = LONGEST_WAIT_S if self.paused else self.pace.ahead_s(robot.loop.time)
+            self.wait(min(ahead_s, LONGEST_WAIT_S))
+            if self.paused or ahead_s > LONGEST_WAIT_S or self.stopping:
+                continue
+            if robot.run(stop, slice_s):
+                return
+            self.bury()
+
+    def wait(self, seconds: float) -> None:
+        """Sleep so long (not at all when not above 0), but hear the supervisor and what leads outside meanwhile."""
+        now = wallclock.monotonic_s()
+        end = now + seconds
+        self.stage_words[places.HEARTBEAT_NS] = wallclock.monotonic_ns()
+        while True:
+            ends = self.robot.polled
+            read = [self.link.fileno()]
+            write: list[int] = []
+            for each in ends:
+                read += each.filenos()
+                write += each.filenos_to_write() if hasattr(each, "filenos_to_write") else []
+            ready, writable, _ = select.select(read, write, [], max(0.0, end - now))
+            if read[0] in ready:
+                self.hear()
+                return
+            if writable or ready:
+                self.robot.poll_now()
+            now = wallclock.monotonic_s()
+            if now >= self.next_status_s:
+                self.next_status_s = now + STATUS_S
+                self.tell(status=self.status())
+            if now >= end:
+                return
+
+    # --- the supervisor -----------------------------------------------------------------------------------
+
+    def tell(self, **content: Any) -> None:
+        """Send a dictionary; while the supervisor is busy a status may get lost, nothing else."""
+        data = json.dumps(content).encode()
+        try:
+            self.link.send(data, socket.MSG_DONTWAIT if "status" in content else 0)
+        except BlockingIOError:
+            pass
+
+    def hear(self) -> None:
+        """Everything the supervisor has sent."""
+        while True:
+            try:
+                data = self.link.recv(65536, socket.MSG_DONTWAIT)
+            except BlockingIOError:
+                return
+            if not data:
+                self.stopping = True
+                return
+            self.obey(json.loads(data))
+
+    def obey(self, order: dict) -> None:
+        """One order; an order that cannot be carried out is answered with its reason."""
+        robot, what = self.robot, order["do"]
+        try:
+            if what == "stop":
+                self.stopping = True
+            elif what == "pause":
+                self.paused = True
+            elif what == "resume":
+                if self.paused:
+                    self.paused = False
+                    self.pace.start(robot.loop.time)
+            elif what == "key":
+                robot.operator.press(order["key"], robot.loop.time, KEY_HOLD_NS)
+            elif what == "set":
+                self.set_variable(order["name"], order["value"])
+            elif what == "make_room":
+                self.make_room(order["board"])
+            elif what == "revive":
+                self.revive(order["board"])
+            answer = {"answer": order.get("number"), "time_s": robot.time_s}
+        except UserError as mistake:
+            answer = {"answer": order.get("number"), "error": str(mistake)}
+        if order.get("number") is not None:
+            self.tell(**answer)
+
+    def set_variable(self, name: str, value: float) -> None:
+        """Write a variable of the main brain's table at this instant."""
+        number = all_variables.ID_OF.get(name)
+        if number is None:
+            raise UserError(f"set: {name} is no variable of the main brain's table")
+        kind = all_variables.TYPES[number]
+        try:
+            word = word_of_value(kind, value)
+        except (ValueError, OverflowError, struct.error):
+            raise UserError(f"set: {value} does not fit in {name}, which is {kind}") from None
+        self.remotes["MB"].send(SET_WORD, self.robot.loop.time, number, word)
+
+    def status(self) -> dict:
+        """What the live view shows."""
+        robot = self.robot
+        return {
+            "time_s": robot.time_s,
+            "time_ns": robot.loop.time,
+            "steps": robot.steps,
+            "distance_m": robot.distance_m,
+            "speed_m_per_s": robot.mean_speed_m_per_s(),
+            "behind_s": max(0.0, -self.pace.ahead_s(robot.loop.time)),
+            "paused": self.paused,
+            "buses": {
+                bus.name: {"load": bus.load_windows()[-1] if bus.window_count else 0.0, "errors": bus.errors}
+                for bus in robot.buses
+            },
+            "ends": [end.counters() for end in robot.polled],
+            "damaged": {name: remote.from_board.damaged for name, remote in self.remotes.items()},
+            "damage": [remote.from_board.last_damage for remote in self.remotes.values() if remote.from_board.damaged],
+        }
+
+    # --- boards that are gone -----------------------------------------------------------------------------
+
+    def nodes_of(self, name: str) -> list:
+        """(bus, node) of every controller of a board."""
+        loop, place = self.robot.loop, wiring.BOARDS.index(name)
+        return [
+            (self.robot.buses[loop.bus_of[4 * place + i]], loop.node_of[4 * place + i])
+            for i in range(4)
+            if loop.bus_of[4 * place + i] >= 0
+        ]
+
+    def bury(self) -> None:
+        """A board that went away is off its buses; its pins stay as they were, so its watchdog line stands still."""
+        for name, remote in self.remotes.items():
+            if remote.gone and name not in self.mourned:
+                self.mourned.add(name)
+                self.deaths.append({"board": name, "time_s": self.robot.time_s})
+                for bus, node in self.nodes_of(name):
+                    bus.set_mode(node, RESET, self.robot.loop.time)
+                self.tell(gone=name, time_s=self.robot.time_s)
+
+    def make_room(self, name: str) -> None:
+        """The old process of a board has ended: set its channel back for a new one."""
+        remote, words = self.remotes[name], self.blocks[name].words
+        remote.gone = True
+        self.bury()
+        remote.posted = False
+        words[places.ASKED] = words[places.ANSWERED] = remote.ask.rung
+        words[places.ASK_USED] = words[places.ANSWER_USED] = 0
+        remote.to_board.sequence = remote.from_board.sequence = 0
+        remote.to_board.used = 0
+
+    def revive(self, name: str) -> None:
+        """The board has a process again: it gets its power a millisecond from now."""
+        remote = self.remotes[name]
+        power_up_ns = self.robot.loop.time + POWER_UP_NS
+        self.blocks[name].words[places.POWER_UP] = power_up_ns
+        remote.gone = False
+        remote.next_time = power_up_ns
+        remote.quiet_until = 0
+        remote.reached = self.robot.loop.time
+        self.mourned.discard(name)
+        for bus, node in self.nodes_of(name):
+            bus.set_mode(node, OPERATING, self.robot.loop.time)
+
+    # --- the end ------------------------------------------------------------------------------------------
+
+    def collect(self) -> None:
+        """Bring every board to the plant's instant, fetch what it counted, and let its process end."""
+        for name, remote in self.remotes.items():
+            remote.catch_up(self.robot.loop.time)
+            remote.from_board.notes.clear()
+            remote.command(places.COMMAND_SNAPSHOT)
+            if remote.gone:
+                continue
+            parts = [note for note in remote.from_board.notes if note[0] == NOTE and note[3] == NOTE_SNAPSHOT]
+            parts.sort(key=lambda note: note[4])
+            snapshot.put(self.robot.boards[name], json.loads(b"".join(note[-1] for note in parts)))
+            remote.dismiss()
+
+
+def serve(
+    robot: Any,
+    blocks: dict,
+    stage: tuple,
+    settings: Settings,
+    link: socket.socket,
+    stop: StopRule,
+    finish: Callable[[Any, "PlantRun", bool], int],
+) -> int:
+    """The whole life of the plant's process; returns its exit code: that of `finish`."""
+    kernel.name_process("ranger-plant")
+    kernel.sharp_timers()
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.SIG_IGN)  # the supervisor decides when it is over
+    if settings.real_time:
+        kernel.lock_memory()
+        kernel.real_time_scheduling()
+    run = PlantRun(robot, blocks, stage, settings, link)
+    started = wallclock.monotonic_s()
+    run.run(stop)
+    run.wall_s = wallclock.monotonic_s() - started
+    interrupted = run.stopping
+    run.tell(collecting=True)
+    run.collect()
+    os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
+    run.tell(over=True, status=run.status())
+    link.setblocking(True)
+    while True:  # the terminal is the supervisor's until it says so
+        data = link.recv(65536)
+        if not data or json.loads(data)["do"] == "finish":
+            break
+    return finish(robot, run, interrupted)

@@ -1,0 +1,29 @@
+"""How a robot of processes is to be run."""
+
+import dataclasses
+import math
+
+from foundation.user_error import UserError
+
+NEVER, ON_FAILURE = "never", "on-failure"
+
+
+@dataclasses.dataclass(frozen=True)
+class Settings:
+    """speed: virtual seconds per wall-clock second, None as fast as it goes. restart: what to do with dead boards.
+
+    real_time: ask for SCHED_FIFO and locked memory. name: under which the running robot is found.
+    """
+
+    speed: float | None = 1.0
+    restart: str = NEVER
+    real_time: bool = True
+    name: str = "ranger"
+
+    def __post_init__(self) -> None:
+        if self.speed is not None and not (math.isfinite(self.speed) and 1e-4 <= self.speed <= 1000.0):
+            raise UserError(f"speed is {self.speed!r}, allowed are 0.0001 to 1000, or max")
+        if self.restart not in (NEVER, ON_FAILURE):
+            raise UserError(f"restart is {self.restart!r}, allowed are {NEVER}, {ON_FAILURE}")
+        if not self.name or len(self.name) > 64 or not self.name.replace("-", "").replace("_", "").isalnum():
+            raise UserError(f"name is {self.name!r}, allowed are up to 64 letters, digits, - and _")

@@ -1,0 +1,454 @@
+"""The process the user starts: makes the others, notices what becomes of them, and is the last to leave.
+
+It builds the robot once and never runs it. Every other process is a fork of it: the plant's process takes the robot
+over, a board's process one of its boards; a restarted board is a fork as well. When the supervisor dies, however it
+dies, the kernel kills the others; their memory is anonymous and their sockets have no names, so nothing remains.
+"""
+
+import contextlib
+import dataclasses
+import gc
+import json
+import os
+import select
+import signal
+import socket
+import sys
+import warnings
+from collections.abc import Callable, Iterator
+from typing import Any
+
+from foundation import wallclock
+from foundation.user_error import UserError
+from harness import wiring
+from harness.processes import block as places
+from harness.processes import board_process, kernel, plant_process
+from harness.processes.block import Block, new_stage
+from harness.processes.control import ControlServer
+from harness.processes.lateness import figures
+from harness.processes.settings import ON_FAILURE, Settings
+from harness.scenario import StopRule
+
+PLANT = "plant"
+LOOK_S = 0.2  # between two looks at boards and screen
+HANG_S = 1.0  # a board that keeps its turn so long is looked at; named well within 2 s
+RESTART_LIMIT = 5  # per board with --restart on-failure, so that a board that cannot live does not keep us busy
+
+RUNNING, STOPPED, GONE, RESTARTING = "running", "stopped", "gone", "restarting"
+
+
+class View:
+    """What the supervisor shows; tools/ has one for a terminal and one for a pipe."""
+
+    def show(self, state: dict) -> None:
+        """The state of the run, some times a second."""
+
+    def say(self, text: str) -> None:
+        """Something happened: one line."""
+
+    def close(self) -> None:
+        """Leave the terminal to others."""
+
+
+@dataclasses.dataclass
+class Child:
+    """A process of the robot. `turn`: the turn it had when last looked at, since `turn_since_s`."""
+
+    name: str
+    process: int
+    state: str = RUNNING
+    turn: int = -1
+    turn_since_s: float = 0.0
+    turn_cpu_s: float = 0.0
+
+
+class Supervisor:
+    """Runs `robot` as processes. `finish(robot, run, interrupted)`: called in the plant's process at the end."""
+
+    def __init__(
+        self,
+        robot: Any,
+        settings: Settings,
+        stop: StopRule,
+        finish: Callable[[Any, Any, bool], int],
+        view: View,
+    ) -> None:
+        self.robot = robot
+        self.settings = settings
+        self.stop_rule = stop
+        self.finish = finish
+        self.view = view
+        self.control = ControlServer(settings.name)
+        self.stage = new_stage()
+        table_words = len(robot.boards["MB"].store.words)
+        self.blocks = {
+            name: Block(name, place, table_words if name == "MB" else 0) for place, name in enumerate(wiring.BOARDS)
+        }
+        self.children: dict[str, Child] = {}
+        self.link, self.plant_link = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        self.wakeup_read, self.wakeup_write = socket.socketpair()
+        self.signals: list[int] = []
+        self.interrupts = 0
+        self.ending = False  # the plant's process has said that it is over
+        self.status: dict = {}
+        self.restarts: dict[str, int] = {}
+        self.exit_code: int | None = None
+        self.scheduling = self.try_scheduling()
+        self.plant_seen = (0, 0.0)
+
+    # --- processes ----------------------------------------------------------------------------------------
+
+    def fork(self, name: str, body: Callable[[], int]) -> int:
+        """A child that runs `body` and leaves with what it returns."""
+        parent = os.getpid()
+        sys.stdout.flush()
+        sys.stderr.flush()
+        with warnings.catch_warnings():
+            # numerical libraries keep threads for matrices; nothing of ours uses them, in no process
+            warnings.simplefilter("ignore", DeprecationWarning)
+            process = os.fork()
+        if process:
+            self.children[name] = Child(name, process)
+            return process
+        code = board_process.FAILED
+        try:
+            kernel.die_with_parent(parent)
+            signal.set_wakeup_fd(-1)
+            for number in (signal.SIGCHLD, signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+                signal.signal(number, signal.SIG_IGN if number != signal.SIGCHLD else signal.SIG_DFL)
+            for each in (self.link, self.wakeup_read, self.wakeup_write):
+                each.close()
+            self.control.close()
+            gc.freeze()
+            code = body()
+        except BaseException as error:  # noqa: BLE001  (a child must never return into the parent's program)
+            with contextlib.suppress(Exception):
+                print(f"ranger-sim: {name}: {type(error).__name__}: {error}", file=sys.stderr)
+        finally:
+            with contextlib.suppress(Exception):
+                sys.stdout.flush()
+                sys.stderr.flush()
+            os._exit(code)
+
+    def start_board(self, name: str, fresh: bool = False) -> None:
+        """A process for a board: for the one that was built, or for one fresh from the shelf."""
+        block = self.blocks[name]
+
+        def body() -> int:
+            self.plant_link.close()
+            self.robot.logbook.close()
+            return board_process.serve(self.robot, name, block, self.stage, self.settings.real_time, fresh)
+
+        block.words[places.FATE] = 0
+        block.words[places.FAULT_TEXT] = 0
+        self.fork(name, body)
+
+    def start_plant(self) -> None:
+        """The plant's process."""
+
+        def body() -> int:
+            return plant_process.serve(
+                self.robot, self.blocks, self.stage, self.settings, self.plant_link, self.stop_rule, self.finish
+            )
+
+        self.fork(PLANT, body)
+        self.plant_link.close()
+
+    # --- the life of a run --------------------------------------------------------------------------------
+
+    def describe(self) -> str:
+        """The pace, and what was obtained of the kernel."""
+        pace = "as fast as it goes" if self.settings.speed is None else f"{self.settings.speed:g} x real time"
+        return f"{pace}; {self.scheduling}"
+
+    def run(self) -> int:
+        """Start everything, look after it, and return the exit code."""
+        with self.signals_noted():
+            try:
+                for name in wiring.BOARDS:
+                    self.start_board(name)
+                self.start_plant()
+                while self.exit_code is None:
+                    self.turn()
+            finally:
+                self.view.close()
+                self.kill_all()
+                self.control.close()
+        return self.exit_code
+
+    @contextlib.contextmanager
+    def signals_noted(self) -> Iterator[None]:
+        """Signals wake the loop and are handled there."""
+
+        def note(number: int, _frame: Any) -> None:
+            self.signals.append(number)
+
+        self.wakeup_write.setblocking(False)
+        self.wakeup_read.setblocking(False)
+        watched = (signal.SIGCHLD, signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+        before = {number: signal.signal(number, note) for number in watched}
+        wakeup = signal.set_wakeup_fd(self.wakeup_write.fileno(), warn_on_full_buffer=False)
+        try:
+            yield
+        finally:
+            signal.set_wakeup_fd(wakeup)
+            for number, handler in before.items():
+                signal.signal(number, handler)
+
+    def try_scheduling(self) -> str:
+        """What the children will get of real-time scheduling and locked memory, found out in one that ends at once."""
+        if not self.settings.real_time:
+            return "ordinary scheduling, memory not locked (as asked for)"
+        read, write = os.pipe()
+        process = os.fork()
+        if process == 0:
+            fifo, locked = kernel.real_time_scheduling(), kernel.lock_memory()
+            os.write(write, f"{fifo}\n{locked}".encode())
+            os._exit(0)
+        os.close(write)
+        with os.fdopen(read) as pipe:
+            fifo, _, locked = pipe.read().partition("\n")
+        os.waitpid(process, 0)
+        scheduling = f"ordinary scheduling (SCHED_FIFO: {fifo})" if fifo else "SCHED_FIFO"
+        memory = f"memory not locked ({locked})" if locked else "memory locked"
+        return f"{scheduling}, {memory}"
+
+    def turn(self) -> None:
+        """Wait for something to happen, or a fifth of a second, and see to it."""
+        read = [self.wakeup_read.fileno(), self.link.fileno(), *self.control.filenos()]
+        ready, _, _ = select.select(read, [], [], LOOK_S)
+        if self.wakeup_read.fileno() in ready:
+            with contextlib.suppress(BlockingIOError):
+                while self.wakeup_read.recv(4096):
+                    pass
+        signals, self.signals = self.signals, []
+        self.hear_plant()  # before the news of children: what they were told comes first
+        if signal.SIGCHLD in signals:
+            self.reap()
+        if any(number != signal.SIGCHLD for number in signals):
+            self.interrupt()
+        self.control.poll(self.obey)
+        self.look()
+
+    def interrupt(self) -> None:
+        """Ctrl-C: once to stop and finish the files, twice to break off."""
+        self.interrupts += 1
+        if self.interrupts > 1:
+            self.view.say("broken off: no files are finished")
+            self.exit_code = 130
+            return
+        self.order({"do": "stop"})
+        for child in self.children.values():
+            if child.state == STOPPED:
+                os.kill(child.process, signal.SIGCONT)  # it has to finish as well
+
+    def order(self, content: dict) -> None:
+        """Tell the plant's process something."""
+        with contextlib.suppress(OSError):  # it is gone: `reap` has the news
+            self.link.send(json.dumps(content).encode())
+
+    def hear_plant(self) -> None:
+        """What the plant's process has sent."""
+        while True:
+            try:
+                data = self.link.recv(1 << 20, socket.MSG_DONTWAIT)
+            except (BlockingIOError, ConnectionResetError):
+                return
+            if not data:
+                return
+            news = json.loads(data)
+            if "status" in news:
+                self.status = news["status"]
+            if news.get("answer") is not None:
+                self.answered(news)
+            if "gone" in news:
+                self.view.say(f"{news['gone']} is off its bus since {news['time_s']:.3f} s of the robot's time")
+            if "collecting" in news:  # from here on boards end because they are told to
+                self.ending = True
+            if "over" in news:
+                self.look()
+                self.view.close()
+                self.order({"do": "finish"})
+
+    def answered(self, news: dict) -> None:
+        """The plant's process has carried out an order, or says why not."""
+        number = news["answer"]
+        if isinstance(number, str):  # a restart: "restart MCH"
+            name = number.partition(" ")[2]
+            self.start_board(name, fresh=True)
+            self.order({"do": "revive", "board": name})
+            self.view.say(f"{name} restarted at {news['time_s']:.3f} s of the robot's time")
+            return
+        self.control.answer(number, {"error": news["error"]} if "error" in news else {"time_s": news["time_s"]})
+
+    # --- what becomes of the processes --------------------------------------------------------------------
+
+    def reap(self) -> None:
+        """Take note of every child that ended, was stopped or goes on."""
+        while True:
+            try:
+                process, status = os.waitpid(-1, os.WNOHANG | os.WUNTRACED | os.WCONTINUED)
+            except ChildProcessError:
+                return
+            if process == 0:
+                return
+            child = next((each for each in self.children.values() if each.process == process), None)
+            if child is None:
+                continue
+            if os.WIFSTOPPED(status):
+                child.state = STOPPED
+                self.view.say(f"{child.name} (process {process}) is stopped by signal {os.WSTOPSIG(status)}: all wait")
+            elif os.WIFCONTINUED(status):
+                child.state = RUNNING
+                self.view.say(f"{child.name} (process {process}) goes on")
+            else:
+                self.ended(child, os.waitstatus_to_exitcode(status))
+
+    def ended(self, child: Child, code: int) -> None:
+        """A child is no more."""
+        before, child.state = child.state, GONE
+        if child.name == PLANT:
+            self.plant_ended(child, code)
+            return
+        if self.ending and code == 0:
+            return
+        words = self.blocks[child.name].words
+        how = f"was killed by signal {-code}" if code < 0 else f"ended with code {code}"
+        why = self.blocks[child.name].fault()
+        if before != RESTARTING:
+            self.view.say(f"{child.name} (process {child.process}) {how}{': ' + why if why else ''}")
+        words[places.FATE] = 1
+        os.eventfd_write(self.blocks[child.name].answer_descriptor, 1)
+        if self.ending or self.interrupts:
+            return
+        if before == RESTARTING:
+            self.make_room(child)
+        elif self.settings.restart == ON_FAILURE:
+            self.restarts[child.name] = self.restarts.get(child.name, 0) + 1
+            if self.restarts[child.name] > RESTART_LIMIT:
+                self.view.say(f"{child.name} ended {RESTART_LIMIT + 1} times: not restarted any more")
+            else:
+                self.make_room(child)
+
+    def make_room(self, child: Child) -> None:
+        """Have the plant's process set the channel back; `answered` starts the new process."""
+        child.state = RESTARTING
+        self.order({"do": "make_room", "board": child.name, "number": f"restart {child.name}"})
+
+    def plant_ended(self, child: Child, code: int) -> None:
+        """The run is over, as it should be or not."""
+        if self.ending and code >= 0:
+            self.exit_code = code
+            return
+        how = f"was killed by signal {-code}" if code < 0 else f"ended with code {code}"
+        self.view.say(f"{PLANT} (process {child.process}) {how}: the run is lost, no files are finished")
+        self.exit_code = 1
+
+    def look(self) -> None:
+        """Find boards that keep their turn too long, and show how things are."""
+        now = wallclock.monotonic_s()
+        for name, block in self.blocks.items():
+            child = self.children.get(name)
+            if child is None or child.state != RUNNING:
+                continue
+            words = block.words
+            turn = words[places.ASKED]
+            if turn == words[places.ANSWERED] or turn != child.turn:
+                child.turn, child.turn_since_s = turn, now
+                child.turn_cpu_s = kernel.processor_time_s(child.process) if turn != words[places.ANSWERED] else 0.0
+                continue
+            held_s = now - child.turn_since_s
+            if held_s < HANG_S or kernel.state_of(child.process) in ("T", "t", "Z", ""):
+                continue
+            used_s = kernel.processor_time_s(child.process) - child.turn_cpu_s
+            if kernel.state_of(child.process) == "R" and used_s < HANG_S / 2:
+                continue  # it would like to, but the machine is busy with others
+            self.view.say(f"{name} (process {child.process}) hangs: no answer for {held_s:.1f} s; it is killed")
+            os.kill(child.process, signal.SIGKILL)
+            child.turn_since_s = now
+        plant = self.children.get(PLANT)
+        if not self.ending and plant is not None and plant.state == RUNNING:
+            self.look_at_plant(plant, now)
+        if not self.ending:
+            self.view.show(self.state())
+
+    def look_at_plant(self, plant: Child, now: float) -> None:
+        """Name the plant's process when it makes no progress although no board keeps it waiting."""
+        progress = self.stage[0][places.HEARTBEAT_NS]
+        waits = any(
+            words[places.ASKED] != words[places.ANSWERED] for words in (each.words for each in self.blocks.values())
+        )
+        if progress != self.plant_seen[0] or waits:
+            self.plant_seen = (progress, now)
+            plant.turn = 0
+        elif now - self.plant_seen[1] > HANG_S and plant.turn == 0 and kernel.state_of(plant.process) not in ("T", "t"):
+            plant.turn = 1
+            self.view.say(f"{PLANT} (process {plant.process}) hangs: no progress for {now - self.plant_seen[1]:.1f} s")
+
+    def state(self) -> dict:
+        """Everything the view shows."""
+        boards = {}
+        for name, block in self.blocks.items():
+            words, child, board = block.words, self.children.get(name), self.robot.boards[name]
+            bins = words[places.LATENESS : places.LATENESS + places.LATENESS_WORDS]
+            boards[name] = {
+                "state": child.state if child is not None else GONE,
+                "process": child.process if child is not None else 0,
+                "slots": words[places.SLOT_COUNT],
+                "overruns": words[places.OVERRUNS],
+                "max_slot_us": words[places.MAX_SLOT_CYCLES] * 1e6 / board.hz,
+                "errors": words[places.ERRORS],
+                "damaged": words[places.DAMAGED] + self.status.get("damaged", {}).get(name, 0),
+                "lateness": figures(bins, words[places.LATE_MAX] / 1000.0),
+            }
+        return {
+            "name": self.settings.name,
+            "speed": self.settings.speed,
+            "scheduling": self.scheduling,
+            "plant": self.children[PLANT].process if PLANT in self.children else 0,
+            "boards": boards,
+            **self.status,
+        }
+
+    def obey(self, number: int, request: dict) -> None:
+        """A request of `ranger-sim ctl`; answered at once, or when the plant's process has answered."""
+        what = request.get("do")
+        if what == "status":
+            self.control.answer(number, self.state())
+        elif what in ("pause", "resume", "key", "set"):
+            stopped = [child.name for child in self.children.values() if child.state == STOPPED]
+            if stopped:
+                self.control.answer(number, {"error": f"{', '.join(stopped)} is stopped: all wait for it"})
+            else:
+                self.order({**request, "number": number})
+        elif what == "restart":
+            child = self.children.get(str(request.get("board")))
+            if child is None or child.name == PLANT:
+                known = ", ".join(wiring.BOARDS)
+                self.control.answer(number, {"error": f"restart: {request.get('board')!r} is none of {known}"})
+                return
+            if child.state == GONE:
+                self.make_room(child)
+            else:
+                child.state = RESTARTING
+                os.kill(child.process, signal.SIGKILL)
+            self.control.answer(number, {"restarting": child.name})
+        else:
+            self.control.answer(number, {"error": f"{what!r} is no request"})
+
+    def kill_all(self) -> None:
+        """Whatever still lives."""
+        for child in self.children.values():
+            if child.state != GONE:
+                with contextlib.suppress(ProcessLookupError):
+                    os.kill(child.process, signal.SIGKILL)
+        for child in self.children.values():
+            if child.state != GONE:
+                with contextlib.suppress(ChildProcessError):
+                    os.waitpid(child.process, 0)
+
+
+def check_platform() -> None:
+    """UserError where processes of this kind cannot be had."""
+    if not sys.platform.startswith("linux"):
+        raise UserError("up: boards as processes need Linux (eventfd, abstract sockets); `walk` runs everywhere")

@@ -1,0 +1,292 @@
+"""`ranger-sim up`: the robot as processes at the pace of the wall clock; `ranger-sim ctl`: requests to it."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import json
+from typing import TYPE_CHECKING, Any
+
+from rich.console import Console
+from rich.live import Live
+from rich.table import Table
+
+from foundation import wallclock
+from foundation.user_error import UserError
+from harness import build
+from harness.processes import block as places
+from harness.processes import control
+from harness.processes.lateness import figures
+from harness.processes.settings import NEVER, ON_FAILURE, Settings
+from harness.processes.supervisor import Supervisor, View, check_platform
+from harness.scenario import StopRule
+from tools import bus, serial_options, walk
+from tools.files import json_target, writable_folder
+
+if TYPE_CHECKING:
+    from harness.processes.plant_process import PlantRun
+    from harness.ranger import Ranger
+
+PLAIN_S = 2.0  # between two lines where there is no terminal
+FOREVER = StopRule(steps=1 << 40)
+
+
+def speed(text: str) -> float | None:
+    """An argparse type: a factor, or max (None)."""
+    if text == "max":
+        return None
+    try:
+        return float(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is neither a number nor max") from None
+
+
+def register(commands: Any) -> None:
+    """Add both subcommands to the command line."""
+    up = commands.add_parser(
+        "up",
+        help="the robot as processes, in real time",
+        description="One process per board and one for the body. Without an end it walks until Ctrl-C.",
+    )
+    walk.add_run_options(up)
+    group = up.add_argument_group("processes")
+    group.add_argument(
+        "--speed", type=speed, default=1.0, metavar="FACTOR|max", help="virtual seconds per second (default 1.0)"
+    )
+    group.add_argument(
+        "--restart",
+        choices=(NEVER, ON_FAILURE),
+        default=NEVER,
+        help="what becomes of a board that dies (default never)",
+    )
+    group.add_argument("--name", default="ranger", help="under which others find this robot (default ranger)")
+    group.add_argument(
+        "--no-real-time", action="store_true", help="do not ask for SCHED_FIFO and locked memory, even if permitted"
+    )
+    bus.add_server_options(up)
+    up.set_defaults(run=run)
+
+    ctl = commands.add_parser(
+        "ctl",
+        help="pause, resume, look at or change a robot that `up` runs",
+        description="status | pause | resume | restart BOARD | key N | set NAME VALUE",
+    )
+    ctl.add_argument("request", choices=("status", "pause", "resume", "restart", "key", "set"))
+    ctl.add_argument("values", nargs="*", metavar="VALUE")
+    ctl.add_argument("--name", default="ranger", help="of the robot (default ranger)")
+    ctl.set_defaults(run=run_ctl)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Start the processes and look after them; exit codes as for `walk`."""
+    from harness.ranger import Ranger  # the whole robot: only when it is to walk
+
+    check_platform()
+    settings = Settings(
+        speed=options.speed, restart=options.restart, real_time=not options.no_real_time, name=options.name
+    )
+    folder = writable_folder(options.out) if options.out else None
+    json_file = json_target(options.json)
+    console = Console(stderr=True, quiet=options.json == "-")
+    scenario, stop = walk.scenario_of(options), walk.stop_of(options) or FOREVER
+    quirks = serial_options.quirks_of(options)
+    with contextlib.closing(Ranger(scenario, log=options.log if folder else "none", quirks=quirks)) as robot:
+        ends, lines = serial_options.connect(robot, options)
+        servers, more = bus.open_servers(
+            {each.name: each for each in robot.buses}, options.name, options.slcan, options.socketcand
+        )
+        for server in servers:
+            robot.attach(server)
+        for line in lines + more:
+            console.print(line, highlight=False, soft_wrap=True)
+        if not build.is_compiled():
+            console.print(f"running interpreted, slowly: {build.why_interpreted()}", highlight=False, soft_wrap=True)
+
+        def finish(robot: Ranger, run: PlantRun, interrupted: bool) -> int:
+            summary = robot.summary()
+            summary["processes"] = processes_summary(robot, run, servers, ends)
+            for line in serial_options.report(ends):
+                console.print(line, highlight=False, soft_wrap=True)
+            walk.finish(robot, summary, options, folder, json_file, console)
+            print_processes(summary["processes"], console)
+            if interrupted:
+                return 130
+            return 1 if summary["fell"] or summary["failed_boards"] else 0
+
+        view = LiveView(console) if console.is_terminal else PlainView(console)
+        supervisor = Supervisor(robot, settings, stop, finish, view)
+        view.say(f"ranger-sim up, name {settings.name}: {supervisor.describe()}")
+        return supervisor.run()
+
+
+def processes_summary(robot: Ranger, run: PlantRun, servers: list[Any], ends: dict[str, Any]) -> dict:
+    """What `--json` says about the processes: pace, lateness, turns, damage, deaths, what came from outside."""
+    boards = {}
+    for name, block in run.blocks.items():
+        words = block.words
+        bins = words[places.LATENESS : places.LATENESS + places.LATENESS_WORDS]
+        boards[name] = {
+            "lateness": figures(bins, words[places.LATE_MAX] / 1000.0),
+            "turns_per_s": run.remotes[name].turns / robot.time_s if robot.time_s > 0.0 else 0.0,
+            "damaged_messages": words[places.DAMAGED] + run.remotes[name].from_board.damaged,
+        }
+    sent = sum(server.counters().get("frames_in", 0) for server in servers)
+    return {
+        "speed": run.settings.speed if run.settings.speed is not None else "max",
+        "wall_s": run.wall_s,
+        "paced_factor": robot.time_s / run.wall_s if run.wall_s > 0.0 else None,
+        "boards": boards,
+        "deaths": run.deaths,
+        "asynchronous": bool(sent or any(end.asynchronous for end in ends.values())),
+        "frames_from_outside": sent,
+    }
+
+
+def print_processes(found: dict, console: Console) -> None:
+    """The table of lateness."""
+    table = lateness_table({name: each["lateness"] for name, each in found["boards"].items()})
+    console.print(table)
+    console.print(
+        f"{found['paced_factor'] or 0.0:.2f} x real time by the wall clock, "
+        f"{sum(each['turns_per_s'] for each in found['boards'].values()):.0f} turns per second of the robot's time"
+        + ("; frames or bytes came from outside: this run cannot be repeated" if found["asynchronous"] else ""),
+        highlight=False,
+    )
+    for death in found["deaths"]:
+        console.print(f"{death['board']} was lost at {death['time_s']:.3f} s", highlight=False)
+
+
+def micro(value: float | None) -> str:
+    """A time in us, or a dash."""
+    return "-" if value is None else f"{value:.0f}"
+
+
+def lateness_table(lateness: dict) -> Table:
+    """How late slots were, by board, in us."""
+    table = Table(title="lateness of slots, us", box=None, pad_edge=False)
+    for heading in ("board", "slots", "p50", "p99", "p99.9", "max"):
+        table.add_column(heading, justify="left" if heading == "board" else "right")
+    for name, each in lateness.items():
+        table.add_row(
+            name, str(each["slots"]), *(micro(each[key]) for key in ("p50_us", "p99_us", "p999_us", "max_us"))
+        )
+    return table
+
+
+class PlainView(View):
+    """Lines for where there is no terminal."""
+
+    def __init__(self, console: Console) -> None:
+        self.console = console
+        self.next_s = 0.0
+
+    def show(self, state: dict) -> None:
+        """A line now and then."""
+        now = wallclock.monotonic_s()
+        if now < self.next_s or "time_s" not in state:
+            return
+        self.next_s = now + PLAIN_S
+        loads = " ".join(f"{100.0 * each['load']:.0f}" for each in state["buses"].values())
+        late = max((each["lateness"]["p99_us"] or 0.0) for each in state["boards"].values())
+        wrong = [f"{name} {each['state']}" for name, each in state["boards"].items() if each["state"] != "running"]
+        self.say(
+            f"{state['time_s']:.1f} s, {state['steps']} steps, {state['distance_m']:.2f} m, loads {loads} %, "
+            f"late p99 {late:.0f} us" + (", paused" if state["paused"] else "") + "".join(f", {each}" for each in wrong)
+        )
+
+    def say(self, text: str) -> None:
+        self.console.print(text, highlight=False, soft_wrap=True)
+
+
+class LiveView(View):
+    """A table that is redrawn in place; what happens is printed above it."""
+
+    def __init__(self, console: Console) -> None:
+        self.console = console
+        # no thread of its own: the supervisor forks
+        self.live: Live | None = Live(console=console, auto_refresh=False, transient=True)
+        self.started = False
+
+    def show(self, state: dict) -> None:
+        """Draw it."""
+        if self.live is None or "time_s" not in state:
+            return
+        if not self.started:
+            self.started = True
+            self.live.start()
+        self.live.update(self.picture(state), refresh=True)
+
+    def picture(self, state: dict) -> Table:
+        """The whole view: the robot in two lines, then its boards."""
+        loads = "  ".join(
+            f"{name} {100.0 * each['load']:.0f} %" + (f" ({each['errors']} errors)" if each["errors"] else "")
+            for name, each in state["buses"].items()
+        )
+        pace = "as fast as it goes" if state["speed"] is None else f"speed {state['speed']:g}"
+        late = state["behind_s"]
+        caption = f"{loads}\n{state['scheduling']}" + "".join(f"\n{text}" for text in state["damage"])
+        for counters in state["ends"]:
+            used = ", ".join(f"{key.replace('_', ' ')} {value}" for key, value in counters.items() if value)
+            caption += f"\n{used}" if used else ""
+        table = Table(
+            title=f"{state['time_s']:.1f} s ({pace}{', paused' if state['paused'] else ''}"
+            f"{f', {late:.1f} s behind' if late > 0.1 and state['speed'] is not None else ''}), "
+            f"{state['steps']} steps, {state['distance_m']:.2f} m, {state['speed_m_per_s']:.2f} m/s",
+            caption=caption,
+            caption_justify="left",
+            title_justify="left",
+        )
+        for heading in ("board", "process", "state", "slots", "longest us", "overruns", "errors"):
+            table.add_column(heading, justify="left" if heading in ("board", "state") else "right")
+        for heading in ("late p50", "p99", "p99.9", "max us"):
+            table.add_column(heading, justify="right")
+        for name, each in state["boards"].items():
+            lateness = each["lateness"]
+            table.add_row(
+                name,
+                str(each["process"]),
+                each["state"],
+                str(each["slots"]),
+                f"{each['max_slot_us']:.0f}",
+                str(each["overruns"]),
+                str(each["errors"]),
+                *(micro(lateness[key]) for key in ("p50_us", "p99_us", "p999_us", "max_us")),
+            )
+        return table
+
+    def say(self, text: str) -> None:
+        self.console.print(text, highlight=False, soft_wrap=True)
+
+    def close(self) -> None:
+        if self.live is not None and self.started:
+            self.live.stop()
+        self.live = None
+
+
+def run_ctl(options: argparse.Namespace) -> int:
+    """Send the request and print the answer."""
+    what, values = options.request, options.values
+    wanted = {"restart": ("BOARD",), "key": ("N",), "set": ("NAME", "VALUE")}.get(what, ())
+    if len(values) != len(wanted):
+        raise UserError(f"ctl {what} takes {' '.join(wanted) or 'no value'}, got {' '.join(values) or 'none'}")
+    request: dict = {"do": what}
+    if what == "restart":
+        request["board"] = values[0]
+    elif what == "key":
+        if values[0] not in ("0", "1", "2", "3", "4", "5"):
+            raise UserError(f"ctl key: {values[0]} is not 0 to 5")
+        request["key"] = int(values[0])
+    elif what == "set":
+        request["name"] = values[0]
+        try:
+            request["value"] = float(values[1])
+        except ValueError:
+            raise UserError(f"ctl set: {values[1]} is not a number") from None
+    answer = control.ask(options.name, request)
+    if what == "status":
+        print(json.dumps(answer, indent=2))
+    elif what == "restart":
+        print(f"{answer['restarting']} is being restarted")
+    else:
+        print(f"{what}: at {answer['time_s']:.4f} s of the robot's time")
+    return 0
