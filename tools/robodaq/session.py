@@ -170,7 +170,8 @@ class Session:
         ahead = (stamp - self.clock_ms) & 0xFFFFFFFF
         if ahead < HALF:
             self.clock_ms = stamp
-            if ahead >= GAP_MS and FIRST_CHANNEL not in self.writes:  # before, time comes with the slow list only
+            # before time is a channel it comes with the slow list only, and says nothing about gaps
+            if ahead >= GAP_MS and self.selection and FIRST_CHANNEL not in self.writes:
                 self.gaps += 1
                 self.longest_gap_ms = max(self.longest_gap_ms, ahead)
         elif number == TIMESTAMP and (1 << 32) - ahead > 1000:
