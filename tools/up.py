@@ -17,7 +17,7 @@ from harness import build
 from harness.processes import block as places
 from harness.processes import control
 from harness.processes.lateness import figures
-from harness.processes.settings import NEVER, ON_FAILURE, Settings
+from harness.processes.settings import NEVER, ON_FAILURE, Settings, one_processor
 from harness.processes.supervisor import Supervisor, View, check_platform
 from harness.scenario import StopRule
 from tools import bus, serial_options, walk
@@ -39,6 +39,17 @@ def speed(text: str) -> float | None:
         return float(text)
     except ValueError:
         raise argparse.ArgumentTypeError(f"{text!r} is neither a number nor max") from None
+
+
+def processor(text: str) -> int | None:
+    """The processor that --processor means; None for all of them."""
+    if text == "one":
+        return one_processor() if build.is_compiled() else None
+    if text == "all":
+        return None
+    if not text.isdecimal():
+        raise UserError(f"--processor {text}: one, all or the number of a processor is expected")
+    return int(text)
 
 
 def register(commands: Any) -> None:
@@ -63,6 +74,12 @@ def register(commands: Any) -> None:
     group.add_argument(
         "--no-real-time", action="store_true", help="do not ask for SCHED_FIFO and locked memory, even if permitted"
     )
+    group.add_argument(
+        "--processor",
+        default="one",
+        metavar="one|all|N",
+        help="processors for plant and boards (default one, the fastest: they take turns; interpreted all)",
+    )
     bus.add_server_options(up)
     up.set_defaults(run=run)
 
@@ -83,7 +100,11 @@ def run(options: argparse.Namespace) -> int:
 
     check_platform()
     settings = Settings(
-        speed=options.speed, restart=options.restart, real_time=not options.no_real_time, name=options.name
+        speed=options.speed,
+        restart=options.restart,
+        real_time=not options.no_real_time,
+        name=options.name,
+        processor=processor(options.processor),
     )
     folder = writable_folder(options.out) if options.out else None
     json_file = json_target(options.json)

@@ -12,12 +12,13 @@ from harness.processes.block import Block
 from harness.processes.channel import Bell
 from harness.processes.endpoint import Endpoint
 from harness.processes.fresh_board import wire_fresh_board
+from harness.processes.settings import Settings
 from harness.processes.stage import Audience
 
 FAILED = 4  # exit code: the board's program raised
 
 
-def serve(robot: Any, name: str, block: Block, stage: tuple, real_time: bool, fresh: bool) -> int:
+def serve(robot: Any, name: str, block: Block, stage: tuple, settings: Settings, fresh: bool) -> int:
     """Run board `name` of the wired, never run `robot` until told to stop; returns the exit code.
 
     fresh: not the board that was built with the robot but a new one, powered up when the plant's process says.
@@ -26,7 +27,8 @@ def serve(robot: Any, name: str, block: Block, stage: tuple, real_time: bool, fr
     kernel.sharp_timers()
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)  # the supervisor decides when it is over
-    if real_time:
+    kernel.stay_on(settings.processor)
+    if settings.real_time:
         kernel.lock_memory()
         kernel.real_time_scheduling()
     place = wiring.BOARDS.index(name)

@@ -31,6 +31,12 @@ def sharp_timers() -> None:
     _libc().prctl(PR_SET_TIMERSLACK, 1, 0, 0, 0)
 
 
+def stay_on(processor: int | None) -> None:
+    """Run on this processor only; None: wherever the kernel likes."""
+    if processor is not None:
+        os.sched_setaffinity(0, {processor})
+
+
 def lock_memory() -> str:
     """Keep all pages in memory; returns why not, empty when it was permitted."""
     libc = _libc()
@@ -46,6 +52,12 @@ def real_time_scheduling() -> str:
     except OSError as error:
         return error.strerror or str(error)
     return ""
+
+
+def be_ordinary() -> None:
+    """Give real-time scheduling back and run wherever there is room: for writing files."""
+    os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
+    os.sched_setaffinity(0, range(os.cpu_count() or 1))
 
 
 def processor_time_s(process: int) -> float:

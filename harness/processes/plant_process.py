@@ -1,7 +1,6 @@
 """What runs in the plant's process: the lockstep, released by the wall clock, with boards that live elsewhere."""
 
 import json
-import os
 import select
 import signal
 import socket
@@ -269,6 +268,7 @@ def serve(
     kernel.sharp_timers()
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)  # the supervisor decides when it is over
+    kernel.stay_on(settings.processor)
     if settings.real_time:
         kernel.lock_memory()
         kernel.real_time_scheduling()
@@ -279,7 +279,7 @@ def serve(
     interrupted = run.stopping
     run.tell(collecting=True)
     run.collect()
-    os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
+    kernel.be_ordinary()
     run.tell(over=True, status=run.status())
     link.setblocking(True)
     while True:  # the terminal is the supervisor's until it says so

@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+import os
 
 from foundation.user_error import UserError
 
@@ -13,17 +14,31 @@ class Settings:
     """speed: virtual seconds per wall-clock second, None as fast as it goes. restart: what to do with dead boards.
 
     real_time: ask for SCHED_FIFO and locked memory. name: under which the running robot is found.
+    processor: the one that plant and boards share, None for all. They take turns, so they would mostly wait for each
+    other on several as well; waking a process there costs ten times as much (a turn in a virtual machine: 3 us on
+    one processor, 30 to 140 us between two; benchmarks/processes.md).
     """
 
     speed: float | None = 1.0
     restart: str = NEVER
     real_time: bool = True
     name: str = "ranger"
+    processor: int | None = None
 
     def __post_init__(self) -> None:
         if self.speed is not None and not (math.isfinite(self.speed) and 1e-4 <= self.speed <= 1000.0):
             raise UserError(f"speed is {self.speed!r}, allowed are 0.0001 to 1000, or max")
+        allowed = os.sched_getaffinity(0)
+        if self.processor is not None and self.processor not in allowed:
+            raise UserError(
+                f"processor is {self.processor}, allowed are {', '.join(map(str, sorted(allowed)))}, or all"
+            )
         if self.restart not in (NEVER, ON_FAILURE):
             raise UserError(f"restart is {self.restart!r}, allowed are {NEVER}, {ON_FAILURE}")
         if not self.name or len(self.name) > 64 or not self.name.replace("-", "").replace("_", "").isalnum():
             raise UserError(f"name is {self.name!r}, allowed are up to 64 letters, digits, - and _")
+
+
+def one_processor() -> int:
+    """The processor that a robot takes when nobody says which: the last one this process may use."""
+    return max(os.sched_getaffinity(0))

@@ -137,7 +137,7 @@ class Supervisor:
         def body() -> int:
             self.plant_link.close()
             self.robot.logbook.close()
-            return board_process.serve(self.robot, name, block, self.stage, self.settings.real_time, fresh)
+            return board_process.serve(self.robot, name, block, self.stage, self.settings, fresh)
 
         block.words[places.FATE] = 0
         block.words[places.FAULT_TEXT] = 0
@@ -211,7 +211,8 @@ class Supervisor:
         os.waitpid(process, 0)
         scheduling = f"ordinary scheduling (SCHED_FIFO: {fifo})" if fifo else "SCHED_FIFO"
         memory = f"memory not locked ({locked})" if locked else "memory locked"
-        return f"{scheduling}, {memory}"
+        place = "all processors" if self.settings.processor is None else f"processor {self.settings.processor}"
+        return f"{scheduling}, {memory}, on {place}"
 
     def turn(self) -> None:
         """Wait for something to happen, or a fifth of a second, and see to it."""
