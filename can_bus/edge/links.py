@@ -369,19 +369,15 @@ class PrivateBus:
 
     def pass_time(self) -> int:
         """Up to now; every link gets what happened. Returns the next instant of interest. The lock is held."""
-        due = self.paced.advance()
         while True:
-            news = False
+            due = self.paced.advance()
             for link in self.links:
                 events = link.tap.events
                 if events:
-                    news = True
                     link.tap.events = []
                     link.hear(events)
-            # at full speed there is more to do as long as something happened
-            if self.paced.speed != 0.0 or not news:
+            if due > self.paced.time:  # otherwise there was more than one call does
                 return due
-            due = self.paced.advance()
 
 
 class PrivateLink(Link):
@@ -419,7 +415,8 @@ class PrivateLink(Link):
         """Queue a frame, waiting up to `timeout` s for a place (None: for ever)."""
         with self.changed:
             self._check()
-            self.bus.pass_time()
+            if self.bus.paced.speed != 0.0:
+                self.bus.pass_time()
             answer = self.tap.offer(identifier, flags, lo, hi)
             if answer == FULL:
                 self._wait(lambda: self.tap.queued < self.tap.depth, timeout)

@@ -80,15 +80,15 @@ class PacedBus:
         such repetitions are passed over, and the frame goes out as soon as somebody joins.
         """
         bus, taps = self.bus, self.taps
-        until = self.now()
+        until = self.time if self.held() else self.now()
         bit_ns = 1_000_000_000 // self.bitrate
         for _ in range(BURST):
-            taps.poll(self.time)
-            due = min(bus.next_time, taps.due())
-            waits = due <= until and self._alone()
+            hears = taps.poll(self.time)
+            due = min(bus.next_time, hears)
+            waits = bus.operating < 2 and due <= until and self._alone()
             if waits:
-                due = taps.due()  # what happened before is still told
-            if due > until or self.held():
+                due = hears  # what happened before is still told
+            if due > until:
                 break
             # one bit more: what ends within it belongs to the same frame, and no frame starts so soon after another
             self.time = max(self.time, min(due + bit_ns, until))
@@ -96,15 +96,15 @@ class PacedBus:
                 bus.advance(self.time)
         else:
             return self.time
-        alone = self._alone()
+        alone = bus.operating < 2 and self._alone()
         if self.speed != 0.0:
             self.time = max(self.time, until)
         if alone:
             self._pass_over(self.time)
         if self.speed != 0.0:
             bus.advance(self.time)
-            taps.poll(self.time)
-        return taps.due() if alone else min(bus.next_time, taps.due())
+            hears = taps.poll(self.time)
+        return hears if alone else min(bus.next_time, hears)
 
     def _alone(self) -> bool:
         """True while what waits cannot be acknowledged, by nobody, and only repeats."""

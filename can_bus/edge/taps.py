@@ -322,6 +322,7 @@ class Taps:
         self.depth = depth
         self.time = 0
         self.taps: list[Tap] = []
+        self.leaving = 0  # clients that left and still send
         self.spare: list[Tap] = []  # nodes whose clients left: a bus cannot lose a node
 
     def add(self, name: str) -> Tap:
@@ -342,6 +343,7 @@ class Taps:
         if tap not in self.taps or tap.leaving:
             return
         tap.leaving = True
+        self.leaving += 1
         tap.leave_by = self.time + LINGER_NS
         self._see_off(tap)
 
@@ -349,21 +351,28 @@ class Taps:
         tap.events.clear()
         if not tap.queued or tap.off or self.bus.operating < 2 or self.time > tap.leave_by:
             tap.leave(self.time)
+            self.leaving -= 1
             self.taps.remove(tap)
             self.spare.append(tap)
 
-    def poll(self, now: int) -> None:
-        """Every client's `poll`; those who left and have nothing more to send are taken off the bus."""
+    def poll(self, now: int) -> int:
+        """Every client's `poll`; who left and has nothing more to send is taken off the bus.
+
+        Returns the first instant (ns) at which a client has something to hear, or NEVER.
+        """
         self.time = now
+        due = NEVER
         for tap in self.taps:
-            tap.poll(now)
-        if any(tap.leaving for tap in self.taps):
+            head: int = tap.inbox.head_time
+            if head <= now or tap.waiting:
+                tap.poll(now)
+                head = tap.inbox.head_time
+            if head < due:
+                due = head
+        if self.leaving:
             for tap in [tap for tap in self.taps if tap.leaving]:
                 self._see_off(tap)
-
-    def due(self) -> int:
-        """The first instant (ns) at which a client has something to hear, or NEVER."""
-        return min((tap.inbox.head_time for tap in self.taps), default=NEVER)
+        return due
 
     @property
     def queued(self) -> bool:
