@@ -9,6 +9,8 @@ cdef class Body:
     cdef public double[::1] saved, matrix, solution
     cdef public double foot_outer, leg_outer, leg_inner, foot_inner, motor_outer, motor_inner
     cdef public double foot_outer_rate, leg_outer_rate, leg_inner_rate, foot_inner_rate, motor_outer_rate, motor_inner_rate
+    cdef public double known_foot_outer, sin_foot_outer, cos_foot_outer, known_leg_outer, sin_leg_outer, cos_leg_outer
+    cdef public double known_leg_inner, sin_leg_inner, cos_leg_inner, known_foot_inner, sin_foot_inner, cos_foot_inner
     cdef public double hip_x, hip_y, hip_vx, hip_vy, anchor_outer, anchor_inner
     cdef public double height_outer, height_inner, gap_outer, gap_inner, scuff_time_s, passing_gap
     cdef public double friction_ratio_max, slip_s, normal_force_min, brush_s, sole_k, sole_c
@@ -24,17 +26,19 @@ cdef class Body:
     cdef public double stop_low, stop_high, stop_k, stop_c, inverse_smoothing, closing_rate
     cdef public double fall_lean, fall_height, fall_split, stall_s, time_s, released_s
     cdef public double elapsed, P_stance_x, P_stance_y, P_swing_x, P_swing_y
-    cpdef void set_slope(self, double slope_rad)
-    cpdef double chain_x(self, double foot, double leg)
-    cpdef double chain_y(self, double foot, double leg)
-    cdef double _excess(self, double foot)
-    cpdef double contact_x(self, long long leg)
-    cpdef double ankle_x(self, long long leg)
-    cpdef void update_pose(self)
-    cpdef void update_hip_rates(self)
-    cpdef bint stands(self, long long leg)
-    cpdef double hip_angle(self)
-    cpdef double hip_rate(self)
+    cpdef void set_slope(self, double slope_rad) noexcept
+    cpdef double chain_x(self, double foot, double leg) noexcept
+    cpdef double chain_y(self, double foot, double leg) noexcept
+    cdef double _excess(self, double foot) noexcept
+    cdef void _know_angles(self) noexcept
+    cdef double _behind(self, long long leg) noexcept
+    cpdef double contact_x(self, long long leg) noexcept
+    cpdef double ankle_x(self, long long leg) noexcept
+    cpdef void update_pose(self) noexcept
+    cpdef void update_hip_rates(self) noexcept
+    cpdef bint stands(self, long long leg) noexcept
+    cpdef double hip_angle(self) noexcept
+    cpdef double hip_rate(self) noexcept
     cpdef dict snapshot(self)
     cpdef double energy_J(self)
     cpdef void place(self, double outer_leg_rad, double hip_rad)
@@ -43,30 +47,33 @@ cdef class Body:
     cpdef void hold_standing(self, double outer_leg_rad, double hip_rad, long long stance=*)
     cpdef void release(self, double outer_leg_rate, long long stance=*, double stance_foot_rate=*, double hip_rate=*)
     cpdef void begin_walk(self)
-    cpdef void limp_foot(self, long long leg)
+    cpdef void limp_foot(self, long long leg) noexcept
     cpdef void on_feet(self, double h, long long stages)
-    cdef double _stop(self, double angle, double rate)
-    cdef double _exact_spring(self, double angle)
-    cdef void _ask_terms(self, bint outer_stance, double th, double tw, double a_s, double a_w, double p, double n, double us, double uw, double ra_s, double ra_w, double up, double un)
+    cdef double _stop(self, double angle, double rate) noexcept
+    cdef double _exact_spring(self, double angle) noexcept
+    cdef void _ask_terms(
+        self, bint outer_stance, double hip, double a_s, double a_w, double p, double n, double hip_rate,
+        double ra_s, double ra_w, double up, double un,
+    )
     cpdef void in_air(self, double h, long long stages)
     cpdef void impact(self, bint outer, bint inner)
-    cpdef void _eliminate(self, long long n)
+    cpdef void _eliminate(self, long long n) noexcept
     cpdef void advance(self, double h)
-    cdef void _save(self)
-    cdef void _restore(self)
-    cdef double _rise(self, long long leg)
+    cdef void _save(self) noexcept
+    cdef void _restore(self) noexcept
+    cdef double _rise(self, long long leg) noexcept
     cpdef bint lets_go(self, long long leg)
     cdef bint _pulled_now(self, double h)
-    cdef bint _sole_ready(self, long long leg)
-    cdef bint _may_leave(self, long long leg)
+    cdef bint _sole_ready(self, long long leg) noexcept
+    cdef bint _may_leave(self, long long leg) noexcept
     cdef double _crossed(self)
-    cdef double _ahead(self)
+    cdef double _ahead(self) noexcept
     cdef double _try(self, double h)
     cdef double _locate(self, double h)
     cdef void _act(self)
-    cpdef long long event_time_ns(self)
+    cpdef long long event_time_ns(self) noexcept
     cdef void _touch(self, long long foot)
     cdef void _leave(self, long long foot)
     cdef void _watch(self, double h)
-    cpdef void _keep_forces(self, double h)
+    cpdef void _keep_forces(self, double h) noexcept
     cpdef void _fall(self, cause)

@@ -1,3 +1,5 @@
+# cython: boundscheck=False, wraparound=False, cdivision=True
+# (indices are those of `saved`, `matrix` and `solution`, all written out; no integer is divided)
 """Ranger's body: four links, two elastic ankle drives, two feet on the floor. Equations: plant/EQUATIONS.md.
 
 Coordinates never swap names: every angle belongs to a leg, outer or inner (EQUATIONS 1). All are positive
@@ -61,6 +63,20 @@ class Body:
         self.hip_vx = 0.0
         self.hip_vy = 0.0
         self.saved = array.array("d", [0.0]) * 16
+
+        # sines and cosines of the four angles that are named here; `_know_angles` brings them up to date
+        self.known_foot_outer = 0.0
+        self.sin_foot_outer = 0.0
+        self.cos_foot_outer = 1.0
+        self.known_leg_outer = 0.0
+        self.sin_leg_outer = 0.0
+        self.cos_leg_outer = 1.0
+        self.known_leg_inner = 0.0
+        self.sin_leg_inner = 0.0
+        self.cos_leg_inner = 1.0
+        self.known_foot_inner = 0.0
+        self.sin_foot_inner = 0.0
+        self.cos_foot_inner = 1.0
 
         # contact: where the sweet spot of a standing foot would touch, and the height of its foothold
         self.mode = 0
@@ -206,12 +222,43 @@ class Body:
             return foot - self.toe
         return 0.0
 
+    def _know_angles(self) -> cython.void:
+        """Sines and cosines of the present angles into the fields; the steps on the floor leave them there."""
+        if self.foot_outer != self.known_foot_outer:
+            self.known_foot_outer = self.foot_outer
+            self.sin_foot_outer = sin(self.foot_outer)
+            self.cos_foot_outer = cos(self.foot_outer)
+        if self.leg_outer != self.known_leg_outer:
+            self.known_leg_outer = self.leg_outer
+            self.sin_leg_outer = sin(self.leg_outer)
+            self.cos_leg_outer = cos(self.leg_outer)
+        if self.leg_inner != self.known_leg_inner:
+            self.known_leg_inner = self.leg_inner
+            self.sin_leg_inner = sin(self.leg_inner)
+            self.cos_leg_inner = cos(self.leg_inner)
+        if self.foot_inner != self.known_foot_inner:
+            self.known_foot_inner = self.foot_inner
+            self.sin_foot_inner = sin(self.foot_inner)
+            self.cos_foot_inner = cos(self.foot_inner)
+
+    def _behind(self, leg: cython.longlong) -> cython.double:
+        """The lowest point of a foot behind the hip, m (EQUATIONS 4)."""
+        foot: cython.double
+        x: cython.double
+        self._know_angles()
+        if leg == 0:
+            foot = self.foot_outer
+            x = self.el * self.sin_leg_outer - self.d * self.sin_foot_outer
+        else:
+            foot = self.foot_inner
+            x = self.el * self.sin_leg_inner - self.d * self.sin_foot_inner
+        if foot < self.heel or foot > self.toe:
+            x += self.r * sin(self._excess(foot))
+        return x
+
     def contact_x(self, leg: cython.longlong) -> cython.double:
         """Where the lowest point of a foot is along the floor, m."""
-        foot: cython.double = self.foot_outer if leg == 0 else self.foot_inner
-        lean: cython.double = self.leg_outer if leg == 0 else self.leg_inner
-        excess: cython.double = self._excess(foot)
-        return self.hip_x - self.chain_x(foot, lean) + self.r * (foot - excess)
+        return self.hip_x - self._behind(leg)
 
     def ankle_x(self, leg: cython.longlong) -> cython.double:
         """Where an ankle is along the floor, m."""
@@ -219,36 +266,52 @@ class Body:
 
     def update_pose(self) -> cython.void:
         """Hip position and the two gaps from the angles (in flight and held: the gaps only)."""
-        outer: cython.double = self.chain_y(self.foot_outer, self.leg_outer)
-        inner: cython.double = self.chain_y(self.foot_inner, self.leg_inner)
+        outer: cython.double
+        inner: cython.double
+        foot: cython.double
+        self._know_angles()
+        # the hip above and ahead of its anchor, EQUATIONS 4
+        outer = self.el * self.cos_leg_outer - self.d * self.cos_foot_outer
+        foot = self.foot_outer
+        if foot < self.heel or foot > self.toe:
+            outer += self.r * cos(self._excess(foot))
+        else:
+            outer += self.r
+        inner = self.el * self.cos_leg_inner - self.d * self.cos_foot_inner
+        foot = self.foot_inner
+        if foot < self.heel or foot > self.toe:
+            inner += self.r * cos(self._excess(foot))
+        else:
+            inner += self.r
         if self.mode == 1 or self.mode == 2 or self.standing:
             if self.stance == 0:
+                foot = self.foot_outer
                 self.hip_y = self.height_outer + outer
-                self.hip_x = self.anchor_outer + self.chain_x(self.foot_outer, self.leg_outer)
+                self.hip_x = self.anchor_outer + self._behind(0) + self.r * (foot - self._excess(foot))
             else:
                 self.hip_y = self.height_inner + inner
-                self.hip_x = self.anchor_inner + self.chain_x(self.foot_inner, self.leg_inner)
+                self.hip_x = self.anchor_inner + self._behind(1) + self.r * (foot - self._excess(foot))
         self.gap_outer = self.hip_y - outer - self.height_outer
         self.gap_inner = self.hip_y - inner - self.height_inner
 
     def update_hip_rates(self) -> cython.void:
         """Hip velocity from the standing foot (EQUATIONS 4)."""
         foot: cython.double
-        leg: cython.double
         foot_rate: cython.double
         leg_rate: cython.double
         excess: cython.double
         if self.mode != 1 and self.mode != 2:
             return
+        self._know_angles()
         if self.stance == 0:
-            foot, leg = self.foot_outer, self.leg_outer
-            foot_rate, leg_rate = self.foot_outer_rate, self.leg_outer_rate
+            foot, foot_rate, leg_rate = self.foot_outer, self.foot_outer_rate, self.leg_outer_rate
+            sF, cF, st, ct = self.sin_foot_outer, self.cos_foot_outer, self.sin_leg_outer, self.cos_leg_outer
         else:
-            foot, leg = self.foot_inner, self.leg_inner
-            foot_rate, leg_rate = self.foot_inner_rate, self.leg_inner_rate
+            foot, foot_rate, leg_rate = self.foot_inner, self.foot_inner_rate, self.leg_inner_rate
+            sF, cF, st, ct = self.sin_foot_inner, self.cos_foot_inner, self.sin_leg_inner, self.cos_leg_inner
         excess = self._excess(foot)
-        self.hip_vx = (self.r * cos(excess) - self.d * cos(foot)) * foot_rate + self.el * cos(leg) * leg_rate
-        self.hip_vy = (self.d * sin(foot) - self.r * sin(excess)) * foot_rate - self.el * sin(leg) * leg_rate
+        self.hip_vx = (self.r * cos(excess) - self.d * cF) * foot_rate + self.el * ct * leg_rate
+        self.hip_vy = (self.d * sF - self.r * sin(excess)) * foot_rate - self.el * st * leg_rate
 
     def stands(self, leg: cython.longlong) -> cython.bint:
         """True while this foot has the floor under it."""
@@ -459,10 +522,10 @@ class Body:
     # ---- motion on one or two feet ----------------------------------------------------------------------------
 
     def on_feet(self, h: cython.double, stages: cython.longlong) -> cython.void:
-        """One Runge-Kutta step of `h` seconds in single or double stance; stages 4, or 1 to look only.
+        """One Runge-Kutta-Nystrom step of `h` seconds in single or double stance; stages 4, or 1 to look only.
 
         Inside, s is the stance (reference) leg and w the other. Accelerations and floor forces of the start of
-        the step are left in the fields (EQUATIONS 5, 6).
+        the step are left in the fields (EQUATIONS 5, 6); the stages' angles and rates are those of EQUATIONS 15.
         """
         double_stance: cython.bint = self.mode == 2
         outer_stance: cython.bint = self.stance == 0
@@ -488,11 +551,9 @@ class Body:
         low: cython.double = self.stop_low
         high: cython.double = self.stop_high
         eps: cython.double = self.inverse_smoothing
-        sole_k: cython.double = self.sole_k
-        sole_c: cython.double = self.sole_c
-        sole_v: cython.double = self.sole_v
         hip_coulomb: cython.double = self.hip_coulomb
         hip_viscous: cython.double = self.hip_viscous
+        self._know_angles()
         if outer_stance:
             F0, th0, tw0, G0 = self.foot_outer, self.leg_outer, self.leg_inner, self.foot_inner
             p0, n0 = self.motor_outer, self.motor_inner
@@ -503,6 +564,8 @@ class Body:
                 self.foot_inner_rate,
             )
             up0, un0 = self.motor_outer_rate, self.motor_inner_rate
+            sF, cF, st, ct = self.sin_foot_outer, self.cos_foot_outer, self.sin_leg_outer, self.cos_leg_outer
+            sw, cw, sG, cG = self.sin_leg_inner, self.cos_leg_inner, self.sin_foot_inner, self.cos_foot_inner
             mcs, mws, Js, mcw, mww, Jw = (
                 self.mc_outer,
                 self.mw_outer,
@@ -526,6 +589,8 @@ class Body:
                 self.foot_outer_rate,
             )
             up0, un0 = self.motor_inner_rate, self.motor_outer_rate
+            sF, cF, st, ct = self.sin_foot_inner, self.cos_foot_inner, self.sin_leg_inner, self.cos_leg_inner
+            sw, cw, sG, cG = self.sin_leg_outer, self.cos_leg_outer, self.sin_foot_outer, self.cos_foot_outer
             mcs, mws, Js, mcw, mww, Jw = (
                 self.mc_inner,
                 self.mw_inner,
@@ -542,51 +607,107 @@ class Body:
         m22: cython.double = M * el * el - 2.0 * el * mcs + Js + JH
         i33: cython.double = 1.0 / (Jw + JH)
         half: cython.double = 0.5 * h
-        c: cython.double = half
-        weight: cython.double = 1.0
+        quarter: cython.double = 0.25 * h
+        sixth: cython.double = h / 6.0
         F: cython.double = F0
         th: cython.double = th0
         tw: cython.double = tw0
         G: cython.double = G0
         p: cython.double = p0
         n: cython.double = n0
+        a_s: cython.double = F - th
+        a_w: cython.double = G - tw
+        hip: cython.double = th - tw
         uF: cython.double = uF0
         us: cython.double = us0
         uw: cython.double = uw0
         uG: cython.double = uG0
         up: cython.double = up0
         un: cython.double = un0
-        # sums of k1 + k2 + k3 (positions) and k1 + 2 k2 + 2 k3 + k4 (rates)
+        # first accelerations, and sums k1 + k2 + k3
+        kF = ks_ = kw = kG = kp = kn = 0.0
         qF = qs = qw = qG = qp = qn = 0.0
-        vF = vs = vw = vG = vp = vn = 0.0
         for stage in range(stages):
-            sF = sin(F)
-            cF = cos(F)
-            st = sin(th)
-            ct = cos(th)
-            sw = sin(tw)
-            cw = cos(tw)
-            ls = el * st
-            lc = el * ct
-            As = mcs * ct + mws * st
-            Bs = mcs * st - mws * ct
-            Aw = mcw * cw + mww * sw
-            Bw = mcw * sw - mww * cw
-            if F < heel:
-                sg = F - heel
-                e = r * cos(sg) - d * cF
-                f = d * sF - r * sin(sg)
-                df = -e
-            elif F > toe:
-                sg = F - toe
-                e = r * cos(sg) - d * cF
-                f = d * sF - r * sin(sg)
-                df = -e
-            else:
-                sg = 0.0
+            if stage != 2:
+                # what depends on angles alone; stages 1 and 2 look at the same ones
+                if stage > 0:
+                    sF = sin(F)
+                    cF = cos(F)
+                    st = sin(th)
+                    ct = cos(th)
+                    sw = sin(tw)
+                    cw = cos(tw)
+                    if stage == 3 or double_stance or brush:
+                        sG = sin(G)
+                        cG = cos(G)
+                ls = el * st
+                lc = el * ct
+                As = mcs * ct + mws * st
+                Bs = mcs * st - mws * ct
+                Aw = mcw * cw + mww * sw
+                Bw = mcw * sw - mww * cw
                 df = d * cF
-                e = r - df
                 f = d * sF
+                sg = 0.0
+                e = r - df
+                if F < heel or F > toe:
+                    sg = F - heel if F < heel else F - toe
+                    e = r * cos(sg) - df
+                    f -= r * sin(sg)
+                    df = -e
+                m11 = M * (e * e + f * f) + Jf
+                m12 = M * (e * lc - f * ls) - As * e + Bs * f
+                m13 = Bw * f - Aw * e
+                m23 = -(lc * Aw + ls * Bw) - JH
+                t13 = m13 * i33
+                t23 = m23 * i33
+                n11 = m11 - t13 * m13
+                n12 = m12 - t13 * m23
+                n22 = m22 - t23 * m23
+                inv = 1.0 / (n11 * n22 - n12 * n12)
+                n11 *= inv
+                n12 *= inv
+                n22 *= inv
+                pull_s = ks * (p - a_s)
+                pull_w = 0.0 if massless else ks * (n - a_w)
+                spring = self._exact_spring(hip) if exact_spring else kh * hip
+                if brush or double_stance:
+                    dfw = d * cG
+                    fw = d * sG
+                    gg = 0.0
+                    ew = r - dfw
+                    if G < heel or G > toe:
+                        gg = G - heel if G < heel else G - toe
+                        ew = r * cos(gg) - dfw
+                        fw -= r * sin(gg)
+                        dfw = -ew
+                    lsw = el * sw
+                    lcw = el * cw
+                    gap = (Ys - Yw) + (e - ew) + (lc - lcw)
+                if double_stance:
+                    # columns: what a unit force on the other foot does to the three accelerations (EQUATIONS 6)
+                    b1 = e + t13 * lcw
+                    b2 = lc + t23 * lcw
+                    x1 = n22 * b1 - n12 * b2
+                    x2 = n11 * b2 - n12 * b1
+                    x3 = -i33 * lcw - t13 * x1 - t23 * x2
+                    b1 = f - t13 * lsw
+                    b2 = -ls - t23 * lsw
+                    y1 = n22 * b1 - n12 * b2
+                    y2 = n11 * b2 - n12 * b1
+                    y3 = i33 * lsw - t13 * y1 - t23 * y2
+                    Sxx = e * x1 + lc * x2 - lcw * x3
+                    Sxy = e * y1 + lc * y2 - lcw * y3
+                    Syy = f * y1 - ls * y2 + lsw * y3
+                    c11 = -Syy * Jf - fw * fw
+                    c12 = ew * fw + Sxy * Jf
+                    c13 = ew * Syy - Sxy * fw
+                    c22 = -Sxx * Jf - ew * ew
+                    c23 = Sxx * fw - Sxy * ew
+                    c33 = Sxx * Syy - Sxy * Sxy
+                    idet = 1.0 / (Sxx * c11 + Sxy * c12 - ew * c13)
+                    # r (F - sg) - f + l sin th, both legs
+                    gap_x = (Xs - Xw) + r * ((F - sg) - (G - gg)) - (f - fw) + (ls - lsw)
             us2 = us * us
             uw2 = uw * uw
             uF2 = uF * uF
@@ -596,15 +717,10 @@ class Body:
             Px = M * ax + Bs * us2 + Bw * uw2
             Py = M * ay + As * us2 + Aw * uw2
             # torques: cables with the motors behind them, stops, hip
-            a_s = F - th
-            a_w = G - tw
-            Ts = ks * (p - a_s)
-            Tw = ks * (n - a_w)
+            Ts = pull_s
+            Tw = pull_w
             mp = s_drive - s_coulomb * tanh(up * eps) - s_viscous * up - Ts
-            mn = w_drive - w_coulomb * tanh(un * eps) - w_viscous * un
-            if massless:
-                Tw = 0.0
-            mn -= Tw
+            mn = w_drive - w_coulomb * tanh(un * eps) - w_viscous * un - Tw
             if a_s < low or a_s > high:
                 Ts += self._stop(a_s, uF - us)
             if a_w < low or a_w > high:
@@ -613,15 +729,11 @@ class Body:
                 if massless:
                     mn += stop
             hd = us - uw
-            Th = hip_drive - hip_coulomb * tanh(hd * eps) - hip_viscous * hd
-            if exact_spring:
-                Th -= self._exact_spring(th - tw)
-            else:
-                Th -= kh * (th - tw)
+            Th = hip_drive - hip_coulomb * tanh(hd * eps) - hip_viscous * hd - spring
             TF = Ts - Cs * uF
             TG = Tw
             if with_terms:
-                self._ask_terms(outer_stance, th, tw, a_s, a_w, p, n, us, uw, uF - us, uG - uw, up, un)
+                self._ask_terms(outer_stance, hip, a_s, a_w, p, n, hd, uF - us, uG - uw, up, un)
                 if outer_stance:
                     Th += self.extra_hip
                     Ts += self.extra_outer
@@ -642,105 +754,46 @@ class Body:
                     mn += self.extra_outer_motor
                     if massless:
                         mn += self.extra_outer
-            # generalised forces and mass matrix (EQUATIONS 5.3), unknowns: foot s, leg s, leg w
+            # generalised forces (EQUATIONS 5.3), unknowns: foot s, leg s, leg w
             Q1 = TF - e * Px - f * Py
             Q2 = Th - Ts - lc * Px + ls * Py + As * ax - Bs * ay
-            Q3 = -Th - Tw + Aw * ax - Bw * ay
+            Q3 = Aw * ax - Bw * ay - Th - Tw
             Rx = 0.0
             Ry = 0.0
-            if brush:
+            if brush and gap < 0.0:
                 # the swing foot brushes the floor with its sole: normal force and sliding friction (EQUATIONS 9)
-                if G < heel:
-                    gg = G - heel
-                elif G > toe:
-                    gg = G - toe
+                Ry = -self.sole_k * gap - self.sole_c * (f * uF - ls * us - fw * uG + lsw * uw)
+                if Ry > 0.0:
+                    Rx = -self.mu * Ry * tanh((e * uF + lc * us - ew * uG - lcw * uw) * self.sole_v)
+                    push = -ew * Rx - fw * Ry
+                    Q1 += e * Rx + f * Ry
+                    Q2 += lc * Rx - ls * Ry
+                    Q3 += lsw * Ry - lcw * Rx
+                    TG += push
+                    if massless:
+                        Q3 += push
+                        mn += push
                 else:
-                    gg = 0.0
-                ew = r * cos(gg) - d * cos(G)
-                fw = d * sin(G) - r * sin(gg)
-                lsw = el * sw
-                lcw = el * cw
-                gap = (Ys + r * cos(sg) - d * cF + lc) - (Yw + r * cos(gg) - d * cos(G) + lcw)
-                if gap < 0.0:
-                    Ry = -sole_k * gap - sole_c * (f * uF - ls * us - fw * uG + lsw * uw)
-                    if Ry > 0.0:
-                        Rx = -self.mu * Ry * tanh((e * uF + lc * us - ew * uG - lcw * uw) * sole_v)
-                        push = -ew * Rx - fw * Ry
-                        Q1 += e * Rx + f * Ry
-                        Q2 += lc * Rx - ls * Ry
-                        Q3 += lsw * Ry - lcw * Rx
-                        TG += push
-                        if massless:
-                            Q3 += push
-                            mn += push
-                    else:
-                        Ry = 0.0
-            m11 = M * (e * e + f * f) + Jf
-            m12 = M * (e * lc - f * ls) - As * e + Bs * f
-            m13 = Bw * f - Aw * e
-            m23 = -(lc * Aw + ls * Bw) - JH
-            t13 = m13 * i33
-            t23 = m23 * i33
-            n11 = m11 - t13 * m13
-            n12 = m12 - t13 * m23
-            n22 = m22 - t23 * m23
-            inv = 1.0 / (n11 * n22 - n12 * n12)
+                    Ry = 0.0
             b1 = Q1 - t13 * Q3
             b2 = Q2 - t23 * Q3
-            aF = (n22 * b1 - n12 * b2) * inv
-            as_ = (n11 * b2 - n12 * b1) * inv
+            aF = n22 * b1 - n12 * b2
+            as_ = n11 * b2 - n12 * b1
             aw = i33 * Q3 - t13 * aF - t23 * as_
             ap = mp * iJA
             an = mn * iJA
             if double_stance:
                 # the other foot closes the linkage by its force (Rx, Ry): EQUATIONS 6
-                sG = sin(G)
-                cG = cos(G)
-                if G < heel:
-                    gg = G - heel
-                elif G > toe:
-                    gg = G - toe
-                else:
-                    gg = 0.0
-                ew = r * cos(gg) - d * cG
-                fw = d * sG - r * sin(gg)
-                dfw = -ew if gg != 0.0 else d * cG
-                lsw = el * sw
-                lcw = el * cw
                 uG2 = uG * uG
                 om = self.closing_rate
-                # r (F - sg) + r sin(sg) - d sin F + l sin th, both legs
-                gx_ = (Xs - Xw) + r * ((F - sg + sin(sg)) - (G - gg + sin(gg))) - d * (sF - sG) + ls - lsw
-                gy_ = (Ys - Yw) + r * (cos(sg) - cos(gg)) - d * (cF - cG) + lc - lcw
                 vx_ = e * uF + lc * us - ew * uG - lcw * uw
                 vy_ = f * uF - ls * us - fw * uG + lsw * uw
-                bx = fw * uG2 - lsw * uw2 - (ax + gx) - om * (2.0 * vx_ + om * gx_)
-                by = dfw * uG2 - lcw * uw2 - (ay + gy) - om * (2.0 * vy_ + om * gy_)
+                bx = fw * uG2 - lsw * uw2 - (ax + gx) - om * (2.0 * vx_ + om * gap_x)
+                by = dfw * uG2 - lcw * uw2 - (ay + gy) - om * (2.0 * vy_ + om * gap)
                 TG -= Cw * uG
-                # columns: what a unit force on the other foot does to the three accelerations
-                b1 = e + t13 * lcw
-                b2 = lc + t23 * lcw
-                x1 = (n22 * b1 - n12 * b2) * inv
-                x2 = (n11 * b2 - n12 * b1) * inv
-                x3 = -i33 * lcw - t13 * x1 - t23 * x2
-                b1 = f - t13 * lsw
-                b2 = -ls - t23 * lsw
-                y1 = (n22 * b1 - n12 * b2) * inv
-                y2 = (n11 * b2 - n12 * b1) * inv
-                y3 = i33 * lsw - t13 * y1 - t23 * y2
-                Sxx = e * x1 + lc * x2 - lcw * x3
-                Sxy = e * y1 + lc * y2 - lcw * y3
-                Syy = f * y1 - ls * y2 + lsw * y3
                 r1 = bx - (e * aF + lc * as_ - lcw * aw)
                 r2 = by - (f * aF - ls * as_ + lsw * aw)
                 r3 = -TG
-                c11 = -Syy * Jf - fw * fw
-                c12 = ew * fw + Sxy * Jf
-                c13 = ew * Syy - Sxy * fw
-                c22 = -Sxx * Jf - ew * ew
-                c23 = Sxx * fw - Sxy * ew
-                c33 = Sxx * Syy - Sxy * Sxy
-                idet = 1.0 / (Sxx * c11 + Sxy * c12 - ew * c13)
                 Rx = (c11 * r1 + c12 * r2 + c13 * r3) * idet
                 Ry = (c12 * r1 + c22 * r2 + c23 * r3) * idet
                 aG = (c13 * r1 + c23 * r2 + c33 * r3) * idet
@@ -779,13 +832,23 @@ class Body:
                     self.motor_outer_acc = an
                 if stages == 1:
                     return
-            vF += weight * aF
-            vs += weight * as_
-            vw += weight * aw
-            vG += weight * aG
-            vp += weight * ap
-            vn += weight * an
-            if stage < 3:
+                qF = kF = aF
+                qs = ks_ = as_
+                qw = kw = aw
+                qG = kG = aG
+                qp = kp = ap
+                qn = kn = an
+                F = F0 + half * (uF0 + quarter * aF)
+                th = th0 + half * (us0 + quarter * as_)
+                tw = tw0 + half * (uw0 + quarter * aw)
+                G = G0 + half * (uG0 + quarter * aG)
+                p = p0 + half * (up0 + quarter * ap)
+                n = n0 + half * (un0 + quarter * an)
+                a_s = F - th
+                a_w = G - tw
+                hip = th - tw
+                c = half
+            elif stage < 3:
                 qF += aF
                 qs += as_
                 qw += aw
@@ -793,35 +856,51 @@ class Body:
                 qp += ap
                 qn += an
                 if stage == 2:
+                    F = F0 + h * (uF0 + half * aF)
+                    th = th0 + h * (us0 + half * as_)
+                    tw = tw0 + h * (uw0 + half * aw)
+                    G = G0 + h * (uG0 + half * aG)
+                    p = p0 + h * (up0 + half * ap)
+                    n = n0 + h * (un0 + half * an)
+                    a_s = F - th
+                    a_w = G - tw
+                    hip = th - tw
+                    if not double_stance:
+                        # the legs' geometry at the angles of the step's end: it serves the next step as well
+                        F = F0 + h * (uF0 + sixth * qF)
+                        th = th0 + h * (us0 + sixth * qs)
+                        tw = tw0 + h * (uw0 + sixth * qw)
+                        G = G0 + h * (uG0 + sixth * qG)
                     c = h
-                    weight = 1.0
-                else:
-                    weight = 2.0
-                F = F0 + c * uF
-                th = th0 + c * us
-                tw = tw0 + c * uw
-                G = G0 + c * uG
-                p = p0 + c * up
-                n = n0 + c * un
+            if stage < 3:
                 uF = uF0 + c * aF
                 us = us0 + c * as_
                 uw = uw0 + c * aw
                 uG = uG0 + c * aG
                 up = up0 + c * ap
                 un = un0 + c * an
-        sixth: cython.double = h / 6.0
-        F = F0 + h * (uF0 + sixth * qF)
-        th = th0 + h * (us0 + sixth * qs)
-        tw = tw0 + h * (uw0 + sixth * qw)
-        G = G0 + h * (uG0 + sixth * qG)
+        if outer_stance:
+            self.known_foot_outer, self.known_leg_outer, self.known_leg_inner, self.known_foot_inner = F, th, tw, G
+            self.sin_foot_outer, self.cos_foot_outer, self.sin_leg_outer, self.cos_leg_outer = sF, cF, st, ct
+            self.sin_leg_inner, self.cos_leg_inner, self.sin_foot_inner, self.cos_foot_inner = sw, cw, sG, cG
+        else:
+            self.known_foot_inner, self.known_leg_inner, self.known_leg_outer, self.known_foot_outer = F, th, tw, G
+            self.sin_foot_inner, self.cos_foot_inner, self.sin_leg_inner, self.cos_leg_inner = sF, cF, st, ct
+            self.sin_leg_outer, self.cos_leg_outer, self.sin_foot_outer, self.cos_foot_outer = sw, cw, sG, cG
+        if double_stance:
+            F = F0 + h * (uF0 + sixth * qF)
+            th = th0 + h * (us0 + sixth * qs)
+            tw = tw0 + h * (uw0 + sixth * qw)
+            G = G0 + h * (uG0 + sixth * qG)
         p = p0 + h * (up0 + sixth * qp)
         n = n0 + h * (un0 + sixth * qn)
-        uF = uF0 + sixth * vF
-        us = us0 + sixth * vs
-        uw = uw0 + sixth * vw
-        uG = uG0 + sixth * vG
-        up = up0 + sixth * vp
-        un = un0 + sixth * vn
+        # k1 + 2 k2 + 2 k3 + k4
+        uF = uF0 + sixth * (2.0 * qF - kF + aF)
+        us = us0 + sixth * (2.0 * qs - ks_ + as_)
+        uw = uw0 + sixth * (2.0 * qw - kw + aw)
+        uG = uG0 + sixth * (2.0 * qG - kG + aG)
+        up = up0 + sixth * (2.0 * qp - kp + ap)
+        un = un0 + sixth * (2.0 * qn - kn + an)
         if outer_stance:
             self.foot_outer = F
             self.leg_outer = th
@@ -866,14 +945,12 @@ class Body:
     def _ask_terms(
         self,
         outer_stance: cython.bint,
-        th: cython.double,
-        tw: cython.double,
+        hip: cython.double,
         a_s: cython.double,
         a_w: cython.double,
         p: cython.double,
         n: cython.double,
-        us: cython.double,
-        uw: cython.double,
+        hip_rate: cython.double,
         ra_s: cython.double,
         ra_w: cython.double,
         up: cython.double,
@@ -881,14 +958,14 @@ class Body:
     ) -> cython.void:
         """Let the additional terms set their torques for this state, in fixed legs (EQUATIONS 12)."""
         if outer_stance:
-            self.terms.joint_torques(self, th - tw, us - uw, a_s, ra_s, a_w, ra_w, p, up, n, un)
+            self.terms.joint_torques(self, hip, hip_rate, a_s, ra_s, a_w, ra_w, p, up, n, un)
         else:
-            self.terms.joint_torques(self, tw - th, uw - us, a_w, ra_w, a_s, ra_s, n, un, p, up)
+            self.terms.joint_torques(self, -hip, -hip_rate, a_w, ra_w, a_s, ra_s, n, un, p, up)
 
     # ---- motion in the air or in the operator's hands ---------------------------------------------------------
 
     def in_air(self, h: cython.double, stages: cython.longlong) -> cython.void:
-        """One Runge-Kutta step of `h` seconds in flight or held (EQUATIONS 7); stages 4, or 1 to look only."""
+        """One step as `on_feet` makes it, of `h` seconds in flight or held (EQUATIONS 7); stages 4, or 1 to look."""
         held: cython.bint = self.mode == 0
         locked: cython.bint = held and self.lock_hip
         standing: cython.bint = held and self.standing
@@ -923,19 +1000,34 @@ class Body:
         un: cython.double = self.motor_inner_rate
         F0, th0, tw0, G0, p0, n0 = F, th, tw, G, p, n
         uF0, us0, uw0, uG0, up0, un0 = uF, us, uw, uG, up, un
+        self._know_angles()
+        st, ct, sw, cw = self.sin_leg_outer, self.cos_leg_outer, self.sin_leg_inner, self.cos_leg_inner
+        # sums of k1 + k2 + k3 (positions) and k1 + 2 k2 + 2 k3 + k4 (rates)
         qF = qs = qw = qG = qp = qn = qx = qy = 0.0
         vF = vs = vw = vG = vp = vn = vx = vy = 0.0
-        c: cython.double = 0.5 * h
+        half: cython.double = 0.5 * h
+        quarter: cython.double = 0.25 * h
+        c: cython.double = half
         weight: cython.double = 1.0
         for stage in range(stages):
-            Ao = mco * cos(th) + mwo * sin(th)
-            Bo = mco * sin(th) - mwo * cos(th)
-            Ai = mci * cos(tw) + mwi * sin(tw)
-            Bi = mci * sin(tw) - mwi * cos(tw)
-            a_s = F - th
-            a_w = G - tw
-            Ts = 0.0 if massless and not outer_stands else ks * (p - a_s)
-            Tw = 0.0 if massless and not inner_stands else ks * (n - a_w)
+            if stage != 2:
+                # what depends on angles alone; stages 1 and 2 look at the same ones
+                if stage > 0:
+                    st = sin(th)
+                    ct = cos(th)
+                    sw = sin(tw)
+                    cw = cos(tw)
+                Ao = mco * ct + mwo * st
+                Bo = mco * st - mwo * ct
+                Ai = mci * cw + mwi * sw
+                Bi = mci * sw - mwi * cw
+                a_s = F - th
+                a_w = G - tw
+                pull_s = 0.0 if massless and not outer_stands else ks * (p - a_s)
+                pull_w = 0.0 if massless and not inner_stands else ks * (n - a_w)
+                spring = self._exact_spring(th - tw) if self.exact_spring else self.kh * (th - tw)
+            Ts = pull_s
+            Tw = pull_w
             mp = self.outer_drive - self.outer_coulomb * tanh(up * eps) - self.outer_viscous * up - Ts
             mn = self.inner_drive - self.inner_coulomb * tanh(un * eps) - self.inner_viscous * un - Tw
             if a_s < low or a_s > high:
@@ -949,13 +1041,9 @@ class Body:
                 if massless:
                     mn += stop
             hd = us - uw
-            Th = self.hip_drive - self.hip_coulomb * tanh(hd * eps) - self.hip_viscous * hd
-            if self.exact_spring:
-                Th -= self._exact_spring(th - tw)
-            else:
-                Th -= self.kh * (th - tw)
+            Th = self.hip_drive - self.hip_coulomb * tanh(hd * eps) - self.hip_viscous * hd - spring
             if with_terms:
-                self._ask_terms(True, th, tw, a_s, a_w, p, n, us, uw, uF - us, uG - uw, up, un)
+                self._ask_terms(True, th - tw, a_s, a_w, p, n, hd, uF - us, uG - uw, up, un)
                 Th += self.extra_hip
                 Ts += self.extra_outer
                 Tw += self.extra_inner
@@ -1040,17 +1128,23 @@ class Body:
                 qn += an
                 qx += axh
                 qy += ayh
-                if stage == 2:
+                if stage == 0:
+                    F = F0 + half * (uF0 + quarter * aF)
+                    th = th0 + half * (us0 + quarter * as_)
+                    tw = tw0 + half * (uw0 + quarter * aw)
+                    G = G0 + half * (uG0 + quarter * aG)
+                    p = p0 + half * (up0 + quarter * ap)
+                    n = n0 + half * (un0 + quarter * an)
+                    weight = 2.0
+                elif stage == 2:
+                    F = F0 + h * (uF0 + half * aF)
+                    th = th0 + h * (us0 + half * as_)
+                    tw = tw0 + h * (uw0 + half * aw)
+                    G = G0 + h * (uG0 + half * aG)
+                    p = p0 + h * (up0 + half * ap)
+                    n = n0 + h * (un0 + half * an)
                     c = h
                     weight = 1.0
-                else:
-                    weight = 2.0
-                F = F0 + c * uF
-                th = th0 + c * us
-                tw = tw0 + c * uw
-                G = G0 + c * uG
-                p = p0 + c * up
-                n = n0 + c * un
                 uF = uF0 + c * aF
                 us = us0 + c * as_
                 uw = uw0 + c * aw
@@ -1223,7 +1317,7 @@ class Body:
             self._save()
             if self.mode == 1 or self.mode == 2:
                 self.on_feet(remaining, 4)
-                if tries < 20 and self._pulled_now(remaining):
+                if (self.outer_Fy < 0.0 or self.inner_Fy < 0.0) and tries < 20 and self._pulled_now(remaining):
                     continue  # a foot left the floor at the start of this piece: nothing has moved yet
                 self.update_pose()
             else:
@@ -1380,7 +1474,7 @@ class Body:
         """True when this foot of a double stance is not ahead: let go, its sole stops it from driving in."""
         if self.mode != 2 or self.Jf == 0.0:
             return False
-        return self.contact_x(leg) - self.contact_x(1 - leg) < self.strike_ahead
+        return self._behind(1 - leg) - self._behind(leg) < self.strike_ahead
 
     def _may_leave(self, leg: cython.longlong) -> cython.bint:
         """Feet on the floor may leave it; the leading one in double stance only with `lift_leading`."""
@@ -1407,13 +1501,15 @@ class Body:
                     self.event = 4
             return value
         if self.mode == 1:
+            if self.stance == 0:
+                value = self.gap_inner + (0.0 if self.inner_armed else 2e-6)
+            else:
+                value = self.gap_outer + (0.0 if self.outer_armed else 2e-6)
             # only a foot ahead can strike; beside and behind it brushes with its sole
-            if self._ahead() > self.strike_ahead:
-                self.event = 2 - self.stance  # the other foot
-                if self.stance == 0:
-                    return self.gap_inner + (0.0 if self.inner_armed else 2e-6)
-                return self.gap_outer + (0.0 if self.outer_armed else 2e-6)
-            return 1.0
+            if value < 0.0 and self._ahead() <= self.strike_ahead:
+                return 1.0
+            self.event = 2 - self.stance  # the other foot
+            return value
         self.event = 1
         value = self.gap_outer + (0.0 if self.outer_armed else 2e-6)
         other = self.gap_inner + (0.0 if self.inner_armed else 2e-6)
@@ -1425,8 +1521,8 @@ class Body:
     def _ahead(self) -> cython.double:
         """How far the swing foot's lowest point is ahead of the stance foot's, m."""
         if self.stance == 0:
-            return self.contact_x(1) - self.contact_x(0)
-        return self.contact_x(0) - self.contact_x(1)
+            return self._behind(0) - self._behind(1)
+        return self._behind(1) - self._behind(0)
 
     def _try(self, h: cython.double) -> cython.double:
         """The event function after a piece of `h` seconds from the saved state."""

@@ -13,8 +13,8 @@ def test_errors_of_the_step_are_those_of_the_table():
     found = {(step, smoothing): error for step, smoothing, error in bm.step_errors((500.0, 125.0, 62.5))}
     table = {
         (500.0, 0.05): 2.6e-6,
-        (125.0, 0.05): 5.7e-9,
-        (62.5, 0.05): 4.7e-10,
+        (125.0, 0.05): 5.6e-9,
+        (62.5, 0.05): 4.6e-10,
         (500.0, 0.01): 1.0e-4,
         (125.0, 0.01): 1.5e-6,
         (62.5, 0.01): 1.6e-8,
