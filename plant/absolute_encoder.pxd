@@ -10,4 +10,4 @@ cdef class AbsoluteEncoder:
     cdef public bint started
     cdef public NoiseSource noise
     cdef public RandomStream flips
-    cpdef long long word(self, double angle, double h=*)
+    cpdef long long word(self, double angle, double h=*) noexcept

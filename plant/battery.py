@@ -1,3 +1,5 @@
+# cython: boundscheck=False, wraparound=False, cdivision=True
+# (the interval is kept inside the curve; the voltage is above zero where it divides)
 """Battery packs in parallel: open-circuit voltage against charge, internal resistance, charge counted.
 
 Seven packs of 25.9 V and 67 Wh nominal (appendix 3.10); 493 Wh were used on the long walk, so capacity and
@@ -89,12 +91,15 @@ class Battery:
         i = int(x)
         if i > self.intervals - 1:
             i = self.intervals - 1
-        return self.curve[i] + (self.curve[i + 1] - self.curve[i]) * (x - i)
+        V: cython.double = self.curve[i]
+        return V + (self.curve[i + 1] - V) * (x - i)
 
     def step(self, h: cython.double, motor_current_A: cython.double, electronics_W: cython.double) -> cython.void:
         """`h` seconds at this mean current of all motors (A) and power of the electronics (W)."""
         a: cython.double
         root: cython.double
+        V: cython.double
+        amps: cython.double
         if self.cut_off:
             self.voltage_V = 0.0
             self.current_A = 0.0
@@ -103,16 +108,18 @@ class Battery:
         root = a * a - 4.0 * self.resistance_ohm * electronics_W
         if root < 0.0:
             root = 0.0  # more than the battery can give: it gives the most it can
-        self.voltage_V = 0.5 * (a + sqrt(root))
-        if self.voltage_V <= 0.0:
+        V = 0.5 * (a + sqrt(root))
+        if V <= 0.0:
             self.voltage_V = 0.0
             self.cut_off = True  # short circuit: the protection opens
             self.current_A = 0.0
             return
-        self.current_A = motor_current_A + electronics_W / self.voltage_V
-        self.charge -= self.current_A * h * self.per_As
-        self.delivered_J += self.voltage_V * self.current_A * h
-        self.lost_J += self.resistance_ohm * self.current_A * self.current_A * h
+        amps = motor_current_A + electronics_W / V
+        self.voltage_V = V
+        self.current_A = amps
+        self.charge -= amps * h * self.per_As
+        self.delivered_J += V * amps * h
+        self.lost_J += self.resistance_ohm * amps * amps * h
         self.open_voltage_V = self.open_circuit_V(self.charge)
         if self.charge <= 0.0:
             self.cut_off = True

@@ -1,3 +1,5 @@
+# cython: boundscheck=False, wraparound=False
+# (places in the queue are below `count`, and `count` below `capacity`)
 """The H-bridge of a motor board: two PWM leads, low-side enables, and the watchdog that takes its power away.
 
 What a board does arrives stamped (ns) and takes effect at its stamp, also inside a step of the plant; a stamp
@@ -57,7 +59,14 @@ class Drive:
 
     def watchdog_edge(self, time: cython.longlong) -> cython.void:
         """The watchdog line changed its level at `time`."""
-        self._queue(time, 1, 0, 0, 0)
+        if not self.powered or time > self.power_off_ns:
+            self._queue(time, 1, 0, 0, 0)  # the bridge gets its power back at this edge
+            return
+        # it keeps its power, as it would if the edge were kept until its time
+        self.power_off_ns = time + self.watchdog_ns
+        self.next_change_ns = self.power_off_ns
+        if self.count > 0 and self.times[0] < self.next_change_ns:
+            self.next_change_ns = self.times[0]
 
     def low_side(self, time: cython.longlong, enable2: cython.bint, enable6: cython.bint) -> cython.void:
         """The two low-side enables from `time` on."""

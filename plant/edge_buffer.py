@@ -1,3 +1,5 @@
+# cython: boundscheck=False, wraparound=False
+# (`count` stays below `capacity`: a full buffer grows first)
 """Stamped edges and stamped bytes that leave a sensor during one step of the plant."""
 
 import array

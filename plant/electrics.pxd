@@ -8,6 +8,7 @@ cdef class Electrics:
     cdef public object parameters
     cdef public Battery battery
     cdef public MotorUnit hip, outer_ankle, inner_ankle, steering
+    cdef public list motors
     cdef public FootSensors outer_feet, inner_feet
     cdef public NoiseSource noise
     cdef public double[::1] analog_start, analog_end, values, zero_V, slope_V, noise_V, scale, offset, lag_s, state, battery_A
@@ -16,13 +17,12 @@ cdef class Electrics:
     cdef public double electronics_J, motor_current_A
     cpdef void step_motors(
         self, long long t0, long long t1, double hip_rate, double outer_rate, double inner_rate, double steering_rate,
-    )
+    ) noexcept
     cpdef void sense(
         self, long long t0, long long t1, bint outer_contact, double outer_load_N,
         bint inner_contact, double inner_load_N, double steering_rad,
-    )
+    ) noexcept
     cpdef void settle(
         self, bint outer_contact, double outer_load_N, bint inner_contact, double inner_load_N, double steering_rad,
-    )
-    cpdef void _read(self, double h, double steering_rad)
-    cpdef void _motor(self, long long motor, MotorUnit unit, double battery_V) noexcept
+    ) noexcept
+    cpdef void _read(self, double h, double steering_rad) noexcept

@@ -1,3 +1,5 @@
+# cython: boundscheck=False, wraparound=False
+# (places are those of the 19 wiring points, the four motors and `NoiseSource.block`)
 """Battery, four motors, electronics and every voltage that a board's converters see.
 
 A step of the plant in order: `step_motors` with the joint rates at its start (currents, torques for the body),
@@ -105,6 +107,7 @@ class Electrics:
         self.outer_ankle = MotorUnit("outer_ankle", p.outer_ankle, -1)
         self.inner_ankle = MotorUnit("inner_ankle", p.inner_ankle, 1)
         self.steering = MotorUnit("steering", p.steering, 1)
+        self.motors = [self.hip, self.outer_ankle, self.inner_ankle, self.steering]
         self.outer_feet = FootSensors("outer", p.foot_rise_time_constant_s, p.foot_share, p.foot_full_load_N)
         self.inner_feet = FootSensors("inner", p.foot_rise_time_constant_s, p.foot_share, p.foot_full_load_N)
         self.noise = NoiseSource(seed, "analog sensors")
@@ -191,8 +194,10 @@ class Electrics:
         """The voltages at the end of the step: contact and load of each foot pair, steering angle (rad)."""
         h: cython.double = (t1 - t0) * 1e-9
         i: cython.longlong
+        start: cython.double[::1] = self.analog_start
+        end: cython.double[::1] = self.analog_end
         for i in range(19):  # ANALOG_COUNT
-            self.analog_start[i] = self.analog_end[i]
+            start[i] = end[i]
         self.outer_feet.step(h, outer_contact, outer_load_N)
         self.inner_feet.step(h, inner_contact, inner_load_N)
         if h != self.lag_h:
@@ -224,17 +229,32 @@ class Electrics:
         """Fill `analog_end`."""
         V: cython.double = self.battery.voltage_V
         seen: cython.double = V if V < self.voltage_clip_V else self.voltage_clip_V
+        lag: cython.double = self.lag_factor
+        amps: cython.double
         steps: cython.double
         nearest: cython.longlong
         value: cython.double
         place: cython.longlong
+        motor: cython.longlong
         i: cython.longlong
+        unit: MotorUnit
         values: cython.double[::1] = self.values
         end: cython.double[::1] = self.analog_end
-        self._motor(0, self.hip, seen)
-        self._motor(1, self.outer_ankle, seen)
-        self._motor(2, self.inner_ankle, seen)
-        self._motor(3, self.steering, seen)
+        battery_A: cython.double[::1] = self.battery_A
+        motors: list = self.motors
+        for motor in range(4):
+            # what the three sensors of a motor board measure
+            unit = cython.cast(MotorUnit, motors[motor])
+            amps = unit.current_A
+            if unit.drive.sensed_lead_switches:
+                amps += unit.mounting * self.pwm_offset_A
+            value = battery_A[motor]
+            value += (unit.battery_current_A - value) * lag
+            battery_A[motor] = value
+            i = 3 * motor
+            values[i] = amps
+            values[i + 1] = value
+            values[i + 2] = seen
         values[12] = self.outer_feet.left_V
         values[13] = self.outer_feet.right_V
         values[14] = self.inner_feet.left_V
@@ -263,13 +283,3 @@ class Electrics:
         noise: cython.double[::1] = self.noise_V
         for i in range(19):
             end[i] = zero[i] + slope[i] * values[i] + noise[i] * table[place + i]
-
-    def _motor(self, motor: cython.longlong, unit: MotorUnit, battery_V: cython.double) -> cython.void:
-        """What the three sensors of one motor board measure."""
-        amps: cython.double = unit.current_A
-        if unit.drive.sensed_lead_switches:
-            amps += unit.mounting * self.pwm_offset_A
-        self.battery_A[motor] += (unit.battery_current_A - self.battery_A[motor]) * self.lag_factor
-        self.values[3 * motor] = amps
-        self.values[3 * motor + 1] = self.battery_A[motor]
-        self.values[3 * motor + 2] = battery_V

@@ -74,9 +74,11 @@ class FootSensors:
         if h != self.last_h:
             self.last_h = h
             self.decay = exp(-h / self.rise_time_constant_s)
-        self.closure = target + (self.closure - target) * self.decay
-        self.left_V = (self.swing_counts + self.span_counts * self.left_gain * self.closure) * (2.5 / 8192.0)
-        self.right_V = (self.swing_counts + self.span_counts * self.right_gain * self.closure) * (2.5 / 8192.0)
+        target += (self.closure - target) * self.decay
+        self.closure = target
+        target *= self.span_counts
+        self.left_V = (self.swing_counts + self.left_gain * target) * (2.5 / 8192.0)
+        self.right_V = (self.swing_counts + self.right_gain * target) * (2.5 / 8192.0)
 
     def settle(self, contact: cython.bint, load_N: cython.double) -> cython.void:
         """Take the value that a lasting contact and load give."""

@@ -10,18 +10,18 @@ cdef class Imu:
     cdef public long long filter_samples, latency_ns, baud, sample_ns, fusion_divider, ppb, phase_ns
     cdef public RandomStream stream
     cdef public ByteBuffer bytes
-    cdef public long long samples, next_sample_ns, line_free_ns, packets, mode, command
+    cdef public long long samples, next_sample_ns, line_free_ns, byte_ns, packets, mode, command
     cdef public long long acknowledge, acknowledge_ns, checksum
     cdef public double[::1] ring
     cdef public double ring_sum, lagged, rate_x, roll
-    cpdef void receive_byte(self, long long time, long long byte)
+    cpdef void receive_byte(self, long long time, long long byte) noexcept
     cpdef long long sample_time(self, long long n)
     cpdef void update(
         self, long long t0, long long t1, double lean0, double rate0, double lean1, double rate1,
         double yaw=*, double yaw_rate=*,
     )
-    cpdef void _send(self, long long byte)
-    cpdef void _word(self, long long word)
-    cpdef void _sum(self)
-    cpdef void _packet(self, long long start, double first, double second, double third, double yaw_rate)
-    cpdef void _acknowledge(self)
+    cpdef void _send(self, long long byte) noexcept
+    cpdef void _word(self, long long word) noexcept
+    cpdef void _sum(self) noexcept
+    cpdef void _packet(self, long long start, double first, double second, double third, double yaw_rate) noexcept
+    cpdef void _acknowledge(self) noexcept

@@ -1,3 +1,5 @@
+# cython: boundscheck=False, wraparound=False
+# (places in the ring are taken modulo its length, those in the line's buffer are below its capacity)
 """The inertial sensor 3DM-GX3-25 on the outer legs: packets of bytes on its serial line.
 
 It is silent until the command C4 C1 29 xx arrives, acknowledges it and then sends packet xx for ever (00 stops
@@ -88,6 +90,7 @@ class Imu:
         self.samples = 0
         self.next_sample_ns = phase_ns
         self.line_free_ns = 0
+        self.byte_ns = 0
         self.packets = 0
         self.mode = 0  # header of the packet that is sent, 0: silent
         self.command = 0  # bytes of a command received so far
@@ -175,9 +178,15 @@ class Imu:
 
     def _send(self, byte: cython.longlong) -> cython.void:
         """One byte on the line, from `line_free_ns` on; 10 bits at the baud rate."""
+        line: ByteBuffer = self.bytes
+        i: cython.longlong = line.count
         self.checksum += byte
-        self.line_free_ns += _TEN_BITS // self.baud
-        self.bytes.push(self.line_free_ns, byte)
+        self.line_free_ns += self.byte_ns
+        if i == line.capacity:
+            line.grow()
+        line.times[i] = self.line_free_ns
+        line.values[i] = byte
+        line.count = i + 1
 
     def _word(self, word: cython.longlong) -> cython.void:
         """Four bytes, the highest first."""
@@ -203,6 +212,7 @@ class Imu:
         """One packet of 31 bytes whose first start bit is at `start`."""
         self.line_free_ns = start
         self.checksum = 0
+        self.byte_ns = _TEN_BITS // self.baud
         self._send(self.mode)
         self._word(word_of_float(first))
         self._word(word_of_float(second))
@@ -220,6 +230,7 @@ class Imu:
         if start > self.line_free_ns:
             self.line_free_ns = start
         self.checksum = 0
+        self.byte_ns = _TEN_BITS // self.baud
         self._send(0xC4)
         self._send(self.acknowledge)
         self._word(self.acknowledge_ns // 16000 & _MASK)

@@ -10,17 +10,17 @@ cdef class IncrementalEncoder:
     cdef public double eccentricity_1, phase_1, eccentricity_2, phase_2, jitter
     cdef public RandomStream stream
     cdef public double[::1] errors
-    cdef public bint has_errors, started, broken
+    cdef public bint has_errors, started, broken, has_end
     cdef public EdgeBuffer edges
-    cdef public double u0, du, m0, m1, span_ns
-    cpdef double position(self, double angle)
-    cpdef double speed(self, double angle, double rate)
-    cpdef double threshold(self, long long n)
-    cpdef void reset(self, double angle)
-    cpdef long long level_a(self)
+    cdef public double u0, du, m0, m1, span_ns, end_angle, end_rate, end_u, end_speed
+    cpdef double position(self, double angle) noexcept
+    cpdef double speed(self, double angle, double rate) noexcept
+    cpdef double threshold(self, long long n) noexcept
+    cpdef void reset(self, double angle) noexcept
+    cpdef long long level_a(self) noexcept
     cpdef long long level_b(self, double angle)
     cpdef void update(self, long long t0, long long t1, double angle0, double rate0, double angle1, double rate1)
-    cpdef double _value(self, double x)
-    cpdef void _turning(self, long long t0, long long t1, double u0, double u1)
+    cpdef double _value(self, double x) noexcept
+    cpdef void _turning(self, long long t0, long long t1, double u0, double u1, double m0, double m1)
     cpdef void _piece(self, double x0, double x1)
     cpdef void _emit(self, double x0, double x1, double level, long long level_b)

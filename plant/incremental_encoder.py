@@ -1,3 +1,5 @@
+# cython: boundscheck=False, wraparound=False
+# (places in the disc's table are taken modulo its size, places in the edge buffer are below its capacity)
 """An incremental encoder: every edge of channel A with the level of channel B, from angle and rate.
 
 Position is counted in edges of A, u = sign x gear x lines / pi x angle: two edges per line, as the 2X decoder
@@ -72,6 +74,12 @@ class IncrementalEncoder:
         self.total = 0
         self.started = False
         self.broken = False
+        # where the last `update` ended: joint angle and rate, edges and edges per second there
+        self.end_angle = 0.0
+        self.end_rate = 0.0
+        self.end_u = 0.0
+        self.end_speed = 0.0
+        self.has_end = False
         # the running piece, as fields so that the helpers need no long argument lists
         self.u0 = 0.0
         self.du = 0.0
@@ -134,6 +142,7 @@ class IncrementalEncoder:
             n -= 1
         self.cell = n
         self.started = True
+        self.has_end = False
         self.edges.count = 0
 
     def level_a(self) -> cython.longlong:
@@ -162,6 +171,8 @@ class IncrementalEncoder:
         u0: cython.double
         u1: cython.double
         du: cython.double
+        m0: cython.double
+        m1: cython.double
         g0: cython.double
         g1: cython.double
         b: cython.double
@@ -174,44 +185,62 @@ class IncrementalEncoder:
         time: cython.longlong
         last: cython.longlong
         cell: cython.longlong
+        count: cython.longlong = 0
+        forward: cython.bint
         buffer: EdgeBuffer = self.edges
         buffer.count = 0
         if not self.started:
             self.reset(angle0)
         if self.broken:
             return
-        u0 = self.position(angle0)
-        u1 = self.position(angle1)
+        # as a rule a step starts where the last one ended
+        if self.has_end and angle0 == self.end_angle and rate0 == self.end_rate:
+            u0 = self.end_u
+            m0 = h * self.end_speed
+        else:
+            u0 = self.position(angle0)
+            m0 = h * self.speed(angle0, rate0)
+        if self.eccentricity_1 != 0.0 or self.eccentricity_2 != 0.0:
+            u1 = self.position(angle1)
+            x = self.speed(angle1, rate1)
+        else:
+            u1 = self.edges_per_shaft_rad * (self.shaft_per_rad * (self.scale * angle1 + self.offset_rad))
+            x = self.edges_per_shaft_rad * self.shaft_per_rad * self.scale * rate1
+        m1 = h * x
+        self.end_angle = angle1
+        self.end_rate = rate1
+        self.end_u = u1
+        self.end_speed = x
+        self.has_end = True
         du = u1 - u0
-        self.m0 = h * self.speed(angle0, rate0)
-        self.m1 = h * self.speed(angle1, rate1)
-        if du > 0.0:
-            if self.m0 < 0.5 * du or self.m0 > 2.0 * du or self.m1 < 0.5 * du or self.m1 > 2.0 * du:
-                self._turning(t0, t1, u0, u1)
+        cell = self.cell
+        forward = du > 0.0
+        if forward:
+            if m0 < 0.5 * du or m0 > 2.0 * du or m1 < 0.5 * du or m1 > 2.0 * du:
+                self._turning(t0, t1, u0, u1, m0, m1)
                 return
-            level = self.threshold(self.cell + 1)
+            level = self.errors[(cell + 1) % self.table_size] + (cell + 1) if self.has_errors else cell + 1
             if u1 < level:
                 return
         elif du < 0.0:
-            if self.m0 > 0.5 * du or self.m0 < 2.0 * du or self.m1 > 0.5 * du or self.m1 < 2.0 * du:
-                self._turning(t0, t1, u0, u1)
+            if m0 > 0.5 * du or m0 < 2.0 * du or m1 > 0.5 * du or m1 < 2.0 * du:
+                self._turning(t0, t1, u0, u1, m0, m1)
                 return
-            level = self.threshold(self.cell)
+            level = self.errors[cell % self.table_size] + cell if self.has_errors else cell
             if u1 >= level:
                 return
         else:
-            if self.m0 != 0.0 or self.m1 != 0.0:
-                self._turning(t0, t1, u0, u1)
+            if m0 != 0.0 or m1 != 0.0:
+                self._turning(t0, t1, u0, u1, m0, m1)
             return
         # x(s): fraction of the step at which the fraction s of the way is done
         inverse = 1.0 / du
-        g0 = du / self.m0
-        g1 = du / self.m1
+        g0 = du / m0
+        g1 = du / m1
         b = 3.0 - 2.0 * g0 - g1
         c = g0 + g1 - 2.0
         span = t1 - t0
         last = t0
-        cell = self.cell
         while True:
             s = (level - u0) * inverse
             x = s * (g0 + s * (b + s * c))
@@ -224,27 +253,28 @@ class IncrementalEncoder:
             if time >= t1:
                 time = t1 - 1
             last = time
-            if buffer.count == buffer.capacity:
+            if count == buffer.capacity:
                 buffer.grow()
-            buffer.times[buffer.count] = time
-            if du > 0.0:
+            buffer.times[count] = time
+            if forward:
                 cell += 1
-                buffer.levels_a[buffer.count] = 1 - (cell & 1)
-                buffer.levels_b[buffer.count] = cell & 1
-                buffer.count += 1
+                buffer.levels_a[count] = 1 - (cell & 1)
+                buffer.levels_b[count] = cell & 1
+                count += 1
                 level = self.errors[(cell + 1) % self.table_size] + (cell + 1) if self.has_errors else cell + 1
                 if u1 < level:
                     break
             else:
-                buffer.levels_b[buffer.count] = cell & 1
+                buffer.levels_b[count] = cell & 1
                 cell -= 1
-                buffer.levels_a[buffer.count] = 1 - (cell & 1)
-                buffer.count += 1
+                buffer.levels_a[count] = 1 - (cell & 1)
+                count += 1
                 level = self.errors[cell % self.table_size] + cell if self.has_errors else cell
                 if u1 >= level:
                     break
         self.cell = cell
-        self.total += buffer.count
+        buffer.count = count
+        self.total += count
 
     def _value(self, x: cython.double) -> cython.double:
         """The cubic at the fraction x of the step, in edges."""
@@ -252,7 +282,15 @@ class IncrementalEncoder:
             self.m0 + x * (3.0 * self.du - 2.0 * self.m0 - self.m1 + x * (self.m0 + self.m1 - 2.0 * self.du))
         )
 
-    def _turning(self, t0: cython.longlong, t1: cython.longlong, u0: cython.double, u1: cython.double) -> cython.void:
+    def _turning(
+        self,
+        t0: cython.longlong,
+        t1: cython.longlong,
+        u0: cython.double,
+        u1: cython.double,
+        m0: cython.double,
+        m1: cython.double,
+    ) -> cython.void:
         """Edges of a step in which the position may turn round: pieces between the cubic's turning points."""
         a: cython.double
         b: cython.double
@@ -263,6 +301,8 @@ class IncrementalEncoder:
         before: cython.longlong = self.edges.count
         self.u0 = u0
         self.du = u1 - u0
+        self.m0 = m0
+        self.m1 = m1
         self.t0 = t0
         self.span_ns = t1 - t0
         self.last_time = t0

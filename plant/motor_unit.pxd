@@ -14,11 +14,11 @@ cdef class MotorUnit:
     cdef public double bridge_current_A, current_A, mean_current_A, battery_current_A, heat_W, drive_voltage_V
     cdef public double drive_Nm, coulomb_Nm, viscous_Nms
     cdef public double drawn_J, drawn_before_J, returned_J, mechanical_J, winding_J, series_J, contact_J, ripple_J, gate_J, diode_J
-    cdef public double charge_As, absolute_As, square_A2s, last_duration_s, decay, decay_rate
-    cpdef double magnetic_J(self)
-    cpdef double battery_J(self)
-    cpdef double torque_Nm(self, double current_A, double rate_rad_s)
+    cdef public double heat_J, heat_s, known_s, known_ohm, tau_s, decay, decay_s, decay_squared_s
+    cpdef double magnetic_J(self) noexcept
+    cpdef double battery_J(self) noexcept
+    cpdef double torque_Nm(self, double current_A, double rate_rad_s) noexcept
     cpdef void load(self, double current_A) noexcept
-    cpdef void step_electrical(self, long long t0, long long t1, double rate_rad_s, double battery_V)
-    cpdef void _current(self, double seconds, double x, double drop)
+    cpdef void step_electrical(self, long long t0, long long t1, double rate_rad_s, double battery_V) noexcept
+    cdef void _know_step(self, double h, double R) noexcept
     cpdef void _warm(self, double h) noexcept

@@ -1,3 +1,5 @@
+# cython: cdivision=True
+# (only doubles are divided, by durations and resistances above zero)
 """A brushed motor with its drive: winding current in closed form, friction at the joint, heat, power balance.
 
 Everything seen from outside is in the joint's sense: a positive current turns the joint positively. `mounting`
@@ -78,7 +80,7 @@ class MotorUnit:
         self.current_A = 0.0
         self.mean_current_A = 0.0
         self.battery_current_A = 0.0
-        self.heat_W = 0.0  # in the rotor, mean over the step
+        self.heat_W = 0.0  # in the rotor, mean over the last 8 ms
         self.drive_voltage_V = 0.0  # mean over the step, in the bridge's sense
         self.drive_Nm = 0.0
         self.coulomb_Nm = p.constant_friction_Nm
@@ -94,13 +96,15 @@ class MotorUnit:
         self.ripple_J = 0.0
         self.gate_J = 0.0
         self.diode_J = 0.0
-        # integrals over the running step
-        self.charge_As = 0.0  # of I
-        self.absolute_As = 0.0  # of |I|
-        self.square_A2s = 0.0  # of I^2
-        self.last_duration_s = 0.0
+        self.heat_J = 0.0  # in the rotor since its temperature was last computed, and the time since then
+        self.heat_s = 0.0
+        # of a whole step of `known_s` at `known_ohm`: time constant, e^(-t/tau) and two integrals of it
+        self.known_s = 0.0
+        self.known_ohm = 0.0
+        self.tau_s = 0.0
         self.decay = 0.0
-        self.decay_rate = 0.0
+        self.decay_s = 0.0
+        self.decay_squared_s = 0.0
 
     def magnetic_J(self) -> cython.double:
         """Energy in winding and inductor now."""
@@ -130,164 +134,173 @@ class MotorUnit:
         rate_rad_s: cython.double,
         battery_V: cython.double,
     ) -> cython.void:
-        """Winding, bridge and heat from `t0` to `t1` (ns) at a constant joint rate and battery voltage."""
+        """Winding, bridge and heat from `t0` to `t1` (ns) at a constant joint rate and battery voltage.
+
+        Pieces between changes of the bridge; in each the current runs to its final value, or to zero and on from
+        there, and its integral, that of its size and that of its square are summed (EQUATIONS 10.2-10.7).
+        """
+        drive: Drive = self.drive
         now: cython.longlong = t0
         following: cython.longlong
         h: cython.double = (t1 - t0) * 1e-9
+        R: cython.double = self.winding_ohm + self.series_ohm
+        back_emf_V: cython.double = self.mounting * self.K * self.gear * rate_rad_s
+        amps: cython.double = self.bridge_current_A
+        open_bridge: cython.bint
         seconds: cython.double
-        back_emf_V: cython.double
-        V: cython.double
+        left: cython.double
+        x: cython.double
         drop: cython.double
         d: cython.double
-        ripple: cython.double
+        sign: cython.double
+        final: cython.double
+        above: cython.double
+        tau: cython.double
+        e: cython.double
+        e_s: cython.double
+        ee_s: cython.double
+        part: cython.double
         charge: cython.double
         absolute: cython.double
-        square: cython.double
         energy: cython.double
         from_battery_As: cython.double = 0.0
         total_As: cython.double = 0.0
-        total_A2s: cython.double = 0.0
+        size_As: cython.double = 0.0
+        square_A2s: cython.double = 0.0
         ripple_J: cython.double = 0.0
-        contact_J: cython.double = 0.0
         volt_seconds: cython.double = 0.0
         if t1 <= t0:
             return
-        self.drive.apply(t0)
-        back_emf_V = self.mounting * self.K * self.gear * rate_rad_s
+        if drive.next_change_ns <= t0:
+            drive.apply(t0)
+        if h != self.known_s or R != self.known_ohm:
+            self._know_step(h, R)
+        tau = self.tau_s
         while now < t1:
-            following = self.drive.next_change_ns
+            following = drive.next_change_ns
             if following > t1:
                 following = t1
             seconds = (following - now) * 1e-9
-            if self.drive.is_open:
-                self._current(seconds, -back_emf_V, self.contact_drop_V + battery_V + 2.0 * self.diode_drop_V)
-                charge = self.charge_As
-                absolute = self.absolute_As
-                square = self.square_A2s
+            open_bridge = drive.is_open
+            d = drive.duty
+            if open_bridge:
+                x = -back_emf_V
+                drop = self.contact_drop_V + battery_V + 2.0 * self.diode_drop_V
+            else:
+                x = d * battery_V - back_emf_V
+                drop = self.contact_drop_V + self.dead_time_fraction * battery_V
+            charge = 0.0
+            absolute = 0.0
+            left = seconds
+            while left > 0.0:
+                # `sign`: side of zero the current is on or goes to; `final` and `above` are measured on that side
+                if amps > 0.0:
+                    sign = 1.0
+                elif amps < 0.0:
+                    sign = -1.0
+                elif x > drop:
+                    sign = 1.0
+                elif x < -drop:
+                    sign = -1.0
+                else:
+                    break  # the contact drop holds the current at zero
+                final = (sign * x - drop) / R
+                above = sign * amps - final
+                if left == h:
+                    e = self.decay
+                    e_s = self.decay_s
+                    ee_s = self.decay_squared_s
+                else:
+                    e = exp(-left / tau)
+                    e_s = tau * (1.0 - e)
+                    ee_s = 0.5 * tau * (1.0 - e * e)
+                if final + above * e < 0.0:
+                    # the current reaches zero inside: there e = -final / above
+                    e = -final / above
+                    e_s = tau * (1.0 - e)
+                    ee_s = 0.5 * tau * (1.0 - e * e)
+                    part = tau * log(above / -final)
+                    if part > left:
+                        part = left
+                    left -= part
+                    amps = 0.0
+                else:
+                    part = left
+                    left = 0.0
+                    amps = sign * (final + above * e)
+                part *= final
+                square_A2s += final * (part + 2.0 * above * e_s) + above * above * ee_s
+                part += above * e_s
+                charge += sign * part
+                absolute += part
+            total_As += charge
+            size_As += absolute
+            if open_bridge:
                 from_battery_As -= absolute
                 self.diode_J += 2.0 * self.diode_drop_V * absolute
             else:
-                d = self.drive.duty
-                V = d * battery_V
-                drop = self.contact_drop_V
-                if self.dead_time_fraction > 0.0:
-                    drop += self.dead_time_fraction * battery_V
-                self._current(seconds, V - back_emf_V, drop)
-                charge = self.charge_As
-                absolute = self.absolute_As
-                square = self.square_A2s
-                from_battery_As += d * charge
-                volt_seconds += V * seconds
-                if self.dead_time_fraction > 0.0:
-                    # the drop is the battery's own voltage, switched against the current: it goes back
-                    from_battery_As -= self.dead_time_fraction * absolute
+                # the dead time's drop is the battery's own voltage, switched against the current: it goes back
+                from_battery_As += d * charge - self.dead_time_fraction * absolute
+                volt_seconds += d * battery_V * seconds
                 if d < 0.0:
                     d = -d
                 if d > 0.0:
-                    ripple = battery_V * d * (1.0 - d) * self.ripple_factor
-                    energy = ripple * ripple * (1.0 / 12.0) * (self.winding_ohm + self.series_ohm) * seconds
-                    self.ripple_J += energy
-                    ripple_J += energy
-                if self.drive.switching_leads > 0 and battery_V > 0.0:
-                    energy = self.drive.switching_leads * self.gate_W_per_V * battery_V * seconds
-                    self.gate_J += energy
-                    from_battery_As += energy / battery_V
-            energy = self.contact_drop_V * absolute
-            self.contact_J += energy
-            contact_J += energy
-            self.mechanical_J += back_emf_V * charge
-            total_As += charge
-            total_A2s += square
+                    energy = battery_V * d * (1.0 - d) * self.ripple_factor
+                    ripple_J += energy * energy * (1.0 / 12.0) * R * seconds
+                if drive.switching_leads > 0 and battery_V > 0.0:
+                    energy = drive.switching_leads * self.gate_W_per_V * seconds
+                    from_battery_As += energy
+                    self.gate_J += energy * battery_V
             now = following
-            if now < t1 or now == self.drive.next_change_ns:
-                self.drive.apply(now)
+            if now == drive.next_change_ns:
+                drive.apply(now)
         if ripple_J > 0.0:
             from_battery_As += ripple_J / battery_V
-        energy = self.winding_ohm * total_A2s
+            self.ripple_J += ripple_J
+        part = self.contact_drop_V * size_As
+        self.contact_J += part
+        self.mechanical_J += back_emf_V * total_As
+        energy = self.winding_ohm * square_A2s
         self.winding_J += energy
-        self.series_J += self.series_ohm * total_A2s
-        # the ripple heats the winding and the series parts in proportion to their resistance
-        self.heat_W = (energy + contact_J + ripple_J * self.winding_ohm / (self.winding_ohm + self.series_ohm)) / h
-        self.current_A = self.mounting * self.bridge_current_A
+        self.series_J += self.series_ohm * square_A2s
+        self.bridge_current_A = amps
+        self.current_A = self.mounting * amps
         self.mean_current_A = self.mounting * total_As / h
         self.battery_current_A = from_battery_As / h
         self.drive_voltage_V = volt_seconds / h
-        energy = from_battery_As * battery_V
-        if energy >= 0.0:
-            self.drawn_J += energy
+        x = from_battery_As * battery_V
+        if x >= 0.0:
+            self.drawn_J += x
         else:
-            self.returned_J -= energy
-        self._warm(h)
-        self.load(self.mean_current_A)
+            self.returned_J -= x
+        # the ripple heats the winding and the series parts in proportion to their resistance
+        self.heat_J += energy + part + ripple_J * self.winding_ohm / R
+        self.heat_s += h
+        if self.heat_s >= 0.008:
+            self.heat_W = self.heat_J / self.heat_s
+            self._warm(self.heat_s)
+            self.heat_J = 0.0
+            self.heat_s = 0.0
+        # the three torque numbers for the body: `load` of the mean current
+        x = self.gear * self.K * self.mean_current_A
+        self.drive_Nm = x
+        self.coulomb_Nm = self.mu * (x if x > 0.0 else -x) + self.C0
+        self.viscous_Nms = self.C1
 
-    def _current(self, seconds: cython.double, x: cython.double, drop: cython.double) -> cython.void:
-        """Bridge current over `seconds` with x = V - K G w; leaves the integrals of I, |I| and I^2."""
-        R: cython.double = self.winding_ohm + self.series_ohm
-        tau: cython.double
-        amps: cython.double = self.bridge_current_A
-        left: cython.double = seconds
-        final: cython.double
-        start: cython.double
-        crossing: cython.double
-        e: cython.double
-        part: cython.double
-        sign: cython.double
-        charge: cython.double = 0.0
-        absolute: cython.double = 0.0
-        square: cython.double = 0.0
-        while left > 0.0:
-            # `sign`: side of zero the current is on or goes to; start and final are measured on that side
-            if amps > 0.0:
-                sign = 1.0
-            elif amps < 0.0:
-                sign = -1.0
-            elif x > drop:
-                sign = 1.0
-            elif x < -drop:
-                sign = -1.0
-            else:
-                break  # the contact drop holds the current at zero
-            tau = self.inductance_H / R
-            start = sign * amps
-            final = (sign * x - drop) / R
-            crossing = left
-            if final < 0.0:
-                e = exp(-left / tau) if left != self.last_duration_s or R != self.decay_rate else self.decay
-                if final + (start - final) * e < 0.0:
-                    crossing = tau * log((start - final) / -final)
-            if crossing < left:
-                # the current reaches zero inside: there e = -final / (start - final)
-                e = -final / (start - final)
-                left -= crossing
-                amps = 0.0
-            else:
-                if left == self.last_duration_s and R == self.decay_rate:
-                    e = self.decay
-                else:
-                    e = exp(-left / tau)
-                    self.last_duration_s = left
-                    self.decay_rate = R
-                    self.decay = e
-                crossing = left
-                left = 0.0
-                amps = sign * (final + (start - final) * e)
-                if sign * amps < 0.0:
-                    amps = 0.0
-            part = final * crossing + (start - final) * tau * (1.0 - e)
-            charge += sign * part
-            absolute += part
-            square += (
-                final * final * crossing
-                + 2.0 * final * (start - final) * tau * (1.0 - e)
-                + (start - final) * (start - final) * (0.5 * tau) * (1.0 - e * e)
-            )
-        self.bridge_current_A = amps
-        self.charge_As = charge
-        self.absolute_As = absolute
-        self.square_A2s = square
+    def _know_step(self, h: cython.double, R: cython.double) -> cython.void:
+        """Keep what a step of `h` seconds at a loop resistance of `R` ohm needs of the exponential."""
+        self.known_s = h
+        self.known_ohm = R
+        self.tau_s = self.inductance_H / R
+        self.decay = exp(-h / self.tau_s)
+        self.decay_s = self.tau_s * (1.0 - self.decay)
+        self.decay_squared_s = 0.5 * self.tau_s * (1.0 - self.decay * self.decay)
 
     def _warm(self, h: cython.double) -> cython.void:
-        """Winding and housing temperature; R and K follow when their coefficients are set."""
+        """Winding and housing after `h` seconds of `heat_W`; R and K follow when their coefficients are set.
+
+        Asked every 8 ms, less than a 600th of any winding's time constant: chosen by us.
+        """
         inward: cython.double = (self.rotor_temperature_C - self.housing_temperature_C) * self.G_wh
         outward: cython.double = (self.housing_temperature_C - self.air_C) * self.G_ha
         self.rotor_temperature_C += (self.heat_W - inward) * h * self.inverse_C_w

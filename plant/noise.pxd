@@ -4,5 +4,5 @@ cdef class NoiseSource:
     cdef public RandomStream stream
     cdef public double[::1] table
     cdef public long long word, left
-    cpdef double normal(self)
-    cpdef long long block(self)
+    cpdef double normal(self) noexcept
+    cpdef long long block(self) noexcept

@@ -1,3 +1,5 @@
+# cython: boundscheck=False, wraparound=False
+# (a place is twelve bits and the table has more than 4096 values)
 """Cheap normal noise for sensors that are read at every step of the plant.
 
 A table of the 4096 quantiles of the normal distribution, scaled to variance 1 and shuffled by the seed, is
