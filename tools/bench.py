@@ -33,6 +33,14 @@ def register(commands: Any) -> None:
     command.add_argument(
         "--walks", action="store_true", help="instead: how far and how the parameter sets walk, over seeds and floors"
     )
+    command.add_argument(
+        "--interfaces",
+        action="store_true",
+        help="instead: frames through our python-can interface and python-can's own",
+    )
+    command.add_argument(
+        "--frames", type=whole_number(3), default=1_000_000, help="frames of --interfaces (default 1000000)"
+    )
     command.add_argument("--case", choices=sorted(CASES), help=argparse.SUPPRESS)
     command.set_defaults(run=run)
 
@@ -101,6 +109,13 @@ def virtual_case(frames: int) -> dict:
     return {"figure": benchmark.virtual_frames(frames)["frames_per_s"], "unit": "frames per CPU s"}
 
 
+def fuzz_case(cases: int) -> dict:
+    """Wrong bytes on the data link, both ways; everything accounted for, or an error."""
+    from tools import fuzz_serial
+
+    return fuzz_serial.benchmark(cases)
+
+
 CASES = {
     # case: (title, function of the virtual seconds)
     "robot": ("whole robot, digest on, logs off", lambda s: robot_case(s)),
@@ -112,6 +127,7 @@ CASES = {
     "bus": ("our four buses, every buffer always full", lambda s: bus_case(50_000 * int(s))),
     "bus-quarter": ("our four buses at 25 % load", lambda s: bus_case(50_000 * int(s), 0.25)),
     "bus-eight": ("our four buses, eight boards each, 75 % load", lambda s: bus_case(50_000 * int(s), 0.75, 8)),
+    "serial-fuzz": ("wrong bytes on the serial line", lambda s: fuzz_case(5_000 * int(s))),
     "virtual": ("python-can virtual, three boards", lambda s: virtual_case(1_000 * int(s))),
 }
 INTERPRETED = ("robot", "plant", "bus")
@@ -187,6 +203,22 @@ def walks(options: argparse.Namespace) -> int:
     return 0
 
 
+def interfaces(options: argparse.Namespace) -> int:
+    """Frames through python-can interfaces, ours first; a table, and everything as JSON."""
+    from tools.interface_bench import compare, table_of
+
+    json_file = json_target(options.json)
+    rows = compare(options.frames, Console(stderr=True, quiet=options.json == "-"))
+    result = {"date": wallclock.today_iso(), "machine": machine(), "interfaces": rows}
+    if options.json == "-":
+        print(json.dumps(result, indent=2))
+        return 0
+    if json_file is not None:
+        replace_file(json_file, (json.dumps(result, indent=2) + "\n").encode())
+    Console().print(table_of(rows))
+    return 0
+
+
 def machine() -> dict:
     """What the figures were taken on."""
     model = platform.processor() or platform.machine()
@@ -207,6 +239,8 @@ def run(options: argparse.Namespace) -> int:
     """Measure every case `--runs` times in turn; print medians and the ratio to the whole robot."""
     if options.walks:
         return walks(options)
+    if options.interfaces:
+        return interfaces(options)
     if options.case:
         print(json.dumps(CASES[options.case][1](options.seconds)))
         return 0
