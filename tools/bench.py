@@ -36,7 +36,7 @@ def register(commands: Any) -> None:
     command.add_argument(
         "--interfaces",
         action="store_true",
-        help="instead: frames through our python-can interface and python-can's own",
+        help="instead: frames through python-can interfaces, ours first",
     )
     command.add_argument(
         "--frames", type=whole_number(3), default=1_000_000, help="frames of --interfaces (default 1000000)"

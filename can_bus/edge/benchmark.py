@@ -18,6 +18,7 @@ from can_bus.edge.paced import PacedBus
 from foundation import wallclock
 
 IDENTIFIERS = 16  # per sender
+SPACING = 64  # between the first identifiers of two senders
 SILENCE_S = 2.0  # after so long without a frame, what has not come is lost
 MULTICAST_GROUP = "239.74.163.2"  # python-can's default group for IPv4
 
@@ -39,15 +40,21 @@ def opened(interface: str, channel: str) -> can.BusABC:
 
 
 class Tally:
-    """Frames that one reader has heard: how many, and how many came out of the order of their identifier."""
+    """Frames that one reader has heard: how many, and how many came out of the order of their identifier.
 
-    def __init__(self) -> None:
+    Those of the reader itself (`own`) do not count: `udp_multicast` gives them back unasked.
+    """
+
+    def __init__(self, own: int = -1) -> None:
+        self.own = own
         self.heard = 0
         self.reordered = 0
         self.expected: dict[int, int] = {}
 
     def take(self, message: can.Message) -> None:
         """Count a frame; its data are the running number of its identifier."""
+        if message.arbitration_id // SPACING == self.own:
+            return
         number = int.from_bytes(message.data, "little")
         self.reordered += number < self.expected.get(message.arbitration_id, 0)
         self.expected[message.arbitration_id] = number + 1
@@ -57,7 +64,7 @@ class Tally:
 def numbered(sender: int, number: int) -> can.Message:
     """Frame `number` of a sender: its identifiers in turn, each with a running number."""
     return can.Message(
-        arbitration_id=64 * sender + number % IDENTIFIERS,
+        arbitration_id=SPACING * sender + number % IDENTIFIERS,
         data=(number // IDENTIFIERS).to_bytes(8, "little"),
         is_extended_id=False,
     )
@@ -71,7 +78,7 @@ def interface_frames(interface: str, frames: int, nodes: int = 3) -> dict:
     time).
     """
     channel = f"ranger-sim-benchmark-{os.getpid()}"
-    tallies = [Tally() for _ in range(nodes)]
+    tallies = [Tally(node) for node in range(nodes)]
     with contextlib.ExitStack() as stack:
         buses = [stack.enter_context(opened(interface, channel)) for _ in range(nodes)]
         start, wall = wallclock.process_cpu_s(), wallclock.monotonic_s()
@@ -115,9 +122,7 @@ def two_processes(interface: str, frames: int) -> dict:
         name = f"benchmark-{os.getpid()}"
         if interface == "ranger_sim":
             stack.enter_context(_helper("host", name)).wait_for("hosting")
-            bus = can.Bus(
-                interface="ranger_sim", channel=f"{name}/can1", rx_queue_size=10_000_000, ignore_config=True
-            )
+            bus = can.Bus(interface="ranger_sim", channel=f"{name}/can1", rx_queue_size=10_000_000, ignore_config=True)
         else:
             bus = opened(interface, name)
         stack.enter_context(bus)
