@@ -49,7 +49,8 @@ def serve(robot: Any, name: str, block: Block, stage: tuple, settings: Settings,
         (number, wire.word) for number, wire in enumerate(robot.loop.word_wires) if wire.board is robot.boards[name]
     ]
     plant = robot.plant
-    audience = Audience(*stage, robot.loop.step_times, plant.analog_start, plant.analog_end, board.words, wires)
+    words, doubles = stage
+    audience = Audience(words, doubles, robot.loop.step_times, plant.analog_start, plant.analog_end, board.words, wires)
     try:
         Endpoint(board, block, stage, audience, place).serve()
     except BaseException as error:  # noqa: BLE001  (whatever a program on a board raises is said by the supervisor)

@@ -44,8 +44,9 @@ class PlantRun:
         self.blocks = blocks
         self.settings = settings
         self.link = link
-        self.pace = Pace(*stage, settings.speed)
-        self.stage_words = stage[0]
+        words, doubles = stage
+        self.pace = Pace(words, doubles, settings.speed)
+        self.stage_words = words
         self.paused = False
         self.stopping = False
         self.mourned: set[str] = set()
@@ -53,7 +54,9 @@ class PlantRun:
         self.next_status_s = 0.0
         self.wall_s = 0.0  # wall clock since the pace began, pauses included
         loop = robot.loop
-        show = Stage(*stage, robot.plant, loop.step_times, [(wire.board, wire.word) for wire in loop.word_wires])
+        show = Stage(
+            words, doubles, robot.plant, loop.step_times, [(wire.board, wire.word) for wire in loop.word_wires]
+        )
         self.remotes = {
             name: RemoteBoard(
                 robot.boards[name],
@@ -122,6 +125,8 @@ class PlantRun:
             self.link.send(data, socket.MSG_DONTWAIT if "status" in content else 0)
         except BlockingIOError:
             pass
+        except OSError:  # nobody looks after us any more, and the kernel is about to end this process
+            self.stopping = True
 
     def hear(self) -> None:
         """Everything the supervisor has sent."""
@@ -130,6 +135,8 @@ class PlantRun:
                 data = self.link.recv(65536, socket.MSG_DONTWAIT)
             except BlockingIOError:
                 return
+            except OSError:
+                data = b""
             if not data:
                 self.stopping = True
                 return
