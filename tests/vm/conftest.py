@@ -77,6 +77,14 @@ class Candump:
             found.setdefault(interface, []).append(tuple(frame))
         return {interface: frames[:-1] for interface, frames in found.items()}
 
+    def data(self):
+        """{interface: ["00E#0102", ...]}: the same as text."""
+        found = {}
+        for line in self.path.read_text().splitlines():
+            _, interface, text = line.split()
+            found.setdefault(interface, []).append(text)
+        return {interface: texts[:-1] for interface, texts in found.items()}
+
 
 def await_condition(condition, seconds=60.0):
     """Look until it holds; AssertionError when it does not in time."""
