@@ -116,6 +116,13 @@ def fuzz_case(cases: int) -> dict:
     return fuzz_serial.benchmark(cases)
 
 
+def can_fuzz_case(cases: int) -> dict:
+    """Frames of every kind and bytes that are none, from outside onto a whole robot's buses."""
+    from tools import fuzz_can
+
+    return fuzz_can.benchmark(cases)
+
+
 CASES = {
     # case: (title, function of the virtual seconds)
     "robot": ("whole robot, digest on, logs off", lambda s: robot_case(s)),
@@ -128,6 +135,7 @@ CASES = {
     "bus-quarter": ("our four buses at 25 % load", lambda s: bus_case(50_000 * int(s), 0.25)),
     "bus-eight": ("our four buses, eight boards each, 75 % load", lambda s: bus_case(50_000 * int(s), 0.75, 8)),
     "serial-fuzz": ("wrong bytes on the serial line", lambda s: fuzz_case(5_000 * int(s))),
+    "can-fuzz": ("wrong and foreign frames on the buses", lambda s: can_fuzz_case(5_000 * int(s))),
     "virtual": ("python-can virtual, three boards", lambda s: virtual_case(1_000 * int(s))),
 }
 INTERPRETED = ("robot", "plant", "bus")

@@ -8,6 +8,7 @@ import math
 import os
 import socket
 import struct
+from collections.abc import Mapping
 from contextlib import suppress
 
 from can_bus.bus import Bus
@@ -61,7 +62,7 @@ class AttachServer:
     every stamp that leaves. A process that forks must close its copy.
     """
 
-    def __init__(self, name: str, buses: dict[str, Bus | Taps], epoch_ns: int = 0) -> None:
+    def __init__(self, name: str, buses: Mapping[str, Bus | Taps], epoch_ns: int = 0) -> None:
         self.name = name
         self.epoch_ns = epoch_ns
         self.channels: dict[str, Taps] = {}

@@ -7,6 +7,7 @@ have no text in that mode (they are counted as not carried). Nothing but loopbac
 import math
 import re
 import socket
+from collections.abc import Mapping
 from contextlib import suppress
 
 from can_bus.bus import Bus
@@ -46,7 +47,9 @@ class _Client:
 class SocketcandServer:
     """`buses`, {channel: Bus}, on a TCP port (0: a free one; see `port`). UserError when it cannot be had."""
 
-    def __init__(self, buses: "dict[str, Bus | Taps]", port: int, host: str = "127.0.0.1", epoch_ns: int = 0) -> None:
+    def __init__(
+        self, buses: "Mapping[str, Bus | Taps]", port: int, host: str = "127.0.0.1", epoch_ns: int = 0
+    ) -> None:
         self.epoch_ns = epoch_ns
         self.channels: dict[str, Taps] = {}
         self.own: list[Taps] = []

@@ -1,0 +1,31 @@
+"""A short run of the benchmark's hostile clients, and that its checks can fail."""
+
+import pytest
+
+from can_bus.bus import RESET
+from foundation.user_error import UserError
+from tools import fuzz_can
+
+
+def test_three_thousand_cases_from_outside_move_the_counters_and_stop_nothing():
+    result = fuzz_can.benchmark(3000)
+    assert result["cases"] == 3000 and result["robots"] == 1
+    for name in ("frames_in", "frames_out", "malformed", "refused", "received_by_boards", "answered_at_the_end"):
+        assert result[name] > 50, name
+    assert result["frames_dropped"] == 0
+
+
+def test_the_checks_notice():
+    fuzz = fuzz_can.Fuzz()
+    for _ in range(30):
+        fuzz.slice()
+    board = fuzz.robot.boards["MCH"]
+    board.scheduler.slot_time -= 6_000_000
+    fuzz.robot.loop.boards = [each for each in fuzz.robot.loop.boards if each is not board]
+    with pytest.raises(UserError, match="board MCH has stopped"):
+        fuzz.slice()
+    fuzz.robot.buses[0].nodes[0].mode = RESET
+    with pytest.raises(UserError, match="board CSR is off can1"):
+        fuzz.end()
+    fuzz.robot.buses[0].nodes[0].mode = 0
+    fuzz.end()
