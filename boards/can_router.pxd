@@ -15,6 +15,9 @@ from firmware_sim.scheduler cimport Task
 from foundation.events cimport EventQueue
 from foundation.numbers cimport float32, word_of_float
 
+cimport cython
+
+@cython.final
 cdef class CanRouterBoard(Microcontroller):
     cdef public object quirks
     cdef public Gpio gpio
@@ -37,7 +40,8 @@ cdef class CanRouterBoard(Microcontroller):
     cdef public long long own_lost
     cdef public bint idle
     cdef public long long idle_since, flush_next, pair_ns, wakes, batches
-    cdef public long long route_idle, route_frame, flush_idle, flush_frame, sync_cycles
+    cdef public long long[::1] route_ns, flush_ns
+    cdef public long long sync_cycles
     cdef public long long code_dnf, code_near_limit, code_task_limit, code_queue_full
     cpdef void report(self, long long code)
     cpdef object on_segment_timer(self, EventQueue queue)
@@ -47,7 +51,7 @@ cdef class CanRouterBoard(Microcontroller):
     cpdef object on_can3(self, EventQueue queue)
     cpdef object on_can4(self, EventQueue queue)
     cpdef object on_can_error(self, EventQueue queue)
-    cpdef void receive(self, CanController controller)
+    cpdef bint receive(self, CanController controller)
     cpdef long long flush(self, CanController controller)
     cpdef bint can_flush(self)
     cpdef long long main_loop(self)

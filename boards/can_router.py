@@ -1,3 +1,5 @@
+# cython: boundscheck=False, wraparound=False
+# (every index below is a bus, a place of its rings, or a number of frames that one turn can move)
 """The CAN router (CSR, board B10A): four buses, the link to the main brain, the robot's time.
 
 Facts network-and-boards 1.4-1.6, 3.7, 4.16; appendix 3.7, 3.11. Interrupts fill rings and keep the time; the
@@ -134,10 +136,11 @@ class CanRouterBoard(Microcontroller):
             self.on_limit = self.task_limit
             self.on_near_limit = self.slot_near_limit
 
-        self.route_idle = ROUTE_IDLE_CYCLES
-        self.route_frame = ROUTE_FRAME_CYCLES
-        self.flush_idle = FLUSH_IDLE_CYCLES
-        self.flush_frame = FLUSH_FRAME_CYCLES
+        # ns that a turn takes by the frames it moves: one each from three sources; into two transmit buffers
+        route_cycles = [ROUTE_IDLE_CYCLES + ROUTE_FRAME_CYCLES * moved for moved in range(4)]
+        flush_cycles = [FLUSH_IDLE_CYCLES + FLUSH_FRAME_CYCLES * moved for moved in range(3)]
+        self.route_ns = array.array("q", [int(cycles * self.ns_per_cycle) for cycles in route_cycles])
+        self.flush_ns = array.array("q", [int(cycles * self.ns_per_cycle) for cycles in flush_cycles])
         self.sync_cycles = 4 * CYCLES_PER_SYNC
         self.pair_ns = int((ROUTE_IDLE_CYCLES + FLUSH_IDLE_CYCLES + LOOP_CYCLES // 4) * self.ns_per_cycle)
         self.idle = True
@@ -241,11 +244,11 @@ class CanRouterBoard(Microcontroller):
         self.receive(self.can4)
         return None
 
-    def receive(self, controller: CanController) -> cython.void:
-        """Copy the older receive buffer into the common ring and release it."""
+    def receive(self, controller: CanController) -> cython.bint:
+        """Copy the older receive buffer into the common ring and release it; False when nothing is there."""
         frame: cython.longlong = controller.RFS
         if controller.rx_count == 0:
-            return
+            return False
         self.router.receive(
             controller.number,
             controller.RID,
@@ -254,6 +257,7 @@ class CanRouterBoard(Microcontroller):
             controller.RDB,
         )
         controller.release()
+        return True
 
     def on_can_error(self, queue) -> object:
         """Read every controller's capture register; restart one that is bus-off."""
@@ -299,7 +303,8 @@ class CanRouterBoard(Microcontroller):
             ):
                 break
             router.tx_read[channel] = (router.tx_read[channel] + 1) & 7
-            self.load.count(channel)
+            router.waiting -= 1
+            self.load.counts[channel] += 1
             moved += 1
         return moved
 
@@ -307,9 +312,7 @@ class CanRouterBoard(Microcontroller):
         """True when a frame waits for a bus that has a free transmit buffer and is not in reset."""
         router: Router = self.router
         controller: CanController
-        i: cython.longlong
-        for i in range(4):
-            controller = cython.cast(CanController, self.controllers[i])
+        for controller in self.controllers:
             if router.tx_read[controller.number] != router.tx_write[controller.number]:
                 if (controller.tx_free[1] != 0 or controller.tx_free[2] != 0) and not controller.MOD & 1:
                     return True
@@ -324,8 +327,10 @@ class CanRouterBoard(Microcontroller):
         at: cython.longlong = self.now
         passed: cython.longlong
         moved: cython.longlong
+        router: Router = self.router
+        controller: CanController
         self.wakes += 1
-        if not (self.router.has_work() or self.can_flush()):
+        if not router.has_work() and not (router.waiting > 0 and self.can_flush()):
             if not self.idle:
                 self.idle = True
                 self.idle_since = at
@@ -341,19 +346,20 @@ class CanRouterBoard(Microcontroller):
                 at += self.pair_ns - passed
         while True:
             self.now = at
-            moved = self.router.route_step(at)
-            passed = int((self.route_idle + self.route_frame * moved) * self.ns_per_cycle)
-            at += passed
-            self.now = at
-            moved = self.flush(cython.cast(CanController, self.controllers[self.flush_next]))
-            passed = int((self.flush_idle + self.flush_frame * moved) * self.ns_per_cycle)
-            at += passed
+            moved = router.route_step(at)
+            at += self.route_ns[moved]
+            moved = 0
+            if router.waiting > 0:
+                self.now = at
+                controller = self.controllers[self.flush_next]
+                moved = self.flush(controller)
+            at += self.flush_ns[moved]
             self.flush_next += 1
             if self.flush_next == 4:
                 self.flush_next = 0
             if at >= self.horizon or at >= self.alarm_time or at >= self.tick_time or at >= self.inbox.head_time:
                 return at
-            if not (self.router.has_work() or self.can_flush()):
+            if not router.has_work() and not (router.waiting > 0 and self.can_flush()):
                 self.idle = True
                 self.idle_since = at
                 self.background_wanted = False

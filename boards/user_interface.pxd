@@ -18,6 +18,9 @@ from firmware_sim.peripherals.uart cimport Uart
 from firmware_sim.scheduler cimport Task
 from foundation.events cimport EventQueue
 
+cimport cython
+
+@cython.final
 cdef class UserInterfaceBoard(Microcontroller):
     cdef public object quirks
     cdef public NetworkTime time

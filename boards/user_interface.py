@@ -183,10 +183,7 @@ class UserInterfaceBoard(Microcontroller):
 
     def on_uart(self, queue) -> object:
         """UART1: empty the FIFO into the parser's ring; returns the bytes."""
-        count: cython.longlong = self.uart1.fifo_count
-        for _byte in range(count):
-            self.imu.push(self.uart1.RBR())
-        return count
+        return self.imu.receive(self.uart1)
 
     def on_rc_edge(self, queue) -> object:
         """Timer0: every capture that is flagged."""

@@ -2,6 +2,9 @@ from foundation.numbers cimport float_of_word, word_of_float, wrap_i32
 
 cdef long long _MASK
 
+cimport cython
+
+@cython.final
 cdef class DataStore:
     cdef public long long size
     cdef public long long[::1] words, stamps, unread

@@ -308,16 +308,11 @@ class Lockstep:
         """Move what the buses logged into the canonical trace, bus after bus."""
         bus: Bus
         b: cython.longlong
-        i: cython.longlong
-        at: cython.longlong
         for b in range(len(self.buses)):
             bus = cython.cast(Bus, self.buses[b])
-            if bus.log_count == 0:
-                continue
-            for i in range(bus.log_count):
-                at = i * 6
-                self.recorder.frame(bus.log[at], b, bus.log[at + 1], bus.log[at + 2], bus.log[at + 3], bus.log[at + 4])
-            bus.log_count = 0
+            if bus.log_count > 0:
+                self.recorder.add_frames(b, bus.log, bus.log_count)
+                bus.log_count = 0
 
     def _route(self, index: cython.longlong, board: Microcontroller) -> cython.void:
         """Hand on what a board put out: frames to its bus, PWM and pins to its drive, segments to the link."""

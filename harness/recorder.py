@@ -1,3 +1,5 @@
+# cython: boundscheck=False, wraparound=False
+# (every index below is a place of a block: a block is a whole number of rows and flushed when it is full)
 """The canonical trace of a run: every frame on every bus and the body's state, hashed as they happen.
 
 Three streams of fixed-width rows. Frames (hashed): three 64-bit integers a row. Samples of the plant
@@ -29,14 +31,15 @@ class RowStream:
         self.digest = hashlib.sha256() if hashed else None
         self.sink = None
 
-    def finish_row(self, time_ns: cython.longlong) -> cython.void:
-        """Close the row that was just written at `used - columns`."""
+    def finish_row(self, time_ns: cython.longlong) -> cython.longlong:
+        """Close the row that was just written at `used - columns`; returns how many there are."""
         self.rows += 1
         self.last_time_ns = time_ns
         if self.used == self.capacity:
             self.flush()
+        return self.rows
 
-    def flush(self) -> cython.void:
+    def flush(self) -> None:
         """Hash and hand over what the block holds."""
         if self.used == 0:
             return
@@ -57,23 +60,25 @@ class Recorder:
         self.samples = RowStream("d", sample_columns + 1, True)
         self.words = RowStream("q", word_columns + 1, False)
 
-    def frame(
-        self,
-        time_ns: cython.longlong,
-        bus: cython.longlong,
-        identifier: cython.longlong,
-        flags: cython.longlong,
-        word0: cython.longlong,
-        word1: cython.longlong,
-    ) -> cython.void:
-        """One frame seen on bus 0..3, at the instant its receivers have it."""
+    def add_frames(self, bus: cython.longlong, log: cython.longlong[::1], count: cython.longlong) -> cython.longlong:
+        """The first `count` frames that bus 0..3 logged, as `can_bus.bus.Bus` logs them: LOG_FIELDS numbers each, at
+        the instant their receivers have them. Returns the number of rows."""
         stream: RowStream = self.frames
         at: cython.longlong = stream.used
-        stream.integers[at] = time_ns
-        stream.integers[at + 1] = (word0 << 12) | (flags << 4) | bus
-        stream.integers[at + 2] = (word1 << 29) | identifier
-        stream.used = at + 3
-        stream.finish_row(time_ns)
+        base: cython.longlong = 0
+        for _frame in range(count):
+            stream.integers[at] = log[base]
+            stream.integers[at + 1] = (log[base + 3] << 12) | (log[base + 2] << 4) | bus
+            stream.integers[at + 2] = (log[base + 4] << 29) | log[base + 1]
+            at += 3
+            stream.used = at
+            stream.last_time_ns = log[base]
+            if at == stream.capacity:
+                stream.flush()
+                at = 0
+            base += 6  # LOG_FIELDS
+        stream.rows += count
+        return stream.rows
 
     def trace_digest(self):
         """SHA-256 (hex) over the frames and the samples so far; what is pending is flushed first."""

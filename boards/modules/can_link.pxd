@@ -6,6 +6,9 @@ from firmware_sim.peripherals.can_controller cimport CanController
 from foundation.events cimport EventQueue
 from foundation.numbers cimport word_of_float, word_of_i32
 
+cimport cython
+
+@cython.final
 cdef class CanLink:
     cdef public Microcontroller chip
     cdef public CanController controller

@@ -1,3 +1,5 @@
+# cython: boundscheck=False, wraparound=False
+# (every index below is a place of a ring, which is masked, or an identifier held against the list's length)
 """A satellite's end of its CAN bus: frames to setters by identifier, values to frames
 (facts network-and-boards 1.3, 4.14).
 
@@ -111,19 +113,21 @@ class CanLink:
 
     def on_receive(self, queue: EventQueue) -> object:
         """Interrupt: copy the frame into the ring and release the hardware buffer."""
-        after: cython.longlong = (self.rx_write + 1) & 63
+        write: cython.longlong = self.rx_write
+        after: cython.longlong = (write + 1) & 63
+        controller: CanController = self.controller
         if after == self.rx_read:
             self.receive_lost += 1
             if self.report_full:
                 self.errors.report(self.code_receive_full)
         else:
-            self.rx_frames[self.rx_write] = self.controller.RFS
-            self.rx_ids[self.rx_write] = self.controller.RID
-            self.rx_values[self.rx_write] = self.controller.RDA
-            self.rx_times[self.rx_write] = self.controller.RDB
+            self.rx_frames[write] = controller.RFS
+            self.rx_ids[write] = controller.RID
+            self.rx_values[write] = controller.RDA
+            self.rx_times[write] = controller.RDB
             self.rx_write = after
             self.received += 1
-        self.controller.release()
+        controller.release()
         return None
 
     def on_error(self, queue: EventQueue) -> object:
@@ -148,15 +152,17 @@ class CanLink:
         return None
 
     def receive_all(self) -> object:
-        """Slot task: deliver every frame that waits; returns how many there were."""
+        """Slot task: deliver every frame that waits; returns how many there were, None without any."""
         frames: cython.longlong = 0
         place: cython.longlong
         receiver: Receiver
+        if self.rx_read == self.rx_write:
+            return None
         while self.rx_read != self.rx_write:
             place = self.rx_read
             # DLC 8 and neither remote nor extended, as the bits stand in RFS
             if self.rx_frames[place] == 524288 and 0 <= self.rx_ids[place] < 2048:
-                receiver = cython.cast(Receiver, self.receivers[self.rx_ids[place]])
+                receiver = self.receivers[self.rx_ids[place]]
                 if receiver is not None:
                     receiver.deliver(self.rx_values[place], self.rx_times[place])
                     self.delivered += 1
@@ -174,16 +180,17 @@ class CanLink:
         self, identifier: cython.longlong, value_word: cython.longlong, time_word: cython.longlong
     ) -> cython.bint:
         """Queue a frame with both words given (0 ... 2^32-1); False when the ring is full and it is lost."""
-        after: cython.longlong = (self.tx_write + 1) & 7
+        write: cython.longlong = self.tx_write
+        after: cython.longlong = (write + 1) & 7
         waiting: cython.longlong
         if after == self.tx_read:
             self.send_lost += 1
             if self.report_full:
                 self.errors.report(self.code_send_full)
             return False
-        self.tx_ids[self.tx_write] = identifier
-        self.tx_values[self.tx_write] = value_word
-        self.tx_times[self.tx_write] = time_word
+        self.tx_ids[write] = identifier
+        self.tx_values[write] = value_word
+        self.tx_times[write] = time_word
         self.tx_write = after
         self.queued += 1
         waiting = (after - self.tx_read) & 7
@@ -206,19 +213,25 @@ class CanLink:
             self.send_words(identifier, self.errors.word, self.errors.stamp)
 
     def feed(self) -> object:
-        """Slot task, and after each queued frame: fill free hardware buffers, 1 before 2. Returns frames."""
+        """Slot task, and after each queued frame: fill free hardware buffers, 1 before 2.
+
+        Returns how many frames went there, None when none waited.
+        """
         frames: cython.longlong = 0
         buffer: cython.longlong
         place: cython.longlong
+        controller: CanController = self.controller
+        if self.tx_read == self.tx_write:
+            return None
         while self.tx_read != self.tx_write:
-            if self.controller.tx_free[1] != 0:
+            if controller.tx_free[1] != 0:
                 buffer = 1
-            elif self.controller.tx_free[2] != 0:
+            elif controller.tx_free[2] != 0:
                 buffer = 2
             else:
                 break
             place = self.tx_read
-            if not self.controller.transmit(buffer, self.tx_ids[place], 8, self.tx_values[place], self.tx_times[place]):
+            if not controller.transmit(buffer, self.tx_ids[place], 8, self.tx_values[place], self.tx_times[place]):
                 break
             self.tx_read = (place + 1) & 7
             frames += 1

@@ -1,3 +1,5 @@
+# cython: boundscheck=False, wraparound=False
+# (every index below is a channel, 0 ... 4)
 """Frames per millisecond on each bus, as the router counts them: sent and received, its own sync included."""
 
 import array
@@ -11,13 +13,11 @@ class CanLoad:
     def __init__(self) -> None:
         self.counts = array.array("q", [0]) * 5
         self.peaks = array.array("q", [0]) * 5
-        self.totals = array.array("q", [0]) * 5
         self.last_counts = array.array("q", [0]) * 5
 
     def count(self, channel: cython.longlong) -> cython.void:
         """One frame more on `channel` in this millisecond."""
         self.counts[channel] += 1
-        self.totals[channel] += 1
 
     def end_of_millisecond(self) -> cython.void:
         """Keep the largest count and start the next millisecond."""

@@ -1,5 +1,9 @@
+from firmware_sim.peripherals.uart cimport Uart
 from foundation.numbers cimport float_of_word
 
+cimport cython
+
+@cython.final
 cdef class ImuParser:
     cdef public object report
     cdef public long long header, needed, code_ring_full
@@ -11,7 +15,8 @@ cdef class ImuParser:
     cdef public double acceleration_x, acceleration_y, acceleration_z
     cdef public long long timer
     cdef public long long packets, bad_checksums, skipped_bytes, bytes_lost
-    cpdef void push(self, long long byte)
-    cpdef long long waiting(self)
-    cpdef long long update(self)
-    cpdef double _float_at(self, long long index)
+    cpdef bint push(self, long long byte)
+    cpdef long long receive(self, Uart uart)
+    cpdef long long waiting(self) noexcept
+    cpdef long long update(self) noexcept
+    cpdef double _float_at(self, long long index) noexcept

@@ -1,3 +1,5 @@
+# cython: boundscheck=False, wraparound=False
+# (every index below is a place of the ring, which is masked)
 """The IMU's packets: a receive ring of 128 bytes and a parser that takes one packet or none per call.
 
 Both packets the board can ask for have 31 bytes: a header byte, six big-endian singles, a four-byte timer
@@ -16,6 +18,7 @@ import array
 import cython
 
 from datatable.generated import errors
+from firmware_sim.peripherals.uart import Uart
 
 if not cython.compiled:
     from foundation.numbers import float_of_word
@@ -32,7 +35,7 @@ def start_command(header) -> bytes:
 
 
 class ImuParser:
-    """Bytes in by `push`, one packet out per `update`; values stay until the next good packet.
+    """Bytes in by `push` or `receive`, one packet out per `update`; values stay until the next good packet.
 
     `report(code)` hears MSIMU_RX_OF when the ring is full. `late_by_one_byte`: the firmware waits for
     more than 31 bytes, so a packet stays unread until its successor has begun.
@@ -62,15 +65,27 @@ class ImuParser:
         self.skipped_bytes = 0
         self.bytes_lost = 0
 
-    def push(self, byte: cython.longlong) -> cython.void:
-        """Store a received byte; 127 fit, a byte more is lost and reported (MSIMU_RX_OF)."""
+    def push(self, byte: cython.longlong) -> cython.bint:
+        """Store a received byte; 127 fit, a byte more is lost and reported (MSIMU_RX_OF): False."""
         following: cython.longlong = (self.ring_write + 1) & 127
         if following == self.ring_read:
             self.bytes_lost += 1
             self.report(self.code_ring_full)
-            return
+            return False
         self.ring[self.ring_write] = byte & 0xFF
         self.ring_write = following
+        return True
+
+    def receive(self, uart: Uart) -> cython.longlong:
+        """Store every byte that waits in the FIFO of `uart`; returns how many there were."""
+        count: cython.longlong = uart.fifo_count
+        if self.waiting() + count < 128:
+            uart.read_all(self.ring, self.ring_write, 127)
+            self.ring_write = (self.ring_write + count) & 127
+        else:
+            for _byte in range(count):
+                self.push(uart.RBR())
+        return count
 
     def waiting(self) -> cython.longlong:
         """Bytes in the ring."""
@@ -87,11 +102,13 @@ class ImuParser:
         sent: cython.longlong
         i: cython.longlong
         read: cython.longlong
-        while self.waiting() >= self.needed and self.ring[self.ring_read] != self.header:
+        waiting: cython.longlong = self.waiting()
+        while waiting >= self.needed and self.ring[self.ring_read] != self.header:
             self.ring_read = (self.ring_read + 1) & 127
             self.skipped_bytes += 1
             examined += 1
-        if self.waiting() < self.needed:
+            waiting -= 1
+        if waiting < self.needed:
             return examined
         read = self.ring_read
         for i in range(29):

@@ -2,8 +2,11 @@ from boards.modules.can_load cimport CanLoad
 from boards.modules.network_time cimport NetworkTime
 from firmware_sim.peripherals.can_controller cimport CanController
 
+cimport cython
+
 cdef long long _MASK
 
+@cython.final
 cdef class NetworkClock:
     cdef public NetworkTime time
     cdef public CanLoad load
@@ -11,4 +14,4 @@ cdef class NetworkClock:
     cdef public long long ticks, divider
     cdef public long long[::1] sent, skipped
     cpdef bint tick(self)
-    cpdef void send_sync(self)
+    cpdef long long send_sync(self)

@@ -1,13 +1,17 @@
 from boards.modules.can_load cimport CanLoad
 from boards.modules.ssp_link cimport RouterSspLink
 
+cimport cython
+
+@cython.final
 cdef class RoutingTable:
     cdef public long long[::1] destinations, sources
     cdef public long long learned, changed
-    cpdef void set_destinations(self, long long identifier, long long mask)
-    cpdef void learn(self, long long identifier, long long channel)
-    cpdef void subscribe(self, long long identifier, long long channel)
+    cpdef object set_destinations(self, identifier, mask)
+    cpdef void learn(self, long long identifier, long long channel) noexcept
+    cpdef void subscribe(self, long long identifier, long long channel) noexcept
 
+@cython.final
 cdef class Router:
     cdef public RoutingTable table
     cdef public RouterSspLink ssp
@@ -20,13 +24,13 @@ cdef class Router:
     cdef public long long[::1] own_id, own_flags, own_word0, own_word1
     cdef public long long own_write, own_read
     cdef public long long[::1] receive_full_codes
-    cdef public long long routed, copies, receive_lost, own_lost, unroutable
+    cdef public long long waiting, routed, copies, receive_lost, own_lost, unroutable
     cdef public long long[::1] transmit_lost, receive_lost_from
     cpdef bint receive(self, long long channel, long long identifier, long long flags, long long word0, long long word1)
-    cpdef bint send(self, long long identifier, long long word0, long long word1)
+    cpdef bint send(self, long long identifier, long long word0, long long word1) noexcept
     cpdef long long route_step(self, long long now)
     cpdef long long route(self, long long source, long long identifier, long long flags, long long word0, long long word1, long long now)
-    cpdef bint queue(self, long long channel, long long identifier, long long flags, long long word0, long long word1)
-    cpdef bint has_frame_for(self, long long channel)
-    cpdef bint has_work(self)
-    cpdef long long frames_for(self, long long channel)
+    cpdef bint queue(self, long long channel, long long identifier, long long flags, long long word0, long long word1) noexcept
+    cpdef bint has_frame_for(self, long long channel) noexcept
+    cpdef bint has_work(self) noexcept
+    cpdef long long frames_for(self, long long channel) noexcept

@@ -1,3 +1,5 @@
+# cython: boundscheck=False, wraparound=False
+# (every index below is a channel, an identifier held against the table's size, or a place of a ring, which is masked)
 """Routing: a table of 2032 identifiers, the rings in front of it, and the order in which frames move.
 
 A table entry is a mask of destinations (bit 0 SSP, bits 1-4 CAN1-CAN4) and the source last seen (7: none
@@ -34,8 +36,10 @@ class RoutingTable:
         for identifier, mask in routes:
             self.set_destinations(identifier, mask)
 
-    def set_destinations(self, identifier: cython.longlong, mask: cython.longlong) -> cython.void:
+    def set_destinations(self, identifier, mask) -> None:
         """Replace the destinations of `identifier`; IndexError above 2031."""
+        if not 0 <= identifier < IDENTIFIERS:
+            raise IndexError(f"routing table: identifier {identifier} is not 0 ... {IDENTIFIERS - 1}")
         self.destinations[identifier] = mask & 0x1F
 
     def learn(self, identifier: cython.longlong, channel: cython.longlong) -> cython.void:
@@ -78,6 +82,7 @@ class Router:
         self.tx_flags = array.array("q", [0]) * 40
         self.tx_word0 = array.array("q", [0]) * 40
         self.tx_word1 = array.array("q", [0]) * 40
+        self.waiting = 0  # frames in the four transmit rings
         self.tx_write = array.array("q", [0]) * 5
         self.tx_read = array.array("q", [0]) * 5
         self.own_id = array.array("q", [0]) * 8
@@ -112,7 +117,7 @@ class Router:
         """
         following: cython.longlong = (self.rx_write + 1) & 63
         slot: cython.longlong = self.rx_write
-        self.load.count(channel)
+        self.load.counts[channel] += 1
         if following == self.rx_read:
             self.receive_lost += 1
             self.receive_lost_from[channel] += 1
@@ -143,15 +148,20 @@ class Router:
 
     def has_work(self) -> cython.bint:
         """True while a frame waits at any of the three sources."""
-        return self.rx_read != self.rx_write or self.own_read != self.own_write or self.ssp.has_segments()
+        return (
+            self.rx_read != self.rx_write
+            or self.own_read != self.own_write
+            or self.ssp.received_read != self.ssp.received_write
+        )
 
     def route_step(self, now: cython.longlong) -> cython.longlong:
         """Move up to three frames, one each from the link, the CAN ring and the own ring; return how many."""
         moved: cython.longlong = 0
         read: cython.longlong
-        if self.ssp.has_segments() and self.ssp.take():
-            self.load.count(0)
-            self.route(0, self.ssp.rx_id, self.ssp.rx_flags, self.ssp.rx_word0, self.ssp.rx_word1, now)
+        ssp: RouterSspLink = self.ssp
+        if ssp.received_read != ssp.received_write and ssp.take():
+            self.load.counts[0] += 1
+            self.route(0, ssp.rx_id, ssp.rx_flags, ssp.rx_word0, ssp.rx_word1, now)
             moved += 1
         read = self.rx_read
         if read != self.rx_write:
@@ -185,27 +195,32 @@ class Router:
         mask: cython.longlong
         channel: cython.longlong
         n: cython.longlong = 0
-        if identifier > 2031:
+        table: RoutingTable = self.table
+        if not 0 <= identifier <= 2031:
             self.unroutable += 1
             return 0
         self.routed += 1
         if flags & 16 and 1 <= source <= 4:  # FLAG_REMOTE: somebody on that bus asks for the value
-            self.table.subscribe(identifier, source)
-            channel = self.table.sources[identifier]
+            table.subscribe(identifier, source)
+            channel = table.sources[identifier]
             if 1 <= channel <= 4 and channel != source:
                 self.queue(channel, identifier, flags, word0, word1)
                 n += 1
             self.copies += n
             return n
-        self.table.learn(identifier, source)
-        mask = self.table.destinations[identifier]
-        if mask & 1 and source != 0:
+        if table.sources[identifier] != source:
+            table.learn(identifier, source)
+        mask = table.destinations[identifier] & ~(1 << source)
+        if mask & 1:
             self.ssp.push(identifier, flags, word0, word1, now)
             n += 1
-        for channel in range(1, 5):
-            if (mask >> channel) & 1 and channel != source:
+        channel = 1
+        while mask > 1:
+            mask >>= 1
+            if mask & 1:
                 self.queue(channel, identifier, flags, word0, word1)
                 n += 1
+            channel += 1
         self.copies += n
         return n
 
@@ -224,6 +239,7 @@ class Router:
         if following == self.tx_read[channel]:
             self.transmit_lost[channel] += 1
             return False
+        self.waiting += 1
         self.tx_id[slot] = identifier
         self.tx_flags[slot] = flags
         self.tx_word0[slot] = word0

@@ -1,5 +1,8 @@
 from firmware_sim.peripherals.ssp cimport SspSegment
 
+cimport cython
+
+@cython.final
 cdef class MainBrainSspLink:
     cdef public object report
     cdef public long long last_id
@@ -15,12 +18,13 @@ cdef class MainBrainSspLink:
     cdef public long long checksum_errors, receive_full, transmit_full, ids_out_of_range
     cdef public long long code_checksum, code_receive_full, code_transmit_full, code_id_out_of_range
     cpdef SspSegment exchanged(self, SspSegment segment)
-    cpdef void receive(self, SspSegment segment)
+    cpdef bint receive(self, SspSegment segment)
     cpdef SspSegment next_segment(self)
     cpdef long long parse(self)
     cpdef bint send(self, long long identifier, long long word0, long long word1)
-    cpdef long long flush(self)
+    cpdef long long flush(self) noexcept
 
+@cython.final
 cdef class RouterSspLink:
     cdef public object report
     cdef public bint frames_may_straddle
@@ -37,14 +41,14 @@ cdef class RouterSspLink:
     cdef public long long checksum_errors, receive_overwritten, transmit_lost, low_rate
     cdef public long long code_receive_overwritten, code_low_rate, code_checksum, code_transmit_full
     cpdef bint push(self, long long identifier, long long flags, long long word0, long long word1, long long now)
-    cpdef long long half_words_waiting(self)
+    cpdef long long half_words_waiting(self) noexcept
     cpdef SspSegment next_segment(self, long long now)
     cpdef SspSegment tick(self, long long now)
-    cpdef void receive(self, SspSegment segment)
+    cpdef void receive(self, SspSegment segment) noexcept
     cpdef bint take(self)
-    cpdef bint has_segments(self)
+    cpdef bint has_segments(self) noexcept
 
-cpdef long long checksum(SspSegment segment)
-cpdef void finish(SspSegment segment, long long used)
+cpdef long long checksum(SspSegment segment) noexcept
+cpdef void finish(SspSegment segment, long long used) noexcept
 cpdef SspSegment empty_segment()
 cpdef SspSegment corrupted_copy(SspSegment segment, long long index, long long flipped_bits)

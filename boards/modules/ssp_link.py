@@ -1,3 +1,6 @@
+# cython: boundscheck=False, wraparound=False
+# (every index below is a half-word 0 ... 30 of a segment, in a ring a place that is wrapped where it is moved, or a
+# frame of the 96 that the 16 segments of the main brain can hold)
 """The serial link between the router and the main brain: both ends, as logic on segments.
 
 A segment is 31 half-words: up to six frames of five half-words, zeros, and a checksum. The router is the
@@ -110,8 +113,8 @@ class MainBrainSspLink:
         self.receive(segment)
         return self.next_segment()
 
-    def receive(self, segment: SspSegment) -> cython.void:
-        """Copy a received segment into the next of the 16 places, as the receive DMA does.
+    def receive(self, segment: SspSegment) -> cython.bint:
+        """Copy a received segment into the next of the 16 places, as the receive DMA does; False when it is lost.
 
         With all places full the segment is dropped and MB_SSP_RX_FULL reported (dropping the newest is
         chosen by us, because the facts name only the error).
@@ -123,8 +126,8 @@ class MainBrainSspLink:
         if self.received_count == 16:
             self.receive_full += 1
             self.report(self.code_receive_full)
-            return
-        slot = (self.received_read + self.received_count) % 16
+            return False
+        slot = (self.received_read + self.received_count) & 15
         base = slot * 31
         for i in range(used):
             self.received_words[base + i] = segment.words[i]
@@ -139,6 +142,7 @@ class MainBrainSspLink:
             self.received_used[slot] = 30
         self.received_count += 1
         self.segments_received += 1
+        return True
 
     def next_segment(self) -> SspSegment:
         """The oldest queued segment, or the empty one: what the transmit DMA is started on."""
@@ -147,7 +151,9 @@ class MainBrainSspLink:
         if self.queue_count == 0:
             return self.empty
         segment = self.queue[self.queue_read]
-        self.queue_read = (self.queue_read + 1) % 18
+        self.queue_read += 1
+        if self.queue_read == 18:
+            self.queue_read = 0
         self.queue_count -= 1
         return segment
 
@@ -168,7 +174,7 @@ class MainBrainSspLink:
         for _segment in range(segments):
             base = self.received_read * 31
             used = self.received_used[self.received_read]
-            self.received_read = (self.received_read + 1) % 16
+            self.received_read = (self.received_read + 1) & 15
             self.received_count -= 1
             total = 1
             for i in range(used):
@@ -182,7 +188,7 @@ class MainBrainSspLink:
                 header = self.received_words[base + i]
                 if (header >> 11) != 0x0F:
                     break
-                header = header & 0x7FF
+                header &= 0x7FF
                 if header > self.last_id:
                     self.ids_out_of_range += 1
                     self.report(self.code_id_out_of_range)
@@ -287,7 +293,8 @@ class RouterSspLink:
 
     def half_words_waiting(self) -> cython.longlong:
         """Half-words in the transmit ring."""
-        return (self.ring_write - self.ring_read) % 500
+        waiting: cython.longlong = self.ring_write - self.ring_read
+        return waiting if waiting >= 0 else waiting + 500
 
     def push(
         self,
@@ -303,18 +310,19 @@ class RouterSspLink:
         """
         write: cython.longlong = self.ring_write
         header: cython.longlong = (identifier & 0x7FF) | 0x7800
-        if (write - self.ring_read) % 500 > 494:
+        if self.half_words_waiting() > 494:
             self.transmit_lost += 1
             self.report(self.code_transmit_full)
             return False
         if flags & 16:  # FLAG_REMOTE
             header |= 0x8000
         self.ring[write] = header
-        self.ring[(write + 1) % 500] = (word0 >> 16) & 0xFFFF
-        self.ring[(write + 2) % 500] = word0 & 0xFFFF
-        self.ring[(write + 3) % 500] = (word1 >> 16) & 0xFFFF
-        self.ring[(write + 4) % 500] = word1 & 0xFFFF
-        self.ring_write = (write + 5) % 500
+        self.ring[write + 1] = (word0 >> 16) & 0xFFFF
+        self.ring[write + 2] = word0 & 0xFFFF
+        self.ring[write + 3] = (word1 >> 16) & 0xFFFF
+        self.ring[write + 4] = word1 & 0xFFFF
+        write += 5
+        self.ring_write = write if write < 500 else 0  # 500 are 100 frames: none is split by the end of the ring
         self.push_time = now
         return True
 
@@ -323,23 +331,22 @@ class RouterSspLink:
 
         Of a frame being pushed at that moment only the half-words already written are seen.
         """
-        available: cython.longlong = (self.ring_write - self.ring_read) % 500
-        written: cython.longlong
         take: cython.longlong
+        word: cython.longlong
+        total: cython.longlong = 1
         i: cython.longlong
         read: cython.longlong = self.ring_read
         segment: SspSegment
         self.segments_sent += 1
-        if available == 0:
+        if read == self.ring_write:
             return self.empty
-        written = (now - self.push_time) // self.push_step_ns
-        if written < 5:
-            if written < 0:
-                written = 0
-            available = available - 5 + written
-            if available < 0:
-                available = 0
-        take = available
+        take = self.half_words_waiting()
+        if now - self.push_time < 5 * self.push_step_ns:
+            take -= 5
+            if now > self.push_time:
+                take += (now - self.push_time) // self.push_step_ns
+            if take < 0:
+                take = 0
         if take > 30:
             take = 30
         if not self.frames_may_straddle:
@@ -347,14 +354,19 @@ class RouterSspLink:
         if take == 0:
             return self.empty
         segment = self.pool[self.pool_next]
-        self.pool_next = (self.pool_next + 1) % 4
+        self.pool_next = (self.pool_next + 1) & 3
         for i in range(take):
-            segment.words[i] = self.ring[read]
+            word = self.ring[read]
+            segment.words[i] = word
+            total += word
             read += 1
             if read == 500:
                 read = 0
+        for i in range(take, segment.used):
+            segment.words[i] = 0  # what an earlier use left behind
+        segment.used = take
+        segment.words[30] = total & 0xFFFF  # the checksum
         self.ring_read = read
-        finish(segment, take)
         self.frames_sent += take // 5
         return segment
 
@@ -370,7 +382,7 @@ class RouterSspLink:
                 self.low_rate += 1
                 self.report(self.code_low_rate)
             else:
-                following = (self.received_write + 1) % 8
+                following = (self.received_write + 1) & 7
                 if following == self.received_read:
                     self.receive_overwritten += 1
                     self.report(self.code_receive_overwritten)
@@ -418,7 +430,7 @@ class RouterSspLink:
                 if (total & 0xFFFF) != self.received_words[base + 30]:
                     self.checksum_errors += 1
                     self.report(self.code_checksum)
-                    self.received_read = (self.received_read + 1) % 8
+                    self.received_read = (self.received_read + 1) & 7
                     continue
             i = self.position
             if i < used and i <= 25:
@@ -432,5 +444,5 @@ class RouterSspLink:
                     self.frames_received += 1
                     return True
             self.position = 0
-            self.received_read = (self.received_read + 1) % 8
+            self.received_read = (self.received_read + 1) & 7
         return False

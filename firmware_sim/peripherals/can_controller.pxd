@@ -1,6 +1,9 @@
-from firmware_sim.microcontroller cimport Peripheral
+from firmware_sim.microcontroller cimport Microcontroller, Peripheral
 from firmware_sim.vic cimport InterruptSource
 
+cimport cython
+
+@cython.final
 cdef class CanController(Peripheral):
     cdef public long long number, MOD, IER, ICR, BTR
     cdef public long long RFS, RID, RDA, RDB, rx_count
@@ -11,12 +14,12 @@ cdef class CanController(Peripheral):
     cdef public long long received, data_overruns, requests, sent, lost, aborted, refused
     cdef public InterruptSource rx_source, tx_source, error_source
     cpdef bint transmit(self, long long buffer, long long identifier, long long flags, long long lo, long long hi)
-    cpdef bint buffer_free(self, long long buffer)
-    cpdef void write_CMR(self, long long command)
-    cpdef void write_MOD(self, long long mode)
-    cpdef void release(self)
-    cpdef long long read_ICR(self)
-    cpdef long long SR(self)
-    cpdef long long GSR(self)
+    cpdef bint buffer_free(self, long long buffer) noexcept
+    cpdef long long write_CMR(self, long long command)
+    cpdef void write_MOD(self, long long mode) noexcept
+    cpdef void release(self) noexcept
+    cpdef long long read_ICR(self) noexcept
+    cpdef long long SR(self) noexcept
+    cpdef long long GSR(self) noexcept
     cpdef double bit_rate(self)
-    cdef void _bus_off(self)
+    cdef void _bus_off(self) noexcept

@@ -1,3 +1,5 @@
+# cython: boundscheck=False, wraparound=False
+# (every index below is a transmit buffer, 1 ... 3: `transmit` and the bus's answers are held against that)
 """One CAN controller of the LPC2194 (CxMOD, CxCMR, CxGSR, CxSR, CxICR, CxIER, CxBTR, CxRFS, CxRID, CxRDA,
 CxRDB, and CxTFI1-3, CxTID1-3, CxTDA1-3, CxTDB1-3 as TFI[1] ... TDB[3]).
 
@@ -16,7 +18,7 @@ import array
 
 import cython
 
-from firmware_sim.microcontroller import Peripheral
+from firmware_sim.microcontroller import Microcontroller, Peripheral
 from foundation.events import CAN_RX, CAN_STATUS, CAN_TX_DONE
 from foundation.user_error import UserError
 
@@ -104,7 +106,7 @@ class CanController(Peripheral):
 
     def buffer_free(self, buffer: cython.longlong) -> cython.bint:
         """TBS of a transmit buffer 1 ... 3."""
-        return self.tx_free[buffer] != 0
+        return self.tx_free[buffer & 3] != 0
 
     def transmit(
         self,
@@ -114,7 +116,13 @@ class CanController(Peripheral):
         lo: cython.longlong,
         hi: cython.longlong,
     ) -> cython.bint:
-        """Fill a buffer and request it; flags as in foundation/events.py. False when the buffer is not free."""
+        """Fill a buffer and request it; flags as in foundation/events.py. False when the buffer is not free.
+
+        IndexError for a buffer that is not 1 ... 3.
+        """
+        chip: Microcontroller = self.chip
+        if not 1 <= buffer <= 3:
+            raise IndexError(f"{chip.name}: CAN controller {self.number}: transmit buffer {buffer} is not 1 ... 3")
         if self.tx_free[buffer] == 0 or self.MOD & 1:
             self.refused += 1
             return False
@@ -122,11 +130,14 @@ class CanController(Peripheral):
         self.TID[buffer] = identifier
         self.TDA[buffer] = lo
         self.TDB[buffer] = hi
-        self.write_CMR((3 if flags & 32 else 1) | 16 << buffer)
+        self.tx_free[buffer] = 0
+        self.tx_complete[buffer] = 0
+        self.requests += 1
+        chip.outbox.push(chip.now, 0, 32, self.number, buffer, identifier, flags, lo, hi)  # CAN_REQUEST
         return True
 
-    def write_CMR(self, command: cython.longlong) -> cython.void:
-        """Write the command register."""
+    def write_CMR(self, command: cython.longlong) -> cython.longlong:
+        """Write the command register; returns the command."""
         buffer: cython.longlong
         flags: cython.longlong
         frame: cython.longlong
@@ -135,32 +146,26 @@ class CanController(Peripheral):
         if command & 8:
             self.overrun = False
         if command & 3 == 0 or self.MOD & 1:
-            return
+            return command
         for buffer in range(1, 4):
             if command & 16 << buffer:
                 if command & 1:
-                    if self.tx_free[buffer] == 0:
-                        self.refused += 1
-                        continue
                     frame = self.TFI[buffer]
                     flags = frame >> 16 & 15 | (frame >> 30 & 1) << 4 | (frame >> 31 & 1) << 6
                     if command & 2:
                         flags |= 32
-                    self.tx_free[buffer] = 0
-                    self.tx_complete[buffer] = 0
-                    self.requests += 1
-                    self.chip.outbox.push(
-                        self.chip.now, 0, 32, self.number, buffer, self.TID[buffer],
-                        flags, self.TDA[buffer], self.TDB[buffer],
-                    )  # CAN_REQUEST  # fmt: skip
+                    self.transmit(buffer, self.TID[buffer], flags, self.TDA[buffer], self.TDB[buffer])
+                    self.TFI[buffer] = frame  # with the bits that do not travel
                 elif self.tx_free[buffer] == 0:
                     self.chip.outbox.push(self.chip.now, 0, 33, self.number, buffer)  # CAN_ABORT
+        return command
 
     # --- receive ----------------------------------------------------------------------------------------
 
     def on_message(self, queue) -> cython.void:
         """What the bus tells: a frame received, the end of a transmission, a change of the error state."""
         frame: cython.longlong
+        buffer: cython.longlong
         if queue.kind == 2:  # CAN_RX
             if self.MOD & 1:
                 return
@@ -188,18 +193,17 @@ class CanController(Peripheral):
             if self.IER & 1:
                 self.chip.vic.raise_source(self.rx_source)
         elif queue.kind == 3:  # CAN_TX_DONE
-            self.tx_free[queue.b] = 1
-            frame = 2 if queue.b == 1 else 256 << (queue.b - 1)
+            buffer = queue.b & 3
+            self.tx_free[buffer] = 1
             if queue.c == 0:
                 self.sent += 1
-                self.tx_complete[queue.b] = 1
-                self.ICR |= frame
+                self.tx_complete[buffer] = 1
             elif queue.c == 1:
                 self.aborted += 1
-                self.ICR |= frame
             else:
                 self.lost += 1
-                self.ICR |= frame
+            frame = 2 if buffer == 1 else 256 << (buffer - 1)
+            self.ICR |= frame
             if self.IER & frame:
                 self.chip.vic.raise_source(self.tx_source)
         else:  # CAN_STATUS

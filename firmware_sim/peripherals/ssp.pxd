@@ -2,20 +2,24 @@ from firmware_sim.microcontroller cimport Peripheral
 from firmware_sim.vic cimport InterruptSource
 from foundation.events cimport EventQueue
 
+cimport cython
+
+@cython.final
 cdef class SspSegment:
     cdef public long long[::1] words
     cdef public long long used
-    cpdef void clear(self)
-    cpdef void copy_from(self, SspSegment other)
+    cpdef void clear(self) noexcept
+    cpdef void copy_from(self, SspSegment other) noexcept
 
+@cython.final
 cdef class SspPort(Peripheral):
     cdef public long long number, exchanges, overwritten
     cdef public SspSegment received
     cdef public long long received_time
     cdef public bint fresh
     cdef public InterruptSource source
-    cpdef void start(self, SspSegment segment)
-    cpdef void load(self, SspSegment segment)
+    cpdef void start(self, SspSegment segment) noexcept
+    cpdef void load(self, SspSegment segment) noexcept
     cpdef SspSegment take(self)
 
 cpdef long long segment_time_ns(long long words, long long word_bits, long long bit_rate)

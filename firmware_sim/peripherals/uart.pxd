@@ -1,6 +1,9 @@
 from firmware_sim.microcontroller cimport Peripheral
 from firmware_sim.vic cimport InterruptSource
 
+cimport cython
+
+@cython.final
 cdef class Uart(Peripheral):
     cdef public long long number, trigger, DL, DIVADDVAL, MULVAL, hz
     cdef public double baud
@@ -10,8 +13,8 @@ cdef class Uart(Peripheral):
     cdef public long long fifo_head, fifo_count, IIR, errors
     cdef public long long received, overruns, sent, refused, transmit_free
     cpdef void set_divisor(self, long long DL, long long DIVADDVAL=*, long long MULVAL=*)
-    cpdef long long RBR(self)
+    cpdef long long RBR(self) noexcept
     cpdef bint THR(self, long long byte)
     cpdef long long LSR(self)
-    cpdef long long waiting(self)
-    cdef void _store(self, long long byte)
+    cpdef long long waiting(self) noexcept
+    cpdef long long read_all(self, long long[::1] ring, long long write, long long mask) noexcept

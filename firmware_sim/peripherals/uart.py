@@ -1,3 +1,5 @@
+# cython: boundscheck=False, wraparound=False
+# (every index below is a place of the FIFO or of a caller's ring, which is masked)
 """A UART with byte timing: UnRBR, UnTHR, UnLSR, UnIIR, UnDLL/DLM as one divisor, UnFDR; 8N1.
 
 Receive: UART_BYTE messages stamped with the end of the byte fill a FIFO of 16. One message may bring up to
@@ -74,27 +76,24 @@ class Uart(Peripheral):
         instant as byte by byte.
         """
         i: cython.longlong
-        if queue.c > 1:
-            for i in range(queue.c):
-                self._store((queue.d >> 8 * i if i < 4 else queue.e >> 8 * (i - 4)) & 255)
-        else:
-            self._store(queue.b & 255)
+        byte: cython.longlong = queue.b
+        count: cython.longlong = queue.c if queue.c > 1 else 1
+        self.received += count
+        for i in range(count):
+            if queue.c > 1:
+                byte = queue.d >> 8 * i if i < 4 else queue.e >> 8 * (i - 4)
+            if self.fifo_count < 16:
+                self.fifo[(self.fifo_head + self.fifo_count) & 15] = byte & 255
+                self.fifo_count += 1
+            else:  # lost
+                self.overruns += 1
+                self.errors |= 2
         if self.fifo_count == 0:
             return
         self.chip.set_alarm(self.timeout_alarm, queue.time + 4 * self.byte_ns)
         if self.fifo_count >= self.trigger:
             self.IIR = 4
             self.chip.vic.raise_source(self.source)
-
-    def _store(self, byte: cython.longlong) -> cython.void:
-        """A byte into the FIFO; the seventeenth is lost (overrun)."""
-        self.received += 1
-        if self.fifo_count >= 16:
-            self.overruns += 1
-            self.errors |= 2
-            return
-        self.fifo[(self.fifo_head + self.fifo_count) % 16] = byte
-        self.fifo_count += 1
 
     def on_alarm(self, alarm: cython.longlong, time: cython.longlong) -> cython.void:
         """Character time-out (0) or transmit FIFO empty (1)."""
@@ -112,12 +111,26 @@ class Uart(Peripheral):
         if self.fifo_count == 0:
             return 0
         byte = self.fifo[self.fifo_head]
-        self.fifo_head = (self.fifo_head + 1) % 16
+        self.fifo_head = (self.fifo_head + 1) & 15
         self.fifo_count -= 1
         if self.fifo_count == 0:
             self.IIR = 1
             self.chip.set_alarm(self.timeout_alarm, 1 << 62)
         return byte
+
+    def read_all(self, ring: cython.longlong[::1], write: cython.longlong, mask: cython.longlong) -> cython.longlong:
+        """Take every received byte, as reads of RBR do, into `ring` (of mask + 1 places, a power of two) from place
+        `write` on. Returns how many there were."""
+        count: cython.longlong = self.fifo_count
+        i: cython.longlong
+        for i in range(count):
+            ring[(write + i) & mask] = self.fifo[(self.fifo_head + i) & 15]
+        if count > 0:
+            self.fifo_head = (self.fifo_head + count) & 15
+            self.fifo_count = 0
+            self.IIR = 1
+            self.chip.set_alarm(self.timeout_alarm, 1 << 62)
+        return count
 
     def THR(self, byte: cython.longlong) -> cython.bint:
         """Send a byte; False (and `refused` counts) when the FIFO is full."""
