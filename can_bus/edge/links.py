@@ -3,6 +3,7 @@
 Both are used from any number of threads. Nothing here starts a thread, but for `PrivateLink.fileno` by the clock.
 """
 
+import logging
 import os
 import select
 import socket
@@ -17,6 +18,7 @@ from can_bus.edge.paced import PacedBus
 from can_bus.edge.taps import (
     DROPPED,
     ERROR_ACTIVE,
+    ERROR_PASSIVE,
     FULL,
     LISTENING,
     NOT_ON_BUS,
@@ -30,6 +32,8 @@ from can_bus.edge.taps import (
 from foundation import wallclock
 from foundation.events import NEVER
 from foundation.user_error import UserError
+
+log = logging.getLogger("can.ranger_sim")
 
 RECEIVE_QUEUE = 100_000  # frames kept for a reader; chosen by us: 20 MB, and 4 s of all four of Ranger's buses
 HANDSHAKE_S = 5.0  # chosen by us: a robot in slow motion polls its clients every few milliseconds
@@ -396,6 +400,7 @@ class PrivateLink(Link):
         self.bitrate = bus.paced.bitrate
         self.changed = threading.Condition(bus.lock)
         self.pump: threading.Thread | None = None
+        self.warned = False
         with bus.lock:
             self.tap = bus.paced.add(label)
             if listen_only:
@@ -419,6 +424,13 @@ class PrivateLink(Link):
                 self.bus.pass_time()
             answer = self.tap.offer(identifier, flags, lo, hi)
             if answer == FULL:
+                if timeout is None and self.tap.state == ERROR_PASSIVE and not self.warned:
+                    self.warned = True
+                    log.warning(
+                        "%s: nobody acknowledges, so sending waits (this bus is private to this process; "
+                        "`ranger-sim bus` shares one)",
+                        self.label,
+                    )
                 self._wait(lambda: self.tap.queued < self.tap.depth, timeout)
                 answer = self.tap.offer(identifier, flags, lo, hi)
             self._check()

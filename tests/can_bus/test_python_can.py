@@ -217,13 +217,18 @@ def test_a_full_queue_blocks_until_the_timeout_and_then_raises(bus):
     assert [each.arbitration_id for each in drained(other)] == list(range(64))
 
 
-def test_a_sender_that_waits_for_room_goes_on_when_there_is_some(bus):
-    alone = bus(bitrate=1_000_000)
+def test_a_sender_that_waits_for_room_says_so_and_goes_on_when_there_is_some(bus, caplog):
+    alone = bus(speed="max")
+    told = threading.Event()
+    caplog.handler.addFilter(lambda record: told.set() or True)
     thread = threading.Thread(target=lambda: [alone.send(message(number)) for number in range(100)])
     thread.start()
+    assert told.wait(60)
     other = bus()
     assert [other.recv(60).arbitration_id for _ in range(100)] == list(range(100))
     thread.join()
+    (entry,) = caplog.records
+    assert "nobody acknowledges, so sending waits" in entry.getMessage()
 
 
 def test_what_cannot_be_on_a_classic_bus_is_refused(bus):
@@ -431,6 +436,21 @@ def test_threads_may_send_and_receive_on_one_attached_bus(bus):
         for sender in senders:
             mine = [int.from_bytes(each.data) for each in messages if each.arbitration_id == sender]
             assert mine == list(range(count))
+
+
+def test_python_cans_environment_and_configuration_are_honoured(bus, monkeypatch, tmp_path):
+    with hosted("can1", bitrate=250_000) as (name, _):
+        configuration = tmp_path / "can.ini"
+        configuration.write_text(f"[here]\ninterface = ranger_sim\nchannel = can1\nrobot = {name}\nbitrate = 250000\n")
+        monkeypatch.setattr(can.util, "CONFIG_FILES", [str(configuration)])
+        with can.Bus(config_context="here") as one:
+            assert str(one) == f"ranger_sim {name}/can1, 250000 bit/s"
+        monkeypatch.setenv("CAN_INTERFACE", "ranger_sim")
+        monkeypatch.setenv("CAN_CHANNEL", f"{name}/can1")
+        monkeypatch.setenv("CAN_CONFIG", '{"receive_own_messages": "yes"}')
+        with can.Bus() as two, can.Bus():
+            two.send(message(0x9))
+            assert two.recv(60).is_rx is False
 
 
 # --- every frame --------------------------------------------------------------------------------------------
