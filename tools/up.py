@@ -20,7 +20,7 @@ from harness.processes.lateness import figures
 from harness.processes.settings import NEVER, ON_FAILURE, Settings, one_processor
 from harness.processes.supervisor import Supervisor, View, check_platform
 from harness.scenario import StopRule
-from tools import bus, serial_options, walk
+from tools import serial_options, walk
 from tools.files import json_target, writable_folder
 
 if TYPE_CHECKING:
@@ -80,7 +80,10 @@ def register(commands: Any) -> None:
         metavar="one|all|N",
         help="processors for plant and boards (default one, the fastest: they take turns; interpreted all)",
     )
-    bus.add_server_options(up)
+    group.add_argument(
+        "--slcan", action="append", default=[], metavar="CHANNEL", help="a bus on a pseudo-terminal (repeatable)"
+    )
+    group.add_argument("--socketcand", metavar="[HOST:]PORT", help="all buses over TCP (port 0: a free one)")
     up.set_defaults(run=run)
 
     ctl = commands.add_parser(
@@ -96,7 +99,8 @@ def register(commands: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Start the processes and look after them; exit codes as for `walk`."""
-    from harness.ranger import Ranger  # the whole robot: only when it is to walk
+    from harness.ranger import Ranger  # the whole robot, and python-can: only when it is to walk
+    from tools import bus
 
     check_platform()
     settings = Settings(

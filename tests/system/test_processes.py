@@ -1,0 +1,346 @@
+"""`ranger-sim up`: the same walk as in lockstep, and what becomes of it when a process dies, hangs or is stopped."""
+
+import contextlib
+import json
+import os
+import pathlib
+import re
+import signal
+import subprocess
+import sys
+import uuid
+
+import pytest
+
+from foundation import wallclock
+from foundation.user_error import UserError
+from harness import wiring
+from harness.processes import control
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+TWO_SECONDS = 2.0  # the promise for naming what died or hangs
+PATIENCE_S = 60.0  # for everything that promises no time, on a busy machine
+FACTORS = {"realtime_factor", "cpu_factor"}  # how fast the machine was
+
+
+class Up:
+    """A running `ranger-sim up` (or a script that does the same) with a name of its own."""
+
+    def __init__(self, *arguments, script=None, speed="0.05"):
+        self.name = f"test-{uuid.uuid4().hex[:12]}"
+        self.mark = f"RANGER_SIM_TEST={self.name}"
+        command = [sys.executable, "-m", "tools.cli", "up"] if script is None else [sys.executable, "-c", script]
+        self.started = subprocess.Popen(
+            [*command, "--name", self.name, "--no-real-time", "--speed", speed, *arguments],
+            cwd=ROOT,
+            env={**os.environ, "RANGER_SIM_TEST": self.name, "PYTHONUNBUFFERED": "1"},
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            start_new_session=True,
+        )
+        os.set_blocking(self.started.stdout.fileno(), False)
+        self.text = ""
+
+    def read(self):
+        """What was printed so far."""
+        with contextlib.suppress(BlockingIOError):
+            while part := os.read(self.started.stdout.fileno(), 65536):
+                self.text += part.decode()
+        return self.text
+
+    def wait_for(self, pattern, seconds=PATIENCE_S):
+        """The match of `pattern` in what is printed; fails when it does not come in time."""
+        end = wallclock.monotonic_s() + seconds
+        while not (match := re.search(pattern, self.read())):
+            assert wallclock.monotonic_s() < end, f"no {pattern!r} within {seconds} s in:\n{self.text}"
+            wallclock.sleep_s(0.02)
+        return match
+
+    def status(self):
+        return control.ask(self.name, {"do": "status"})
+
+    def running(self):
+        """The status, as soon as virtual time passes; also of a robot that prints nothing."""
+        end = wallclock.monotonic_s() + PATIENCE_S
+        while True:
+            with contextlib.suppress(UserError):  # not there yet
+                if "time_s" in (status := self.status()):
+                    return status
+            assert wallclock.monotonic_s() < end, f"does not run:\n{self.read()}"
+            wallclock.sleep_s(0.02)
+
+    def processes(self):
+        """Process ids by name, as the robot tells them, once it runs."""
+        status = self.running()
+        found = {name: each["process"] for name, each in status["boards"].items()}
+        return {**found, "plant": status["plant"], "supervisor": self.started.pid}
+
+    def alive(self):
+        """Processes that carry our mark in their environment, zombies left out."""
+        found = []
+        for entry in pathlib.Path("/proc").iterdir():
+            if entry.name.isdecimal():
+                with contextlib.suppress(OSError):
+                    if self.mark.encode() in (entry / "environ").read_bytes().split(b"\0"):
+                        found.append(int(entry.name))
+        return found
+
+    def interrupt(self):
+        self.started.send_signal(signal.SIGINT)
+        return self.end()
+
+    def end(self):
+        """Wait for the supervisor; nothing may be left. Returns its exit code."""
+        end = wallclock.monotonic_s() + PATIENCE_S
+        while self.started.poll() is None:
+            self.read()
+            assert wallclock.monotonic_s() < end, f"does not end:\n{self.text}"
+            wallclock.sleep_s(0.02)
+        self.read()
+        self.nothing_left()
+        return self.started.returncode
+
+    def nothing_left(self):
+        """No process (the kernel needs a moment to kill them), no socket, no shared memory with a name."""
+        end = wallclock.monotonic_s() + TWO_SECONDS
+        while self.alive() or self.name in pathlib.Path("/proc/net/unix").read_text():
+            assert wallclock.monotonic_s() < end, f"still there: {self.alive()} or a socket"
+            wallclock.sleep_s(0.02)
+
+    def close(self):
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(self.started.pid, signal.SIGKILL)
+        self.started.wait()
+        self.started.stdout.close()
+
+
+@pytest.fixture
+def up():
+    started = []
+    shared_memory = sorted(os.listdir("/dev/shm"))
+
+    def start(*arguments, **how):
+        started.append(Up(*arguments, **how))
+        return started[-1]
+
+    yield start
+    for each in started:
+        each.close()
+    assert sorted(os.listdir("/dev/shm")) == shared_memory
+
+
+def summary_of(text):
+    return json.loads(text[text.index("{") :])
+
+
+def comparable(summary):
+    return {name: value for name, value in summary.items() if name not in FACTORS | {"processes"}}
+
+
+@pytest.fixture(scope="module")
+def walked():
+    """The summary of two steps in lockstep."""
+    done = subprocess.run(
+        [sys.executable, "-m", "tools.cli", "walk", "--steps", "2", "--json", "-"],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    return json.loads(done.stdout)
+
+
+@pytest.mark.parametrize("speed", ["max", "1.0"])
+def test_the_robot_as_processes_walks_the_same_walk_at_any_pace(up, walked, speed):
+    """Not only the digest: everything a summary counts, of boards, buses and body, is the same."""
+    robot = up("--steps", "2", "--json", "-", speed=speed)
+    assert robot.end() == 0
+    found = summary_of(robot.text)
+    assert comparable(found) == comparable(walked)
+    slots = [each["lateness"]["slots"] for each in found["processes"]["boards"].values()]
+    assert (min(slots) > 1000) == (speed != "max")
+    assert all(each["damaged_messages"] == 0 for each in found["processes"]["boards"].values())
+
+
+def test_real_time_scheduling_is_asked_for_and_what_was_obtained_is_said(up):
+    robot = up("--time", "0.02s")
+    assert "ordinary scheduling, memory not locked (as asked for)" in robot.wait_for("ranger-sim up.*").group()
+    assert robot.end() == 0
+
+
+def test_every_killed_process_is_named_within_two_seconds_and_nothing_is_left(up):
+    """Board after board, while the robot is still held up; then the plant, without which the run is lost."""
+    robot = up()
+    processes = robot.processes()
+    for victim in wiring.BOARDS:
+        os.kill(processes[victim], signal.SIGKILL)
+        robot.wait_for(rf"{victim} \(process \d+\) was killed by signal 9", TWO_SECONDS)
+        robot.wait_for(rf"{victim} is off its bus since ")
+    os.kill(processes["plant"], signal.SIGKILL)
+    robot.wait_for(r"plant \(process \d+\) was killed by signal 9: the run is lost", TWO_SECONDS)
+    assert robot.end() == 1
+
+
+def test_without_the_supervisor_nothing_is_left(up):
+    robot = up()
+    processes = robot.processes()
+    assert set(processes.values()) == set(robot.alive())
+    os.kill(processes["supervisor"], signal.SIGKILL)
+    assert robot.end() == -signal.SIGKILL
+
+
+def test_a_stopped_board_stalls_the_run_and_loses_nothing(up, walked):
+    robot = up("--steps", "2", "--json", "-", speed="max")
+    status = robot.running()
+    board = status["boards"]["CSR"]["process"]
+    os.kill(board, signal.SIGSTOP)
+    while robot.status()["boards"]["CSR"]["state"] != "stopped":
+        wallclock.sleep_s(0.02)
+    stalled = robot.status()["boards"]["CSR"]["slots"]
+    with pytest.raises(UserError, match="CSR is stopped: all wait for it"):
+        control.ask(robot.name, {"do": "pause"})
+    assert robot.status()["boards"]["CSR"]["slots"] == stalled
+    os.kill(board, signal.SIGCONT)
+    assert robot.end() == 0
+    assert comparable(summary_of(robot.text)) == comparable(walked)
+
+
+def test_a_stopped_board_is_named(up):
+    robot = up()
+    os.kill(robot.processes()["MB"], signal.SIGSTOP)
+    robot.wait_for(r"MB \(process \d+\) is stopped by signal 19: all wait", TWO_SECONDS)
+    assert robot.interrupt() == 130  # it is let go on, so that the files can be finished
+
+
+SCRIPT = """
+import argparse, contextlib, sys
+from harness.processes.settings import Settings
+from harness.processes.supervisor import Supervisor, View
+from harness.ranger import Ranger
+from harness.scenario import StopRule
+
+parser = argparse.ArgumentParser()
+parser.add_argument("--name")
+parser.add_argument("--speed", type=float)
+parser.add_argument("--no-real-time", action="store_true")
+parser.add_argument("--hang", action="store_true")
+options = parser.parse_args()
+
+class Said(View):
+    def say(self, text):
+        print(text, flush=True)
+
+with contextlib.closing(Ranger()) as robot:
+    board = robot.board("MCH")
+    own = board.compliant_control
+
+    def control():
+        while board.now > 200_000_000:
+            pass
+        return own()
+
+    if options.hang:
+        robot.replace("MCH", "mc_compliant_control", control, cost=3900)
+
+    def finish(robot, run, interrupted):
+        drive = robot.plant.motors[0].drive
+        print("hip powered", drive.powered, "losses", drive.power_losses, "at", round(robot.time_s, 3))
+        print("P_UI_LCD_TIME is", robot.variable("P_UI_LCD_TIME"))
+        return 0
+
+    settings = Settings(options.speed, name=options.name, real_time=False)
+    sys.exit(Supervisor(robot, settings, StopRule(time_s=0.25), finish, Said()).run())
+"""
+
+
+def test_a_hanging_board_is_named_and_its_motor_loses_its_power(up):
+    """The board's program never returns after 0.2 s; the bridge has power for 10 ms after the last watchdog edge."""
+    robot = up("--hang", script=SCRIPT, speed="1000")
+    robot.wait_for(r"MCH \(process \d+\) hangs: no answer for 1\.\d s; it is killed")
+    robot.wait_for(r"hip powered False losses 1 at 0.25")
+    assert robot.end() == 0
+
+
+def test_a_dead_board_is_restarted_where_that_is_the_policy(up):
+    robot = up("--restart", "on-failure", speed="0.2")
+    before = robot.processes()["UI"]
+    os.kill(before, signal.SIGKILL)
+    robot.wait_for(r"UI restarted at ")
+    while robot.status()["boards"]["UI"]["state"] != "running":
+        wallclock.sleep_s(0.02)
+    slots = robot.status()["boards"]["UI"]["slots"]
+    while robot.status()["boards"]["UI"]["slots"] < slots + 5:
+        wallclock.sleep_s(0.02)
+    assert robot.status()["boards"]["UI"]["process"] != before
+    assert robot.interrupt() == 130
+
+
+def test_a_board_is_restarted_on_request(up):
+    robot = up(speed="0.2")
+    before = robot.processes()["MCSI"]
+    assert control.ask(robot.name, {"do": "restart", "board": "MCSI"}) == {"restarting": "MCSI"}
+    robot.wait_for(r"MCSI restarted at ")
+    assert robot.status()["boards"]["MCSI"]["process"] != before
+    assert robot.interrupt() == 130
+
+
+def test_pausing_stops_virtual_time_and_resuming_goes_on_where_it_was(up, command):
+    robot = up(speed="1.0")
+    robot.running()
+    paused = float(re.search(r"at ([\d.]+) s", command("ctl", "pause", "--name", robot.name).stdout).group(1))
+    while not (status := robot.status())["paused"]:
+        wallclock.sleep_s(0.02)
+    wallclock.sleep_s(0.3)
+    assert robot.status()["time_s"] == status["time_s"] == pytest.approx(paused, abs=1e-4)
+    resumed = float(re.search(r"at ([\d.]+) s", command("ctl", "resume", "--name", robot.name).stdout).group(1))
+    assert resumed == paused
+    robot.wait_for(rf"(?m)^{int(paused) + 1}\.\d s, ")
+    assert robot.interrupt() == 130
+
+
+def test_a_variable_is_set_and_a_key_is_pressed_in_the_running_robot(up, command):
+    robot = up(script=SCRIPT, speed="0.002")
+    robot.running()
+    done = command("ctl", "set", "P_UI_LCD_TIME", "42.5", "--name", robot.name)
+    assert done.returncode == 0 and done.stdout.startswith("set: at ")
+    assert command("ctl", "key", "2", "--name", robot.name).stdout.startswith("key: at ")
+    wrong = command("ctl", "set", "NO_SUCH_VARIABLE", "1", "--name", robot.name)
+    assert wrong.returncode == 2 and "NO_SUCH_VARIABLE is no variable" in wrong.stderr
+    assert command("ctl", "key", "9", "--name", robot.name).returncode == 2
+    assert robot.interrupt() == 0 and "P_UI_LCD_TIME is 42.5" in robot.text
+
+
+def test_a_request_to_no_robot_is_one_line(command):
+    done = command("ctl", "status", "--name", "nobody-runs-this")
+    assert done.returncode == 2
+    assert done.stderr.startswith("ranger-sim: no robot named nobody-runs-this is running here")
+
+
+def test_two_robots_cannot_have_one_name(up, command):
+    robot = up()
+    robot.processes()
+    done = command("up", "--name", robot.name, "--steps", "1")
+    assert done.returncode == 2 and "is already" in done.stderr or "taken" in done.stderr
+    assert robot.interrupt() == 130
+
+
+def test_ctrl_c_finishes_the_files_as_walk_does(up, tmp_path):
+    robot = up("--out", str(tmp_path))
+    robot.processes()
+    assert robot.interrupt() == 130
+    assert json.loads((tmp_path / "summary.json").read_text())["fell"] is False
+    assert (tmp_path / "can1.log").exists() and (tmp_path / "report.html").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "complaint"),
+    [
+        (["--speed", "0"], "speed is 0.0, allowed are 0.0001 to 1000, or max"),
+        (["--speed", "fast"], "'fast' is neither a number nor max"),
+        (["--processor", "99"], "processor is 99, allowed are"),
+        (["--name", "a b"], "name is 'a b', allowed are"),
+    ],
+)
+def test_a_mistake_in_an_option_is_one_line(command, arguments, complaint):
+    done = command("up", "--time", "0.01s", *arguments)
+    assert done.returncode == 2 and complaint in done.stderr and "Traceback" not in done.stderr
