@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from typing import TYPE_CHECKING, Any
 
 from boards.quirks import Quirks
@@ -85,7 +86,10 @@ def connect(robot: Ranger, options: argparse.Namespace) -> tuple[dict[str, Any],
         ends["imu"] = serial_ports.connect_imu(robot, ports["imu"])
     if "imu-offer" in ports:
         ends["imu-offer"] = serial_ports.offer_imu(robot, ports["imu-offer"])
-    return ends, [MEANINGS[name].format(port.path) for name, port in ports.items()]
+    lines = [MEANINGS[name].format(port.path) for name, port in ports.items()]
+    if options.json == "-":  # nothing else is printed then, and without its name a pseudo-terminal is of no use
+        print(*lines, sep="\n", file=sys.stderr, flush=True)
+    return ends, lines
 
 
 def report(ends: dict[str, Any]) -> list[str]:
