@@ -100,23 +100,32 @@ def receivers(interface):
     return sum(line.split()[:1] == [interface] for line in lines)
 
 
+@contextlib.contextmanager
+def recording(path, *interfaces):
+    """A Candump that listens already."""
+    before = [receivers(interface) for interface in interfaces]
+    watcher = Candump(path, interfaces)
+
+    def candump_listens():
+        return all(receivers(interface) > had for interface, had in zip(interfaces, before, strict=True))
+
+    try:
+        await_condition(candump_listens)
+        yield watcher
+    finally:
+        watcher.process.kill()
+        watcher.process.communicate()
+        watcher.file.close()
+
+
 @pytest.fixture
 def candump(tmp_path):
     """candump(interface, ...): started, and listening already; ended with the test."""
     with contextlib.ExitStack() as stack:
 
         def start(*interfaces):
-            before = [receivers(interface) for interface in interfaces]
             number = len(list(tmp_path.glob("candump*")))
-            watcher = Candump(tmp_path / f"candump{number}.log", interfaces)
-            stack.callback(watcher.process.wait)
-            stack.callback(watcher.process.kill)
-
-            def listening():
-                return all(receivers(interface) > had for interface, had in zip(interfaces, before, strict=True))
-
-            await_condition(listening)
-            return watcher
+            return stack.enter_context(recording(tmp_path / f"candump{number}.log", *interfaces))
 
         yield start
 
