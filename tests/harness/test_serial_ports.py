@@ -6,15 +6,20 @@ import select
 
 import pytest
 import serial
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from boards.modules.imu_parser import ImuParser, start_command
 from boards.quirks import Quirks
+from boards.user_interface import UserInterfaceBoard
+from firmware_sim.clock import Crystal
 from foundation.events import NEVER, PIN_EDGE, UART_BYTE
 from foundation.user_error import UserError
 from harness import serial_ports
 from harness.ranger import Ranger
 from harness.scenario import Scenario
 from harness.serial_ports import Dropouts, PtyPort, RealPort, SerialLine
+from plant.imu import Imu
 
 BYTE_NS = 10_000
 MS = 1_000_000
@@ -347,3 +352,36 @@ def test_closing_a_robot_closes_its_ends_once():
     assert (line.port.master, line.port.slave, line.filenos()) == (-1, -1, [])
     robot.close()
     assert line.poll(0) == NEVER
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    st.lists(st.one_of(st.binary(max_size=30), st.sampled_from((start_command(0xCF), start_command(0xC2)))), max_size=8)
+)
+def test_no_bytes_of_a_host_stop_the_plants_inertial_unit(pieces):
+    imu = Imu(seed=1)
+    offer = serial_ports.ImuOffer(imu, Paper(b"".join(pieces)))
+    for step in range(200):
+        offer.poll(step * MS)
+        imu.update(step * MS, (step + 1) * MS, 0.1, 0.2, 0.1, 0.2)
+        offer.bytes_sent(imu.bytes.times, imu.bytes.values, imu.bytes.count)
+    assert imu.samples == 200
+    # whatever came before: four bytes end a command that was begun, and then one gets through
+    offer.line.port.incoming = bytes(4) + start_command(0xC2)
+    for step in range(200, 230):
+        offer.poll(step * MS)
+        imu.update(step * MS, (step + 1) * MS, 0.1, 0.2, 0.1, 0.2)
+    assert imu.mode == 0xC2
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.binary(max_size=600))
+def test_no_bytes_at_the_imu_port_stop_the_board(data):
+    board = UserInterfaceBoard(Crystal(), Quirks())
+    line = SerialLine(board.inbox.push, 1, Paper(data), board.uart1.byte_ns)
+    for ms in range(40):
+        line.poll(ms * MS)
+        board.advance((ms + 1) * MS)
+    imu = board.imu
+    assert board.scheduler.overruns == 0 and board.scheduler.slot_count == 40
+    assert 31 * imu.packets + imu.bad_checksums + imu.skipped_bytes + imu.waiting() + imu.bytes_lost == len(data)

@@ -6,7 +6,13 @@ clock. So nothing sleeps and nothing depends on how fast the machine is.
 
 import contextlib
 import json
+import os
+import pathlib
+import re
 import select
+import signal
+import subprocess
+import sys
 
 import pytest
 
@@ -19,6 +25,7 @@ from harness.scenario import Scenario
 from tools import cli, daq
 from tools.robodaq.codec import write_packet
 
+ROOT = pathlib.Path(__file__).resolve().parents[2]
 ID = all_variables.ID_OF
 LOOK_S = 0.005
 
@@ -224,3 +231,34 @@ def test_a_port_that_is_not_there_gets_one_line(capsys):
     assert capsys.readouterr().err == (
         "ranger-sim: serial port /dev/no-such-port: No such file or directory\n"
     )  # fmt: skip
+
+
+def test_daq_in_a_process_of_its_own_writes_to_a_robot_in_processes():
+    """`up` as fast as it goes, `daq` beside it; both are real, and only what was written is looked at."""
+    up = subprocess.Popen(
+        [sys.executable, "-m", "tools.cli", "up", "--speed", "max", "--daq-port", "pty", "--json", "-"]
+        + ["--name", f"daq-test-{os.getpid()}"],
+        cwd=ROOT,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        place = re.search(r"--port (\S+)", up.stderr.readline()).group(1)
+        asked = ["--write", "C_F_ST_F_ANG=4.25", "--read", "C_F_ST_F_ANG", "--timeout", "60s", "--json", "-"]
+        told = subprocess.run(
+            [sys.executable, "-m", "tools.cli", "daq", "--port", place, *asked],
+            cwd=ROOT,
+            capture_output=True,
+            text=True,
+            timeout=300,
+            check=False,
+        )
+        result = json.loads(told.stdout)
+        assert (told.returncode, result["read"]) == (0, {"C_F_ST_F_ANG": 4.25}), told.stderr
+        assert result["bad_checksums"] == 0
+    finally:
+        up.send_signal(signal.SIGINT)
+        out, err = up.communicate(timeout=300)
+    assert up.returncode == 130, err
+    assert json.loads(out)["slots"]["MB"]["overruns"] == 0
