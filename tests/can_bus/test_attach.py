@@ -3,17 +3,21 @@
 import pathlib
 import socket
 import struct
+import threading
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from can_bus.bus import Bus
+from can_bus.bus import RESET, Bus
 from can_bus.edge import attach_records as wire
+from can_bus.edge import host as host_module
 from can_bus.edge import links
 from can_bus.edge.attach import BACKLOG_LIMIT, CLIENT_LIMIT, AttachServer
-from can_bus.edge.taps import TRANSMIT_QUEUE
-from foundation.events import FLAG_EXTENDED, FLAG_REMOTE, STAGE_BUS, EventQueue
+from can_bus.edge.host import BusHost
+from can_bus.edge.paced import PacedBus
+from can_bus.edge.taps import RECEIVED, TRANSMIT_QUEUE
+from foundation.events import FLAG_ERROR, FLAG_EXTENDED, FLAG_REMOTE, FLAG_SINGLE_SHOT, STAGE_BUS, EventQueue
 from foundation.random_stream import RandomStream
 from foundation.user_error import UserError
 
@@ -141,6 +145,24 @@ def test_a_client_hears_the_boards_of_its_channel_only(owner):
     owner.run(10)
     assert [frame[1:] for frame in frames_of(said(one))] == [(0x55, 8, 1, 2)]
     assert said(two) == []
+
+
+def test_how_often_a_board_tries_is_its_own_business(owner):
+    client, _ = owner.attached()
+    owner.buses["can1"].request(0, 1, owner.time, 0x55, 8 | FLAG_SINGLE_SHOT, 1, 2)
+    owner.run(10)
+    assert [frame[1:] for frame in frames_of(said(client))] == [(0x55, 8, 1, 2)]
+
+
+def test_a_sender_that_nobody_acknowledges_hears_of_it_until_nothing_changes_any_more(owner):
+    client, _ = owner.attached()
+    owner.buses["can1"].set_mode(0, RESET, owner.time)
+    owner.run(2)
+    client.send(wire.send_record(0x55, 0, 0, 0))
+    owner.run(1000)
+    assert owner.buses["can1"].errors > 100
+    errors = frames_of(said(client))
+    assert len(errors) == 16 and all(frame[2] & FLAG_ERROR for frame in errors)
 
 
 def test_a_client_that_only_asks_gets_the_channels_and_is_no_node(owner):
@@ -293,6 +315,41 @@ def test_who_listens_under_the_address_but_is_no_robot_is_told():
     impostor.close()
     with pytest.raises(FileNotFoundError):
         links.greeted(name, "can1")
+
+
+def test_a_frame_directly_behind_the_welcome_is_not_forgotten():
+    name = fresh_name()
+    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as listener:
+        listener.bind(wire.SOCKET_PREFIX + name)
+        listener.listen()
+        welcome = wire.record(wire.WELCOME, wire.WELCOME_BODY.pack(1, 64, RATE, 0) + b"can1")
+        frame = wire.frame_record(wire.FRAME, 5, 0x77, 0, 0, 0)
+
+        def answer():
+            connection, _ = listener.accept()
+            connection.sendall(welcome + frame)
+            connections.append(connection)
+
+        connections = []
+        thread = threading.Thread(target=answer)
+        thread.start()
+        link = links.AttachedLink(name, "can1")
+        thread.join()
+        assert link.receive(0) == (RECEIVED, 5, 0x77, 0, 0, 0)
+        link.close()
+        connections[0].close()
+
+
+def test_a_host_naps_no_longer_than_its_servers_are_patient(monkeypatch):
+    naps = []
+    monkeypatch.setattr(host_module.select, "select", lambda read, write, error, nap: naps.append(nap))
+    host = BusHost([PacedBus("can1")])
+    host.serve(AttachServer(fresh_name(), {"can1": host.buses[0].taps}))
+    host.turn(0.5)
+    monkeypatch.setattr(host.servers[0], "patience_s", lambda: 0.1)
+    host.turn(0.5)
+    host.close()
+    assert naps == [0.5, 0.1]
 
 
 # --- fuzz ---------------------------------------------------------------------------------------------------

@@ -76,7 +76,7 @@ def test_a_bus_with_too_much_to_do_has_no_bound():
     a, b = response_times(messages, 1_000_000)
     assert utilisation(messages, 1_000_000) > 1
     assert a.response_ns == 270_000 and not a.met
-    assert b.response_ns is None and not b.met and most_waiting([a, b], "") is None
+    assert b.response_ns is None and not b.met and most_waiting([a, b], "", 1_000_000) is None
 
 
 def test_a_bus_filled_to_the_last_bit_has_a_bound_only_without_blocking_and_jitter():
@@ -126,8 +126,8 @@ def test_a_queue_that_stands_still_is_later_by_that():
 
 def test_frames_waiting_in_a_queue_are_counted():
     bounds = response_times([message(f"m{n}", n, MS, queue="node") for n in range(3)], 1_000_000)
-    assert most_waiting(bounds, "node") == 3
-    assert most_waiting(bounds, "other") == 0
+    assert most_waiting(bounds, "node", 1_000_000) == 3
+    assert most_waiting(bounds, "other", 1_000_000) == 0
 
 
 @pytest.mark.parametrize("field", ["bits", "period_ns", "deadline_ns", "jitter_ns", "pause_ns"])

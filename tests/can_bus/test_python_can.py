@@ -321,6 +321,18 @@ def test_periodic_sending_by_python_cans_thread(bus, caplog):
     assert not [entry for entry in caplog.records if entry.levelno >= logging.WARNING]
 
 
+def test_a_periodic_message_after_the_shutdown_is_no_error_but_one_that_fails_before_is(bus, clock):
+    a, _ = bus(), bus()
+    sender = python_can._WhileOpen(a)
+    a.inject_errors(32)
+    sender.send(message(0x100))
+    clock.to(50_000_000)
+    with pytest.raises(can.CanOperationError, match="bus-off"):
+        sender.send(message(0x100))
+    a.shutdown()
+    sender.send(message(0x100))
+
+
 def test_a_notifier_hands_messages_to_listeners(bus):
     a, b = bus(), bus()
     reader = can.BufferedReader()
