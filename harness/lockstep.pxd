@@ -36,7 +36,7 @@ cdef class Lockstep:
     cdef public SspWire ssp
     cdef public Imu imu
     cdef public Microcontroller imu_board, main_brain
-    cdef public object serial_lines, imu_tap
+    cdef public object serial_lines, can_lines, imu_tap
     cdef public Estimator estimator
     cdef public long long imu_index, imu_uart
     cdef public long long swing_leg, strike_seen_ns, strike_count, strikes_unmatched, strikes_missed, steps_noticed
@@ -51,5 +51,6 @@ cdef class Lockstep:
     cdef void _deliver_bytes(self) noexcept
     cdef void _collect_frames(self)
     cdef void _route(self, long long index, Microcontroller board)
+    cdef void _can_output(self, long long index, EventQueue out)
     cdef void _serial_output(self, long long index, EventQueue out)
     cdef void _sample(self, long long now)

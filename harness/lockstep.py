@@ -142,6 +142,7 @@ class Lockstep:
         self.imu_index = -1
         self.imu_uart = 0
         self.serial_lines = None  # {(board, UART): what hears it}, when something outside is connected
+        self.can_lines = None  # {(board, controller): what takes its requests}, when its bus is outside
         self.imu_tap = None  # hears what the inertial unit sends, beside its board
         self.estimator = None
         self.swing_leg = 1
@@ -346,6 +347,8 @@ class Lockstep:
                     bus = cython.cast(Bus, self.buses[self.bus_of[place]])
                     bus.request(self.node_of[place], out.b, out.time, out.c, out.d, out.e, out.f)
                     self.bus_due[self.bus_of[place]] = bus.next_time
+                elif self.can_lines is not None:
+                    self._can_output(index, out)
             elif out.kind == 37:  # SSP_START
                 ssp = self.ssp
                 ssp.start(out.time, out.ref)
@@ -358,17 +361,27 @@ class Lockstep:
                     bus = cython.cast(Bus, self.buses[self.bus_of[place]])
                     bus.abort(self.node_of[place], out.b, out.time)
                     self.bus_due[self.bus_of[place]] = bus.next_time
+                elif self.can_lines is not None:
+                    self._can_output(index, out)
             elif out.kind == 34:  # CAN_MODE
                 place = 4 * index + out.a - 1
                 if self.bus_of[place] >= 0:
                     bus = cython.cast(Bus, self.buses[self.bus_of[place]])
                     bus.set_mode(self.node_of[place], out.b, out.time)
                     self.bus_due[self.bus_of[place]] = bus.next_time
+                elif self.can_lines is not None:
+                    self._can_output(index, out)
             elif out.kind == 39:  # UART_OUTPUT
                 if index == self.imu_index and out.a == self.imu_uart and self.imu is not None:
                     self.imu.receive_byte(out.time, out.b)
                 elif self.serial_lines is not None:
                     self._serial_output(index, out)
+
+    def _can_output(self, index: cython.longlong, out: EventQueue) -> cython.void:
+        """A controller asks its bus for something, and the bus is outside."""
+        line = self.can_lines.get((index, out.a))
+        if line is not None:
+            line.from_board(out.kind, out.time, out.b, out.c, out.d, out.e, out.f)
 
     def _serial_output(self, index: cython.longlong, out: EventQueue) -> cython.void:
         """A UART has put something out: to the outside, if it is connected there."""

@@ -17,6 +17,7 @@ from harness import build
 from harness.processes import block as places
 from harness.processes import control
 from harness.processes.lateness import figures
+from harness.processes.outside import move_bus
 from harness.processes.settings import NEVER, ON_FAILURE, Settings, one_processor
 from harness.processes.supervisor import Supervisor, View, check_platform
 from harness.scenario import StopRule
@@ -24,6 +25,7 @@ from tools import serial_options, walk
 from tools.files import json_target, writable_folder
 
 if TYPE_CHECKING:
+    from can_bus.edge.external_bus import ExternalBus
     from harness.processes.plant_process import PlantRun
     from harness.ranger import Ranger
 
@@ -84,6 +86,15 @@ def register(commands: Any) -> None:
         "--slcan", action="append", default=[], metavar="CHANNEL", help="a bus on a pseudo-terminal (repeatable)"
     )
     group.add_argument("--socketcand", metavar="[HOST:]PORT", help="all buses over TCP (port 0: a free one)")
+    group.add_argument(
+        "--bus",
+        action="append",
+        default=[],
+        metavar="BUS=INTERFACE:CHANNEL",
+        help="put a bus on a python-can interface, e.g. can1=socketcan:vcan0 (repeatable); can1= asks python-can's own"
+        " configuration, section can1. The run is then asynchronous",
+    )
+    with_python_can_options(up)
     up.set_defaults(run=run)
 
     ctl = commands.add_parser(
@@ -95,6 +106,40 @@ def register(commands: Any) -> None:
     ctl.add_argument("values", nargs="*", metavar="VALUE")
     ctl.add_argument("--name", default="ranger", help="of the robot (default ranger)")
     ctl.set_defaults(run=run_ctl)
+
+
+def with_python_can_options(command: Any) -> None:
+    """python-can's own options for interfaces, as --bus-bitrate, --bus-kwargs ...; they hold for every --bus.
+
+    Importing python-can takes a second, so they are added when this command is really parsed.
+    """
+    own = command.parse_known_args
+
+    def parse_known_args(*arguments: Any, **keywords: Any) -> Any:
+        from can_bus.edge.external_bus import add_options
+
+        command.parse_known_args = own
+        add_options(command)
+        return own(*arguments, **keywords)
+
+    command.parse_known_args = parse_known_args
+
+
+def external_buses(options: argparse.Namespace, robot: Ranger) -> list[ExternalBus]:
+    """The buses of --bus, not opened yet. UserError for one that is not there or is given twice."""
+    from can_bus.edge.external_bus import ExternalBus, keywords_of, opener, split_name
+
+    found: dict[str, ExternalBus] = {}
+    bit_rates = {bus.name: bus.bitrate for bus in robot.buses}
+    for text in options.bus:
+        name, where = split_name(text)
+        if name not in bit_rates:
+            raise UserError(f"--bus {text}: there is no bus {name}; there are {', '.join(bit_rates)}")
+        if name in found:
+            raise UserError(f"--bus {text}: {name} is given twice")
+        keywords = {**keywords_of(options), **where}
+        found[name] = ExternalBus(name, int(keywords.get("bitrate", bit_rates[name])), opener(name, keywords))
+    return list(found.values())
 
 
 def run(options: argparse.Namespace) -> int:
@@ -124,12 +169,15 @@ def run(options: argparse.Namespace) -> int:
             robot.attach(server)
         for line in lines + more:
             console.print(line, highlight=False, soft_wrap=True)
+        outside = external_buses(options, robot)
+        for each in outside:
+            console.print(f"{each.name} is outside: this run is asynchronous and cannot be repeated", highlight=False)
         if not build.is_compiled():
             console.print(f"running interpreted, slowly: {build.why_interpreted()}", highlight=False, soft_wrap=True)
 
         def finish(robot: Ranger, run: PlantRun, interrupted: bool) -> int:
             summary = robot.summary()
-            summary["processes"] = processes_summary(robot, run, servers, ends)
+            summary["processes"] = processes_summary(robot, run, servers, ends, outside)
             for line in serial_options.report(ends):
                 console.print(line, highlight=False, soft_wrap=True)
             walk.finish(robot, summary, options, folder, json_file, console)
@@ -139,12 +187,19 @@ def run(options: argparse.Namespace) -> int:
             return 1 if summary["fell"] or summary["failed_boards"] else 0
 
         view = LiveView(console) if console.is_terminal else PlainView(console)
-        supervisor = Supervisor(robot, settings, stop, finish, view)
+
+        def begin(robot: Ranger) -> None:
+            for each in outside:
+                move_bus(robot, each)
+
+        supervisor = Supervisor(robot, settings, stop, finish, view, begin)
         view.say(f"ranger-sim up, name {settings.name}: {supervisor.describe()}")
         return supervisor.run()
 
 
-def processes_summary(robot: Ranger, run: PlantRun, servers: list[Any], ends: dict[str, Any]) -> dict:
+def processes_summary(
+    robot: Ranger, run: PlantRun, servers: list[Any], ends: dict[str, Any], outside: list[ExternalBus]
+) -> dict:
     """What `--json` says about the processes: pace, lateness, turns, damage, deaths, what came from outside."""
     boards = {}
     for name, block in run.blocks.items():
@@ -162,8 +217,9 @@ def processes_summary(robot: Ranger, run: PlantRun, servers: list[Any], ends: di
         "paced_factor": robot.time_s / run.wall_s if run.wall_s > 0.0 else None,
         "boards": boards,
         "deaths": run.deaths,
-        "asynchronous": bool(sent or any(end.asynchronous for end in ends.values())),
-        "frames_from_outside": sent,
+        "asynchronous": bool(outside or sent or any(end.asynchronous for end in ends.values())),
+        "frames_from_clients": sent,
+        "outside": {each.name: {**each.counters(), "last_error": each.last_error} for each in outside},
     }
 
 
@@ -177,6 +233,9 @@ def print_processes(found: dict, console: Console) -> None:
         + ("; frames or bytes came from outside: this run cannot be repeated" if found["asynchronous"] else ""),
         highlight=False,
     )
+    for name, counts in found["outside"].items():
+        used = ", ".join(f"{key.replace('_', ' ')} {value}" for key, value in counts.items() if value)
+        console.print(f"{name} outside: {used or 'no traffic'}", highlight=False, soft_wrap=True)
     for death in found["deaths"]:
         console.print(f"{death['board']} was lost at {death['time_s']:.3f} s", highlight=False)
 

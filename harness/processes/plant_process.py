@@ -27,6 +27,7 @@ FAST_SLICE_S = 0.005  # the same when there is no pace to keep
 STATUS_S = 0.1  # wall clock between two reports to the supervisor
 LONGEST_WAIT_S = 0.1  # so that the supervisor sees that the process lives
 KEY_HOLD_NS = 200_000_000  # a firm press
+MISUSE = 2  # exit code when something outside cannot be opened
 RESET, OPERATING = 1, 0  # modes of a bus node
 POWER_UP_NS = 1_000_000  # from a restarted process being there to its board's power
 
@@ -72,6 +73,11 @@ class PlantRun:
         loop.remote = True
         loop.main_brain_words = blocks["MB"].table()
         robot.boards["MB"].store.words = blocks["MB"].table()
+        for name, remote in self.remotes.items():
+            if name not in settings.boards:  # it has no process: another one stands outside in its place, or none
+                remote.gone = True
+                self.mourned.add(name)
+                self.unplug(name)
 
     # --- passing time -------------------------------------------------------------------------------------
 
@@ -191,14 +197,23 @@ class PlantRun:
             "speed_m_per_s": robot.mean_speed_m_per_s(),
             "behind_s": max(0.0, -self.pace.ahead_s(robot.loop.time)),
             "paused": self.paused,
-            "buses": {
-                bus.name: {"load": bus.load_windows()[-1] if bus.window_count else 0.0, "errors": bus.errors}
-                for bus in robot.buses
-            },
+            "buses": self.loads(),
             "ends": [end.counters() for end in robot.polled],
             "damaged": {name: remote.from_board.damaged for name, remote in self.remotes.items()},
             "damage": [remote.from_board.last_damage for remote in self.remotes.values() if remote.from_board.damaged],
         }
+
+    def loads(self) -> dict:
+        """Load in the latest 10 ms and error frames of every bus, inside and outside."""
+        outside = {end.name: end for end in self.robot.polled if hasattr(end, "window_load")}
+        found = {}
+        for bus in self.robot.buses:
+            if bus.name in outside:
+                found[bus.name] = {"load": outside[bus.name].window_load, "errors": outside[bus.name].errors}
+            else:
+                load = bus.load_windows()[-1] if bus.window_count else 0.0
+                found[bus.name] = {"load": load, "errors": bus.errors}
+        return found
 
     # --- boards that are gone -----------------------------------------------------------------------------
 
@@ -217,9 +232,13 @@ class PlantRun:
             if remote.gone and name not in self.mourned:
                 self.mourned.add(name)
                 self.deaths.append({"board": name, "time_s": self.robot.time_s})
-                for bus, node in self.nodes_of(name):
-                    bus.set_mode(node, RESET, self.robot.loop.time)
+                self.unplug(name)
                 self.tell(gone=name, time_s=self.robot.time_s)
+
+    def unplug(self, name: str) -> None:
+        """Take the controllers of a board off the emulated buses."""
+        for bus, node in self.nodes_of(name):
+            bus.set_mode(node, RESET, self.robot.loop.time)
 
     def make_room(self, name: str) -> None:
         """The old process of a board has ended: set its channel back for a new one."""
@@ -268,9 +287,13 @@ def serve(
     settings: Settings,
     link: socket.socket,
     stop: StopRule,
+    begin: Callable[[Any], None],
     finish: Callable[[Any, "PlantRun", bool], int],
 ) -> int:
-    """The whole life of the plant's process; returns its exit code: that of `finish`."""
+    """The whole life of the plant's process; returns its exit code: that of `finish`.
+
+    `begin(robot)` opens what leads outside, in the process that will use it; its UserError ends the run with code 2.
+    """
     kernel.name_process("ranger-plant")
     kernel.sharp_timers()
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
@@ -280,6 +303,11 @@ def serve(
         kernel.lock_memory()
         kernel.real_time_scheduling()
     run = PlantRun(robot, blocks, stage, settings, link)
+    try:
+        begin(robot)
+    except UserError as mistake:
+        run.tell(failed=str(mistake))
+        return MISUSE
     started = wallclock.monotonic_s()
     run.run(stop)
     run.wall_s = wallclock.monotonic_s() - started

@@ -5,6 +5,7 @@ import math
 import os
 
 from foundation.user_error import UserError
+from harness import wiring
 
 NEVER, ON_FAILURE = "never", "on-failure"
 
@@ -16,7 +17,8 @@ class Settings:
     real_time: ask for SCHED_FIFO and locked memory. name: under which the running robot is found.
     processor: the one that plant and boards share, None for all. They take turns, so they would mostly wait for each
     other on several as well; waking a process there costs ten times as much (a turn in a virtual machine: 3 us on
-    one processor, 30 to 140 us between two; benchmarks/processes.md).
+    one processor, 30 to 140 us between two).
+    boards: those that get a process; the others stand outside as real hardware, or nowhere.
     """
 
     speed: float | None = 1.0
@@ -24,6 +26,7 @@ class Settings:
     real_time: bool = True
     name: str = "ranger"
     processor: int | None = None
+    boards: tuple[str, ...] = wiring.BOARDS
 
     def __post_init__(self) -> None:
         if self.speed is not None and not (math.isfinite(self.speed) and 1e-4 <= self.speed <= 1000.0):

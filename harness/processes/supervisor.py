@@ -34,7 +34,7 @@ LOOK_S = 0.2  # between two looks at boards and screen
 HANG_S = 1.0  # a board that keeps its turn so long is looked at; named well within 2 s
 RESTART_LIMIT = 5  # per board with --restart on-failure, so that a board that cannot live does not keep us busy
 
-RUNNING, STOPPED, GONE, RESTARTING = "running", "stopped", "gone", "restarting"
+RUNNING, STOPPED, GONE, RESTARTING, OUTSIDE = "running", "stopped", "gone", "restarting", "outside"
 
 
 class View:
@@ -63,7 +63,11 @@ class Child:
 
 
 class Supervisor:
-    """Runs `robot` as processes. `finish(robot, run, interrupted)`: called in the plant's process at the end."""
+    """Runs `robot` as processes.
+
+    Called in the plant's process: `begin(robot)` before time passes, to open what leads outside, and
+    `finish(robot, run, interrupted)` at the end; what that returns is the exit code.
+    """
 
     def __init__(
         self,
@@ -72,8 +76,10 @@ class Supervisor:
         stop: StopRule,
         finish: Callable[[Any, Any, bool], int],
         view: View,
+        begin: Callable[[Any], None] = lambda _robot: None,
     ) -> None:
         self.robot = robot
+        self.begin = begin
         self.settings = settings
         self.stop_rule = stop
         self.finish = finish
@@ -93,6 +99,7 @@ class Supervisor:
         self.status: dict = {}
         self.restarts: dict[str, int] = {}
         self.exit_code: int | None = None
+        self.failure = ""  # what the plant's process could not open
         self.scheduling = self.try_scheduling()
         self.plant_seen = (0, 0.0)
 
@@ -148,7 +155,14 @@ class Supervisor:
 
         def body() -> int:
             return plant_process.serve(
-                self.robot, self.blocks, self.stage, self.settings, self.plant_link, self.stop_rule, self.finish
+                self.robot,
+                self.blocks,
+                self.stage,
+                self.settings,
+                self.plant_link,
+                self.stop_rule,
+                self.begin,
+                self.finish,
             )
 
         self.fork(PLANT, body)
@@ -165,7 +179,7 @@ class Supervisor:
         """Start everything, look after it, and return the exit code."""
         with self.signals_noted():
             try:
-                for name in wiring.BOARDS:
+                for name in self.settings.boards:
                     self.start_board(name)
                 self.start_plant()
                 while self.exit_code is None:
@@ -174,6 +188,8 @@ class Supervisor:
                 self.view.close()
                 self.kill_all()
                 self.control.close()
+        if self.failure:
+            raise UserError(self.failure)
         return self.exit_code
 
     @contextlib.contextmanager
@@ -264,6 +280,8 @@ class Supervisor:
                 self.answered(news)
             if "gone" in news:
                 self.view.say(f"{news['gone']} is off its bus since {news['time_s']:.3f} s of the robot's time")
+            if "failed" in news:
+                self.failure, self.ending = news["failed"], True
             if "collecting" in news:  # from here on boards end because they are told to
                 self.ending = True
             if "over" in news:
@@ -393,7 +411,7 @@ class Supervisor:
             words, child, board = block.words, self.children.get(name), self.robot.boards[name]
             bins = words[places.LATENESS : places.LATENESS + places.LATENESS_WORDS]
             boards[name] = {
-                "state": child.state if child is not None else GONE,
+                "state": child.state if child is not None else OUTSIDE,
                 "process": child.process if child is not None else 0,
                 "slots": words[places.SLOT_COUNT],
                 "overruns": words[places.OVERRUNS],
@@ -425,7 +443,7 @@ class Supervisor:
         elif what == "restart":
             child = self.children.get(str(request.get("board")))
             if child is None or child.name == PLANT:
-                known = ", ".join(wiring.BOARDS)
+                known = ", ".join(self.settings.boards)
                 self.control.answer(number, {"error": f"restart: {request.get('board')!r} is none of {known}"})
                 return
             if child.state == GONE:

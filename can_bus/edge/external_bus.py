@@ -1,0 +1,281 @@
+"""One of the robot's buses outside the simulation: every controller is a peer of its own on a python-can interface.
+
+Each controller has a python-can bus to itself, so on SocketCAN the boards hear each other, candump and whatever else
+is there, exactly as programs of their own would. All peers live in the process that owns virtual time, because frames
+from outside get their stamps there; a board's process never sees a wall clock.
+
+Such a bus is asynchronous: what comes in depends on the wall clock, and no run on it can be repeated. Arbitration,
+acknowledgement and the wire are those of the interface; here a controller is busy for the nominal length of its
+frame. What does not fit anywhere is counted: `not_taken` (the interface's queue was full, tried again), `overflow`
+(frames from outside faster than the bus could carry them), `refused` (CAN FD).
+
+What we ask of the robot is a small set of plain methods (`from_board`, `poll`), as for the other ends of wires.
+"""
+
+import collections
+from collections.abc import Callable
+from contextlib import suppress
+from typing import Any
+
+import can
+from can import cli as can_options
+
+from can_bus.edge.messages import frame_of_message, message_of_frame
+from can_bus.frame import INTERMISSION_BITS, frame_bits
+from foundation.events import (
+    CAN_ABORT,
+    CAN_MODE,
+    CAN_REQUEST,
+    CAN_RX,
+    CAN_TX_DONE,
+    FLAG_ERROR,
+    FLAG_SINGLE_SHOT,
+    TX_ABORTED,
+    TX_LOST,
+    TX_SENT,
+)
+from foundation.user_error import UserError
+
+# Virtual time between two looks at the interfaces: one step of the plant. Chosen by us: less brings nothing, as the
+# boards' outputs act at the next step, and much more would be seen in the control loops (500 Hz).
+POLL_NS = 125_000
+# Frames read at once are handed on one after the other, as a bus would; further ahead than this they are dropped.
+# Chosen by us: ten slots of the main brain, more than any queue in the robot holds.
+AHEAD_NS = 20_000_000
+READ_LIMIT = 200  # frames per peer and poll, so that a flood does not stop virtual time
+
+
+def split_name(text: str) -> tuple[str, dict[str, str]]:
+    """("can1", keywords for can.Bus) of `can1=socketcan:vcan0`.
+
+    `can1=vcan0` leaves the interface to python-can's configuration, `can1=` everything: it looks into its files and
+    environment variables, in the section named like the bus.
+    """
+    name, equals, where = text.partition("=")
+    if not equals or not name:
+        raise UserError(f"--bus {text}: BUS=INTERFACE:CHANNEL is expected, e.g. can1=socketcan:vcan0")
+    interface, colon, channel = where.partition(":")
+    if not colon:
+        return name, {"channel": where} if where else {}
+    if not channel:
+        raise UserError(f"--bus {text}: no channel after {interface}:")
+    if interface not in can.VALID_INTERFACES:
+        known = ", ".join(sorted(can.VALID_INTERFACES))
+        raise UserError(f"--bus {text}: python-can knows no interface {interface}; it knows {known}")
+    return name, {"interface": interface, "channel": channel}
+
+
+def opener(name: str, keywords: dict[str, Any]) -> Callable[[], Any]:
+    """A function that opens one python-can bus with these keywords; python-can's configuration fills in the rest."""
+
+    def open_peer() -> Any:
+        try:
+            return can.Bus(config_context=name, **keywords)
+        except Exception as error:  # whatever a driver raises when it is not there
+            where = ":".join(str(keywords.get(each, "(by configuration)")) for each in ("interface", "channel"))
+            text = " ".join(str(error).split()) or type(error).__name__
+            raise UserError(f"bus {name} on {where}: {text}") from None
+
+    return open_peer
+
+
+def add_options(parser: Any) -> None:
+    """python-can's own options for interfaces, with the prefix --bus-: bit rate, timing, further keywords."""
+    can_options.add_bus_arguments(parser, prefix="bus", group_title="interfaces outside (python-can), for every --bus")
+
+
+def keywords_of(options: Any) -> dict[str, Any]:
+    """Keywords for can.Bus that these options give."""
+    found: dict[str, Any] = {}
+    for name in ("channel", "interface", "bitrate", "fd", "data_bitrate", "timing"):
+        if f"bus_{name}" in options:
+            found[name] = getattr(options, f"bus_{name}")
+    return {**found, **getattr(options, "bus_bus_kwargs", {})}
+
+
+class Peer:
+    """One controller of a board on the interface. Fields as those of a node of an emulated bus."""
+
+    def __init__(
+        self, owner: "ExternalBus", label: str, connection: Any, inbox: Any, controller: int, order: int
+    ) -> None:
+        self.owner = owner
+        self.label = label
+        self.connection = connection
+        self.inbox = inbox
+        self.controller = controller
+        self.order = order
+        self.operating = True
+        self.waiting: collections.deque[tuple[int, int, int, int, int]] = collections.deque()
+        self.free_ns = 0  # until then its latest frame is on the wire
+        self.read_ns = 0  # end of the latest frame handed to the board
+        self.unreadable = ""
+
+    def from_board(self, kind: int, time: int, b: int, c: int, d: int, e: int, f: int) -> None:
+        """A request of the board's controller: the fields of CAN_REQUEST, CAN_ABORT or CAN_MODE."""
+        if kind == CAN_REQUEST:
+            if not self.operating:
+                self._done(time, b, TX_ABORTED)
+                return
+            self.waiting.append((b, c, d, e, f))
+            self.flush(time)
+        elif kind == CAN_ABORT:
+            self._drop(time, {b})
+        elif kind == CAN_MODE:
+            self.operating = b == 0
+            if not self.operating:
+                self._drop(time, {1, 2, 3})
+
+    def flush(self, time: int) -> None:
+        """Give the interface what waits, as far as it takes it."""
+        while self.waiting:
+            buffer, identifier, flags, lo, hi = self.waiting[0]
+            message = message_of_frame(0, identifier, flags & ~FLAG_SINGLE_SHOT, lo, hi, is_rx=False)
+            try:
+                self.connection.send(message, timeout=0)
+            except (can.CanError, OSError, ValueError) as error:
+                self.owner.not_taken += 1
+                self.owner.last_error = f"{self.label}: {error}"
+                if flags & FLAG_SINGLE_SHOT:  # one attempt: it is over
+                    self.waiting.popleft()
+                    self._done(time, buffer, TX_LOST)
+                    self.owner.single_shot_skipped += 1
+                    continue
+                return
+            self.waiting.popleft()
+            self.owner.frames_out += 1
+            self.free_ns = max(time, self.free_ns) + self.owner.length_ns(identifier, flags, lo, hi)
+            self._done(self.free_ns, buffer, TX_SENT)
+            self.owner.seen(self, self.free_ns, identifier, flags & ~FLAG_SINGLE_SHOT, lo, hi)
+
+    def read(self, now_ns: int) -> None:
+        """Hand on what has come, one frame after the other."""
+        for _ in range(READ_LIMIT):
+            try:
+                message = self.connection.recv(0)
+            except (can.CanError, OSError, ValueError) as error:
+                self.unreadable = str(error)
+                self.owner.last_error = f"{self.label}: {error}"
+                return
+            self.unreadable = ""
+            if message is None:
+                return
+            try:
+                identifier, flags, lo, hi = frame_of_message(message)
+            except UserError:
+                self.owner.refused += 1
+                continue
+            if flags & FLAG_ERROR:
+                self.owner.count_error(self)
+                continue
+            flags = flags & ~15 | min(flags & 15, 8)
+            end_ns = max(now_ns, self.read_ns + self.owner.length_ns(identifier, flags, lo, hi))
+            if end_ns > now_ns + AHEAD_NS:
+                self.owner.overflow += 1
+                continue
+            self.read_ns = end_ns
+            self.owner.frames_in += self is self.owner.peers[0]
+            self.owner.seen(self, end_ns, identifier, flags, lo, hi)
+            if self.operating:
+                self.inbox.push(end_ns, self.order, CAN_RX, self.controller, identifier, flags, lo, hi)
+
+    def _drop(self, time: int, buffers: set[int]) -> None:
+        for entry in [each for each in self.waiting if each[0] in buffers]:
+            self.waiting.remove(entry)
+            self._done(time, entry[0], TX_ABORTED)
+
+    def _done(self, time: int, buffer: int, status: int) -> None:
+        self.inbox.push(time, self.order, CAN_TX_DONE, self.controller, buffer, status)
+
+
+class ExternalBus:
+    """Bus `name` of the robot at `bit_rate` (bit/s, for the length of frames). `open_peer` gives python-can buses.
+
+    `sinks`: functions (time_ns, identifier, flags, lo, hi) that hear every frame once, as the first peer does.
+    """
+
+    asynchronous = True
+
+    def __init__(self, name: str, bit_rate: int, open_peer: Callable[[], Any]) -> None:
+        self.name = name
+        self.bit_rate = bit_rate
+        self.open_peer = open_peer
+        self.peers: list[Peer] = []
+        self.sinks: list[Callable[[int, int, int, int, int], Any]] = []
+        self.frames_in = 0
+        self.frames_out = 0
+        self.not_taken = 0
+        self.overflow = 0
+        self.refused = 0
+        self.errors = 0
+        self.single_shot_skipped = 0
+        self.last_error = ""
+        self.busy_ns = 0
+        self.window_ns = 0
+        self.window_busy_ns = 0
+        self.window_load = 0.0
+
+    def add_peer(self, label: str, inbox: Any, controller: int, order: int) -> Peer:
+        """A controller of a board; UserError when the interface cannot be opened."""
+        peer = Peer(self, label, self.open_peer(), inbox, controller, order)
+        self.peers.append(peer)
+        return peer
+
+    def poll(self, now_ns: int) -> int:
+        """Frames in, and what waited out; returns when it wants to be polled next."""
+        for peer in self.peers:
+            if peer.waiting:
+                peer.flush(now_ns)
+            peer.read(now_ns)
+        return now_ns + POLL_NS
+
+    def length_ns(self, identifier: int, flags: int, lo: int, hi: int) -> int:
+        """How long such a frame holds the wire, intermission included."""
+        bits = frame_bits(identifier, flags & ~FLAG_SINGLE_SHOT, lo, hi) + INTERMISSION_BITS
+        return bits * 1_000_000_000 // self.bit_rate
+
+    def seen(self, peer: Peer, time_ns: int, identifier: int, flags: int, lo: int, hi: int) -> None:
+        """The first peer sent or received a frame: that is one frame of this bus."""
+        if peer is not self.peers[0]:
+            return
+        length_ns = self.length_ns(identifier, flags, lo, hi)
+        if time_ns - self.window_ns >= 10_000_000:  # windows of 10 ms, as on the emulated buses
+            self.window_load = min(1.0, self.window_busy_ns / max(1, time_ns - self.window_ns))
+            self.window_ns, self.window_busy_ns = time_ns, 0
+        self.window_busy_ns += length_ns
+        self.busy_ns += length_ns
+        for sink in self.sinks:
+            sink(time_ns, identifier, flags, lo, hi)
+
+    def count_error(self, peer: Peer) -> None:
+        """An error frame that the interface has told; every peer is told of it."""
+        if peer is self.peers[0]:
+            self.errors += 1
+
+    def filenos(self) -> list[int]:
+        """What to select on for reading, where the interface has such a thing."""
+        found = []
+        for peer in self.peers:
+            with suppress(NotImplementedError, OSError, ValueError):
+                number = peer.connection.fileno()
+                if number >= 0 and not peer.unreadable:
+                    found.append(number)
+        return found
+
+    def counters(self) -> dict[str, int]:
+        """Whole numbers for the live view and the summary."""
+        return {
+            "frames_in": self.frames_in,
+            "frames_out": self.frames_out,
+            "not_taken": self.not_taken,
+            "overflow": self.overflow,
+            "refused": self.refused,
+            "error_frames": self.errors,
+            "single_shot_skipped": self.single_shot_skipped,
+        }
+
+    def close(self) -> None:
+        """Leave the interfaces."""
+        for peer in self.peers:
+            with suppress(can.CanError, OSError):
+                peer.connection.shutdown()
