@@ -19,3 +19,8 @@ def available_interfaces() -> list[str]:
     finally:
         log.setLevel(level)
     return sorted({f"{each['interface']}:{each['channel']}" for each in found})
+
+
+def known_interfaces() -> tuple[str, ...]:
+    """Names of the interfaces that python-can has, adapters' drivers installed or not; sorted."""
+    return tuple(sorted(can.VALID_INTERFACES))

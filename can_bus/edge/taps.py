@@ -33,7 +33,6 @@ from foundation.events import (
     FLAG_ERROR,
     FLAG_EXTENDED,
     FLAG_REMOTE,
-    FLAG_SINGLE_SHOT,
     NEVER,
     STAGE_BUS,
     TX_SENT,
@@ -174,8 +173,7 @@ class Tap:
         while inbox.head_time <= now:
             inbox.take()
             if inbox.kind == CAN_RX:
-                flags = inbox.c & ~FLAG_SINGLE_SHOT  # that flag is the sender's own business
-                self.events.append((RECEIVED, inbox.time, inbox.b, flags, inbox.d, inbox.e))
+                self.events.append((RECEIVED, inbox.time, inbox.b, inbox.c, inbox.d, inbox.e))
                 self.received += 1
             elif inbox.kind == CAN_TX_DONE:
                 self._done(inbox.time, inbox.b, inbox.c)
