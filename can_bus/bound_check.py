@@ -145,21 +145,26 @@ def critical_releases(
     """Releases at the critical instant of message `place` for a busy period.
 
     The longest frame of lower level starts just before; then everything that can delay the message is queued at once,
-    each as late after its release as its jitter allows, and from then on as soon as its period allows.
+    each as late after its release as its jitter allows, and from then on as soon as its period allows. A train begins
+    with the message if it is in it, else with its highest priority.
     """
     messages = [sender.message for sender in senders]
     level = level_of(messages[place], messages)
     start = -(-100 * 10**9 // bit_rate)  # an edge: what is queued then takes part from the next one on
-    lower = [i for i, m in enumerate(messages) if m.key > level]
+    lower = [i for i, m in enumerate(messages) if m.key > level and m.offset_ns is None]
     longest = max(lower, key=lambda i: messages[i].bits, default=-1)
     releases: list[list[tuple[int, int]]] = []
     for index, one in enumerate(messages):
-        if one.key > level:
+        if one.key > level and one.offset_ns is None:  # a train keeps its offsets, whatever its frames' levels
             # asked for just before the edge that the others miss
             releases.append([(start - LEAD_NS, start - LEAD_NS)] if index == longest else [])
             continue
-        instants = []
         released = start - one.jitter_ns
+        if one.offset_ns is not None:
+            train = [m for m in messages if m.queue == one.queue]
+            first = messages[place] if messages[place].queue == one.queue else min(train, key=lambda m: m.key)
+            released += (one.offset_ns - (first.offset_ns or 0)) % one.period_ns
+        instants = []
         while released <= start + busy_ns:
             instants.append((released, max(released, start)))
             released += one.period_ns
@@ -170,14 +175,16 @@ def critical_releases(
 def random_set(stream: RandomStream) -> tuple[list[Sender], int]:
     """A message set and its bit rate: 2 to 12 messages, 20 to 95 % of the bus in the worst case.
 
-    In a quarter of the sets some messages share first-in-first-out queues.
+    In a quarter of the sets some messages share first-in-first-out queues, in another the first half is a train.
     """
     bit_rate = BIT_RATES[stream.integer(len(BIT_RATES))]
     count = 2 + stream.integer(11)
     load = 0.2 + 0.75 * stream.uniform()
     shares = [0.1 + stream.uniform() for _ in range(count)]
     with_jitter = stream.integer(2) == 1
-    queues = ("", "", "one", "two") if stream.integer(4) == 0 else ("",)
+    kind = stream.integer(4)
+    queues = ("", "", "one", "two") if kind == 0 else ("",)
+    cycle = 0
     used: set[int] = set()
     senders = []
     for index, share in enumerate(shares):
@@ -190,7 +197,14 @@ def random_set(stream: RandomStream) -> tuple[list[Sender], int]:
         period = int(bits * 1e9 / bit_rate * sum(shares) / (share * load))
         jitter = stream.integer(period) if with_jitter and stream.integer(2) else 0
         queue = queues[stream.integer(len(queues))]
-        one = message(f"m{index}", identifier, period, flags, jitter_ns=jitter, queue=queue)
+        offset = None
+        if kind == 1 and index < count // 2:  # one frame per slot, anywhere in it; some every other cycle only
+            # as many frames as if each had the worst period of them: at most the load aimed at
+            cycle = cycle or int(160 * 1e9 / bit_rate * sum(shares) / (min(shares[: count // 2]) * load))
+            slot = cycle // (count // 2)
+            period = cycle * (1 + stream.integer(2))
+            offset, jitter, queue = index * slot, slot if with_jitter else 0, "train"
+        one = message(f"m{index}", identifier, period, flags, jitter_ns=jitter, queue=queue, offset_ns=offset)
         senders.append(Sender(one, identifier, flags, *longest_content(identifier, flags)))
     return senders, bit_rate
 
@@ -198,9 +212,10 @@ def random_set(stream: RandomStream) -> tuple[list[Sender], int]:
 def random_releases(senders: Sequence[Sender], stream: RandomStream, length_ns: int) -> list[list[tuple[int, int]]]:
     """Random phases, gaps at least a period (most of them exactly that) and delays up to the jitter."""
     releases = []
+    phase = stream.integer(max(sender.message.period_ns for sender in senders))
     for sender in senders:
         one = sender.message
-        released = stream.integer(one.period_ns)
+        released = stream.integer(one.period_ns) if one.offset_ns is None else phase + one.offset_ns
         queued = 0
         instants = []
         while released < length_ns:
@@ -208,7 +223,7 @@ def random_releases(senders: Sequence[Sender], stream: RandomStream, length_ns: 
             queued = max(queued, released + delay)  # two instances are not queued in the wrong order
             instants.append((released, queued))
             released += one.period_ns
-            if stream.integer(8) == 0:
+            if one.offset_ns is None and stream.integer(8) == 0:
                 released += stream.integer(one.period_ns)
         releases.append(instants)
     return releases

@@ -13,10 +13,18 @@ push what it delays into its own next instance. What it needs and how this file 
     w   queueing of instance q = 0, 1 ..: w = B + q C_m + sum over k in hp of ceil((w + J_k + bit) / T_k) C_k
     R   response, from release to end:    R = max over q of J_m + w(q) - q T_m + C_m
 
-Frames that leave a controller through a first-in-first-out queue are not sent in the order of their priorities.
-After R. I. Davis, S. Kollmann, V. Pollex, F. Slomka, "Schedulability analysis for Controller Area Network with FIFO
-queues" (2013), each such frame has the lowest priority of its queue, all others of its queue delay it, and where it
-delays frames of a higher level its time in the queue counts as further jitter.
+Two things are added, because real controllers need them; without them the above is what is computed.
+
+Queues. Frames that leave a controller first in, first out are not sent in the order of their priorities. After
+R. I. Davis, S. Kollmann, V. Pollex, F. Slomka, "Schedulability analysis for Controller Area Network (CAN) with FIFO
+queues, priority queues and gateways", Real-Time Systems 49 (2013), such a frame has the lowest priority of its queue,
+the others of its queue delay it, and where it delays frames above that level its time in the queue is further jitter.
+Frames that are queued after it count as well if their priority is higher: the hardware has several buffers behind the
+queue and offers the best of them.
+
+Trains. Messages of one queue that one clock releases at known offsets never come all at once. Such a queue is a train:
+in place of ceil((w + J) / T) stands the largest number of its frames that any window of w + J holds, and in place of
+q T the distance between the releases of the first frame and the one looked at, over all frames it may begin with.
 
 Holds without bit errors, for controllers that offer their frame at every chance. All times are whole numbers: a tick is
 1 / bit rate of a nanosecond, so that a bit is 10^9 ticks at any bit rate. Python has no largest integer.
@@ -24,16 +32,18 @@ Holds without bit errors, for controllers that offer their frame at every chance
 
 from __future__ import annotations
 
+import bisect
 import dataclasses
+import math
 from collections.abc import Iterable, Sequence
 from fractions import Fraction
 
 from can_bus.frame import INTERMISSION_BITS, arbitration_key, worst_case_bits
 
 TICKS_PER_BIT = 10**9
-# A busy period of more instances than this is given up as unbounded. At a utilisation of 99.9 % a level of 100 frames
-# with one period needs some 1000; chosen by us so that an answer comes within seconds.
-MOST_INSTANCES = 100_000
+# A busy period of more instances than this is given up as unbounded, so that an answer comes within seconds. Chosen by
+# us: at a utilisation of 99.9 % a level of 100 frames with one period needs some 1000.
+MOST_INSTANCES = 2_000
 MOST_ROUNDS = 100_000  # of one search for a fixed point; each but the last finds at least one frame more
 
 
@@ -44,6 +54,8 @@ class Message:
     Times in ns. `queue`: name of the first-in-first-out queue that it shares with others of its controller;
     empty where it has a transmit buffer to itself (or the driver keeps its queue sorted by priority). `pause_ns`: how
     long in all that queue may stand still while the frame is in it, because its driver fills free buffers late.
+    `last_key`: where frames of several identifiers take turns in one stream, the key of the lowest priority among them
+    (`key` is the highest then). `offset_ns`: release relative to the others of its queue, on one clock; None: any.
     """
 
     name: str
@@ -54,6 +66,8 @@ class Message:
     jitter_ns: int = 0
     queue: str = ""
     pause_ns: int = 0
+    last_key: int = -1
+    offset_ns: int | None = None
 
     def __post_init__(self) -> None:
         if min(self.bits, self.period_ns, self.deadline_ns) < 1 or min(self.jitter_ns, self.pause_ns) < 0:
@@ -71,6 +85,7 @@ def message(
     deadline_ns: int | None = None,
     jitter_ns: int = 0,
     queue: str = "",
+    offset_ns: int | None = None,
 ) -> Message:
     """A stream of frames with this identifier and these flags (length code and FLAG_*), as long as stuffing can make
     them. Deadline: the period unless given."""
@@ -82,6 +97,7 @@ def message(
         period_ns if deadline_ns is None else deadline_ns,
         jitter_ns,
         queue,
+        offset_ns=offset_ns,
     )
 
 
@@ -114,102 +130,206 @@ def utilisation(messages: Iterable[Message], bit_rate: int) -> Fraction:
 def level_of(message: Message, messages: Iterable[Message]) -> int:
     """Key of the priority that a message counts with: its own, or the lowest priority in its queue."""
     if not message.queue:
-        return message.key
-    return max(other.key for other in messages if other.queue == message.queue)
+        return max(message.key, message.last_key)
+    return max(max(other.key, other.last_key) for other in messages if other.queue == message.queue)
 
 
-class _Stream:
-    """One message in ticks."""
+class _Train:
+    """Frames released on one clock, in ticks: `entries` (offset, message) over one cycle, by offset."""
 
-    __slots__ = ("message", "level", "length", "period", "jitter", "held")
-
-    def __init__(self, message: Message, level: int, bit_rate: int) -> None:
-        self.message = message
+    def __init__(self, messages: Sequence[Message], level: int, bit_rate: int, clock_ppm: int) -> None:
+        self.queue = messages[0].queue
         self.level = level
-        self.length = message.bits * TICKS_PER_BIT
-        self.period = message.period_ns * bit_rate
-        self.jitter = message.jitter_ns * bit_rate
+        self.length = max(one.bits for one in messages) * TICKS_PER_BIT
+        self.jitter = max(one.jitter_ns for one in messages) * bit_rate
+        self.pause = max(one.pause_ns for one in messages) * bit_rate
+        self.cycle = math.lcm(*(one.period_ns for one in messages)) * bit_rate
+        self.clock_ppm = clock_ppm
         self.held: int | None = 0  # longest time behind others of its queue; None: no bound
+        self.entries: list[tuple[int, Message]] = []
+        if sum(self.cycle // (one.period_ns * bit_rate) for one in messages) > MOST_INSTANCES:
+            raise ValueError(f"queue {self.queue}: periods have no common multiple of at most {MOST_INSTANCES} frames")
+        for one in messages:
+            first, period = (one.offset_ns or 0) * bit_rate, one.period_ns * bit_rate
+            self.entries += [(at % self.cycle, one) for at in range(first, first + self.cycle, period)]
+        self.entries.sort(key=lambda entry: entry[0])
+        self.known_spans: dict[int | None, list[int]] = {}
+
+    def spans(self, level: int | None) -> list[int]:
+        """Place n - 1: least distance from the first to the last of n releases of this level or above (None: all)."""
+        if level not in self.known_spans:
+            at = [offset for offset, one in self.entries if level is None or one.key <= level]
+            twice = at + [offset + self.cycle for offset in at]
+            self.known_spans[level] = [min(twice[i + n] - twice[i] for i in range(len(at))) for n in range(len(at))]
+        return self.known_spans[level]
+
+    def most(self, level: int | None, window: int) -> int:
+        """Most releases of this level or above that a window of so many true ticks can hold."""
+        spans = self.spans(level)
+        if not spans or window <= 0:
+            return 0
+        window = self.by_its_clock(window)
+        if len(spans) == 1:
+            return -(-window // self.cycle)
+        cycles = (window - 1) // self.cycle
+        return cycles * len(spans) + bisect.bisect_left(spans, window - cycles * self.cycle)
+
+    def by_its_clock(self, ticks: int) -> int:
+        """At most so many ticks pass on a fast clock in `ticks` true ones."""
+        return ticks if not self.clock_ppm else ticks + -(-ticks * self.clock_ppm // 1_000_000)
+
+    def distance(self, first: int, last: int) -> int:
+        """True ticks that pass at least between releases number `first` and `last`, counted from a cycle's begin on."""
+        count = len(self.entries)
+        ticks = self.entries[last % count][0] - self.entries[first % count][0]
+        ticks += (last // count - first // count) * self.cycle
+        return ticks if not self.clock_ppm else ticks - -(-ticks * self.clock_ppm // 1_000_000)
 
 
-def _arrivals(streams: Sequence[tuple[int, int, int]], time: int) -> int:
-    """Ticks of work that (length, period, jitter) bring until `time`."""
-    return sum(-(-(time + jitter) // period) * length for length, period, jitter in streams)
+def _trains(messages: Sequence[Message], bit_rate: int, clock_ppm: int) -> list[_Train]:
+    """Each queue whose messages all have offsets is one train, any other message is a train of its own."""
+    trains = []
+    free = [one for one in messages if not one.queue]
+    for queue in dict.fromkeys(one.queue for one in messages if one.queue):
+        members = [one for one in messages if one.queue == queue]
+        if all(one.offset_ns is not None for one in members):
+            trains.append(_Train(members, level_of(members[0], members), bit_rate, clock_ppm))
+        else:
+            free += members
+    for one in free:
+        trains.append(_Train([one], level_of(one, messages), bit_rate, clock_ppm))
+    return trains
 
 
-def response_times(messages: Iterable[Message], bit_rate: int) -> list[Bound]:
+class _Delays:
+    """What delays the frames of one train: (train, level that counts, jitter), and what blocks them, in ticks."""
+
+    def __init__(self, own: _Train, trains: Sequence[_Train]) -> None:
+        self.sources: list[tuple[_Train, int | None, int]] = []
+        self.blocking = 0
+        self.bounded = True
+        for other in trains:
+            if other is own:
+                continue
+            if own.queue and other.queue == own.queue:
+                self.sources.append((other, None, other.jitter))
+                continue
+            if other.spans(own.level):
+                jitter = other.jitter
+                if other.level > own.level:  # it may have waited behind frames that the own level does not count
+                    if other.held is None:
+                        self.bounded = False
+                        return
+                    jitter += other.held
+                self.sources.append((other, own.level, jitter))
+            if any(max(one.key, one.last_key) > own.level for _, one in other.entries):
+                self.blocking = max(self.blocking, other.length)
+        self.blocking += own.pause
+
+    def work(self, time: int) -> int:
+        """Ticks of work that the others bring until `time`."""
+        return sum(train.most(level, time + jitter) * train.length for train, level, jitter in self.sources)
+
+    def load(self) -> Fraction:
+        """Share of the bus that the others take."""
+        return sum((Fraction(len(t.spans(level)) * t.length, t.cycle) for t, level, _ in self.sources), Fraction(0))
+
+
+def response_times(messages: Iterable[Message], bit_rate: int, clock_ppm: int = 0) -> list[Bound]:
     """The bound of every message at `bit_rate` (bit/s), in the order given.
 
-    Two messages with one key (the same identifier in two places of a schedule) delay each other.
+    Periods and offsets are by clocks that may be fast or slow by `clock_ppm`. Two messages with one key (the same
+    identifier in two places of a schedule) delay each other.
     """
     given = list(messages)
-    streams = [_Stream(m, level_of(m, given), bit_rate) for m in given]
+    trains = _trains(given, bit_rate, clock_ppm)
     found: dict[int, Bound] = {}
     # from the lowest level up: only queues of lower levels add jitter to a level above them
-    for place in sorted(range(len(streams)), key=lambda i: -streams[i].level):
-        bound = _bound(streams[place], streams, bit_rate)
-        found[place] = bound
-        one = streams[place]
-        if one.message.queue:
-            one.held = None if bound.response_ns is None else max(0, bound.response_ns * bit_rate - one.jitter)
-    return [found[place] for place in range(len(streams))]
+    for own in sorted(trains, key=lambda train: -train.level):
+        delays = _Delays(own, trains)
+        busy = _busy_period(own, delays, bit_rate)
+        for one in dict.fromkeys(id(one) for _, one in own.entries):
+            found[one] = _bound(one, own, delays, busy, bit_rate)
+        if own.queue:
+            answers = [found[id(one)].response_ns for _, one in own.entries]
+            held = None if None in answers else max(answer * bit_rate - own.jitter for answer in answers if answer)
+            own.held = held
+    return [found[id(one)] for one in given]
 
 
-def _bound(own: _Stream, streams: list[_Stream], bit_rate: int) -> Bound:
-    """The bound of one stream; those of lower levels are known."""
-    queue = own.message.queue
-    before: list[tuple[int, int, int]] = []  # length, period, jitter of what can delay it
-    blocking = 0
-    for other in streams:
-        if other is own:
-            continue
-        if other.message.key <= own.level or (queue and other.message.queue == queue):
-            jitter = other.jitter
-            if other.level > own.level:  # it may have waited behind frames that the own level does not count
-                if other.held is None:
-                    return _unbounded(own, blocking, bit_rate)
-                jitter += other.held
-            before.append((other.length, other.period, jitter))
-        else:
-            blocking = max(blocking, other.length)
-    blocking += own.message.pause_ns * bit_rate
-    level = [*before, (own.length, own.period, own.jitter)]
-    load = sum((Fraction(length, period) for length, period, _ in level), Fraction(0))
-    if load > 1 or (load == 1 and (blocking or any(jitter for _, _, jitter in level))):
-        return _unbounded(own, blocking, bit_rate)
-    busy = blocking + sum(length for length, _, _ in level)
-    rounds = 0
-    while (longer := blocking + _arrivals(level, busy)) != busy:
+def _busy_period(own: _Train, delays: _Delays, bit_rate: int) -> int | None:
+    """Longest busy period of the level of `own` in ticks; None when there is no end to it."""
+    load = delays.load() + Fraction(len(own.entries) * own.length, own.cycle)
+    jitter = own.jitter or own.clock_ppm or any(jitter for _, _, jitter in delays.sources)
+    if not delays.bounded or load > 1 or (load == 1 and (delays.blocking or jitter)):
+        return None
+    shortest = own.cycle // len(own.entries)
+    busy, rounds = delays.blocking + own.length, 0
+    while (longer := delays.blocking + own.most(None, busy + own.jitter) * own.length + delays.work(busy)) != busy:
         busy = longer
         rounds += 1
-        if rounds > MOST_ROUNDS or busy > MOST_INSTANCES * own.period:
-            return _unbounded(own, blocking, bit_rate)
-    instances = -(-(busy + own.jitter) // own.period)
+        if rounds > MOST_ROUNDS or busy > MOST_INSTANCES * shortest:
+            return None
+    return busy
+
+
+def _bound(which: int, own: _Train, delays: _Delays, busy: int | None, bit_rate: int) -> Bound:
+    """The bound of the message with this id() in its train."""
+    places = [place for place, (_, one) in enumerate(own.entries) if id(one) == which]
+    message = own.entries[places[0]][1]
+    blocking_ns = -(-delays.blocking // bit_rate)
+    if busy is None:
+        return Bound(message, None, blocking_ns, 0, 0, None)
+    instances = own.most(None, busy + own.jitter)
+    count = len(own.entries)
     worst, latest = 0, 0
-    wait = blocking
-    for q in range(instances):
-        while (longer := blocking + q * own.length + _arrivals(before, wait + TICKS_PER_BIT)) != wait:
-            wait = longer
-        response = own.jitter + wait - q * own.period + own.length
-        if response > worst:
-            worst, latest = response, q
-        wait += own.length
-    return Bound(own.message, -(-worst // bit_rate), -(-blocking // bit_rate), latest, instances, -(-busy // bit_rate))
+    for place in places:
+        later = [n for n in range(1, count + 1) if own.queue and own.entries[(place + n) % count][1].key <= message.key]
+        for before in range(instances):  # frames of the train since the busy period began
+            first = place + count * (instances // count + 1) - before
+            since = own.distance(first, first + before)
+            if since >= busy + own.jitter:
+                break
+            wait = delays.blocking + before * own.length
+            while True:
+                horizon = wait + TICKS_PER_BIT
+                passing = _passing(own, first, before, later, horizon + own.jitter)
+                longer = delays.blocking + (before + passing) * own.length + delays.work(horizon)
+                if longer <= wait:
+                    break
+                wait = longer
+            response = own.jitter + wait + own.length - since
+            if response > worst:
+                worst, latest = response, before
+    return Bound(message, -(-worst // bit_rate), blocking_ns, latest, instances, -(-busy // bit_rate))
 
 
-def _unbounded(own: _Stream, blocking: int, bit_rate: int) -> Bound:
-    return Bound(own.message, None, -(-blocking // bit_rate), 0, 0, None)
+def _passing(own: _Train, first: int, before: int, later: Sequence[int], window: int) -> int:
+    """How many later frames of higher priority are released within `window` of frame number `first`."""
+    if not later:
+        return 0
+    count = len(own.entries)
+    here = first + before
+    turns = 0
+    passed = 0
+    while True:
+        for n in later:
+            if own.distance(first, here + turns * count + n) >= window:
+                return passed
+            passed += 1
+        turns += 1
 
 
-def most_waiting(bounds: Iterable[Bound], queue: str) -> int | None:
-    """Most frames of a first-in-first-out queue that can wait at once, the one being sent included; None: no bound.
+def most_waiting(bounds: Iterable[Bound], queue: str, bit_rate: int, clock_ppm: int = 0) -> int | None:
+    """Most frames of a queue that can be under way at once, the one being sent included; None: no bound.
 
-    Each stream has at most ceil(R / T) frames between release and end at any time.
+    At any time these are frames that were queued within the longest response.
     """
-    total = 0
-    for bound in bounds:
-        if bound.message.queue == queue:
-            if bound.response_ns is None:
-                return None
-            total += -(-bound.response_ns // bound.message.period_ns)
-    return total
+    own = [bound for bound in bounds if bound.message.queue == queue]
+    longest = 0
+    for bound in own:
+        if bound.response_ns is None:
+            return None
+        longest = max(longest, bound.response_ns)
+    trains = _trains([bound.message for bound in own], bit_rate, clock_ppm)
+    return sum(train.most(None, longest * bit_rate) for train in trains)

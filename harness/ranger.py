@@ -23,9 +23,10 @@ from firmware_sim.clock import seeded_crystal
 from foundation import wallclock
 from foundation.events import STAGE_BUS
 from foundation.random_stream import RandomStream
-from harness import lockstep, wiring
+from harness import bus_schedule, lockstep, wiring
 from harness.logbook import Logbook
 from harness.operator import Operator
+from harness.profile import Profile
 from harness.recorder import Recorder
 from harness.scenario import Scenario, StopRule
 from plant.ranger import RangerPlant
@@ -49,7 +50,13 @@ BOARD_CLASSES: dict[str, Any] = {
 class Ranger:
     """One robot in one scenario. Same scenario, same bytes. Close it when done (or use contextlib.closing)."""
 
-    def __init__(self, scenario: Scenario | None = None, log: str = "none", quirks: Quirks | None = None) -> None:
+    def __init__(
+        self,
+        scenario: Scenario | None = None,
+        log: str = "none",
+        quirks: Quirks | None = None,
+        profile: Profile | None = None,  # its bit rates and schedules; boards that it has outside are emulated here
+    ) -> None:
         self.scenario = scenario if scenario is not None else Scenario()
         self.quirks = quirks if quirks is not None else Quirks()
         self.controller = controllers.load(self.scenario.controller)
@@ -70,7 +77,9 @@ class Ranger:
         }
         self.boards["CSR"].time.ms = self.scenario.start_uptime_ms
         # CAN
-        self.buses = [Bus(f"can{n}", BUS_BIT_RATE, seed) for n in (1, 2, 3, 4)]
+        self.profile = profile
+        rates = {name: bus.bit_rate for name, bus in profile.buses.items()} if profile is not None else {}
+        self.buses = [Bus(f"can{n}", rates.get(f"can{n}", BUS_BIT_RATE), seed) for n in (1, 2, 3, 4)]
         for bus in self.buses:
             bus.reset_statistics(self.start_ns)  # loads count from the start of the run
         self.recorder = Recorder(len(self.plant.sample_names), all_variables.TABLE_SIZE)
@@ -79,6 +88,9 @@ class Ranger:
             self.plant, [self.boards[name] for name in wiring.BOARDS], self.buses, self.recorder, self.start_ns
         )
         self._connect()
+        if profile is not None:
+            for board in self.boards.values():
+                bus_schedule.apply(board, profile)
         self.operator = Operator(self.controller.operator, self.plant, self.boards["UI"], self.start_ns)
         self.polled: list[Any] = []  # ends of wires that lead out of the simulation
         self.next_poll_ns = self.start_ns

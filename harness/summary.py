@@ -48,6 +48,7 @@ def of(robot: Any) -> dict:
         "cpu_factor": robot.time_s / robot.cpu_s if robot.cpu_s > 0.0 else None,
         "compiled": build.is_compiled(),
         "controller": robot.scenario.controller,
+        "profile": robot.profile.name if robot.profile is not None else None,
         "model_file": robot.scenario.model_file,
         "seed": robot.scenario.seed,
         "slope_rad": robot.scenario.slope_rad,

@@ -14,7 +14,10 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeRemainingColumn
 
 from foundation import wallclock
+from foundation.user_error import UserError
 from harness import build
+from harness.profile import Profile
+from harness.profile import load as load_profile
 from harness.scenario import Scenario, StopRule
 from tools import serial_options
 from tools.files import json_target, replace_file, writable_folder
@@ -73,6 +76,7 @@ def add_run_options(command: Any) -> None:
     )
     command.add_argument("--out", metavar="DIR", help="folder for logs, summary and report (made if missing)")
     command.add_argument("--json", metavar="FILE|-", help="the summary as JSON; - prints it and nothing else")
+    command.add_argument("--profile", metavar="FILE", help="bit rates and bus schedules of a profile (name or .toml)")
     serial_options.add_options(command)
 
 
@@ -101,6 +105,24 @@ def scenario_of(options: argparse.Namespace) -> Scenario:
     )
 
 
+def profile_of(options: argparse.Namespace, console: Console) -> Profile | None:
+    """The profile that was asked for; in lockstep all its boards run here, and its buses inside."""
+    if options.profile is None:
+        return None
+    profile = load_profile(options.profile)
+    if profile.absent():
+        raise UserError(
+            f"{profile.path}: {', '.join(profile.absent())} absent: walk needs every board; up runs without some"
+        )
+    if profile.external():
+        console.print(
+            f"{', '.join(profile.external())}: emulated as well, and every bus inside: a walk is in virtual time",
+            highlight=False,
+            soft_wrap=True,
+        )
+    return profile
+
+
 def run_scenario(scenario: Scenario, stop: StopRule, options: argparse.Namespace, interrupted: list[bool]) -> int:
     """`run` with everything checked; `interrupted` is filled by Ctrl-C."""
     from harness.ranger import Ranger  # the whole robot: only when it is to walk
@@ -110,7 +132,9 @@ def run_scenario(scenario: Scenario, stop: StopRule, options: argparse.Namespace
     quiet = options.json == "-"
     console = Console(stderr=True, quiet=quiet)
     quirks = serial_options.quirks_of(options)
-    with contextlib.closing(Ranger(scenario, log=options.log if folder else "none", quirks=quirks)) as robot:
+    profile = profile_of(options, console)
+    log = options.log if folder else "none"
+    with contextlib.closing(Ranger(scenario, log=log, quirks=quirks, profile=profile)) as robot:
         ends, places = serial_options.connect(robot, options)
         for place in places:
             console.print(place, highlight=False, soft_wrap=True)

@@ -7,6 +7,6 @@ cdef class IoData:
     cdef public MainBrainSspLink link
     cdef public NetworkTime time
     cdef public long long[::1] send_ids, dividers, turn_ids
-    cdef public long long subscriber, timestamp, turn, slots
+    cdef public long long subscriber, timestamp, turn, turn_every, slots
     cpdef object receive(self)
     cpdef object send(self)

@@ -25,17 +25,19 @@ class IoData:
         self.subscriber = 1  # SSP, bit of the store's read flags
         self.timestamp = 0  # id of TIMESTAMP
         # for buses slower than the robot's: the first list goes out in every n-th slot (n per entry), of the second one
-        # entry per slot, in turn
+        # entry in the last of every `turn_every` slots, in turn
         self.dividers = array.array("q", [1]) * len(self.send_ids)
         self.turn_ids = array.array("q")
+        self.turn_every = 1
         self.turn = 0
         self.slots = 0
 
-    def thin(self, send_ids, dividers, turn_ids) -> None:
-        """Send `send_ids` in every n-th slot only, n in `dividers`; of `turn_ids` one per slot, in turn."""
+    def thin(self, send_ids, dividers, turn_ids, turn_every=1) -> None:
+        """Send `send_ids` in every n-th slot only, n in `dividers`; of `turn_ids` one every so many slots, in turn."""
         self.send_ids = array.array("q", send_ids)
         self.dividers = array.array("q", dividers)
         self.turn_ids = array.array("q", turn_ids)
+        self.turn_every = turn_every
         self.turn = 0
 
     def receive(self) -> object:
@@ -66,7 +68,7 @@ class IoData:
                 store.mark_read(number, self.subscriber)
                 sent += 1
             place = store.next_unread(self.send_ids, place + 1, self.subscriber)
-        if len(self.turn_ids) > 0:
+        if len(self.turn_ids) > 0 and (self.slots + 1) % self.turn_every == 0:
             place = store.next_unread(self.turn_ids, self.turn + 1, self.subscriber)
             if place < 0:
                 place = store.next_unread(self.turn_ids, 0, self.subscriber)

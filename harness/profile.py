@@ -1,0 +1,415 @@
+"""Profiles: which boards are emulated, external or absent, and on what each bus runs. Files `profiles/*.toml`.
+
+    title = "..."                      what it is for; description = "..." says more
+    [boards]                           "emulated" (also what is not named), "external" or "absent"
+    MCH = "external"
+    [buses.can1]                       can1 ... can4; what is not named is emulated at the robot's own rate
+    interface = "socketcan"            of python-can; left out: the bus is emulated inside
+    channel = "can0"
+    bit_rate = 1_000_000               bit/s
+    schedule = "1mbit"                 schedules/1mbit.toml beside this file or shipped; "full": as the firmware sends
+    options = { receive_own_messages = false }   further arguments of python-can's Bus
+
+A profile passes whole or not at all; whatever is wrong is named together: file, key, value and the rule broken.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import pathlib
+import tomllib
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import datatable
+from datatable.model import Table
+from foundation.user_error import UserError
+from harness import wiring
+from harness.bus_schedule import MOST_ROWS, MOST_TURNS, BusSchedule, command_variables, passes_of
+
+FOLDER = pathlib.Path(__file__).resolve().parent.parent / "profiles"
+SCHEDULES = "schedules"
+FULL = "full"
+EMULATED, EXTERNAL, ABSENT = "emulated", "external", "absent"
+STATES = (EMULATED, EXTERNAL, ABSENT)
+BUSES = ("can1", "can2", "can3", "can4")
+# Below, a frame of 8 bytes takes longer than the robot's slots can wait (chosen by us); above, no controller follows.
+LOWEST_BIT_RATE, HIGHEST_BIT_RATE = 10_000, 8_000_000
+# ISO 11898-1 classic CAN, and what python-can's bit timings allow. Interfaces of software alone have no bit rate.
+ADAPTER_BIT_RATE = 1_000_000
+SOFTWARE_INTERFACES = ("ranger_sim", "virtual", "udp_multicast")
+WITHOUT_CAN = (
+    "the main brain has no CAN, only its private link to the router, so it can be external only with an external "
+    "router, and an external router only with the main brain"
+)
+
+
+@dataclasses.dataclass(frozen=True)
+class ProfileFault:
+    """One thing wrong: file, key (dotted), its value, the rule it breaks."""
+
+    file: str
+    key: str
+    value: str
+    rule: str
+
+    def __str__(self) -> str:
+        what = f" {self.key}" if self.key else ""
+        value = f" = {self.value}" if self.value else ""
+        return f"{self.file}{':' if what else ''}{what}{value}: {self.rule}"
+
+
+class ProfileError(UserError):
+    """A bad profile with all its faults: `faults` in order, and one line each as the message."""
+
+    def __init__(self, faults: list[ProfileFault]) -> None:
+        self.faults = tuple(faults)
+        super().__init__("\n".join(str(fault) for fault in self.faults))
+
+
+@dataclasses.dataclass(frozen=True)
+class BusProfile:
+    """One bus. `interface` None: emulated inside. `bit_rate` in bit/s; `options`: further arguments of python-can."""
+
+    name: str
+    interface: str | None
+    channel: str | None
+    bit_rate: int
+    schedule_name: str
+    schedule: BusSchedule
+    options: Mapping[str, Any]
+
+    def python_can(self) -> dict[str, Any] | None:
+        """Arguments of `can.Bus`, or None for an emulated bus. The bit rate is given where the interface sets it."""
+        if self.interface is None:
+            return None
+        found: dict[str, Any] = {"interface": self.interface, "channel": self.channel}
+        if self.interface != "socketcan" and self.interface not in SOFTWARE_INTERFACES:
+            found["bitrate"] = self.bit_rate  # a SocketCAN interface gets its rate from `ip link`
+        return {**found, **self.options}
+
+
+@dataclasses.dataclass(frozen=True)
+class Profile:
+    """A checked profile: every board of `wiring.BOARDS` and all four buses are in it."""
+
+    name: str
+    path: str
+    title: str
+    description: str
+    boards: Mapping[str, str]
+    buses: Mapping[str, BusProfile]
+
+    def _boards(self, state: str) -> tuple[str, ...]:
+        return tuple(name for name in wiring.BOARDS if self.boards[name] == state)
+
+    def emulated(self) -> tuple[str, ...]:
+        """Boards that run here."""
+        return self._boards(EMULATED)
+
+    def external(self) -> tuple[str, ...]:
+        """Boards that are real, or run elsewhere."""
+        return self._boards(EXTERNAL)
+
+    def absent(self) -> tuple[str, ...]:
+        """Boards that are not there."""
+        return self._boards(ABSENT)
+
+    def schedules(self) -> dict[str, BusSchedule]:
+        """Schedule by bus."""
+        return {name: bus.schedule for name, bus in self.buses.items()}
+
+
+class _Reader:
+    """Reads one file and collects its faults; every wrong key is told, never raised."""
+
+    def __init__(self, file: str, faults: list[ProfileFault]) -> None:
+        self.file = file
+        self.faults = faults
+
+    def fault(self, key: str, value: object, rule: str) -> None:
+        """Note a fault; `value` None: there is none to show."""
+        shown = "" if value is None else _shown(value)
+        self.faults.append(ProfileFault(self.file, _plain(key), shown, rule))
+
+    def content(self, path: pathlib.Path) -> dict[str, Any] | None:
+        """The tables of a TOML file; None with a fault when it cannot be read."""
+        try:
+            return tomllib.loads(path.read_bytes().decode("utf-8-sig"))
+        except OSError as error:
+            self.fault("", None, f"cannot be read: {error.strerror}")
+        except UnicodeDecodeError as error:
+            self.fault("", None, f"not UTF-8 text (byte {error.start})")
+        except RecursionError:
+            self.fault("", None, "is nested too deeply")
+        except ValueError as error:  # TOMLDecodeError, a path with a null byte, dates that are none
+            self.fault("", None, f"not valid TOML: {_plain(str(error))}")
+        return None
+
+    def only(self, table: Mapping[str, Any], allowed: tuple[str, ...], place: str) -> None:
+        """A fault for each key that is not allowed."""
+        for key in table:
+            if key not in allowed:
+                self.fault(_dotted(place, key), table[key], f"unknown key; allowed are {', '.join(allowed)}")
+
+    def text(self, table: Mapping[str, Any], key: str, place: str = "", default: str | None = "") -> str | None:
+        """A text under a key, or the default."""
+        value = table.get(key, default)
+        if value is default or (isinstance(value, str) and value.isprintable()):
+            return value
+        self.fault(_dotted(place, key), value, "printable text on one line is expected")
+        return default
+
+    def table(self, table: Mapping[str, Any], key: str, place: str = "") -> dict[str, Any]:
+        """A table under a key, empty where there is none."""
+        value = table.get(key, {})
+        if isinstance(value, dict):
+            return value
+        self.fault(_dotted(place, key), value, f"a table [{_dotted(place, key)}] is expected")
+        return {}
+
+    def whole(self, value: Any, key: str, low: int, high: int, default: int, unit: str = "") -> int:
+        """A whole number within limits, or the default with a fault."""
+        if type(value) is int and low <= value <= high:
+            return value
+        self.fault(key, value, f"a whole number from {low} to {high}{unit} is expected")
+        return default
+
+
+def _plain(text: str) -> str:
+    """Without what would break a line, and not too long."""
+    printable = text if text.isprintable() else repr(text)[1:-1]
+    return printable if len(printable) <= 160 else printable[:157] + "..."
+
+
+def _shown(value: object) -> str:
+    quoted = repr(value)
+    return quoted if len(quoted) <= 60 else quoted[:57] + "..."
+
+
+def _dotted(place: str, key: str) -> str:
+    return f"{place}.{key}" if place else key
+
+
+# ---- schedules
+
+
+def available_schedules(folder: pathlib.Path | None = None) -> tuple[str, ...]:
+    """Names of the schedules shipped, and of those beside a profile in `folder`."""
+    folders = [FOLDER / SCHEDULES] + ([folder / SCHEDULES] if folder else [])
+    return tuple(sorted({path.stem for each in folders for path in each.glob("*.toml")}))
+
+
+def _schedule(name: str, folder: pathlib.Path, table: Table, faults: list[ProfileFault]) -> BusSchedule:
+    """The schedule of that name, which exists; its faults are added."""
+    path = folder / SCHEDULES / f"{name}.toml"
+    if not path.is_file():
+        path = FOLDER / SCHEDULES / f"{name}.toml"
+    reader = _Reader(str(path), faults)
+    content = reader.content(path) or {}
+    reader.only(content, ("title", "description", "every", "occasional", "commands_in_turn"), "")
+    sent = {row_name: board for board in table.with_role("satellite") for row in board.rows for row_name in row}
+    commands = {variable.name for variable in command_variables(table)}
+    every: dict[str, int] = {}
+    for key, value in reader.table(content, "every").items():
+        if key not in sent and key not in commands:
+            listed = [board.name for board in table.boards if key in board.occasional]
+            reader.fault(
+                f"every.{key}",
+                value,
+                f"is in the occasional list of {listed[0]}: give [occasional] {listed[0]}"
+                if listed
+                else "no row of a board's schedule sends it and it is no command of the main brain",
+            )
+        else:
+            every[key] = reader.whole(value, f"every.{key}", 1, MOST_TURNS, 1)
+    occasional: dict[str, int] = {}
+    for key, value in reader.table(content, "occasional").items():
+        if key not in {board.name for board in table.with_role("satellite") if board.occasional}:
+            reader.fault(
+                f"occasional.{key}", value, "no board of that name has an occasional list and a CAN bus of its own"
+            )
+        else:
+            occasional[key] = reader.whole(value, f"occasional.{key}", 1, MOST_TURNS, 1)
+    in_turn = reader.whole(content.get("commands_in_turn", 0), "commands_in_turn", 0, MOST_TURNS, 0)
+    found = BusSchedule(
+        name,
+        reader.text(content, "title") or name,
+        reader.text(content, "description") or "",
+        every,
+        occasional,
+        in_turn,
+    )
+    for board in table.with_role("satellite"):
+        if board.firmware and passes_of(board, found) * len(board.rows) > MOST_ROWS:
+            reader.fault(
+                "every",
+                None,
+                f"the numbers of {board.name} repeat only after {passes_of(board, found)} passes of {len(board.rows)} "
+                f"rows, more than {MOST_ROWS} rows: choose numbers with a smaller common multiple",
+            )
+    return found
+
+
+# ---- profiles
+
+
+def available() -> tuple[str, ...]:
+    """Names of the profiles shipped."""
+    return tuple(sorted(path.stem for path in FOLDER.glob("*.toml")))
+
+
+@functools.cache
+def default() -> Profile:
+    """The robot as it is: every board emulated, its own bit rate, every board sending as its firmware does."""
+    table = datatable.load()
+    schedule = full_schedule()
+    buses = {name: BusProfile(name, None, None, table.bit_rates[name.upper()], FULL, schedule, {}) for name in BUSES}
+    boards = dict.fromkeys(wiring.BOARDS, EMULATED)
+    return Profile("default", "", "the robot as it is", "", boards, buses)
+
+
+@functools.cache
+def full_schedule() -> BusSchedule:
+    """The schedule of the firmware itself."""
+    faults: list[ProfileFault] = []
+    found = _schedule(FULL, FOLDER, datatable.load(), faults)
+    if faults:
+        raise ProfileError(faults)
+    return found
+
+
+def load(name: str | pathlib.Path, interfaces: Callable[[], tuple[str, ...]] | None = None) -> Profile:
+    """The profile `name` of those shipped, or the file at that path when it ends in .toml.
+
+    ProfileError names all its faults. `interfaces` gives python-can's interface names, asked when a bus names one.
+    """
+    text = str(name)
+    if not text.endswith(".toml") and text not in available():
+        raise UserError(f"profile {text!r}: unknown; there are {', '.join(available())}, or give a .toml file")
+    path = pathlib.Path(text) if text.endswith(".toml") else FOLDER / f"{text}.toml"
+    faults: list[ProfileFault] = []
+    reader = _Reader(str(path), faults)
+    content = reader.content(path)
+    if content is None:
+        raise ProfileError(faults)
+    table = datatable.load()
+    reader.only(content, ("title", "description", "boards", "buses"), "")
+    title = reader.text(content, "title") or path.stem
+    description = reader.text(content, "description") or ""
+    boards = _boards(reader, reader.table(content, "boards"))
+    buses = _buses(reader, reader.table(content, "buses"), path.parent, table, interfaces or _interfaces)
+    _together(reader, boards, buses, table)
+    if faults:
+        raise ProfileError(faults)
+    return Profile(path.stem, str(path), title, description, boards, buses)
+
+
+def _interfaces() -> tuple[str, ...]:
+    from can_bus.edge.interfaces import known_interfaces  # python-can takes a second to load
+
+    return known_interfaces()
+
+
+def _boards(reader: _Reader, given: Mapping[str, Any]) -> dict[str, str]:
+    boards = dict.fromkeys(wiring.BOARDS, EMULATED)
+    for name, state in given.items():
+        if name not in boards:
+            reader.fault(f"boards.{name}", state, f"no such board; the boards are {', '.join(wiring.BOARDS)}")
+        elif state not in STATES:
+            reader.fault(f"boards.{name}", state, f"one of {', '.join(STATES)} is expected")
+        else:
+            boards[name] = state
+    return boards
+
+
+def _buses(
+    reader: _Reader,
+    given: Mapping[str, Any],
+    folder: pathlib.Path,
+    table: Table,
+    interfaces: Callable[[], tuple[str, ...]],
+) -> dict[str, BusProfile]:
+    for name in given:
+        if name not in BUSES:
+            reader.fault(f"buses.{name}", given[name], f"no such bus; the buses are {', '.join(BUSES)}")
+    schedules: dict[str, BusSchedule] = {}
+    found = {}
+    for name in BUSES:
+        place = f"buses.{name}"
+        entry = reader.table(given, name, "buses")
+        reader.only(entry, ("interface", "channel", "bit_rate", "schedule", "options"), place)
+        interface = reader.text(entry, "interface", place, None)
+        channel = reader.text(entry, "channel", place, None)
+        options = reader.table(entry, "options", place)
+        if interface is not None and interface not in interfaces():
+            reader.fault(f"{place}.interface", interface, f"unknown to python-can; it knows {', '.join(interfaces())}")
+        if interface is not None and not channel:
+            reader.fault(f"{place}.channel", channel, "is missing: which channel of the interface, for example can0")
+        if interface is None:
+            for key in ("channel", "options"):
+                if entry.get(key):
+                    reader.fault(
+                        f"{place}.{key}", entry[key], "means nothing without interface: the bus is emulated inside"
+                    )
+        for key in options:
+            if key in ("interface", "channel", "bitrate", "fd"):
+                reader.fault(
+                    f"{place}.options.{key}", options[key], "is given by the profile's own keys, not as an option"
+                )
+        usual = table.bit_rates[name.upper()]
+        rate = reader.whole(
+            entry.get("bit_rate", usual), f"{place}.bit_rate", LOWEST_BIT_RATE, HIGHEST_BIT_RATE, usual, " bit/s"
+        )
+        if interface is not None and rate > ADAPTER_BIT_RATE and not _without_rate(interface, channel or ""):
+            reader.fault(
+                f"{place}.bit_rate",
+                rate if "bit_rate" in entry else None,
+                f"{'' if 'bit_rate' in entry else f'is missing, so {rate}: '}adapters for classic CAN end at "
+                f"{ADAPTER_BIT_RATE} bit/s",
+            )
+        wanted = reader.text(entry, "schedule", place, FULL) or FULL
+        if wanted not in schedules:
+            if wanted in available_schedules(folder):
+                schedules[wanted] = _schedule(wanted, folder, table, reader.faults)
+            else:
+                known = ", ".join(available_schedules(folder))
+                reader.fault(f"{place}.schedule", wanted, f"no such schedule; there are {known}")
+                schedules[wanted] = full_schedule()
+        found[name] = BusProfile(name, interface, channel, rate, wanted, schedules[wanted], options)
+    return found
+
+
+def _without_rate(interface: str, channel: str) -> bool:
+    """True for interfaces of software alone, where a bit rate means nothing."""
+    return interface in SOFTWARE_INTERFACES or (interface == "socketcan" and channel.startswith(("vcan", "vxcan")))
+
+
+def _together(reader: _Reader, boards: Mapping[str, str], buses: Mapping[str, BusProfile], table: Table) -> None:
+    """What only shows when boards and buses are seen together."""
+    brain, router = table.with_role("main brain")[0].name, table.with_role("router")[0].name
+    if EXTERNAL in (boards[brain], boards[router]) and boards[brain] != boards[router]:
+        external = brain if boards[brain] == EXTERNAL else router
+        reader.fault(f"boards.{external}", EXTERNAL, WITHOUT_CAN)
+    elif boards[router] == ABSENT and boards[brain] == EMULATED:
+        reader.fault(
+            f"boards.{router}", ABSENT, f"without the router {brain} reaches nobody: make {brain} absent as well"
+        )
+    for name in wiring.BOARDS:
+        if boards[name] == EXTERNAL:
+            for bus in table.board(name).buses:
+                if bus.lower() in buses and buses[bus.lower()].interface is None:
+                    reader.fault(
+                        f"boards.{name}",
+                        EXTERNAL,
+                        f"hangs on {bus.lower()}, which is emulated inside: give [buses.{bus.lower()}] an interface",
+                    )
+    users: dict[tuple[str, str], str] = {}
+    for name, bus in buses.items():
+        if bus.interface is not None and bus.channel:
+            first = users.setdefault((bus.interface, bus.channel), name)
+            if first != name:
+                reader.fault(
+                    f"buses.{name}.channel", bus.channel, f"{bus.interface} {bus.channel} is also what {first} uses"
+                )
