@@ -39,7 +39,7 @@ cdef class CanRouterBoard(Microcontroller):
     cdef public long long[::1] can_leds
     cdef public long long own_lost
     cdef public bint idle
-    cdef public long long idle_since, flush_next, pair_ns, wakes, batches
+    cdef public long long idle_since, flush_next, pair_ns
     cdef public long long[::1] route_ns, flush_ns
     cdef public long long sync_cycles
     cdef public long long code_dnf, code_near_limit, code_task_limit, code_queue_full

@@ -146,8 +146,6 @@ class CanRouterBoard(Microcontroller):
         self.idle = True
         self.idle_since = phase_ns
         self.flush_next = 0
-        self.wakes = 0
-        self.batches = 0
         self.background = self.main_loop
         self.adc.start_burst(ANALOG["supply_current"], ANALOG["supply_voltage"])
         self.start(self.schedule(), phase_ns)
@@ -319,7 +317,7 @@ class CanRouterBoard(Microcontroller):
         return False
 
     def main_loop(self) -> cython.longlong:
-        """Move what waits, until nothing does or something else is due; returns the instant reached, or 0.
+        """Move what waits, until nothing does or something else is due; returns the instant reached, 0 when it idles.
 
         An idle loop spins through its four pairs of "route, flush", so work that comes up waits for the
         pair in progress to end and is met wherever the loop happens to be.
@@ -328,23 +326,22 @@ class CanRouterBoard(Microcontroller):
         passed: cython.longlong
         moved: cython.longlong
         router: Router = self.router
+        link: RouterSspLink = self.link
         controller: CanController
-        self.wakes += 1
-        if not router.has_work() and not (router.waiting > 0 and self.can_flush()):
-            if not self.idle:
-                self.idle = True
-                self.idle_since = at
-            return 0
-        self.batches += 1
-        if self.idle:
-            self.idle = False
-            passed = at - self.idle_since
-            self.flush_next = (self.flush_next + passed // self.pair_ns) % 4
-            passed = passed % self.pair_ns
-            if passed > 0:
-                self.flush_next = (self.flush_next + 1) % 4
-                at += self.pair_ns - passed
-        while True:
+        while (
+            router.rx_read != router.rx_write
+            or router.own_read != router.own_write
+            or link.received_read != link.received_write
+            or (router.waiting > 0 and self.can_flush())
+        ):
+            if self.idle:
+                self.idle = False
+                passed = at - self.idle_since
+                self.flush_next = (self.flush_next + passed // self.pair_ns) % 4
+                passed = passed % self.pair_ns
+                if passed > 0:
+                    self.flush_next = (self.flush_next + 1) % 4
+                    at += self.pair_ns - passed
             self.now = at
             moved = router.route_step(at)
             at += self.route_ns[moved]
@@ -359,11 +356,12 @@ class CanRouterBoard(Microcontroller):
                 self.flush_next = 0
             if at >= self.horizon or at >= self.alarm_time or at >= self.tick_time or at >= self.inbox.head_time:
                 return at
-            if not router.has_work() and not (router.waiting > 0 and self.can_flush()):
-                self.idle = True
-                self.idle_since = at
-                self.background_wanted = False
-                return at
+        if self.idle:
+            return 0
+        self.idle = True
+        self.idle_since = at
+        self.background_wanted = False
+        return at
 
     # --- slot tasks -------------------------------------------------------------------------------------
 

@@ -63,13 +63,12 @@ cdef class Bus:
     cdef bint _change(self, long long until)
     cdef long long _next_join(self)
     cdef void _look_ahead(self) noexcept
-    cdef void _start_at(self, long long first) noexcept
     cdef void _remove(self, long long slot) noexcept
     cdef long long _attempt(self, long long k)
+    cdef long long _arbitrate(self, long long k) noexcept
     cdef bint _contend(self, long long k, long long best)
-    cdef long long _succeed(self, long long k, long long slot, long long bits, bint merged)
     cdef long long _finish_sender(self, Node node, long long slot, long long end, long long done)
-    cdef void _account(self, long long first) noexcept
+    cdef void _split_windows(self, long long first) noexcept
     cdef void _roll(self, long long bit) noexcept
     cdef long long _record(
         self, long long time, long long identifier, long long flags, long long lo, long long hi, long long node

@@ -234,6 +234,7 @@ class Bus:
             setattr(self, field, grown)
         return index
 
+    @cython.cdivision(True)  # instants are not negative
     def request(
         self,
         node: cython.longlong,
@@ -255,6 +256,9 @@ class Bus:
         slot: cython.longlong
         length: cython.longlong = flags & 15
         first: cython.longlong
+        start: cython.longlong
+        second: cython.longlong
+        billion: cython.longlong = 1000000000
         if node < 0 or node >= len(self.nodes):
             raise ValueError(f"bus {self.name}: node {node} does not exist")
         if buffer < 1 or buffer > 3:
@@ -290,16 +294,22 @@ class Bus:
         if time < self.advanced:
             # stamped before what has been decided: it takes part from here on
             self.late_requests += 1
-            first = self.bit_of(self.advanced) + 1
+            first = max(self.bit_of(self.advanced) + 1, self.free_bit)
+            start = self.edge_ns(first)
         elif time < self.free_time:
             first = self.free_bit
-        else:
-            first = self.bit_of(time) + 1
+            start = self.free_time
+        else:  # the bit after bit_of(time), and its edge_ns
+            second = time // billion
+            first = (time - second * billion) * self.bitrate // billion + 1
+            start = second * billion + (first * billion + self.bitrate - 1) // self.bitrate
+            first += second * self.bitrate
         self.asked[slot] = first
         self.asked_time[slot] = time
         if first < owner.suspend_bit:
             first = owner.suspend_bit
-        self.keys[slot] = arbitration_key(identifier, flags)
+            start = self.edge_ns(first)
+        self.keys[slot] = arbitration_key(identifier, flags) if flags & 80 else identifier << 21
         self.identifiers[slot] = identifier
         self.flags[slot] = flags
         self.lows[slot] = lo
@@ -314,7 +324,9 @@ class Bus:
             return True
         self.ready[slot] = first
         if first < self.next_bit:
-            self._start_at(first)
+            self.next_bit = first
+        if start < self.next_time:
+            self.next_time = start
         return True
 
     def _refuse(self, owner, flags) -> None:
@@ -483,28 +495,18 @@ class Bus:
             ready = self.ready[self.pending[i]]
             if ready < first:
                 first = ready
-        self.next_time = _NEVER
-        self.next_bit = _NEVER
-        if first < _NEVER:
-            self._start_at(first)
+        if first <= self.free_bit:
+            self.next_bit = self.free_bit
+            self.next_time = self.free_time
+        else:
+            self.next_bit = first
+            self.next_time = self.edge_ns(first) if first < _NEVER else _NEVER
         if self.joining > 0:
             first = self._next_join()
             if first < self.next_bit:
                 self.next_time = self.edge_ns(first)
         if self.commands.head_time < self.next_time:
             self.next_time = self.commands.head_time
-
-    def _start_at(self, first: cython.longlong) -> cython.void:
-        """The next frame starts at bit `first`, or as soon as the bus is free."""
-        time: cython.longlong
-        if first <= self.free_bit:
-            self.next_bit = self.free_bit
-            time = self.free_time
-        else:
-            self.next_bit = first
-            time = self.edge_ns(first)
-        if time < self.next_time:
-            self.next_time = time
 
     def _execute(self) -> None:
         """Carry out the first abort or mode change."""
@@ -594,50 +596,110 @@ class Bus:
 
     # ---- one frame
 
+    @cython.cdivision(True)  # bits and slots are not negative
     def _attempt(self, k: cython.longlong) -> cython.longlong:
-        """The frame that starts at bit k: arbitration, then success or an error frame. Returns when the bus is free."""
-        best: cython.longlong = self.pending[0]
-        best_key: cython.longlong = 0
-        contenders: cython.longlong = 0
+        """The frame that starts at bit k: arbitration, then an error frame, or a whole frame and results to everybody.
+
+        Returns the bit at which the bus is free again.
+        """
+        slot: cython.longlong = self.pending[0]
         merged: cython.bint = False
+        heard: cython.bint = False
+        bits: cython.longlong
+        end: cython.longlong
+        node: Node
+        inbox: EventQueue
+        if self.pending_count > 1:
+            slot = self._arbitrate(k)
+            merged = self._contend(k, slot)
+        if self.joining > 0:
+            self._count_sequences(k)
+        identifier: cython.longlong = self.identifiers[slot]
+        flags: cython.longlong = self.flags[slot]
+        lo: cython.longlong = self.lows[slot]
+        hi: cython.longlong = self.highs[slot]
+        bits = measure(identifier, flags, lo, hi) & 0xFFFF
+        if merged or self.operating < 2 or self.strikes_left > 0 or self.next_strike < k + bits - 1:
+            if self._disturbed(k, slot, bits, merged):
+                return self.free_bit
+        end = k + bits
+        # edge_ns of end - 1 (the end of the sixth bit of EOF), of end, and of the end of the intermission
+        rate: cython.longlong = self.bitrate
+        billion: cython.longlong = 1000000000
+        second: cython.longlong = k // rate
+        rest: cython.longlong = (end - second * rate) * billion + rate - 1
+        received: cython.longlong = second * billion + (rest - billion) // rate
+        done: cython.longlong = second * billion + rest // rate
+        sender: cython.longlong = slot // 3
+        self.free_bit = end + 3  # INTERMISSION_BITS
+        self.free_time = second * billion + (rest + 3 * billion) // rate
+        self.quiet_bit = end - 8  # ACK delimiter and EOF are recessive
+        flags &= 0x5F  # single shot is not on the wire
+        for node in self.nodes:
+            if node.index == sender:
+                self._finish_sender(node, slot, end, done)
+            elif node.mode == 0 and not (merged and node.sending_end == end):  # OPERATING
+                if node.receive_errors > 0:
+                    self._calm_receiver(node, received)
+                if node.listening:
+                    inbox = node.inbox
+                    inbox.push(received, node.order, 2, node.controller, identifier, flags, lo, hi)  # CAN_RX
+                    node.received += 1
+                    heard = True
+        if received <= self.advanced:
+            self.late_results += 1
+        if not heard:
+            self.lost += 1
+        self.frames += 1
+        if flags & 64:  # FLAG_EXTENDED
+            self._count_extended(identifier)
+        else:
+            self.frames_by_identifier[identifier] += 1
+            if done - self.asked_time[slot] > self.response_max_ns[identifier]:
+                self.response_max_ns[identifier] = done - self.asked_time[slot]
+        self.bits += bits + 3  # INTERMISSION_BITS
+        self.window_busy += bits + 3
+        if self.free_bit > self.window_end:
+            self._split_windows(k)
+        self._record(received, identifier, flags, lo, hi, sender)
+        return self.free_bit
+
+    def _arbitrate(self, k: cython.longlong) -> cython.longlong:
+        """The slot that wins the frame that starts at bit k."""
+        best: cython.longlong = -1
+        best_key: cython.longlong = 0
         i: cython.longlong
         slot: cython.longlong
         key: cython.longlong
-        bits: cython.longlong
-        vulnerable: cython.longlong
-        if self.pending_count > 1:
-            for i in range(self.pending_count):
-                slot = self.pending[i]
-                if self.ready[slot] <= k:
-                    key = self.keys[slot]
-                    if contenders == 0 or key < best_key or (key == best_key and slot < best):
-                        best = slot
-                        best_key = key
-                    contenders += 1
-        if self.joining > 0:
-            self._count_sequences(k)
-        if contenders > 1:
-            merged = self._contend(k, best)
-        bits = measure(self.identifiers[best], self.flags[best], self.lows[best], self.highs[best]) & 0xFFFF
-        if merged or self.operating < 2 or self.strikes_left > 0 or self.next_strike < k + bits - 1:
-            senders = self._senders(k, best) if merged else [best]
-            position = -1
-            if merged:
-                position = self._collision(senders)
-            acknowledged = self.operating > len(senders)
-            if position < 0:
-                vulnerable = 41 if self.flags[best] & 64 else 17  # see inject_errors
-                position = self._strike_of(k, k + bits - 1, vulnerable)
-            if not acknowledged and (position < 0 or position > bits - 9):
-                position = bits - 9  # the ACK slot stays recessive
-            if position >= 0:
-                self._fail(k, senders, position, acknowledged)
-                return self.free_bit
-            for slot in senders:
-                if slot != best:
-                    self.merged += 1
-                    self._finish_sender(self.nodes[slot // 3], slot, k + bits, self.edge_ns(k + bits))
-        return self._succeed(k, best, bits, merged)
+        for i in range(self.pending_count):
+            slot = self.pending[i]
+            if self.ready[slot] <= k:
+                key = self.keys[slot]
+                if best < 0 or key < best_key or (key == best_key and slot < best):
+                    best = slot
+                    best_key = key
+        return best
+
+    def _disturbed(self, k, best, bits, merged) -> bool:
+        """Settle the frame on bits k ... k + bits - 1 where something may be wrong; True when it failed."""
+        senders = self._senders(k, best) if merged else [best]
+        position = -1
+        if merged:
+            position = self._collision(senders)
+        acknowledged = self.operating > len(senders)
+        if position < 0:
+            vulnerable = 41 if self.flags[best] & 64 else 17  # see inject_errors
+            position = self._strike_of(k, k + bits - 1, vulnerable)
+        if not acknowledged and (position < 0 or position > bits - 9):
+            position = bits - 9  # the ACK slot stays recessive
+        if position >= 0:
+            self._fail(k, senders, position, acknowledged)
+            return True
+        for slot in senders:
+            if slot != best:
+                self.merged += 1
+                self._finish_sender(self.nodes[slot // BUFFERS], slot, k + bits, self.edge_ns(k + bits))
+        return False
 
     @cython.cdivision(True)  # slots are not negative
     def _contend(self, k: cython.longlong, best: cython.longlong) -> cython.bint:
@@ -710,62 +772,15 @@ class Bus:
                 return position
         return -1
 
-    @cython.cdivision(True)  # bits and slots are not negative
-    def _succeed(
-        self, k: cython.longlong, slot: cython.longlong, bits: cython.longlong, merged: cython.bint
-    ) -> cython.longlong:
-        """A whole frame on bits k ... k + bits - 1: results to everybody. Returns the bit at which the bus is free."""
-        end: cython.longlong = k + bits
-        # edge_ns of end - 1 (the end of the sixth bit of EOF), of end, and of the end of the intermission
-        rate: cython.longlong = self.bitrate
-        billion: cython.longlong = 1000000000
-        second: cython.longlong = k // rate
-        rest: cython.longlong = (end - second * rate) * billion + rate - 1
-        received: cython.longlong = second * billion + (rest - billion) // rate
-        done: cython.longlong = second * billion + rest // rate
-        sender: cython.longlong = slot // 3
-        identifier: cython.longlong = self.identifiers[slot]
-        flags: cython.longlong = self.flags[slot] & 0x5F  # single shot is not on the wire
-        lo: cython.longlong = self.lows[slot]
-        hi: cython.longlong = self.highs[slot]
-        heard: cython.bint = False
-        node: Node
-        inbox: EventQueue
-        self.free_bit = end + 3  # INTERMISSION_BITS
-        self.free_time = second * billion + (rest + 3 * billion) // rate
-        self.quiet_bit = end - 8  # ACK delimiter and EOF are recessive
-        for node in self.nodes:
-            if node.index == sender:
-                self._finish_sender(node, slot, end, done)
-            elif node.mode == 0 and not (merged and node.sending_end == end):  # OPERATING
-                if node.receive_errors > 0:
-                    self._calm_receiver(node, received)
-                if node.listening:
-                    inbox = node.inbox
-                    inbox.push(received, node.order, 2, node.controller, identifier, flags, lo, hi)  # CAN_RX
-                    node.received += 1
-                    heard = True
-        if received <= self.advanced:
-            self.late_results += 1
-        if not heard:
-            self.lost += 1
-        self.frames += 1
-        if flags & 64:  # FLAG_EXTENDED
-            self._count_extended(identifier)
-        else:
-            self.frames_by_identifier[identifier] += 1
-            if done - self.asked_time[slot] > self.response_max_ns[identifier]:
-                self.response_max_ns[identifier] = done - self.asked_time[slot]
-        self._account(k)
-        self._record(received, identifier, flags, lo, hi, sender)
-        return self.free_bit
-
     def _finish_sender(
         self, node: Node, slot: cython.longlong, end: cython.longlong, done: cython.longlong
     ) -> cython.longlong:
         """The sender of a whole frame that ended at bit `end`, `done` in ns: its buffer is free from `done` on."""
         inbox: EventQueue = node.inbox
-        self._remove(slot)
+        if self.pending_count == 1:
+            self.pending_count = 0
+        else:
+            self._remove(slot)
         self.busy_until[slot] = done
         inbox.push(done, node.order, 3, node.controller, slot % 3 + 1, 0)  # CAN_TX_DONE, TX_SENT
         node.sent += 1
@@ -817,7 +832,10 @@ class Bus:
         self.free_time = self.edge_ns(self.free_bit)
         self.quiet_bit = over - 8
         self.errors += 1
-        self._account(k)
+        self.bits += self.free_bit - k
+        self.window_busy += self.free_bit - k
+        if self.free_bit > self.window_end:
+            self._split_windows(k)
         capture = ICR_BUS_ERROR | fields[position] << ICR_FIELD_SHIFT
         for node in self.nodes:
             if node.mode != OPERATING:
@@ -895,10 +913,10 @@ class Bus:
         counts = self.frames_by_extended_identifier
         counts[identifier] = counts.get(identifier, 0) + 1
 
-    def _account(self, first: cython.longlong) -> cython.void:
-        """The bits from `first` until the bus is free were taken."""
+    def _split_windows(self, first: cython.longlong) -> cython.void:
+        """The bits from `first` until the bus is free, counted in the open window, reach beyond it."""
         last: cython.longlong = self.free_bit
-        self.bits += last - first
+        self.window_busy -= last - first
         if first >= self.window_end:
             self._roll(first)
         while last > self.window_end:

@@ -1,8 +1,8 @@
 from foundation.numbers cimport float_of_word, word_of_float, wrap_i32
 
-cdef long long _MASK
-
 cimport cython
+
+cdef long long _MASK
 
 @cython.final
 cdef class DataStore:
@@ -12,18 +12,18 @@ cdef class DataStore:
     cdef public object on_out_of_range
 
     cpdef bint has(self, long long number)
-    cpdef void set_word(self, long long number, long long word, long long stamp)
+    cpdef bint set_word(self, long long number, long long word, long long stamp)
     cpdef long long get_word(self, long long number)
-    cpdef void set_float(self, long long number, double value)
+    cpdef bint set_float(self, long long number, double value)
     cpdef double get_float(self, long long number)
-    cpdef void set_int(self, long long number, long long value)
+    cpdef bint set_int(self, long long number, long long value)
     cpdef long long get_int(self, long long number)
-    cpdef void set_u32(self, long long number, long long value)
+    cpdef bint set_u32(self, long long number, long long value)
     cpdef long long get_u32(self, long long number)
     cpdef long long stamp(self, long long number)
-    cpdef long long network_time_ms(self)
+    cpdef long long network_time_ms(self) noexcept
     cpdef long long age_ms(self, long long number, long long now)
     cpdef bint is_unread(self, long long number, long long subscriber)
-    cpdef void mark_read(self, long long number, long long subscriber)
-    cpdef void mark_unread(self, long long number)
+    cpdef bint mark_read(self, long long number, long long subscriber)
+    cpdef bint mark_unread(self, long long number)
     cpdef long long next_unread(self, long long[::1] numbers, long long start, long long subscriber)

@@ -1,3 +1,5 @@
+# cython: boundscheck=False, wraparound=False
+# (every index below is an id held against the table's size, or a place in the caller's list of ids)
 """The main brain's data at run time: one 32-bit word and one ms stamp per id, with a read flag per subscriber.
 
 What the robot's io data module keeps (facts network 4.13). A write makes a value new for every subscriber.
@@ -51,12 +53,14 @@ class DataStore:
 
     # ---- frames: word and stamp together
 
-    def set_word(self, number: cython.longlong, word: cython.longlong, stamp: cython.longlong) -> cython.void:
-        """Store the two words of a frame as they are; new for every subscriber."""
+    def set_word(self, number: cython.longlong, word: cython.longlong, stamp: cython.longlong) -> cython.bint:
+        """Store the two words of a frame as they are; new for every subscriber. True when the table has the id."""
         if 0 <= number < self.size or self.has(number):
             self.words[number] = word & _MASK
             self.stamps[number] = stamp & _MASK
             self.unread[number] = 0x7F
+            return True
+        return False
 
     def get_word(self, number: cython.longlong) -> cython.longlong:
         """The value word, 0 ... 2^32-1."""
@@ -66,12 +70,14 @@ class DataStore:
 
     # ---- typed access: the stamp is the network time the main brain heard last
 
-    def set_float(self, number: cython.longlong, value: cython.double) -> cython.void:
-        """Store a number, rounded to single precision."""
+    def set_float(self, number: cython.longlong, value: cython.double) -> cython.bint:
+        """Store a number, rounded to single precision; True when the table has the id."""
         if 0 <= number < self.size or self.has(number):
             self.words[number] = word_of_float(value)
             self.stamps[number] = self.stamps[0]
             self.unread[number] = 0x7F
+            return True
+        return False
 
     def get_float(self, number: cython.longlong) -> cython.double:
         """The word read as a single-precision number."""
@@ -79,12 +85,14 @@ class DataStore:
             return float_of_word(self.words[number])
         return 0.0
 
-    def set_int(self, number: cython.longlong, value: cython.longlong) -> cython.void:
-        """Store a signed integer; only its low 32 bits are kept."""
+    def set_int(self, number: cython.longlong, value: cython.longlong) -> cython.bint:
+        """Store a signed integer, of which only the low 32 bits are kept; True when the table has the id."""
         if 0 <= number < self.size or self.has(number):
             self.words[number] = value & _MASK
             self.stamps[number] = self.stamps[0]
             self.unread[number] = 0x7F
+            return True
+        return False
 
     def get_int(self, number: cython.longlong) -> cython.longlong:
         """The word read as a signed integer, -2^31 ... 2^31-1."""
@@ -92,9 +100,9 @@ class DataStore:
             return wrap_i32(self.words[number])
         return 0
 
-    def set_u32(self, number: cython.longlong, value: cython.longlong) -> cython.void:
-        """Store an unsigned integer; only its low 32 bits are kept."""
-        self.set_int(number, value)
+    def set_u32(self, number: cython.longlong, value: cython.longlong) -> cython.bint:
+        """Store an unsigned integer, of which only the low 32 bits are kept; True when the table has the id."""
+        return self.set_int(number, value)
 
     def get_u32(self, number: cython.longlong) -> cython.longlong:
         """The word read as an unsigned integer, 0 ... 2^32-1."""
@@ -126,17 +134,19 @@ class DataStore:
             return (self.unread[number] >> subscriber) & 1 == 1
         return False
 
-    def mark_read(self, number: cython.longlong, subscriber: cython.longlong) -> cython.void:
-        """`subscriber` has read the value; the others are not concerned."""
-        bit: cython.longlong = 1
+    def mark_read(self, number: cython.longlong, subscriber: cython.longlong) -> cython.bint:
+        """`subscriber` has read the value, the others are not concerned; True when the table has the id."""
         if 0 <= number < self.size or self.has(number):
-            bit = bit << subscriber
-            self.unread[number] &= ~bit
+            self.unread[number] &= ~(1 << subscriber)
+            return True
+        return False
 
-    def mark_unread(self, number: cython.longlong) -> cython.void:
-        """The value counts as new for every subscriber though it was not written."""
+    def mark_unread(self, number: cython.longlong) -> cython.bint:
+        """The value counts as new for every subscriber though it was not written; True when the table has the id."""
         if 0 <= number < self.size or self.has(number):
             self.unread[number] = 0x7F
+            return True
+        return False
 
     def next_unread(
         self, numbers: cython.longlong[::1], start: cython.longlong, subscriber: cython.longlong

@@ -310,7 +310,10 @@ class RouterSspLink:
         """
         write: cython.longlong = self.ring_write
         header: cython.longlong = (identifier & 0x7FF) | 0x7800
-        if self.half_words_waiting() > 494:
+        waiting: cython.longlong = write - self.ring_read
+        if waiting < 0:
+            waiting += 500
+        if waiting > 494:
             self.transmit_lost += 1
             self.report(self.code_transmit_full)
             return False
