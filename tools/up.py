@@ -13,7 +13,7 @@ from rich.table import Table
 
 from foundation import wallclock
 from foundation.user_error import UserError
-from harness import build
+from harness import build, wiring
 from harness.processes import block as places
 from harness.processes import control
 from harness.processes.lateness import figures
@@ -91,10 +91,10 @@ def register(commands: Any) -> None:
         action="append",
         default=[],
         metavar="BUS=INTERFACE:CHANNEL",
-        help="put a bus on a python-can interface, e.g. can1=socketcan:vcan0 (repeatable); can1= asks python-can's own"
-        " configuration, section can1. The run is then asynchronous",
+        help="put a bus on a python-can interface, e.g. can1=socketcan:vcan0, with python-can's options behind it if "
+        "needed ('can1=slcan:/dev/ttyACM0 --bitrate 1000000'); can1= asks python-can's configuration, section can1; "
+        "MCH=... gives one board of such a bus a place of its own (repeatable). The run is then asynchronous",
     )
-    with_python_can_options(up)
     up.set_defaults(run=run)
 
     ctl = commands.add_parser(
@@ -108,38 +108,30 @@ def register(commands: Any) -> None:
     ctl.set_defaults(run=run_ctl)
 
 
-def with_python_can_options(command: Any) -> None:
-    """python-can's own options for interfaces, as --bus-bitrate, --bus-kwargs ...; they hold for every --bus.
-
-    Importing python-can takes a second, so they are added when this command is really parsed.
-    """
-    own = command.parse_known_args
-
-    def parse_known_args(*arguments: Any, **keywords: Any) -> Any:
-        from can_bus.edge.external_bus import add_options
-
-        command.parse_known_args = own
-        add_options(command)
-        return own(*arguments, **keywords)
-
-    command.parse_known_args = parse_known_args
-
-
-def external_buses(options: argparse.Namespace, robot: Ranger) -> list[ExternalBus]:
-    """The buses of --bus, not opened yet. UserError for one that is not there or is given twice."""
-    from can_bus.edge.external_bus import ExternalBus, keywords_of, opener, split_name
+def external_buses(options: argparse.Namespace, robot: Ranger) -> tuple[list[ExternalBus], dict[str, Any]]:
+    """The buses of --bus, not opened yet, and {board: what opens its peer}. UserError for what is not there."""
+    from can_bus.edge.external_bus import ExternalBus, opener, place_of
 
     found: dict[str, ExternalBus] = {}
+    openers: dict[str, Any] = {}
     bit_rates = {bus.name: bus.bitrate for bus in robot.buses}
+    single = {wire.board for wire in wiring.CAN} - {"CSR"}
     for text in options.bus:
-        name, where = split_name(text)
-        if name not in bit_rates:
-            raise UserError(f"--bus {text}: there is no bus {name}; there are {', '.join(bit_rates)}")
-        if name in found:
+        name, keywords = place_of(text)
+        if name in found or name in openers:
             raise UserError(f"--bus {text}: {name} is given twice")
-        keywords = {**keywords_of(options), **where}
-        found[name] = ExternalBus(name, int(keywords.get("bitrate", bit_rates[name])), opener(name, keywords))
-    return list(found.values())
+        if name in single:
+            openers[name] = opener(name, keywords)
+        elif name in bit_rates:
+            found[name] = ExternalBus(name, int(keywords.get("bitrate", bit_rates[name])), opener(name, keywords))
+        else:
+            known = ", ".join([*bit_rates, *(each for each in wiring.BOARDS if each in single)])
+            raise UserError(f"--bus {text}: there is no bus or board {name}; there are {known}")
+    for board in openers:
+        bus = next(f"can{wire.bus}" for wire in wiring.CAN if wire.board == board)
+        if bus not in found:
+            raise UserError(f"--bus {board}=...: its bus {bus} is not outside (--bus {bus}=...)")
+    return list(found.values()), openers
 
 
 def run(options: argparse.Namespace) -> int:
@@ -169,7 +161,7 @@ def run(options: argparse.Namespace) -> int:
             robot.attach(server)
         for line in lines + more:
             console.print(line, highlight=False, soft_wrap=True)
-        outside = external_buses(options, robot)
+        outside, openers = external_buses(options, robot)
         for each in outside:
             console.print(f"{each.name} is outside: this run is asynchronous and cannot be repeated", highlight=False)
         if not build.is_compiled():
@@ -190,7 +182,7 @@ def run(options: argparse.Namespace) -> int:
 
         def begin(robot: Ranger) -> None:
             for each in outside:
-                move_bus(robot, each)
+                move_bus(robot, each, openers, settings.boards)
 
         supervisor = Supervisor(robot, settings, stop, finish, view, begin)
         view.say(f"ranger-sim up, name {settings.name}: {supervisor.describe()}")

@@ -12,10 +12,16 @@ frame. What does not fit anywhere is counted: `not_taken` (the interface's queue
 What we ask of the robot is a small set of plain methods (`from_board`, `poll`), as for the other ends of wires.
 """
 
+import argparse
 import collections
+import errno
+import select
+import shlex
+import socket
+import struct
 from collections.abc import Callable
 from contextlib import suppress
-from typing import Any
+from typing import Any, NoReturn
 
 import can
 from can import cli as can_options
@@ -42,27 +48,48 @@ POLL_NS = 125_000
 # Frames read at once are handed on one after the other, as a bus would; further ahead than this they are dropped.
 # Chosen by us: ten slots of the main brain, more than any queue in the robot holds.
 AHEAD_NS = 20_000_000
+RECEIVE_BYTES = 8 << 20  # of a socket: some 10,000 frames wait there while the robot computes; chosen by us
+SO_RCVBUFFORCE, SO_MEMINFO, MEMINFO_DROPS = 33, 55, 8  # socket(7) and linux/sock_diag.h: the ninth word counts drops
 READ_LIMIT = 200  # frames per peer and poll, so that a flood does not stop virtual time
 
 
-def split_name(text: str) -> tuple[str, dict[str, str]]:
-    """("can1", keywords for can.Bus) of `can1=socketcan:vcan0`.
+class _Options(argparse.ArgumentParser):
+    """python-can's arguments; a mistake in them is the user's."""
 
-    `can1=vcan0` leaves the interface to python-can's configuration, `can1=` everything: it looks into its files and
-    environment variables, in the section named like the bus.
+    def error(self, message: str) -> NoReturn:
+        raise UserError(message)
+
+
+def place_of(text: str) -> tuple[str, dict[str, Any]]:
+    """("can1", keywords for can.Bus) of `can1=socketcan:vcan0`, the value of the option --bus.
+
+    Behind it may stand options of python-can, as its own programs take them (`can1=slcan:/dev/ttyACM0 --bitrate
+    1000000`). What is left out, the interface (`can1=vcan0`) or everything (`can1=`), comes from python-can's
+    configuration: its environment variables and its files, there from the section named like the bus.
     """
     name, equals, where = text.partition("=")
     if not equals or not name:
         raise UserError(f"--bus {text}: BUS=INTERFACE:CHANNEL is expected, e.g. can1=socketcan:vcan0")
-    interface, colon, channel = where.partition(":")
-    if not colon:
-        return name, {"channel": where} if where else {}
-    if not channel:
-        raise UserError(f"--bus {text}: no channel after {interface}:")
-    if interface not in can.VALID_INTERFACES:
-        known = ", ".join(sorted(can.VALID_INTERFACES))
-        raise UserError(f"--bus {text}: python-can knows no interface {interface}; it knows {known}")
-    return name, {"interface": interface, "channel": channel}
+    words = shlex.split(where)
+    head = words.pop(0) if words and not words[0].startswith("-") else ""
+    found: dict[str, Any] = {}
+    interface, colon, channel = head.partition(":")
+    if colon:
+        if not channel:
+            raise UserError(f"--bus {text}: no channel after {interface}:")
+        if interface not in can.VALID_INTERFACES:
+            known = ", ".join(sorted(can.VALID_INTERFACES))
+            raise UserError(f"--bus {text}: python-can knows no interface {interface}; it knows {known}")
+        found = {"interface": interface, "channel": channel}
+    elif head:
+        found = {"channel": head}
+    parser = _Options(prog=f"--bus {name}", add_help=False)
+    can_options.add_bus_arguments(parser)
+    try:
+        options = vars(parser.parse_args(words))
+    except (UserError, argparse.ArgumentError) as mistake:
+        raise UserError(f"--bus {text}: {mistake}") from None
+    return name, {**found, **options.pop("bus_kwargs", {}), **options}
 
 
 def opener(name: str, keywords: dict[str, Any]) -> Callable[[], Any]:
@@ -70,27 +97,47 @@ def opener(name: str, keywords: dict[str, Any]) -> Callable[[], Any]:
 
     def open_peer() -> Any:
         try:
-            return can.Bus(config_context=name, **keywords)
+            connection = can.Bus(config_context=name, **keywords)
         except Exception as error:  # whatever a driver raises when it is not there
             where = ":".join(str(keywords.get(each, "(by configuration)")) for each in ("interface", "channel"))
             text = " ".join(str(error).split()) or type(error).__name__
-            raise UserError(f"bus {name} on {where}: {text}") from None
+            raise UserError(f"bus {name} on {where}: {text}{hint_for(error, keywords)}") from None
+        widen(connection)
+        return connection
 
     return open_peer
 
 
-def add_options(parser: Any) -> None:
-    """python-can's own options for interfaces, with the prefix --bus-: bit rate, timing, further keywords."""
-    can_options.add_bus_arguments(parser, prefix="bus", group_title="interfaces outside (python-can), for every --bus")
+def hint_for(error: Exception, keywords: dict[str, Any]) -> str:
+    """What would help against two failures that everybody meets."""
+    if isinstance(error, OSError) and error.errno == errno.ENODEV:
+        channel = keywords.get("channel", "vcan0")
+        return f" (`ip link add {channel} type vcan && ip link set {channel} up` makes a virtual one)"
+    if isinstance(error, OSError) and error.errno == errno.EAFNOSUPPORT:
+        return " (this kernel has no SocketCAN; `ranger-sim vm` has one)"
+    return ""
 
 
-def keywords_of(options: Any) -> dict[str, Any]:
-    """Keywords for can.Bus that these options give."""
-    found: dict[str, Any] = {}
-    for name in ("channel", "interface", "bitrate", "fd", "data_bitrate", "timing"):
-        if f"bus_{name}" in options:
-            found[name] = getattr(options, f"bus_{name}")
-    return {**found, **getattr(options, "bus_bus_kwargs", {})}
+def widen(connection: Any) -> None:
+    """Let a socket hold more frames, as far as the system permits."""
+    end = getattr(connection, "socket", None)
+    if isinstance(end, socket.socket):
+        for option in (socket.SO_RCVBUF, SO_RCVBUFFORCE):
+            with suppress(OSError):
+                end.setsockopt(socket.SOL_SOCKET, option, RECEIVE_BYTES)
+
+
+def dropped_by_kernel(connection: Any) -> int:
+    """Frames that found no room in the socket so far; 0 where the interface is no socket."""
+    end = getattr(connection, "socket", None)
+    if not isinstance(end, socket.socket):
+        return 0
+    try:
+        words = end.getsockopt(socket.SOL_SOCKET, SO_MEMINFO, 36)
+    except OSError:
+        return 0
+    drops: int = struct.unpack_from("=I", words, 4 * MEMINFO_DROPS)[0]
+    return drops
 
 
 class Peer:
@@ -106,6 +153,9 @@ class Peer:
         self.controller = controller
         self.order = order
         self.operating = True
+        self.descriptor = -1
+        with suppress(NotImplementedError, OSError, ValueError):
+            self.descriptor = connection.fileno()
         self.waiting: collections.deque[tuple[int, int, int, int, int]] = collections.deque()
         self.free_ns = 0  # until then its latest frame is on the wire
         self.read_ns = 0  # end of the latest frame handed to the board
@@ -170,12 +220,12 @@ class Peer:
                 continue
             flags = flags & ~15 | min(flags & 15, 8)
             end_ns = max(now_ns, self.read_ns + self.owner.length_ns(identifier, flags, lo, hi))
+            self.owner.frames_in += self is self.owner.peers[0]
+            self.owner.seen(self, min(end_ns, now_ns + AHEAD_NS), identifier, flags, lo, hi)
             if end_ns > now_ns + AHEAD_NS:
                 self.owner.overflow += 1
                 continue
             self.read_ns = end_ns
-            self.owner.frames_in += self is self.owner.peers[0]
-            self.owner.seen(self, end_ns, identifier, flags, lo, hi)
             if self.operating:
                 self.inbox.push(end_ns, self.order, CAN_RX, self.controller, identifier, flags, lo, hi)
 
@@ -201,6 +251,7 @@ class ExternalBus:
         self.bit_rate = bit_rate
         self.open_peer = open_peer
         self.peers: list[Peer] = []
+        self.poller = select.poll()
         self.sinks: list[Callable[[int, int, int, int, int], Any]] = []
         self.frames_in = 0
         self.frames_out = 0
@@ -215,19 +266,33 @@ class ExternalBus:
         self.window_busy_ns = 0
         self.window_load = 0.0
 
-    def add_peer(self, label: str, inbox: Any, controller: int, order: int) -> Peer:
+    def add_peer(
+        self, label: str, inbox: Any, controller: int, order: int, open_peer: Callable[[], Any] | None = None
+    ) -> Peer:
         """A controller of a board; UserError when the interface cannot be opened."""
-        peer = Peer(self, label, self.open_peer(), inbox, controller, order)
+        peer = Peer(self, label, (open_peer or self.open_peer)(), inbox, controller, order)
         self.peers.append(peer)
+        if peer.descriptor >= 0:
+            self.poller.register(peer.descriptor, select.POLLIN)
         return peer
 
     def poll(self, now_ns: int) -> int:
         """Frames in, and what waited out; returns when it wants to be polled next."""
+        ready = {descriptor for descriptor, _ in self.poller.poll(0)}  # one question for all: recv asks again
         for peer in self.peers:
             if peer.waiting:
                 peer.flush(now_ns)
-            peer.read(now_ns)
+            if peer.descriptor < 0 or peer.descriptor in ready:
+                peer.read(now_ns)
         return now_ns + POLL_NS
+
+    def drain(self, now_ns: int) -> None:
+        """At the end: what was sent before it belongs into the record."""
+        while True:
+            before = self.frames_in
+            self.poll(now_ns)
+            if self.frames_in == before:
+                return
 
     def length_ns(self, identifier: int, flags: int, lo: int, hi: int) -> int:
         """How long such a frame holds the wire, intermission included."""
@@ -254,13 +319,7 @@ class ExternalBus:
 
     def filenos(self) -> list[int]:
         """What to select on for reading, where the interface has such a thing."""
-        found = []
-        for peer in self.peers:
-            with suppress(NotImplementedError, OSError, ValueError):
-                number = peer.connection.fileno()
-                if number >= 0 and not peer.unreadable:
-                    found.append(number)
-        return found
+        return [peer.descriptor for peer in self.peers if peer.descriptor >= 0 and not peer.unreadable]
 
     def counters(self) -> dict[str, int]:
         """Whole numbers for the live view and the summary."""
@@ -268,7 +327,7 @@ class ExternalBus:
             "frames_in": self.frames_in,
             "frames_out": self.frames_out,
             "not_taken": self.not_taken,
-            "overflow": self.overflow,
+            "overflow": self.overflow + sum(dropped_by_kernel(peer.connection) for peer in self.peers),
             "refused": self.refused,
             "error_frames": self.errors,
             "single_shot_skipped": self.single_shot_skipped,

@@ -8,25 +8,32 @@ from foundation.events import STAGE_BUS
 from harness import wiring
 
 
-def move_bus(robot: Any, external: Any, boards: tuple = wiring.BOARDS) -> None:
+def move_bus(robot: Any, external: Any, openers: dict, boards: tuple) -> None:
     """Every controller of `boards` on bus `external.name` is unplugged from the emulated bus and gets a peer instead.
 
-    `external`: an object with add_peer, poll, sinks (can_bus.edge.external_bus.ExternalBus). UserError when an
-    interface cannot be opened. Its frames go into the robot's record like those of an emulated bus.
+    `external`: an object with add_peer, poll, sinks (can_bus.edge.external_bus.ExternalBus). `openers`: {board: what
+    opens its peer}, for those that have a place of their own. UserError when an interface cannot be opened. Its
+    frames go into the robot's record like those of an emulated bus.
     """
     loop = robot.loop
     number = next(place for place, bus in enumerate(robot.buses) if bus.name == external.name)
     if loop.can_lines is None:
         loop.can_lines = {}
     for wire in wiring.CAN:
-        if wire.bus != number + 1 or wire.board not in boards:
+        if wire.bus != number + 1:
             continue
         place = wiring.BOARDS.index(wire.board)
         at = 4 * place + wire.controller - 1
         loop.bus_of[at] = loop.node_of[at] = -1
+        if wire.board not in boards:
+            continue
         order = STAGE_BUS * 256 + 16 * place + wire.controller
         loop.can_lines[place, wire.controller] = external.add_peer(
-            f"{external.name}, {wire.board}", robot.boards[wire.board].inbox, wire.controller, order
+            f"{external.name}, {wire.board}",
+            robot.boards[wire.board].inbox,
+            wire.controller,
+            order,
+            openers.get(wire.board),
         )
     row = array.array("q", [0]) * LOG_FIELDS  # as the emulated bus logs a frame
     bus = robot.buses[number]

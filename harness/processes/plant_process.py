@@ -268,6 +268,9 @@ class PlantRun:
 
     def collect(self) -> None:
         """Bring every board to the plant's instant, fetch what it counted, and let its process end."""
+        for end in self.robot.polled:
+            if hasattr(end, "drain"):
+                end.drain(self.robot.loop.time)
         for name, remote in self.remotes.items():
             remote.catch_up(self.robot.loop.time)
             remote.from_board.notes.clear()

@@ -3,7 +3,7 @@
 import can
 import pytest
 
-from can_bus.edge.external_bus import AHEAD_NS, ExternalBus, keywords_of, opener, split_name
+from can_bus.edge.external_bus import AHEAD_NS, ExternalBus, opener, place_of
 from can_bus.frame import frame_bits
 from foundation.events import (
     CAN_ABORT,
@@ -172,13 +172,13 @@ def test_leaving_shuts_every_peer_down(bus):
     ],
 )
 def test_where_a_bus_goes(text, found):
-    assert split_name(text) == found
+    assert place_of(text) == found
 
 
 @pytest.mark.parametrize("text", ["can1", "=socketcan:vcan0", "can1=socketcan:", "can1=nothing:0"])
 def test_a_place_that_means_nothing_is_refused(text):
     with pytest.raises(UserError, match="--bus"):
-        split_name(text)
+        place_of(text)
 
 
 def test_python_cans_configuration_fills_in_what_is_not_given(monkeypatch, tmp_path):
@@ -202,12 +202,30 @@ def test_an_interface_that_is_not_there_is_one_line():
         opener("can1", {"interface": "slcan", "channel": "/dev/no-such-port"})()
 
 
-def test_python_cans_own_options_are_understood():
-    import argparse
+def test_python_cans_own_options_stand_behind_the_place():
+    text = "can1=slcan:/dev/ttyACM0 --bitrate 1000000 --bus-kwargs app_name=ranger serial=7"
+    assert place_of(text) == (
+        "can1",
+        {
+            "interface": "slcan",
+            "channel": "/dev/ttyACM0",
+            "bitrate": 1_000_000,
+            "app_name": "ranger",
+            "serial": 7,
+        },
+    )
+    with pytest.raises(UserError, match="--bus can1=slcan:x --bitrate fast: .*invalid int value"):
+        place_of("can1=slcan:x --bitrate fast")
 
-    from can_bus.edge.external_bus import add_options
 
-    parser = argparse.ArgumentParser()
-    add_options(parser)
-    options = parser.parse_args(["--bus-bitrate", "1000000", "--bus-bus-kwargs", "app_name=ranger", "serial=7"])
-    assert keywords_of(options) == {"bitrate": 1_000_000, "app_name": "ranger", "serial": 7}
+def test_a_board_may_have_a_place_of_its_own_on_the_bus(bus):
+    other = Wire()
+    peer = bus.add_peer("can1, UI", EventQueue(), 1, 620, lambda: other)
+    peer.from_board(CAN_REQUEST, 0, 1, 0x123, 8, 0, 0)
+    assert len(other.sent) == 1 and len(bus.wires) == 2
+
+
+def test_at_the_end_everything_that_was_sent_is_read(bus):
+    bus.wires[0].to_read = [can.Message(arbitration_id=number, is_extended_id=False) for number in range(500)]
+    bus.drain(0)
+    assert [frame[1] for frame in bus.heard] == list(range(500))
