@@ -121,11 +121,11 @@ class AttachServer:
         return {"clients": sum(client.tap is not None for client in self.clients), **self.totals}
 
     def close(self) -> None:
-        """End every connection; the name is free again."""
+        """End every connection, with what the last poll found; the name is free again."""
         for client in list(self.clients):
+            self._answer(client)
+            self._write(client)
             self._drop(client)
-        for taps in self.own:
-            taps.poll(taps.time)
         self.listener.close()
 
     # ---- connections

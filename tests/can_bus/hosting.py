@@ -56,9 +56,12 @@ def hosted(*channels, name=None, speed=1.0, servers=(), **options):
 
 
 class Program:
-    """A program in a process of its own, on pipes or (terminal=True) on a pseudo-terminal of 120 x 40."""
+    """A program in a process of its own, on pipes or (terminal=True) on a pseudo-terminal of 120 x 40.
 
-    def __init__(self, *arguments, terminal=False):
+    together: standard error comes with the output.
+    """
+
+    def __init__(self, *arguments, terminal=False, together=False):
         environment = {**os.environ, "PYTHONUNBUFFERED": "1", "TERM": "xterm", "COLUMNS": "120", "LINES": "40"}
         self.master = None
         self.text = ""
@@ -71,7 +74,10 @@ class Program:
             self.output = self.master
         else:
             self.process = subprocess.Popen(
-                [sys.executable, *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE, env=environment
+                [sys.executable, *arguments],
+                stdout=subprocess.PIPE,
+                stderr=subprocess.STDOUT if together else subprocess.PIPE,
+                env=environment,
             )
             self.output = self.process.stdout.fileno()
 
@@ -82,7 +88,8 @@ class Program:
         if self.process.poll() is None:
             self.process.kill()
         self.process.wait()
-        self.process.stderr.close()
+        if self.process.stderr is not None:
+            self.process.stderr.close()
         if self.process.stdout is not None:
             self.process.stdout.close()
         if self.master is not None:
@@ -107,7 +114,7 @@ class Program:
         """What the program has said on standard error; it must be about to end."""
         if self.process.poll() is None:
             self.process.kill()
-        return self.process.stderr.read().decode("utf-8", "replace")
+        return self._said().decode("utf-8", "replace")
 
     def type(self, keys):
         os.write(self.master, keys.encode())
@@ -121,5 +128,11 @@ class Program:
             with contextlib.suppress(OSError):
                 while os.read(self.master, 65536):
                     pass
+        elif self.process.stderr is None:
+            while os.read(self.output, 65536):  # or it would wait for a reader
+                pass
         code = self.process.wait(PATIENCE_S)
-        return code, self.process.stderr.read().decode("utf-8", "replace")
+        return code, self._said()
+
+    def _said(self):
+        return self.process.stderr.read().decode("utf-8", "replace") if self.process.stderr is not None else ""

@@ -4,14 +4,19 @@ import contextlib
 import itertools
 import socket
 
+import can
+import pytest
+
 from can_bus.bus import OPERATING
 from can_bus.edge import attach_records as wire
 from can_bus.edge.attach import AttachServer
+from can_bus.edge.candump import read_candump
+from can_bus.edge.messages import frame_of_message
 from can_bus.edge.taps import OFF
 from foundation.random_stream import RandomStream
 from harness.ranger import Ranger
 from harness.scenario import Scenario
-from tests.can_bus.hosting import fresh_name
+from tests.can_bus.hosting import Program, fresh_name
 
 MS = 1_000_000
 
@@ -90,6 +95,29 @@ def test_listeners_hear_what_the_robot_logs_and_change_nothing():
         times = [frame[0] for frame in client.frames]
         assert times == sorted(times)
         client.socket.close()
+
+
+def test_beside_a_running_robot_python_can_sees_what_the_robot_logs(tmp_path):
+    name = fresh_name()
+    call = ("-m", "tools.cli", "up", "--time", "2s", "--name", name, "--log", "full", "--out", str(tmp_path))
+    with Program(*call, together=True) as robot:
+        robot.until(r"python-can: .*\n")
+        heard = []
+        with can.Bus(interface="ranger_sim", channel=f"{name}/can4", ignore_config=True) as bus:
+            with pytest.raises(can.CanOperationError, match="has gone"):
+                while True:
+                    heard.append(bus.recv())
+            assert bus.statistics()["missed"] == 0
+        assert robot.ended()[0] == 0
+    logged = [entry[1:] for entry in read_candump(tmp_path / "can4.log")]
+    seen = [(round(each.timestamp * 1e9), *frame_of_message(each)) for each in heard]
+
+    def same(one, other):  # stamps pass through a float, the log cuts to microseconds
+        return one[1:] == other[1:] and abs(one[0] - other[0]) <= 1000
+
+    first = next(place for place, entry in enumerate(logged) if same(entry, seen[0]))
+    assert len(seen) > 5000
+    assert all(same(*pair) for pair in zip(seen, logged[first : first + len(seen)], strict=True))
 
 
 def test_frames_of_every_identifier_and_length_kill_no_board():
