@@ -24,7 +24,7 @@ class OneLineParser(argparse.ArgumentParser):
 def parser() -> argparse.ArgumentParser:
     """The whole command line."""
     from datatable import cli as table_command
-    from tools import bench, bus, daq, info, tune, up, walk
+    from tools import bench, bus, can_bounds, check_bus, daq, info, tune, up, walk
     from tools.vm import command as vm
 
     top = OneLineParser(
@@ -39,6 +39,8 @@ def parser() -> argparse.ArgumentParser:
     tune.register(commands)
     up.register(commands)
     bus.register(commands)
+    can_bounds.register(commands)
+    check_bus.register(commands)
     daq.register(commands)
     vm.register(commands)
     return top
