@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import dataclasses
 import json
 from typing import TYPE_CHECKING, Any
 
@@ -20,6 +21,8 @@ from harness.processes.lateness import figures
 from harness.processes.outside import move_bus
 from harness.processes.settings import NEVER, ON_FAILURE, Settings, one_processor
 from harness.processes.supervisor import Supervisor, View, check_platform
+from harness.profile import Profile
+from harness.profile import load as load_profile
 from harness.scenario import StopRule
 from tools import serial_options, walk
 from tools.files import json_target, writable_folder
@@ -108,8 +111,13 @@ def register(commands: Any) -> None:
     ctl.set_defaults(run=run_ctl)
 
 
-def external_buses(options: argparse.Namespace, robot: Ranger) -> tuple[list[ExternalBus], dict[str, Any]]:
-    """The buses of --bus, not opened yet, and {board: what opens its peer}. UserError for what is not there."""
+def external_buses(
+    options: argparse.Namespace, robot: Ranger, profile: Profile | None
+) -> tuple[list[ExternalBus], dict[str, Any]]:
+    """Buses of the profile and of --bus (which comes first), not opened yet, and {board: what opens its peer}.
+
+    UserError for what is not there or contradicts itself.
+    """
     from can_bus.edge.external_bus import ExternalBus, opener, place_of
 
     found: dict[str, ExternalBus] = {}
@@ -127,6 +135,10 @@ def external_buses(options: argparse.Namespace, robot: Ranger) -> tuple[list[Ext
         else:
             known = ", ".join([*bit_rates, *(each for each in wiring.BOARDS if each in single)])
             raise UserError(f"--bus {text}: there is no bus or board {name}; there are {known}")
+    for name, bus_profile in profile.buses.items() if profile is not None else ():
+        keywords_of_profile = bus_profile.python_can()
+        if keywords_of_profile is not None and name not in found:
+            found[name] = ExternalBus(name, bus_profile.bit_rate, opener(name, keywords_of_profile))
     for board in openers:
         bus = next(f"can{wire.bus}" for wire in wiring.CAN if wire.board == board)
         if bus not in found:
@@ -152,7 +164,14 @@ def run(options: argparse.Namespace) -> int:
     console = Console(stderr=True, quiet=options.json == "-")
     scenario, stop = walk.scenario_of(options), walk.stop_of(options) or FOREVER
     quirks = serial_options.quirks_of(options)
-    with contextlib.closing(Ranger(scenario, log=options.log if folder else "none", quirks=quirks)) as robot:
+    profile = load_profile(options.profile) if options.profile is not None else None
+    if profile is not None:
+        settings = dataclasses.replace(settings, boards=profile.emulated())
+        for what, boards in (("outside", profile.external()), ("absent", profile.absent())):
+            if boards:
+                console.print(f"{', '.join(boards)}: {what}", highlight=False)
+    log = options.log if folder else "none"
+    with contextlib.closing(Ranger(scenario, log=log, quirks=quirks, profile=profile)) as robot:
         ends, lines = serial_options.connect(robot, options)
         servers, more = bus.open_servers(
             {each.name: each for each in robot.buses}, options.name, options.slcan, options.socketcand
@@ -161,7 +180,7 @@ def run(options: argparse.Namespace) -> int:
             robot.attach(server)
         for line in lines + more:
             console.print(line, highlight=False, soft_wrap=True)
-        outside, openers = external_buses(options, robot)
+        outside, openers = external_buses(options, robot, profile)
         for each in outside:
             console.print(f"{each.name} is outside: this run is asynchronous and cannot be repeated", highlight=False)
         if not build.is_compiled():
@@ -169,6 +188,7 @@ def run(options: argparse.Namespace) -> int:
 
         def finish(robot: Ranger, run: PlantRun, interrupted: bool) -> int:
             summary = robot.summary()
+            summary["failed_boards"] = [name for name in summary["failed_boards"] if name in settings.boards]
             summary["processes"] = processes_summary(robot, run, servers, ends, outside)
             for line in serial_options.report(ends):
                 console.print(line, highlight=False, soft_wrap=True)

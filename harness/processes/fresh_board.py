@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from harness import wiring
+from harness import bus_schedule, wiring
 
 
 def wire_fresh_board(robot: Any, name: str, power_up_ns: int) -> Any:
@@ -11,6 +11,8 @@ def wire_fresh_board(robot: Any, name: str, power_up_ns: int) -> Any:
     What a power-up forgets is forgotten: the router's time begins at 0, the main brain has its parameter set again.
     """
     board = robot.new_board(name, power_up_ns)
+    if robot.profile is not None:
+        bus_schedule.apply(board, robot.profile)
     loop, plant = robot.loop, robot.plant
     for analog in wiring.ANALOG:
         if analog.board == name:

@@ -310,6 +310,45 @@ def test_a_variable_is_set_and_a_key_is_pressed_in_the_running_robot(up, command
     assert robot.interrupt() == 0 and "P_UI_LCD_TIME is 42.5" in robot.text
 
 
+def test_a_bus_outside_carries_the_robots_frames_and_the_run_says_that_it_is_asynchronous(up):
+    """python-can's `virtual` exists within one process, which is where all peers are."""
+    robot = up("--bus", "can1=virtual:outside", "--time", "0.3s", "--json", "-", speed="0.5")
+    assert robot.end() == 0
+    found = summary_of(robot.text)
+    outside = found["processes"]["outside"]["can1"]
+    assert found["processes"]["asynchronous"] and found["failed_boards"] == []
+    # 2 ms slots: the hip's four frames and, from the router, commands; both ways through the interface
+    assert outside["frames_in"] > 300 and outside["frames_out"] > outside["frames_in"]
+    assert outside["not_taken"] == outside["overflow"] == outside["refused"] == 0
+    assert found["can"]["can1"]["frames"] > 600
+
+
+def test_boards_that_a_profile_has_elsewhere_get_no_process(up, tmp_path):
+    profile = tmp_path / "without.toml"
+    profile.write_text('title = "no steering"\n[boards]\nMCSI = "absent"\n')
+    robot = up("--profile", str(profile), "--time", "0.1s", "--json", "-", speed="max")
+    assert robot.end() == 0
+    found = summary_of(robot.text)
+    assert (
+        found["failed_boards"] == [] and found["slots"]["MCSI"]["count"] == 0 and found["slots"]["MCFI"]["count"] > 150
+    )
+
+
+@pytest.mark.parametrize(
+    ("places", "complaint"),
+    [
+        (["can9=virtual:a"], "there is no bus or board can9; there are can1, can2, can3, can4, MCH"),
+        (["can1=virtual:a", "can1=virtual:b"], "can1 is given twice"),
+        (["MCH=virtual:a"], "its bus can1 is not outside"),
+        (["can1=socketcan:no-such-interface"], "bus can1 on socketcan:no-such-interface: "),
+    ],
+)
+def test_a_bus_that_cannot_be_put_outside_is_one_line(command, places, complaint):
+    options = [word for place in places for word in ("--bus", place)]
+    done = command("up", "--time", "0.01s", "--name", f"test-{uuid.uuid4().hex[:12]}", *options)
+    assert done.returncode == 2 and complaint in done.stderr and "Traceback" not in done.stderr
+
+
 def test_a_request_to_no_robot_is_one_line(command):
     done = command("ctl", "status", "--name", "nobody-runs-this")
     assert done.returncode == 2
