@@ -406,10 +406,9 @@ def _together(reader: _Reader, boards: Mapping[str, str], buses: Mapping[str, Bu
                         f"hangs on {bus.lower()}, which is emulated inside: give [buses.{bus.lower()}] an interface",
                     )
     users: dict[tuple[str, str], str] = {}
-    for name, bus in buses.items():
-        if bus.interface is not None and bus.channel:
-            first = users.setdefault((bus.interface, bus.channel), name)
+    for name, used in buses.items():
+        if used.interface is not None and used.channel:
+            first = users.setdefault((used.interface, used.channel), name)
             if first != name:
-                reader.fault(
-                    f"buses.{name}.channel", bus.channel, f"{bus.interface} {bus.channel} is also what {first} uses"
-                )
+                rule = f"{used.interface} {used.channel} is also what {first} uses"
+                reader.fault(f"buses.{name}.channel", used.channel, rule)

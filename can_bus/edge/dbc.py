@@ -5,7 +5,6 @@ from __future__ import annotations
 import pathlib
 
 import cantools
-from cantools.database import UnsupportedDatabaseFormatError
 from cantools.database.can import Database
 
 from can_bus.bounds import Message, message
@@ -25,12 +24,9 @@ def read_messages(path: pathlib.Path, bit_rate: int | None) -> tuple[list[Messag
         database = cantools.database.load_file(str(path), database_format="dbc", strict=False)
     except OSError as error:
         raise UserError(f"{path}: cannot be read: {error.strerror}") from None
-    except (UnsupportedDatabaseFormatError, UnicodeDecodeError) as error:
-        raise UserError(f"{path}: not a DBC file: {' '.join(str(error).split())}") from None
     except Exception as error:  # what a broken file makes of cantools is of many kinds
-        raise UserError(
-            f"{path}: cantools cannot read it: {type(error).__name__}: {' '.join(str(error).split())}"
-        ) from None
+        said = " ".join(f"{type(error).__name__}: {error}".split())
+        raise UserError(f"{path}: not a DBC file that cantools can read: {said}") from None
     if not isinstance(database, Database):
         raise UserError(f"{path}: holds no CAN messages")
     rate = bit_rate if bit_rate is not None else _baudrate(database)
