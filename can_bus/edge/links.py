@@ -36,7 +36,7 @@ from foundation.user_error import UserError
 log = logging.getLogger("can.ranger_sim")
 
 RECEIVE_QUEUE = 100_000  # frames kept for a reader; chosen by us: 20 MB, and 4 s of all four of Ranger's buses
-HANDSHAKE_S = 5.0  # chosen by us: a robot in slow motion polls its clients every few milliseconds
+HANDSHAKE_S = 60.0  # chosen by us: a robot answers once its boards have started, on a slow machine after half a minute
 STALE_S = 60.0  # a wait without a limit is cut into pieces of this length
 FOR_EVER = 1e18
 
