@@ -5,7 +5,7 @@ from harness.processes.stage cimport Audience
 
 cdef class Endpoint:
     cdef public Microcontroller board
-    cdef public object estimator, clock, shared
+    cdef public object estimator, totals, clock, shared
     cdef public long long[::1] block, stage
     cdef public double[::1] stage_doubles
     cdef public Bell ask, answer

@@ -40,6 +40,8 @@ class Endpoint:
             shared.words, f"from {board.name}", shared.from_board_first, places.SLOTS, places.ANSWER_USED, FROM_BOARD
         )
         self.audience = audience
+        errors = getattr(board, "errors", None)
+        self.totals: object = None if errors is None else errors.totals
         self.estimator = getattr(board, "estimator", None)
         self.clock: object = wallclock.monotonic_ns
         self.pending = EventQueue(64)
@@ -146,6 +148,8 @@ class Endpoint:
         self.block[44] = self.to_board.damaged  # DAMAGED
         self.block[45] = self.reached  # REACHED
         self.block[48] += 1  # TURNS
+        if (self.block[48] & 1023) == 1 and self.totals is not None:  # some ten times a second
+            self.block[43] = sum(self.totals)  # ERRORS
         if self.estimator is not None:
             self.block[38] = self.estimator.swing_leg  # SWING_LEG
 

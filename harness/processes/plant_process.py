@@ -25,6 +25,7 @@ from harness.scenario import StopRule
 SLICE_S = 0.0005  # virtual time between two looks at the wall clock: one slot of a motor board
 FAST_SLICE_S = 0.005  # the same when there is no pace to keep
 STATUS_S = 0.1  # wall clock between two reports to the supervisor
+NAP_S = 0.0005  # after something outside was served, before it is looked at again
 LONGEST_WAIT_S = 0.1  # so that the supervisor sees that the process lives
 KEY_HOLD_NS = 200_000_000  # a firm press
 MISUSE = 2  # exit code when something outside cannot be opened
@@ -113,9 +114,14 @@ class PlantRun:
             if read[0] in ready:
                 self.hear()
                 return
+            now = wallclock.monotonic_s()
             if writable or ready:
                 self.robot.poll_now()
-            now = wallclock.monotonic_s()
+                # what an end cannot take in at this instant of virtual time stays there: no spinning on it
+                if select.select(read[:1], [], [], min(NAP_S, max(0.0, end - now)))[0]:
+                    self.hear()
+                    return
+                now = wallclock.monotonic_s()
             if now >= self.next_status_s:
                 self.next_status_s = now + STATUS_S
                 self.tell(status=self.status())
