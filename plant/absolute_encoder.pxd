@@ -1,7 +1,10 @@
+cimport cython
+
 from libc.math cimport exp, sin
 from foundation.random_stream cimport RandomStream
 from plant.noise cimport NoiseSource
 
+@cython.final
 cdef class AbsoluteEncoder:
     cdef public str name
     cdef public long long zero, sign, flipped

@@ -1,5 +1,8 @@
+cimport cython
+
 from libc.math cimport sqrt
 
+@cython.final
 cdef class Battery:
     cdef public object parameters
     cdef public double[::1] curve

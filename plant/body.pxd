@@ -1,5 +1,8 @@
+cimport cython
+
 from libc.math cimport cos, fabs, sin, sqrt, tanh
 
+@cython.final
 cdef class Body:
     cdef public object parameters, floor, record, terms
     cdef public str cause

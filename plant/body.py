@@ -998,6 +998,11 @@ class Body:
         uG: cython.double = self.foot_inner_rate
         up: cython.double = self.motor_outer_rate
         un: cython.double = self.motor_inner_rate
+        o_drive, o_coulomb, o_viscous = self.outer_drive, self.outer_coulomb, self.outer_viscous
+        i_drive, i_coulomb, i_viscous = self.inner_drive, self.inner_coulomb, self.inner_viscous
+        hip_drive, hip_coulomb, hip_viscous = self.hip_drive, self.hip_coulomb, self.hip_viscous
+        exact_spring: cython.bint = self.exact_spring
+        kh: cython.double = self.kh
         F0, th0, tw0, G0, p0, n0 = F, th, tw, G, p, n
         uF0, us0, uw0, uG0, up0, un0 = uF, us, uw, uG, up, un
         self._know_angles()
@@ -1012,24 +1017,25 @@ class Body:
         for stage in range(stages):
             if stage != 2:
                 # what depends on angles alone; stages 1 and 2 look at the same ones
-                if stage > 0:
-                    st = sin(th)
-                    ct = cos(th)
-                    sw = sin(tw)
-                    cw = cos(tw)
-                Ao = mco * ct + mwo * st
-                Bo = mco * st - mwo * ct
-                Ai = mci * cw + mwi * sw
-                Bi = mci * sw - mwi * cw
+                if not locked:
+                    if stage > 0:
+                        st = sin(th)
+                        ct = cos(th)
+                        sw = sin(tw)
+                        cw = cos(tw)
+                    Ao = mco * ct + mwo * st
+                    Bo = mco * st - mwo * ct
+                    Ai = mci * cw + mwi * sw
+                    Bi = mci * sw - mwi * cw
                 a_s = F - th
                 a_w = G - tw
                 pull_s = 0.0 if massless and not outer_stands else ks * (p - a_s)
                 pull_w = 0.0 if massless and not inner_stands else ks * (n - a_w)
-                spring = self._exact_spring(th - tw) if self.exact_spring else self.kh * (th - tw)
+                spring = self._exact_spring(th - tw) if exact_spring else kh * (th - tw)
             Ts = pull_s
             Tw = pull_w
-            mp = self.outer_drive - self.outer_coulomb * tanh(up * eps) - self.outer_viscous * up - Ts
-            mn = self.inner_drive - self.inner_coulomb * tanh(un * eps) - self.inner_viscous * un - Tw
+            mp = o_drive - o_coulomb * tanh(up * eps) - o_viscous * up - Ts
+            mn = i_drive - i_coulomb * tanh(un * eps) - i_viscous * un - Tw
             if a_s < low or a_s > high:
                 stop = self._stop(a_s, uF - us)
                 Ts += stop
@@ -1041,7 +1047,9 @@ class Body:
                 if massless:
                     mn += stop
             hd = us - uw
-            Th = self.hip_drive - self.hip_coulomb * tanh(hd * eps) - self.hip_viscous * hd - spring
+            Th = 0.0
+            if not locked:
+                Th = hip_drive - hip_coulomb * tanh(hd * eps) - hip_viscous * hd - spring
             if with_terms:
                 self._ask_terms(True, th - tw, a_s, a_w, p, n, hd, uF - us, uG - uw, up, un)
                 Th += self.extra_hip

@@ -1,3 +1,6 @@
+cimport cython
+
+@cython.final
 cdef class Drive:
     cdef public long long watchdog_ns, mr2, mr6, mr0, power_off_ns, switching_leads, power_losses
     cdef public long long capacity, count, next_change_ns

@@ -1,3 +1,6 @@
+cimport cython
+
+@cython.final
 cdef class EdgeBuffer:
     cdef public long long capacity, count
     cdef public long long[::1] times, levels_a, levels_b
@@ -5,6 +8,7 @@ cdef class EdgeBuffer:
     cpdef void grow(self)
     cpdef void push(self, long long time, long long level_a, long long level_b) noexcept
 
+@cython.final
 cdef class ByteBuffer:
     cdef public long long capacity, count
     cdef public long long[::1] times, values

@@ -1,9 +1,12 @@
+cimport cython
+
 from libc.math cimport exp
 from plant.battery cimport Battery
 from plant.foot_sensor cimport FootSensors
 from plant.motor_unit cimport MotorUnit
 from plant.noise cimport NoiseSource
 
+@cython.final
 cdef class Electrics:
     cdef public object parameters
     cdef public Battery battery
@@ -11,7 +14,7 @@ cdef class Electrics:
     cdef public list motors
     cdef public FootSensors outer_feet, inner_feet
     cdef public NoiseSource noise
-    cdef public double[::1] analog_start, analog_end, values, zero_V, slope_V, noise_V, scale, offset, lag_s, state, battery_A
+    cdef public double[::1] analog_start, analog_end, values, zero_V, slope_V, noise_V, lines, scale, offset, lag_s, state, battery_A
     cdef public bint has_terms
     cdef public double electronics_W, pwm_offset_A, voltage_clip_V, battery_current_lag_s, lag_h, lag_factor
     cdef public double electronics_J, motor_current_A

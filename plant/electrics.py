@@ -117,6 +117,7 @@ class Electrics:
         self.zero_V = array.array("d", [0.0]) * ANALOG_COUNT
         self.slope_V = array.array("d", [0.0]) * ANALOG_COUNT  # volts per ampere, volt or rad
         self.noise_V = array.array("d", [0.0]) * ANALOG_COUNT
+        self.lines = array.array("d", [0.0]) * (3 * ANALOG_COUNT)  # zero_V, slope_V, noise_V of one after the other
         # additional terms of a model file, in the unit of the quantity
         self.has_terms = False
         self.scale = array.array("d", [1.0]) * ANALOG_COUNT
@@ -221,6 +222,10 @@ class Electrics:
         self.inner_feet.settle(inner_contact, inner_load_N)
         self.lag_h = 0.0
         self.lag_factor = 1.0
+        for i in range(19):
+            self.lines[3 * i] = self.zero_V[i]
+            self.lines[3 * i + 1] = self.slope_V[i]
+            self.lines[3 * i + 2] = self.noise_V[i]
         self._read(0.0, steering_rad)
         for i in range(19):
             self.analog_start[i] = self.analog_end[i]
@@ -240,7 +245,6 @@ class Electrics:
         unit: MotorUnit
         values: cython.double[::1] = self.values
         end: cython.double[::1] = self.analog_end
-        battery_A: cython.double[::1] = self.battery_A
         motors: list = self.motors
         for motor in range(4):
             # what the three sensors of a motor board measure
@@ -248,17 +252,19 @@ class Electrics:
             amps = unit.current_A
             if unit.drive.sensed_lead_switches:
                 amps += unit.mounting * self.pwm_offset_A
-            value = battery_A[motor]
+            value = self.battery_A[motor]
             value += (unit.battery_current_A - value) * lag
-            battery_A[motor] = value
+            self.battery_A[motor] = value
             i = 3 * motor
             values[i] = amps
             values[i + 1] = value
             values[i + 2] = seen
-        values[12] = self.outer_feet.left_V
-        values[13] = self.outer_feet.right_V
-        values[14] = self.inner_feet.left_V
-        values[15] = self.inner_feet.right_V
+        feet: FootSensors = self.outer_feet
+        values[12] = feet.left_V
+        values[13] = feet.right_V
+        feet = self.inner_feet
+        values[14] = feet.left_V
+        values[15] = feet.right_V
         # the sensor's own 1024 steps of a turn: the nearest one
         steps = steering_rad * (1024.0 / 6.283185307179586)
         if steps >= 0.0:
@@ -276,10 +282,10 @@ class Electrics:
                         value = self.state[i] + (value - self.state[i]) * (1.0 - exp(-h / self.lag_s[i]))
                     self.state[i] = value
                 values[i] = value
+        noise: cython.double[::1] = self.noise.table
+        lines: cython.double[::1] = self.lines
         place = self.noise.block()
-        table: cython.double[::1] = self.noise.table
-        zero: cython.double[::1] = self.zero_V
-        slope: cython.double[::1] = self.slope_V
-        noise: cython.double[::1] = self.noise_V
+        line: cython.longlong = 0
         for i in range(19):
-            end[i] = zero[i] + slope[i] * values[i] + noise[i] * table[place + i]
+            end[i] = lines[line] + lines[line + 1] * values[i] + lines[line + 2] * noise[place + i]
+            line += 3

@@ -1,5 +1,8 @@
+cimport cython
+
 from libc.math cimport exp
 
+@cython.final
 cdef class FootSensors:
     cdef public str name
     cdef public double rise_time_constant_s, share, per_N, left_gain, right_gain, swing_counts, span_counts

@@ -1,3 +1,5 @@
+cimport cython
+
 from libc.math cimport cos, exp, sin
 from foundation.numbers cimport word_of_float
 from foundation.random_stream cimport RandomStream
@@ -5,6 +7,7 @@ from plant.edge_buffer cimport ByteBuffer
 
 cdef long long _MASK, _TEN_BITS
 
+@cython.final
 cdef class Imu:
     cdef public double bias_rad_s, noise_rad_s, roll_bias_rad, roll_noise_rad, rate_scale, lag_s, cross_x_from_z
     cdef public long long filter_samples, latency_ns, baud, sample_ns, fusion_divider, ppb, phase_ns
@@ -20,6 +23,7 @@ cdef class Imu:
         self, long long t0, long long t1, double lean0, double rate0, double lean1, double rate1,
         double yaw=*, double yaw_rate=*,
     )
+    cpdef void _begin(self) noexcept
     cpdef void _send(self, long long byte) noexcept
     cpdef void _word(self, long long word) noexcept
     cpdef void _sum(self) noexcept

@@ -176,24 +176,46 @@ class Imu:
             self.samples += 1
             self.next_sample_ns = self.sample_time(self.samples)
 
+    def _begin(self) -> cython.void:
+        """Make room for a packet and start its sum."""
+        line: ByteBuffer = self.bytes
+        if line.count + 32 > line.capacity:
+            line.grow()
+        self.byte_ns = _TEN_BITS // self.baud
+        self.checksum = 0
+
     def _send(self, byte: cython.longlong) -> cython.void:
         """One byte on the line, from `line_free_ns` on; 10 bits at the baud rate."""
         line: ByteBuffer = self.bytes
-        i: cython.longlong = line.count
         self.checksum += byte
         self.line_free_ns += self.byte_ns
-        if i == line.capacity:
-            line.grow()
-        line.times[i] = self.line_free_ns
-        line.values[i] = byte
-        line.count = i + 1
+        line.times[line.count] = self.line_free_ns
+        line.values[line.count] = byte
+        line.count += 1
 
     def _word(self, word: cython.longlong) -> cython.void:
         """Four bytes, the highest first."""
-        self._send(word >> 24 & 255)
-        self._send(word >> 16 & 255)
-        self._send(word >> 8 & 255)
-        self._send(word & 255)
+        line: ByteBuffer = self.bytes
+        times: cython.longlong[::1] = line.times
+        values: cython.longlong[::1] = line.values
+        at: cython.longlong = line.count
+        a: cython.longlong = word >> 24 & 255
+        b: cython.longlong = word >> 16 & 255
+        c: cython.longlong = word >> 8 & 255
+        d: cython.longlong = word & 255
+        time: cython.longlong = self.line_free_ns
+        step: cython.longlong = self.byte_ns
+        times[at] = time + step
+        times[at + 1] = time + 2 * step
+        times[at + 2] = time + 3 * step
+        times[at + 3] = time + 4 * step
+        values[at] = a
+        values[at + 1] = b
+        values[at + 2] = c
+        values[at + 3] = d
+        self.line_free_ns = time + 4 * step
+        self.checksum += a + b + c + d
+        line.count = at + 4
 
     def _sum(self) -> cython.void:
         """The 16-bit sum of everything since the header."""
@@ -211,8 +233,7 @@ class Imu:
     ) -> cython.void:
         """One packet of 31 bytes whose first start bit is at `start`."""
         self.line_free_ns = start
-        self.checksum = 0
-        self.byte_ns = _TEN_BITS // self.baud
+        self._begin()
         self._send(self.mode)
         self._word(word_of_float(first))
         self._word(word_of_float(second))
@@ -229,8 +250,7 @@ class Imu:
         start: cython.longlong = self.acknowledge_ns + self.latency_ns
         if start > self.line_free_ns:
             self.line_free_ns = start
-        self.checksum = 0
-        self.byte_ns = _TEN_BITS // self.baud
+        self._begin()
         self._send(0xC4)
         self._send(self.acknowledge)
         self._word(self.acknowledge_ns // 16000 & _MASK)

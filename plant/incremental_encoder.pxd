@@ -1,7 +1,10 @@
+cimport cython
+
 from libc.math cimport cos, sin, sqrt
 from foundation.random_stream cimport RandomStream
 from plant.edge_buffer cimport EdgeBuffer
 
+@cython.final
 cdef class IncrementalEncoder:
     cdef public str name
     cdef public object seed
@@ -13,6 +16,7 @@ cdef class IncrementalEncoder:
     cdef public bint has_errors, started, broken, has_end
     cdef public EdgeBuffer edges
     cdef public double u0, du, m0, m1, span_ns, end_angle, end_rate, end_u, end_speed
+    cdef public double calm_from, calm_to, calm_rad
     cpdef double position(self, double angle) noexcept
     cpdef double speed(self, double angle, double rate) noexcept
     cpdef double threshold(self, long long n) noexcept
@@ -20,6 +24,7 @@ cdef class IncrementalEncoder:
     cpdef long long level_a(self) noexcept
     cpdef long long level_b(self, double angle)
     cpdef void update(self, long long t0, long long t1, double angle0, double rate0, double angle1, double rate1)
+    cdef void _calm(self) noexcept
     cpdef double _value(self, double x) noexcept
     cpdef void _turning(self, long long t0, long long t1, double u0, double u1, double m0, double m1)
     cpdef void _piece(self, double x0, double x1)

@@ -80,6 +80,10 @@ class IncrementalEncoder:
         self.end_u = 0.0
         self.end_speed = 0.0
         self.has_end = False
+        # joint angles (rad) between which no edge lies, with `calm_rad` to spare on both sides; empty when unknown
+        self.calm_from = 1.0
+        self.calm_to = -1.0
+        self.calm_rad = 0.0
         # the running piece, as fields so that the helpers need no long argument lists
         self.u0 = 0.0
         self.du = 0.0
@@ -143,6 +147,8 @@ class IncrementalEncoder:
         self.cell = n
         self.started = True
         self.has_end = False
+        self.calm_from = 1.0
+        self.calm_to = -1.0
         self.edges.count = 0
 
     def level_a(self) -> cython.longlong:
@@ -193,6 +199,13 @@ class IncrementalEncoder:
             self.reset(angle0)
         if self.broken:
             return
+        if self.calm_from < angle0 < self.calm_to and self.calm_from < angle1 < self.calm_to:
+            # between two edges at both ends; the cubic bulges out by at most 4/27 of each end's rate times the step
+            x = rate0 if rate0 > 0.0 else -rate0
+            x += rate1 if rate1 > 0.0 else -rate1
+            if h * x < self.calm_rad:
+                self.has_end = False
+                return
         # as a rule a step starts where the last one ended
         if self.has_end and angle0 == self.end_angle and rate0 == self.end_rate:
             u0 = self.end_u
@@ -221,6 +234,7 @@ class IncrementalEncoder:
                 return
             level = self.errors[(cell + 1) % self.table_size] + (cell + 1) if self.has_errors else cell + 1
             if u1 < level:
+                self._calm()
                 return
         elif du < 0.0:
             if m0 > 0.5 * du or m0 < 2.0 * du or m1 > 0.5 * du or m1 < 2.0 * du:
@@ -228,6 +242,7 @@ class IncrementalEncoder:
                 return
             level = self.errors[cell % self.table_size] + cell if self.has_errors else cell
             if u1 >= level:
+                self._calm()
                 return
         else:
             if m0 != 0.0 or m1 != 0.0:
@@ -273,8 +288,23 @@ class IncrementalEncoder:
                 if u1 >= level:
                     break
         self.cell = cell
+        self.calm_from = 1.0
+        self.calm_to = -1.0
         buffer.count = count
         self.total += count
+
+    def _calm(self) -> cython.void:
+        """Find the joint angles between the two edges beside the present position, a tenth of an edge inside."""
+        a: cython.double = self.edges_per_shaft_rad * self.shaft_per_rad * self.scale
+        b: cython.double = self.edges_per_shaft_rad * self.shaft_per_rad * self.offset_rad
+        if self.calm_from < self.calm_to or self.eccentricity_1 != 0.0 or self.eccentricity_2 != 0.0 or a == 0.0:
+            return
+        self.calm_from = (self.threshold(self.cell) + 0.1 - b) / a
+        self.calm_to = (self.threshold(self.cell + 1) - 0.1 - b) / a
+        if a < 0.0:
+            self.calm_from, self.calm_to = self.calm_to, self.calm_from
+            a = -a
+        self.calm_rad = 0.5 / a  # 4/27 of it are less than a tenth of an edge
 
     def _value(self, x: cython.double) -> cython.double:
         """The cubic at the fraction x of the step, in edges."""
@@ -333,6 +363,8 @@ class IncrementalEncoder:
             self._piece(x1, x2)
         if x2 < 1.0 and x1 < x2:
             self._piece(x2, 1.0)
+        self.calm_from = 1.0
+        self.calm_to = -1.0
         self.total += self.edges.count - before
 
     def _piece(self, x0: cython.double, x1: cython.double) -> cython.void:

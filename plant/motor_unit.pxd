@@ -1,6 +1,9 @@
+cimport cython
+
 from libc.math cimport exp, log, tanh
 from plant.drive cimport Drive
 
+@cython.final
 cdef class MotorUnit:
     cdef public str name
     cdef public object parameters
@@ -20,5 +23,7 @@ cdef class MotorUnit:
     cpdef double torque_Nm(self, double current_A, double rate_rad_s) noexcept
     cpdef void load(self, double current_A) noexcept
     cpdef void step_electrical(self, long long t0, long long t1, double rate_rad_s, double battery_V) noexcept
+    cdef void _rest(self, double h, double voltage_V) noexcept
+    cdef void _heat(self) noexcept
     cdef void _know_step(self, double h, double R) noexcept
     cpdef void _warm(self, double h) noexcept

@@ -173,6 +173,11 @@ class MotorUnit:
             return
         if drive.next_change_ns <= t0:
             drive.apply(t0)
+        if amps == 0.0 and drive.switching_leads == 0 and drive.next_change_ns > t1:
+            x = drive.duty * battery_V - back_emf_V
+            if -self.contact_drop_V <= x <= self.contact_drop_V:
+                self._rest(h, drive.duty * battery_V)
+                return
         if h != self.known_s or R != self.known_ohm:
             self._know_step(h, R)
         tau = self.tau_s
@@ -277,15 +282,32 @@ class MotorUnit:
         self.heat_J += energy + part + ripple_J * self.winding_ohm / R
         self.heat_s += h
         if self.heat_s >= 0.008:
-            self.heat_W = self.heat_J / self.heat_s
-            self._warm(self.heat_s)
-            self.heat_J = 0.0
-            self.heat_s = 0.0
+            self._heat()
         # the three torque numbers for the body: `load` of the mean current
         x = self.gear * self.K * self.mean_current_A
         self.drive_Nm = x
         self.coulomb_Nm = self.mu * (x if x > 0.0 else -x) + self.C0
         self.viscous_Nms = self.C1
+
+    def _rest(self, h: cython.double, voltage_V: cython.double) -> cython.void:
+        """A step of `h` seconds without current: the contact drop holds it at zero and no lead switches."""
+        self.current_A = 0.0
+        self.mean_current_A = 0.0
+        self.battery_current_A = 0.0
+        self.drive_voltage_V = voltage_V
+        self.heat_s += h
+        if self.heat_s >= 0.008:
+            self._heat()
+        self.drive_Nm = 0.0
+        self.coulomb_Nm = self.C0
+        self.viscous_Nms = self.C1
+
+    def _heat(self) -> cython.void:
+        """Warm the motor with the mean power since it was last warmed."""
+        self.heat_W = self.heat_J / self.heat_s
+        self._warm(self.heat_s)
+        self.heat_J = 0.0
+        self.heat_s = 0.0
 
     def _know_step(self, h: cython.double, R: cython.double) -> cython.void:
         """Keep what a step of `h` seconds at a loop resistance of `R` ohm needs of the exponential."""

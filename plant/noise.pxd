@@ -1,5 +1,8 @@
+cimport cython
+
 from foundation.random_stream cimport RandomStream
 
+@cython.final
 cdef class NoiseSource:
     cdef public RandomStream stream
     cdef public double[::1] table

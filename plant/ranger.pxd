@@ -1,3 +1,5 @@
+cimport cython
+
 from plant.absolute_encoder cimport AbsoluteEncoder
 from plant.body cimport Body
 from plant.electrics cimport Electrics
@@ -6,6 +8,7 @@ from plant.incremental_encoder cimport IncrementalEncoder
 from plant.motor_unit cimport MotorUnit
 from plant.steering cimport Steering
 
+@cython.final
 cdef class RangerPlant:
     cdef public object parameters, floor, record, sample_names, model_file
     cdef public Body body

@@ -1,5 +1,8 @@
+cimport cython
+
 from libc.math cimport cos, sin, tanh
 
+@cython.final
 cdef class Steering:
     cdef public double twist, rate, yaw, path_x, path_y, hip_x, known_yaw, sin_yaw, cos_yaw
     cdef public double rotor_inertia, swing_inertia, stance_inertia, stiffness, damping, stop

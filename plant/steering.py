@@ -73,7 +73,7 @@ class Steering:
         went: cython.double
         if outer_stands and inner_stands:
             self.rate = 0.0
-        else:
+        elif drive != 0.0 or rate != 0.0 or before != 0.0:
             rate += (
                 h
                 * (

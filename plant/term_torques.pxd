@@ -1,5 +1,8 @@
+cimport cython
+
 from libc.math cimport exp, sin, tanh
 
+@cython.final
 cdef class TermTorques:
     cdef public long long count
     cdef public double zero_rad, hip_gear, ankle_gear, inverse_smoothing
