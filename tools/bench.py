@@ -123,6 +123,13 @@ def can_fuzz_case(cases: int) -> dict:
     return fuzz_can.benchmark(cases)
 
 
+def channel_fuzz_case(cases: int) -> dict:
+    """Damaged messages in the channel of a board process."""
+    from tools import fuzz_channel
+
+    return fuzz_channel.benchmark(cases)
+
+
 CASES = {
     # case: (title, function of the virtual seconds)
     "robot": ("whole robot, digest on, logs off", lambda s: robot_case(s)),
@@ -136,6 +143,7 @@ CASES = {
     "bus-eight": ("our four buses, eight boards each, 75 % load", lambda s: bus_case(50_000 * int(s), 0.75, 8)),
     "serial-fuzz": ("wrong bytes on the serial line", lambda s: fuzz_case(5_000 * int(s))),
     "can-fuzz": ("wrong and foreign frames on the buses", lambda s: can_fuzz_case(5_000 * int(s))),
+    "channel-fuzz": ("damaged messages to a board process", lambda s: channel_fuzz_case(5_000 * int(s))),
     "virtual": ("python-can virtual, three boards", lambda s: virtual_case(1_000 * int(s))),
 }
 INTERPRETED = ("robot", "plant", "bus")

@@ -17,10 +17,11 @@ from foundation.user_error import UserError
 from harness import build, wiring
 from harness.processes import block as places
 from harness.processes import control
+from harness.processes.hardware import HardwareInTheLoop
 from harness.processes.lateness import figures
 from harness.processes.outside import move_bus
 from harness.processes.settings import NEVER, ON_FAILURE, Settings, one_processor
-from harness.processes.supervisor import Supervisor, View, check_platform
+from harness.processes.supervisor import ELSEWHERE, RUNNING, Supervisor, View, check_platform
 from harness.profile import Profile
 from harness.profile import load as load_profile
 from harness.scenario import StopRule
@@ -186,10 +187,16 @@ def run(options: argparse.Namespace) -> int:
         if not build.is_compiled():
             console.print(f"running interpreted, slowly: {build.why_interpreted()}", highlight=False, soft_wrap=True)
 
+        elsewhere: list[HardwareInTheLoop] = []
+
         def finish(robot: Ranger, run: PlantRun, interrupted: bool) -> int:
             summary = robot.summary()
             summary["failed_boards"] = [name for name in summary["failed_boards"] if name in settings.boards]
             summary["processes"] = processes_summary(robot, run, servers, ends, outside)
+            for each in elsewhere:
+                summary["processes"]["external_boards"] = each.watch.report()
+                for line in each.watch.lines():
+                    console.print(line, highlight=False, soft_wrap=True)
             for line in serial_options.report(ends):
                 console.print(line, highlight=False, soft_wrap=True)
             walk.finish(robot, summary, options, folder, json_file, console)
@@ -203,6 +210,8 @@ def run(options: argparse.Namespace) -> int:
         def begin(robot: Ranger) -> None:
             for each in outside:
                 move_bus(robot, each, openers, settings.boards)
+            if profile is not None and (profile.external() or profile.absent()):
+                elsewhere.append(HardwareInTheLoop(robot, profile, outside))
 
         supervisor = Supervisor(robot, settings, stop, finish, view, begin)
         view.say(f"ranger-sim up, name {settings.name}: {supervisor.describe()}")
@@ -284,7 +293,8 @@ class PlainView(View):
         self.next_s = now + PLAIN_S
         loads = " ".join(f"{100.0 * each['load']:.0f}" for each in state["buses"].values())
         late = max((each["lateness"]["p99_us"] or 0.0) for each in state["boards"].values())
-        wrong = [f"{name} {each['state']}" for name, each in state["boards"].items() if each["state"] != "running"]
+        expected = (RUNNING, ELSEWHERE)
+        wrong = [f"{name} {each['state']}" for name, each in state["boards"].items() if each["state"] not in expected]
         self.say(
             f"{state['time_s']:.1f} s, {state['steps']} steps, {state['distance_m']:.2f} m, loads {loads} %, "
             f"late p99 {late:.0f} us" + (", paused" if state["paused"] else "") + "".join(f", {each}" for each in wrong)

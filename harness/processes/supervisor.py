@@ -34,7 +34,7 @@ LOOK_S = 0.2  # between two looks at boards and screen
 HANG_S = 1.0  # a board that keeps its turn so long is looked at; named well within 2 s
 RESTART_LIMIT = 5  # per board with --restart on-failure, so that a board that cannot live does not keep us busy
 
-RUNNING, STOPPED, GONE, RESTARTING, OUTSIDE = "running", "stopped", "gone", "restarting", "outside"
+RUNNING, STOPPED, GONE, RESTARTING, ELSEWHERE = "running", "stopped", "gone", "restarting", "elsewhere"
 
 
 class View:
@@ -411,7 +411,7 @@ class Supervisor:
             words, child, board = block.words, self.children.get(name), self.robot.boards[name]
             bins = words[places.LATENESS : places.LATENESS + places.LATENESS_WORDS]
             boards[name] = {
-                "state": child.state if child is not None else OUTSIDE,
+                "state": child.state if child is not None else ELSEWHERE,
                 "process": child.process if child is not None else 0,
                 "slots": words[places.SLOT_COUNT],
                 "overruns": words[places.OVERRUNS],
