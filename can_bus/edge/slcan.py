@@ -12,6 +12,7 @@ from contextlib import suppress
 
 from can_bus.bus import Bus
 from can_bus.edge.messages import data_of_words, words_of_data
+from can_bus.edge.stream_server import COUNTERS, NEXT_POLL_NS, QUICK_POLL_NS
 from can_bus.edge.taps import ERROR_PASSIVE, OFF, QUEUED, RECEIVED, Event, Tap, Taps, taps_of
 from foundation.events import FLAG_ERROR, FLAG_EXTENDED, FLAG_REMOTE
 from foundation.user_error import UserError
@@ -19,8 +20,6 @@ from foundation.user_error import UserError
 LINE_LIMIT = 32  # characters; the longest command, an extended frame of eight bytes, has 26
 BACKLOG_LIMIT = 1 << 16  # bytes that wait for a slow reader before frames are dropped; chosen by us
 HELD_ABOVE = 1 << 12  # bytes; a bus at full speed waits then
-NEXT_POLL_NS = 1_000_000
-QUICK_POLL_NS = 31_250
 STAMP_WRAP_MS = 60_000  # LAWICEL: stamps of 16 bits run from 0 to 59999 ms
 OK, BELL = b"\r", b"\a"
 # letter: (digits of the identifier, flags)
@@ -46,9 +45,7 @@ class SlcanServer:
         self.stamps = False
         self.overrun = False
         self.overlong = False
-        self.totals = dict.fromkeys(
-            ("clients_seen", "frames_in", "frames_out", "frames_dropped", "malformed", "refused"), 0
-        )
+        self.totals = dict.fromkeys(COUNTERS, 0)
         try:
             import tty
         except ImportError:

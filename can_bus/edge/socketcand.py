@@ -12,17 +12,13 @@ from contextlib import suppress
 
 from can_bus.bus import Bus
 from can_bus.edge.messages import data_of_words, words_of_data
-from can_bus.edge.taps import QUEUED, RECEIVED, Event, Tap, Taps, taps_of
+from can_bus.edge.stream_server import BACKLOG_LIMIT, CLIENT_LIMIT, Connection, StreamServer
+from can_bus.edge.taps import QUEUED, RECEIVED, Event, Tap, Taps
 from foundation import wallclock
 from foundation.events import FLAG_ERROR, FLAG_EXTENDED, FLAG_REMOTE
 from foundation.user_error import UserError
 
-CLIENT_LIMIT = 64  # chosen by us
 TEXT_LIMIT = 256  # characters of one message; the longest, a send with eight bytes, has 45
-BACKLOG_LIMIT = 1 << 20  # bytes that wait for a slow client before frames are dropped; chosen by us
-HELD_ABOVE = 1 << 16
-NEXT_POLL_NS = 1_000_000
-QUICK_POLL_NS = 31_250
 # Clients take everything that has come in for the answer to `rawmode`; a frame directly behind it confuses them. So
 # nothing follows it for this long (chosen by us: the time in which a client reads its answer on a busy machine).
 QUIET_AFTER_RAWMODE_S = 0.1
@@ -30,118 +26,52 @@ ERROR_MASK = 0x1FFFFFFF
 MESSAGE = re.compile(rb"\s*<\s*([^<>]*?)\s*>")
 
 
-class _Client:
+class _Client(Connection):
     """One connection."""
 
     def __init__(self, connection: socket.socket) -> None:
-        self.connection = connection
-        self.incoming = bytearray()
-        self.outgoing = bytearray(b"< hi >")
-        self.taps: Taps | None = None
-        self.tap: Tap | None = None
+        super().__init__(connection)
+        self.outgoing += b"< hi >"
         self.quiet_until = 0.0
         self.kept: list[Event] = []
-        self.ending = False
 
 
-class SocketcandServer:
+class SocketcandServer(StreamServer[_Client]):
     """`buses`, {channel: Bus}, on a TCP port (0: a free one; see `port`). UserError when it cannot be had."""
 
     def __init__(
         self, buses: "Mapping[str, Bus | Taps]", port: int, host: str = "127.0.0.1", epoch_ns: int = 0
     ) -> None:
-        self.epoch_ns = epoch_ns
-        self.channels: dict[str, Taps] = {}
-        self.own: list[Taps] = []
-        for channel, bus in buses.items():
-            taps, mine = taps_of(bus)
-            self.channels[channel] = taps
-            if mine:
-                self.own.append(taps)
-        self.clients: list[_Client] = []
-        self.totals = dict.fromkeys(
-            ("clients_seen", "frames_in", "frames_out", "frames_dropped", "malformed", "refused", "not_carried"), 0
-        )
-        self.listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+        listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
         try:
-            self.listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-            self.listener.setblocking(False)
-            self.listener.bind((host, port))
-            self.listener.listen(CLIENT_LIMIT)
+            listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            listener.setblocking(False)
+            listener.bind((host, port))
+            listener.listen(CLIENT_LIMIT)
         except (OSError, OverflowError) as error:
-            self.listener.close()
+            listener.close()
             reason = error.strerror if isinstance(error, OSError) else "a port is 0 ... 65535"
             raise UserError(f"socketcand on {host}:{port}: {reason}") from None
-        self.host, self.port = self.listener.getsockname()
-
-    def poll(self, now_ns: int) -> int:
-        """Frames from clients in, frames of the buses out; returns the latest instant for the next poll, ns."""
-        self._accept()
-        for client in list(self.clients):
-            self._read(client)
-        for taps in self.own:
-            taps.poll(now_ns)
-        for client in list(self.clients):
-            self._answer(client)
-            self._write(client)
-        busy = any(client.tap is not None and client.tap.queued for client in self.clients)
-        return now_ns + (QUICK_POLL_NS if busy else NEXT_POLL_NS)
-
-    def filenos(self) -> list[int]:
-        """Descriptors that become readable when a client wants something."""
-        return [self.listener.fileno(), *(client.connection.fileno() for client in self.clients)]
-
-    def filenos_to_write(self) -> list[int]:
-        """Descriptors on which something waits until the client takes more."""
-        return [client.connection.fileno() for client in self.clients if client.outgoing]
+        super().__init__(listener, buses, epoch_ns)
+        self.totals["not_carried"] = 0
+        self.host, self.port = listener.getsockname()
 
     def patience_s(self) -> float:
-        """Wall-clock seconds after which a poll has something to do even if nothing else happens."""
+        """Until kept frames may follow the answer to rawmode."""
         return QUIET_AFTER_RAWMODE_S if any(client.kept for client in self.clients) else math.inf
 
-    def counters(self) -> dict[str, int]:
-        """Whole numbers by name, as the other servers have them, and frames not carried."""
-        return {"clients": sum(client.tap is not None for client in self.clients), **self.totals}
+    def _welcomed(self, connection: socket.socket) -> _Client | None:
+        """The protocol has no word for `no room`."""
+        if len(self.clients) >= CLIENT_LIMIT:
+            self.totals["refused"] += 1
+            connection.close()
+            return None
+        with suppress(OSError):
+            connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        return _Client(connection)
 
-    def close(self) -> None:
-        """End every connection."""
-        for client in list(self.clients):
-            self._drop(client)
-        self.listener.close()
-
-    def _accept(self) -> None:
-        while True:
-            try:
-                connection, _ = self.listener.accept()
-            except OSError:
-                return
-            connection.setblocking(False)
-            if len(self.clients) >= CLIENT_LIMIT:
-                self.totals["refused"] += 1
-                connection.close()
-                continue
-            with suppress(OSError):
-                connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-            self.clients.append(_Client(connection))
-
-    def _read(self, client: _Client) -> None:
-        """Everything that has arrived from one client."""
-        gone = False
-        if client.ending:
-            return
-        try:
-            while True:
-                data = client.connection.recv(1 << 16)
-                if not data:
-                    gone = True
-                    break
-                client.incoming += data
-                if len(data) < 1 << 16:
-                    break
-        except BlockingIOError:
-            pass
-        except OSError:
-            gone = True
+    def _understand(self, client: _Client) -> None:
+        """The messages that are whole, one after the other."""
         while not client.ending and (found := MESSAGE.match(client.incoming)):
             text = found.group(1).decode("latin-1")
             del client.incoming[: found.end()]
@@ -150,8 +80,6 @@ class SocketcandServer:
         if not client.ending and (len(client.incoming) > TEXT_LIMIT or rest and not rest.startswith(b"<")):
             self._refuse(client, "that is no message in angle brackets")
             client.ending = True
-        if gone:
-            self._drop(client)
 
     def _refuse(self, client: _Client, reason: str) -> None:
         self.totals["malformed"] += 1
@@ -228,29 +156,3 @@ class SocketcandServer:
                 text = f"< frame {name} {stamp} {data_of_words(flags, lo, hi).hex().upper()} >"
             client.outgoing += text.encode()
             self.totals["frames_out"] += 1
-
-    def _write(self, client: _Client) -> None:
-        """As much as the client takes now."""
-        if client.outgoing:
-            try:
-                sent = client.connection.send(client.outgoing)
-            except BlockingIOError:
-                sent = 0
-            except OSError:
-                self._drop(client)
-                return
-            del client.outgoing[:sent]
-        if client.tap is not None:
-            client.tap.held = len(client.outgoing) > HELD_ABOVE
-        if client.ending and not client.outgoing:
-            self._drop(client)
-
-    def _drop(self, client: _Client) -> None:
-        if client not in self.clients:
-            return
-        self.clients.remove(client)
-        if client.tap is not None and client.taps is not None:
-            client.tap.held = False
-            client.taps.remove(client.tap)
-        with suppress(OSError):
-            client.connection.close()
