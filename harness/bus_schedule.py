@@ -47,6 +47,12 @@ FRAMES_PER_EXCHANGE = 6
 # How much a main-brain slot varies before it sends, and the router before it has routed: chosen by us, above what the
 # costs of boards/main_brain/board.py and boards/can_router.py make of twenty frames and a slot of the router.
 COMMAND_VARIATION_NS = 200_000
+# What a command that the schedule does not name adds without `commands_in_turn`. Boards that are told something in
+# every slot (the motors) get at most one other command per slot: the modes change one thing at a time. Of the other
+# boards (display, lights) each command comes at most so often, all of them perhaps in one slot: the fastest is
+# ERROR_LCD, once per pass of the main brain's rows, 22 ms. The first slot of all, which sends every command once, is
+# not covered.
+ON_DEMAND_MS = Fraction(20)
 HARDWARE_BUFFERS = 2  # transmit buffers that a board's queue is emptied into (facts network 1.6, 4.14)
 SYNC = "TIMESTAMP"
 
@@ -170,8 +176,7 @@ def streams(table: Table, bus: str, schedules: Mapping[str, BusSchedule], absent
 
     Satellites: a row's variables once per pass or every n-th, anywhere in their slots; the occasional list as one
     stream. Router: TIMESTAMP, and the main brain's commands. Those that the schedule names come in every n-th of its
-    slots, the others count as one frame per slot: with `commands_in_turn` the main brain sees to that; without, it is
-    what its program does except in its first slot, which sends every command once.
+    slots; of the others one every so many slots with `commands_in_turn`, else as it says at ON_DEMAND_MS.
     """
     schedule = schedules[bus]
     found: list[Stream] = []
@@ -218,30 +223,40 @@ def _command_streams(
     """What the main brain sends to one bus: all of a slot leaves together, in the order of identifiers."""
     regular: list[Variable] = []
     others: list[Variable] = []
-    in_turn = 1
+    in_turn = 0
     for variable in command_variables(table):
         own = [schedules[name.lower()] for name in variable.buses if name.lower() in schedules]
         if any(variable.name in one.every for one in own):
             regular.append(variable)
-        else:
+        elif bus.upper() in variable.buses:
             others.append(variable)
             in_turn = max(in_turn, *(one.commands_in_turn for one in own))
 
-    def common(before: int, offset: int) -> dict[str, Any]:
+    def common(variable: Variable, offset: int = 0) -> dict[str, Any]:
+        before = sum(1 for one in regular if one.id < variable.id)
+        if not in_turn:
+            before += sum(1 for one in others if one.id < variable.id and one.subscribers == variable.subscribers)
         jitter = EXCHANGE_NS * (1 + before // FRAMES_PER_EXCHANGE) + COMMAND_VARIATION_NS
         return {"queue": router, "jitter_ns": jitter, "offset_ns": int(slot_ms * offset * 1_000_000)}
 
     found = []
-    for place, variable in enumerate(regular):
+    for variable in regular:
         if bus.upper() in variable.buses:
             n = max(
                 schedules[name.lower()].turns(variable.name) for name in variable.buses if name.lower() in schedules
             )
-            found.append(_stream("MB", variable.name, [variable], slot_ms * n, **common(place, 0)))
-    listed = [variable for variable in others if bus.upper() in variable.buses]
-    if listed:
-        more = common(len(regular), in_turn - 1)
-        found.append(_stream("MB", "(other commands)", listed, slot_ms * in_turn, **more))
+            found.append(_stream("MB", variable.name, [variable], slot_ms * n, **common(variable)))
+    if not in_turn:
+        steered = {one.subscribers for one in regular}
+        found += [
+            _stream("MB", one.name, [one], ON_DEMAND_MS, **common(one, 1))
+            for one in others
+            if one.subscribers not in steered
+        ]
+        others = [one for one in others if one.subscribers in steered]
+    if others:
+        every = max(1, in_turn)
+        found.append(_stream("MB", "(other commands)", others, slot_ms * every, **common(others[-1], every - 1)))
     return found
 
 

@@ -70,8 +70,10 @@ def of_profile(options: argparse.Namespace) -> list[dict]:
         ]
         notes = []
         if not bus.schedule.commands_in_turn:
+            rare = f"{float(bus_schedule.ON_DEMAND_MS):g}"
             notes.append(
-                "'(other commands)' counts one frame per slot of the main brain; in its first slot it sends all of them"
+                "of other commands to a motor one per slot of the main brain is counted, of those to the user "
+                f"interface each every {rare} ms; the first slot after power-up sends every command once: not covered"
             )
         found.append(report(name, bus.bit_rate, bus.schedule_name, bounds.bounds, frames, bounds.waiting, notes))
     return found
