@@ -8,6 +8,7 @@ each at the start and then as the schedule has them, those that it does not name
 from __future__ import annotations
 
 import heapq
+import math
 from fractions import Fraction
 
 import datatable
@@ -73,7 +74,7 @@ class RestBus:
         if variable.id not in self.words or variable.id == self.sync_id:
             raise UserError(f"rest-bus: {variable.name} is not sent from here; {variable.publisher} sends it")
         low, high = variable.minimum, variable.maximum
-        if (low is not None and value < low) or (high is not None and value > high):
+        if not math.isfinite(value) or (low is not None and value < low) or (high is not None and value > high):
             raise UserError(
                 f"rest-bus: {variable.name} = {value!r} is outside {low} to {high} {variable.unit}".rstrip()
             )
