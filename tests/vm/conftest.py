@@ -10,12 +10,14 @@ import pytest
 
 from can_bus.edge.candump import read_candump
 from foundation import wallclock
+from foundation.events import FLAG_EXTENDED
 
 from . import places
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 FIGURES = []
 LAST = "1FFFFFFF#E0F0"  # closes a recording: nobody else sends this
+LAST_FRAME = (0x1FFFFFFF, 2 | FLAG_EXTENDED, 0xF0E0, 0)
 
 
 def pytest_configure(config):
@@ -72,18 +74,16 @@ class Candump:
 
     def frames(self):
         """{interface: [(identifier, flags, lo, hi), ...]} in the order of arrival."""
-        found = {}
+        found = {interface: [] for interface in self.interfaces}
         for interface, _, *frame in read_candump(self.path):
-            found.setdefault(interface, []).append(tuple(frame))
-        return {interface: frames[:-1] for interface, frames in found.items()}
+            if tuple(frame) != LAST_FRAME:  # two of them, where two interfaces are on one wire
+                found[interface].append(tuple(frame))
+        return found
 
     def data(self):
         """{interface: ["00E#0102", ...]}: the same as text."""
-        found = {}
-        for line in self.path.read_text().splitlines():
-            _, interface, text = line.split()
-            found.setdefault(interface, []).append(text)
-        return {interface: texts[:-1] for interface, texts in found.items()}
+        lines = [line.split() for line in self.path.read_text().splitlines()]
+        return {name: [text for _, where, text in lines if where == name and text != LAST] for name in self.interfaces}
 
 
 def await_condition(condition, seconds=60.0):
