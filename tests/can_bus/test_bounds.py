@@ -124,6 +124,51 @@ def test_a_queue_that_stands_still_is_later_by_that():
     assert response_times([paused], 1_000_000)[0].response_ns == 635_000
 
 
+def train(count=4, slot_ns=500_000, **more):
+    """A board with a frame in each of `count` slots, one after the other."""
+    return [
+        message(f"m{n}", 10 + n, count * slot_ns, queue="board", offset_ns=n * slot_ns, **more) for n in range(count)
+    ]
+
+
+def test_frames_of_a_train_do_not_come_all_at_once():
+    """Four slots of 0.5 ms at 1 Mbit/s: alone on the bus each frame finds it free; without offsets all four collide."""
+    assert [bound.response_ns for bound in response_times(train(), 1_000_000)] == [135_000] * 4
+    loose = [dataclasses.replace(one, offset_ns=None) for one in train()]
+    assert [bound.response_ns for bound in response_times(loose, 1_000_000)] == [4 * 135_000] * 4
+
+
+def test_another_frame_meets_as_many_of_a_train_as_fit_its_window():
+    """Level below the train: w = 135 us for one frame; the next comes 500 us later, when the other has been sent."""
+    below = message("below", 100, 10 * MS)
+    assert response_times([*train(), below], 1_000_000)[-1].response_ns == 2 * 135_000
+    assert (
+        response_times([*train(slot_ns=136_000), below], 1_000_000)[-1].response_ns == 2 * 135_000
+    )  # slips in between
+
+
+def test_jitter_lets_frames_of_a_train_catch_up_with_each_other():
+    late = train(jitter_ns=500_000)
+    below = message("below", 100, 10 * MS)
+    assert response_times([*late, below], 1_000_000)[-1].response_ns == 3 * 135_000
+    assert max(bound.response_ns for bound in response_times(late, 1_000_000)) == 500_000 + 2 * 135_000
+
+
+def test_a_fast_clock_brings_a_trains_frames_closer():
+    edge = [message("a", 1, MS, queue="q", offset_ns=0), message("b", 2, MS, queue="q", offset_ns=135_500)]
+    below = message("below", 100, 10 * MS)
+    assert response_times([*edge, below], 1_000_000)[-1].response_ns == 3 * 135_000  # within the bit that counts
+    wide = [edge[0], dataclasses.replace(edge[1], offset_ns=137_000)]
+    assert response_times([*wide, below], 1_000_000)[-1].response_ns == 2 * 135_000
+    assert response_times([*wide, below], 1_000_000, clock_ppm=10_000)[-1].response_ns == 3 * 135_000
+
+
+def test_a_train_whose_cycle_is_endless_is_refused():
+    odd = [message(f"m{n}", n, MS + n, queue="q", offset_ns=0) for n in range(3)]
+    with pytest.raises(ValueError, match="queue q: periods have no common multiple"):
+        response_times(odd, 1_000_000)
+
+
 def test_frames_waiting_in_a_queue_are_counted():
     bounds = response_times([message(f"m{n}", n, MS, queue="node") for n in range(3)], 1_000_000)
     assert most_waiting(bounds, "node", 1_000_000) == 3

@@ -1,0 +1,171 @@
+"""`can-bounds` and `check-bus` as people type them: tables, JSON, exit codes, mistakes."""
+
+import json
+
+import pytest
+
+from can_bus.bounds import response_times
+from can_bus.edge.dbc import read_messages
+from tools import cli
+from tools.cli import main
+
+DBC = """VERSION ""
+NS_ :
+BS_:
+BU_: A B
+BO_ 1 First: 7 A
+ SG_ x : 0|8@1+ (1,0) [0|0] "" B
+BO_ 2 Second: 7 A
+ SG_ x : 0|8@1+ (1,0) [0|0] "" B
+BO_ 2147483651 Third: 7 B
+ SG_ x : 0|8@1+ (1,0) [0|0] "" A
+BO_ 4 Silent: 8 B
+ SG_ x : 0|8@1+ (1,0) [0|0] "" A
+BA_DEF_ BO_ "GenMsgCycleTime" INT 0 100000;
+BA_DEF_ "Baudrate" INT 0 1000000;
+BA_DEF_DEF_ "GenMsgCycleTime" 0;
+BA_DEF_DEF_ "Baudrate" 0;
+BA_ "Baudrate" 125;
+BA_ "GenMsgCycleTime" BO_ 1 4;
+BA_ "GenMsgCycleTime" BO_ 2 6;
+BA_ "GenMsgCycleTime" BO_ 2147483651 20;
+"""
+
+
+@pytest.fixture
+def dbc(tmp_path):
+    path = tmp_path / "net.dbc"
+    path.write_text(DBC, encoding="utf-8")
+    return path
+
+
+def printed(capsys, *arguments):
+    code = main(list(map(str, arguments)))
+    return code, capsys.readouterr().out
+
+
+def test_the_robots_own_buses_are_met_and_told_as_tables(capsys):
+    code, text = printed(capsys, "can-bounds")
+    assert code == 0
+    for bus in ("can1", "can2", "can3", "can4"):
+        assert f"{bus}: 3 Mbit/s, schedule full" in text
+    assert text.count("every deadline met") == 4 and "MCH_ANGLE" in text
+
+
+def test_a_profile_is_analysed_with_its_rates_and_schedules(capsys):
+    code, text = printed(capsys, "can-bounds", "--profile", "hil-1mbit", "--json", "-")
+    found = json.loads(text)
+    assert code == 0 and found["met"]
+    assert {(bus["bit_rate"], bus["schedule"]) for bus in found["buses"]} == {(1_000_000, "1mbit")}
+    angle = next(frame for frame in found["buses"][0]["frames"] if frame["name"] == "MCH_ANGLE")
+    assert (angle["identifier"], angle["period_ms"], angle["board"]) == (14, 4.0, "MCH")
+    assert angle["response_ms"] < angle["deadline_ms"] == 4.0
+
+
+def test_a_profile_that_is_too_slow_leaves_with_1_and_says_what_is_late(capsys, tmp_path):
+    path = tmp_path / "slow.toml"
+    path.write_text("[buses.can4]\nbit_rate = 1000000\n", encoding="utf-8")
+    code, text = printed(capsys, "can-bounds", "--profile", path)
+    assert code == 1 and "can miss their deadlines" in text and "late" in text
+
+
+def test_a_dbc_file_gives_its_messages_rate_and_what_it_lacks(dbc):
+    messages, rate, silent = read_messages(dbc, None)
+    assert (rate, silent) == (125_000, ["Silent"])
+    assert [(m.name, m.period_ns, m.bits) for m in messages] == [
+        ("First", 4_000_000, 125),
+        ("Second", 6_000_000, 125),
+        ("Third", 20_000_000, 150),
+    ]
+    first, second, third = response_times(messages, rate)
+    # the extended identifier 3 begins with eleven zeros, so it wins against 1 and 2
+    assert (third.response_ns, first.response_ns, second.response_ns) == (2_200_000, 3_200_000, 3_200_000)
+
+
+def test_a_dbc_file_on_the_command_line(capsys, dbc, tmp_path):
+    code, text = printed(capsys, "can-bounds", "--dbc", dbc, "--json", tmp_path / "b.json")
+    assert code == 0 and "left out: Silent" in text
+    found = json.loads((tmp_path / "b.json").read_text(encoding="utf-8"))
+    assert [frame["identifier"] for frame in found["buses"][0]["frames"]] == [1, 2, 3]
+    assert main(["can-bounds", "--dbc", str(dbc), "--bit-rate", "50000"]) == 1
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        ("nonsense", "not a DBC file"),
+        (DBC.replace('BA_ "Baudrate" 125;', ""), "--bit-rate"),
+        (DBC.replace("Second: 7", "Second: 64"), "Second has 64 bytes"),
+        ('VERSION ""\nBU_: A\nBO_ 4 Silent: 8 A\n', "--bit-rate"),
+        ("\0\0\0", "not a DBC file"),
+    ],
+)
+def test_a_dbc_file_that_is_none_gets_one_line(capsys, tmp_path, content, words):
+    path = tmp_path / "bad.dbc"
+    path.write_text(content, encoding="utf-8")
+    assert main(["can-bounds", "--dbc", str(path)]) == 2
+    error = capsys.readouterr().err
+    assert words in error and "bad.dbc" in error and len(error.splitlines()) == 1
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["can-bounds", "--profile", "nobody"], ["nobody", "hil-1mbit"]),
+        (["can-bounds", "--dbc", "no-such.dbc"], ["no-such.dbc"]),
+        (["can-bounds", "--bit-rate", "125000"], ["--bit-rate", "--dbc"]),
+        (["check-bus", "nobody"], ["nobody", "hil-1mbit"]),
+        (["walk", "--profile", "nobody"], ["nobody", "hil-1mbit"]),
+    ],
+)
+def test_a_mistake_gets_one_line(capsys, arguments, words):
+    assert main(arguments) == 2
+    error = capsys.readouterr().err
+    assert all(word in error for word in words) and len(error.splitlines()) == 1
+
+
+def test_every_fault_of_a_profile_gets_a_line(capsys, tmp_path):
+    path = tmp_path / "bad.toml"
+    path.write_text('[boards]\nMB = "external"\nMCH = "real"\n', encoding="utf-8")
+    assert main(["check-bus", str(path)]) == 2
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) == 2 and "boards.MCH = 'real'" in lines[0] and "has no CAN" in lines[1]
+
+
+def test_a_walk_needs_every_board(capsys, tmp_path):
+    path = tmp_path / "part.toml"
+    path.write_text('[boards]\nUI = "absent"\n', encoding="utf-8")
+    assert main(["walk", "--steps", "1", "--profile", str(path)]) == 2
+    assert "UI absent" in capsys.readouterr().err
+
+
+def test_check_bus_tells_what_mends_a_missing_interface(capsys, tmp_path, monkeypatch):
+    from can_bus.edge import check_bus
+
+    def nothing(_):
+        raise check_bus.NotReadError(check_bus.NO_DEVICE)
+
+    monkeypatch.setattr(check_bus.check_link, "__defaults__", (nothing,))
+    path = tmp_path / "mine.toml"
+    path.write_text('[buses.can1]\ninterface = "socketcan"\nchannel = "vcan0"\n', encoding="utf-8")
+    code, text = printed(capsys, "check-bus", path)
+    assert code == 1
+    assert "FAIL there" in text and "mend: ip link add dev vcan0 type vcan" in text
+    assert text.count("emulated inside") == 3
+
+
+def test_check_bus_opens_what_is_not_socketcan_and_listens(capsys, tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_text('[buses.can2]\ninterface = "virtual"\nchannel = "check"\n', encoding="utf-8")
+    code, text = printed(capsys, "check-bus", path, "--listen", "10ms", "--json", "-")
+    found = json.loads(text)
+    assert code == 0 and found["ready"]
+    (traffic,) = found["buses"][1]["findings"]
+    assert traffic["what"] == "traffic" and traffic["ok"] is None
+
+
+def test_the_commands_are_in_the_help(capsys):
+    with pytest.raises(SystemExit):
+        cli.main(["--help"])
+    text = capsys.readouterr().out
+    assert "can-bounds" in text and "check-bus" in text
