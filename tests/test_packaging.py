@@ -18,6 +18,7 @@ from harness import build
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 BUILT = (".so", ".pyd")
+DATA_FOLDERS = ("profiles",)  # shipped beside the packages, no Python in them
 COMPILER = (os.environ.get("CC") or sysconfig.get_config_var("CC") or "cc").split()[0]
 needs_compiler = pytest.mark.skipif(shutil.which(COMPILER) is None, reason="no C compiler here")
 WHERE_FROM = (
@@ -120,7 +121,7 @@ def test_every_file_of_the_packages_is_shipped_and_nothing_else(shipped):
     def kept(root):
         return {
             path.relative_to(root).as_posix()
-            for package in foundation.OUR_PACKAGES
+            for package in (*foundation.OUR_PACKAGES, *DATA_FOLDERS)
             for path in (root / package).rglob("*")
             if path.is_file() and "__pycache__" not in path.parts and path.suffix not in BUILT
         }
@@ -129,7 +130,7 @@ def test_every_file_of_the_packages_is_shipped_and_nothing_else(shipped):
         name for name in kept(ROOT) if not name.endswith(".c") or name.startswith("datatable/generated/")
     }  # earlier builds left C files beside the sources
     assert kept(shipped) == in_tree
-    assert {path.name for path in shipped.iterdir()} == set(foundation.OUR_PACKAGES)
+    assert {path.name for path in shipped.iterdir()} == {*foundation.OUR_PACKAGES, *DATA_FOLDERS}
 
 
 def test_the_shipped_robot_walks_from_another_folder_both_ways(shipped, tmp_path):
@@ -147,6 +148,8 @@ def test_the_shipped_robot_walks_from_another_folder_both_ways(shipped, tmp_path
         assert (out / "report.html").stat().st_size > 100_000
         done = run(["-m", "tools.cli", "table", "generate", "--check"], tmp_path, **setting)
         assert done.returncode == 0, done.stderr
+        done = run(["-m", "tools.cli", "can-bounds", "--profile", "hil-1mbit", "--json", "-"], tmp_path, **setting)
+        assert done.returncode == 0 and json.loads(done.stdout)["met"], done.stderr
     assert len(digests) == 1
 
 
@@ -264,7 +267,7 @@ def test_packages_are_listed_alike_everywhere():
     in_setup = re.search(r"PACKAGES = \((.*?)\)", source, re.DOTALL).group(1)
     assert tuple(re.findall(r'"(\w+)"', in_setup)) == foundation.OUR_PACKAGES
     found = PROJECT["tool"]["setuptools"]["packages"]["find"]["include"]
-    assert tuple(name.removesuffix("*") for name in found) == foundation.OUR_PACKAGES
+    assert tuple(name.removesuffix("*") for name in found) == (*foundation.OUR_PACKAGES, *DATA_FOLDERS)
     assert tuple(PROJECT["tool"]["mypy"]["packages"]) == foundation.OUR_PACKAGES
 
 
