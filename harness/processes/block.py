@@ -43,6 +43,7 @@ REACHED = 45  # ns: the instant up to which it has run
 LATE_MAX = 46  # ns
 LATE_COUNT = 47
 TURNS = 48
+URGENT = 49  # message kinds (bits) that the board may answer at once
 # the supervisor's words
 FATE = 56  # 0 alive, 1 gone: nobody will answer
 # text of what ended the process, UTF-8, its length in bytes in the first word

@@ -51,7 +51,7 @@ cdef class Mailbox:
     cdef public long long[::1] words, limits
     cdef public str name
     cdef public long long first, slots, used_word, direction, until
-    cdef public long long sequence, used, at, closed, damaged
+    cdef public long long sequence, used, at, closed, damaged, kinds, bit_of_kind
     cdef public str last_damage
     cdef public list notes
     cpdef bint put(self, EventQueue queue)

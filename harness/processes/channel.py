@@ -97,6 +97,8 @@ class Mailbox:
         self.used = 0
         self.at = 0
         self.closed = 0
+        self.bit_of_kind = 1  # as wide as `kinds`
+        self.kinds = 0  # bits of the kinds below 60 that were taken since the last `open`
         self.damaged = 0
         self.last_damage = ""
         self.notes = []
@@ -155,6 +157,7 @@ class Mailbox:
         """Look at what the other side sent."""
         used = self.words[self.used_word]
         self.at = 0
+        self.kinds = 0
         self.closed = used
         if not 0 <= used <= self.slots:
             self.closed = 0
@@ -190,6 +193,7 @@ class Mailbox:
                 fields = [self.words[at + 1 + i] for i in range(8)]
                 self.notes.append((self.words[at] & 0xFF, *fields, ref))
                 return True
+            self.kinds |= self.bit_of_kind << (self.words[at] & 0x3F)
             queue.push(
                 self.words[at + 1],
                 self.words[at + 2],

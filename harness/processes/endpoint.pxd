@@ -5,15 +5,14 @@ from harness.processes.stage cimport Audience
 
 cdef class Endpoint:
     cdef public Microcontroller board
-    cdef public object estimator, totals, clock, shared
+    cdef public object estimator, router, totals, clock, shared
     cdef public long long[::1] block, stage
     cdef public double[::1] stage_doubles
     cdef public Bell ask, answer
     cdef public Mailbox to_board, from_board
     cdef public Audience audience
     cdef public EventQueue pending
-    cdef public long long slots_seen, turns, reached
-    cdef public bint asks_board
+    cdef public long long slots_seen, turns, reached, urgent_kinds, promised
     cpdef void serve(self)
     cdef void _advance(self)
     cdef void _run_to(self, long long until)

@@ -9,13 +9,14 @@ import cython
 
 from firmware_sim.microcontroller import Microcontroller
 from foundation import wallclock
-from foundation.events import EventQueue
+from foundation.events import CAN_RX, CAN_TX_DONE, PIN_EDGE, UART_BYTE, EventQueue
 from harness.processes import block as places
 from harness.processes import snapshot
 from harness.processes.channel import Bell, Mailbox
-from harness.processes.kinds import FROM_BOARD, NOTE, NOTE_SNAPSHOT, NOTE_WORDS, SET_WORD, TO_BOARD
+from harness.processes.kinds import FROM_BOARD, KINDS, NOTE, NOTE_SNAPSHOT, NOTE_WORDS, SET_WORD, TO_BOARD
 from harness.processes.lateness import bin_of
 
+EVERYTHING = 0xFFFF  # bits of all message kinds to a board
 NOTE_BYTES = 8 * (NOTE_WORDS - 1)
 
 
@@ -42,12 +43,17 @@ class Endpoint:
         self.audience = audience
         errors = getattr(board, "errors", None)
         self.totals: object = None if errors is None else errors.totals
+        self.router = getattr(board, "router", None)
+        self.urgent_kinds = EVERYTHING
+        if hasattr(board, "can"):
+            # a motor board or the user interface: edges, frames, bytes and buffers that come free wait for a task
+            self.urgent_kinds &= ~(1 << PIN_EDGE | 1 << CAN_RX | 1 << CAN_TX_DONE | 1 << UART_BYTE)
+        self.promised = 0
         self.estimator = getattr(board, "estimator", None)
         self.clock: object = wallclock.monotonic_ns
         self.pending = EventQueue(64)
         self.slots_seen = 0
         self.reached = 0
-        self.asks_board = hasattr(board, "next_output")
 
     def serve(self) -> cython.void:
         """Until told to stop."""
@@ -80,6 +86,8 @@ class Endpoint:
         self.to_board.open()
         while self.to_board.take(self.board.inbox):
             pass
+        if self.to_board.kinds & self.block[49] or self.to_board.notes:  # URGENT
+            self.promised = 0
         if self.to_board.notes:
             self.obey()
         if rows - self.audience.rows > 64:
@@ -128,6 +136,8 @@ class Endpoint:
                 self.from_board.send()
                 return out.count > 0 or self.pending.count > 0
             if out.take():
+                if out.time < self.promised:
+                    self.broke_its_promise()
                 self.from_board.put(out)
             elif self.pending.take():
                 self.from_board.put(self.pending)
@@ -140,7 +150,13 @@ class Endpoint:
         """The words that the plant's process and the supervisor look at."""
         board: Microcontroller = self.board
         self.block[35] = board.next_time  # NEXT_TIME
-        self.block[36] = self._next_output()  # NEXT_OUTPUT
+        self.promised = self._next_output()
+        self.block[36] = self.promised  # NEXT_OUTPUT
+        self.block[49] = self.urgent_kinds  # URGENT
+        if self.router is not None and self.router.waiting == 0:
+            self.block[49] = (
+                self.urgent_kinds & ~8
+            )  # a transmit buffer comes free (CAN_TX_DONE) and nothing waits for it
         self.block[39] = board.scheduler.slot_time  # SLOT_TIME
         self.block[40] = board.scheduler.slot_count  # SLOT_COUNT
         self.block[41] = board.scheduler.overruns  # OVERRUNS
@@ -154,13 +170,19 @@ class Endpoint:
             self.block[38] = self.estimator.swing_leg  # SWING_LEG
 
     def _next_output(self) -> cython.longlong:
-        """Before this instant (ns) the board puts nothing out by itself."""
+        """Before this instant (ns) the board puts nothing out, whatever comes in of a kind that can wait."""
         board: Microcontroller = self.board
-        if board.background is not None or board.vic.fiq_pending != 0 or board.vic.irq_pending != 0:
+        if not board.scheduler.done or board.vic.fiq_pending != 0 or board.vic.irq_pending != 0:
             return 0
-        if board.scheduler.done:
-            return min(board.tick_time, board.alarm_time)
-        return 0
+        if board.background is not None and board.background_wanted:
+            return 0
+        return min(board.tick_time, board.alarm_time)
+
+    def broke_its_promise(self) -> None:
+        """An output before the instant that the last answer named: the plant has gone on without it."""
+        out = self.board.outbox
+        kind = KINDS[out.kind].name if out.kind in KINDS else f"kind {out.kind}"
+        raise RuntimeError(f"{kind} put out at {out.time} ns, but nothing was to come before {self.promised} ns")
 
     def obey(self) -> None:
         """Messages that are for this process."""

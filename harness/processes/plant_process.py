@@ -32,11 +32,6 @@ MISUSE = 2  # exit code when something outside cannot be opened
 RESET, OPERATING = 1, 0  # modes of a bus node
 POWER_UP_NS = 1_000_000  # from a restarted process being there to its board's power
 
-# Message kinds (bits) that may make a board put something out at once. The motor boards and the user interface keep
-# edges, frames and bytes until a task of theirs looks; the router forwards, and the main brain loads its next segment.
-URGENT_EVERYTHING = 0xFFFF
-URGENT_FOR_SENDERS = URGENT_EVERYTHING & ~(1 << 1 | 1 << 2 | 1 << 5)  # PIN_EDGE, CAN_RX, UART_BYTE can wait
-
 
 class PlantRun:
     """Runs the wired, never run `robot` against board processes; `link`: the socket to the supervisor."""
@@ -65,7 +60,6 @@ class PlantRun:
                 blocks[name],
                 show,
                 place,
-                URGENT_EVERYTHING if name in ("CSR", "MB") else URGENT_FOR_SENDERS,
                 name == "MB",
             )
             for place, name in enumerate(wiring.BOARDS)
@@ -274,6 +268,8 @@ class PlantRun:
 
     def collect(self) -> None:
         """Bring every board to the plant's instant, fetch what it counted, and let its process end."""
+        if self.robot.polled:
+            self.robot.poll_now()
         for end in self.robot.polled:
             if hasattr(end, "drain"):
                 end.drain(self.robot.loop.time)

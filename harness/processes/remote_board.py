@@ -23,13 +23,13 @@ if not cython.compiled:
 
 
 class RemoteBoard(Microcontroller):
-    """`shadow`: the wired board object of this process. `urgent_kinds`: bit mask of message kinds that cannot wait.
+    """`shadow`: the wired board object of this process. `urgent_kinds`: message kinds (bits) that cannot wait.
 
     `follows_steps`: the plant's process reads what this board shows (the main brain's table and swing leg) after
     every step of the plant, so it is up to date by then.
     """
 
-    def __init__(self, shadow, shared, stage, place, urgent_kinds, follows_steps) -> None:
+    def __init__(self, shadow, shared, stage, place, follows_steps) -> None:
         Microcontroller.__init__(self, shadow.name, shadow.hz, shadow.crystal)
         shared.check(place)
         self.shadow = shadow
@@ -47,7 +47,7 @@ class RemoteBoard(Microcontroller):
         )
         self.stage = stage
         self.place = place
-        self.urgent_kinds = urgent_kinds
+        self.urgent_kinds = 0xFFFF  # all, until the board has said which
         self.follows_steps = follows_steps
         self.estimator = getattr(shadow, "estimator", None)
         self.posted = False
@@ -171,6 +171,7 @@ class RemoteBoard(Microcontroller):
                 self.ask.ring()
         self.next_time = self.block[35]
         self.quiet_until = self.block[36]
+        self.urgent_kinds = self.block[49]
         if self.estimator is not None:
             self.estimator.swing_leg = self.block[38]
             self.shadow.scheduler.slot_time = self.block[39]
