@@ -136,6 +136,13 @@ def channel_fuzz_case(cases: int) -> dict:
     return fuzz_channel.benchmark(cases)
 
 
+def profile_fuzz_case(cases: int) -> dict:
+    """Damaged profiles and schedules."""
+    from tools import fuzz_profiles
+
+    return fuzz_profiles.benchmark(cases)
+
+
 CASES = {
     # case: (title, function of the virtual seconds)
     "robot": ("whole robot, digest on, logs off", lambda s: robot_case(s)),
@@ -150,6 +157,7 @@ CASES = {
     "serial-fuzz": ("wrong bytes on the serial line", lambda s: fuzz_case(5_000 * int(s))),
     "can-fuzz": ("wrong and foreign frames on the buses", lambda s: can_fuzz_case(5_000 * int(s))),
     "channel-fuzz": ("damaged messages to a board process", lambda s: channel_fuzz_case(5_000 * int(s))),
+    "profile-fuzz": ("damaged profiles and schedules", lambda s: profile_fuzz_case(5_000 * int(s))),
     "virtual": ("python-can virtual, three boards", lambda s: virtual_case(1_000 * int(s))),
 }
 INTERPRETED = ("robot", "plant", "bus")
