@@ -30,6 +30,7 @@ def serve(robot: Any, name: str, block: Block, stage: tuple, settings: Settings,
     kernel.stay_on(settings.processor)
     if settings.real_time:
         kernel.lock_memory()
+    if settings.wants_fifo:
         kernel.real_time_scheduling()
     place = wiring.BOARDS.index(name)
     board = robot.boards[name]

@@ -306,6 +306,7 @@ def serve(
     kernel.stay_on(settings.processor)
     if settings.real_time:
         kernel.lock_memory()
+    if settings.wants_fifo:
         kernel.real_time_scheduling()
     run = PlantRun(robot, blocks, stage, settings, link)
     try:

@@ -41,6 +41,11 @@ class Settings:
         if not self.name or len(self.name) > 64 or not self.name.replace("-", "").replace("_", "").isalnum():
             raise UserError(f"name is {self.name!r}, allowed are up to 64 letters, digits, - and _")
 
+    @property
+    def wants_fifo(self) -> bool:
+        """Without a pace there is nothing to be in time for, and the machine belongs to others as well."""
+        return self.real_time and self.speed is not None
+
 
 def one_processor() -> int:
     """The processor that a robot takes when nobody says which: the last one this process may use."""

@@ -218,7 +218,8 @@ class Supervisor:
         read, write = os.pipe()
         process = os.fork()
         if process == 0:
-            fifo, locked = kernel.real_time_scheduling(), kernel.lock_memory()
+            fifo = kernel.real_time_scheduling() if self.settings.wants_fifo else "no pace to keep"
+            locked = kernel.lock_memory()
             os.write(write, f"{fifo}\n{locked}".encode())
             os._exit(0)
         os.close(write)
