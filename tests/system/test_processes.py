@@ -290,8 +290,8 @@ def test_pausing_stops_virtual_time_and_nothing_is_lost(up, command, walked):
     paused = float(re.search(r"at ([\d.]+) s", command("ctl", "pause", "--name", robot.name).stdout).group(1))
     while not (status := robot.status())["paused"]:
         wallclock.sleep_s(0.02)
-    wallclock.sleep_s(0.3)
-    assert robot.status()["time_s"] == status["time_s"] == pytest.approx(paused, abs=1e-4)
+    for _ in range(50):
+        assert robot.status()["time_s"] == status["time_s"] == pytest.approx(paused, abs=1e-4)
     resumed = float(re.search(r"at ([\d.]+) s", command("ctl", "resume", "--name", robot.name).stdout).group(1))
     assert resumed == paused < walked["time_s"]
     assert robot.end() == 0
