@@ -18,6 +18,7 @@ p mod n = r mod n, so that a board's frames do not follow each other more closel
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
 from collections.abc import Mapping
 from fractions import Fraction
@@ -82,6 +83,12 @@ class Stream:
     board: str
 
 
+@functools.cache
+def robots_table() -> Table:
+    """The master table of the robot, loaded once."""
+    return datatable.load()
+
+
 def command_variables(table: Table) -> tuple[Variable, ...]:
     """What the main brain may send to the buses, by id."""
     return tuple(v for v in table.variables if v.publisher == "MB" and any(bus.startswith("CAN") for bus in v.buses))
@@ -119,7 +126,7 @@ def thinned_rows(board: Board, rows: list, schedule: BusSchedule) -> list:
 
 def apply(board: Any, profile: Profile, table: Table | None = None) -> None:
     """Give an emulated board the schedules of a profile: after it is built, before time passes."""
-    table = table if table is not None else datatable.load()
+    table = table if table is not None else robots_table()
     schedules = {name: bus.schedule for name, bus in profile.buses.items()}
     description = table.board(board.name)
     if description.role == "main brain":

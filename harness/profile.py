@@ -22,11 +22,10 @@ import tomllib
 from collections.abc import Callable, Mapping
 from typing import Any
 
-import datatable
 from datatable.model import Table
 from foundation.user_error import UserError
 from harness import wiring
-from harness.bus_schedule import MOST_ROWS, MOST_TURNS, BusSchedule, command_variables, passes_of
+from harness.bus_schedule import MOST_ROWS, MOST_TURNS, BusSchedule, command_variables, passes_of, robots_table
 
 FOLDER = pathlib.Path(__file__).resolve().parent.parent / "profiles"
 SCHEDULES = "schedules"
@@ -263,7 +262,7 @@ def available() -> tuple[str, ...]:
 @functools.cache
 def default() -> Profile:
     """The robot as it is: every board emulated, its own bit rate, every board sending as its firmware does."""
-    table = datatable.load()
+    table = robots_table()
     schedule = full_schedule()
     buses = {name: BusProfile(name, None, None, table.bit_rates[name.upper()], FULL, schedule, {}) for name in BUSES}
     boards = dict.fromkeys(wiring.BOARDS, EMULATED)
@@ -274,7 +273,7 @@ def default() -> Profile:
 def full_schedule() -> BusSchedule:
     """The schedule of the firmware itself."""
     faults: list[ProfileFault] = []
-    found = _schedule(FULL, FOLDER, datatable.load(), faults)
+    found = _schedule(FULL, FOLDER, robots_table(), faults)
     if faults:
         raise ProfileError(faults)
     return found
@@ -294,7 +293,7 @@ def load(name: str | pathlib.Path, interfaces: Callable[[], tuple[str, ...]] | N
     content = reader.content(path)
     if content is None:
         raise ProfileError(faults)
-    table = datatable.load()
+    table = robots_table()
     reader.only(content, ("title", "description", "boards", "buses"), "")
     title = reader.text(content, "title") or path.stem
     description = reader.text(content, "description") or ""

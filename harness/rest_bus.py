@@ -11,12 +11,11 @@ import heapq
 import math
 from fractions import Fraction
 
-import datatable
 from datatable.model import Table, Variable
 from datatable.packing import word_of_value
 from foundation.events import NEVER
 from foundation.user_error import UserError
-from harness.bus_schedule import command_variables, schedule_of_board
+from harness.bus_schedule import command_variables, robots_table, schedule_of_board
 from harness.profile import Profile
 from harness.supervision import SYNC, expected_periods
 
@@ -29,7 +28,7 @@ class RestBus:
     """The generator for the absent boards of a profile. Frames as tuples (time_ns, bus, identifier, flags, lo, hi)."""
 
     def __init__(self, profile: Profile, start_ns: int = 0, table: Table | None = None) -> None:
-        self.table = table if table is not None else datatable.load()
+        self.table = table if table is not None else robots_table()
         self.start_ns = start_ns
         self.words: dict[int, int] = {}
         self.sync_id = self.table.variable(SYNC).id

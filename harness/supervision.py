@@ -22,11 +22,10 @@ from collections.abc import Mapping
 from fractions import Fraction
 from typing import Any
 
-import datatable
 from datatable.model import Board, Table, Variable
 from datatable.packing import value_of_word
 from foundation.events import FLAG_ERROR, FLAG_EXTENDED, FLAG_REMOTE
-from harness.bus_schedule import BusSchedule, schedule_of_board
+from harness.bus_schedule import BusSchedule, robots_table, schedule_of_board
 from harness.profile import Profile
 
 SYNC = "TIMESTAMP"
@@ -86,7 +85,7 @@ class Watch:
     """Supervises the external boards of a profile. `start_ns`: when they should begin to send."""
 
     def __init__(self, profile: Profile, start_ns: int = 0, table: Table | None = None) -> None:
-        table = table if table is not None else datatable.load()
+        table = table if table is not None else robots_table()
         self.start_ns = start_ns
         self.now_ns = start_ns
         self.faults = 0

@@ -11,7 +11,6 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-import datatable
 from can_bus.bounds import Bound, response_times, utilisation
 from foundation.user_error import UserError
 from harness import bus_schedule, profile
@@ -59,7 +58,7 @@ def run(options: argparse.Namespace) -> int:
 def of_profile(options: argparse.Namespace) -> list[dict]:
     """The four buses of a profile, or of the robot as it is."""
     chosen = profile.load(options.profile) if options.profile else profile.default()
-    table = datatable.load()
+    table = bus_schedule.robots_table()
     found = []
     for name, bus in chosen.buses.items():
         streams = bus_schedule.streams(table, name, chosen.schedules(), chosen.absent())

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 
-import datatable
-from harness import profile
+from harness import bus_schedule, profile
 from tools.files import json_target, replace_file
 from tools.units import TIMES, quantity
 
@@ -44,7 +43,7 @@ def run(options: argparse.Namespace) -> int:
     """Look at every bus, print; 0 when all is well, 1 when something must be mended."""
     json_file = json_target(options.json)
     chosen = profile.load(options.profile)
-    table = datatable.load()
+    table = bus_schedule.robots_table()
     found = [check(chosen, name, table, options.listen) for name in chosen.buses]
     ready = all(finding["ok"] is not False for bus in found for finding in bus["findings"])
     text = json.dumps({"profile": chosen.path, "ready": ready, "buses": found}, indent=2)
