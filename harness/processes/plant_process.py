@@ -80,9 +80,9 @@ class PlantRun:
         """Until the stop rule, a fall, or the supervisor says so; pausing stops virtual time."""
         robot = self.robot
         slice_s = FAST_SLICE_S if self.settings.speed is None else SLICE_S
-        self.pace.start(robot.loop.time)
-        if robot.run(stop, slice_s):
+        if robot.run(stop, slice_s):  # the first slice when all processes are there, whenever that is
             return
+        self.pace.start(robot.loop.time)
         while not self.stopping:
             ahead_s = LONGEST_WAIT_S if self.paused else self.pace.ahead_s(robot.loop.time)
             self.wait(min(ahead_s, LONGEST_WAIT_S))

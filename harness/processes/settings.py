@@ -17,7 +17,7 @@ class Settings:
     real_time: ask for SCHED_FIFO and locked memory. name: under which the running robot is found.
     processor: the one that plant and boards share, None for all. They take turns, so they would mostly wait for each
     other on several as well; waking a process there costs ten times as much (a turn in a virtual machine: 3 us on
-    one processor, 30 to 140 us between two).
+    one processor, 30 to 140 us between two; benchmarks/2026-11-21-processes.json).
     boards: those that get a process; the others stand outside as real hardware, or nowhere.
     """
 
