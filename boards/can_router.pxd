@@ -51,10 +51,10 @@ cdef class CanRouterBoard(Microcontroller):
     cpdef object on_can3(self, EventQueue queue)
     cpdef object on_can4(self, EventQueue queue)
     cpdef object on_can_error(self, EventQueue queue)
-    cpdef bint receive(self, CanController controller)
-    cpdef long long flush(self, CanController controller)
-    cpdef bint can_flush(self)
-    cpdef long long main_loop(self)
+    cpdef bint receive(self, CanController controller) except? -1
+    cpdef long long flush(self, CanController controller) except? <long long>-1
+    cpdef bint can_flush(self) except? -1
+    cpdef long long main_loop(self) except? <long long>-1
     cpdef void slot_exceeded(self)
     cpdef void slot_near_limit(self)
     cpdef void task_limit(self, Task task)
@@ -64,8 +64,8 @@ cdef class CanRouterBoard(Microcontroller):
     cpdef void count_load(self)
     cpdef void show_load(self)
     cpdef void send_error(self)
-    cpdef double current_A(self)
-    cpdef double voltage_V(self)
+    cpdef double current_A(self) except? -1
+    cpdef double voltage_V(self) except? -1
     cpdef void send_power(self)
     cpdef void send_current(self)
     cpdef void send_voltage(self)

@@ -36,6 +36,7 @@ from firmware_sim.peripherals.timer_capture import TimerCapture
 from firmware_sim.scheduler import Occasional, Schedule, Task
 from firmware_sim.vic import FIQ, TIMER_MATCH
 from foundation.events import CAN_RX, CAN_STATUS, SSP_SEGMENT
+from foundation.numbers import integers
 
 if not cython.compiled:
     from foundation.numbers import float32, word_of_float
@@ -112,7 +113,7 @@ class CanRouterBoard(Microcontroller):
             self.report,
             quirks.router_one_frame_lag,
         )
-        self.can_leds = array.array("q", [0]) * 5
+        self.can_leds = integers(5)
         self.own_lost = 0
 
         # bus-off, warning, overrun, passive, error while receiving, while sending; per controller
@@ -310,8 +311,10 @@ class CanRouterBoard(Microcontroller):
         """True when a frame waits for a bus that has a free transmit buffer and is not in reset."""
         router: Router = self.router
         controller: CanController
-        for controller in self.controllers:
-            if router.tx_read[controller.number] != router.tx_write[controller.number]:
+        channel: cython.longlong
+        for channel in range(1, 5):
+            if router.tx_read[channel] != router.tx_write[channel]:
+                controller = self.controllers[channel - 1]
                 if (controller.tx_free[1] != 0 or controller.tx_free[2] != 0) and not controller.MOD & 1:
                     return True
         return False

@@ -55,21 +55,21 @@ cdef class Bus:
     cpdef bint request(
         self, long long node, long long buffer, long long time, long long identifier, long long flags,
         long long lo, long long hi,
-    )
+    ) except? -1
     cpdef void abort(self, long long node, long long buffer, long long time)
     cpdef void set_mode(self, long long node, long long mode, long long time)
-    cpdef long long advance(self, long long until)
+    cpdef long long advance(self, long long until) except? <long long>-1
     cpdef long long pending_of(self, long long node) noexcept
-    cdef bint _change(self, long long until)
-    cdef long long _next_join(self)
+    cdef bint _change(self, long long until) except? -1
+    cdef long long _next_join(self) except? <long long>-1
     cdef void _look_ahead(self) noexcept
     cdef void _remove(self, long long slot) noexcept
-    cdef long long _attempt(self, long long k)
+    cdef long long _attempt(self, long long k) except? <long long>-1
     cdef long long _arbitrate(self, long long k) noexcept
-    cdef bint _contend(self, long long k, long long best)
-    cdef long long _finish_sender(self, Node node, long long slot, long long end, long long done)
+    cdef bint _contend(self, long long k, long long best) except? -1
+    cdef long long _finish_sender(self, Node node, long long slot, long long end, long long done) except? <long long>-1
     cdef void _split_windows(self, long long first) noexcept
     cdef void _roll(self, long long bit) noexcept
     cdef long long _record(
         self, long long time, long long identifier, long long flags, long long lo, long long hi, long long node
-    )
+    ) except? <long long>-1

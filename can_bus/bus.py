@@ -32,6 +32,7 @@ from foundation.events import (
     TX_LOST,
     EventQueue,
 )
+from foundation.numbers import integers
 from foundation.random_stream import RandomStream
 
 if not cython.compiled:
@@ -136,7 +137,7 @@ class Bus:
         self.next_time = NEVER
         self.operating = 0
         self.joining = 0
-        empty = array.array("q", [])
+        empty = integers(0)
         self.keys = empty
         self.ready = empty
         self.asked = empty
@@ -180,15 +181,15 @@ class Bus:
         self.flushed = 0
         self.late_results = 0
         self.late_requests = 0
-        self.frames_by_identifier = array.array("q", [0]) * 2048
-        self.response_max_ns = array.array("q", [0]) * 2048
+        self.frames_by_identifier = integers(2048)
+        self.response_max_ns = integers(2048)
         self.frames_by_extended_identifier = {}
         self.origin_bit = self.bit_of(time)
         self.window_end = self.origin_bit + self.window_bits
         self.window_busy = 0
         self.window_busy_max = 0
         self.window_count = 0
-        self.windows = array.array("q", [0]) * WINDOW_RING
+        self.windows = integers(WINDOW_RING)
 
     # ---- time
 
@@ -229,8 +230,10 @@ class Bus:
             ("busy_until", 0),
             ("pending", 0),
         ):
-            grown = array.array("q", getattr(self, field))
-            grown.extend([filler] * BUFFERS)
+            before = getattr(self, field)
+            grown = integers(len(before) + BUFFERS, filler)
+            for slot in range(len(before)):
+                grown[slot] = before[slot]
             setattr(self, field, grown)
         return index
 

@@ -11,19 +11,19 @@ cdef class DataStore:
     cdef public long long out_of_range_count, out_of_range_id
     cdef public object on_out_of_range
 
-    cpdef bint has(self, long long number)
-    cpdef bint set_word(self, long long number, long long word, long long stamp)
-    cpdef long long get_word(self, long long number)
-    cpdef bint set_float(self, long long number, double value)
-    cpdef double get_float(self, long long number)
-    cpdef bint set_int(self, long long number, long long value)
-    cpdef long long get_int(self, long long number)
-    cpdef bint set_u32(self, long long number, long long value)
-    cpdef long long get_u32(self, long long number)
-    cpdef long long stamp(self, long long number)
+    cpdef bint has(self, long long number) except? -1
+    cpdef bint set_word(self, long long number, long long word, long long stamp) except? -1
+    cpdef long long get_word(self, long long number) except? <long long>-1
+    cpdef bint set_float(self, long long number, double value) except? -1
+    cpdef double get_float(self, long long number) except? -1
+    cpdef bint set_int(self, long long number, long long value) except? -1
+    cpdef long long get_int(self, long long number) except? <long long>-1
+    cpdef bint set_u32(self, long long number, long long value) except? -1
+    cpdef long long get_u32(self, long long number) except? <long long>-1
+    cpdef long long stamp(self, long long number) except? <long long>-1
     cpdef long long network_time_ms(self) noexcept
-    cpdef long long age_ms(self, long long number, long long now)
-    cpdef bint is_unread(self, long long number, long long subscriber)
-    cpdef bint mark_read(self, long long number, long long subscriber)
-    cpdef bint mark_unread(self, long long number)
-    cpdef long long next_unread(self, long long[::1] numbers, long long start, long long subscriber)
+    cpdef long long age_ms(self, long long number, long long now) except? <long long>-1
+    cpdef bint is_unread(self, long long number, long long subscriber) except? -1
+    cpdef bint mark_read(self, long long number, long long subscriber) except? -1
+    cpdef bint mark_unread(self, long long number) except? -1
+    cpdef long long next_unread(self, long long[::1] numbers, long long start, long long subscriber) except? <long long>-1

@@ -4,16 +4,28 @@ Interpreted Python has neither 32-bit floats nor wrapping integers, compiled cod
 rounding and every wrap therefore goes through this file, which gives the same bits either way.
 """
 
+import array
+
 import cython
 
 if not cython.compiled:
-    from struct import pack, unpack
+    from struct import Struct
+
+    _single, _word = Struct("<f"), Struct("<I")
 
 WORD_MASK = 0xFFFFFFFF
 # The same for the functions below: C variables when compiled (numbers.pxd), because Cython makes a Python object of
 # every literal above 31 bits.
 _MASK = 0xFFFFFFFF
 _SIGN = 0x80000000
+
+
+def integers(count, value=0):
+    """`count` whole numbers of 64 bits, all `value`, for a field that is looked at by index only.
+
+    Compiled, an array, whose items are C numbers; interpreted, where an array makes a new object at every look, a list.
+    """
+    return array.array("q", [value]) * count if cython.compiled else [value] * count
 
 
 def float32(value: cython.double) -> cython.double:
@@ -33,7 +45,7 @@ def word_of_float(value: cython.double) -> cython.longlong:
         return cython.cast(cython.longlong, cython.cast(cython.pointer(cython.uint), cython.address(single))[0])
     else:
         try:
-            return unpack("<I", pack("<f", value))[0]
+            return _word.unpack(_single.pack(value))[0]
         except OverflowError:
             return 0xFF800000 if value < 0 else 0x7F800000
 
@@ -44,7 +56,7 @@ def float_of_word(word: cython.longlong) -> cython.double:
         bits: cython.uint = cython.cast(cython.uint, word & _MASK)
         return cython.cast(cython.double, cython.cast(cython.pointer(cython.float), cython.address(bits))[0])
     else:
-        return unpack("<f", pack("<I", word & 0xFFFFFFFF))[0]
+        return _single.unpack(_word.pack(word & 0xFFFFFFFF))[0]
 
 
 def wrap_u32(value: cython.longlong) -> cython.longlong:

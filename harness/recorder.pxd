@@ -7,10 +7,10 @@ cdef class RowStream:
     cdef public double[::1] reals
     cdef public bint is_real
     cdef public object digest, sink
-    cpdef long long finish_row(self, long long time_ns)
+    cpdef long long finish_row(self, long long time_ns) except? <long long>-1
     cpdef object flush(self)
 
 @cython.final
 cdef class Recorder:
     cdef public RowStream frames, samples, words
-    cpdef long long add_frames(self, long long bus, long long[::1] log, long long count)
+    cpdef long long add_frames(self, long long bus, long long[::1] log, long long count) except? <long long>-1

@@ -24,8 +24,8 @@ cdef class CanLink:
     cpdef object on_receive(self, EventQueue queue)
     cpdef object on_error(self, EventQueue queue)
     cpdef object receive_all(self)
-    cpdef bint send_words(self, long long identifier, long long value_word, long long time_word)
-    cpdef bint send_float(self, long long identifier, double value)
-    cpdef bint send_int(self, long long identifier, long long value)
+    cpdef bint send_words(self, long long identifier, long long value_word, long long time_word) except? -1
+    cpdef bint send_float(self, long long identifier, double value) except? -1
+    cpdef bint send_int(self, long long identifier, long long value) except? -1
     cpdef void send_error(self, long long identifier)
     cpdef object feed(self)

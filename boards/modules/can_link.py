@@ -8,8 +8,6 @@ Sending: frames are built with the last network time, wait in a ring of 8 and go
 buffers 1 and 2 as these fall free: looked after whenever a frame is queued, and in every slot.
 """
 
-import array
-
 import cython
 
 from boards.modules.error_module import ErrorModule
@@ -26,6 +24,7 @@ from firmware_sim.peripherals.can_controller import (
     CanController,
 )
 from foundation.events import CAN_RX, CAN_STATUS, EventQueue
+from foundation.numbers import integers
 from foundation.user_error import UserError
 
 if not cython.compiled:
@@ -74,15 +73,15 @@ class CanLink:
         self.code_receive_full = getattr(codes, prefix + "RX_BUF_OF")
         self.code_send_full = codes.CAN_TX_QUEUE_FULL
         self.receivers = [None] * IDENTIFIERS
-        self.rx_frames = array.array("q", [0]) * RECEIVE_RING
-        self.rx_ids = array.array("q", [0]) * RECEIVE_RING
-        self.rx_values = array.array("q", [0]) * RECEIVE_RING
-        self.rx_times = array.array("q", [0]) * RECEIVE_RING
+        self.rx_frames = integers(RECEIVE_RING)
+        self.rx_ids = integers(RECEIVE_RING)
+        self.rx_values = integers(RECEIVE_RING)
+        self.rx_times = integers(RECEIVE_RING)
         self.rx_write = 0
         self.rx_read = 0
-        self.tx_ids = array.array("q", [0]) * SEND_RING
-        self.tx_values = array.array("q", [0]) * SEND_RING
-        self.tx_times = array.array("q", [0]) * SEND_RING
+        self.tx_ids = integers(SEND_RING)
+        self.tx_values = integers(SEND_RING)
+        self.tx_times = integers(SEND_RING)
         self.tx_write = 0
         self.tx_read = 0
         self.received = 0

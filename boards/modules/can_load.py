@@ -2,18 +2,18 @@
 # (every index below is a channel, 0 ... 4)
 """Frames per millisecond on each bus, as the router counts them: sent and received, its own sync included."""
 
-import array
-
 import cython
+
+from foundation.numbers import integers
 
 
 class CanLoad:
     """Counters of the four buses, index 1-4; index 0 counts the SSP link and is not reported."""
 
     def __init__(self) -> None:
-        self.counts = array.array("q", [0]) * 5
-        self.peaks = array.array("q", [0]) * 5
-        self.last_counts = array.array("q", [0]) * 5
+        self.counts = integers(5)
+        self.peaks = integers(5)
+        self.last_counts = integers(5)
 
     def count(self, channel: cython.longlong) -> cython.void:
         """One frame more on `channel` in this millisecond."""

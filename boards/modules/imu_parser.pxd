@@ -15,8 +15,8 @@ cdef class ImuParser:
     cdef public double acceleration_x, acceleration_y, acceleration_z
     cdef public long long timer
     cdef public long long packets, bad_checksums, skipped_bytes, bytes_lost
-    cpdef bint push(self, long long byte)
-    cpdef long long receive(self, Uart uart)
+    cpdef bint push(self, long long byte) except? -1
+    cpdef long long receive(self, Uart uart) except? <long long>-1
     cpdef long long waiting(self) noexcept
     cpdef long long update(self) noexcept
     cpdef double _float_at(self, long long index) noexcept

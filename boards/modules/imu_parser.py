@@ -13,12 +13,11 @@ the sum of the 29 bytes before it.
   0xC2 is chosen by us, because it is the device's documented packet with scaled rates and no angles.
 """
 
-import array
-
 import cython
 
 from datatable.generated import errors
 from firmware_sim.peripherals.uart import Uart
+from foundation.numbers import integers
 
 if not cython.compiled:
     from foundation.numbers import float_of_word
@@ -47,7 +46,7 @@ class ImuParser:
         self.has_angles = header == 0xCF
         self.needed = 32 if late_by_one_byte else 31
         self.code_ring_full = errors.MSIMU_RX_OF
-        self.ring = array.array("q", [0]) * 128
+        self.ring = integers(128)
         self.ring_write = 0
         self.ring_read = 0
         self.roll = 0.0

@@ -13,5 +13,5 @@ cdef class NetworkClock:
     cdef public list controllers
     cdef public long long ticks, divider
     cdef public long long[::1] sent, skipped
-    cpdef bint tick(self)
-    cpdef long long send_sync(self)
+    cpdef bint tick(self) except? -1
+    cpdef long long send_sync(self) except? <long long>-1

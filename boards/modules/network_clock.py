@@ -7,13 +7,12 @@ with transmit and abort together: a frame that does not get through at once is n
 buffer is still busy the millisecond is skipped without an error. Source: facts network-and-boards 1.4.
 """
 
-import array
-
 import cython
 
 from boards.modules.can_load import CanLoad
 from boards.modules.network_time import NetworkTime
 from firmware_sim.peripherals.can_controller import CanController
+from foundation.numbers import integers
 
 TICKS_PER_MS = 5
 SYNC_BUFFER = 3
@@ -34,8 +33,8 @@ class NetworkClock:
         self.load = load
         self.ticks = 0
         self.divider = 0
-        self.sent = array.array("q", [0]) * 5
-        self.skipped = array.array("q", [0]) * 5
+        self.sent = integers(5)
+        self.skipped = integers(5)
 
     def tick(self) -> cython.bint:
         """One 200 us interrupt; True when a millisecond has passed and sync went out."""

@@ -26,10 +26,10 @@ cdef class Router:
     cdef public long long[::1] receive_full_codes
     cdef public long long waiting, routed, copies, receive_lost, own_lost, unroutable
     cdef public long long[::1] transmit_lost, receive_lost_from
-    cpdef bint receive(self, long long channel, long long identifier, long long flags, long long word0, long long word1)
+    cpdef bint receive(self, long long channel, long long identifier, long long flags, long long word0, long long word1) except? -1
     cpdef bint send(self, long long identifier, long long word0, long long word1) noexcept
-    cpdef long long route_step(self, long long now)
-    cpdef long long route(self, long long source, long long identifier, long long flags, long long word0, long long word1, long long now)
+    cpdef long long route_step(self, long long now) except? <long long>-1
+    cpdef long long route(self, long long source, long long identifier, long long flags, long long word0, long long word1, long long now) except? <long long>-1
     cpdef bint queue(self, long long channel, long long identifier, long long flags, long long word0, long long word1) noexcept
     cpdef bint has_frame_for(self, long long channel) noexcept
     cpdef bint has_work(self) noexcept

@@ -14,6 +14,7 @@ import cython
 from boards.modules.can_load import CanLoad
 from boards.modules.ssp_link import RouterSspLink
 from datatable.generated import errors
+from foundation.numbers import integers
 
 IDENTIFIERS = 2032  # 2032-2047 would begin with seven recessive bits, which CAN forbids
 CHANNEL_SSP = 0
@@ -29,8 +30,8 @@ class RoutingTable:
 
     def __init__(self, routes=()) -> None:
         # every identifier that the table does not name goes to the main brain
-        self.destinations = array.array("q", [1]) * 2032
-        self.sources = array.array("q", [7]) * 2032
+        self.destinations = integers(2032, 1)
+        self.sources = integers(2032, 7)
         self.learned = 0
         self.changed = 0
         for identifier, mask in routes:
@@ -71,24 +72,24 @@ class Router:
         self.load = load
         self.report = report
         self.one_frame_lag = one_frame_lag
-        self.rx_channel = array.array("q", [0]) * 64
-        self.rx_id = array.array("q", [0]) * 64
-        self.rx_flags = array.array("q", [0]) * 64
-        self.rx_word0 = array.array("q", [0]) * 64
-        self.rx_word1 = array.array("q", [0]) * 64
+        self.rx_channel = integers(64)
+        self.rx_id = integers(64)
+        self.rx_flags = integers(64)
+        self.rx_word0 = integers(64)
+        self.rx_word1 = integers(64)
         self.rx_write = 0
         self.rx_read = 0
-        self.tx_id = array.array("q", [0]) * 40
-        self.tx_flags = array.array("q", [0]) * 40
-        self.tx_word0 = array.array("q", [0]) * 40
-        self.tx_word1 = array.array("q", [0]) * 40
+        self.tx_id = integers(40)
+        self.tx_flags = integers(40)
+        self.tx_word0 = integers(40)
+        self.tx_word1 = integers(40)
         self.waiting = 0  # frames in the four transmit rings
-        self.tx_write = array.array("q", [0]) * 5
-        self.tx_read = array.array("q", [0]) * 5
-        self.own_id = array.array("q", [0]) * 8
-        self.own_flags = array.array("q", [0]) * 8
-        self.own_word0 = array.array("q", [0]) * 8
-        self.own_word1 = array.array("q", [0]) * 8
+        self.tx_write = integers(5)
+        self.tx_read = integers(5)
+        self.own_id = integers(8)
+        self.own_flags = integers(8)
+        self.own_word0 = integers(8)
+        self.own_word1 = integers(8)
         self.own_write = 0
         self.own_read = 0
         self.receive_full_codes = array.array(
@@ -98,10 +99,10 @@ class Router:
         self.routed = 0
         self.copies = 0
         self.receive_lost = 0
-        self.receive_lost_from = array.array("q", [0]) * 5  # by channel
+        self.receive_lost_from = integers(5)  # by channel
         self.own_lost = 0
         self.unroutable = 0
-        self.transmit_lost = array.array("q", [0]) * 5
+        self.transmit_lost = integers(5)
 
     def receive(
         self,

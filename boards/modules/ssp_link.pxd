@@ -18,10 +18,10 @@ cdef class MainBrainSspLink:
     cdef public long long checksum_errors, receive_full, transmit_full, ids_out_of_range
     cdef public long long code_checksum, code_receive_full, code_transmit_full, code_id_out_of_range
     cpdef SspSegment exchanged(self, SspSegment segment)
-    cpdef bint receive(self, SspSegment segment)
+    cpdef bint receive(self, SspSegment segment) except? -1
     cpdef SspSegment next_segment(self)
-    cpdef long long parse(self)
-    cpdef bint send(self, long long identifier, long long word0, long long word1)
+    cpdef long long parse(self) except? <long long>-1
+    cpdef bint send(self, long long identifier, long long word0, long long word1) except? -1
     cpdef long long flush(self) noexcept
 
 @cython.final
@@ -40,12 +40,12 @@ cdef class RouterSspLink:
     cdef public long long segments_sent, segments_received, frames_sent, frames_received
     cdef public long long checksum_errors, receive_overwritten, transmit_lost, low_rate
     cdef public long long code_receive_overwritten, code_low_rate, code_checksum, code_transmit_full
-    cpdef bint push(self, long long identifier, long long flags, long long word0, long long word1, long long now)
+    cpdef bint push(self, long long identifier, long long flags, long long word0, long long word1, long long now) except? -1
     cpdef long long half_words_waiting(self) noexcept
     cpdef SspSegment next_segment(self, long long now)
     cpdef SspSegment tick(self, long long now)
     cpdef void receive(self, SspSegment segment) noexcept
-    cpdef bint take(self)
+    cpdef bint take(self) except? -1
     cpdef bint has_segments(self) noexcept
 
 cpdef long long checksum(SspSegment segment) noexcept

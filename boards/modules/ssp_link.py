@@ -13,12 +13,11 @@ Empty segments are one shared object per end and queued ones come from a pool, s
 segment that was handed over: a fault makes its own with `corrupted_copy`.
 """
 
-import array
-
 import cython
 
 from datatable.generated import errors
 from firmware_sim.peripherals.ssp import SspSegment
+from foundation.numbers import integers
 
 SEGMENT_HALF_WORDS = 31
 FRAME_HALF_WORDS = 5
@@ -81,8 +80,8 @@ class MainBrainSspLink:
         self.last_id = last_id
         # the receive DMA is armed in the middle of nowhere, so the first segment comes shifted (facts 1.6)
         self.first_is_junk = first_is_junk
-        self.received_words = array.array("q", [0]) * (16 * 31)
-        self.received_used = array.array("q", [0]) * 16
+        self.received_words = integers(16 * 31)
+        self.received_used = integers(16)
         self.received_read = 0
         self.received_count = 0
         # 16 queued, one being exchanged, one being packed
@@ -91,9 +90,9 @@ class MainBrainSspLink:
         self.packing = None
         self.queue_read = 0
         self.queue_count = 0
-        self.ids = array.array("q", [0]) * (16 * 6)
-        self.words0 = array.array("q", [0]) * (16 * 6)
-        self.words1 = array.array("q", [0]) * (16 * 6)
+        self.ids = integers(16 * 6)
+        self.words0 = integers(16 * 6)
+        self.words1 = integers(16 * 6)
         self.frames = 0
         self.segments_received = 0
         self.segments_sent = 0
@@ -256,7 +255,7 @@ class RouterSspLink:
     def __init__(self, report, frames_may_straddle=False) -> None:
         self.report = report
         self.frames_may_straddle = frames_may_straddle
-        self.ring = array.array("q", [0]) * 500
+        self.ring = integers(500)
         self.ring_write = 0
         self.ring_read = 0
         self.push_time = -1_000_000
@@ -266,8 +265,8 @@ class RouterSspLink:
         self.pool = [empty_segment() for _ in range(4)]
         self.empty = empty_segment()
         self.pool_next = 0
-        self.received_words = array.array("q", [0]) * (8 * 31)
-        self.received_used = array.array("q", [0]) * 8
+        self.received_words = integers(8 * 31)
+        self.received_used = integers(8)
         self.received_write = 0
         self.received_read = 0
         self.position = 0

@@ -13,13 +13,13 @@ cdef class CanController(Peripheral):
     cdef public long long tx_errors, rx_errors
     cdef public long long received, data_overruns, requests, sent, lost, aborted, refused
     cdef public InterruptSource rx_source, tx_source, error_source
-    cpdef bint transmit(self, long long buffer, long long identifier, long long flags, long long lo, long long hi)
+    cpdef bint transmit(self, long long buffer, long long identifier, long long flags, long long lo, long long hi) except? -1
     cpdef bint buffer_free(self, long long buffer) noexcept
-    cpdef long long write_CMR(self, long long command)
+    cpdef long long write_CMR(self, long long command) except? <long long>-1
     cpdef void write_MOD(self, long long mode) noexcept
     cpdef void release(self) noexcept
     cpdef long long read_ICR(self) noexcept
     cpdef long long SR(self) noexcept
     cpdef long long GSR(self) noexcept
-    cpdef double bit_rate(self)
+    cpdef double bit_rate(self) except? -1
     cdef void _bus_off(self) noexcept

@@ -14,12 +14,11 @@ SR, per transmit buffer 8 bits apart: RBS 1, DOS 2, TBS 4, TCS 8, ES 64, BS 128.
 RFS, TFI: DLC in bits 16-19, RTR bit 30, extended identifier bit 31.
 """
 
-import array
-
 import cython
 
 from firmware_sim.microcontroller import Microcontroller, Peripheral
 from foundation.events import CAN_RX, CAN_STATUS, CAN_TX_DONE
+from foundation.numbers import integers
 from foundation.user_error import UserError
 
 CMR_TR, CMR_AT, CMR_RRB, CMR_CDO, CMR_SRR, CMR_STB1, CMR_STB2, CMR_STB3 = 1, 2, 4, 8, 16, 32, 64, 128
@@ -73,12 +72,12 @@ class CanController(Peripheral):
         self.second_RID = 0
         self.second_RDA = 0
         self.second_RDB = 0
-        self.TFI = array.array("q", [0]) * 4
-        self.TID = array.array("q", [0]) * 4
-        self.TDA = array.array("q", [0]) * 4
-        self.TDB = array.array("q", [0]) * 4
-        self.tx_free = array.array("q", [1]) * 4
-        self.tx_complete = array.array("q", [1]) * 4
+        self.TFI = integers(4)
+        self.TID = integers(4)
+        self.TDA = integers(4)
+        self.TDB = integers(4)
+        self.tx_free = integers(4, 1)
+        self.tx_complete = integers(4, 1)
         self.overrun = False
         self.bus_off = False
         self.error_warning = False

@@ -22,4 +22,4 @@ cdef class SspPort(Peripheral):
     cpdef void load(self, SspSegment segment) noexcept
     cpdef SspSegment take(self)
 
-cpdef long long segment_time_ns(long long words, long long word_bits, long long bit_rate)
+cpdef long long segment_time_ns(long long words, long long word_bits, long long bit_rate) except? <long long>-1

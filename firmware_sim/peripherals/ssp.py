@@ -8,12 +8,11 @@ The FIFO is not modelled word by word: the interrupts that feed it are charged i
 handler, which returns the number of half-words.
 """
 
-import array
-
 import cython
 
 from firmware_sim.microcontroller import Peripheral
 from foundation.events import SSP_SEGMENT
+from foundation.numbers import integers
 
 SEGMENT_WORDS = 31
 BIT_RATE = 3_000_000  # 60 MHz / 20
@@ -29,7 +28,7 @@ class SspSegment:
     """31 half-words in `words`, each 0 ... 65535; `used`: how many are filled in."""
 
     def __init__(self) -> None:
-        self.words = array.array("q", [0]) * SEGMENT_WORDS
+        self.words = integers(SEGMENT_WORDS)
         self.used = 0
 
     def clear(self) -> cython.void:

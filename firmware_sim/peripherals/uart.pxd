@@ -14,7 +14,7 @@ cdef class Uart(Peripheral):
     cdef public long long received, overruns, sent, refused, transmit_free
     cpdef void set_divisor(self, long long DL, long long DIVADDVAL=*, long long MULVAL=*)
     cpdef long long RBR(self) noexcept
-    cpdef bint THR(self, long long byte)
-    cpdef long long LSR(self)
+    cpdef bint THR(self, long long byte) except? -1
+    cpdef long long LSR(self) except? <long long>-1
     cpdef long long waiting(self) noexcept
     cpdef long long read_all(self, long long[::1] ring, long long write, long long mask) noexcept

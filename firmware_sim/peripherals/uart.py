@@ -11,13 +11,12 @@ Transmit: a byte written to THR leaves as UART_OUTPUT, stamped with the end of i
 the FIFO has become empty, (UART_TRANSMIT, number) is raised.
 """
 
-import array
-
 import cython
 
 from firmware_sim.microcontroller import Peripheral
 from firmware_sim.vic import UART_TRANSMIT
 from foundation.events import NEVER, UART_BYTE
+from foundation.numbers import integers
 from foundation.user_error import UserError
 
 FIFO_BYTES = 16
@@ -39,7 +38,7 @@ class Uart(Peripheral):
         self.transmit_source = chip.vic.source(UART_TRANSMIT, number)
         self.timeout_alarm = chip.new_alarm(self, 0)
         self.transmit_alarm = chip.new_alarm(self, 1)
-        self.fifo = array.array("q", [0]) * FIFO_BYTES
+        self.fifo = integers(FIFO_BYTES)
         self.fifo_head = 0
         self.fifo_count = 0
         self.IIR = 1
@@ -76,18 +75,22 @@ class Uart(Peripheral):
         instant as byte by byte.
         """
         i: cython.longlong
-        byte: cython.longlong = queue.b
-        count: cython.longlong = queue.c if queue.c > 1 else 1
+        count: cython.longlong = 1
+        bytes_left: cython.longlong = queue.b
+        if queue.c > 1:
+            count = queue.c
+            bytes_left = queue.d
         self.received += count
         for i in range(count):
-            if queue.c > 1:
-                byte = queue.d >> 8 * i if i < 4 else queue.e >> 8 * (i - 4)
+            if i == 4:
+                bytes_left = queue.e
             if self.fifo_count < 16:
-                self.fifo[(self.fifo_head + self.fifo_count) & 15] = byte & 255
+                self.fifo[(self.fifo_head + self.fifo_count) & 15] = bytes_left & 255
                 self.fifo_count += 1
             else:  # lost
                 self.overruns += 1
                 self.errors |= 2
+            bytes_left >>= 8
         if self.fifo_count == 0:
             return
         self.chip.set_alarm(self.timeout_alarm, queue.time + 4 * self.byte_ns)
