@@ -20,7 +20,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
@@ -56,6 +56,7 @@ COMMAND_VARIATION_NS = 200_000
 ON_DEMAND_MS = Fraction(20)
 HARDWARE_BUFFERS = 2  # transmit buffers that a board's queue is emptied into (facts network 1.6, 4.14)
 SYNC = "TIMESTAMP"
+OTHER = "(other commands)"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -92,6 +93,34 @@ def robots_table() -> Table:
 def command_variables(table: Table) -> tuple[Variable, ...]:
     """What the main brain may send to the buses, by id."""
     return tuple(v for v in table.variables if v.publisher == "MB" and any(bus.startswith("CAN") for bus in v.buses))
+
+
+@dataclasses.dataclass(frozen=True)
+class Commands:
+    """The main brain's commands by how they leave: in every n-th slot; one in every `turn_every` slots, in turn; in the
+    slot in which they are written."""
+
+    regular: tuple[tuple[Variable, int], ...]
+    in_turn: tuple[Variable, ...]
+    turn_every: int
+    at_once: tuple[Variable, ...]
+
+
+def sort_commands(table: Table, schedules: Mapping[str, BusSchedule]) -> Commands:
+    """How each command leaves with the schedules of its buses; where these differ, the slowest counts."""
+    regular, in_turn, at_once = [], [], []
+    turn_every = 1
+    for variable in command_variables(table):
+        own = [schedules[bus.lower()] for bus in variable.buses if bus.lower() in schedules]
+        naming = [one for one in own if variable.name in one.every]
+        if naming:
+            regular.append((variable, max(one.turns(variable.name) for one in naming)))
+        elif any(one.commands_in_turn for one in own):
+            in_turn.append(variable)
+            turn_every = max(turn_every, *(one.commands_in_turn for one in own))
+        else:
+            at_once.append(variable)
+    return Commands(tuple(regular), tuple(in_turn), turn_every, tuple(at_once))
 
 
 def schedule_of_board(schedules: Mapping[str, BusSchedule], board: Board) -> BusSchedule:
@@ -149,21 +178,12 @@ def _apply_to_satellite(board: Any, schedule: BusSchedule, description: Board) -
 
 
 def _apply_to_main_brain(board: Any, schedules: Mapping[str, BusSchedule], table: Table) -> None:
-    regular: list[int] = []
-    turns: list[int] = []
-    in_turn: list[int] = []
-    turn_every = 1
-    for number in board.io.send_ids:
-        variable = table.variable(str(number))
-        own = [schedules[bus.lower()] for bus in variable.buses if bus.lower() in schedules]
-        if any(one.commands_in_turn and variable.name not in one.every for one in own):
-            in_turn.append(number)
-            turn_every = max(turn_every, *(one.commands_in_turn for one in own))
-        else:
-            regular.append(number)
-            turns.append(max((one.turns(variable.name) for one in own), default=1))
-    if in_turn or any(n != 1 for n in turns):
-        board.io.thin(regular, turns, in_turn, turn_every)
+    sorted_out = sort_commands(table, schedules)
+    turns = {variable.id: n for variable, n in sorted_out.regular}
+    in_turn = [variable.id for variable in sorted_out.in_turn]
+    if in_turn or any(n != 1 for n in turns.values()):
+        at_once = [number for number in board.io.send_ids if number not in in_turn]
+        board.io.thin(at_once, [turns.get(number, 1) for number in at_once], in_turn, sorted_out.turn_every)
 
 
 # ---- as the analysis sees it
@@ -228,42 +248,32 @@ def _command_streams(
     table: Table, bus: str, schedules: Mapping[str, BusSchedule], router: str, slot_ms: Fraction
 ) -> list[Stream]:
     """What the main brain sends to one bus: all of a slot leaves together, in the order of identifiers."""
-    regular: list[Variable] = []
-    others: list[Variable] = []
-    in_turn = 0
-    for variable in command_variables(table):
-        own = [schedules[name.lower()] for name in variable.buses if name.lower() in schedules]
-        if any(variable.name in one.every for one in own):
-            regular.append(variable)
-        elif bus.upper() in variable.buses:
-            others.append(variable)
-            in_turn = max(in_turn, *(one.commands_in_turn for one in own))
+    commands = sort_commands(table, schedules)
 
-    def common(variable: Variable, offset: int = 0) -> dict[str, Any]:
-        before = sum(1 for one in regular if one.id < variable.id)
-        if not in_turn:
-            before += sum(1 for one in others if one.id < variable.id and one.subscribers == variable.subscribers)
+    def here(variables: Sequence[Variable]) -> list[Variable]:
+        return [variable for variable in variables if bus.upper() in variable.buses]
+
+    def common(variable: Variable, beside: Sequence[Variable], offset: int) -> dict[str, Any]:
+        """Those of lower numbers leave before it: the regular ones, and what else comes in its slot."""
+        before = sum(1 for one, _ in commands.regular if one.id < variable.id)
+        before += sum(1 for one in beside if one.id < variable.id)
         jitter = EXCHANGE_NS * (1 + before // FRAMES_PER_EXCHANGE) + COMMAND_VARIATION_NS
         return {"queue": router, "jitter_ns": jitter, "offset_ns": int(slot_ms * offset * 1_000_000)}
 
     found = []
-    for variable in regular:
-        if bus.upper() in variable.buses:
-            n = max(
-                schedules[name.lower()].turns(variable.name) for name in variable.buses if name.lower() in schedules
-            )
-            found.append(_stream("MB", variable.name, [variable], slot_ms * n, **common(variable)))
-    if not in_turn:
-        steered = {one.subscribers for one in regular}
-        found += [
-            _stream("MB", one.name, [one], ON_DEMAND_MS, **common(one, 1))
-            for one in others
-            if one.subscribers not in steered
-        ]
-        others = [one for one in others if one.subscribers in steered]
-    if others:
-        every = max(1, in_turn)
-        found.append(_stream("MB", "(other commands)", others, slot_ms * every, **common(others[-1], every - 1)))
+    for variable, n in commands.regular:
+        if here([variable]):
+            found.append(_stream("MB", variable.name, [variable], slot_ms * n, **common(variable, (), 0)))
+    if in_turn := here(commands.in_turn):
+        every = commands.turn_every
+        found.append(_stream("MB", OTHER, in_turn, slot_ms * every, **common(in_turn[-1], (), every - 1)))
+    steered = {one.subscribers for one, _ in commands.regular}
+    if of_steered := [one for one in here(commands.at_once) if one.subscribers in steered]:
+        found.append(_stream("MB", OTHER, of_steered, slot_ms, **common(of_steered[-1], (), 0)))
+    for one in here(commands.at_once):
+        if one.subscribers not in steered:
+            beside = [other for other in here(commands.at_once) if other.subscribers == one.subscribers]
+            found.append(_stream("MB", one.name, [one], ON_DEMAND_MS, **common(one, beside, 1)))
     return found
 
 

@@ -137,6 +137,19 @@ def test_commands_leave_in_their_slots_and_the_others_one_at_a_time_in_turn():
     assert sorted(sent) == sorted(set(mb.SEND) - {command, stiffness})  # each once, none starved
 
 
+def test_buses_with_different_schedules_each_have_their_own():
+    hil, full = profile.load(HIL), profile.default()
+    mixed = dataclasses.replace(full, buses={**full.buses, "can1": hil.buses["can1"]})
+    commands = bus_schedule.sort_commands(TABLE, mixed.schedules())
+    turns = {variable.name: n for variable, n in commands.regular}
+    assert (turns["MCH_STIFFNESS"], turns["MCFI_STIFFNESS"]) == (2, 1)
+    names = {variable.name for variable in commands.in_turn}
+    assert {"MB_STATUS", "MCH_SHUTDOWN"} <= names and "MCFI_SHUTDOWN" not in names
+    assert {variable.name for variable in commands.at_once} >= {"MCFI_SHUTDOWN", "UI_SET_LED_1"}
+    assert commands.turn_every == 2
+    assert all(found.met for found in bounds(mixed).values())
+
+
 # ---- bounds
 
 
