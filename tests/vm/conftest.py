@@ -17,6 +17,7 @@ from . import places
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 FIGURES = []
 LAST = "1FFFFFFF#E0F0"  # closes a recording: nobody else sends this
+SMALLER_BUFFER = "receive buffer size was adjusted"  # to what others than root may have: no fault
 LAST_FRAME = (0x1FFFFFFF, 2 | FLAG_EXTENDED, 0xF0E0, 0)
 
 
@@ -25,11 +26,14 @@ def pytest_configure(config):
     config.addinivalue_line("markers", "adapters: needs two CAN adapters that may be reconfigured")
 
 
-@pytest.fixture(autouse=True)
-def only_where_asked():
+def pytest_collection_modifyitems(items):
     """An ordinary run of the suite has neither the interfaces nor the time."""
-    if not places.run_by_make_test_vm():
-        pytest.skip("on real SocketCAN: `make test-vm` runs it")
+    if places.run_by_make_test_vm():
+        return
+    here = pathlib.Path(__file__).parent
+    for item in items:
+        if here in item.path.parents:
+            item.add_marker(pytest.mark.skip(reason="on real SocketCAN: `make test-vm` runs it"))
 
 
 @pytest.fixture
@@ -70,7 +74,7 @@ class Candump:
         self.process.send_signal(signal.SIGINT)
         _, told = self.process.communicate(timeout=60)
         self.file.close()
-        return told
+        return "".join(line for line in told.splitlines(True) if SMALLER_BUFFER not in line)
 
     def frames(self):
         """{interface: [(identifier, flags, lo, hi), ...]} in the order of arrival."""
