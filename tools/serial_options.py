@@ -87,7 +87,7 @@ def connect(robot: Ranger, options: argparse.Namespace) -> tuple[dict[str, Any],
     if "imu-offer" in ports:
         ends["imu-offer"] = serial_ports.offer_imu(robot, ports["imu-offer"])
     lines = [MEANINGS[name].format(port.path) for name, port in ports.items()]
-    if options.json == "-":  # nothing else is printed then, and without its name a pseudo-terminal is of no use
+    if lines and options.json == "-":  # nothing else is printed, and without its name a pseudo-terminal is of no use
         print(*lines, sep="\n", file=sys.stderr, flush=True)
     return ends, lines
 
