@@ -611,7 +611,6 @@ class Bus:
         bits: cython.longlong
         end: cython.longlong
         node: Node
-        inbox: EventQueue
         if self.pending_count > 1:
             slot = self._arbitrate(k)
             merged = self._contend(k, slot)
@@ -645,8 +644,7 @@ class Bus:
                 if node.receive_errors > 0:
                     self._calm_receiver(node, received)
                 if node.listening:
-                    inbox = node.inbox
-                    inbox.push(received, node.order, 2, node.controller, identifier, flags, lo, hi)  # CAN_RX
+                    node.inbox.push(received, node.order, 2, node.controller, identifier, flags, lo, hi)  # CAN_RX
                     node.received += 1
                     heard = True
         if received <= self.advanced:
@@ -775,17 +773,17 @@ class Bus:
                 return position
         return -1
 
+    @cython.cdivision(True)  # slots are not negative
     def _finish_sender(
         self, node: Node, slot: cython.longlong, end: cython.longlong, done: cython.longlong
     ) -> cython.longlong:
         """The sender of a whole frame that ended at bit `end`, `done` in ns: its buffer is free from `done` on."""
-        inbox: EventQueue = node.inbox
         if self.pending_count == 1:
             self.pending_count = 0
         else:
             self._remove(slot)
         self.busy_until[slot] = done
-        inbox.push(done, node.order, 3, node.controller, slot % 3 + 1, 0)  # CAN_TX_DONE, TX_SENT
+        node.inbox.push(done, node.order, 3, node.controller, slot % 3 + 1, 0)  # CAN_TX_DONE, TX_SENT
         node.sent += 1
         node.sending_end = end
         if node.passive:
