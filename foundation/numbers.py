@@ -28,6 +28,11 @@ def integers(count, value=0):
     return array.array("q", [value]) * count if cython.compiled else [value] * count
 
 
+def reals(values):
+    """The numbers of `values` as doubles, for a field that is looked at by index only; what for is told above."""
+    return array.array("d", values) if cython.compiled else [float(value) for value in values]
+
+
 def float32(value: cython.double) -> cython.double:
     """`value` rounded to the nearest IEEE single; beyond the largest single it becomes infinite."""
     if cython.compiled:
