@@ -11,12 +11,12 @@ power of the electronics together (EQUATIONS 10.8):
 When a pack is empty its protection opens (appendix 3.10, "undercharge"): voltage 0, `cut_off` true.
 """
 
-import array
 import dataclasses
 import math
 
 import cython
 
+from foundation.numbers import reals
 from foundation.user_error import UserError
 
 if not cython.compiled:
@@ -70,7 +70,7 @@ class Battery:
     def __init__(self, parameters=None) -> None:
         p = parameters if parameters is not None else BatteryParameters()
         self.parameters = p
-        self.curve = array.array("d", [p.cells_in_series * volts for volts in p.cell_volts])
+        self.curve = reals(p.cells_in_series * volts for volts in p.cell_volts)
         self.intervals = len(p.cell_volts) - 1
         self.resistance_ohm = p.pack_resistance_ohm / p.packs
         self.per_As = 1.0 / p.capacity_As

@@ -13,10 +13,9 @@ Modes: held by the operator, single stance, double stance, flight, fallen. Force
 robot, along the (sloped) floor and normal to it.
 """
 
-import array
-
 import cython
 
+from foundation.numbers import reals
 from plant.floor import Floor
 from plant.parameters import BodyParameters
 from plant.walk_record import WalkRecord
@@ -62,7 +61,7 @@ class Body:
         self.hip_y = 0.0
         self.hip_vx = 0.0
         self.hip_vy = 0.0
-        self.saved = array.array("d", [0.0]) * 16
+        self.saved = reals([0.0] * 16)
 
         # sines and cosines of the four angles that are named here; `_know_angles` brings them up to date
         self.known_foot_outer = 0.0
@@ -193,8 +192,8 @@ class Body:
         self.P_stance_y = 0.0
         self.P_swing_x = 0.0
         self.P_swing_y = 0.0
-        self.matrix = array.array("d", [0.0]) * 110
-        self.solution = array.array("d", [0.0]) * 10
+        self.matrix = reals([0.0] * 110)
+        self.solution = reals([0.0] * 10)
         self.place(0.0, 0.3)
 
     def set_slope(self, slope_rad: cython.double) -> cython.void:
@@ -266,31 +265,30 @@ class Body:
 
     def update_pose(self) -> cython.void:
         """Hip position and the two gaps from the angles (in flight and held: the gaps only)."""
+        el: cython.double = self.el
+        d: cython.double = self.d
+        r: cython.double = self.r
         outer: cython.double
         inner: cython.double
         foot: cython.double
         self._know_angles()
-        # the hip above and ahead of its anchor, EQUATIONS 4
-        outer = self.el * self.cos_leg_outer - self.d * self.cos_foot_outer
+        # the hip above its anchors, and ahead of that of the reference leg: EQUATIONS 4
+        outer = el * self.cos_leg_outer - d * self.cos_foot_outer
         foot = self.foot_outer
-        if foot < self.heel or foot > self.toe:
-            outer += self.r * cos(self._excess(foot))
-        else:
-            outer += self.r
-        inner = self.el * self.cos_leg_inner - self.d * self.cos_foot_inner
+        outer += r * cos(self._excess(foot)) if foot < self.heel or foot > self.toe else r
+        inner = el * self.cos_leg_inner - d * self.cos_foot_inner
         foot = self.foot_inner
-        if foot < self.heel or foot > self.toe:
-            inner += self.r * cos(self._excess(foot))
-        else:
-            inner += self.r
+        inner += r * cos(self._excess(foot)) if foot < self.heel or foot > self.toe else r
         if self.mode == 1 or self.mode == 2 or self.standing:
             if self.stance == 0:
                 foot = self.foot_outer
                 self.hip_y = self.height_outer + outer
-                self.hip_x = self.anchor_outer + self._behind(0) + self.r * (foot - self._excess(foot))
+                self.hip_x = self.anchor_outer + el * self.sin_leg_outer - d * self.sin_foot_outer + r * foot
             else:
                 self.hip_y = self.height_inner + inner
-                self.hip_x = self.anchor_inner + self._behind(1) + self.r * (foot - self._excess(foot))
+                self.hip_x = self.anchor_inner + el * self.sin_leg_inner - d * self.sin_foot_inner + r * foot
+            if foot < self.heel or foot > self.toe:
+                self.hip_x += r * (sin(self._excess(foot)) - self._excess(foot))
         self.gap_outer = self.hip_y - outer - self.height_outer
         self.gap_inner = self.hip_y - inner - self.height_inner
 

@@ -8,9 +8,9 @@ bridge has power until `watchdog_ns` after the last edge on the watchdog line, a
 (appendix 3.9; facts network-and-boards 4.3).
 """
 
-import array
-
 import cython
+
+from foundation.numbers import integers
 
 PWM_WRITE = 0
 WATCHDOG_EDGE = 1
@@ -40,9 +40,9 @@ class Drive:
         self.switching_leads = 0
         self.sensed_lead_switches = False
         self.power_losses = 0  # times the watchdog ran out
-        self.times = array.array("q", [0]) * 16
-        self.kinds = array.array("q", [0]) * 16
-        self.values = array.array("q", [0]) * 48
+        self.times = integers(16)
+        self.kinds = integers(16)
+        self.values = integers(48)
         self.capacity = 16
         self.count = 0
         self.next_change_ns = 1 << 62  # first queued change or the end of the watchdog's time
@@ -104,8 +104,10 @@ class Drive:
     def _grow(self) -> None:
         self.capacity = 2 * self.capacity
         for name, width in (("times", 1), ("kinds", 1), ("values", 3)):
-            grown = array.array("q", getattr(self, name))
-            grown.extend(array.array("q", [0]) * (width * self.capacity - len(grown)))
+            old = getattr(self, name)
+            grown = integers(width * self.capacity)
+            for i, value in enumerate(old):
+                grown[i] = value
             setattr(self, name, grown)
 
     def apply(self, time: cython.longlong) -> cython.void:

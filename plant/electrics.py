@@ -17,12 +17,12 @@ the gain of 20 and the converter's 2) that is 0.25 mV, a tenth of what its data 
 rejection at 100 kHz leaves of 26 V.
 """
 
-import array
 import dataclasses
 import math
 
 import cython
 
+from foundation.numbers import reals
 from foundation.user_error import UserError
 from plant.battery import Battery, BatteryParameters
 from plant.electronics import power_W
@@ -111,20 +111,20 @@ class Electrics:
         self.outer_feet = FootSensors("outer", p.foot_rise_time_constant_s, p.foot_share, p.foot_full_load_N)
         self.inner_feet = FootSensors("inner", p.foot_rise_time_constant_s, p.foot_share, p.foot_full_load_N)
         self.noise = NoiseSource(seed, "analog sensors")
-        self.analog_start = array.array("d", [0.0]) * ANALOG_COUNT
-        self.analog_end = array.array("d", [0.0]) * ANALOG_COUNT
-        self.values = array.array("d", [0.0]) * ANALOG_COUNT  # what is measured: A, V, rad
-        self.zero_V = array.array("d", [0.0]) * ANALOG_COUNT
-        self.slope_V = array.array("d", [0.0]) * ANALOG_COUNT  # volts per ampere, volt or rad
-        self.noise_V = array.array("d", [0.0]) * ANALOG_COUNT
-        self.lines = array.array("d", [0.0]) * (3 * ANALOG_COUNT)  # zero_V, slope_V, noise_V of one after the other
+        self.analog_start = reals([0.0] * ANALOG_COUNT)
+        self.analog_end = reals([0.0] * ANALOG_COUNT)
+        self.values = reals([0.0] * ANALOG_COUNT)  # what is measured: A, V, rad
+        self.zero_V = reals([0.0] * ANALOG_COUNT)
+        self.slope_V = reals([0.0] * ANALOG_COUNT)  # volts per ampere, volt or rad
+        self.noise_V = reals([0.0] * ANALOG_COUNT)
+        self.lines = reals([0.0] * (3 * ANALOG_COUNT))  # zero_V, slope_V, noise_V of one after the other
         # additional terms of a model file, in the unit of the quantity
         self.has_terms = False
-        self.scale = array.array("d", [1.0]) * ANALOG_COUNT
-        self.offset = array.array("d", [0.0]) * ANALOG_COUNT
-        self.lag_s = array.array("d", [0.0]) * ANALOG_COUNT
-        self.state = array.array("d", [0.0]) * ANALOG_COUNT
-        self.battery_A = array.array("d", [0.0]) * len(MOTOR_NAMES)  # smoothed, per motor
+        self.scale = reals([1.0] * ANALOG_COUNT)
+        self.offset = reals([0.0] * ANALOG_COUNT)
+        self.lag_s = reals([0.0] * ANALOG_COUNT)
+        self.state = reals([0.0] * ANALOG_COUNT)
+        self.battery_A = reals([0.0] * len(MOTOR_NAMES))  # smoothed, per motor
         self.pwm_offset_A = p.pwm_offset_A
         self.voltage_clip_V = p.voltage_clip_V
         self.battery_current_lag_s = p.battery_current_lag_s
@@ -194,11 +194,6 @@ class Electrics:
     ) -> cython.void:
         """The voltages at the end of the step: contact and load of each foot pair, steering angle (rad)."""
         h: cython.double = (t1 - t0) * 1e-9
-        i: cython.longlong
-        start: cython.double[::1] = self.analog_start
-        end: cython.double[::1] = self.analog_end
-        for i in range(19):  # ANALOG_COUNT
-            start[i] = end[i]
         self.outer_feet.step(h, outer_contact, outer_load_N)
         self.inner_feet.step(h, inner_contact, inner_load_N)
         if h != self.lag_h:
@@ -231,7 +226,7 @@ class Electrics:
             self.analog_start[i] = self.analog_end[i]
 
     def _read(self, h: cython.double, steering_rad: cython.double) -> cython.void:
-        """Fill `analog_end`."""
+        """Fill `analog_end`; what stood there becomes `analog_start`."""
         V: cython.double = self.battery.voltage_V
         seen: cython.double = V if V < self.voltage_clip_V else self.voltage_clip_V
         lag: cython.double = self.lag_factor
@@ -244,6 +239,7 @@ class Electrics:
         i: cython.longlong
         unit: MotorUnit
         values: cython.double[::1] = self.values
+        start: cython.double[::1] = self.analog_start
         end: cython.double[::1] = self.analog_end
         motors: list = self.motors
         for motor in range(4):
@@ -287,5 +283,6 @@ class Electrics:
         place = self.noise.block()
         line: cython.longlong = 0
         for i in range(19):
+            start[i] = end[i]
             end[i] = lines[line] + lines[line + 1] * values[i] + lines[line + 2] * noise[place + i]
             line += 3

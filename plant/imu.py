@@ -19,10 +19,9 @@ roll = roll_bias - LO. So the firmware's -(rate x - bias) is the legs' rate. The
 ROBOT PARITY: fused angles are the true ones with noise and bias; the device's slow correction is not modelled.
 """
 
-import array
-
 import cython
 
+from foundation.numbers import reals
 from foundation.random_stream import RandomStream
 from foundation.user_error import UserError
 from plant.edge_buffer import ByteBuffer
@@ -96,7 +95,7 @@ class Imu:
         self.command = 0  # bytes of a command received so far
         self.acknowledge = -1  # command byte to acknowledge
         self.acknowledge_ns = 0
-        self.ring = array.array("d", [0.0]) * MAX_FILTER
+        self.ring = reals([0.0] * MAX_FILTER)
         self.ring_sum = 0.0
         self.lagged = 0.0
         self.rate_x = 0.0  # of the last sample

@@ -17,10 +17,9 @@ per edge, new every time; it moves the stamp, never past a neighbour or out of t
 disc (rad of encoder shaft, once and twice per turn).
 """
 
-import array
-
 import cython
 
+from foundation.numbers import reals
 from foundation.random_stream import RandomStream
 from foundation.user_error import UserError
 from plant.edge_buffer import EdgeBuffer
@@ -65,7 +64,7 @@ class IncrementalEncoder:
         self.jitter = jitter
         self.stream = RandomStream(seed, f"encoder {name} jitter")
         self.table_size = 2 * lines
-        self.errors = array.array("d", [0.0]) * (2 * lines)
+        self.errors = reals([0.0] * (2 * lines))
         self.has_errors = False
         self.seed = seed
         self.set_disc(line_error, duty_error)
@@ -256,11 +255,19 @@ class IncrementalEncoder:
         c = g0 + g1 - 2.0
         span = t1 - t0
         last = t0
+        x = du if forward else -du
+        while buffer.capacity < x + 3.0:  # the disc's errors may let in one more at either end
+            buffer.grow()
+        times: cython.longlong[::1] = buffer.times
+        levels_a: cython.longlong[::1] = buffer.levels_a
+        levels_b: cython.longlong[::1] = buffer.levels_b
+        jitter: cython.double = self.jitter
+        has_errors: cython.bint = self.has_errors
         while True:
             s = (level - u0) * inverse
             x = s * (g0 + s * (b + s * c))
-            if self.jitter > 0.0:
-                x += self.stream.normal() * self.jitter * (inverse if inverse > 0.0 else -inverse)
+            if jitter > 0.0:
+                x += self.stream.normal() * jitter * (inverse if inverse > 0.0 else -inverse)
             time = int(x * span)
             time += t0
             if time < last:
@@ -268,23 +275,21 @@ class IncrementalEncoder:
             if time >= t1:
                 time = t1 - 1
             last = time
-            if count == buffer.capacity:
-                buffer.grow()
-            buffer.times[count] = time
+            times[count] = time
             if forward:
                 cell += 1
-                buffer.levels_a[count] = 1 - (cell & 1)
-                buffer.levels_b[count] = cell & 1
+                levels_a[count] = 1 - (cell & 1)
+                levels_b[count] = cell & 1
                 count += 1
-                level = self.errors[(cell + 1) % self.table_size] + (cell + 1) if self.has_errors else cell + 1
+                level = self.errors[(cell + 1) % self.table_size] + (cell + 1) if has_errors else cell + 1
                 if u1 < level:
                     break
             else:
-                buffer.levels_b[count] = cell & 1
+                levels_b[count] = cell & 1
                 cell -= 1
-                buffer.levels_a[count] = 1 - (cell & 1)
+                levels_a[count] = 1 - (cell & 1)
                 count += 1
-                level = self.errors[cell % self.table_size] + cell if self.has_errors else cell
+                level = self.errors[cell % self.table_size] + cell if has_errors else cell
                 if u1 >= level:
                     break
         self.cell = cell

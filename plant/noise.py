@@ -7,24 +7,24 @@ addressed by 12 random bits; one 64-bit draw serves five values (`normal`) or fi
 to 64 neighbours is read (`block`). Largest value 3.67.
 """
 
-import array
 import statistics
 
 import cython
 
+from foundation.numbers import reals
 from foundation.random_stream import RandomStream
 
 TABLE_SIZE = 4096
 BLOCK = 64  # values that may be read from a place on
 
 
-def quantile_table() -> array.array:
+def quantile_table() -> list[float]:
     """The 4096 values: quantiles at (i + 1/2) / 4096, mean 0, variance 1."""
     normal = statistics.NormalDist()
     half = [normal.inv_cdf((i + 0.5) / TABLE_SIZE) for i in range(TABLE_SIZE // 2)]
     scale = (2.0 * sum(value * value for value in half) / TABLE_SIZE) ** -0.5
     half = [value * scale for value in half]
-    return array.array("d", half + [-value for value in reversed(half)])
+    return half + [-value for value in reversed(half)]
 
 
 class NoiseSource:
@@ -37,7 +37,7 @@ class NoiseSource:
             j = self.stream.integer(i + 1)
             table[i], table[j] = table[j], table[i]
         table.extend(table[:BLOCK])
-        self.table = table
+        self.table = reals(table)
         self.word = 0
         self.left = 0
 

@@ -8,11 +8,10 @@ Seen from the boards: `motors` with their drives, `encoders` with their edges, `
 `words`, `imu`. Seen from outside: `body`, `record`, `steering`, and the few fields a harness asks every step.
 """
 
-import array
-
 import cython
 import numpy as np
 
+from foundation.numbers import integers
 from plant.absolute_encoder import AbsoluteEncoder
 from plant.body import Body
 from plant.electrics import Electrics
@@ -119,7 +118,7 @@ class RangerPlant:
         self.hip_word = AbsoluteEncoder("hip", 4590, 1, seed=seed)
         self.outer_word = AbsoluteEncoder("outer_ankle", 6562, -1, seed=seed)
         self.inner_word = AbsoluteEncoder("inner_ankle", 1572, 1, seed=seed)
-        self.words = array.array("q", [0]) * 3
+        self.words = integers(3)
         self.imu = Imu(seed, phase_ns=start_ns)
         self.analog_start = self.electrics.analog_start
         self.analog_end = self.electrics.analog_end

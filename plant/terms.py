@@ -13,13 +13,13 @@ file can get wrong is a UserError that names file, term, field and limit. A plan
 torques are asked for only when there are any, and sensors and windings keep their neutral numbers.
 """
 
-import array
 import dataclasses
 import math
 import pathlib
 import tomllib
 from typing import Any
 
+from foundation.numbers import reals
 from foundation.user_error import UserError
 from plant import term_torques as torques
 from plant.wiring_points import ANALOG_NAMES, ENCODER_NAMES, WORD_NAMES
@@ -380,13 +380,13 @@ def _apply_analog(electrics: Any, i: int, term: Term) -> None:
     """A term of a voltage sensor, number i of the wiring points."""
     name, (value,) = term.form.name, term.values.values()
     if name == "sensor_noise":
-        noise = array.array("d", electrics.noise_V)
+        noise = reals(electrics.noise_V)
         noise[i] = value * abs(electrics.slope_V[i])
         electrics.noise_V = noise
         return
     electrics.has_terms = True
     field = {"sensor_scale": "scale", "sensor_offset": "offset", "sensor_lag": "lag_s"}[name]
-    numbers = array.array("d", getattr(electrics, field))
+    numbers = reals(getattr(electrics, field))
     numbers[i] = value * numbers[i] if name == "sensor_scale" else value + numbers[i]
     setattr(electrics, field, numbers)
 
