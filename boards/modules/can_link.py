@@ -151,12 +151,12 @@ class CanLink:
         return None
 
     def receive_all(self) -> object:
-        """Slot task: deliver every frame that waits; returns how many there were, None without any."""
+        """Slot task: deliver every frame that waits; returns how many there were."""
         frames: cython.longlong = 0
         place: cython.longlong
         receiver: Receiver
         if self.rx_read == self.rx_write:
-            return None
+            return 0
         while self.rx_read != self.rx_write:
             place = self.rx_read
             # DLC 8 and neither remote nor extended, as the bits stand in RFS
@@ -214,14 +214,14 @@ class CanLink:
     def feed(self) -> object:
         """Slot task, and after each queued frame: fill free hardware buffers, 1 before 2.
 
-        Returns how many frames went there, None when none waited.
+        Returns how many frames went there.
         """
         frames: cython.longlong = 0
         buffer: cython.longlong
         place: cython.longlong
         controller: CanController = self.controller
         if self.tx_read == self.tx_write:
-            return None
+            return 0
         while self.tx_read != self.tx_write:
             if controller.tx_free[1] != 0:
                 buffer = 1
