@@ -99,44 +99,44 @@ class AnkleBoard(MotorBoard):
         self.id_ankle_angle = -1
         self.id_ankle_rate = -1
 
-    def set_start_values(self) -> cython.void:
+    def set_start_values(self) -> None:
         """Both incremental encoders start at the absolute angle."""
         self.motor.set_position(self.encoder.angle)
         self.joint.set_position(self.encoder.angle)
 
-    def update_switches(self) -> cython.void:
+    def update_switches(self) -> None:
         """ls_update: both limit switches and both feet, with the newest converter results."""
         self.left_switch.sample()
         self.right_switch.sample()
         self.right_foot.sample(self.adc_external.results[3])
         self.left_foot.sample(self.adc_external.results[2])
 
-    def rezero(self) -> cython.void:
+    def rezero(self) -> None:
         """Motor encoder towards the ankle, only while the foot rests near its upper stop."""
         rate: cython.longlong = self.joint.rate
         if self.encoder.angle < self.rezero_angle and -self.rezero_rate < rate < self.rezero_rate:
             self.rezero_motor(self.rezero_share)
 
-    def send_ankle_angle(self) -> cython.void:
+    def send_ankle_angle(self) -> None:
         self.can.send_float(self.id_ankle_angle, float32(self.encoder.angle_rad()))
 
-    def send_ankle_rate(self) -> cython.void:
+    def send_ankle_rate(self) -> None:
         self.can.send_float(self.id_ankle_rate, float_of_fixed(self.joint.rate))
 
-    def send_right_heel_sense(self) -> cython.void:
+    def send_right_heel_sense(self) -> None:
         self.can.send_float(self.id_right_heel_sense, self.adc_external.results[3])
 
-    def send_left_heel_sense(self) -> cython.void:
+    def send_left_heel_sense(self) -> None:
         self.can.send_float(self.id_left_heel_sense, self.adc_external.results[2])
 
-    def send_right_contact(self) -> cython.void:
+    def send_right_contact(self) -> None:
         self.can.send_float(self.id_right_hs, self.right_foot.contact.state)
 
-    def send_left_contact(self) -> cython.void:
+    def send_left_contact(self) -> None:
         self.can.send_float(self.id_left_hs, self.left_foot.contact.state)
 
-    def send_right_switch(self) -> cython.void:
+    def send_right_switch(self) -> None:
         self.can.send_float(self.id_right_ls, self.right_switch.switch.state)
 
-    def send_left_switch(self) -> cython.void:
+    def send_left_switch(self) -> None:
         self.can.send_float(self.id_left_ls, self.left_switch.switch.state)

@@ -43,7 +43,7 @@ cdef class CanRouterBoard(Microcontroller):
     cdef public long long[::1] route_ns, flush_ns
     cdef public long long sync_cycles
     cdef public long long code_dnf, code_near_limit, code_task_limit, code_queue_full
-    cpdef void report(self, long long code)
+    cpdef int report(self, long long code) except -1
     cpdef object on_segment_timer(self, EventQueue queue)
     cpdef object on_segment(self, EventQueue queue)
     cpdef object on_can1(self, EventQueue queue)
@@ -55,21 +55,21 @@ cdef class CanRouterBoard(Microcontroller):
     cpdef long long flush(self, CanController controller) except? <long long>-1
     cpdef bint can_flush(self) except? -1
     cpdef long long main_loop(self) except? <long long>-1
-    cpdef void slot_exceeded(self)
-    cpdef void slot_near_limit(self)
-    cpdef void task_limit(self, Task task)
-    cpdef void send_float(self, long long identifier, double value)
-    cpdef void send_time(self)
+    cpdef int slot_exceeded(self) except -1
+    cpdef int slot_near_limit(self) except -1
+    cpdef int task_limit(self, Task task) except -1
+    cpdef int send_float(self, long long identifier, double value) except -1
+    cpdef int send_time(self) except -1
     cpdef object update_errors(self)
-    cpdef void count_load(self)
-    cpdef void show_load(self)
-    cpdef void send_error(self)
+    cpdef int count_load(self) except -1
+    cpdef int show_load(self) except -1
+    cpdef int send_error(self) except -1
     cpdef double current_A(self) except? -1
     cpdef double voltage_V(self) except? -1
-    cpdef void send_power(self)
-    cpdef void send_current(self)
-    cpdef void send_voltage(self)
-    cpdef void send_load_1(self)
-    cpdef void send_load_2(self)
-    cpdef void send_load_3(self)
-    cpdef void send_load_4(self)
+    cpdef int send_power(self) except -1
+    cpdef int send_current(self) except -1
+    cpdef int send_voltage(self) except -1
+    cpdef int send_load_1(self) except -1
+    cpdef int send_load_2(self) except -1
+    cpdef int send_load_3(self) except -1
+    cpdef int send_load_4(self) except -1

@@ -185,7 +185,7 @@ class CanRouterBoard(Microcontroller):
 
     # --- errors -----------------------------------------------------------------------------------------
 
-    def report(self, code: cython.longlong) -> cython.void:
+    def report(self, code: cython.longlong) -> None:
         """Note an error; with the firmware's quirk each report carries the one before, the first is 0."""
         if self.errors_one_late:
             self.errors.report(self.error_before)
@@ -193,15 +193,15 @@ class CanRouterBoard(Microcontroller):
         else:
             self.errors.report(code)
 
-    def slot_exceeded(self) -> cython.void:
+    def slot_exceeded(self) -> None:
         """A tick found the row unfinished."""
         self.report(self.code_dnf)
 
-    def slot_near_limit(self) -> cython.void:
+    def slot_near_limit(self) -> None:
         """A slot took more than 90 % of its length."""
         self.report(self.code_near_limit)
 
-    def task_limit(self, task: Task) -> cython.void:
+    def task_limit(self, task: Task) -> None:
         """A task took longer than its limit."""
         self.report(self.code_task_limit)
 
@@ -368,14 +368,14 @@ class CanRouterBoard(Microcontroller):
 
     # --- slot tasks -------------------------------------------------------------------------------------
 
-    def send_float(self, identifier: cython.longlong, value: cython.double) -> cython.void:
+    def send_float(self, identifier: cython.longlong, value: cython.double) -> None:
         """A variable of the router itself, stamped with its own time, into its own ring."""
         if not self.router.send(identifier, word_of_float(value), self.time.ms):
             self.own_lost += 1
             if self.report_full:
                 self.report(self.code_queue_full)
 
-    def send_time(self) -> cython.void:
+    def send_time(self) -> None:
         """The main brain's copy of the time.
 
         ROBOT PARITY: on the robot the first word of this copy is the count as a float; the table has the
@@ -398,11 +398,11 @@ class CanRouterBoard(Microcontroller):
                 self.report(self.code_queue_full)
         return self.errors.update()
 
-    def count_load(self) -> cython.void:
+    def count_load(self) -> None:
         """The millisecond's frame counts."""
         self.load.end_of_millisecond()
 
-    def show_load(self) -> cython.void:
+    def show_load(self) -> None:
         """One light per bus: 0 silent, 1 traffic, 2 from 20 frames/ms, 3 from 30.
 
         ROBOT PARITY: which pins they hang on is not known, so they are state only.
@@ -420,7 +420,7 @@ class CanRouterBoard(Microcontroller):
             else:
                 self.can_leds[i] = 3
 
-    def send_error(self) -> cython.void:
+    def send_error(self) -> None:
         """The error that waits longest, if one does."""
         if self.errors.take():
             if not self.router.send(table.ERROR_VARIABLE, self.errors.word, self.errors.stamp):
@@ -434,30 +434,30 @@ class CanRouterBoard(Microcontroller):
         """Supply voltage of the electronics by the converter."""
         return float32(VOLTAGE_GAIN_V * (self.adc.DR(1) + VOLTAGE_OFFSET))
 
-    def send_power(self) -> cython.void:
+    def send_power(self) -> None:
         """CSR_MCU_POWER, W: the product of both readings."""
         self.send_float(table.CSR_MCU_POWER, self.current_A() * self.voltage_V())
 
-    def send_current(self) -> cython.void:
+    def send_current(self) -> None:
         """CSR_MCU_CURRENT, A."""
         self.send_float(table.CSR_MCU_CURRENT, self.current_A())
 
-    def send_voltage(self) -> cython.void:
+    def send_voltage(self) -> None:
         """CSR_MCU_VOLTAGE, V."""
         self.send_float(table.CSR_MCU_VOLTAGE, self.voltage_V())
 
-    def send_load_1(self) -> cython.void:
+    def send_load_1(self) -> None:
         """CSR_CAN1_LOAD, most frames in one ms since the last report."""
         self.send_float(table.CSR_CAN1_LOAD, self.load.report_peak(1))
 
-    def send_load_2(self) -> cython.void:
+    def send_load_2(self) -> None:
         """CSR_CAN2_LOAD."""
         self.send_float(table.CSR_CAN2_LOAD, self.load.report_peak(2))
 
-    def send_load_3(self) -> cython.void:
+    def send_load_3(self) -> None:
         """CSR_CAN3_LOAD."""
         self.send_float(table.CSR_CAN3_LOAD, self.load.report_peak(3))
 
-    def send_load_4(self) -> cython.void:
+    def send_load_4(self) -> None:
         """CSR_CAN4_LOAD."""
         self.send_float(table.CSR_CAN4_LOAD, self.load.report_peak(4))

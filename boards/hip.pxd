@@ -11,8 +11,8 @@ cdef class HipBoard(MotorBoard):
     cdef public HipSafety safety
     cdef public long long id_angle, id_ang_rate
     cpdef Schedule schedule(self)
-    cpdef void set_start_values(self)
+    cpdef int set_start_values(self) except -1
     cpdef long long controlled_position(self)
-    cpdef void rezero(self)
-    cpdef void send_angle(self)
-    cpdef void send_ang_rate(self)
+    cpdef int rezero(self) except -1
+    cpdef int send_angle(self) except -1
+    cpdef int send_ang_rate(self) except -1

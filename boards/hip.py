@@ -115,7 +115,7 @@ class HipBoard(MotorBoard):
             ),
         )  # fmt: skip
 
-    def set_start_values(self) -> cython.void:
+    def set_start_values(self) -> None:
         """Encoders start at the absolute angle; the firmware of 2016 forgets the motor's."""
         self.joint.set_position(self.encoder.angle)
         if self.quirks.hip_motor_encoder_preset:
@@ -125,13 +125,13 @@ class HipBoard(MotorBoard):
         """The joint's own angle, rad x 65536."""
         return self.encoder.angle
 
-    def rezero(self) -> cython.void:
+    def rezero(self) -> None:
         """5 % of the difference per call, always."""
         if self.quirks.hip_rezero:
             self.rezero_motor(REZERO_SHARE)
 
-    def send_angle(self) -> cython.void:
+    def send_angle(self) -> None:
         self.can.send_float(self.id_angle, float32(self.encoder.angle_rad()))
 
-    def send_ang_rate(self) -> cython.void:
+    def send_ang_rate(self) -> None:
         self.can.send_float(self.id_ang_rate, float_of_fixed(self.joint.rate))

@@ -30,7 +30,7 @@ cdef long long BATTERY_VOLTAGE_CHANNEL
 cdef class PowerUp(Peripheral):
     cdef public MotorBoard board
     cdef public long long first, second
-    cpdef void begin(self, long long phase_ns)
+    cpdef int begin(self, long long phase_ns) except -1
 
 cdef class MotorBoard(Microcontroller):
     cdef public object table, quirks
@@ -63,28 +63,28 @@ cdef class MotorBoard(Microcontroller):
     cdef public long long id_batt_current, id_batt_voltage, id_hbridge_temp, id_status, id_execution_time
     cdef public long long id_max_execution_time
     cpdef Schedule schedule(self)
-    cpdef void read_sensors_once(self)
-    cpdef void set_start_values(self)
-    cpdef void start_internal_adc(self)
-    cpdef void start_absolute_encoder(self)
+    cpdef int read_sensors_once(self) except -1
+    cpdef int set_start_values(self) except -1
+    cpdef int start_internal_adc(self) except -1
+    cpdef int start_absolute_encoder(self) except -1
     cpdef object on_absolute_encoder(self, EventQueue queue)
     cpdef object on_internal_adc(self, EventQueue queue)
-    cpdef void start_external_adc(self)
+    cpdef int start_external_adc(self) except -1
     cpdef long long controlled_position(self)
     cpdef long long controlled_velocity(self)
-    cpdef void compliant_control(self)
-    cpdef void rezero_motor(self, long long share)
-    cpdef void send_error(self)
-    cpdef void send_motor_position(self)
-    cpdef void send_motor_velocity(self)
-    cpdef void send_motor_current(self)
-    cpdef void send_battery_power(self)
-    cpdef void send_battery_current(self)
-    cpdef void send_battery_voltage(self)
-    cpdef void send_bridge_temperature(self)
-    cpdef void send_status(self)
-    cpdef void send_execution_time(self)
-    cpdef void send_max_execution_time(self)
-    cpdef void note_overrun(self)
-    cpdef void note_limit(self, Task task)
-    cpdef void note_near_limit(self)
+    cpdef int compliant_control(self) except -1
+    cpdef int rezero_motor(self, long long share) except -1
+    cpdef int send_error(self) except -1
+    cpdef int send_motor_position(self) except -1
+    cpdef int send_motor_velocity(self) except -1
+    cpdef int send_motor_current(self) except -1
+    cpdef int send_battery_power(self) except -1
+    cpdef int send_battery_current(self) except -1
+    cpdef int send_battery_voltage(self) except -1
+    cpdef int send_bridge_temperature(self) except -1
+    cpdef int send_status(self) except -1
+    cpdef int send_execution_time(self) except -1
+    cpdef int send_max_execution_time(self) except -1
+    cpdef int note_overrun(self) except -1
+    cpdef int note_limit(self, Task task) except -1
+    cpdef int note_near_limit(self) except -1

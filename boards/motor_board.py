@@ -112,7 +112,7 @@ class PowerUp(Peripheral):
         self.first = chip.new_alarm(self, 0)
         self.second = chip.new_alarm(self, 1)
 
-    def begin(self, phase_ns: cython.longlong) -> cython.void:
+    def begin(self, phase_ns: cython.longlong) -> None:
         """Power comes at `phase_ns`."""
         self.chip.set_alarm(self.first, phase_ns + START_VALUES_NS)
         self.chip.set_alarm(self.second, phase_ns + SLOTS_BEGIN_NS - 1)
@@ -300,24 +300,24 @@ class MotorBoard(Microcontroller):
 
     # --- start-up ---------------------------------------------------------------------------------------
 
-    def read_sensors_once(self) -> cython.void:
+    def read_sensors_once(self) -> None:
         """Before the first slot: low sides on, multiplexer set, and one reading of the joint's angle."""
         self.output.enable_low_side(1)
         if self.encoder is not None:
             self.gpio.write(PINS["absolute_encoder_select"], self.encoder_select)
             self.spi.start()
 
-    def set_start_values(self) -> cython.void:
+    def set_start_values(self) -> None:
         """When that reading has come."""
 
     # --- tasks ------------------------------------------------------------------------------------------
 
-    def start_internal_adc(self) -> cython.void:
+    def start_internal_adc(self) -> None:
         """adci_convert_all: battery voltage on AIN1."""
         if not self.adc_internal.start(BATTERY_VOLTAGE_CHANNEL):
             self.errors.report(CODE_ADCI_DNF)
 
-    def start_absolute_encoder(self) -> cython.void:
+    def start_absolute_encoder(self) -> None:
         """ae_update: begin a transfer; the interrupt 14 us later has the result for this slot's control."""
         self.spi.start()
 
@@ -330,7 +330,7 @@ class MotorBoard(Microcontroller):
         """Interrupt: the result stays in `adc_internal.result`; no filter on these boards."""
         return None
 
-    def start_external_adc(self) -> cython.void:
+    def start_external_adc(self) -> None:
         """adcx_convert_all: start the sequence; the last one unfinished is an error, and it goes on."""
         if not self.adc_external.start_sequence():
             self.errors.report(CODE_ADCX_DNF)
@@ -343,7 +343,7 @@ class MotorBoard(Microcontroller):
         """Velocity in the compliant law, rad/s x 65536."""
         return self.motor.rate
 
-    def compliant_control(self) -> cython.void:
+    def compliant_control(self) -> None:
         """mc_compliant_control: both loops, outer then inner."""
         velocity: cython.longlong = self.controlled_velocity()
         target: cython.longlong = self.compliance.update(self.controlled_position(), velocity)
@@ -351,57 +351,57 @@ class MotorBoard(Microcontroller):
         self.compliance.target = target
         self.current_control.update(target, self.readings.motor_current_fixed())
 
-    def rezero_motor(self, share: cython.longlong) -> cython.void:
+    def rezero_motor(self, share: cython.longlong) -> None:
         """Move the motor's angle towards the joint's by `share` (x 65536) of their difference."""
         difference: cython.longlong = self.encoder.angle - self.motor.position
         self.motor.set_position(self.motor.position + ((difference * share) >> 16))
 
     # --- what is published --------------------------------------------------------------------------------
 
-    def send_error(self) -> cython.void:
+    def send_error(self) -> None:
         self.can.send_error(self.id_error)
 
-    def send_motor_position(self) -> cython.void:
+    def send_motor_position(self) -> None:
         self.can.send_float(self.id_motor_position, float_of_fixed(self.motor.position))
 
-    def send_motor_velocity(self) -> cython.void:
+    def send_motor_velocity(self) -> None:
         self.can.send_float(self.id_motor_velocity, float_of_fixed(self.motor.rate))
 
-    def send_motor_current(self) -> cython.void:
+    def send_motor_current(self) -> None:
         self.can.send_float(self.id_motor_current, self.readings.motor_current())
 
-    def send_battery_power(self) -> cython.void:
+    def send_battery_power(self) -> None:
         self.can.send_float(self.id_batt_power, self.readings.battery_power())
 
-    def send_battery_current(self) -> cython.void:
+    def send_battery_current(self) -> None:
         self.can.send_float(self.id_batt_current, self.readings.battery_current())
 
-    def send_battery_voltage(self) -> cython.void:
+    def send_battery_voltage(self) -> None:
         self.can.send_float(self.id_batt_voltage, self.readings.battery_voltage())
 
-    def send_bridge_temperature(self) -> cython.void:
+    def send_bridge_temperature(self) -> None:
         """AIN3 is never converted, so 0 is sent (facts 4.6)."""
         self.can.send_float(self.id_hbridge_temp, 0.0)
 
-    def send_status(self) -> cython.void:
+    def send_status(self) -> None:
         self.can.send_float(self.id_status, 1.0)
 
-    def send_execution_time(self) -> cython.void:
+    def send_execution_time(self) -> None:
         self.can.send_float(self.id_execution_time, self.execution.seconds())
 
-    def send_max_execution_time(self) -> cython.void:
+    def send_max_execution_time(self) -> None:
         self.can.send_float(self.id_max_execution_time, self.execution.longest_seconds())
 
     # --- what the scheduler tells ---------------------------------------------------------------------------
 
-    def note_overrun(self) -> cython.void:
+    def note_overrun(self) -> None:
         """A tick found the row unfinished."""
         self.errors.report(CODE_OVERRUN)
 
-    def note_limit(self, task: Task) -> cython.void:
+    def note_limit(self, task: Task) -> None:
         """A task took longer than its limit."""
         self.errors.report(CODE_TASK_LIMIT)
 
-    def note_near_limit(self) -> cython.void:
+    def note_near_limit(self) -> None:
         """A slot took more than 90 % of its length."""
         self.errors.report(CODE_NEAR_LIMIT)

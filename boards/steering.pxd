@@ -9,12 +9,12 @@ cdef class SteeringBoard(MotorBoard):
     cdef public bint direct, closed_loop, check_limits
     cdef public long long code_left, code_right, code_stopped, id_steer_angle
     cpdef Schedule schedule(self)
-    cpdef void read_sensors_once(self)
-    cpdef void set_start_values(self)
+    cpdef int read_sensors_once(self) except -1
+    cpdef int set_start_values(self) except -1
     cpdef long long controlled_position(self)
     cpdef long long controlled_velocity(self)
     cpdef void update_pwm(self)
-    cpdef void steering_control(self)
-    cpdef void check(self)
-    cpdef void send_steer_angle(self)
-    cpdef void send_power(self)
+    cpdef int steering_control(self) except -1
+    cpdef int check(self) except -1
+    cpdef int send_steer_angle(self) except -1
+    cpdef int send_power(self) except -1

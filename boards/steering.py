@@ -104,12 +104,12 @@ class SteeringBoard(MotorBoard):
             ),
         )  # fmt: skip
 
-    def read_sensors_once(self) -> cython.void:
+    def read_sensors_once(self) -> None:
         """Before the first slot: one sequence of the converter."""
         self.output.enable_low_side(1)
         self.start_external_adc()
 
-    def set_start_values(self) -> cython.void:
+    def set_start_values(self) -> None:
         """The present steering angle is the zero."""
         self.zero = self.adc_external.results[SENSOR]
 
@@ -138,7 +138,7 @@ class SteeringBoard(MotorBoard):
             duty = 0
         self.output.write(duty)
 
-    def steering_control(self) -> cython.void:
+    def steering_control(self) -> None:
         """mc_compliant_control: the loops if they are wanted, otherwise only watchdog and monitors.
 
         Either way a motor that may not run is an error in every slot (facts 4.3), so a board that the main
@@ -149,7 +149,7 @@ class SteeringBoard(MotorBoard):
         elif self.current_control.supervise(self.readings.motor_current_fixed()) and not self.output.running():
             self.errors.report(self.code_stopped)
 
-    def check(self) -> cython.void:
+    def check(self) -> None:
         """The limit check of the firmware, which never calls it: +/-200 counts about 4803.
 
         Positive duty turns towards higher counts (chosen by us: no record tells).
@@ -164,8 +164,8 @@ class SteeringBoard(MotorBoard):
         self.current_control.block_positive = high
         self.current_control.block_negative = low
 
-    def send_steer_angle(self) -> cython.void:
+    def send_steer_angle(self) -> None:
         self.can.send_float(self.id_steer_angle, self.adc_external.results[SENSOR] - self.zero)
 
-    def send_power(self) -> cython.void:
+    def send_power(self) -> None:
         self.can.send_float(self.id_batt_power, self.readings.battery_power_fixed())

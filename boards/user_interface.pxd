@@ -42,30 +42,30 @@ cdef class UserInterfaceBoard(Microcontroller):
     cdef public SyncLight sync_light
     cdef public long long slots, imu_start_slots
     cdef public bytes imu_command
-    cpdef void report(self, long long code)
+    cpdef int report(self, long long code) except -1
     cpdef object on_uart(self, EventQueue queue)
     cpdef object on_rc_edge(self, EventQueue queue)
-    cpdef void lcd_tick(self)
-    cpdef void note_overrun(self)
-    cpdef void note_limit(self, Task task)
-    cpdef void note_near_limit(self)
+    cpdef int lcd_tick(self) except -1
+    cpdef int note_overrun(self) except -1
+    cpdef int note_limit(self, Task task) except -1
+    cpdef int note_near_limit(self) except -1
     cpdef object update_imu(self)
     cpdef object update_errors(self)
-    cpdef void update_buzzer(self)
+    cpdef int update_buzzer(self) except -1
     cpdef object update_sync_light(self)
-    cpdef void watch_sync_key(self)
-    cpdef void send_roll(self)
-    cpdef void send_pitch(self)
-    cpdef void send_yaw(self)
-    cpdef void send_rate_x(self)
-    cpdef void send_rate_y(self)
-    cpdef void send_rate_z(self)
-    cpdef void send_error(self)
-    cpdef void send_buttons(self)
-    cpdef void send_rc_0(self)
-    cpdef void send_rc_1(self)
-    cpdef void send_rc_2(self)
-    cpdef void send_rc_3(self)
-    cpdef void send_status(self)
-    cpdef void send_execution_time(self)
-    cpdef void send_max_execution_time(self)
+    cpdef int watch_sync_key(self) except -1
+    cpdef int send_roll(self) except -1
+    cpdef int send_pitch(self) except -1
+    cpdef int send_yaw(self) except -1
+    cpdef int send_rate_x(self) except -1
+    cpdef int send_rate_y(self) except -1
+    cpdef int send_rate_z(self) except -1
+    cpdef int send_error(self) except -1
+    cpdef int send_buttons(self) except -1
+    cpdef int send_rc_0(self) except -1
+    cpdef int send_rc_1(self) except -1
+    cpdef int send_rc_2(self) except -1
+    cpdef int send_rc_3(self) except -1
+    cpdef int send_status(self) except -1
+    cpdef int send_execution_time(self) except -1
+    cpdef int send_max_execution_time(self) except -1

@@ -195,7 +195,7 @@ class UserInterfaceBoard(Microcontroller):
         self.timer0.clear(flags & 240)
         return None
 
-    def lcd_tick(self) -> cython.void:
+    def lcd_tick(self) -> None:
         """The display's share of the slot timer's interrupt."""
         if self.lcd.tick():
             self.extra_cycles += LCD_BYTE_CYCLES
@@ -204,19 +204,19 @@ class UserInterfaceBoard(Microcontroller):
 
     # --- errors -----------------------------------------------------------------------------------------
 
-    def report(self, code: cython.longlong) -> cython.void:
+    def report(self, code: cython.longlong) -> None:
         """Note an error of a module."""
         self.errors.report(code)
 
-    def note_overrun(self) -> cython.void:
+    def note_overrun(self) -> None:
         """A tick found the row unfinished."""
         self.errors.report(codes.ASCHED_DNF)
 
-    def note_limit(self, task: Task) -> cython.void:
+    def note_limit(self, task: Task) -> None:
         """A task took longer than its limit."""
         self.errors.report(codes.SCHED_TASK_LIMIT)
 
-    def note_near_limit(self) -> cython.void:
+    def note_near_limit(self) -> None:
         """A slot took more than 90 % of its length."""
         self.errors.report(codes.SCHED_SLOT_NEAR_LIMIT)
 
@@ -239,7 +239,7 @@ class UserInterfaceBoard(Microcontroller):
             self.buzzer.error_sound(self.errors.flagged[i])
         return self.errors.update()
 
-    def watch_sync_key(self) -> cython.void:
+    def watch_sync_key(self) -> None:
         """Key 4 toggles the sync light."""
         self.sync_light.watch_key()
 
@@ -247,68 +247,68 @@ class UserInterfaceBoard(Microcontroller):
         """One millisecond of its pattern; returns the light transfers it took."""
         return self.sync_light.update()
 
-    def update_buzzer(self) -> cython.void:
+    def update_buzzer(self) -> None:
         """One millisecond of beeps and tune."""
         self.buzzer.update()
 
     # --- what is published ------------------------------------------------------------------------------
 
-    def send_roll(self) -> cython.void:
+    def send_roll(self) -> None:
         """UI_ROLL, rad; 0 while the IMU sends rates alone. Old values are sent on if the IMU falls silent."""
         self.can.send_float(table.UI_ROLL, self.imu.roll)
 
-    def send_pitch(self) -> cython.void:
+    def send_pitch(self) -> None:
         """UI_PITCH, rad."""
         self.can.send_float(table.UI_PITCH, self.imu.pitch)
 
-    def send_yaw(self) -> cython.void:
+    def send_yaw(self) -> None:
         """UI_YAW, rad."""
         self.can.send_float(table.UI_YAW, self.imu.yaw)
 
-    def send_rate_x(self) -> cython.void:
+    def send_rate_x(self) -> None:
         """UI_ANG_RATE_X, rad/s."""
         self.can.send_float(table.UI_ANG_RATE_X, self.imu.rate_x)
 
-    def send_rate_y(self) -> cython.void:
+    def send_rate_y(self) -> None:
         """UI_ANG_RATE_Y, rad/s."""
         self.can.send_float(table.UI_ANG_RATE_Y, self.imu.rate_y)
 
-    def send_rate_z(self) -> cython.void:
+    def send_rate_z(self) -> None:
         """UI_ANG_RATE_Z, rad/s."""
         self.can.send_float(table.UI_ANG_RATE_Z, self.imu.rate_z)
 
-    def send_error(self) -> cython.void:
+    def send_error(self) -> None:
         """ERROR_UI, the error that waits longest, if one does."""
         self.can.send_error(table.ERROR_VARIABLE)
 
-    def send_buttons(self) -> cython.void:
+    def send_buttons(self) -> None:
         """UI_BUTTONS, bit mask of the keys that are down."""
         self.can.send_int(table.UI_BUTTONS, self.keypad.buttons())
 
-    def send_rc_0(self) -> cython.void:
+    def send_rc_0(self) -> None:
         """UI_RC_0, pulse width in 1/60 us."""
         self.can.send_float(table.UI_RC_0, self.rc.width(0))
 
-    def send_rc_1(self) -> cython.void:
+    def send_rc_1(self) -> None:
         """UI_RC_1."""
         self.can.send_float(table.UI_RC_1, self.rc.width(1))
 
-    def send_rc_2(self) -> cython.void:
+    def send_rc_2(self) -> None:
         """UI_RC_2; its pin drives the sync light, so 0."""
         self.can.send_float(table.UI_RC_2, self.rc.width(2))
 
-    def send_rc_3(self) -> cython.void:
+    def send_rc_3(self) -> None:
         """UI_RC_3."""
         self.can.send_float(table.UI_RC_3, self.rc.width(3))
 
-    def send_status(self) -> cython.void:
+    def send_status(self) -> None:
         """UI_STATUS, always 1."""
         self.can.send_float(table.UI_STATUS, 1.0)
 
-    def send_execution_time(self) -> cython.void:
+    def send_execution_time(self) -> None:
         """UI_EXECUTION_TIME, s."""
         self.can.send_float(table.UI_EXECUTION_TIME, self.execution.seconds())
 
-    def send_max_execution_time(self) -> cython.void:
+    def send_max_execution_time(self) -> None:
         """UI_MAX_EXECUTION_TIME, s."""
         self.can.send_float(table.UI_MAX_EXECUTION_TIME, self.execution.longest_seconds())

@@ -37,7 +37,7 @@ class AnalogPins:
         v0: cython.double,
         t1: cython.longlong,
         v1: cython.double,
-    ) -> cython.void:
+    ) -> None:
         """The voltage of pin `index` runs straight from `v0` at `t0` to `v1` at `t1`; it follows nothing more."""
         self.places[index] = -1
         self.start_times[index] = t0

@@ -1,3 +1,6 @@
+cimport cython
+
+from foundation.edge_buffer cimport EdgeBuffer
 from foundation.events cimport EventQueue
 from firmware_sim.analog cimport AnalogPins
 from firmware_sim.clock cimport Crystal
@@ -7,8 +10,14 @@ from firmware_sim.vic cimport InterruptController, InterruptSource
 cdef class Peripheral:
     cdef public Microcontroller chip
     cpdef void on_message(self, EventQueue queue)
-    cpdef long long on_pin(self, long long channel, long long level, long long time)
+    cpdef long long on_pin(self, long long channel, long long level, long long time) except? -1
     cpdef void on_alarm(self, long long alarm, long long time)
+
+@cython.final
+cdef class EdgeLine:
+    cdef public EdgeBuffer buffer
+    cdef public long long pin, partner_pin, channel, next_time
+    cdef public Peripheral peripheral
 
 cdef class Microcontroller:
     cdef public str name
@@ -37,25 +46,33 @@ cdef class Microcontroller:
     cdef public long long alarm_first
     cdef public list message_table, pin_owners
     cdef public long long[::1] pin_channels
+    cdef public list edge_lines
+    cdef public EdgeLine edge_line
+    cdef public long long edge_time
     cdef public long long unclaimed, match_time, instant
     cdef public object on_timer_tick
     cdef public object background
     cdef public bint background_wanted
     cdef public long long horizon
-    cpdef long long advance(self, long long until)
-    cpdef bint due(self, long long until)
+    cpdef long long advance(self, long long until) except? -1
+    cpdef bint due(self, long long until) except? -1
     cpdef void spend(self, long long cycles) noexcept
-    cpdef long long cycles_since_tick(self)
-    cpdef long long request(self, InterruptSource source)
-    cpdef long long set_alarm(self, long long index, long long time)
-    cpdef void start(self, Schedule schedule, long long phase_ns)
+    cpdef long long cycles_since_tick(self) except? -1
+    cpdef long long request(self, InterruptSource source) except? -1
+    cpdef long long edges_came(self) noexcept
+    cpdef bint nothing_more_at(self, long long time) noexcept
+    cdef long long _serve_now(self) except? -1
+    cdef long long _edges(self, long long until) except? -1
+    cdef long long _find_first_alarm(self) noexcept
+    cpdef long long set_alarm(self, long long index, long long time) except? -1
+    cpdef int start(self, Schedule schedule, long long phase_ns) except -1
     cpdef object on_slot_timer(self, EventQueue queue)
-    cdef long long _input(self)
-    cdef long long _alarm(self, long long time)
-    cdef long long _timer_match(self)
-    cdef long long _background(self)
-    cdef long long _serve(self, InterruptSource source, long long time)
-    cdef long long _code(self, long long until)
-    cdef long long _wait_over(self)
-    cdef long long _charge(self, Task task, long long cycles)
-    cdef long long _close_slot(self, long long since)
+    cdef long long _input(self) except? -1
+    cdef long long _alarm(self, long long time) except? -1
+    cdef long long _timer_match(self) except? -1
+    cdef long long _background(self) except? -1
+    cdef long long _serve(self, InterruptSource source, long long time) except? -1
+    cdef long long _code(self, long long until) except? -1
+    cdef long long _wait_over(self) except? -1
+    cdef long long _charge(self, Task task, long long cycles) except? -1
+    cdef long long _close_slot(self, long long since) except? -1

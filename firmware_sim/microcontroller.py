@@ -1,3 +1,5 @@
+# cython: boundscheck=False, wraparound=False
+# (indices are those of pins, alarms, tasks and edge lines, checked when they are made)
 """One microcontroller: its inputs, its interrupts and its slots, run to any instant of virtual time.
 
 To everything outside, a board is: advance to a time with stamped messages in `inbox`, find stamped messages
@@ -20,6 +22,7 @@ from firmware_sim.analog import AnalogPins
 from firmware_sim.clock import Crystal
 from firmware_sim.scheduler import Occasional, Schedule, SlotScheduler, Task, Wait
 from firmware_sim.vic import SLOT_TIMER, InterruptController, InterruptSource
+from foundation.edge_buffer import EdgeBuffer
 from foundation.events import NEVER, EventQueue
 from foundation.user_error import UserError
 
@@ -46,6 +49,21 @@ class Peripheral:
 
     def on_alarm(self, alarm: cython.longlong, time: cython.longlong) -> cython.void:
         """The alarm that this peripheral numbered `alarm` is due."""
+
+
+class EdgeLine:
+    """An encoder on two pins: its edges are read where its sensor writes them, each at its stamp.
+
+    Channel A changes on `pin`; channel B, whose level each edge brings along, hangs on `partner_pin`.
+    """
+
+    def __init__(self, buffer: EdgeBuffer, pin, partner_pin, peripheral: Peripheral, channel) -> None:
+        self.buffer = buffer
+        self.pin = pin
+        self.partner_pin = partner_pin
+        self.peripheral = peripheral
+        self.channel = channel
+        self.next_time = NEVER
 
 
 class Microcontroller:
@@ -111,6 +129,9 @@ class Microcontroller:
         self.message_table = [None] * (MESSAGE_KINDS * INDICES_PER_KIND)
         self.pin_owners = [None] * PINS
         self.pin_channels = array.array("q", [-1]) * PINS
+        self.edge_lines = []
+        self.edge_line = None
+        self.edge_time = NEVER
         self.unclaimed = 0
 
     # --- set-up -------------------------------------------------------------------------------------------
@@ -123,6 +144,11 @@ class Microcontroller:
     def claim(self, kind, index, peripheral) -> None:
         """Messages of `kind` whose field a is `index` (0 ... 15) go to `peripheral.on_message`."""
         self._check_peripheral(peripheral)
+        if not (0 <= kind < MESSAGE_KINDS and 0 <= index < INDICES_PER_KIND):
+            raise UserError(
+                f"{self.name}: kind {kind} is not 0 ... {MESSAGE_KINDS - 1}"
+                f" or index {index} not 0 ... {INDICES_PER_KIND - 1}"
+            )
         place = kind * INDICES_PER_KIND + index
         if self.message_table[place] is not None:
             raise UserError(f"{self.name}: messages of kind {kind}, index {index} are claimed twice")
@@ -138,6 +164,34 @@ class Microcontroller:
         self.pin_owners[pin] = peripheral
         self.pin_channels[pin] = channel
 
+    def listen_to_edges(self, buffer: EdgeBuffer, pin, partner_pin) -> None:
+        """Edges of `buffer` arrive on `pin`, claimed before, with the level of `partner_pin`; tell by `edges_came`."""
+        if not 0 <= pin < PINS or self.pin_owners[pin] is None:
+            raise UserError(f"{self.name}: no peripheral has claimed pin {pin}, so edges there would be lost")
+        self.edge_lines.append(EdgeLine(buffer, pin, partner_pin, self.pin_owners[pin], self.pin_channels[pin]))
+
+    def edges_came(self) -> cython.longlong:
+        """The buffers of the edge lines may hold new edges; returns the first one's instant.
+
+        Edges of two lines at one instant come in the order in which the lines were connected, and before messages.
+        """
+        line: EdgeLine
+        buffer: EdgeBuffer
+        i: cython.longlong
+        lines: list = self.edge_lines
+        self.edge_time = 1 << 62
+        for i in range(len(lines)):
+            line = cython.cast(EdgeLine, lines[i])
+            buffer = line.buffer
+            if buffer.read < buffer.count:
+                line.next_time = buffer.times[buffer.read]
+                if line.next_time < self.edge_time:
+                    self.edge_time = line.next_time
+                    self.edge_line = line
+            else:
+                line.next_time = 1 << 62
+        return self.edge_time
+
     def new_alarm(self, peripheral, number) -> int:
         """An alarm slot; when due, `peripheral.on_alarm(number, time)` runs. Returns the slot."""
         self._check_peripheral(peripheral)
@@ -151,7 +205,6 @@ class Microcontroller:
 
     def set_alarm(self, index: cython.longlong, time: cython.longlong) -> cython.longlong:
         """Alarm `index` is due at `time` (ns); NEVER takes it back. Returns the first alarm's instant."""
-        i: cython.longlong
         self.alarm_times[index] = time
         if time < self.alarm_time:
             self.alarm_time = time
@@ -159,15 +212,23 @@ class Microcontroller:
             if time < self.next_time:
                 self.next_time = time
         elif index == self.alarm_first:
-            for i in range(self.alarm_count):
-                if self.alarm_times[i] < time:
-                    time = self.alarm_times[i]
-                    index = i
-            self.alarm_time = time
-            self.alarm_first = index
+            self._find_first_alarm()
         return self.alarm_time
 
-    def start(self, schedule: Schedule, phase_ns: cython.longlong) -> cython.void:
+    def _find_first_alarm(self) -> cython.longlong:
+        """Which alarm is due first; among equals the one that was made first."""
+        i: cython.longlong
+        first: cython.longlong = 0
+        time: cython.longlong = self.alarm_times[0]
+        for i in range(1, self.alarm_count):
+            if self.alarm_times[i] < time:
+                time = self.alarm_times[i]
+                first = i
+        self.alarm_time = time
+        self.alarm_first = first
+        return time
+
+    def start(self, schedule: Schedule, phase_ns: cython.longlong) -> None:
         """Run `schedule`: the first slot begins at `phase_ns`, the later ones by this chip's crystal."""
         cycles: cython.longlong = schedule.slot_ns * self.hz // 1000000000
         self.scheduler = SlotScheduler(schedule, cycles)
@@ -205,8 +266,8 @@ class Microcontroller:
     # --- the event loop -----------------------------------------------------------------------------------
 
     def due(self, until: cython.longlong) -> cython.bint:
-        """True when something happens here before `until`, inputs that wait in the inbox included."""
-        return self.next_time < until or self.inbox.head_time < until
+        """True when something happens here before `until`, inputs that wait included."""
+        return self.next_time < until or self.inbox.head_time < until or self.edge_time < until
 
     def advance(self, until: cython.longlong) -> cython.longlong:
         """Run everything with an instant before `until` (ns); returns `next_time`."""
@@ -216,7 +277,7 @@ class Microcontroller:
         time: cython.longlong
         service: cython.longlong
         what: cython.longlong
-        if self.next_time >= until and inbox.head_time >= until:
+        if self.next_time >= until and inbox.head_time >= until and self.edge_time >= until:
             return self.next_time  # idle: by far the most frequent answer in short steps
         self.horizon = until
         while True:
@@ -251,6 +312,11 @@ class Microcontroller:
                 if service < time:
                     time = service
                     what = 6
+            if self.edge_time <= time and self.edge_time <= inbox.head_time:
+                if self.edge_time >= until:
+                    break
+                self._edges(until)
+                continue
             if inbox.head_time <= time:
                 if inbox.head_time >= until:
                     break
@@ -258,13 +324,8 @@ class Microcontroller:
                 self.instant = inbox.time
                 self.now = inbox.time
                 self._input()
-                if (
-                    vic.fiq_pending != 0
-                    and self.fiq_free <= self.instant < inbox.head_time
-                    and self.instant < self.alarm_time
-                    and self.instant < self.tick_time
-                ):
-                    self._serve(vic.next_fiq(), self.instant)  # the common case, without another round
+                if vic.fiq_pending != 0 or vic.irq_pending != 0:
+                    self._serve_now()
                 continue
             if time >= until:
                 break
@@ -275,17 +336,89 @@ class Microcontroller:
                 self._serve(vic.next_fiq(), time)
             elif what == 4:
                 self._serve(vic.next_irq(), time)
-            elif what == 2:
-                self._timer_match()
             elif what == 6:
                 self._background()
             else:
-                self._alarm(time)
+                if what == 1:
+                    self._alarm(time)
+                else:
+                    self._timer_match()
+                if vic.fiq_pending != 0 or vic.irq_pending != 0:
+                    self._serve_now()
         self.next_time = time
         return time
 
-    @cython.boundscheck(False)
-    @cython.wraparound(False)
+    def _serve_now(self) -> cython.longlong:
+        """Serve what is pending if it can be served at this very instant: the common case, without another round."""
+        vic: InterruptController = self.vic
+        time: cython.longlong = self.instant
+        if self.fiq_free > time or not self.nothing_more_at(time):
+            return 0
+        if vic.fiq_pending != 0:
+            return self._serve(vic.next_fiq(), time)
+        if self.irq_free > time:
+            return 0
+        return self._serve(vic.next_irq(), time)
+
+    def nothing_more_at(self, time: cython.longlong) -> cython.bint:
+        """True when no edge, message, alarm or tick is due at `time` or before: handlers may run."""
+        return (
+            time < self.inbox.head_time and time < self.edge_time and time < self.alarm_time and time < self.tick_time
+        )
+
+    def _edges(self, until: cython.longlong) -> cython.longlong:
+        """Edges from the first one on, each with its fast interrupt, until something else comes first.
+
+        Hardware first: the capture happens at the edge's stamp whatever the processor does. Returns the last instant.
+        """
+        vic: InterruptController = self.vic
+        line: EdgeLine
+        buffer: EdgeBuffer
+        place: cython.longlong
+        time: cython.longlong
+        lines: list = self.edge_lines
+        other: EdgeLine
+        i: cython.longlong
+        self.background_wanted = True
+        while True:
+            line = self.edge_line
+            buffer = line.buffer
+            place = buffer.read
+            buffer.read = place + 1
+            time = buffer.times[place]
+            self.instant = time
+            self.now = time
+            self.pins[line.pin] = buffer.levels_a[place]
+            self.pins[line.partner_pin] = buffer.levels_b[place]
+            if place + 1 < buffer.count:
+                line.next_time = buffer.times[place + 1]
+            else:
+                line.next_time = 1 << 62
+            self.edge_time = 1 << 62
+            for i in range(len(lines)):
+                other = cython.cast(EdgeLine, lines[i])
+                if other.next_time < self.edge_time:
+                    self.edge_time = other.next_time
+                    self.edge_line = other
+            line.peripheral.on_pin(line.channel, buffer.levels_a[place], time)
+            if vic.fiq_pending != 0:
+                if self.fiq_free > time or not self.nothing_more_at(time):
+                    return time
+                self._serve(vic.next_fiq(), time)
+                if vic.fiq_pending != 0:
+                    return time
+            if (
+                vic.irq_pending != 0
+                or self.edge_time >= until
+                or self.edge_time > self.inbox.head_time
+                or self.edge_time > self.alarm_time
+                or self.edge_time > self.tick_time
+                or self.background is not None
+            ):
+                return time
+            if self.code_time < self.edge_time and not self.scheduler.done and (not self.waiting or self.check_wait):
+                return time
+
     def _input(self) -> cython.longlong:
         """The message just taken: hardware first; its interrupt line is raised by the peripheral."""
         inbox: EventQueue = self.inbox
@@ -314,28 +447,20 @@ class Microcontroller:
             if inbox.kind != 1:
                 self.unclaimed += 1
             return 0
-        source.keeps_message = True
-        source.time = inbox.time
-        source.order = inbox.order
-        source.a = inbox.a
-        source.b = inbox.b
-        source.c = inbox.c
-        source.d = inbox.d
-        source.e = inbox.e
-        source.f = inbox.f
-        source.ref = inbox.ref
+        source.keep_message(inbox)
         self.vic.raise_source(source)
         return 0
 
-    @cython.boundscheck(False)
-    @cython.wraparound(False)
     def _alarm(self, time: cython.longlong) -> cython.longlong:
         """The first alarm is due."""
         i: cython.longlong = self.alarm_first
         peripheral: Peripheral = cython.cast(Peripheral, self.alarm_owners[i])
         self.now = time
-        self.set_alarm(i, 1 << 62)
+        self.alarm_times[i] = 1 << 62
+        self.alarm_time = 1 << 62  # until the next one is looked for, so that `set_alarm` need not
+        self.alarm_first = -1
         peripheral.on_alarm(self.alarm_numbers[i], time)
+        self._find_first_alarm()
         if self.waiting:
             self.check_wait = True
             if self.code_time < time:
@@ -361,7 +486,6 @@ class Microcontroller:
 
     def _background(self) -> cython.longlong:
         """One turn of the main loop beside the scheduler."""
-        done: cython.longlong
         if self.code_time < self.instant:
             self.code_time = self.instant
         self.now = self.code_time
@@ -374,27 +498,25 @@ class Microcontroller:
 
     def _serve(self, source: InterruptSource, time: cython.longlong) -> cython.longlong:
         """Run the handler of a pending source at `time` and let its cycles pass."""
-        inbox: EventQueue = self.inbox
+        vic: InterruptController = self.vic
         cycles: cython.longlong = source.base_cycles
         busy: cython.longlong = source.base_ns
         items: cython.longlong
-        self.vic.accept(source)
+        source.pending = False
+        source.served += 1
+        if source.slot < 0:
+            vic.fiq_pending &= ~source.bit
+        else:
+            vic.irq_pending &= ~source.bit
         self.background_wanted = True
         self.now = time + source.latency_ns
         if source.keeps_message:
-            inbox.time = source.time
-            inbox.order = source.order
-            inbox.kind = source.kind
-            inbox.a = source.a
-            inbox.b = source.b
-            inbox.c = source.c
-            inbox.d = source.d
-            inbox.e = source.e
-            inbox.f = source.f
-            inbox.ref = source.ref
-            source.ref = None
+            source.give_message(self.inbox)
         self.extra_cycles = 0
-        result = call_with(source.handler, inbox)
+        if cython.compiled:
+            result = call_with(source.handler, self.inbox)
+        else:
+            result = source.handler(self.inbox)
         if result is not None:
             items = result
             cycles += source.per_item * items
@@ -421,8 +543,6 @@ class Microcontroller:
             self.scheduler.note_interrupt(source.name, cycles)
         return cycles
 
-    @cython.boundscheck(False)
-    @cython.wraparound(False)
     def _code(self, until: cython.longlong) -> cython.longlong:
         """Run tasks from `code_time` on, until something else comes first."""
         scheduler: SlotScheduler = self.scheduler
@@ -435,6 +555,12 @@ class Microcontroller:
         cycles: cython.longlong
         items: cython.longlong
         busy: cython.longlong
+        # what comes first of the things that no task can move
+        limit: cython.longlong = until
+        if self.tick_time < limit:
+            limit = self.tick_time
+        if self.edge_time < limit:
+            limit = self.edge_time
         while True:
             self.now = self.code_time
             self.extra_cycles = 0
@@ -459,7 +585,10 @@ class Microcontroller:
                 scheduler.run_tasks += 1
                 cycles = task.cost
                 if task.kind == 0:
-                    result = call(task.function)
+                    if cython.compiled:
+                        result = call(task.function)
+                    else:
+                        result = task.function()
                     if result is not None:
                         items = result
                         cycles += task.per_item * items
@@ -500,8 +629,7 @@ class Microcontroller:
                         self.check_wait = False
                         return 0
             if (
-                self.code_time >= self.tick_time
-                or self.code_time >= until
+                self.code_time >= limit
                 or self.code_time >= inbox.head_time
                 or self.code_time >= self.alarm_time
                 or vic.irq_pending != 0

@@ -1,3 +1,5 @@
+cimport cython
+
 cdef extern from "Python.h":
     ctypedef struct PyObject
     ctypedef object (*plain_call "PyCFunction")(PyObject*, PyObject*)
@@ -9,10 +11,14 @@ cdef extern from "Python.h":
     int METH_NOARGS, METH_FASTCALL, METH_KEYWORDS
 
 # What stands in a schedule is mostly a bound method of a compiled class. Its C function is then called without the
-# general machinery of Python calls; anything else is called in the ordinary way.
+# general machinery of Python calls; anything else is called in the ordinary way. (Cython declares methods without
+# arguments as METH_NOARGS or, so that keywords can be refused, as METH_FASTCALL | METH_KEYWORDS.)
 cdef inline object call(object function):
-    if PyCFunction_CheckExact(function) and PyCFunction_GET_FLAGS(function) == METH_NOARGS:
-        return PyCFunction_GET_FUNCTION(function)(PyCFunction_GET_SELF(function), NULL)
+    if PyCFunction_CheckExact(function):
+        if PyCFunction_GET_FLAGS(function) == METH_FASTCALL | METH_KEYWORDS:
+            return (<fast_call>PyCFunction_GET_FUNCTION(function))(PyCFunction_GET_SELF(function), NULL, 0, NULL)
+        if PyCFunction_GET_FLAGS(function) == METH_NOARGS:
+            return PyCFunction_GET_FUNCTION(function)(PyCFunction_GET_SELF(function), NULL)
     return function()
 
 cdef inline object call_with(object function, object argument):
@@ -28,26 +34,31 @@ cdef class Task:
     cdef public str name, item
     cdef public long long calls, hits, last_cycles, max_cycles, total_cycles
 
+@cython.final
 cdef class Wait(Task):
     cdef public long long waits
 
+@cython.final
 cdef class Occasional(Task):
     cdef public list tasks
     cdef public long long position
     cdef public bint extra_idle_call
     cpdef Task next_task(self)
 
+@cython.final
 cdef class Schedule:
     cdef public long long slot_ns, divider, tick_cost, tick_slot, tick_latency
     cdef public list every, rows, last
     cdef public bint completion_flag
 
+@cython.final
 cdef class SlotRecord:
     cdef public long long time_ns, row, cycles
     cdef public bint overrun
     cdef public list tasks
     cdef public dict interrupts
 
+@cython.final
 cdef class SlotScheduler:
     cdef public Schedule schedule
     cdef public list tasks, row_starts, row_ends
@@ -65,5 +76,5 @@ cdef class SlotScheduler:
     cdef public long long record_length
     cdef public list records
     cdef public SlotRecord record, late_record
-    cpdef bint tick(self, long long timer_time)
-    cpdef bint close(self, long long cycles)
+    cpdef bint tick(self, long long timer_time) except? -1
+    cpdef bint close(self, long long cycles) except? -1

@@ -1,3 +1,8 @@
+cimport cython
+
+from foundation.events cimport EventQueue
+
+@cython.final
 cdef class InterruptSource:
     cdef public long long kind, index
     cdef public str name
@@ -8,7 +13,10 @@ cdef class InterruptSource:
     cdef public long long requests, merged, served, total_cycles, max_cycles
     cdef public long long time, order, a, b, c, d, e, f
     cdef public object ref
+    cpdef int keep_message(self, EventQueue queue) except -1
+    cpdef int give_message(self, EventQueue queue) except -1
 
+@cython.final
 cdef class InterruptController:
     cdef public double ns_per_cycle
     cdef public dict sources
@@ -18,4 +26,3 @@ cdef class InterruptController:
     cpdef InterruptSource next_fiq(self)
     cpdef InterruptSource next_irq(self)
     cpdef bint raise_source(self, InterruptSource source) noexcept
-    cpdef long long accept(self, InterruptSource source) noexcept

@@ -8,6 +8,7 @@ loop in microcontroller.py serves; this file only keeps who waits.
 
 import cython
 
+from foundation.events import EventQueue
 from foundation.user_error import UserError
 
 FIQ = -1
@@ -64,6 +65,33 @@ class InterruptSource:
         self.d = 0
         self.e = 0
         self.f = 0
+        self.ref = None
+
+    def keep_message(self, queue: EventQueue) -> None:
+        """Keep the message in the fields of `queue` until it is served."""
+        self.keeps_message = True
+        self.time = queue.time
+        self.order = queue.order
+        self.a = queue.a
+        self.b = queue.b
+        self.c = queue.c
+        self.d = queue.d
+        self.e = queue.e
+        self.f = queue.f
+        self.ref = queue.ref
+
+    def give_message(self, queue: EventQueue) -> None:
+        """Put the kept message into the fields of `queue`, where a handler looks for it."""
+        queue.time = self.time
+        queue.order = self.order
+        queue.kind = self.kind
+        queue.a = self.a
+        queue.b = self.b
+        queue.c = self.c
+        queue.d = self.d
+        queue.e = self.e
+        queue.f = self.f
+        queue.ref = self.ref
         self.ref = None
 
 
@@ -149,16 +177,6 @@ class InterruptController:
         else:
             self.irq_pending |= source.bit
         return True
-
-    def accept(self, source: InterruptSource) -> cython.longlong:
-        """The request of a pending source is being served; returns how often it was served."""
-        source.pending = False
-        if source.slot < 0:
-            self.fiq_pending &= ~source.bit
-        else:
-            self.irq_pending &= ~source.bit
-        source.served += 1
-        return source.served
 
     @cython.boundscheck(False)
     @cython.wraparound(False)

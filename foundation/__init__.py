@@ -12,6 +12,7 @@ import os
 import sys
 from collections.abc import Sequence
 from types import ModuleType
+from typing import Any
 
 OUR_PACKAGES = (
     "foundation",
@@ -63,6 +64,14 @@ class SourceOnlyFinder:
         return None
 
 
+def plain_cast(_: object, value: Any) -> Any:
+    """`cython.cast` for the interpreted run: what the compiler is told about a class needs no test at each use."""
+    return value
+
+
 RUNS_INTERPRETED_BECAUSE = why_not_compiled()  # decided once: modules are not exchanged while a process runs
 if RUNS_INTERPRETED_BECAUSE and SourceOnlyFinder not in sys.meta_path:
     sys.meta_path.insert(0, SourceOnlyFinder)
+    import cython
+
+    cython.cast = plain_cast

@@ -1,6 +1,9 @@
+cimport cython
+
+@cython.final
 cdef class EventQueue:
     cdef public long long capacity, count, head, tail, free, head_time, pushed
-    cdef public long long[::1] times, orders, kinds, values, nexts, previous
+    cdef public long long[::1] rows
     cdef public list refs
     cdef public long long time, order, kind, a, b, c, d, e, f
     cdef public object ref

@@ -65,12 +65,8 @@ class EventQueue:
         self.free = -1
         self.head_time = 1 << 62
         self.pushed = 0
-        self.times = array.array("q")
-        self.orders = array.array("q")
-        self.kinds = array.array("q")
-        self.values = array.array("q")
-        self.nexts = array.array("q")
-        self.previous = array.array("q")
+        # a slot is one row: time, order, kind, a ... f, next slot, previous slot, 1 if `refs` has an object
+        self.rows = array.array("q")
         self.refs = []
         self.time = 0
         self.order = 0
@@ -94,22 +90,13 @@ class EventQueue:
     def _grow(self, capacity) -> None:
         """Enlarge the pool to `capacity` slots, keeping what is queued."""
         extra = capacity - self.capacity
-        blank = array.array("q", [0]) * extra
-        for name, per_slot in (
-            ("times", 1),
-            ("orders", 1),
-            ("kinds", 1),
-            ("values", 6),
-            ("nexts", 1),
-            ("previous", 1),
-        ):
-            grown = array.array("q", getattr(self, name))
-            grown.extend(blank * per_slot)
-            setattr(self, name, grown)
+        grown = array.array("q", self.rows)
+        grown.extend(array.array("q", [0]) * (12 * extra))
+        self.rows = grown
         self.refs.extend([None] * extra)
         i: cython.longlong
         for i in range(self.capacity, capacity):
-            self.nexts[i] = self.free
+            self.rows[12 * i + 9] = self.free
             self.free = i
         self.capacity = capacity
 
@@ -130,28 +117,17 @@ class EventQueue:
         slot: cython.longlong
         before: cython.longlong
         after: cython.longlong
-        base: cython.longlong
+        row: cython.longlong
         if self.free < 0:
             self._grow(self.capacity * 2)
         slot = self.free
-        self.free = self.nexts[slot]
-        self.times[slot] = time
-        self.orders[slot] = order
-        self.kinds[slot] = kind
-        base = slot * 6
-        self.values[base] = a
-        self.values[base + 1] = b
-        self.values[base + 2] = c
-        self.values[base + 3] = d
-        self.values[base + 4] = e
-        self.values[base + 5] = f
-        if ref is not None:
-            self.refs[slot] = ref
+        row = slot * 12
+        self.free = self.rows[row + 9]
         before = self.tail
-        while before >= 0 and (
-            self.times[before] > time or (self.times[before] == time and self.orders[before] > order)
-        ):
-            before = self.previous[before]
+        while before >= 0 and self.rows[before * 12] >= time:
+            if self.rows[before * 12] == time and self.rows[before * 12 + 1] <= order:
+                break
+            before = self.rows[before * 12 + 10]
         if before < 0:
             after = self.head
             self.head = slot
@@ -159,44 +135,60 @@ class EventQueue:
             if time < self.wakes[self.wake_place]:
                 self.wakes[self.wake_place] = time
         else:
-            after = self.nexts[before]
-            self.nexts[before] = slot
+            after = self.rows[before * 12 + 9]
+            self.rows[before * 12 + 9] = slot
         if after < 0:
             self.tail = slot
         else:
-            self.previous[after] = slot
-        self.nexts[slot] = after
-        self.previous[slot] = before
+            self.rows[after * 12 + 10] = slot
+        self.rows[row] = time
+        self.rows[row + 1] = order
+        self.rows[row + 2] = kind
+        self.rows[row + 3] = a
+        self.rows[row + 4] = b
+        self.rows[row + 5] = c
+        self.rows[row + 6] = d
+        self.rows[row + 7] = e
+        self.rows[row + 8] = f
+        self.rows[row + 9] = after
+        self.rows[row + 10] = before
+        self.rows[row + 11] = 0
+        if ref is not None:
+            self.refs[slot] = ref
+            self.rows[row + 11] = 1
         self.count += 1
         self.pushed += 1
 
     def take(self) -> cython.bint:
         """Move the first message into the fields of the queue; False when the queue is empty."""
         slot: cython.longlong = self.head
-        base: cython.longlong
+        row: cython.longlong = slot * 12
+        after: cython.longlong
         if slot < 0:
             return False
-        self.time = self.times[slot]
-        self.order = self.orders[slot]
-        self.kind = self.kinds[slot]
-        base = slot * 6
-        self.a = self.values[base]
-        self.b = self.values[base + 1]
-        self.c = self.values[base + 2]
-        self.d = self.values[base + 3]
-        self.e = self.values[base + 4]
-        self.f = self.values[base + 5]
-        self.ref = self.refs[slot]
-        if self.ref is not None:
+        self.time = self.rows[row]
+        self.order = self.rows[row + 1]
+        self.kind = self.rows[row + 2]
+        self.a = self.rows[row + 3]
+        self.b = self.rows[row + 4]
+        self.c = self.rows[row + 5]
+        self.d = self.rows[row + 6]
+        self.e = self.rows[row + 7]
+        self.f = self.rows[row + 8]
+        if self.rows[row + 11]:
+            self.ref = self.refs[slot]
             self.refs[slot] = None
-        self.head = self.nexts[slot]
-        if self.head < 0:
+        elif self.ref is not None:
+            self.ref = None
+        after = self.rows[row + 9]
+        self.head = after
+        if after < 0:
             self.tail = -1
             self.head_time = 1 << 62
         else:
-            self.previous[self.head] = -1
-            self.head_time = self.times[self.head]
-        self.nexts[slot] = self.free
+            self.rows[after * 12 + 10] = -1
+            self.head_time = self.rows[after * 12]
+        self.rows[row + 9] = self.free
         self.free = slot
         self.count -= 1
         return True

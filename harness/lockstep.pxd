@@ -1,25 +1,22 @@
+cimport cython
+
 from boards.main_brain.estimator cimport Estimator
 from can_bus.bus cimport Bus
 from firmware_sim.microcontroller cimport Microcontroller
 from foundation.events cimport EventQueue
 from harness.processes.remote_board cimport RemoteBoard
 from harness.recorder cimport Recorder, RowStream
-from plant.edge_buffer cimport ByteBuffer
+from foundation.edge_buffer cimport ByteBuffer
 from plant.imu cimport Imu
 from plant.motor_unit cimport MotorUnit
 from plant.ranger cimport RangerPlant
-from plant.incremental_encoder cimport IncrementalEncoder
 
-cdef class Wire:
-    cdef public IncrementalEncoder encoder
-    cdef public Microcontroller board
-    cdef public long long pin_a, pin_b
-    cpdef void deliver(self) noexcept
-
+@cython.final
 cdef class WordWire:
     cdef public long long source, word
     cdef public Microcontroller board
 
+@cython.final
 cdef class SspWire:
     cdef public Microcontroller master, slave
     cdef public long long exchange_ns, exchanges
@@ -27,9 +24,10 @@ cdef class SspWire:
     cpdef void start(self, long long time_ns, object segment) noexcept
     cpdef void load(self, object segment) noexcept
 
+@cython.final
 cdef class Lockstep:
     cdef public RangerPlant plant
-    cdef public list boards, buses, encoder_wires, word_wires, motors
+    cdef public list boards, buses, word_wires, motors
     cdef public Recorder recorder
     cdef public long long time, next_sample, sample_count, stop_steps
     cdef public double stop_distance_m
@@ -41,7 +39,7 @@ cdef class Lockstep:
     cdef public long long imu_index, imu_uart
     cdef public long long swing_leg, strike_seen_ns, strike_count, strikes_unmatched, strikes_missed, steps_noticed
     cdef public double strike_sum_ms, strike_squares_ms2
-    cdef public long long[::1] due, bus_due, step_times, main_brain_words, bus_of, node_of, watchdog_pin, enable_pins, enables
+    cdef public long long[::1] encoder_boards, due, bus_due, step_times, main_brain_words, bus_of, node_of, watchdog_pin, enable_pins, enables
     cdef public bint records_words, remote
     cdef public double[::1] sample_row
     cpdef long long run(self, long long until)
@@ -49,8 +47,8 @@ cdef class Lockstep:
     cdef void _sense(self) noexcept
     cdef void _show_words(self) noexcept
     cdef void _deliver_bytes(self) noexcept
-    cdef void _collect_frames(self)
-    cdef void _route(self, long long index, Microcontroller board)
-    cdef void _can_output(self, long long index, EventQueue out)
-    cdef void _serial_output(self, long long index, EventQueue out)
-    cdef void _sample(self, long long now)
+    cdef int _collect_frames(self) except -1
+    cdef int _route(self, long long index, Microcontroller board) except -1
+    cdef int _can_output(self, long long index, EventQueue out) except -1
+    cdef int _serial_output(self, long long index, EventQueue out) except -1
+    cdef int _sample(self, long long now) except -1

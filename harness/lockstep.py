@@ -21,12 +21,11 @@ import cython
 
 from can_bus.bus import Bus
 from firmware_sim.microcontroller import Microcontroller
+from foundation.edge_buffer import ByteBuffer
 from foundation.events import EventQueue
 from foundation.user_error import UserError
 from harness.processes.remote_board import RemoteBoard
 from harness.recorder import RowStream
-from plant.edge_buffer import ByteBuffer
-from plant.incremental_encoder import IncrementalEncoder
 from plant.motor_unit import MotorUnit
 from plant.ranger import RangerPlant
 
@@ -38,34 +37,6 @@ REACHED_TIME = 0
 REACHED_STEPS = 1
 REACHED_DISTANCE = 2
 FELL = 3
-
-
-class Wire:
-    """One encoder on two pins of a board: edges of channel A arrive with the level of channel B."""
-
-    def __init__(self, encoder, board, pin_a, pin_b) -> None:
-        self.encoder = encoder
-        self.board = board
-        self.pin_a = pin_a
-        self.pin_b = pin_b
-
-    def deliver(self) -> cython.void:
-        """Hand the edges of the last plant step to the board."""
-        i: cython.longlong
-        encoder: IncrementalEncoder = self.encoder
-        board: Microcontroller = self.board
-        inbox: EventQueue = board.inbox
-        for i in range(encoder.edges.count):
-            # order 256: stage pins; kind 1: PIN_EDGE
-            inbox.push(
-                encoder.edges.times[i],
-                256,
-                1,
-                self.pin_a,
-                encoder.edges.levels_a[i],
-                self.pin_b,
-                encoder.edges.levels_b[i],
-            )
 
 
 class WordWire:
@@ -115,7 +86,7 @@ class Lockstep:
         self.time = start_ns
         self.next_sample = start_ns
         self.main_brain = None
-        self.encoder_wires = []
+        self.encoder_boards = array.array("q")  # numbers of the boards with encoders on their pins
         self.step_times = array.array("q", [start_ns, start_ns])  # ns, of the step that the sensors show
         self.word_wires = []
         self.ssp = None
@@ -154,6 +125,13 @@ class Lockstep:
         self.strike_sum_ms = 0.0
         self.strike_squares_ms2 = 0.0
 
+    def connect_encoder(self, encoder, board, pin_a, pin_b) -> None:
+        """Channels A and B of `encoder` on two pins of `board`."""
+        board.listen_to_edges(encoder.edges, pin_a, pin_b)
+        number = self.boards.index(board)
+        if number not in self.encoder_boards:
+            self.encoder_boards = array.array("q", list(self.encoder_boards) + [number])
+
     def connect_imu(self, imu, board, index, uart) -> None:
         """The inertial unit's bytes go to UART `uart` of `board`, the board's to the unit."""
         self.imu = imu
@@ -180,6 +158,7 @@ class Lockstep:
         i: cython.longlong
         now: cython.longlong
         then: cython.longlong
+        following: cython.longlong
         boards: list = self.boards
         buses: list = self.buses
         quantum: cython.longlong = QUANTUM_NS
@@ -193,7 +172,7 @@ class Lockstep:
         for i in range(board_count):
             # between two runs anything may have been done to a board
             board = self.boards[i]
-            due[i] = min(board.next_time, board.inbox.head_time)
+            due[i] = min(board.next_time, board.inbox.head_time, board.edge_time)
         while self.time < until:
             now = self.time
             then = now + quantum
@@ -222,8 +201,12 @@ class Lockstep:
             for i in range(board_count):
                 if due[i] < then:
                     board = cython.cast(Microcontroller, boards[i])
-                    due[i] = 1 << 62
-                    due[i] = min(board.advance(then), board.inbox.head_time)
+                    following = board.advance(then)
+                    if board.inbox.head_time < following:
+                        following = board.inbox.head_time
+                    if board.edge_time < following:
+                        following = board.edge_time
+                    due[i] = following
                     if board.outbox.count:
                         self._route(i, board)
             if self.estimator is not None and self.estimator.swing_leg != self.swing_leg:
@@ -254,16 +237,17 @@ class Lockstep:
         """What the plant's sensors showed during the step that was just integrated."""
         plant: RangerPlant = self.plant
         i: cython.longlong
-        wire: Wire
         end: cython.longlong = plant.time_ns
         start: cython.longlong = end - plant.step_ns
         self.step_times[0] = start
         self.step_times[1] = end
-        wires: list = self.encoder_wires
-        for i in range(len(wires)):
-            wire = cython.cast(Wire, wires[i])
-            if wire.encoder.edges.count:
-                wire.deliver()
+        board: Microcontroller
+        first: cython.longlong
+        for i in range(len(self.encoder_boards)):
+            board = cython.cast(Microcontroller, self.boards[self.encoder_boards[i]])
+            first = board.edges_came()
+            if first < self.due[self.encoder_boards[i]]:
+                self.due[self.encoder_boards[i]] = first
         if self.imu is not None and self.imu.bytes.count:
             if self.imu_tap is not None:
                 self.imu_tap.bytes_sent(self.imu.bytes.times, self.imu.bytes.values, self.imu.bytes.count)
@@ -305,7 +289,7 @@ class Lockstep:
             board.inbox.push(line.times[i + n - 1], 256, 5, self.imu_uart, line.values[i], n, low, high)
             i += n
 
-    def _collect_frames(self) -> cython.void:
+    def _collect_frames(self) -> None:
         """Move what the buses logged into the canonical trace, bus after bus."""
         bus: Bus
         b: cython.longlong
@@ -315,7 +299,7 @@ class Lockstep:
                 self.recorder.add_frames(b, bus.log, bus.log_count)
                 bus.log_count = 0
 
-    def _route(self, index: cython.longlong, board: Microcontroller) -> cython.void:
+    def _route(self, index: cython.longlong, board: Microcontroller) -> None:
         """Hand on what a board put out: frames to its bus, PWM and pins to its drive, segments to the link."""
         out: EventQueue = board.outbox
         place: cython.longlong
@@ -377,19 +361,19 @@ class Lockstep:
                 elif self.serial_lines is not None:
                     self._serial_output(index, out)
 
-    def _can_output(self, index: cython.longlong, out: EventQueue) -> cython.void:
+    def _can_output(self, index: cython.longlong, out: EventQueue) -> None:
         """A controller asks its bus for something, and the bus is outside."""
         line = self.can_lines.get((index, out.a))
         if line is not None:
             line.from_board(out.kind, out.time, out.b, out.c, out.d, out.e, out.f)
 
-    def _serial_output(self, index: cython.longlong, out: EventQueue) -> cython.void:
+    def _serial_output(self, index: cython.longlong, out: EventQueue) -> None:
         """A UART has put something out: to the outside, if it is connected there."""
         line = self.serial_lines.get((index, out.a))
         if line is not None:
             line.from_board(out.time, out.b, out.c, out.ref)
 
-    def _sample(self, now: cython.longlong) -> cython.void:
+    def _sample(self, now: cython.longlong) -> None:
         """One row of the trace: the body, and when a log is kept the main brain's data table."""
         stream: RowStream = self.recorder.samples
         at: cython.longlong = stream.used

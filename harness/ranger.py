@@ -116,9 +116,8 @@ class Ranger:
         place = {name: number for number, name in enumerate(wiring.BOARDS)}
         for wire in wiring.ENCODERS:
             pins = wiring.PINS[wire.board]
-            loop.encoder_wires.append(
-                lockstep.Wire(self.plant.encoders[wire.encoder], boards[wire.board], pins[wire.pin_a], pins[wire.pin_b])
-            )
+            encoder = self.plant.encoders[wire.encoder]
+            loop.connect_encoder(encoder, boards[wire.board], pins[wire.pin_a], pins[wire.pin_b])
         for analog in wiring.ANALOG:
             channel = wiring.ANALOG_INPUTS[analog.board][analog.input]
             loop.connect_voltage(analog.voltage, boards[analog.board], channel)

@@ -3,7 +3,7 @@ cimport cython
 from libc.math cimport cos, exp, sin
 from foundation.numbers cimport word_of_float
 from foundation.random_stream cimport RandomStream
-from plant.edge_buffer cimport ByteBuffer
+from foundation.edge_buffer cimport ByteBuffer
 
 cdef long long _MASK, _TEN_BITS
 

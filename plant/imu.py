@@ -21,10 +21,10 @@ ROBOT PARITY: fused angles are the true ones with noise and bias; the device's s
 
 import cython
 
+from foundation.edge_buffer import ByteBuffer
 from foundation.numbers import reals
 from foundation.random_stream import RandomStream
 from foundation.user_error import UserError
-from plant.edge_buffer import ByteBuffer
 
 if not cython.compiled:
     from math import cos, exp, sin

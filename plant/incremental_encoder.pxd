@@ -2,7 +2,7 @@ cimport cython
 
 from libc.math cimport cos, sin, sqrt
 from foundation.random_stream cimport RandomStream
-from plant.edge_buffer cimport EdgeBuffer
+from foundation.edge_buffer cimport EdgeBuffer
 
 @cython.final
 cdef class IncrementalEncoder:

@@ -19,10 +19,10 @@ disc (rad of encoder shaft, once and twice per turn).
 
 import cython
 
+from foundation.edge_buffer import EdgeBuffer
 from foundation.numbers import reals
 from foundation.random_stream import RandomStream
 from foundation.user_error import UserError
-from plant.edge_buffer import EdgeBuffer
 
 if not cython.compiled:
     from math import cos, sin, sqrt
@@ -148,7 +148,7 @@ class IncrementalEncoder:
         self.has_end = False
         self.calm_from = 1.0
         self.calm_to = -1.0
-        self.edges.count = 0
+        self.edges.clear()
 
     def level_a(self) -> cython.longlong:
         """Level of channel A now."""
@@ -194,6 +194,7 @@ class IncrementalEncoder:
         forward: cython.bint
         buffer: EdgeBuffer = self.edges
         buffer.count = 0
+        buffer.read = 0
         if not self.started:
             self.reset(angle0)
         if self.broken:

@@ -30,10 +30,10 @@ cdef class MainBrainBoard(Microcontroller):
     cpdef object load_controller(self, controller)
     cpdef object schedule(self)
     cpdef object on_segment(self, EventQueue queue)
-    cpdef void beat(self)
-    cpdef void store_execution_time(self)
-    cpdef void report(self, long long code)
-    cpdef void id_out_of_range(self)
-    cpdef void slot_exceeded(self)
-    cpdef void slot_near_limit(self)
-    cpdef void task_limit(self, Task task)
+    cpdef int beat(self) except -1
+    cpdef int store_execution_time(self) except -1
+    cpdef int report(self, long long code) except -1
+    cpdef int id_out_of_range(self) except -1
+    cpdef int slot_exceeded(self) except -1
+    cpdef int slot_near_limit(self) except -1
+    cpdef int task_limit(self, Task task) except -1

@@ -178,7 +178,7 @@ class MainBrainBoard(Microcontroller):
 
     # --- tasks of our own -------------------------------------------------------------------------------
 
-    def beat(self) -> cython.void:
+    def beat(self) -> None:
         """The heartbeat light: on for 50 ms when bit 8 of the network time rises (facts 1.8)."""
         bit: cython.longlong = self.time.ms >> 8 & 1
         if bit == 1 and self.heartbeat_bit == 0:
@@ -188,7 +188,7 @@ class MainBrainBoard(Microcontroller):
             self.heartbeat_on = False
         self.heartbeat_bit = bit
 
-    def store_execution_time(self) -> cython.void:
+    def store_execution_time(self) -> None:
         """Seconds since the slot began, by Timer0; with the firmware's quirk since the latest tick of 1 ms."""
         since: cython.longlong = self.scheduler.slot_time
         counts: cython.longlong
@@ -199,7 +199,7 @@ class MainBrainBoard(Microcontroller):
 
     # --- errors -----------------------------------------------------------------------------------------
 
-    def report(self, code: cython.longlong) -> cython.void:
+    def report(self, code: cython.longlong) -> None:
         """Note an error; with the firmware's quirk each report carries the one before, the first is 0."""
         if self.errors_one_late:
             self.errors.report(self.error_before)
@@ -207,14 +207,14 @@ class MainBrainBoard(Microcontroller):
         else:
             self.errors.report(code)
 
-    def id_out_of_range(self) -> cython.void:
+    def id_out_of_range(self) -> None:
         self.report(self.code_id_out_of_range)
 
-    def slot_exceeded(self) -> cython.void:
+    def slot_exceeded(self) -> None:
         self.report(self.code_dnf)
 
-    def slot_near_limit(self) -> cython.void:
+    def slot_near_limit(self) -> None:
         self.report(self.code_near_limit)
 
-    def task_limit(self, task: Task) -> cython.void:
+    def task_limit(self, task: Task) -> None:
         self.report(self.code_task_limit)

@@ -1,7 +1,5 @@
 """What a machine tells a motor board, and how machines come by the numbers of the data table."""
 
-import cython
-
 from datatable.generated import mb as table
 
 
@@ -23,12 +21,12 @@ class MotorCommand:
         self.stiffness_id = table_id(f"{board}_STIFFNESS")
         self.dampness_id = table_id(f"{board}_DAMPNESS")
 
-    def send(self, current_A: float, stiffness: float, dampness: float) -> cython.void:
+    def send(self, current_A: float, stiffness: float, dampness: float) -> None:
         """I0 in A, K in A/rad, D in A s/rad."""
         self.store.set_float(self.current_id, current_A)
         self.store.set_float(self.stiffness_id, stiffness)
         self.store.set_float(self.dampness_id, dampness)
 
-    def off(self) -> cython.void:
+    def off(self) -> None:
         """A passive motor."""
         self.send(0.0, 0.0, 0.0)

@@ -19,16 +19,16 @@ cdef class DataLink:
     cdef public long long fast_count, medium_count, phase, fast_place, medium_place, slow_id
     cdef public long long rate_sum, calls_without_step, points, segments_sent, steps
     cdef public long long ring_write, ring_read, packets, bad_packets, refused, ring_full
-    cpdef void build_lists(self)
+    cpdef int build_lists(self) except -1
     cpdef long long allowed_steps(self)
     cpdef object send_data(self)
     cdef void _step(self)
-    cdef void _put(self, long long number)
-    cdef void _byte(self, long long at, long long byte)
-    cdef void _word(self, long long at, long long word)
+    cdef int _put(self, long long number) except -1
+    cdef int _byte(self, long long at, long long byte) except -1
+    cdef int _word(self, long long at, long long word) except -1
     cpdef object on_restart(self, EventQueue queue)
     cpdef object on_sent(self, EventQueue queue)
-    cdef void _start(self)
+    cdef int _start(self) except -1
     cpdef object swap_buffers(self)
     cpdef long long waiting(self)
     cpdef object parse(self)

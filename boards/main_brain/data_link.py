@@ -90,7 +90,7 @@ class DataLink:
 
     # --- to the computer --------------------------------------------------------------------------------
 
-    def build_lists(self) -> cython.void:
+    def build_lists(self) -> None:
         """Row task: what the 48 channels ask for. Identifiers beyond the table are reported and left out."""
         i: cython.longlong
         wanted: cython.longlong
@@ -171,7 +171,7 @@ class DataLink:
             self.phase = 0
             self.fast_place = 0
 
-    def _put(self, number: cython.longlong) -> cython.void:
+    def _put(self, number: cython.longlong) -> None:
         """One point into the segment being filled; the computer has now read that variable."""
         at: cython.longlong = self.filling * 92 + self.in_segment * 10
         self._byte(at, number >> 8)
@@ -193,11 +193,11 @@ class DataLink:
             if not self.uart.busy:
                 self.chip.request(self.restart_source)
 
-    def _byte(self, at: cython.longlong, byte: cython.longlong) -> cython.void:
+    def _byte(self, at: cython.longlong, byte: cython.longlong) -> None:
         self.segments[at] = byte
         self.checksum += byte
 
-    def _word(self, at: cython.longlong, word: cython.longlong) -> cython.void:
+    def _word(self, at: cython.longlong, word: cython.longlong) -> None:
         self._byte(at, word >> 24 & 255)
         self._byte(at + 1, word >> 16 & 255)
         self._byte(at + 2, word >> 8 & 255)
@@ -217,7 +217,7 @@ class DataLink:
         self._start()
         return None
 
-    def _start(self) -> cython.void:
+    def _start(self) -> None:
         at: cython.longlong = self.sending * 92
         if self.used > 0:
             self.uart.transmit(bytes(self.segments[at : at + 92]))

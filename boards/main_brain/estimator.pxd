@@ -15,8 +15,8 @@ cdef class EnergyMeter:
 cdef class HeelSensor:
     cdef public double baseline
     cdef public long long count
-    cpdef void restart(self, double raw)
-    cpdef void average(self, double raw)
+    cpdef int restart(self, double raw) except -1
+    cpdef int average(self, double raw) except -1
     cpdef bint touches(self, double raw, double threshold, double ticks, double base_limit)
 
 cdef class Estimator:
@@ -51,16 +51,16 @@ cdef class Estimator:
     cdef public bint gyro_started, first_step, fallen
     cdef public list meters
     cdef public EnergyMeter hip_energy, outer_energy, inner_energy, steer_energy, mcu_energy
-    cpdef void restart(self)
-    cpdef void zero_counters(self)
+    cpdef int restart(self) except -1
+    cpdef int zero_counters(self) except -1
     cpdef void update(self)
-    cpdef void update_rates(self)
+    cpdef int update_rates(self) except -1
     cpdef void update_outer_angle(self)
     cpdef void detect_strike(self, double hip, double outer_ankle, double inner_ankle)
-    cpdef void set_stage(self, long long stage)
-    cpdef void update_contact_sums(self)
+    cpdef int set_stage(self, long long stage) except -1
+    cpdef int update_contact_sums(self) except -1
     cpdef double contact_sum(self, bint inner)
-    cpdef void strike(self, double hip, double outer_ankle, double inner_ankle)
-    cpdef void update_heights(self, double hip, double outer_ankle, double inner_ankle)
-    cpdef void update_energy(self)
+    cpdef int strike(self, double hip, double outer_ankle, double inner_ankle) except -1
+    cpdef int update_heights(self, double hip, double outer_ankle, double inner_ankle) except -1
+    cpdef int update_energy(self) except -1
     cpdef void judge_fall(self, double hip)

@@ -120,11 +120,11 @@ class HeelSensor:
         self.baseline = 0.0
         self.count = 0
 
-    def restart(self, raw: float) -> cython.void:
+    def restart(self, raw: float) -> None:
         self.baseline = raw
         self.count = 0
 
-    def average(self, raw: float) -> cython.void:
+    def average(self, raw: float) -> None:
         self.baseline = 0.9 * self.baseline + 0.1 * raw
 
     def touches(self, raw: float, threshold: float, ticks: float, base_limit: float) -> cython.bint:
@@ -189,7 +189,7 @@ class Estimator:
         self.hip_energy, self.outer_energy, self.inner_energy, self.steer_energy, self.mcu_energy = self.meters
         store.set_int(self.E_SWING_LEG, 1)
 
-    def restart(self) -> cython.void:
+    def restart(self) -> None:
         """What the reset of the machines does to the estimator: inner legs swing, angle 0."""
         self.stage = 0
         self.swing_leg = 1
@@ -199,7 +199,7 @@ class Estimator:
         self.strike_time = self.store.stamp(self.TIMESTAMP)
         self.store.set_int(self.E_SWING_LEG, 1)
 
-    def zero_counters(self) -> cython.void:
+    def zero_counters(self) -> None:
         """Steps, distance and energies from zero."""
         meter: EnergyMeter
         i: cython.longlong
@@ -237,7 +237,7 @@ class Estimator:
         if reset == 2:
             self.judge_fall(hip)
 
-    def update_rates(self) -> cython.void:
+    def update_rates(self) -> None:
         store: DataStore = self.store
         bad: cython.longlong
         if self.per_tick_filter:
@@ -331,11 +331,11 @@ class Estimator:
         if left_touches or right_touches:
             self.strike(hip, outer_ankle, inner_ankle)
 
-    def set_stage(self, stage: cython.longlong) -> cython.void:
+    def set_stage(self, stage: cython.longlong) -> None:
         self.stage = stage
         self.store.set_int(self.E_HEEL_STAGE, stage)
 
-    def update_contact_sums(self) -> cython.void:
+    def update_contact_sums(self) -> None:
         """The four heel sensors through 10 Hz filters, once per slot (facts network-and-boards 4.17)."""
         store: DataStore = self.store
         self.outer_left_sense.push(store.get_float(self.MCFO_LEFT_HEEL_SENSE))
@@ -350,7 +350,7 @@ class Estimator:
             return self.inner_left_sense.output + self.inner_right_sense.output
         return self.outer_left_sense.output + self.outer_right_sense.output
 
-    def strike(self, hip: float, outer_ankle: float, inner_ankle: float) -> cython.void:
+    def strike(self, hip: float, outer_ankle: float, inner_ankle: float) -> None:
         """A heel strike: exchange the legs, correct the angle, count the step."""
         store: DataStore = self.store
         now: cython.longlong = store.stamp(self.TIMESTAMP)
@@ -386,7 +386,7 @@ class Estimator:
         store.set_int(self.E_SWING_LEG, self.swing_leg)
         self.set_stage(0)
 
-    def update_heights(self, hip: float, outer_ankle: float, inner_ankle: float) -> cython.void:
+    def update_heights(self, hip: float, outer_ankle: float, inner_ankle: float) -> None:
         """Height of the swing ankle over the stance ankle, and of the swing foot over the floor."""
         store: DataStore = self.store
         lo: float = self.outer_angle
@@ -403,7 +403,7 @@ class Estimator:
             store.set_float(self.E_ANKLE_HEIGHT, -rise)
             store.set_float(self.E_SWING_HEIGHT, -rise + inner_sole - outer_sole)
 
-    def update_energy(self) -> cython.void:
+    def update_energy(self) -> None:
         """Battery energy of each motor stage and of the electronics, from their published powers."""
         store: DataStore = self.store
         new: cython.bint = False

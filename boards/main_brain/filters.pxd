@@ -7,6 +7,6 @@ cdef class ButterworthFilter:
     cdef public long long longest_gap, violations, stamp
     cdef public bint started
     cdef public double x1, x2, y1, y2, output
-    cpdef void rest_at(self, double value)
+    cpdef int rest_at(self, double value) except -1
     cpdef double push(self, double value)
     cpdef double push_stamped(self, double value, long long stamp_ms)

@@ -40,7 +40,7 @@ class ButterworthFilter:
         self.y2 = 0.0
         self.output = 0.0
 
-    def rest_at(self, value: cython.double) -> cython.void:
+    def rest_at(self, value: cython.double) -> None:
         """Forget the past as if the input had always been `value`."""
         self.x1 = value
         self.x2 = value

@@ -19,20 +19,20 @@ cdef class FootMachine:
     cdef public long long push_height, push_to_strike, missed_pushes, state_number
     cdef public MotorCommand motor
     cdef public StateMachine machine
-    cpdef void publish_state(self, number)
-    cpdef void track_absolute(self, double target, double stiffness, double dampness)
-    cpdef void track_motor(self, double target, double stiffness, double dampness)
-    cpdef void hold_flipped_down(self)
-    cpdef void hold_standing(self)
-    cpdef void track_stance(self)
-    cpdef void enter_prepush(self)
-    cpdef void push(self)
+    cpdef int publish_state(self, number) except -1
+    cpdef int track_absolute(self, double target, double stiffness, double dampness) except -1
+    cpdef int track_motor(self, double target, double stiffness, double dampness) except -1
+    cpdef int hold_flipped_down(self) except -1
+    cpdef int hold_standing(self) except -1
+    cpdef int track_stance(self) except -1
+    cpdef int enter_prepush(self) except -1
+    cpdef int push(self) except -1
     cpdef bint correction_applies(self)
     cpdef double push_target(self)
-    cpdef void enter_afterpush(self)
-    cpdef void go_limp(self)
-    cpdef void flip_up(self)
-    cpdef void flip_down(self)
+    cpdef int enter_afterpush(self) except -1
+    cpdef int go_limp(self) except -1
+    cpdef int flip_up(self) except -1
+    cpdef int flip_down(self) except -1
     cpdef bint reset_wanted(self)
     cpdef bint own_foot_struck(self)
     cpdef bint other_foot_struck(self)

@@ -105,12 +105,12 @@ class FootMachine:
             on_change=self.publish_state,
         )
 
-    def publish_state(self, number) -> cython.void:
+    def publish_state(self, number) -> None:
         self.store.set_int(self.state_number, number)
 
     # -- actions ---------------------------------------------------------------------------------
 
-    def track_absolute(self, target: float, stiffness: float, dampness: float) -> cython.void:
+    def track_absolute(self, target: float, stiffness: float, dampness: float) -> None:
         """Hold the foot's angle to the floor: the target is renewed from the pose each tick."""
         self.motor.send(
             stiffness * (target + self.store.get_float(self.motor_position) - self.store.get_float(self.own_absolute)),
@@ -118,11 +118,11 @@ class FootMachine:
             dampness,
         )
 
-    def track_motor(self, target: float, stiffness: float, dampness: float) -> cython.void:
+    def track_motor(self, target: float, stiffness: float, dampness: float) -> None:
         """Hold the motor's angle to the leg."""
         self.motor.send(stiffness * target, stiffness, dampness)
 
-    def hold_flipped_down(self) -> cython.void:
+    def hold_flipped_down(self) -> None:
         """Inner start: foot parallel to the floor by the hip angle alone, no use of the IMU."""
         store: DataStore = self.store
         self.track_motor(
@@ -131,7 +131,7 @@ class FootMachine:
             store.get_float(self.C_F_FD_F_RATE),
         )
 
-    def hold_standing(self) -> cython.void:
+    def hold_standing(self) -> None:
         """Outer start: stiff, by the hip angle alone."""
         store: DataStore = self.store
         self.track_motor(
@@ -140,7 +140,7 @@ class FootMachine:
             store.get_float(self.C_F_SST_F_RATE),
         )
 
-    def track_stance(self) -> cython.void:
+    def track_stance(self) -> None:
         store: DataStore = self.store
         self.track_absolute(
             store.get_float(self.P_F_ST_F_TANG),
@@ -148,7 +148,7 @@ class FootMachine:
             store.get_float(self.C_F_ST_F_RATE),
         )
 
-    def enter_prepush(self) -> cython.void:
+    def enter_prepush(self) -> None:
         """Fix this push: stronger and longer after a slow mid-stance.
 
         The gain refers to the nominal rate (0.72) but switches at another one (0.65), so the push jumps
@@ -169,7 +169,7 @@ class FootMachine:
         if self.other_foot_struck():
             store.set_int(self.missed_pushes, store.get_int(self.missed_pushes) + 1)
 
-    def push(self) -> cython.void:
+    def push(self) -> None:
         store: DataStore = self.store
         self.push_ms += 2
         if not self.strike_logged and self.other_foot_struck():
@@ -192,14 +192,14 @@ class FootMachine:
             angle = angle + self.push_angle
         return angle
 
-    def enter_afterpush(self) -> cython.void:
+    def enter_afterpush(self) -> None:
         self.passive_ms = 0
 
-    def go_limp(self) -> cython.void:
+    def go_limp(self) -> None:
         self.passive_ms += 2
         self.motor.off()
 
-    def flip_up(self) -> cython.void:
+    def flip_up(self) -> None:
         store: DataStore = self.store
         self.track_motor(
             store.get_float(self.P_F_FU_F_TANG),
@@ -207,7 +207,7 @@ class FootMachine:
             store.get_float(self.C_F_FU_F_RATE),
         )
 
-    def flip_down(self) -> cython.void:
+    def flip_down(self) -> None:
         store: DataStore = self.store
         self.track_absolute(
             store.get_float(self.P_F_FD_F_TANG),

@@ -21,18 +21,18 @@ cdef class HipMachine:
     cdef public long long premid_time, leg_lo_aftermid, leg_li_aftermid
     cdef public double first_correction, second_correction
     cdef public StateMachine machine
-    cpdef void publish_state(self, number)
-    cpdef void hold_start(self)
-    cpdef void hold_inner_ahead(self)
-    cpdef void hold_outer_ahead(self)
-    cpdef void enter_premid(self)
-    cpdef void enter_aftermid(self)
+    cpdef int publish_state(self, number) except -1
+    cpdef int hold_start(self) except -1
+    cpdef int hold_inner_ahead(self) except -1
+    cpdef int hold_outer_ahead(self) except -1
+    cpdef int enter_premid(self) except -1
+    cpdef int enter_aftermid(self) except -1
     cpdef double correction(self)
     cpdef double base_current(self, double direction)
-    cpdef void swing_inner(self)
-    cpdef void swing_inner_corrected(self)
-    cpdef void swing_outer(self)
-    cpdef void swing_outer_corrected(self)
+    cpdef int swing_inner(self) except -1
+    cpdef int swing_inner_corrected(self) except -1
+    cpdef int swing_outer(self) except -1
+    cpdef int swing_outer_corrected(self) except -1
     cpdef bint reset_wanted(self)
     cpdef bint inner_struck(self)
     cpdef bint outer_struck(self)

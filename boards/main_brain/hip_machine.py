@@ -108,12 +108,12 @@ class HipMachine:
             on_change=self.publish_state,
         )
 
-    def publish_state(self, number) -> cython.void:
+    def publish_state(self, number) -> None:
         self.store.set_int(self.FSM_HIP, number)
 
     # -- actions ---------------------------------------------------------------------------------
 
-    def hold_start(self) -> cython.void:
+    def hold_start(self) -> None:
         """Hold the inner legs ahead until the first heel strike."""
         stiffness: float = self.store.get_float(self.C_HI_SH_H_ANG)
         self.motor.send(
@@ -122,7 +122,7 @@ class HipMachine:
             self.store.get_float(self.C_HI_SH_H_RATE),
         )
 
-    def hold_inner_ahead(self) -> cython.void:
+    def hold_inner_ahead(self) -> None:
         stiffness: float = self.store.get_float(self.C_H_EH_H_ANG)
         self.motor.send(
             stiffness * self.store.get_float(self.P_H_EH_H_TANG),
@@ -130,7 +130,7 @@ class HipMachine:
             self.store.get_float(self.C_H_EH_H_RATE),
         )
 
-    def hold_outer_ahead(self) -> cython.void:
+    def hold_outer_ahead(self) -> None:
         stiffness: float = self.store.get_float(self.C_H_EH_H_ANG)
         self.motor.send(
             -stiffness * self.store.get_float(self.P_H_EH_H_TANG),
@@ -138,10 +138,10 @@ class HipMachine:
             self.store.get_float(self.C_H_EH_H_RATE),
         )
 
-    def enter_premid(self) -> cython.void:
+    def enter_premid(self) -> None:
         self.premid_time = self.store.get_int(self.E_T_AFTER_HS)
 
-    def enter_aftermid(self) -> cython.void:
+    def enter_aftermid(self) -> None:
         """The discrete corrections of this step from the figures of mid-stance."""
         store: DataStore = self.store
         mode: float = store.get_float(self.D_H_ON)
@@ -206,16 +206,16 @@ class HipMachine:
             return 0.0
         return current
 
-    def swing_inner(self) -> cython.void:
+    def swing_inner(self) -> None:
         self.motor.send(self.base_current(1.0), 0.0, 0.0)
 
-    def swing_inner_corrected(self) -> cython.void:
+    def swing_inner_corrected(self) -> None:
         self.motor.send(self.base_current(1.0) + self.correction(), 0.0, 0.0)
 
-    def swing_outer(self) -> cython.void:
+    def swing_outer(self) -> None:
         self.motor.send(self.base_current(-1.0), self.store.get_float(self.C_H_OUTER_STIFFNESS), 0.0)
 
-    def swing_outer_corrected(self) -> cython.void:
+    def swing_outer_corrected(self) -> None:
         self.motor.send(
             self.base_current(-1.0) - self.correction(),
             self.store.get_float(self.C_H_OUTER_STIFFNESS),

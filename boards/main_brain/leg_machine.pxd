@@ -10,13 +10,13 @@ cdef class StanceLeg:
     cdef public bint ss0_known
     cdef public double strike_angle, ss0_angle, ss0_rate, ss0_hip
     cdef public double mid_rate, mid_hip, mid_hip_rate, mid_time
-    cpdef void forget(self)
+    cpdef int forget(self) except -1
     cpdef double angle_before_vertical(self)
     cpdef double hip_ahead(self)
-    cpdef void enter_preswing(self)
-    cpdef void count_preswing(self)
-    cpdef void leave_preswing(self)
-    cpdef void enter_premid(self)
+    cpdef int enter_preswing(self) except -1
+    cpdef int count_preswing(self) except -1
+    cpdef int leave_preswing(self) except -1
+    cpdef int enter_premid(self) except -1
     cpdef void enter_aftermid(self)
 
 cdef class LegMachine:
@@ -31,10 +31,10 @@ cdef class LegMachine:
     cdef public long long aftermid_ms
     cdef public bint rate_of_previous_step
     cdef public StateMachine machine
-    cpdef void preset(self)
-    cpdef void publish_state(self, number)
-    cpdef void count_aftermid(self)
-    cpdef void leave_aftermid(self)
+    cpdef int preset(self) except -1
+    cpdef int publish_state(self, number) except -1
+    cpdef int count_aftermid(self) except -1
+    cpdef int leave_aftermid(self) except -1
     cpdef bint reset_wanted(self)
     cpdef bint inner_foot_flips_up(self)
     cpdef bint outer_foot_flips_up(self)

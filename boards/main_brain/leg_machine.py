@@ -56,7 +56,7 @@ class StanceLeg:
         self.hip_sign = hip_sign
         self.forget()
 
-    def forget(self) -> cython.void:
+    def forget(self) -> None:
         """The state before the first step."""
         self.strike_angle = 0.0
         self.preswing_ms = 0
@@ -78,17 +78,17 @@ class StanceLeg:
         """Hip angle, positive while the swing leg is ahead, rad."""
         return self.hip_sign * self.store.get_float(self.owner.MCH_ANGLE)
 
-    def enter_preswing(self) -> cython.void:
+    def enter_preswing(self) -> None:
         self.strike_angle = self.angle_before_vertical()
         self.preswing_ms = 0
 
-    def count_preswing(self) -> cython.void:
+    def count_preswing(self) -> None:
         self.preswing_ms += 2
 
-    def leave_preswing(self) -> cython.void:
+    def leave_preswing(self) -> None:
         self.store.set_float(self.owner.E_PS_TIME, self.preswing_ms)
 
-    def enter_premid(self) -> cython.void:
+    def enter_premid(self) -> None:
         """Single stance begins (SS0): remember the pose, publish the means over both legs."""
         self.ss0_known = True
         self.ss0_angle = self.angle_before_vertical()
@@ -171,7 +171,7 @@ class LegMachine:
             on_change=self.publish_state,
         )
 
-    def preset(self) -> cython.void:
+    def preset(self) -> None:
         """Before the first step: both legs' figures at the presets (v 0.5 rad/s, omega 1.66 rad/s)."""
         rate: float = self.store.get_float(self.P_L_START_ABSRATE)
         hip_rate: float = self.store.get_float(self.P_L_START_H_RATE)
@@ -186,14 +186,14 @@ class LegMachine:
         self.store.set_float(self.E_AM_H_RATE, hip_rate)
         self.store.set_float(self.E_AM_TIME, 0.0)
 
-    def publish_state(self, number) -> cython.void:
+    def publish_state(self, number) -> None:
         self.store.set_int(self.FSM_LEG, number)
 
-    def count_aftermid(self) -> cython.void:
+    def count_aftermid(self) -> None:
         self.aftermid_ms += 2
         self.store.set_int(self.E_AM_TIMER, self.aftermid_ms)
 
-    def leave_aftermid(self) -> cython.void:
+    def leave_aftermid(self) -> None:
         self.aftermid_ms = 0
         self.store.set_int(self.E_AM_TIMER, 0)
 

@@ -23,18 +23,18 @@ cdef class ModeMachine:
     cdef public long long buttons, pressed, last_song_steps, page, page_time, late_push_light
     cdef public StateMachine machine
     cpdef void update(self)
-    cpdef void publish_state(self, number)
-    cpdef void motors_off(self)
-    cpdef void steering_off(self)
-    cpdef void enter_calibrate(self)
-    cpdef void enter_standby(self)
-    cpdef void enter_stop(self)
-    cpdef void enter_walk(self)
-    cpdef void leave_walk(self)
-    cpdef void walk_display(self)
-    cpdef void show_page(self)
-    cpdef void show_mode(self, name, colour)
-    cpdef void show(self, upper, lower)
+    cpdef int publish_state(self, number) except -1
+    cpdef int motors_off(self) except -1
+    cpdef int steering_off(self) except -1
+    cpdef int enter_calibrate(self) except -1
+    cpdef int enter_standby(self) except -1
+    cpdef int enter_stop(self) except -1
+    cpdef int enter_walk(self) except -1
+    cpdef int leave_walk(self) except -1
+    cpdef int walk_display(self) except -1
+    cpdef int show_page(self) except -1
+    cpdef int show_mode(self, name, colour) except -1
+    cpdef int show(self, upper, lower) except -1
     cpdef bint key_0(self)
     cpdef bint key_1(self)
     cpdef bint key_2(self)

@@ -111,39 +111,39 @@ class ModeMachine:
         self.buttons = buttons
         self.machine.step()
 
-    def publish_state(self, number) -> cython.void:
+    def publish_state(self, number) -> None:
         self.store.set_int(self.FSM_UI, number)
         self.store.set_float(self.EST_UI_FSM_MODE, number)
 
     # -- actions ---------------------------------------------------------------------------------
 
-    def motors_off(self) -> cython.void:
+    def motors_off(self) -> None:
         """All commands and gains 0, rewritten in every slot as in the standby of 2016."""
         self.hip.motor.off()
         self.outer_foot.motor.off()
         self.inner_foot.motor.off()
 
-    def steering_off(self) -> cython.void:
+    def steering_off(self) -> None:
         self.steering.off()
         self.store.set_float(self.MCSI_STIFFNESS, 0.0)
         self.store.set_float(self.MCSI_DAMPNESS, 0.0)
 
-    def enter_calibrate(self) -> cython.void:
+    def enter_calibrate(self) -> None:
         """Power-up mode: motors off, counters to zero."""
         self.estimator.zero_counters()
         self.steering_off()
         self.show_mode("CALIBRAT", PURPLE)
         self.last_song_steps = 0
 
-    def enter_standby(self) -> cython.void:
+    def enter_standby(self) -> None:
         self.steering_off()
         self.show_mode("STANDBY", GREEN)
 
-    def enter_stop(self) -> cython.void:
+    def enter_stop(self) -> None:
         self.steering_off()
         self.show_mode("STOP", RED)
 
-    def enter_walk(self) -> cython.void:
+    def enter_walk(self) -> None:
         self.store.set_int(self.FSM_RESET, 2)
         self.store.set_int(self.E_SWING_LEG, 1)
         self.leg.preset()
@@ -151,7 +151,7 @@ class ModeMachine:
         self.page = 0
         self.page_time = self.store.stamp(self.TIMESTAMP)
 
-    def leave_walk(self) -> cython.void:
+    def leave_walk(self) -> None:
         """Motors to zero, then one tick of every machine with the reset flag: all return to their starts."""
         machine: StateMachine
         walk: State = self.machine.current
@@ -162,7 +162,7 @@ class ModeMachine:
             machine = walk.machines[i]
             machine.step()
 
-    def walk_display(self) -> cython.void:
+    def walk_display(self) -> None:
         """Every 4 s the next of battery, steps, metres; a song every 3000 steps; a light for late pushes."""
         store: DataStore = self.store
         now: cython.longlong = store.stamp(self.TIMESTAMP)
@@ -183,7 +183,7 @@ class ModeMachine:
             self.late_push_light = late
             store.set_int(self.UI_SET_LED_3, 0x000080 if late else 0)
 
-    def show_page(self) -> cython.void:
+    def show_page(self) -> None:
         if self.page == 0:
             self.show("BATTERY", f"{self.store.get_float(self.MCH_BATT_VOLTAGE):.1f} V")
         elif self.page == 1:
@@ -192,11 +192,11 @@ class ModeMachine:
             self.show("METRES", f"{self.store.get_float(self.E_DISTANCE):.1f}")
         self.page = (self.page + 1) % 3
 
-    def show_mode(self, name, colour) -> cython.void:
+    def show_mode(self, name, colour) -> None:
         self.show(name, "")
         self.store.set_int(self.UI_SET_LED_1, colour)
 
-    def show(self, upper, lower) -> cython.void:
+    def show(self, upper, lower) -> None:
         """Two lines of eight characters to the display of the user interface board."""
         for number, word in zip(self.lcd_ids, lcd_words(upper, lower), strict=True):
             self.store.set_int(number, word)

@@ -11,16 +11,16 @@ cdef class SteeringMachine:
     cdef public double twist, ramp_start, ramp_change, ramp_fraction
     cdef public long long shut_down
     cdef public StateMachine machine
-    cpdef void publish_state(self, number)
-    cpdef void send(self, double counts)
-    cpdef void switch(self, long long shut_down)
-    cpdef void off(self)
+    cpdef int publish_state(self, number) except -1
+    cpdef int send(self, double counts) except -1
+    cpdef int switch(self, long long shut_down) except -1
+    cpdef int off(self) except -1
     cpdef double radio_command(self)
-    cpdef void enter_back(self)
-    cpdef void send_twist(self)
-    cpdef void enter_front(self)
-    cpdef void enter_stance(self)
-    cpdef void ramp_to_other_side(self)
+    cpdef int enter_back(self) except -1
+    cpdef int send_twist(self) except -1
+    cpdef int enter_front(self) except -1
+    cpdef int enter_stance(self) except -1
+    cpdef int ramp_to_other_side(self) except -1
     cpdef bint reset_wanted(self)
     cpdef bint inner_struck(self)
     cpdef bint outer_struck(self)

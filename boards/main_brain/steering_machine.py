@@ -57,19 +57,19 @@ class SteeringMachine:
             on_change=self.publish_state,
         )
 
-    def publish_state(self, number) -> cython.void:
+    def publish_state(self, number) -> None:
         self.store.set_int(self.FSM_STEER, number)
 
-    def send(self, counts: float) -> cython.void:
+    def send(self, counts: float) -> None:
         self.store.set_float(self.MCSI_COMMAND_CURRENT, counts)
 
-    def switch(self, shut_down: cython.longlong) -> cython.void:
+    def switch(self, shut_down: cython.longlong) -> None:
         """Tell the board once per change to drive or to shut down."""
         if shut_down != self.shut_down:
             self.shut_down = shut_down
             self.store.set_int(self.MCSI_SHUTDOWN, shut_down)
 
-    def off(self) -> cython.void:
+    def off(self) -> None:
         """No twist; motor shut down where the parameter says so."""
         self.twist = 0.0
         self.send(0.0)
@@ -92,7 +92,7 @@ class SteeringMachine:
             return -1.0
         return command
 
-    def enter_back(self) -> cython.void:
+    def enter_back(self) -> None:
         """Read the radio once per stride."""
         command: float = self.radio_command()
         dead: float = self.store.get_float(self.P_S_RC_DEADBAND)
@@ -103,17 +103,17 @@ class SteeringMachine:
             self.twist = self.store.get_float(self.P_S_MAX_CUR) * command
             self.switch(0)
 
-    def send_twist(self) -> cython.void:
+    def send_twist(self) -> None:
         self.send(self.twist)
 
-    def enter_front(self) -> cython.void:
+    def enter_front(self) -> None:
         self.ramp_start = self.twist
         self.ramp_change = -(1.0 + self.store.get_float(self.P_S_ILST_TWITCH_FRAC)) * self.twist
 
-    def enter_stance(self) -> cython.void:
+    def enter_stance(self) -> None:
         self.ramp_fraction = 0.0
 
-    def ramp_to_other_side(self) -> cython.void:
+    def ramp_to_other_side(self) -> None:
         """From S to -S * twitch in steps of 1/twitch time per tick (1.0: in one tick), then hold."""
         time: float = self.store.get_float(self.P_S_ILST_TWITCH_TIME)
         if self.ramp_fraction < 1.0:

@@ -27,7 +27,7 @@ class AbsoluteEncoder:
         self.counts = 0
         self.angle = 0
 
-    def accept(self, word: cython.longlong) -> cython.void:
+    def accept(self, word: cython.longlong) -> None:
         """A transfer of the serial interface ended: keep its low 13 bits, limited in their step."""
         new: cython.longlong = word & 0x1FFF
         if self.value != 0:

@@ -10,7 +10,7 @@ cdef class Buzzer:
     cdef public long long tunes_started, beeps_made
     cpdef void tone(self, long long hertz)
     cpdef void start_tune(self)
-    cpdef void stop_tune(self)
+    cpdef int stop_tune(self) except -1
     cpdef void error_sound(self, long long code)
     cpdef long long update(self)
 

@@ -71,7 +71,7 @@ class Buzzer:
         self.note = 0
         self.note_left_ms = self.tune_ms[0]
 
-    def stop_tune(self) -> cython.void:
+    def stop_tune(self) -> None:
         """Silence from the next update on."""
         self.playing = False
 

@@ -27,5 +27,5 @@ cdef class CanLink:
     cpdef bint send_words(self, long long identifier, long long value_word, long long time_word) except? -1
     cpdef bint send_float(self, long long identifier, double value) except? -1
     cpdef bint send_int(self, long long identifier, long long value) except? -1
-    cpdef void send_error(self, long long identifier)
+    cpdef int send_error(self, long long identifier) except -1
     cpdef object feed(self)

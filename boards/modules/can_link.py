@@ -206,7 +206,7 @@ class CanLink:
         """Queue a 32-bit whole number, stamped with the network time of now."""
         return self.send_words(identifier, word_of_i32(value), self.time.ms)
 
-    def send_error(self, identifier: cython.longlong) -> cython.void:
+    def send_error(self, identifier: cython.longlong) -> None:
         """Occasional task: send the error that waits longest, if one does."""
         if self.errors.take():
             self.send_words(identifier, self.errors.word, self.errors.stamp)

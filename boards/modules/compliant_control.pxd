@@ -5,9 +5,9 @@ cdef class CompliantControl:
     cdef public long long sign
     cdef public bint latch_with_current
     cdef public long long command, stiffness, dampness, received_stiffness, received_dampness, target
-    cpdef void set_command(self, long long current)
-    cpdef void set_stiffness(self, long long gain)
-    cpdef void set_dampness(self, long long gain)
+    cpdef int set_command(self, long long current) except -1
+    cpdef int set_stiffness(self, long long gain) except -1
+    cpdef int set_dampness(self, long long gain) except -1
     cpdef long long update(self, long long position, long long velocity)
 
 cdef class GainReceiver(Receiver):

@@ -1,3 +1,5 @@
+# cython: boundscheck=False, wraparound=False
+# (pins are those of the table in motor_board.py)
 """The fast interrupt of an incremental encoder: from a timer capture to a count and a time
 (appendix 4.6; facts network-and-boards 4.1).
 
@@ -79,11 +81,12 @@ class EncoderCapture:
         capture: cython.longlong
         wraps: cython.longlong = self.wraps.wraps
         elapsed: cython.longlong
+        timer: TimerCapture = self.timer
         level: cython.bint = self.chip.pins[self.pin] != 0
-        capture = self.timer.CR0 if self.channel == 0 else self.timer.CR(self.channel)
-        self.timer.clear(self.flag)
+        capture = timer.CR0 if self.channel == 0 else timer.CR(self.channel)
+        timer.IR &= ~self.flag
         # a wrap that is not counted yet came before this capture if the capture is a small number
-        if self.timer.IR & 1 and capture < 15000:
+        if timer.IR & 1 and capture < 15000:
             wraps += 1
         elapsed = (wraps - self.last_wraps) * 30000 + capture - self.last_capture
         if elapsed > 0x7F000000:  # LONGEST_TIME
@@ -95,4 +98,4 @@ class EncoderCapture:
         else:
             self.decoder.glitch()
         self.armed_rising = not level
-        self.timer.arm(self.channel, self.armed_rising, not self.armed_rising)
+        timer.arm(self.channel, self.armed_rising, not self.armed_rising)

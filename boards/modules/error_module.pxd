@@ -6,6 +6,6 @@ cdef class ErrorModule:
     cdef public bint per_event, lose_new_after_repeat
     cdef public long long[::1] totals, flags, flagged, codes, counts, stamps
     cdef public long long flagged_count, first, waiting, dropped, word, stamp
-    cpdef void report(self, long long code)
+    cpdef int report(self, long long code) except -1
     cpdef object update(self)
     cpdef bint take(self)

@@ -45,7 +45,7 @@ class ErrorModule:
         self.word = 0
         self.stamp = 0
 
-    def report(self, code: cython.longlong) -> cython.void:
+    def report(self, code: cython.longlong) -> None:
         """Note error `code`; it goes into the ring at the end of the slot. Codes above the table are taken
         as 0 (DEFAULT), so a wrong call is visible rather than lost."""
         if code < 0 or code >= 1024:

@@ -5,6 +5,6 @@ cdef class ExecutionTimer:
     cdef public Microcontroller chip
     cdef public NetworkTime time
     cdef public long long longest, longest_ever
-    cpdef void record(self)
+    cpdef int record(self) except -1
     cpdef double seconds(self)
     cpdef double longest_seconds(self)

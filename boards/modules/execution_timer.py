@@ -19,7 +19,7 @@ class ExecutionTimer:
         self.longest = 0
         self.longest_ever = 0
 
-    def record(self) -> cython.void:
+    def record(self) -> None:
         """Last entry of every row: read the slot timer's count."""
         cycles: cython.longlong = self.chip.cycles_since_tick()
         if self.time.ms & 255 == 0 or cycles > self.longest:

@@ -1,8 +1,8 @@
 cdef class Debounce:
     cdef public long long equal_samples, last, run, state
-    cpdef void sample(self, long long level)
+    cpdef int sample(self, long long level) except -1
 
 cdef class FootContact:
     cdef public long long on_level, off_level, level
     cdef public Debounce contact
-    cpdef void sample(self, long long counts)
+    cpdef int sample(self, long long counts) except -1

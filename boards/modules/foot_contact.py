@@ -13,7 +13,7 @@ class Debounce:
         self.run = 0
         self.state = 0
 
-    def sample(self, level: cython.longlong) -> cython.void:
+    def sample(self, level: cython.longlong) -> None:
         """One reading per slot, 0 or 1."""
         if level != self.last:
             self.last = level
@@ -33,7 +33,7 @@ class FootContact:
         self.level = 0
         self.contact = Debounce(equal_samples)
 
-    def sample(self, counts: cython.longlong) -> cython.void:
+    def sample(self, counts: cython.longlong) -> None:
         """One reading per slot; between the two levels the old level stays."""
         if counts > self.on_level:
             self.level = 1

@@ -10,7 +10,7 @@ cdef class HipSafety:
     cdef public AbsoluteEncoder encoder
     cdef public CurrentControl control
     cdef public McuLed leds
-    cpdef void check(self)
+    cpdef int check(self) except -1
 
 cdef class AnkleSafety:
     cdef public AbsoluteEncoder encoder
@@ -20,4 +20,4 @@ cdef class AnkleSafety:
     cdef public McuLed leds
     cdef public ErrorModule errors
     cdef public long long code_switch, code_stretch, code_low, code_high, low, high, stretch
-    cpdef void check(self)
+    cpdef int check(self) except -1

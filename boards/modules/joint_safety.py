@@ -27,7 +27,7 @@ class HipSafety:
         self.control = control
         self.leds = leds
 
-    def check(self) -> cython.void:
+    def check(self) -> None:
         """Slot task."""
         high: cython.bint = self.encoder.counts > 800  # HIP_LIMIT_COUNTS
         low: cython.bint = self.encoder.counts < -800
@@ -79,7 +79,7 @@ class AnkleSafety:
         self.high = fixed_of_float(ANKLE_HIGH_RAD)
         self.stretch = fixed_of_float(CABLE_STRETCH_RAD)
 
-    def check(self) -> cython.void:
+    def check(self) -> None:
         """Slot task."""
         negative: cython.bint = False
         positive: cython.bint = False

@@ -5,8 +5,8 @@ cdef class CharacterDisplay:
     cdef public long long address, commands, characters
     cdef public bint on, two_lines, wide_bus
     cdef public long long increment
-    cpdef void command(self, long long byte)
-    cpdef void data(self, long long byte)
+    cpdef int command(self, long long byte) except -1
+    cpdef int data(self, long long byte) except -1
 
 cdef class Lcd:
     cdef public CharacterDisplay display

@@ -36,7 +36,7 @@ class CharacterDisplay:
         self.wide_bus = False
         self.increment = 1
 
-    def command(self, byte: cython.longlong) -> cython.void:
+    def command(self, byte: cython.longlong) -> None:
         """A byte with R/S low: the highest bit that is set says what it is."""
         i: cython.longlong
         self.commands += 1
@@ -60,7 +60,7 @@ class CharacterDisplay:
                 self.memory[i] = 0x20
             self.address = 0
 
-    def data(self, byte: cython.longlong) -> cython.void:
+    def data(self, byte: cython.longlong) -> None:
         """A byte with R/S high: a character at the address, which then moves on."""
         self.characters += 1
         self.memory[self.address] = byte & 0xFF

@@ -5,4 +5,4 @@ cdef class LimitSwitch:
     cdef public Gpio gpio
     cdef public long long pin
     cdef public Debounce switch
-    cpdef void sample(self)
+    cpdef int sample(self) except -1

@@ -1,7 +1,5 @@
 """Limit switches on pins, active low, with the same debouncing as the feet (facts network-and-boards 4.9)."""
 
-import cython
-
 from boards.modules.foot_contact import Debounce
 from firmware_sim.peripherals.gpio import Gpio
 
@@ -17,6 +15,6 @@ class LimitSwitch:
         self.gpio.levels[pin] = 1
         self.switch = Debounce(EQUAL_SAMPLES)
 
-    def sample(self) -> cython.void:
+    def sample(self) -> None:
         """One reading per slot."""
         self.switch.sample(1 - self.gpio.levels[self.pin])

@@ -6,14 +6,14 @@ cdef class McuLed:
     cdef public double slots_per_ms
     cdef public long long remaining_green, remaining_red, remaining_blue, lit
     cpdef long long pin(self, long long led)
-    cpdef void set_remaining(self, long long led, long long slots)
-    cpdef void flash(self, long long led, long long ms)
-    cpdef void on(self, long long led)
-    cpdef void off(self, long long led)
+    cpdef int set_remaining(self, long long led, long long slots) except -1
+    cpdef int flash(self, long long led, long long ms) except -1
+    cpdef int on(self, long long led) except -1
+    cpdef int off(self, long long led) except -1
     cpdef void update(self)
 
 cdef class Heartbeat:
     cdef public NetworkTime time
     cdef public McuLed leds
     cdef public long long last_bit, beats
-    cpdef void beat(self)
+    cpdef int beat(self) except -1

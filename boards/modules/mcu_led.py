@@ -31,7 +31,7 @@ class McuLed:
         """Pin number of an LED."""
         return 55 + led  # P1.23, P1.24, P1.25
 
-    def set_remaining(self, led: cython.longlong, slots: cython.longlong) -> cython.void:
+    def set_remaining(self, led: cython.longlong, slots: cython.longlong) -> None:
         """Slots until `led` goes out (-1: never, 0: now)."""
         if led == 0:
             self.remaining_green = slots
@@ -47,15 +47,15 @@ class McuLed:
             self.lit &= ~(1 << led)
             self.gpio.write(self.pin(led), 1)
 
-    def flash(self, led: cython.longlong, ms: cython.longlong) -> cython.void:
+    def flash(self, led: cython.longlong, ms: cython.longlong) -> None:
         """Light `led` for `ms` from now; a running flash starts anew."""
         self.set_remaining(led, int(ms * self.slots_per_ms))
 
-    def on(self, led: cython.longlong) -> cython.void:
+    def on(self, led: cython.longlong) -> None:
         """Light `led` until it is switched off."""
         self.set_remaining(led, -1)
 
-    def off(self, led: cython.longlong) -> cython.void:
+    def off(self, led: cython.longlong) -> None:
         """Put `led` out."""
         self.set_remaining(led, 0)
 
@@ -86,7 +86,7 @@ class Heartbeat:
         self.last_bit = 0
         self.beats = 0
 
-    def beat(self) -> cython.void:
+    def beat(self) -> None:
         """Slot task."""
         bit: cython.longlong = self.time.ms >> 8 & 1
         if bit != self.last_bit:

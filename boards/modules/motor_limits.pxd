@@ -12,6 +12,6 @@ cdef class MotorLimits:
     cdef public long long thermal, thermal_multiplier, excess, excess_multiplier
     cdef public bint too_hot, overloaded
     cdef public long long allowed_min, allowed_max
-    cpdef void monitor(self, long long current)
+    cpdef int monitor(self, long long current) except -1
     cpdef long long limit_target(self, long long target, long long velocity)
     cpdef long long limit_duty(self, long long duty, long long current)

@@ -81,7 +81,7 @@ class MotorLimits:
         self.allowed_min = self.target_min
         self.allowed_max = self.target_max
 
-    def monitor(self, current: cython.longlong) -> cython.void:
+    def monitor(self, current: cython.longlong) -> None:
         """Every slot, also while the motor is off: advance both monitors with the measured current."""
         loss: cython.longlong = fixed_multiply(current, current) - fixed_multiply(self.thermal, self.thermal_rate)
         self.thermal += (loss * 32) >> 16  # SLOT_S_FIXED

@@ -13,6 +13,6 @@ cdef class MotorOutput:
     cpdef bint asleep(self)
     cpdef bint is_shut_down(self)
     cpdef bint running(self)
-    cpdef void feed_watchdog(self)
-    cpdef void enable_low_side(self, long long on)
+    cpdef int feed_watchdog(self) except -1
+    cpdef int enable_low_side(self, long long on) except -1
     cpdef void write(self, long long duty)

@@ -55,12 +55,12 @@ class MotorOutput:
         """True when the motor may be driven."""
         return not (self.stopped or self.asleep() or self.is_shut_down())
 
-    def feed_watchdog(self) -> cython.void:
+    def feed_watchdog(self) -> None:
         """Toggle the watchdog pin, unless the motor is off or shut down."""
         if not (self.stopped or self.is_shut_down()):
             self.gpio.write(self.watchdog_pin, 1 - self.gpio.levels[self.watchdog_pin])
 
-    def enable_low_side(self, on: cython.longlong) -> cython.void:
+    def enable_low_side(self, on: cython.longlong) -> None:
         """Both low-side enables, written when they change."""
         if on != self.low_side:
             self.low_side = on

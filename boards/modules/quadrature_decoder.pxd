@@ -1,6 +1,9 @@
+cimport cython
+
 from boards.modules.error_module cimport ErrorModule
 from foundation.numbers cimport divide_toward_zero
 
+@cython.final
 cdef class QuadratureDecoder:
     cdef public ErrorModule errors
     cdef public long long glitch_code, full_code
@@ -10,9 +13,9 @@ cdef class QuadratureDecoder:
     cdef public long long[::1] ring
     cdef public long long write, read, edges, glitches, dropped_times
     cdef public long long sign, mean, idle, speed, filtered
-    cpdef void edge(self, bint rising, bint partner_high, long long elapsed)
-    cpdef void glitch(self)
-    cpdef void store(self, long long elapsed)
-    cpdef void update_angle(self)
+    cpdef int edge(self, bint rising, bint partner_high, long long elapsed) except -1
+    cpdef int glitch(self) except -1
+    cpdef int store(self, long long elapsed) except -1
+    cpdef int update_angle(self) except -1
     cpdef object update_rate(self)
-    cpdef void set_position(self, long long position)
+    cpdef int set_position(self, long long position) except -1

@@ -1,3 +1,5 @@
+# cython: boundscheck=False, wraparound=False
+# (ring places are 0 ... 63)
 """Incremental encoder: position from both edges of channel A (2X), rate from the time between edges.
 
 The edge part runs in the fast interrupt of every edge, the update part once per slot. All arithmetic is
@@ -68,7 +70,7 @@ class QuadratureDecoder:
         self.speed = 0  # counts per cycle x 2^31, unfiltered
         self.filtered = 0
 
-    def edge(self, rising: cython.bint, partner_high: cython.bint, elapsed: cython.longlong) -> cython.void:
+    def edge(self, rising: cython.bint, partner_high: cython.bint, elapsed: cython.longlong) -> None:
         """An edge of channel A as the fast interrupt sees it.
 
         `elapsed`: cycles since the edge before. Rising with B low counts up, falling inverts.
@@ -77,18 +79,18 @@ class QuadratureDecoder:
         self.edges += 1
         if up:
             self.count += 1
-            self.store(elapsed)
         else:
             self.count -= 1
-            self.store(-elapsed)
+            elapsed = -elapsed
+        self.store(elapsed)
 
-    def glitch(self) -> cython.void:
+    def glitch(self) -> None:
         """The pin's level did not agree with the armed edge: nothing counted, a time of 0 stored."""
         self.edges += 1
         self.glitches += 1
         self.store(0)
 
-    def store(self, elapsed: cython.longlong) -> cython.void:
+    def store(self, elapsed: cython.longlong) -> None:
         """Keep a signed time for the next slot; when the ring is full the time is lost, the count is not."""
         after: cython.longlong = self.write + 1
         if after >= 64:  # RING_SIZE
@@ -96,11 +98,11 @@ class QuadratureDecoder:
         if after == self.read:
             self.dropped_times += 1
             self.errors.report(self.full_code)
-            return
-        self.ring[self.write] = elapsed
-        self.write = after
+        else:
+            self.ring[self.write] = elapsed
+            self.write = after
 
-    def update_angle(self) -> cython.void:
+    def update_angle(self) -> None:
         """Slot task: position from the count, floored."""
         # shift is 8 ... 11 on the robot; never negative for real encoders
         self.position = (self.count * self.position_gain) >> self.position_shift
@@ -179,7 +181,7 @@ class QuadratureDecoder:
             self.rate = (self.rate_gain * self.filtered) >> (self.rate_shift + 15)
         return seen
 
-    def set_position(self, position: cython.longlong) -> cython.void:
+    def set_position(self, position: cython.longlong) -> None:
         """Set the count so that the position reads `position` (rad x 65536), truncated as in C."""
         self.count = divide_toward_zero(position << self.position_shift, self.position_gain)
         self.update_angle()

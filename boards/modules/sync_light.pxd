@@ -10,4 +10,4 @@ cdef class SyncLight:
     cdef public long long held_slots, milliseconds, flashes, pin
     cpdef long long watch_key(self)
     cpdef long long update(self)
-    cpdef void _show(self, bint on)
+    cpdef int _show(self, bint on) except -1

@@ -70,7 +70,7 @@ class SyncLight:
         self._show(on)
         return 3
 
-    def _show(self, on: cython.bint) -> cython.void:
+    def _show(self, on: cython.bint) -> None:
         """Both lights on or off."""
         self.lit = on
         self.gpio.write(self.pin, 0 if on else 1)

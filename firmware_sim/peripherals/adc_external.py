@@ -1,3 +1,5 @@
+# cython: boundscheck=False, wraparound=False
+# (entries of the sequence are 0 ... 15, codes are masked to their registers)
 """The external 14-bit converter ADS7871 on the SSP, its BUSY pin on an external interrupt.
 
 Writing register 4 with bit 7 set starts a conversion of the channel (bits 0-3) at the gain (bits 4-6); BUSY

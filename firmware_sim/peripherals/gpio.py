@@ -47,18 +47,18 @@ class Gpio(Peripheral):
         self.changes += 1
         self.chip.outbox.push(self.chip.now, 0, 36, pin, level)  # PIN_OUTPUT
 
-    def toggle(self, pin: cython.longlong) -> cython.void:
+    def toggle(self, pin: cython.longlong) -> None:
         """Invert an output."""
         self.write(pin, 1 - self.levels[pin])
 
-    def IOSET(self, port: cython.longlong, mask: cython.longlong) -> cython.void:
+    def IOSET(self, port: cython.longlong, mask: cython.longlong) -> None:
         """Set the pins of `mask` (bit 0 = Px.0) of port 0 or 1."""
         bit: cython.longlong
         for bit in range(32):
             if mask >> bit & 1:
                 self.write(port * 32 + bit, 1)
 
-    def IOCLR(self, port: cython.longlong, mask: cython.longlong) -> cython.void:
+    def IOCLR(self, port: cython.longlong, mask: cython.longlong) -> None:
         """Clear the pins of `mask` of port 0 or 1."""
         bit: cython.longlong
         for bit in range(32):

@@ -5,5 +5,5 @@ cdef class Pwm(Peripheral):
     cdef public long long latched_MR0, latched_MR1, latched_MR2, latched_MR3, latched_MR4, latched_MR5, latched_MR6
     cdef public long long phase_ns, latch_time, updates
     cpdef void write(self, long long MR2=*, long long MR6=*)
-    cpdef void latch(self, long long mask)
+    cpdef int latch(self, long long mask) except -1
     cpdef long long next_period(self)

@@ -46,7 +46,7 @@ class Pwm(Peripheral):
             self.MR6 = MR6
         self.latch((1 << 2) | (1 << 6))
 
-    def latch(self, mask: cython.longlong) -> cython.void:
+    def latch(self, mask: cython.longlong) -> None:
         """Write PWMLER: the match values whose bits are set take effect at the next period."""
         self.LER = mask
         self.latch_time = self.next_period()

@@ -1,3 +1,5 @@
+# cython: boundscheck=False, wraparound=False
+# (the word is one of the sixteen of the chip)
 """An absolute encoder read through an SPI master (S0SPDR, S0SPSR): one word per transfer.
 
 The encoder latches its position at the first clock edge and shifts it out; 14 bits at 1 MHz are 14 us,
@@ -20,6 +22,8 @@ class SpiEncoder(Peripheral):
             raise UserError(
                 f"{chip.name}: SPI {number}: {bits} bits, {value_bits} value bits at {bit_rate} Hz are impossible"
             )
+        if not 0 <= word < len(chip.words):
+            raise UserError(f"{chip.name}: SPI {number}: word {word} is not 0 ... {len(chip.words) - 1}")
         self.number = number
         self.word = word
         self.bits = bits

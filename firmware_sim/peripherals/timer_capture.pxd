@@ -14,6 +14,6 @@ cdef class TimerCapture(Peripheral):
     cpdef long long TC(self)
     cpdef long long clear(self, long long mask)
     cpdef long long CR(self, long long channel)
-    cpdef void arm(self, long long channel, bint rising, bint falling)
+    cpdef int arm(self, long long channel, bint rising, bint falling) except -1
     cpdef long long count_at(self, long long time)
     cdef long long _wrap_to(self, long long time)

@@ -1,3 +1,5 @@
+# cython: boundscheck=False, wraparound=False
+# (channels are 0 ... 3, checked when a pin is connected)
 """A timer with four capture channels, as Timer0 and Timer1 of the LPC2194 (T0CR0, T0CCR, T0IR, T0MR0 ...).
 
 The timer counts 0 ... MR0 and starts again. An edge that T0CCR asks for copies the count into the channel's
@@ -13,7 +15,7 @@ import array
 import cython
 
 from firmware_sim.microcontroller import Peripheral
-from firmware_sim.vic import TIMER_MATCH
+from firmware_sim.vic import TIMER_MATCH, InterruptSource
 from foundation.events import PIN_EDGE
 from foundation.user_error import UserError
 
@@ -67,7 +69,7 @@ class TimerCapture(Peripheral):
         self.arm(channel, rising, falling)
         return self.sources[channel]
 
-    def arm(self, channel: cython.longlong, rising: cython.bint, falling: cython.bint) -> cython.void:
+    def arm(self, channel: cython.longlong, rising: cython.bint, falling: cython.bint) -> None:
         """Choose the edges that channel captures (its three bits of T0CCR, interrupt on)."""
         bits: cython.longlong = 4
         if rising:
@@ -123,11 +125,16 @@ class TimerCapture(Peripheral):
         """An edge at a capture pin; returns 0."""
         count: cython.longlong
         flag: cython.longlong = 16 << channel
+        asked: cython.longlong = self.CCR >> (3 * channel)
         self.edges[channel] += 1
-        if self.CCR >> (3 * channel) & (1 if level else 2) == 0:
+        if asked & (1 if level else 2) == 0:
             self.lost[channel] += 1
             return 0
-        count = self.count_at(time)
+        if time >= self.next_wrap_time:
+            self._wrap_to(time)
+        count = int((time - self.wrap_time) * self.counts_per_ns)
+        if count > self.MR0:
+            count = self.MR0
         if channel == 0:
             self.CR0 = count
         elif channel == 1:
@@ -142,8 +149,8 @@ class TimerCapture(Peripheral):
             return 0
         self.IR |= flag
         self.captured[channel] += 1
-        if self.CCR >> (3 * channel) & 4:
-            self.chip.vic.raise_source(self.sources[channel])
+        if asked & 4:
+            self.chip.vic.raise_source(cython.cast(InterruptSource, self.sources[channel]))
         return 0
 
     def on_alarm(self, alarm: cython.longlong, time: cython.longlong) -> cython.void:

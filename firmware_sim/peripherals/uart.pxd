@@ -12,7 +12,7 @@ cdef class Uart(Peripheral):
     cdef public long long[::1] fifo
     cdef public long long fifo_head, fifo_count, IIR, errors
     cdef public long long received, overruns, sent, refused, transmit_free
-    cpdef void set_divisor(self, long long DL, long long DIVADDVAL=*, long long MULVAL=*)
+    cpdef int set_divisor(self, long long DL, long long DIVADDVAL=*, long long MULVAL=*) except -1
     cpdef long long RBR(self) noexcept
     cpdef bint THR(self, long long byte) except? -1
     cpdef long long LSR(self) except? <long long>-1

@@ -50,9 +50,7 @@ class Uart(Peripheral):
         self.transmit_free = 0
         chip.claim(UART_BYTE, number, self)
 
-    def set_divisor(
-        self, DL: cython.longlong, DIVADDVAL: cython.longlong = 0, MULVAL: cython.longlong = 1
-    ) -> cython.void:
+    def set_divisor(self, DL: cython.longlong, DIVADDVAL: cython.longlong = 0, MULVAL: cython.longlong = 1) -> None:
         """Set the divisor latch and the fractional divider."""
         if DL < 1 or MULVAL < 1 or DIVADDVAL < 0 or DIVADDVAL > 14 or MULVAL > 15:
             raise UserError(

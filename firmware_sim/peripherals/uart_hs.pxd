@@ -10,7 +10,7 @@ cdef class HsUart(Peripheral):
     cdef public long long sent, buffer_bytes, active, filled, received, lost
     cdef public long long[::1] buffers
     cpdef bint transmit(self, object data)
-    cdef void _begin(self, object data, long long time)
+    cdef int _begin(self, object data, long long time) except -1
     cdef void _store(self, long long byte)
     cpdef long long swap(self)
     cpdef long long taken(self, long long place)

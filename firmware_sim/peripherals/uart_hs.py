@@ -70,7 +70,7 @@ class HsUart(Peripheral):
             self.waits_for_cts = True
         return True
 
-    def _begin(self, data: object, time: cython.longlong) -> cython.void:
+    def _begin(self, data: object, time: cython.longlong) -> None:
         count: cython.longlong = len(data)
         end: cython.longlong = time + count * self.byte_ns
         self.sent += count

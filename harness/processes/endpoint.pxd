@@ -15,8 +15,8 @@ cdef class Endpoint:
     cdef public long long slots_seen, turns, reached, urgent_kinds, promised
     cpdef void serve(self)
     cdef void _advance(self)
-    cdef void _run_to(self, long long until)
+    cdef int _run_to(self, long long until) except -1
     cdef void _late(self)
     cdef bint _put_out(self)
-    cdef void _show(self)
+    cdef int _show(self) except -1
     cdef long long _next_output(self)

@@ -101,7 +101,7 @@ class Endpoint:
         self._run_to(until)
         self.reached = until
 
-    def _run_to(self, until: cython.longlong) -> cython.void:
+    def _run_to(self, until: cython.longlong) -> None:
         """Run the board, and note how late its slots are."""
         board: Microcontroller = self.board
         if board.next_time < until or board.inbox.head_time < until:
@@ -146,7 +146,7 @@ class Endpoint:
         self.from_board.send()
         return False
 
-    def _show(self) -> cython.void:
+    def _show(self) -> None:
         """The words that the plant's process and the supervisor look at."""
         board: Microcontroller = self.board
         self.block[35] = board.next_time  # NEXT_TIME

@@ -1,4 +1,6 @@
-from firmware_sim.microcontroller cimport Microcontroller
+from firmware_sim.microcontroller cimport EdgeLine, Microcontroller
+from foundation.edge_buffer cimport EdgeBuffer
+from foundation.events cimport EventQueue
 from harness.processes.channel cimport Bell, Mailbox, load
 from harness.processes.stage cimport Stage
 
@@ -11,9 +13,10 @@ cdef class RemoteBoard(Microcontroller):
     cdef public Stage stage
     cdef public bint posted, gone, follows_steps
     cdef public long long place, quiet_until, urgent_kinds, turns, reached
+    cpdef long long edges_came(self) noexcept
     cpdef void begin(self, long long until)
-    cpdef long long advance(self, long long until)
+    cpdef long long advance(self, long long until) except? -1
     cdef bint _urgent(self, long long until) noexcept
     cdef void _post(self, long long command, long long until)
-    cdef void _ring(self, long long command, long long until)
-    cdef bint _collect(self)
+    cdef int _ring(self, long long command, long long until) except -1
+    cdef bint _collect(self) except? -1

@@ -12,7 +12,9 @@ the missed time later, and reads its sensors from the stage's rows of that time.
 
 import cython
 
-from firmware_sim.microcontroller import Microcontroller
+from firmware_sim.microcontroller import EdgeLine, Microcontroller
+from foundation.edge_buffer import EdgeBuffer
+from foundation.events import EventQueue
 from foundation.user_error import UserError
 from harness.processes import block as places
 from harness.processes.channel import Bell, Mailbox
@@ -35,6 +37,7 @@ class RemoteBoard(Microcontroller):
         self.shadow = shadow
         self.inbox = shadow.inbox
         self.outbox = shadow.outbox
+        self.edge_lines = shadow.edge_lines
         self.next_time = shadow.next_time
         self.block = shared.words
         self.ask = Bell(shared.words, places.ASKED, places.BOARD_SLEEPS, shared.ask_descriptor)
@@ -55,6 +58,28 @@ class RemoteBoard(Microcontroller):
         self.quiet_until = 0
         self.turns = 0
         self.reached = 0
+
+    def edges_came(self) -> cython.longlong:
+        """Edges travel as messages to a board that cannot see the sensor's buffer."""
+        line: EdgeLine
+        buffer: EdgeBuffer
+        i: cython.longlong
+        for i in range(len(self.edge_lines)):
+            line = cython.cast(EdgeLine, self.edge_lines[i])
+            buffer = line.buffer
+            while buffer.read < buffer.count:
+                # order 256: stage pins; kind 1: PIN_EDGE
+                self.inbox.push(
+                    buffer.times[buffer.read],
+                    256,
+                    1,
+                    line.pin,
+                    buffer.levels_a[buffer.read],
+                    line.partner_pin,
+                    buffer.levels_b[buffer.read],
+                )
+                buffer.read += 1
+        return self.edge_time
 
     def begin(self, until: cython.longlong) -> cython.void:
         """Ask the board to run everything before `until` (ns), if that can matter already."""
@@ -112,15 +137,18 @@ class RemoteBoard(Microcontroller):
 
     def _urgent(self, until: cython.longlong) -> cython.bint:
         """True when a message before `until` may make the board put something out at once."""
-        slot: cython.longlong = self.inbox.head
+        inbox: EventQueue = self.inbox
+        slot: cython.longlong = inbox.head
         waiting: cython.longlong = 0
-        while slot >= 0 and self.inbox.times[slot] < until:
-            if self.inbox.kinds[slot] >= 60 or self.urgent_kinds >> self.inbox.kinds[slot] & 1:
+        kind: cython.longlong
+        while slot >= 0 and inbox.rows[12 * slot] < until:
+            kind = inbox.rows[12 * slot + 2]
+            if kind >= 60 or self.urgent_kinds >> kind & 1:
                 return True
             waiting += 1
             if waiting > 200:
                 return True
-            slot = self.inbox.nexts[slot]
+            slot = inbox.rows[12 * slot + 9]
         return False
 
     def _post(self, command: cython.longlong, until: cython.longlong) -> cython.void:
@@ -137,7 +165,7 @@ class RemoteBoard(Microcontroller):
             self.to_board.put(self.inbox)
         self._ring(command, until)
 
-    def _ring(self, command: cython.longlong, until: cython.longlong) -> cython.void:
+    def _ring(self, command: cython.longlong, until: cython.longlong) -> None:
         """Hand the turn over."""
         self.to_board.send()
         self.block[18] = command  # COMMAND

@@ -2,10 +2,10 @@ cimport cython
 
 @cython.final
 cdef class EdgeBuffer:
-    cdef public long long capacity, count
+    cdef public long long capacity, count, read
     cdef public long long[::1] times, levels_a, levels_b
     cpdef void clear(self) noexcept
-    cpdef void grow(self)
+    cpdef int grow(self) except -1
     cpdef void push(self, long long time, long long level_a, long long level_b) noexcept
 
 @cython.final
@@ -13,5 +13,5 @@ cdef class ByteBuffer:
     cdef public long long capacity, count
     cdef public long long[::1] times, values
     cpdef void clear(self) noexcept
-    cpdef void grow(self)
+    cpdef int grow(self) except -1
     cpdef void push(self, long long time, long long value) noexcept

@@ -1,6 +1,10 @@
 # cython: boundscheck=False, wraparound=False
 # (`count` stays below `capacity`: a full buffer grows first)
-"""Stamped edges and stamped bytes that leave a sensor during one step of the plant."""
+"""Stamped edges and stamped bytes that leave a sensor during one step of the plant.
+
+The plant writes a step's edges, the chip on whose pins they arrive reads them one by one at their stamps, and both
+hold the same buffer: an edge is the most frequent thing on the robot, and never becomes a message.
+"""
 
 import array
 
@@ -8,7 +12,8 @@ import cython
 
 
 class EdgeBuffer:
-    """Edges of channel A: `times` (ns), the level that A takes, the level of B then. `count` are valid.
+    """Edges of channel A: `times` (ns), the level that A takes, the level of B then. `count` are valid, of which the
+    first `read` have been taken.
 
     It grows when it is full, so no edge is ever lost; `clear` keeps the storage.
     """
@@ -16,6 +21,7 @@ class EdgeBuffer:
     def __init__(self, capacity=64) -> None:
         self.capacity = capacity
         self.count = 0
+        self.read = 0
         self.times = array.array("q", [0]) * capacity
         self.levels_a = array.array("q", [0]) * capacity
         self.levels_b = array.array("q", [0]) * capacity
@@ -23,8 +29,9 @@ class EdgeBuffer:
     def clear(self) -> cython.void:
         """Forget the edges."""
         self.count = 0
+        self.read = 0
 
-    def grow(self) -> cython.void:
+    def grow(self) -> None:
         """Double the storage, keeping what is there."""
         self.capacity = 2 * self.capacity
         for name in ("times", "levels_a", "levels_b"):
@@ -56,7 +63,7 @@ class ByteBuffer:
         """Forget the bytes."""
         self.count = 0
 
-    def grow(self) -> cython.void:
+    def grow(self) -> None:
         """Double the storage, keeping what is there."""
         self.capacity = 2 * self.capacity
         for name in ("times", "values"):
