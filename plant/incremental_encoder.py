@@ -259,9 +259,6 @@ class IncrementalEncoder:
         x = du if forward else -du
         while buffer.capacity < x + 3.0:  # the disc's errors may let in one more at either end
             buffer.grow()
-        times: cython.longlong[::1] = buffer.times
-        levels_a: cython.longlong[::1] = buffer.levels_a
-        levels_b: cython.longlong[::1] = buffer.levels_b
         jitter: cython.double = self.jitter
         has_errors: cython.bint = self.has_errors
         while True:
@@ -276,19 +273,19 @@ class IncrementalEncoder:
             if time >= t1:
                 time = t1 - 1
             last = time
-            times[count] = time
+            buffer.times[count] = time
             if forward:
                 cell += 1
-                levels_a[count] = 1 - (cell & 1)
-                levels_b[count] = cell & 1
+                buffer.levels_a[count] = 1 - (cell & 1)
+                buffer.levels_b[count] = cell & 1
                 count += 1
                 level = self.errors[(cell + 1) % self.table_size] + (cell + 1) if has_errors else cell + 1
                 if u1 < level:
                     break
             else:
-                levels_b[count] = cell & 1
+                buffer.levels_b[count] = cell & 1
                 cell -= 1
-                levels_a[count] = 1 - (cell & 1)
+                buffer.levels_a[count] = 1 - (cell & 1)
                 count += 1
                 level = self.errors[cell % self.table_size] + cell if has_errors else cell
                 if u1 >= level:
