@@ -256,8 +256,8 @@ class IncrementalEncoder:
         c = g0 + g1 - 2.0
         span = t1 - t0
         last = t0
-        x = du if forward else -du
-        while buffer.capacity < x + 3.0:  # the disc's errors may let in one more at either end
+        x = u1 - cell if forward else cell - u1
+        while buffer.capacity < x + 3.0:  # an angle may have been set from outside; the disc's errors let in one or two
             buffer.grow()
         jitter: cython.double = self.jitter
         has_errors: cython.bint = self.has_errors

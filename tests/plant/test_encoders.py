@@ -306,3 +306,16 @@ def test_a_lag_of_an_absolute_encoder_follows_with_its_time_constant():
 def test_an_impossible_absolute_encoder_is_refused(zero, sign):
     with pytest.raises(UserError, match="absolute encoder a"):
         AbsoluteEncoder("a", zero, sign)
+
+
+def test_an_angle_set_from_outside_gives_every_edge_on_the_way_to_it():
+    # 200 edges in a step that itself moves by a hundredth of one, in both directions: the buffer holds 64 at first
+    for sense in (1.0, -1.0):
+        encoder = IncrementalEncoder("e", 512)
+        encoder.reset(0.001)
+        edge = math.pi / 512
+        there = 0.001 + sense * 200 * edge
+        rate = sense * 0.01 * edge / (STEP * 1e-9)
+        encoder.update(0, STEP, there, rate, there + sense * 0.01 * edge, rate)
+        assert encoder.edges.count == 200
+        assert decode(encoder) == sense * 200
