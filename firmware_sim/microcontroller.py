@@ -24,6 +24,7 @@ from firmware_sim.scheduler import Occasional, Schedule, SlotScheduler, Task, Wa
 from firmware_sim.vic import SLOT_TIMER, InterruptController, InterruptSource
 from foundation.edge_buffer import EdgeBuffer
 from foundation.events import NEVER, EventQueue
+from foundation.numbers import integers
 from foundation.user_error import UserError
 
 if not cython.compiled:
@@ -95,7 +96,7 @@ class Microcontroller:
         self.vic = InterruptController(self.ns_per_cycle)
         self.analog = AnalogPins()
         self.words = array.array("q", [0]) * 16
-        self.pins = array.array("q", [0]) * PINS
+        self.pins = integers(PINS)
         self.on_overrun = None
         self.on_limit = None
         self.on_near_limit = None
@@ -122,13 +123,13 @@ class Microcontroller:
         self.stolen_cycles = 0
         self.alarm_time = NEVER
         self.alarm_count = 0
-        self.alarm_times = array.array("q", [NEVER]) * 16
+        self.alarm_times = integers(16, NEVER)
         self.alarm_owners = []
-        self.alarm_numbers = array.array("q", [0]) * 16
+        self.alarm_numbers = integers(16)
         self.alarm_first = 0
         self.message_table = [None] * (MESSAGE_KINDS * INDICES_PER_KIND)
         self.pin_owners = [None] * PINS
-        self.pin_channels = array.array("q", [-1]) * PINS
+        self.pin_channels = integers(PINS, -1)
         self.edge_lines = []
         self.edge_line = None
         self.edge_time = NEVER

@@ -6,9 +6,9 @@ The plant writes a step's edges, the chip on whose pins they arrive reads them o
 hold the same buffer: an edge is the most frequent thing on the robot, and never becomes a message.
 """
 
-import array
-
 import cython
+
+from foundation.numbers import integers
 
 
 class EdgeBuffer:
@@ -22,9 +22,9 @@ class EdgeBuffer:
         self.capacity = capacity
         self.count = 0
         self.read = 0
-        self.times = array.array("q", [0]) * capacity
-        self.levels_a = array.array("q", [0]) * capacity
-        self.levels_b = array.array("q", [0]) * capacity
+        self.times = integers(capacity)
+        self.levels_a = integers(capacity)
+        self.levels_b = integers(capacity)
 
     def clear(self) -> cython.void:
         """Forget the edges."""
@@ -36,8 +36,9 @@ class EdgeBuffer:
         self.capacity = 2 * self.capacity
         for name in ("times", "levels_a", "levels_b"):
             old = getattr(self, name)
-            grown = array.array("q", old)
-            grown.extend(array.array("q", [0]) * (self.capacity - len(old)))
+            grown = integers(self.capacity)
+            for place in range(len(old)):
+                grown[place] = old[place]
             setattr(self, name, grown)
 
     def push(self, time: cython.longlong, level_a: cython.longlong, level_b: cython.longlong) -> cython.void:
@@ -56,8 +57,8 @@ class ByteBuffer:
     def __init__(self, capacity=128) -> None:
         self.capacity = capacity
         self.count = 0
-        self.times = array.array("q", [0]) * capacity
-        self.values = array.array("q", [0]) * capacity
+        self.times = integers(capacity)
+        self.values = integers(capacity)
 
     def clear(self) -> cython.void:
         """Forget the bytes."""
@@ -68,8 +69,9 @@ class ByteBuffer:
         self.capacity = 2 * self.capacity
         for name in ("times", "values"):
             old = getattr(self, name)
-            grown = array.array("q", old)
-            grown.extend(array.array("q", [0]) * (self.capacity - len(old)))
+            grown = integers(self.capacity)
+            for place in range(len(old)):
+                grown[place] = old[place]
             setattr(self, name, grown)
 
     def push(self, time: cython.longlong, value: cython.longlong) -> cython.void:

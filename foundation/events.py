@@ -12,6 +12,8 @@ import array
 
 import cython
 
+from foundation.numbers import integers
+
 NEVER = 1 << 62  # ns; later than any instant of a run (146 years)
 
 STAGE_PLANT = 0
@@ -66,7 +68,7 @@ class EventQueue:
         self.head_time = 1 << 62
         self.pushed = 0
         # a slot is one row: time, order, kind, a ... f, next slot, previous slot, 1 if `refs` has an object
-        self.rows = array.array("q")
+        self.rows = integers(0)
         self.refs = []
         self.time = 0
         self.order = 0
@@ -90,11 +92,12 @@ class EventQueue:
     def _grow(self, capacity) -> None:
         """Enlarge the pool to `capacity` slots, keeping what is queued."""
         extra = capacity - self.capacity
-        grown = array.array("q", self.rows)
-        grown.extend(array.array("q", [0]) * (12 * extra))
+        grown = integers(12 * capacity)
+        i: cython.longlong
+        for i in range(12 * self.capacity):
+            grown[i] = self.rows[i]
         self.rows = grown
         self.refs.extend([None] * extra)
-        i: cython.longlong
         for i in range(self.capacity, capacity):
             self.rows[12 * i + 9] = self.free
             self.free = i
