@@ -1,7 +1,6 @@
 """What runs in the process of one board."""
 
 import os
-import signal
 import traceback
 from typing import Any
 
@@ -23,15 +22,7 @@ def serve(robot: Any, name: str, block: Block, stage: tuple, settings: Settings,
 
     fresh: not the board that was built with the robot but a new one, powered up when the plant's process says.
     """
-    kernel.name_process(f"ranger-{name}")
-    kernel.sharp_timers()
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-        signal.signal(number, signal.SIG_IGN)  # the supervisor decides when it is over
-    kernel.stay_on(settings.processor)
-    if settings.real_time:
-        kernel.lock_memory()
-    if settings.wants_fifo:
-        kernel.real_time_scheduling()
+    kernel.begin_process(f"ranger-{name}", settings)
     place = wiring.BOARDS.index(name)
     board = robot.boards[name]
     if fresh:

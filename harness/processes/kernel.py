@@ -4,6 +4,8 @@ import ctypes
 import os
 import signal
 
+from harness.processes.settings import Settings
+
 PR_SET_PDEATHSIG, PR_SET_NAME, PR_SET_TIMERSLACK = 1, 15, 29  # linux/prctl.h
 MCL_CURRENT, MCL_FUTURE = 1, 2  # sys/mman.h
 FIFO_PRIORITY = 20  # of 99: above everything ordinary, below what keeps the machine alive; chosen by us
@@ -29,6 +31,24 @@ def name_process(name: str) -> None:
 def sharp_timers() -> None:
     """Timers of this process fire within 1 ns instead of 50 us of slack (as far as the kernel can)."""
     _libc().prctl(PR_SET_TIMERSLACK, 1, 0, 0, 0)
+
+
+def leave_signals_to_the_supervisor() -> None:
+    """What Ctrl-C and the like send to a whole group: the supervisor decides when it is over."""
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.SIG_IGN)
+
+
+def begin_process(name: str, settings: Settings) -> None:
+    """What every process of the robot does first: its name, its timers, its processor, its place in the schedule."""
+    name_process(name)
+    sharp_timers()
+    leave_signals_to_the_supervisor()
+    stay_on(settings.processor)
+    if settings.real_time:
+        lock_memory()
+    if settings.wants_fifo:
+        real_time_scheduling()
 
 
 def stay_on(processor: int | None) -> None:

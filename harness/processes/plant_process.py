@@ -2,7 +2,6 @@
 
 import json
 import select
-import signal
 import socket
 import struct
 from collections.abc import Callable
@@ -299,15 +298,7 @@ def serve(
 
     `begin(robot)` opens what leads outside, in the process that will use it; its UserError ends the run with code 2.
     """
-    kernel.name_process("ranger-plant")
-    kernel.sharp_timers()
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-        signal.signal(number, signal.SIG_IGN)  # the supervisor decides when it is over
-    kernel.stay_on(settings.processor)
-    if settings.real_time:
-        kernel.lock_memory()
-    if settings.wants_fifo:
-        kernel.real_time_scheduling()
+    kernel.begin_process("ranger-plant", settings)
     run = PlantRun(robot, blocks, stage, settings, link)
     try:
         begin(robot)

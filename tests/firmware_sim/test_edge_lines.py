@@ -1,0 +1,133 @@
+"""Edges that a chip reads where the sensor wrote them: the same as if each were a message."""
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from firmware_sim.microcontroller import Microcontroller, Peripheral
+from firmware_sim.peripherals.timer_capture import TimerCapture
+from firmware_sim.scheduler import Schedule, Task
+from firmware_sim.vic import FIQ
+from foundation.edge_buffer import EdgeBuffer
+from foundation.events import CAN_RX, NEVER, PIN_EDGE
+from foundation.user_error import UserError
+
+PINS = ((22, 27), (16, 29))  # channels A and B of two encoders
+PINS_ORDER = 256  # stage pins
+STEP_NS = 125_000
+
+
+class Bench:
+    """A chip with two encoders on a timer, slots of two tasks and a frame interrupt; it writes down what happens."""
+
+    def __init__(self, cost):
+        self.chip = chip = Microcontroller("TEST")
+        self.timer = TimerCapture(chip, period=30_000)
+        self.notes = []
+        for channel, (pin, partner) in enumerate(PINS):
+            self.timer.use_channel(channel, pin)
+            chip.vic.attach(PIN_EDGE, pin, self.edge(channel, pin, partner), cost=cost, slot=FIQ)
+        chip.vic.attach(CAN_RX, 1, lambda queue: self.notes.append(("frame", chip.now, queue.b)), cost=700, slot=3)
+        tasks = (Task(self.task("first"), cost=3_000), Task(self.task("second"), cost=2_000))
+        chip.start(Schedule(slot_us=500, every=tasks), 7_000)  # so that ticks fall between the ends of steps
+
+    def edge(self, channel, pin, partner):
+        def served(queue):
+            self.notes.append(
+                (channel, self.chip.now, self.timer.CR(channel), self.chip.pins[pin], self.chip.pins[partner])
+            )
+            self.timer.clear(16 << channel)
+
+        return served
+
+    def task(self, name):
+        return lambda: self.notes.append((name, self.chip.now, self.chip.pins[PINS[0][0]]))
+
+    def outcome(self):
+        timer = self.timer
+        return (
+            self.notes,
+            list(timer.edges),
+            list(timer.captured),
+            list(timer.lost),
+            [(each.served, each.merged, each.total_cycles) for each in self.chip.vic.sources.values()],
+            self.chip.scheduler.total_slot_cycles,
+        )
+
+
+def run(cost, trains, frames, by_lines):
+    """Two milliseconds with the edges (time, level A, level B) of both encoders, in steps as a plant gives them."""
+    bench = Bench(cost)
+    buffers = [EdgeBuffer(1) for _ in PINS]
+    if by_lines:
+        for buffer, (pin, partner) in zip(buffers, PINS, strict=True):
+            bench.chip.listen_to_edges(buffer, pin, partner)
+    for time in frames:
+        bench.chip.inbox.push(time, 512, CAN_RX, 1, time)
+    for start in range(0, 2_000_000, STEP_NS):
+        for train, buffer, (pin, partner) in zip(trains, buffers, PINS, strict=True):
+            buffer.clear()
+            for time, a, b in train:
+                if start <= time < start + STEP_NS:
+                    if by_lines:
+                        buffer.push(time, a, b)
+                    else:
+                        bench.chip.inbox.push(time, PINS_ORDER, PIN_EDGE, pin, a, partner, b)
+        bench.chip.edges_came()
+        for part in range(1, 5):
+            bench.chip.advance(start + part * STEP_NS // 4)
+        assert all(buffer.read == buffer.count for buffer in buffers)
+    return bench.outcome()
+
+
+# anywhere, or closely around a tick and the tasks that follow it
+instants = (
+    st.integers(0, 1_999_999) | st.integers(490_000, 590_000) | st.sampled_from([500_000, 507_000, 507_001, 1_007_000])
+)
+trains = st.lists(st.tuples(instants, st.integers(0, 1), st.integers(0, 1)), min_size=5, max_size=40).map(
+    lambda edges: sorted(edges, key=lambda edge: edge[0])
+)
+
+
+@settings(max_examples=150, deadline=None)
+@given(st.sampled_from([10, 150, 500, 6_000]), trains, trains, st.lists(instants, max_size=6))
+def test_edges_from_the_sensors_buffer_do_what_the_same_edges_do_as_messages(cost, first, second, frames):
+    assert run(cost, (first, second), frames, True) == run(cost, (first, second), frames, False)
+
+
+def test_a_handler_longer_than_the_time_between_edges_loses_captures_and_a_short_one_none():
+    # appendix 4.6: 107,520 edges/s are 558 cycles apart; a second encoder shares the fast interrupt
+    every_ns = 9_300
+    fast = [(time, n & 1, 0) for n, time in enumerate(range(100, 2_000_000, every_ns))]
+    slow = [(time, n & 1, 0) for n, time in enumerate(range(3_000, 2_000_000, 20_000))]
+    assert sum(run(150, (fast, slow), (), True)[3]) == 0
+    assert sum(run(500, (fast, slow), (), True)[3]) > 0
+
+
+def test_an_edge_comes_before_a_frame_of_the_same_instant_and_the_first_line_before_the_second():
+    notes = run(10, ([(700_000, 1, 0)], [(700_000, 1, 1)]), (700_000,), True)[0]
+    assert [note[0] for note in notes if note[1] in range(700_000, 712_000)] == [0, 1, "frame"]
+
+
+def test_a_chip_with_edges_waiting_is_due_and_one_without_is_not():
+    bench = Bench(150)
+    buffer = EdgeBuffer()
+    bench.chip.listen_to_edges(buffer, *PINS[0])
+    bench.chip.advance(400_000)
+    assert bench.chip.edges_came() == NEVER
+    assert not bench.chip.due(450_000)
+    buffer.push(440_000, 1, 0)
+    assert bench.chip.edges_came() == 440_000
+    assert bench.chip.due(450_000)
+
+
+def test_edges_for_a_pin_that_nobody_claimed_are_refused():
+    with pytest.raises(UserError, match="TEST: no peripheral has claimed pin 5"):
+        Microcontroller("TEST").listen_to_edges(EdgeBuffer(), 5, 6)
+
+
+@pytest.mark.parametrize(("kind", "index"), [(32, 0), (-1, 0), (3, 16), (3, -1)])
+def test_a_claim_outside_the_tables_is_refused(kind, index):
+    chip = Microcontroller("TEST")
+    with pytest.raises(UserError, match=f"TEST: kind {kind} is not 0 ... 31 or index {index} not 0 ... 15"):
+        chip.claim(kind, index, Peripheral(chip))
