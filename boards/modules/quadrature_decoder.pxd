@@ -16,6 +16,4 @@ cdef class QuadratureDecoder:
     cpdef int edge(self, bint rising, bint partner_high, long long elapsed) except -1
     cpdef int glitch(self) except -1
     cpdef int store(self, long long elapsed) except -1
-    cpdef int update_angle(self) except -1
-    cpdef object update_rate(self)
     cpdef int set_position(self, long long position) except -1

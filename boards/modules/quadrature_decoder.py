@@ -1,5 +1,5 @@
-# cython: boundscheck=False, wraparound=False
-# (ring places are 0 ... 63)
+# cython: boundscheck=False, wraparound=False, cdivision=True
+# (ring places are 0 ... 63; what is divided in the tasks is above 0)
 """Incremental encoder: position from both edges of channel A (2X), rate from the time between edges.
 
 The edge part runs in the fast interrupt of every edge, the update part once per slot. All arithmetic is
@@ -7,11 +7,10 @@ the firmware's: 32-bit integers and 16.16 fixed point, truncated where C truncat
 network-and-boards 4.1; appendix 4.6).
 """
 
-import array
-
 import cython
 
 from boards.modules.error_module import ErrorModule
+from foundation.numbers import integers
 
 if not cython.compiled:
     from foundation.numbers import divide_toward_zero
@@ -57,7 +56,7 @@ class QuadratureDecoder:
         self.position = 0
         self.rate = 0
         # the interrupt's side
-        self.ring = array.array("q", [0]) * RING_SIZE
+        self.ring = integers(RING_SIZE)
         self.write = 0
         self.read = 0
         self.edges = 0
@@ -108,7 +107,7 @@ class QuadratureDecoder:
         self.position = (self.count * self.position_gain) >> self.position_shift
 
     def update_rate(self):
-        """Slot task: rate from the edge times that came since the last slot. Returns how many came.
+        """Slot task: rate from the edge times that came since the last slot. Returns how many came, None for none.
 
         A change of direction needs two times in a row to be believed: if the second has not come yet, the
         first is left for the next slot. A zero or a single time of the other sign is a glitch, and the time
@@ -119,10 +118,11 @@ class QuadratureDecoder:
         seen: cython.longlong = 0
         here: cython.longlong = self.read
         write: cython.longlong = self.write
+        forward: cython.bint = self.sign > 0
         after: cython.longlong
         elapsed: cython.longlong
         other: cython.longlong
-        exponent: cython.longlong
+        speed: cython.longlong
         while here != write:
             elapsed = self.ring[here]
             after = here + 1
@@ -135,7 +135,7 @@ class QuadratureDecoder:
                     after += 1
                     if after >= 64:
                         after = 0
-            elif (elapsed > 0) == (self.sign > 0):
+            elif (elapsed > 0) == forward:
                 total += elapsed
                 valid += 1
             elif after == write:
@@ -143,7 +143,7 @@ class QuadratureDecoder:
             else:
                 other = self.ring[after]
                 if other != 0 and (other > 0) == (elapsed > 0):
-                    self.sign = -self.sign
+                    forward = not forward
                     total = elapsed
                     valid = 1
                 else:
@@ -154,34 +154,41 @@ class QuadratureDecoder:
                         after = 0
             seen += 1
             here = after
-        self.read = here
+        # from here on without the sign
         if valid == 0:
             # the longer the silence, the slower it must be: the rate falls with the inverse of the silence
             valid = 1
             self.idle += 30000  # cycles per slot
             if self.idle > 0x7FFFFFFF:
                 self.idle = 0x7FFFFFFF
-            total = abs(self.mean)
+            total = self.mean if self.mean >= 0 else -self.mean
             if self.idle > total:
                 total = self.idle
-            if self.sign < 0:
-                total = -total
         else:
             self.idle = 0
-        if total >= 0:
-            self.speed = valid * (0x7FFFFFFF // total)
-            self.mean = total // valid
+            if not forward:
+                total = -total
+        speed = valid * (0x7FFFFFFF // total)
+        if valid > 1:
+            total = total // valid
+        if forward:
+            self.sign = 1
+            self.speed = speed
+            self.mean = total
         else:
-            self.speed = -valid * (0x7FFFFFFF // -total)
-            self.mean = -(-total // valid)
-        exponent = self.filter_exponent
-        self.filtered += (self.speed - self.filtered) >> exponent
+            self.sign = -1
+            self.speed = -speed
+            self.mean = -total
+        self.filtered += (self.speed - self.filtered) >> self.filter_exponent
         # counts/cycle x 2^31 times rad x 60e6/count x 2^shift: 31 - 16 = 15 more bits go for 16.16
         if self.rate_shift + 15 >= 0:
             self.rate = (self.rate_gain * self.filtered) >> (self.rate_shift + 15)
+        if seen == 0:
+            return None
+        self.read = here
         return seen
 
     def set_position(self, position: cython.longlong) -> None:
         """Set the count so that the position reads `position` (rad x 65536), truncated as in C."""
         self.count = divide_toward_zero(position << self.position_shift, self.position_gain)
-        self.update_angle()
+        self.position = (self.count * self.position_gain) >> self.position_shift
