@@ -14,13 +14,3 @@ cdef class AnkleBoard(MotorBoard):
     cdef public long long id_right_hs, id_left_hs, id_right_heel_sense, id_left_heel_sense
     cdef public long long id_right_ls, id_left_ls, id_ankle_angle, id_ankle_rate
     cpdef int set_start_values(self) except -1
-    cpdef int update_switches(self) except -1
-    cpdef int rezero(self) except -1
-    cpdef int send_ankle_angle(self) except -1
-    cpdef int send_ankle_rate(self) except -1
-    cpdef int send_right_heel_sense(self) except -1
-    cpdef int send_left_heel_sense(self) except -1
-    cpdef int send_right_contact(self) except -1
-    cpdef int send_left_contact(self) except -1
-    cpdef int send_right_switch(self) except -1
-    cpdef int send_left_switch(self) except -1

@@ -1,3 +1,5 @@
+# cython: boundscheck=False, wraparound=False
+# (results are those of SEQUENCE)
 """What the boards of the outer and the inner feet share: two feet, two limit switches, one ankle motor.
 
 Facts: network-and-boards 4.2, 4.7-4.9, 5. The two rooms hold their constants and their tables.

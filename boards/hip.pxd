@@ -12,7 +12,4 @@ cdef class HipBoard(MotorBoard):
     cdef public long long id_angle, id_ang_rate
     cpdef Schedule schedule(self)
     cpdef int set_start_values(self) except -1
-    cpdef long long controlled_position(self)
-    cpdef int rezero(self) except -1
-    cpdef int send_angle(self) except -1
-    cpdef int send_ang_rate(self) except -1
+    cpdef long long controlled_position(self) noexcept

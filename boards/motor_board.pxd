@@ -21,7 +21,6 @@ from firmware_sim.peripherals.pwm cimport Pwm
 from firmware_sim.peripherals.spi_encoder cimport SpiEncoder
 from firmware_sim.peripherals.timer_capture cimport TimerCapture
 from firmware_sim.scheduler cimport Schedule, Task
-from foundation.events cimport EventQueue
 from foundation.numbers cimport float_of_fixed
 
 cdef long long CODE_ADCI_DNF, CODE_ADCX_DNF, CODE_OVERRUN, CODE_TASK_LIMIT, CODE_NEAR_LIMIT
@@ -65,26 +64,6 @@ cdef class MotorBoard(Microcontroller):
     cpdef Schedule schedule(self)
     cpdef int read_sensors_once(self) except -1
     cpdef int set_start_values(self) except -1
-    cpdef int start_internal_adc(self) except -1
-    cpdef int start_absolute_encoder(self) except -1
-    cpdef object on_absolute_encoder(self, EventQueue queue)
-    cpdef object on_internal_adc(self, EventQueue queue)
-    cpdef int start_external_adc(self) except -1
-    cpdef long long controlled_position(self)
-    cpdef long long controlled_velocity(self)
-    cpdef int compliant_control(self) except -1
+    cpdef long long controlled_position(self) noexcept
+    cpdef long long controlled_velocity(self) noexcept
     cpdef int rezero_motor(self, long long share) except -1
-    cpdef int send_error(self) except -1
-    cpdef int send_motor_position(self) except -1
-    cpdef int send_motor_velocity(self) except -1
-    cpdef int send_motor_current(self) except -1
-    cpdef int send_battery_power(self) except -1
-    cpdef int send_battery_current(self) except -1
-    cpdef int send_battery_voltage(self) except -1
-    cpdef int send_bridge_temperature(self) except -1
-    cpdef int send_status(self) except -1
-    cpdef int send_execution_time(self) except -1
-    cpdef int send_max_execution_time(self) except -1
-    cpdef int note_overrun(self) except -1
-    cpdef int note_limit(self, Task task) except -1
-    cpdef int note_near_limit(self) except -1

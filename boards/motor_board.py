@@ -321,14 +321,12 @@ class MotorBoard(Microcontroller):
         """ae_update: begin a transfer; the interrupt 14 us later has the result for this slot's control."""
         self.spi.start()
 
-    def on_absolute_encoder(self, queue: EventQueue) -> object:
+    def on_absolute_encoder(self, queue: EventQueue) -> None:
         """Interrupt: the transfer is complete."""
         self.encoder.accept(self.spi.read())
-        return None
 
-    def on_internal_adc(self, queue: EventQueue) -> object:
+    def on_internal_adc(self, queue: EventQueue) -> None:
         """Interrupt: the result stays in `adc_internal.result`; no filter on these boards."""
-        return None
 
     def start_external_adc(self) -> None:
         """adcx_convert_all: start the sequence; the last one unfinished is an error, and it goes on."""

@@ -11,10 +11,6 @@ cdef class SteeringBoard(MotorBoard):
     cpdef Schedule schedule(self)
     cpdef int read_sensors_once(self) except -1
     cpdef int set_start_values(self) except -1
-    cpdef long long controlled_position(self)
-    cpdef long long controlled_velocity(self)
-    cpdef void update_pwm(self)
-    cpdef int steering_control(self) except -1
+    cpdef long long controlled_position(self) noexcept
+    cpdef long long controlled_velocity(self) noexcept
     cpdef int check(self) except -1
-    cpdef int send_steer_angle(self) except -1
-    cpdef int send_power(self) except -1

@@ -1,3 +1,5 @@
+# cython: boundscheck=False, wraparound=False
+# (results are those of SEQUENCE)
 """Steering motor board (MCSI): B2A, 0.5 ms slots, 4 rows, no incremental encoders.
 
 Facts: network-and-boards 3.5 (schedule, laid out below line by line), 4.2, 4.5, 5, 6.1; control-and-data 1.6.
@@ -121,7 +123,7 @@ class SteeringBoard(MotorBoard):
         """No velocity is measured."""
         return 0
 
-    def update_pwm(self) -> cython.void:
+    def update_pwm(self) -> None:
         """dn_update_pwm: COMMAND_CURRENT, whole counts, straight to the duty.
 
         The current monitors act on it as they do in the current loop, and so do blocked directions.

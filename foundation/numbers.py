@@ -11,7 +11,8 @@ import cython
 if not cython.compiled:
     from struct import Struct
 
-    _single, _word = Struct("<f"), Struct("<I")
+    pack_single, unpack_single = Struct("<f").pack, Struct("<f").unpack
+    pack_word, unpack_word = Struct("<I").pack, Struct("<I").unpack
 
 WORD_MASK = 0xFFFFFFFF
 # The same for the functions below: C variables when compiled (numbers.pxd), because Cython makes a Python object of
@@ -38,7 +39,10 @@ def float32(value: cython.double) -> cython.double:
     if cython.compiled:
         return cython.cast(cython.double, cython.cast(cython.float, value))
     else:
-        return float_of_word(word_of_float(value))
+        try:
+            return unpack_single(pack_single(value))[0]
+        except OverflowError:
+            return value * float("inf")
 
 
 def word_of_float(value: cython.double) -> cython.longlong:
@@ -50,7 +54,7 @@ def word_of_float(value: cython.double) -> cython.longlong:
         return cython.cast(cython.longlong, cython.cast(cython.pointer(cython.uint), cython.address(single))[0])
     else:
         try:
-            return _word.unpack(_single.pack(value))[0]
+            return unpack_word(pack_single(value))[0]
         except OverflowError:
             return 0xFF800000 if value < 0 else 0x7F800000
 
@@ -61,7 +65,7 @@ def float_of_word(word: cython.longlong) -> cython.double:
         bits: cython.uint = cython.cast(cython.uint, word & _MASK)
         return cython.cast(cython.double, cython.cast(cython.pointer(cython.float), cython.address(bits))[0])
     else:
-        return _single.unpack(_word.pack(word & 0xFFFFFFFF))[0]
+        return unpack_single(pack_word(word & 0xFFFFFFFF))[0]
 
 
 def wrap_u32(value: cython.longlong) -> cython.longlong:
@@ -90,13 +94,11 @@ def fixed_of_float(value: cython.double) -> cython.longlong:
     The firmware truncates (facts network-and-boards 4); NaN becomes 0.
     """
     scaled: cython.double = value * 65536.0
+    if -2147483648.0 < scaled < 2147483647.0:
+        return cython.cast(cython.longlong, scaled) if cython.compiled else int(scaled)
     if scaled != scaled:
         return 0
-    if scaled >= 2147483647.0:
-        return 2147483647
-    if scaled <= -2147483648.0:
-        return -2147483648
-    return cython.cast(cython.longlong, scaled) if cython.compiled else int(scaled)
+    return 2147483647 if scaled > 0.0 else -2147483648
 
 
 def float_of_fixed(value: cython.longlong) -> cython.double:

@@ -27,15 +27,18 @@ class AbsoluteEncoder:
         self.counts = 0
         self.angle = 0
 
-    def accept(self, word: cython.longlong) -> None:
+    def accept(self, word: cython.longlong) -> cython.void:
         """A transfer of the serial interface ended: keep its low 13 bits, limited in their step."""
         new: cython.longlong = word & 0x1FFF
-        if self.value != 0:
-            if new > self.value + self.largest_step:
-                new = self.value + self.largest_step
+        before: cython.longlong = self.value
+        if before != 0:
+            if new == before:
+                return  # as before, with all that follows from it
+            if new > before + self.largest_step:
+                new = before + self.largest_step
                 self.errors.report(self.spike_code)
-            elif new < self.value - self.largest_step:
-                new = self.value - self.largest_step
+            elif new < before - self.largest_step:
+                new = before - self.largest_step
                 self.errors.report(self.spike_code)
         self.value = new
         self.counts = self.sign * (new - self.zero)

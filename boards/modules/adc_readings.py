@@ -1,3 +1,5 @@
+# cython: boundscheck=False, wraparound=False
+# (entries are places of the converter's sequence)
 """From converter counts to amperes, volts and watts, with the constants of one board
 (facts network-and-boards 4 and 5).
 

@@ -31,19 +31,19 @@ class CompliantControl:
         self.received_dampness = 0
         self.target = 0
 
-    def set_command(self, current: cython.longlong) -> None:
+    def set_command(self, current: cython.longlong) -> cython.void:
         """Constant term, A x 65536; the gains received so far come into force."""
         self.command = current
         self.stiffness = self.received_stiffness
         self.dampness = self.received_dampness
 
-    def set_stiffness(self, gain: cython.longlong) -> None:
+    def set_stiffness(self, gain: cython.longlong) -> cython.void:
         """Position gain, A/rad x 65536."""
         self.received_stiffness = gain
         if not self.latch_with_current:
             self.stiffness = gain
 
-    def set_dampness(self, gain: cython.longlong) -> None:
+    def set_dampness(self, gain: cython.longlong) -> cython.void:
         """Velocity gain, A s/rad x 65536."""
         self.received_dampness = gain
         if not self.latch_with_current:

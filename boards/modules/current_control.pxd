@@ -4,6 +4,9 @@ from boards.modules.motor_limits cimport MotorLimits
 from boards.modules.motor_output cimport MotorOutput
 from foundation.numbers cimport fixed_multiply
 
+cimport cython
+
+@cython.final
 cdef class CurrentControl:
     cdef public MotorLimits limits
     cdef public MotorOutput output
@@ -12,5 +15,5 @@ cdef class CurrentControl:
     cdef public long long code_saturated, code_sum, code_duty, code_stopped
     cdef public long long proportional_gain, integral_gain, integral_limit, integral, error, duty, calls
     cdef public bint block_positive, block_negative
-    cpdef bint supervise(self, long long current)
-    cpdef void update(self, long long target, long long current)
+    cpdef bint supervise(self, long long current) except? -1
+    cpdef int update(self, long long target, long long current) except -1

@@ -61,55 +61,57 @@ class CurrentControl:
         False in the first two calls, which do nothing else than feed.
         """
         off: cython.bint
-        self.output.feed_watchdog()
+        output: MotorOutput = self.output
+        output.feed_watchdog()
         if self.calls < 2:  # START_CALLS
             self.calls += 1
             return False
         self.limits.monitor(current)
         off = self.limits.too_hot or self.limits.overloaded
-        if off != self.output.stopped:
-            self.output.stopped = off
+        if off != output.stopped:
+            output.stopped = off
             if off:
                 self.leds.on(0)  # GREEN
             else:
                 self.leds.off(0)
         return True
 
-    def update(self, target: cython.longlong, current: cython.longlong) -> cython.void:
+    def update(self, target: cython.longlong, current: cython.longlong) -> None:
         """One sample: drive the measured `current` towards `target` (A x 65536, the latter already limited)."""
+        error: cython.longlong
+        integral: cython.longlong
         total: cython.longlong
-        counts: cython.longlong
-        if not self.supervise(current):
-            return
-        if (self.block_positive and target > 0) or (self.block_negative and target < 0):
-            target = 0
-        if not self.output.running():
-            self.errors.report(self.code_stopped)
-            self.duty = 0
-            self.output.write(0)
-            return
-        self.error = target - current
-        self.integral += self.error
-        if self.integral > self.integral_limit:
-            self.integral = self.integral_limit
-            self.errors.report(self.code_saturated)
-        elif self.integral < -self.integral_limit:
-            self.integral = -self.integral_limit
-            self.errors.report(self.code_saturated)
-        total = (self.proportional_gain * self.error >> 16) + fixed_multiply(self.integral_gain, self.integral)
-        if total > 0x7FFFFFFF:
-            total = 0x7FFFFFFF
-            self.errors.report(self.code_sum)
-        elif total < -0x80000000:
-            total = -0x80000000
-            self.errors.report(self.code_sum)
-        total = self.limits.limit_duty(total, current)
-        counts = total >> 16
-        if counts > self.output.largest:
-            counts = self.output.largest
-            self.errors.report(self.code_duty)
-        elif counts < -self.output.largest:
-            counts = -self.output.largest
-            self.errors.report(self.code_duty)
-        self.duty = counts
-        self.output.write(counts)
+        counts: cython.longlong = 0
+        largest: cython.longlong = self.output.largest
+        if self.supervise(current):
+            if not self.output.running():
+                self.errors.report(self.code_stopped)
+            else:
+                if (self.block_positive and target > 0) or (self.block_negative and target < 0):
+                    target = 0
+                error = target - current
+                integral = self.integral + error
+                if integral > self.integral_limit:
+                    integral = self.integral_limit
+                    self.errors.report(self.code_saturated)
+                elif integral < -self.integral_limit:
+                    integral = -self.integral_limit
+                    self.errors.report(self.code_saturated)
+                self.error = error
+                self.integral = integral
+                total = (self.proportional_gain * error >> 16) + fixed_multiply(self.integral_gain, integral)
+                if total > 0x7FFFFFFF:
+                    total = 0x7FFFFFFF
+                    self.errors.report(self.code_sum)
+                elif total < -0x80000000:
+                    total = -0x80000000
+                    self.errors.report(self.code_sum)
+                counts = self.limits.limit_duty(total, current) >> 16
+                if counts > largest:
+                    counts = largest
+                    self.errors.report(self.code_duty)
+                elif counts < -largest:
+                    counts = -largest
+                    self.errors.report(self.code_duty)
+            self.duty = counts
+            self.output.write(counts)

@@ -1,14 +1,15 @@
+# cython: boundscheck=False, wraparound=False
+# (codes are held against the table, places of the ring are 0 ... 31)
 """Errors of one board: noted anywhere, collected once per slot, sent one at a time (appendix 4.9).
 
 An error frame's value word holds the code (bits 0-15), the board's number (16-21) and how often it came
 since it was last sent (22-31); its time word is when it first came (facts network-and-boards 1.7, 4.12).
 """
 
-import array
-
 import cython
 
 from boards.modules.network_time import NetworkTime
+from foundation.numbers import integers
 
 CODES = 1024  # codes 0 ... CODES-1 can be noted (the table has about 120)
 RING_SIZE = 32  # errors waiting to be sent; one place stays empty, as in all rings of the firmware
@@ -31,21 +32,21 @@ class ErrorModule:
         self.time = time
         self.per_event = per_event
         self.lose_new_after_repeat = lose_new_after_repeat
-        self.totals = array.array("q", [0]) * CODES
+        self.totals = integers(CODES)
         # flags of this slot: events per code, and which codes have any, in the order they came
-        self.flags = array.array("q", [0]) * CODES
-        self.flagged = array.array("q", [0]) * CODES
+        self.flags = integers(CODES)
+        self.flagged = integers(CODES)
         self.flagged_count = 0
-        self.codes = array.array("q", [0]) * RING_SIZE
-        self.counts = array.array("q", [0]) * RING_SIZE
-        self.stamps = array.array("q", [0]) * RING_SIZE
+        self.codes = integers(RING_SIZE)
+        self.counts = integers(RING_SIZE)
+        self.stamps = integers(RING_SIZE)
         self.first = 0
         self.waiting = 0
         self.dropped = 0
         self.word = 0
         self.stamp = 0
 
-    def report(self, code: cython.longlong) -> None:
+    def report(self, code: cython.longlong) -> cython.void:
         """Note error `code`; it goes into the ring at the end of the slot. Codes above the table are taken
         as 0 (DEFAULT), so a wrong call is visible rather than lost."""
         if code < 0 or code >= 1024:
@@ -57,7 +58,7 @@ class ErrorModule:
         self.flags[code] += 1
 
     def update(self):
-        """Slot task: move the flags of this slot into the ring; returns how many codes there were."""
+        """Slot task: move the flags of this slot into the ring; returns how many codes there were, None for none."""
         moved: cython.longlong = self.flagged_count
         repeated: cython.bint = False
         i: cython.longlong
@@ -67,7 +68,7 @@ class ErrorModule:
         events: cython.longlong
         found: cython.bint
         if moved == 0:
-            return 0
+            return None
         for i in range(moved):
             code = self.flagged[i]
             events = self.flags[code] if self.per_event else 1

@@ -1,8 +1,12 @@
-cdef class Debounce:
-    cdef public long long equal_samples, last, run, state
-    cpdef int sample(self, long long level) except -1
+cimport cython
 
+@cython.final
+cdef class Debounce:
+    cdef public long long equal_samples, last, run, state, settled
+    cpdef void sample(self, long long level) noexcept
+
+@cython.final
 cdef class FootContact:
     cdef public long long on_level, off_level, level
     cdef public Debounce contact
-    cpdef int sample(self, long long counts) except -1
+    cpdef void sample(self, long long counts) noexcept

@@ -5,15 +5,19 @@ import cython
 
 
 class Debounce:
-    """A level is believed after `equal_samples` equal readings in a row (the first one counts)."""
+    """A level is believed after `equal_samples` equal readings in a row (the first one counts).
+
+    `settled`: the level whose next reading would change nothing, -1 when there is none: readings of it may be left out.
+    """
 
     def __init__(self, equal_samples) -> None:
         self.equal_samples = equal_samples
         self.last = 0
         self.run = 0
         self.state = 0
+        self.settled = 0
 
-    def sample(self, level: cython.longlong) -> None:
+    def sample(self, level: cython.longlong) -> cython.void:
         """One reading per slot, 0 or 1."""
         if level != self.last:
             self.last = level
@@ -22,6 +26,7 @@ class Debounce:
             self.run += 1
         if self.run >= self.equal_samples:
             self.state = level
+        self.settled = level if level == self.state else -1
 
 
 class FootContact:
@@ -33,10 +38,11 @@ class FootContact:
         self.level = 0
         self.contact = Debounce(equal_samples)
 
-    def sample(self, counts: cython.longlong) -> None:
+    def sample(self, counts: cython.longlong) -> cython.void:
         """One reading per slot; between the two levels the old level stays."""
         if counts > self.on_level:
             self.level = 1
         elif counts < self.off_level:
             self.level = 0
-        self.contact.sample(self.level)
+        if self.level != self.contact.settled:
+            self.contact.sample(self.level)

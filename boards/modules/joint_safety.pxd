@@ -6,12 +6,15 @@ from boards.modules.mcu_led cimport McuLed
 from boards.modules.quadrature_decoder cimport QuadratureDecoder
 from foundation.numbers cimport fixed_of_float
 
+cimport cython
+
+@cython.final
 cdef class HipSafety:
     cdef public AbsoluteEncoder encoder
     cdef public CurrentControl control
     cdef public McuLed leds
-    cpdef int check(self) except -1
 
+@cython.final
 cdef class AnkleSafety:
     cdef public AbsoluteEncoder encoder
     cdef public QuadratureDecoder motor
@@ -20,4 +23,3 @@ cdef class AnkleSafety:
     cdef public McuLed leds
     cdef public ErrorModule errors
     cdef public long long code_switch, code_stretch, code_low, code_high, low, high, stretch
-    cpdef int check(self) except -1

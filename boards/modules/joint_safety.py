@@ -29,8 +29,9 @@ class HipSafety:
 
     def check(self) -> None:
         """Slot task."""
-        high: cython.bint = self.encoder.counts > 800  # HIP_LIMIT_COUNTS
-        low: cython.bint = self.encoder.counts < -800
+        counts: cython.longlong = self.encoder.counts
+        high: cython.bint = counts > 800  # HIP_LIMIT_COUNTS
+        low: cython.bint = counts < -800
         if high:
             self.leds.flash(1, 100)  # RED
         elif low:
@@ -81,18 +82,19 @@ class AnkleSafety:
 
     def check(self) -> None:
         """Slot task."""
+        angle: cython.longlong = self.encoder.angle
         negative: cython.bint = False
         positive: cython.bint = False
         if self.left.switch.state or self.right.switch.state:
             negative = True
             self.errors.report(self.code_switch)
-        if self.encoder.angle - self.motor.position > self.stretch:
+        if angle - self.motor.position > self.stretch:
             negative = True
             self.errors.report(self.code_stretch)
-        if self.encoder.angle < self.low:
+        if angle < self.low:
             negative = True
             self.errors.report(self.code_low)
-        if self.encoder.angle > self.high:
+        if angle > self.high:
             positive = True
             self.errors.report(self.code_high)
         if negative or positive:

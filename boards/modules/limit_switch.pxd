@@ -1,8 +1,11 @@
 from boards.modules.foot_contact cimport Debounce
 from firmware_sim.peripherals.gpio cimport Gpio
 
+cimport cython
+
+@cython.final
 cdef class LimitSwitch:
     cdef public Gpio gpio
     cdef public long long pin
     cdef public Debounce switch
-    cpdef int sample(self) except -1
+    cpdef void sample(self) noexcept

@@ -1,4 +1,8 @@
+# cython: boundscheck=False, wraparound=False
+# (pins are those of the table in motor_board.py)
 """Limit switches on pins, active low, with the same debouncing as the feet (facts network-and-boards 4.9)."""
+
+import cython
 
 from boards.modules.foot_contact import Debounce
 from firmware_sim.peripherals.gpio import Gpio
@@ -15,6 +19,8 @@ class LimitSwitch:
         self.gpio.levels[pin] = 1
         self.switch = Debounce(EQUAL_SAMPLES)
 
-    def sample(self) -> None:
+    def sample(self) -> cython.void:
         """One reading per slot."""
-        self.switch.sample(1 - self.gpio.levels[self.pin])
+        closed: cython.longlong = 1 - self.gpio.levels[self.pin]
+        if closed != self.switch.settled:
+            self.switch.sample(closed)

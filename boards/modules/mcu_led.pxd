@@ -1,19 +1,21 @@
 from boards.modules.network_time cimport NetworkTime
 from firmware_sim.peripherals.gpio cimport Gpio
 
+cimport cython
+
+@cython.final
 cdef class McuLed:
     cdef public Gpio gpio
     cdef public double slots_per_ms
     cdef public long long remaining_green, remaining_red, remaining_blue, lit
-    cpdef long long pin(self, long long led)
+    cpdef long long pin(self, long long led) noexcept
     cpdef int set_remaining(self, long long led, long long slots) except -1
     cpdef int flash(self, long long led, long long ms) except -1
     cpdef int on(self, long long led) except -1
     cpdef int off(self, long long led) except -1
-    cpdef void update(self)
 
+@cython.final
 cdef class Heartbeat:
     cdef public NetworkTime time
     cdef public McuLed leds
     cdef public long long last_bit, beats
-    cpdef int beat(self) except -1

@@ -49,7 +49,8 @@ class McuLed:
 
     def flash(self, led: cython.longlong, ms: cython.longlong) -> None:
         """Light `led` for `ms` from now; a running flash starts anew."""
-        self.set_remaining(led, int(ms * self.slots_per_ms))
+        slots: cython.longlong = int(ms * self.slots_per_ms)
+        self.set_remaining(led, slots)
 
     def on(self, led: cython.longlong) -> None:
         """Light `led` until it is switched off."""
@@ -59,7 +60,7 @@ class McuLed:
         """Put `led` out."""
         self.set_remaining(led, 0)
 
-    def update(self) -> cython.void:
+    def update(self) -> None:
         """Slot task: advance the timers."""
         if self.lit == 0:
             return

@@ -1,6 +1,9 @@
 from boards.modules.error_module cimport ErrorModule
 from foundation.numbers cimport fixed_multiply, fixed_of_float
 
+cimport cython
+
+@cython.final
 cdef class MotorLimits:
     cdef public ErrorModule errors
     cdef public long long code_target, code_warm, code_hot, code_cooled, code_excess, code_excess_over
@@ -11,7 +14,6 @@ cdef class MotorLimits:
     cdef public long long excess_limit, excess_fade, speed_max, speed_soft
     cdef public long long thermal, thermal_multiplier, excess, excess_multiplier
     cdef public bint too_hot, overloaded
-    cdef public long long allowed_min, allowed_max
-    cpdef int monitor(self, long long current) except -1
-    cpdef long long limit_target(self, long long target, long long velocity)
-    cpdef long long limit_duty(self, long long duty, long long current)
+    cpdef void monitor(self, long long current) noexcept
+    cpdef long long limit_target(self, long long target, long long velocity) noexcept
+    cpdef long long limit_duty(self, long long duty, long long current) noexcept

@@ -67,7 +67,7 @@ class MotorLimits:
             # a current minus a thermal state: the firmware's mistake of units, hence the wrong sign
             self.thermal_slope = fixed_of_float(1.0 / (thermal_current - SOFT_THERMAL * limit))
         self.excess_limit = excess_limit * 65536
-        self.excess_fade = excess_limit // 10  # the duty has faded to 0 at a tenth of the limit
+        self.excess_fade = max(1, excess_limit // 10)  # the duty has faded to 0 at a tenth of the limit
         self.peak = peak
         self.speed = speed and gear != 0
         self.speed_max = fixed_of_float(RATED_SPEED_RAD_S / gear) if gear else 0
@@ -78,20 +78,21 @@ class MotorLimits:
         self.excess = 0  # A samples
         self.excess_multiplier = 65536
         self.overloaded = False
-        self.allowed_min = self.target_min
-        self.allowed_max = self.target_max
 
-    def monitor(self, current: cython.longlong) -> None:
+    def monitor(self, current: cython.longlong) -> cython.void:
         """Every slot, also while the motor is off: advance both monitors with the measured current."""
-        loss: cython.longlong = fixed_multiply(current, current) - fixed_multiply(self.thermal, self.thermal_rate)
-        self.thermal += (loss * 32) >> 16  # SLOT_S_FIXED
-        if self.thermal >= self.thermal_limit:
+        thermal: cython.longlong = self.thermal
+        excess: cython.longlong = self.excess
+        loss: cython.longlong = fixed_multiply(current, current) - fixed_multiply(thermal, self.thermal_rate)
+        thermal += (loss * 32) >> 16  # SLOT_S_FIXED
+        self.thermal = thermal
+        if thermal >= self.thermal_limit:
             self.thermal_multiplier = 0
             if not self.too_hot:
                 self.too_hot = True
                 self.errors.report(self.code_hot)
-        elif self.thermal >= self.thermal_soft:
-            self.thermal_multiplier = 65536 - fixed_multiply(self.thermal - self.thermal_soft, self.thermal_slope)
+        elif thermal >= self.thermal_soft:
+            self.thermal_multiplier = 65536 - fixed_multiply(thermal - self.thermal_soft, self.thermal_slope)
             self.errors.report(self.code_warm)
         else:
             self.thermal_multiplier = 65536
@@ -99,21 +100,21 @@ class MotorLimits:
                 self.too_hot = False
                 self.errors.report(self.code_cooled)
         if current > 0:
-            self.excess += current - self.current_max
+            excess += current - self.current_max
         elif current < 0:
-            self.excess += self.current_min - current
-        if self.excess < 0:
+            excess += self.current_min - current
+        if excess <= 0:  # nearly always
             self.excess = 0
-        self.excess_multiplier = 65536 - self.excess // self.excess_fade
-        if self.excess_multiplier < 0:
-            self.excess_multiplier = 0
-        if self.excess >= self.excess_limit:
-            if not self.overloaded:
-                self.overloaded = True
-                self.errors.report(self.code_excess)
-        elif self.overloaded and self.excess == 0:
-            self.overloaded = False
-            self.errors.report(self.code_excess_over)
+            self.excess_multiplier = 65536
+            if self.overloaded:
+                self.overloaded = False
+                self.errors.report(self.code_excess_over)
+            return
+        self.excess = excess
+        self.excess_multiplier = max(0, 65536 - excess // self.excess_fade)
+        if excess >= self.excess_limit and not self.overloaded:
+            self.overloaded = True
+            self.errors.report(self.code_excess)
 
     def limit_target(self, target: cython.longlong, velocity: cython.longlong) -> cython.longlong:
         """The target current the motor may have now, at `velocity` (rad/s x 65536, joint side).
@@ -147,8 +148,6 @@ class MotorLimits:
                     low = fixed_multiply(low, share)
                 if target > high or target < low:
                     self.errors.report(self.code_speed)
-        self.allowed_min = low
-        self.allowed_max = high
         if target > high:
             return high
         if target < low:

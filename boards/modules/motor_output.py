@@ -1,3 +1,5 @@
+# cython: boundscheck=False, wraparound=False
+# (pins are those of the table below)
 """The H-bridge seen from the processor: two PWM leads, two low-side enables, the watchdog pin
 (facts network-and-boards 4.4; appendix 3.8 on the alternating leads)."""
 
@@ -36,8 +38,6 @@ class MotorOutput:
         self.stopped = False
         self.second_pattern = False
         self.duty = 0
-        self.MR2 = 0
-        self.MR6 = 0
         self.low_side = -1
         self.watchdog_pin = PINS["motor_watchdog"]
         self.low_side_2_pin = PINS["low_side_2"]
@@ -53,12 +53,12 @@ class MotorOutput:
 
     def running(self) -> cython.bint:
         """True when the motor may be driven."""
-        return not (self.stopped or self.asleep() or self.is_shut_down())
+        return not self.stopped and (self.sleep.value | self.shutdown.value) & 0x7FFF == 0
 
     def feed_watchdog(self) -> None:
         """Toggle the watchdog pin, unless the motor is off or shut down."""
-        if not (self.stopped or self.is_shut_down()):
-            self.gpio.write(self.watchdog_pin, 1 - self.gpio.levels[self.watchdog_pin])
+        if not self.stopped and self.shutdown.value & 0x7FFF == 0:
+            self.gpio.toggle(self.watchdog_pin)
 
     def enable_low_side(self, on: cython.longlong) -> None:
         """Both low-side enables, written when they change."""
@@ -67,40 +67,42 @@ class MotorOutput:
             self.gpio.write(self.low_side_2_pin, on)
             self.gpio.write(self.low_side_6_pin, on)
 
-    def write(self, duty: cython.longlong) -> cython.void:
+    def write(self, duty: cython.longlong) -> None:
         """Drive the bridge with `duty` counts; the leads take turns at every call.
 
         Asleep, both leads rest at 0 and the pattern does not advance; so do they when off or shut down.
         """
         counts: cython.longlong
-        if not self.running():
-            self.duty = 0
-            self.MR2 = 0
-            self.MR6 = 0
-            self.enable_low_side(0 if self.asleep() else 1)
+        MR2: cython.longlong = 0
+        MR6: cython.longlong = 0
+        low_side: cython.longlong = 1
+        if self.stopped or (self.sleep.value | self.shutdown.value) & 0x7FFF:
+            duty = 0
+            if self.asleep():
+                low_side = 0
         else:
-            self.enable_low_side(1)
             if duty > self.largest:
                 duty = self.largest
             elif duty < -self.largest:
                 duty = -self.largest
-            self.duty = duty
             counts = duty * self.sign
-            if counts >= 0:
-                if self.second_pattern:
-                    self.MR2 = 600  # PERIOD_COUNTS
-                    self.MR6 = 600 - counts - self.offset
+            if self.second_pattern:
+                self.second_pattern = False
+                if counts >= 0:
+                    MR2 = 600  # PERIOD_COUNTS
+                    MR6 = 600 - counts - self.offset
                 else:
-                    self.MR2 = counts
-                    self.MR6 = 0
+                    MR2 = 600 + counts - self.offset
+                    MR6 = 600
             else:
-                if self.second_pattern:
-                    self.MR2 = 600 + counts - self.offset
-                    self.MR6 = 600
+                self.second_pattern = True
+                if counts >= 0:
+                    MR2 = counts
                 else:
-                    self.MR2 = 0
-                    self.MR6 = -counts
-            self.second_pattern = not self.second_pattern
-        if self.MR2 != self.pwm.MR2 or self.MR6 != self.pwm.MR6:
-            self.pwm.write(self.MR2, self.MR6)
+                    MR6 = -counts
+        self.duty = duty
+        if low_side != self.low_side:
+            self.enable_low_side(low_side)
+        if MR2 != self.pwm.MR2 or MR6 != self.pwm.MR6:
+            self.pwm.write(MR2, MR6)
         self.feed_watchdog()

@@ -5,11 +5,10 @@ A pin's level at a stamp is that of its last message: a partner pin without mess
 the last edge that reported it.
 """
 
-import array
-
 import cython
 
 from firmware_sim.microcontroller import Peripheral
+from foundation.numbers import integers
 
 
 def p0(bit) -> int:
@@ -28,28 +27,25 @@ class Gpio(Peripheral):
     def __init__(self, chip) -> None:
         Peripheral.__init__(self, chip)
         self.levels = chip.pins
-        self.directions = array.array("q", [0]) * 64
-        self.writes = 0
-        self.changes = 0
+        self.directions = integers(64)
 
     def level(self, pin: cython.longlong) -> cython.longlong:
         """0 or 1, as the pin is now."""
         return self.levels[pin]
 
-    def write(self, pin: cython.longlong, level: cython.longlong) -> cython.void:
+    def write(self, pin: cython.longlong, level: cython.longlong) -> None:
         """Drive an output; a change is told outside as PIN_OUTPUT at `now`."""
-        self.writes += 1
-        if self.directions[pin] == 0:
+        if self.directions[pin] == 0 or self.levels[pin] != level:
             self.directions[pin] = 1
-        elif self.levels[pin] == level:
-            return
-        self.levels[pin] = level
-        self.changes += 1
-        self.chip.outbox.push(self.chip.now, 0, 36, pin, level)  # PIN_OUTPUT
+            self.levels[pin] = level
+            self.chip.outbox.push(self.chip.now, 0, 36, pin, level)  # PIN_OUTPUT
 
     def toggle(self, pin: cython.longlong) -> None:
         """Invert an output."""
-        self.write(pin, 1 - self.levels[pin])
+        level: cython.longlong = 1 - self.levels[pin]
+        self.directions[pin] = 1
+        self.levels[pin] = level
+        self.chip.outbox.push(self.chip.now, 0, 36, pin, level)  # PIN_OUTPUT
 
     def IOSET(self, port: cython.longlong, mask: cython.longlong) -> None:
         """Set the pins of `mask` (bit 0 = Px.0) of port 0 or 1."""

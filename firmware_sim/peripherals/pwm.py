@@ -10,15 +10,18 @@ import cython
 from firmware_sim.microcontroller import Peripheral
 from foundation.user_error import UserError
 
+LONGEST_PERIOD_S = 2  # so that products of times and rates stay within 64 bits
+
 
 class Pwm(Peripheral):
-    """Seven match registers; `latched_MRn` are the values that drive the pins. `period`: MR0 in counts."""
+    """Seven match registers; `latched_MRn` are the values that drive the pins. `period`: MR0 in counts.
+
+    `period_start`: instant (ns) of the period that has what was latched last.
+    """
 
     def __init__(self, chip, period=600, hz=0, phase_ns=0) -> None:
         Peripheral.__init__(self, chip)
         self.hz = hz if hz else chip.hz
-        if period <= 0:
-            raise UserError(f"{chip.name}: PWM: period {period} counts must be above 0")
         self.MR0 = period
         self.MR1 = 0
         self.MR2 = 0
@@ -35,21 +38,28 @@ class Pwm(Peripheral):
         self.latched_MR5 = 0
         self.latched_MR6 = 0
         self.phase_ns = phase_ns
-        self.latch_time = phase_ns
-        self.updates = 0
+        self.rate = 1_000_000_000 + chip.crystal.ppb  # ns that the chip's clock counts in a true second
+        self.period_ns = 0  # on the chip's clock
+        self.period_start = phase_ns
+        self.rest = 0  # what `period_start` was rounded down by, in 1/rate ns
+        self._count_periods()
 
-    def write(self, MR2: cython.longlong = -1, MR6: cython.longlong = -1) -> cython.void:
+    def write(self, MR2: cython.longlong = -1, MR6: cython.longlong = -1) -> None:
         """Write the two bridge leads (counts; -1 leaves one as it is) and enable their latches."""
         if MR2 >= 0:
             self.MR2 = MR2
         if MR6 >= 0:
             self.MR6 = MR6
-        self.latch((1 << 2) | (1 << 6))
+        self.LER = (1 << 2) | (1 << 6)
+        self._find_period()
+        self.latched_MR2 = self.MR2
+        self.latched_MR6 = self.MR6
+        self.chip.outbox.push(self.period_start, 0, 35, self.MR2, self.MR6, self.latched_MR0)  # PWM_UPDATE
 
     def latch(self, mask: cython.longlong) -> None:
         """Write PWMLER: the match values whose bits are set take effect at the next period."""
         self.LER = mask
-        self.latch_time = self.next_period()
+        self._find_period()
         if mask & 1:
             self.latched_MR0 = self.MR0
         if mask & 2:
@@ -65,16 +75,40 @@ class Pwm(Peripheral):
         if mask & 64:
             self.latched_MR6 = self.MR6
         if mask & 69:  # MR0, MR2 or MR6
-            self.updates += 1
             self.chip.outbox.push(
-                self.latch_time, 0, 35, self.latched_MR2, self.latched_MR6, self.latched_MR0
+                self.period_start, 0, 35, self.latched_MR2, self.latched_MR6, self.latched_MR0
             )  # PWM_UPDATE
+        if mask & 1:
+            self._count_periods()
 
-    def next_period(self) -> cython.longlong:
-        """Start (ns) of the first PWM period that begins at `now` or later."""
-        # ROBOT PARITY: periods are counted from phase_ns with the present MR0; on the chip a changed MR0
-        # shifts the later periods instead. MR0 is constant on boards that drive a bridge.
-        local: cython.longlong = self.chip.crystal.local_ns(self.chip.now - self.phase_ns)
-        period: cython.longlong = self.latched_MR0 * 1000000000 // self.hz
-        n: cython.longlong = -(-local // period)
-        return self.chip.crystal.tick_time_ns(n, period, self.phase_ns)
+    def _count_periods(self) -> None:
+        """Count periods of MR0 from `phase_ns` on."""
+        # ROBOT PARITY: on the chip a changed MR0 shifts the later periods instead of counting them anew. MR0 is
+        # constant on boards that drive a bridge.
+        if not 0 < self.latched_MR0 <= LONGEST_PERIOD_S * self.hz:
+            raise UserError(
+                f"{self.chip.name}: PWM: period {self.latched_MR0} counts must be above 0"
+                f" and at most {LONGEST_PERIOD_S * self.hz}"
+            )
+        self.period_ns = self.latched_MR0 * 1_000_000_000 // self.hz
+        self.period_start = self.phase_ns
+        self.rest = 0
+
+    def _find_period(self) -> cython.void:
+        """Go on to the first period that begins at `now` or later: exactly to its `Crystal.tick_time_ns`."""
+        since: cython.longlong
+        periods: cython.longlong
+        parts: cython.longlong
+        whole: cython.longlong
+        while True:
+            since = self.chip.now - self.period_start
+            if since > 2000000000:  # LONGEST_PERIOD_S
+                periods = 2000000000 // self.period_ns
+            else:
+                periods = -(-((since * self.rate - self.rest) // 1000000000) // self.period_ns)
+            parts = self.rest + periods * self.period_ns * 1000000000
+            whole = parts // self.rate
+            self.period_start += whole
+            self.rest = parts - whole * self.rate
+            if since <= 2000000000:
+                return

@@ -247,9 +247,9 @@ def patterns(quirks, duty):
     board = Bench("MCH", quirks).run(ms=1).board
     board.output.second_pattern = False
     board.output.write(duty)
-    first = (board.output.MR2, board.output.MR6)
+    first = (board.pwm.MR2, board.pwm.MR6)
     board.output.write(duty)
-    return first, (board.output.MR2, board.output.MR6)
+    return first, (board.pwm.MR2, board.pwm.MR6)
 
 
 def test_the_two_leads_take_turns_with_the_same_net_drive():
@@ -275,7 +275,7 @@ def test_a_mirrored_motor_swaps_the_leads():
     board = Bench("MCFO").run(ms=1).board
     board.output.second_pattern = False
     board.output.write(50)
-    assert (board.output.MR2, board.output.MR6) == (0, 50)
+    assert (board.pwm.MR2, board.pwm.MR6) == (0, 50)
 
 
 def test_the_watchdog_is_toggled_twice_per_slot():
