@@ -3,22 +3,28 @@ from firmware_sim.peripherals.ssp cimport SspSegment
 cimport cython
 
 @cython.final
+cdef class UnpackedFrames:
+    cdef public long long[::1] ids, words0, words1
+    cpdef long long unpack(self, SspSegment segment, long long place) noexcept
+
+@cython.final
 cdef class MainBrainSspLink:
     cdef public object report
     cdef public long long last_id
-    cdef public long long[::1] received_words, received_used
-    cdef public long long received_read, received_count
+    cdef public UnpackedFrames unpacked
+    cdef public long long[::1] ids, words0, words1
+    cdef public long long frames, received_count, received_frames
+    cdef public list received_errors
     cdef public list queue
     cdef public SspSegment empty, packing
     cdef public long long queue_read, queue_count
-    cdef public long long[::1] ids, words0, words1
-    cdef public long long frames
     cdef public bint first_is_junk
     cdef public long long segments_received, segments_sent, frames_received, frames_sent
     cdef public long long checksum_errors, receive_full, transmit_full, ids_out_of_range
     cdef public long long code_checksum, code_receive_full, code_transmit_full, code_id_out_of_range
     cpdef SspSegment exchanged(self, SspSegment segment)
     cpdef bint receive(self, SspSegment segment) except? -1
+    cpdef SspSegment shifted(self, SspSegment segment)
     cpdef SspSegment next_segment(self)
     cpdef long long parse(self) except? <long long>-1
     cpdef bint send(self, long long identifier, long long word0, long long word1) except? -1
@@ -28,14 +34,14 @@ cdef class MainBrainSspLink:
 cdef class RouterSspLink:
     cdef public object report
     cdef public bint frames_may_straddle
-    cdef public long long[::1] ring
-    cdef public long long ring_write, ring_read, push_time, push_step_ns
-    cdef public list pool
-    cdef public SspSegment empty
-    cdef public long long pool_next
-    cdef public long long[::1] received_words, received_used
+    cdef public list segments
+    cdef public long long first, last, half_words
+    cdef public SspSegment packing, empty
+    cdef public long long push_time, push_step_ns
+    cdef public UnpackedFrames unpacked
+    cdef public long long[::1] received_frames
     cdef public long long received_write, received_read, position
-    cdef public bint exchange_running, exchange_done, frame_waiting
+    cdef public bint exchange_running, exchange_done
     cdef public long long rx_id, rx_flags, rx_word0, rx_word1
     cdef public long long segments_sent, segments_received, frames_sent, frames_received
     cdef public long long checksum_errors, receive_overwritten, transmit_lost, low_rate
@@ -47,8 +53,12 @@ cdef class RouterSspLink:
     cpdef void receive(self, SspSegment segment) noexcept
     cpdef bint take(self) except? -1
     cpdef bint has_segments(self) noexcept
+    cdef void _begin_segment(self) noexcept
+    cdef void _put(self, long long word) noexcept
+    cdef void _cut(self, SspSegment segment, long long used) noexcept
 
 cpdef long long checksum(SspSegment segment) noexcept
 cpdef void finish(SspSegment segment, long long used) noexcept
+cpdef long long add_frame(SspSegment segment, long long header, long long word0, long long word1) noexcept
 cpdef SspSegment empty_segment()
 cpdef SspSegment corrupted_copy(SspSegment segment, long long index, long long flipped_bits)

@@ -1,6 +1,6 @@
 # cython: boundscheck=False, wraparound=False
-# (every index below is a half-word 0 ... 30 of a segment, in a ring a place that is wrapped where it is moved, or a
-# frame of the 96 that the 16 segments of the main brain can hold)
+# (every index below is a half-word 0 ... 30 of a segment, a segment of a circle, wrapped where it is moved, or a frame
+# of those that the receiving end's segments can hold)
 """The serial link between the router and the main brain: both ends, as logic on segments.
 
 A segment is 31 half-words: up to six frames of five half-words, zeros, and a checksum. The router is the
@@ -9,7 +9,10 @@ master and starts an exchange every 200 us; 496 bits at 3.0 Mbit/s take 165.3 us
 bits 11-14, and the remote bit in 15. The checksum is (1 + sum of the other 30) modulo 65536. Source: facts
 network-and-boards 1.6.
 
-Empty segments are one shared object per end and queued ones come from a pool, so nobody may write to a
+Frames are packed straight into the segment that will carry them, whose checksum grows with them, and are unpacked
+straight out of the one that comes in; what is judged later (a checksum, an identifier) is judged on that.
+
+Empty segments are one shared object per end and the others come round in a circle, so nobody may write to a
 segment that was handed over: a fault makes its own with `corrupted_copy`.
 """
 
@@ -26,6 +29,7 @@ HEADER_ONES = 0x7800  # bits 11-14 of every header
 SEGMENT_PERIOD_NS = 200_000  # Timer1 of the router, match 11 999 at 60 MHz
 EXCHANGE_NS = 165_333  # 496 bits at 3.0 Mbit/s
 ROUTER_RING_HALF_WORDS = 500  # one stays free: 99 frames
+ROUTER_SEGMENTS = 24  # 17 hold the ring; one in an exchange, one being delivered, and some for consumers a little late
 ROUTER_RECEIVE_SEGMENTS = 8
 MAIN_BRAIN_SEGMENTS = 16  # each way
 
@@ -55,24 +59,83 @@ def empty_segment() -> SspSegment:
     return segment
 
 
+def add_frame(
+    segment: SspSegment, header: cython.longlong, word0: cython.longlong, word1: cython.longlong
+) -> cython.longlong:
+    """Append a frame to a segment with room for five half-words, checksum included; returns how many are used."""
+    used: cython.longlong = segment.used
+    value_high: cython.longlong = (word0 >> 16) & 0xFFFF
+    value_low: cython.longlong = word0 & 0xFFFF
+    time_high: cython.longlong = (word1 >> 16) & 0xFFFF
+    time_low: cython.longlong = word1 & 0xFFFF
+    segment.words[used] = header
+    segment.words[used + 1] = value_high
+    segment.words[used + 2] = value_low
+    segment.words[used + 3] = time_high
+    segment.words[used + 4] = time_low
+    segment.words[30] = (segment.words[30] + header + value_high + value_low + time_high + time_low) & 0xFFFF
+    segment.used = used + 5
+    return used + 5
+
+
 def corrupted_copy(segment: SspSegment, index: cython.longlong, flipped_bits: cython.longlong) -> SspSegment:
     """A copy of `segment` with bits of half-word `index` (0-30) flipped: a disturbance on the wires."""
     copy: SspSegment = SspSegment()
-    i: cython.longlong
-    for i in range(31):
-        copy.words[i] = segment.words[i]
-    copy.used = segment.used
+    copy.copy_from(segment)
     copy.words[index] ^= flipped_bits & 0xFFFF
     if index < 30 and index >= copy.used:
         copy.used = index + 1
     return copy
 
 
+class UnpackedFrames:
+    """Frames as they come out of segments: `ids`, `words0`, `words1`, by place."""
+
+    def __init__(self, count) -> None:
+        self.ids = integers(count)
+        self.words0 = integers(count)
+        self.words1 = integers(count)
+
+    def unpack(self, segment: SspSegment, place: cython.longlong) -> cython.longlong:
+        """Put the frames of `segment` from `place` on; returns how many, -1 with a wrong checksum.
+
+        A half-word whose top five bits are not 01111 where a header should be ends the frames.
+        """
+        used: cython.longlong = min(segment.used, 30)
+        total: cython.longlong = 1
+        frames: cython.longlong = 0
+        i: cython.longlong = 0
+        header: cython.longlong
+        value_high: cython.longlong
+        value_low: cython.longlong
+        time_high: cython.longlong
+        time_low: cython.longlong
+        while i < used and i <= 25:
+            header = segment.words[i]
+            if header >> 11 != 0x0F:
+                break
+            value_high = segment.words[i + 1]
+            value_low = segment.words[i + 2]
+            time_high = segment.words[i + 3]
+            time_low = segment.words[i + 4]
+            total += header + value_high + value_low + time_high + time_low
+            self.ids[place + frames] = header & 0x7FF
+            self.words0[place + frames] = value_high << 16 | value_low
+            self.words1[place + frames] = time_high << 16 | time_low
+            frames += 1
+            i += 5
+        while i < used:
+            total += segment.words[i]
+            i += 1
+        return frames if total & 0xFFFF == segment.words[30] else -1
+
+
 class MainBrainSspLink:
     """The slave's end: 16 segments each way, parsed and filled once per slot of the main brain.
 
     `report(code)` is called for every error; `last_id` is the highest identifier the data table has.
-    After `parse()` the frames stand in `ids`, `words0`, `words1`, indices 0 ... `frames`-1.
+    After `parse()` the frames stand in `ids`, `words0`, `words1`, indices 0 ... `frames`-1, until the next segment
+    comes in.
     """
 
     def __init__(self, report, last_id, first_is_junk=True) -> None:
@@ -80,20 +143,20 @@ class MainBrainSspLink:
         self.last_id = last_id
         # the receive DMA is armed in the middle of nowhere, so the first segment comes shifted (facts 1.6)
         self.first_is_junk = first_is_junk
-        self.received_words = integers(16 * 31)
-        self.received_used = integers(16)
-        self.received_read = 0
-        self.received_count = 0
+        self.unpacked = UnpackedFrames(16 * 6)
+        self.ids = self.unpacked.ids
+        self.words0 = self.unpacked.words0
+        self.words1 = self.unpacked.words1
+        self.frames = 0
+        self.received_count = 0  # segments and frames that wait for `parse`, and what it will report
+        self.received_frames = 0
+        self.received_errors = []
         # 16 queued, one being exchanged, one being packed
         self.queue = [empty_segment() for _ in range(18)]
         self.empty = empty_segment()
         self.packing = None
         self.queue_read = 0
         self.queue_count = 0
-        self.ids = integers(16 * 6)
-        self.words0 = integers(16 * 6)
-        self.words1 = integers(16 * 6)
-        self.frames = 0
         self.segments_received = 0
         self.segments_sent = 0
         self.frames_received = 0
@@ -113,35 +176,48 @@ class MainBrainSspLink:
         return self.next_segment()
 
     def receive(self, segment: SspSegment) -> cython.bint:
-        """Copy a received segment into the next of the 16 places, as the receive DMA does; False when it is lost.
+        """Keep what a received segment brings, as the receive DMA does in one of 16 places; False when it is lost.
 
         With all places full the segment is dropped and MB_SSP_RX_FULL reported (dropping the newest is
-        chosen by us, because the facts name only the error).
+        chosen by us, because the facts name only the error). A wrong checksum drops the segment, an identifier
+        above `last_id` its frame; `parse` reports them.
         """
-        slot: cython.longlong
-        base: cython.longlong
-        used: cython.longlong = segment.used
+        frames: cython.longlong
+        place: cython.longlong = self.received_frames
         i: cython.longlong
         if self.received_count == 16:
             self.receive_full += 1
             self.report(self.code_receive_full)
             return False
-        slot = (self.received_read + self.received_count) & 15
-        base = slot * 31
-        for i in range(used):
-            self.received_words[base + i] = segment.words[i]
-        for i in range(used, self.received_used[slot]):
-            self.received_words[base + i] = 0
-        self.received_used[slot] = used
-        self.received_words[base + 30] = segment.words[30]
         if self.segments_received == 0 and self.first_is_junk:
-            for i in range(30):
-                self.received_words[base + i] = self.received_words[base + i + 1]
-            self.received_words[base + 30] = 0
-            self.received_used[slot] = 30
+            segment = self.shifted(segment)
         self.received_count += 1
         self.segments_received += 1
+        if segment.used == 0 and segment.words[30] == 1:
+            return True
+        frames = self.unpacked.unpack(segment, place)
+        if frames < 0:
+            self.received_errors.append(self.code_checksum)
+        for i in range(place, place + frames):
+            if self.ids[i] > self.last_id:
+                self.received_errors.append(self.code_id_out_of_range)
+                continue
+            if place < i:
+                self.ids[place] = self.ids[i]
+                self.words0[place] = self.words0[i]
+                self.words1[place] = self.words1[i]
+            place += 1
+        self.received_frames = place
         return True
+
+    def shifted(self, segment: SspSegment) -> SspSegment:
+        """A copy of `segment` as it looks from its second half-word on."""
+        copy: SspSegment = SspSegment()
+        i: cython.longlong
+        for i in range(30):
+            copy.words[i] = segment.words[i + 1]
+        copy.used = 30
+        return copy
 
     def next_segment(self) -> SspSegment:
         """The oldest queued segment, or the empty one: what the transmit DMA is started on."""
@@ -157,48 +233,25 @@ class MainBrainSspLink:
         return segment
 
     def parse(self) -> cython.longlong:
-        """Unpack every waiting segment; return how many segments were read.
+        """Hand over the frames of every waiting segment, and report the errors; returns how many segments were read.
 
         A wrong checksum drops the segment (MB_SSP_CHKSUM). A half-word whose top five bits are not 01111
         where a header should be ends the segment. An identifier above `last_id` drops its frame
         (MB_SSP_ID_OOR).
         """
         segments: cython.longlong = self.received_count
-        n: cython.longlong = 0
-        i: cython.longlong
-        base: cython.longlong
-        used: cython.longlong
-        total: cython.longlong
-        header: cython.longlong
-        for _segment in range(segments):
-            base = self.received_read * 31
-            used = self.received_used[self.received_read]
-            self.received_read = (self.received_read + 1) & 15
-            self.received_count -= 1
-            total = 1
-            for i in range(used):
-                total += self.received_words[base + i]
-            if (total & 0xFFFF) != self.received_words[base + 30]:
-                self.checksum_errors += 1
-                self.report(self.code_checksum)
-                continue
-            i = 0
-            while i < used and i <= 25:
-                header = self.received_words[base + i]
-                if (header >> 11) != 0x0F:
-                    break
-                header &= 0x7FF
-                if header > self.last_id:
-                    self.ids_out_of_range += 1
-                    self.report(self.code_id_out_of_range)
+        if self.received_errors:
+            for code in self.received_errors:
+                if code == self.code_checksum:
+                    self.checksum_errors += 1
                 else:
-                    self.ids[n] = header
-                    self.words0[n] = (self.received_words[base + i + 1] << 16) | self.received_words[base + i + 2]
-                    self.words1[n] = (self.received_words[base + i + 3] << 16) | self.received_words[base + i + 4]
-                    n += 1
-                i += 5
-        self.frames = n
-        self.frames_received += n
+                    self.ids_out_of_range += 1
+                self.report(code)
+            self.received_errors = []
+        self.frames = self.received_frames
+        self.frames_received += self.received_frames
+        self.received_count = 0
+        self.received_frames = 0
         return segments
 
     def send(self, identifier: cython.longlong, word0: cython.longlong, word1: cython.longlong) -> cython.bint:
@@ -206,9 +259,8 @@ class MainBrainSspLink:
 
         Call `flush` after the last frame of a slot.
         """
-        segment: SspSegment
-        used: cython.longlong
-        if self.packing is None:
+        segment: SspSegment = self.packing
+        if segment is None:
             if self.queue_count >= 16:
                 self.transmit_full += 1
                 self.report(self.code_transmit_full)
@@ -216,26 +268,14 @@ class MainBrainSspLink:
             segment = self.queue[(self.queue_read + self.queue_count) % 18]
             finish(segment, 0)
             self.packing = segment
-        else:
-            segment = self.packing
-        used = segment.used
-        segment.words[used] = (identifier & 0x7FF) | 0x7800
-        segment.words[used + 1] = (word0 >> 16) & 0xFFFF
-        segment.words[used + 2] = word0 & 0xFFFF
-        segment.words[used + 3] = (word1 >> 16) & 0xFFFF
-        segment.words[used + 4] = word1 & 0xFFFF
-        segment.used = used + 5
         self.frames_sent += 1
-        if used + 5 == 30:
+        if add_frame(segment, (identifier & 0x7FF) | 0x7800, word0, word1) == 30:
             self.flush()
         return True
 
     def flush(self) -> cython.longlong:
         """Queue the segment being packed, padded with zeros; return how many segments are queued."""
-        segment: SspSegment
         if self.packing is not None:
-            segment = self.packing
-            segment.words[30] = checksum(segment)
             self.packing = None
             self.queue_count += 1
         return self.queue_count
@@ -243,6 +283,8 @@ class MainBrainSspLink:
 
 class RouterSspLink:
     """The master's end: a transmit ring of 500 half-words and 8 received segments.
+
+    The ring is a circle of segments: half-words go into the last of them, a segment is taken whole from the other end.
 
     `frames_may_straddle`: the firmware moves half-words, so a frame that is only partly in the ring when a
     segment is filled is cut, and with a ring that never runs empty nothing re-aligns the frames that
@@ -255,26 +297,25 @@ class RouterSspLink:
     def __init__(self, report, frames_may_straddle=False) -> None:
         self.report = report
         self.frames_may_straddle = frames_may_straddle
-        self.ring = integers(500)
-        self.ring_write = 0
-        self.ring_read = 0
+        self.segments = [empty_segment() for _ in range(ROUTER_SEGMENTS)]
+        self.first = 0  # the segment that goes next
+        self.last = 0  # the segment being packed, which is also
+        self.packing = self.segments[0]
+        self.half_words = 0  # in all of them
         self.push_time = -1_000_000
         # six instructions per half-word pushed, about 12 cycles: chosen by us, because no listing says
         self.push_step_ns = 200
-        # one being exchanged, one being delivered, two to spare for consumers a little late
-        self.pool = [empty_segment() for _ in range(4)]
         self.empty = empty_segment()
-        self.pool_next = 0
-        self.received_words = integers(8 * 31)
-        self.received_used = integers(8)
+        # what came in, by place: six frames, and how many there are (-1: the checksum is wrong)
+        self.unpacked = UnpackedFrames(8 * 6)
+        self.received_frames = integers(8)
         self.received_write = 0
         self.received_read = 0
         self.position = 0
         self.exchange_running = False
         self.exchange_done = False
-        self.frame_waiting = False
         self.rx_id = 0
-        self.rx_flags = 0
+        self.rx_flags = 8  # every frame becomes one of eight bytes
         self.rx_word0 = 0
         self.rx_word1 = 0
         self.segments_sent = 0
@@ -292,8 +333,7 @@ class RouterSspLink:
 
     def half_words_waiting(self) -> cython.longlong:
         """Half-words in the transmit ring."""
-        waiting: cython.longlong = self.ring_write - self.ring_read
-        return waiting if waiting >= 0 else waiting + 500
+        return self.half_words
 
     def push(
         self,
@@ -307,70 +347,81 @@ class RouterSspLink:
 
         `flags` as in foundation.events; `now` is the instant in ns at which the pushing begins.
         """
-        write: cython.longlong = self.ring_write
         header: cython.longlong = (identifier & 0x7FF) | 0x7800
-        waiting: cython.longlong = write - self.ring_read
-        if waiting < 0:
-            waiting += 500
-        if waiting > 494:
+        if self.half_words > 494:
             self.transmit_lost += 1
             self.report(self.code_transmit_full)
             return False
         if flags & 16:  # FLAG_REMOTE
             header |= 0x8000
-        self.ring[write] = header
-        self.ring[write + 1] = (word0 >> 16) & 0xFFFF
-        self.ring[write + 2] = word0 & 0xFFFF
-        self.ring[write + 3] = (word1 >> 16) & 0xFFFF
-        self.ring[write + 4] = word1 & 0xFFFF
-        write += 5
-        self.ring_write = write if write < 500 else 0  # 500 are 100 frames: none is split by the end of the ring
+        self.half_words += 5
         self.push_time = now
+        if self.packing.used > 25:
+            if self.packing.used < 30:  # a frame was cut before: this one straddles two segments
+                for word in (header, word0 >> 16, word0, word1 >> 16, word1):
+                    self._put(word & 0xFFFF)
+                return True
+            self._begin_segment()
+        add_frame(self.packing, header, word0, word1)
         return True
 
+    def _begin_segment(self) -> cython.void:
+        """Let the segment after the last be the one that is packed."""
+        self.last += 1
+        if self.last == 24:
+            self.last = 0
+        self.packing = self.segments[self.last]
+        finish(self.packing, 0)
+
+    def _put(self, word: cython.longlong) -> cython.void:
+        """Append one half-word, without the checksum of frames."""
+        if self.packing.used == 30:
+            self._begin_segment()
+        self.packing.words[self.packing.used] = word
+        self.packing.used += 1
+        self.packing.words[30] = (self.packing.words[30] + word) & 0xFFFF
+
     def next_segment(self, now: cython.longlong) -> SspSegment:
-        """Fill a segment from the ring at instant `now` (ns).
+        """The segment that is exchanged from instant `now` (ns) on.
 
         Of a frame being pushed at that moment only the half-words already written are seen.
         """
         take: cython.longlong
-        word: cython.longlong
-        total: cython.longlong = 1
-        i: cython.longlong
-        read: cython.longlong = self.ring_read
         segment: SspSegment
         self.segments_sent += 1
-        if read == self.ring_write:
+        if self.half_words == 0:
             return self.empty
-        take = self.half_words_waiting()
+        segment = self.segments[self.first]
         if now - self.push_time < 5 * self.push_step_ns:
-            take -= 5
+            take = self.half_words - 5
             if now > self.push_time:
                 take += (now - self.push_time) // self.push_step_ns
-            if take < 0:
-                take = 0
-        if take > 30:
-            take = 30
-        if not self.frames_may_straddle:
-            take = take - take % 5
-        if take == 0:
-            return self.empty
-        segment = self.pool[self.pool_next]
-        self.pool_next = (self.pool_next + 1) & 3
-        for i in range(take):
-            word = self.ring[read]
-            segment.words[i] = word
-            total += word
-            read += 1
-            if read == 500:
-                read = 0
-        for i in range(take, segment.used):
-            segment.words[i] = 0  # what an earlier use left behind
-        segment.used = take
-        segment.words[30] = total & 0xFFFF  # the checksum
-        self.ring_read = read
-        self.frames_sent += take // 5
+            if not self.frames_may_straddle:
+                take -= take % 5
+            if take <= 0:
+                return self.empty
+            if take < segment.used:
+                self._cut(segment, take)
+        if self.first == self.last:
+            self._begin_segment()
+        self.first += 1
+        if self.first == 24:
+            self.first = 0
+        self.half_words -= segment.used
+        self.frames_sent += segment.used // 5
         return segment
+
+    def _cut(self, segment: SspSegment, used: cython.longlong) -> cython.void:
+        """Leave `used` half-words in the first segment; the others come before those of the second, the last one."""
+        i: cython.longlong
+        if self.first == self.last:
+            self._begin_segment()
+        words = [segment.words[i] for i in range(used, segment.used)]
+        words += [self.packing.words[i] for i in range(self.packing.used)]
+        finish(segment, used)
+        finish(self.packing, 0)
+        for word in words:
+            self._put(word)
 
     def tick(self, now: cython.longlong) -> SspSegment:
         """The 200 us interrupt: judge the exchange that should be over, return the next segment.
@@ -396,14 +447,11 @@ class RouterSspLink:
 
     def receive(self, segment: SspSegment) -> cython.void:
         """The end of an exchange: the main brain's half-words lie in the current place."""
-        base: cython.longlong = self.received_write * 31
-        i: cython.longlong
-        for i in range(segment.used):
-            self.received_words[base + i] = segment.words[i]
-        for i in range(segment.used, self.received_used[self.received_write]):
-            self.received_words[base + i] = 0
-        self.received_words[base + 30] = segment.words[30]
-        self.received_used[self.received_write] = segment.used
+        frames: cython.longlong = 0
+        # a segment that starts with zero is passed over without a look at its checksum, as the robot does
+        if segment.used > 0 and segment.words[0] != 0:
+            frames = self.unpacked.unpack(segment, self.received_write * 6)
+        self.received_frames[self.received_write] = frames
         self.exchange_done = True
         self.segments_received += 1
 
@@ -414,37 +462,23 @@ class RouterSspLink:
     def take(self) -> cython.bint:
         """Move the next received frame into rx_id, rx_flags, rx_word0, rx_word1; False if there is none.
 
-        A segment that starts with zero is passed over without a look at its checksum, as the robot does;
-        a wrong checksum drops the segment (SSP_BAD_CHKSM). The data length of a frame becomes 8.
+        A wrong checksum drops the segment (SSP_BAD_CHKSM). The data length of a frame becomes 8.
         """
-        base: cython.longlong
-        used: cython.longlong
-        total: cython.longlong
-        header: cython.longlong
-        i: cython.longlong
+        frames: cython.longlong
+        place: cython.longlong
         while self.received_read != self.received_write:
-            base = self.received_read * 31
-            used = self.received_used[self.received_read]
-            if self.position == 0 and used > 0 and self.received_words[base] != 0:
-                total = 1
-                for i in range(used):
-                    total += self.received_words[base + i]
-                if (total & 0xFFFF) != self.received_words[base + 30]:
-                    self.checksum_errors += 1
-                    self.report(self.code_checksum)
-                    self.received_read = (self.received_read + 1) & 7
-                    continue
-            i = self.position
-            if i < used and i <= 25:
-                header = self.received_words[base + i]
-                if (header >> 11) == 0x0F:
-                    self.rx_id = header & 0x7FF
-                    self.rx_flags = 8
-                    self.rx_word0 = (self.received_words[base + i + 1] << 16) | self.received_words[base + i + 2]
-                    self.rx_word1 = (self.received_words[base + i + 3] << 16) | self.received_words[base + i + 4]
-                    self.position = i + 5
-                    self.frames_received += 1
-                    return True
+            frames = self.received_frames[self.received_read]
+            if self.position < frames:
+                place = self.received_read * 6 + self.position
+                self.rx_id = self.unpacked.ids[place]
+                self.rx_word0 = self.unpacked.words0[place]
+                self.rx_word1 = self.unpacked.words1[place]
+                self.position += 1
+                self.frames_received += 1
+                return True
+            if frames < 0:
+                self.checksum_errors += 1
+                self.report(self.code_checksum)
             self.position = 0
             self.received_read = (self.received_read + 1) & 7
         return False

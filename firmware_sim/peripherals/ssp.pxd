@@ -14,7 +14,7 @@ cdef class SspSegment:
 @cython.final
 cdef class SspPort(Peripheral):
     cdef public long long number, exchanges, overwritten
-    cdef public SspSegment received
+    cdef public SspSegment received, loaded
     cdef public long long received_time
     cdef public bint fresh
     cdef public InterruptSource source

@@ -1,8 +1,9 @@
 """The synchronous serial port as a link of whole segments between two chips.
 
 A segment is 31 half-words; at 16 bits and 3 Mbit/s it lasts 165.3 us. The master starts an exchange
-(SSP_START at `now`), the slave has loaded what it will send (SSP_LOAD); when the last bit is through, each
-side gets SSP_SEGMENT and with it the interrupt (SSP_SEGMENT, number). The wire between them is not ours.
+(SSP_START at `now`), the slave has loaded what it will send (SSP_LOAD), which goes out in every exchange until
+something else is loaded; when the last bit is through, each side gets SSP_SEGMENT and with it the interrupt
+(SSP_SEGMENT, number). The wire between them is not ours.
 
 The FIFO is not modelled word by word: the interrupts that feed it are charged in one, by `per_item` of the
 handler, which returns the number of half-words.
@@ -52,6 +53,7 @@ class SspPort(Peripheral):
     def __init__(self, chip, number=0) -> None:
         Peripheral.__init__(self, chip)
         self.number = number
+        self.loaded = None
         self.exchanges = 0
         self.overwritten = 0
         self.received = None
@@ -65,7 +67,10 @@ class SspPort(Peripheral):
         self.chip.outbox.push(self.chip.now, 0, 37, self.number, 0, 0, 0, 0, 0, segment)  # SSP_START
 
     def load(self, segment: SspSegment) -> cython.void:
-        """Slave: send `segment` in the next exchange. It must not be changed until it is through."""
+        """Slave: send `segment` from the next exchange on. It must not be changed until something else is loaded."""
+        if segment is self.loaded:
+            return
+        self.loaded = segment
         self.chip.outbox.push(self.chip.now, 0, 38, self.number, 0, 0, 0, 0, 0, segment)  # SSP_LOAD
 
     def on_message(self, queue) -> cython.void:

@@ -244,5 +244,6 @@ def drain(router):
         for f in queued(router, c):
             out.append((router.table.sources[f[0]], f[1]))
         router.tx_read[c] = router.tx_write[c]
-    router.ssp.ring_read = router.ssp.ring_write
+    while router.ssp.half_words_waiting():
+        router.ssp.next_segment(10**9)
     return out
