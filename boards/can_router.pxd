@@ -18,6 +18,12 @@ from foundation.numbers cimport float32, word_of_float
 cimport cython
 
 @cython.final
+cdef class BusReceiver:
+    cdef public CanController controller
+    cdef public Router router
+    cpdef object on_frame(self, EventQueue queue)
+
+@cython.final
 cdef class CanRouterBoard(Microcontroller):
     cdef public object quirks
     cdef public Gpio gpio
@@ -46,12 +52,7 @@ cdef class CanRouterBoard(Microcontroller):
     cpdef int report(self, long long code) except -1
     cpdef object on_segment_timer(self, EventQueue queue)
     cpdef object on_segment(self, EventQueue queue)
-    cpdef object on_can1(self, EventQueue queue)
-    cpdef object on_can2(self, EventQueue queue)
-    cpdef object on_can3(self, EventQueue queue)
-    cpdef object on_can4(self, EventQueue queue)
     cpdef object on_can_error(self, EventQueue queue)
-    cpdef bint receive(self, CanController controller) except? -1
     cpdef long long flush(self, CanController controller) except? <long long>-1
     cpdef bint can_flush(self) except? -1
     cpdef long long main_loop(self) except? <long long>-1

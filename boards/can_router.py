@@ -72,6 +72,26 @@ def supply_pins_V(current_A, voltage_V):
     )
 
 
+class BusReceiver:
+    """The receive interrupt of one bus: its frames into the ring that all four share."""
+
+    def __init__(self, controller: CanController, router: Router) -> None:
+        self.controller = controller
+        self.router = router
+
+    def on_frame(self, queue) -> object:
+        """Copy the older receive buffer and release it."""
+        controller: CanController = self.controller
+        flags: cython.longlong = 8
+        if controller.rx_count == 0:
+            return None
+        if controller.RFS != 524288:  # anything but eight bytes of an ordinary frame
+            flags = (controller.RFS >> 16 & 15) | (controller.RFS >> 30 & 1) << 4
+        self.router.receive(controller.number, controller.RID, flags, controller.RDA, controller.RDB)
+        controller.release()
+        return None
+
+
 class CanRouterBoard(Microcontroller):
     """Slots of 1 ms, 10 rows. `phase_ns`: when its program starts; the first sync comes 1 ms later."""
 
@@ -126,10 +146,10 @@ class CanRouterBoard(Microcontroller):
         attach = self.vic.attach
         attach(TIMER_MATCH, 1, self.on_segment_timer, SEGMENT_TIMER_CYCLES, slot=FIQ, name="timer1")
         attach(SSP_SEGMENT, 0, self.on_segment, SEGMENT_CYCLES, HALF_WORD_CYCLES, slot=FIQ, name="ssp")
-        attach(CAN_RX, 1, self.on_can1, RECEIVE_CYCLES, slot=FIQ, name="can1 receive")
-        attach(CAN_RX, 2, self.on_can2, RECEIVE_CYCLES, slot=FIQ, name="can2 receive")
-        attach(CAN_RX, 3, self.on_can3, RECEIVE_CYCLES, slot=FIQ, name="can3 receive")
-        attach(CAN_RX, 4, self.on_can4, RECEIVE_CYCLES, slot=FIQ, name="can4 receive")
+        for controller in self.controllers:
+            number = controller.number
+            receiver: object = BusReceiver(controller, self.router)
+            attach(CAN_RX, number, receiver.on_frame, RECEIVE_CYCLES, slot=FIQ, name=f"can{number} receive")
         attach(CAN_STATUS, 0, self.on_can_error, 150, slot=10, name="can error")
 
         self.on_overrun = self.slot_exceeded
@@ -223,41 +243,6 @@ class CanRouterBoard(Microcontroller):
         self.link.receive(segment)
         return 31
 
-    def on_can1(self, queue) -> object:
-        """A frame on CAN1."""
-        self.receive(self.can1)
-        return None
-
-    def on_can2(self, queue) -> object:
-        """A frame on CAN2."""
-        self.receive(self.can2)
-        return None
-
-    def on_can3(self, queue) -> object:
-        """A frame on CAN3."""
-        self.receive(self.can3)
-        return None
-
-    def on_can4(self, queue) -> object:
-        """A frame on CAN4."""
-        self.receive(self.can4)
-        return None
-
-    def receive(self, controller: CanController) -> cython.bint:
-        """Copy the older receive buffer into the common ring and release it; False when nothing is there."""
-        frame: cython.longlong = controller.RFS
-        if controller.rx_count == 0:
-            return False
-        self.router.receive(
-            controller.number,
-            controller.RID,
-            (frame >> 16 & 15) | (frame >> 30 & 1) << 4,
-            controller.RDA,
-            controller.RDB,
-        )
-        controller.release()
-        return True
-
     def on_can_error(self, queue) -> object:
         """Read every controller's capture register; restart one that is bus-off."""
         controller: CanController
@@ -288,23 +273,26 @@ class CanRouterBoard(Microcontroller):
         channel: cython.longlong = controller.number
         buffer: cython.longlong
         slot: cython.longlong
+        read: cython.longlong = router.tx_read[channel]
         moved: cython.longlong = 0
-        while router.tx_read[channel] != router.tx_write[channel]:
+        while read != router.tx_write[channel]:
             if controller.tx_free[1] != 0:
                 buffer = 1
             elif controller.tx_free[2] != 0:
                 buffer = 2
             else:
                 break
-            slot = channel * 8 + router.tx_read[channel]
+            slot = channel * 8 + read
             if not controller.transmit(
                 buffer, router.tx_id[slot], router.tx_flags[slot], router.tx_word0[slot], router.tx_word1[slot]
             ):
                 break
-            router.tx_read[channel] = (router.tx_read[channel] + 1) & 7
-            router.waiting -= 1
-            self.load.counts[channel] += 1
+            read = (read + 1) & 7
             moved += 1
+        if moved > 0:
+            router.tx_read[channel] = read
+            router.waiting -= moved
+            self.load.counts[channel] += moved
         return moved
 
     def can_flush(self) -> cython.bint:
@@ -319,6 +307,7 @@ class CanRouterBoard(Microcontroller):
                     return True
         return False
 
+    @cython.cdivision(True)  # instants are not negative
     def main_loop(self) -> cython.longlong:
         """Move what waits, until nothing does or something else is due; returns the instant reached, 0 when it idles.
 
@@ -327,36 +316,33 @@ class CanRouterBoard(Microcontroller):
         """
         at: cython.longlong = self.now
         passed: cython.longlong
+        pairs: cython.longlong
         moved: cython.longlong
         router: Router = self.router
         link: RouterSspLink = self.link
-        controller: CanController
         while (
             router.rx_read != router.rx_write
-            or router.own_read != router.own_write
             or link.received_read != link.received_write
+            or router.own_read != router.own_write
             or (router.waiting > 0 and self.can_flush())
         ):
             if self.idle:
                 self.idle = False
                 passed = at - self.idle_since
-                self.flush_next = (self.flush_next + passed // self.pair_ns) % 4
-                passed = passed % self.pair_ns
+                pairs = passed // self.pair_ns
+                passed -= pairs * self.pair_ns
                 if passed > 0:
-                    self.flush_next = (self.flush_next + 1) % 4
+                    pairs += 1
                     at += self.pair_ns - passed
-            self.now = at
+                self.flush_next = (self.flush_next + pairs) & 3
             moved = router.route_step(at)
             at += self.route_ns[moved]
             moved = 0
             if router.waiting > 0:
                 self.now = at
-                controller = self.controllers[self.flush_next]
-                moved = self.flush(controller)
+                moved = self.flush(self.controllers[self.flush_next])
             at += self.flush_ns[moved]
-            self.flush_next += 1
-            if self.flush_next == 4:
-                self.flush_next = 0
+            self.flush_next = (self.flush_next + 1) & 3
             if at >= self.horizon or at >= self.alarm_time or at >= self.tick_time or at >= self.inbox.head_time:
                 return at
         if self.idle:

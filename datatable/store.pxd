@@ -13,6 +13,7 @@ cdef class DataStore:
 
     cpdef bint has(self, long long number) except? -1
     cpdef bint set_word(self, long long number, long long word, long long stamp) except? -1
+    cpdef int set_words(self, long long count, long long[::1] numbers, long long[::1] words, long long[::1] stamps) except -1
     cpdef long long get_word(self, long long number) except? <long long>-1
     cpdef bint set_float(self, long long number, double value) except? -1
     cpdef double get_float(self, long long number) except? -1

@@ -62,6 +62,23 @@ class DataStore:
             return True
         return False
 
+    def set_words(
+        self,
+        count: cython.longlong,
+        numbers: cython.longlong[::1],
+        words: cython.longlong[::1],
+        stamps: cython.longlong[::1],
+    ) -> None:
+        """Store the first `count` of these as `set_word` does, one after the other."""
+        i: cython.longlong
+        number: cython.longlong
+        for i in range(count):
+            number = numbers[i]
+            if 0 <= number < self.size or self.has(number):
+                self.words[number] = words[i] & _MASK
+                self.stamps[number] = stamps[i] & _MASK
+                self.unread[number] = 0x7F
+
     def get_word(self, number: cython.longlong) -> cython.longlong:
         """The value word, 0 ... 2^32-1."""
         if 0 <= number < self.size or self.has(number):

@@ -45,10 +45,8 @@ class IoData:
         link: MainBrainSspLink = self.link
         store: DataStore = self.store
         time: NetworkTime = self.time
-        i: cython.longlong
         link.parse()
-        for i in range(link.frames):
-            store.set_word(link.ids[i], link.words0[i], link.words1[i])
+        store.set_words(link.frames, link.ids, link.words0, link.words1)
         time.ms = store.stamp(self.timestamp)
         return link.frames
 
@@ -58,16 +56,16 @@ class IoData:
         store: DataStore = self.store
         sent: cython.longlong = 0
         number: cython.longlong
-        place: cython.longlong = store.next_unread(self.send_ids, 0, self.subscriber)
+        place: cython.longlong
+        flag: cython.longlong = 1 << self.subscriber
         self.slots += 1
-        while place >= 0:
-            if self.slots % self.dividers[place] == 0:
-                number = self.send_ids[place]
-                if not link.send(number, store.get_word(number), store.stamp(number)):
+        for place in range(len(self.send_ids)):
+            number = self.send_ids[place]
+            if store.unread[number] & flag and self.slots % self.dividers[place] == 0:
+                if not link.send(number, store.words[number], store.stamps[number]):
                     break
-                store.mark_read(number, self.subscriber)
+                store.unread[number] &= ~flag
                 sent += 1
-            place = store.next_unread(self.send_ids, place + 1, self.subscriber)
         if len(self.turn_ids) > 0 and (self.slots + 1) % self.turn_every == 0:
             place = store.next_unread(self.turn_ids, self.turn + 1, self.subscriber)
             if place < 0:

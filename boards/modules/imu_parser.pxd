@@ -8,7 +8,7 @@ cdef class ImuParser:
     cdef public object report
     cdef public long long header, needed, code_ring_full
     cdef public bint has_angles
-    cdef public long long[::1] ring
+    cdef public long long[::1] ring, words
     cdef public long long ring_write, ring_read
     cdef public double roll, pitch, yaw
     cdef public double rate_x, rate_y, rate_z
@@ -19,4 +19,3 @@ cdef class ImuParser:
     cpdef long long receive(self, Uart uart) except? <long long>-1
     cpdef long long waiting(self) noexcept
     cpdef long long update(self) noexcept
-    cpdef double _float_at(self, long long index) noexcept

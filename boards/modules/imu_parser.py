@@ -47,6 +47,7 @@ class ImuParser:
         self.needed = 32 if late_by_one_byte else 31
         self.code_ring_full = errors.MSIMU_RX_OF
         self.ring = integers(128)
+        self.words = integers(7)  # of the packet that was looked at last: six values and the timer
         self.ring_write = 0
         self.ring_read = 0
         self.roll = 0.0
@@ -97,9 +98,13 @@ class ImuParser:
         in the next call's 31 bytes.
         """
         examined: cython.longlong = 0
-        total: cython.longlong = 0
+        total: cython.longlong = self.header
         sent: cython.longlong
         i: cython.longlong
+        byte_0: cython.longlong
+        byte_1: cython.longlong
+        byte_2: cython.longlong
+        byte_3: cython.longlong
         read: cython.longlong
         waiting: cython.longlong = self.waiting()
         while waiting >= self.needed and self.ring[self.ring_read] != self.header:
@@ -109,37 +114,33 @@ class ImuParser:
             waiting -= 1
         if waiting < self.needed:
             return examined
-        read = self.ring_read
-        for i in range(29):
-            total += self.ring[(read + i) & 127]
-        sent = (self.ring[(read + 29) & 127] << 8) | self.ring[(read + 30) & 127]
+        read = self.ring_read + 1
+        for i in range(7):
+            byte_0 = self.ring[read & 127]
+            byte_1 = self.ring[(read + 1) & 127]
+            byte_2 = self.ring[(read + 2) & 127]
+            byte_3 = self.ring[(read + 3) & 127]
+            total += byte_0 + byte_1 + byte_2 + byte_3
+            self.words[i] = byte_0 << 24 | byte_1 << 16 | byte_2 << 8 | byte_3
+            read += 4
+        sent = (self.ring[read & 127] << 8) | self.ring[(read + 1) & 127]
         examined += 31
         if (total & 0xFFFF) != sent:
             self.bad_checksums += 1
-            self.ring_read = (read + 1) & 127
+            self.ring_read = (self.ring_read + 1) & 127
             return examined
         if self.has_angles:
-            self.roll = self._float_at(read + 1)
-            self.pitch = self._float_at(read + 5)
-            self.yaw = self._float_at(read + 9)
+            self.roll = float_of_word(self.words[0])
+            self.pitch = float_of_word(self.words[1])
+            self.yaw = float_of_word(self.words[2])
         else:
-            self.acceleration_x = self._float_at(read + 1)
-            self.acceleration_y = self._float_at(read + 5)
-            self.acceleration_z = self._float_at(read + 9)
-        self.rate_x = self._float_at(read + 13)
-        self.rate_y = self._float_at(read + 17)
-        self.rate_z = self._float_at(read + 21)
-        self.timer = 0
-        for i in range(4):
-            self.timer = (self.timer << 8) | self.ring[(read + 25 + i) & 127]
-        self.ring_read = (read + 31) & 127
+            self.acceleration_x = float_of_word(self.words[0])
+            self.acceleration_y = float_of_word(self.words[1])
+            self.acceleration_z = float_of_word(self.words[2])
+        self.rate_x = float_of_word(self.words[3])
+        self.rate_y = float_of_word(self.words[4])
+        self.rate_z = float_of_word(self.words[5])
+        self.timer = self.words[6]
+        self.ring_read = (read + 2) & 127
         self.packets += 1
         return examined
-
-    def _float_at(self, index: cython.longlong) -> cython.double:
-        """The big-endian single whose first byte is at `index` of the ring."""
-        word: cython.longlong = 0
-        i: cython.longlong
-        for i in range(4):
-            word = (word << 8) | self.ring[(index + i) & 127]
-        return float_of_word(word)

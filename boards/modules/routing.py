@@ -158,13 +158,12 @@ class Router:
     def route_step(self, now: cython.longlong) -> cython.longlong:
         """Move up to three frames, one each from the link, the CAN ring and the own ring; return how many."""
         moved: cython.longlong = 0
-        read: cython.longlong
+        read: cython.longlong = self.rx_read
         ssp: RouterSspLink = self.ssp
         if ssp.received_read != ssp.received_write and ssp.take():
             self.load.counts[0] += 1
             self.route(0, ssp.rx_id, ssp.rx_flags, ssp.rx_word0, ssp.rx_word1, now)
             moved += 1
-        read = self.rx_read
         if read != self.rx_write:
             self.rx_read = (read + 1) & 63
             self.route(
@@ -215,12 +214,13 @@ class Router:
         if mask & 1:
             self.ssp.push(identifier, flags, word0, word1, now)
             n += 1
+        mask >>= 1
         channel = 1
-        while mask > 1:
-            mask >>= 1
+        while mask != 0:
             if mask & 1:
                 self.queue(channel, identifier, flags, word0, word1)
                 n += 1
+            mask >>= 1
             channel += 1
         self.copies += n
         return n

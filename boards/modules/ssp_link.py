@@ -348,6 +348,7 @@ class RouterSspLink:
         `flags` as in foundation.events; `now` is the instant in ns at which the pushing begins.
         """
         header: cython.longlong = (identifier & 0x7FF) | 0x7800
+        used: cython.longlong = self.packing.used
         if self.half_words > 494:
             self.transmit_lost += 1
             self.report(self.code_transmit_full)
@@ -356,8 +357,8 @@ class RouterSspLink:
             header |= 0x8000
         self.half_words += 5
         self.push_time = now
-        if self.packing.used > 25:
-            if self.packing.used < 30:  # a frame was cut before: this one straddles two segments
+        if used > 25:
+            if used < 30:  # a frame was cut before: this one straddles two segments
                 for word in (header, word0 >> 16, word0, word1 >> 16, word1):
                     self._put(word & 0xFFFF)
                 return True
@@ -413,7 +414,6 @@ class RouterSspLink:
 
     def _cut(self, segment: SspSegment, used: cython.longlong) -> cython.void:
         """Leave `used` half-words in the first segment; the others come before those of the second, the last one."""
-        i: cython.longlong
         if self.first == self.last:
             self._begin_segment()
         words = [segment.words[i] for i in range(used, segment.used)]

@@ -23,3 +23,5 @@ cdef class CanController(Peripheral):
     cpdef long long GSR(self) noexcept
     cpdef double bit_rate(self) except? -1
     cdef void _bus_off(self) noexcept
+
+cdef long long frame_word(long long flags) noexcept

@@ -75,20 +75,21 @@ class Uart(Peripheral):
         i: cython.longlong
         count: cython.longlong = 1
         bytes_left: cython.longlong = queue.b
+        place: cython.longlong = self.fifo_head + self.fifo_count
         if queue.c > 1:
             count = queue.c
             bytes_left = queue.d
         self.received += count
+        if self.fifo_count + count > 16:  # the last ones are lost
+            self.overruns += self.fifo_count + count - 16
+            self.errors |= 2
+            count = 16 - self.fifo_count
         for i in range(count):
             if i == 4:
                 bytes_left = queue.e
-            if self.fifo_count < 16:
-                self.fifo[(self.fifo_head + self.fifo_count) & 15] = bytes_left & 255
-                self.fifo_count += 1
-            else:  # lost
-                self.overruns += 1
-                self.errors |= 2
+            self.fifo[(place + i) & 15] = bytes_left & 255
             bytes_left >>= 8
+        self.fifo_count += count
         if self.fifo_count == 0:
             return
         self.chip.set_alarm(self.timeout_alarm, queue.time + 4 * self.byte_ns)
