@@ -5,14 +5,14 @@
     plant -> sensors -> pins -> interrupts and slots -> data table -> CAN -> router -> main brain
           -> CAN -> slots -> PWM -> plant
 
-Virtual time advances in quanta of 31.25 us, a quarter of the plant's step. That is shorter than the shortest
+Virtual time advances in quanta of 31.25 us, an eighth of the plant's step. That is shorter than the shortest
 frame on Ranger's buses (36 us), so a frame requested within a quantum ends after it: boards that are advanced
 one after the other never miss what another one sends, and the result does not depend on the order in which
 they are advanced. Within a quantum: plant, pins, buses, then the boards with their interrupts and slots, then
 their outputs. A board with nothing to do before the end of the quantum is passed over.
 
-ROBOT PARITY: the plant moves in steps of 125 us. What a board writes to its bridge acts from the next step on, so up
-to 125 us late; what sensors show is a straight line over a step (voltages) or stands through it (words).
+ROBOT PARITY: the plant moves in steps of 250 us. What a board writes to its bridge acts from the next step on, so up
+to 250 us late; what sensors show is a straight line over a step (voltages) or stands through it (words).
 """
 
 import array

@@ -215,10 +215,10 @@ def report() -> str:
 
 def steps_of_falling_body(body: Body, seconds: float) -> int:
     """Strikes of a body let alone for so long (it falls); used to time the plant without a controller."""
-    for _ in range(round(seconds / 125e-6)):
+    for _ in range(round(seconds / 250e-6)):
         if body.mode == FALLEN:
             break
-        body.advance(125e-6)
+        body.advance(250e-6)
     return body.record.steps
 
 

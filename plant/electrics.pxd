@@ -17,9 +17,10 @@ cdef class Electrics:
     cdef public double[::1] analog_start, analog_end, values, zero_V, slope_V, noise_V, lines, scale, offset, lag_s, state, battery_A
     cdef public bint has_terms
     cdef public double electronics_W, pwm_offset_A, voltage_clip_V, battery_current_lag_s, lag_h, lag_factor
-    cdef public double electronics_J, motor_current_A
+    cdef public double electronics_J, motor_current_A, hip_rate, outer_rate, inner_rate, steering_rate
     cpdef void step_motors(
         self, long long t0, long long t1, double hip_rate, double outer_rate, double inner_rate, double steering_rate,
+        bint jumped=*,
     ) noexcept
     cpdef void sense(
         self, long long t0, long long t1, bint outer_contact, double outer_load_N,

@@ -78,7 +78,7 @@ class ElectricsParameters:
     foot_noise_counts: float = 10.0
     steering_noise_V: float = 0.0005
     # Smoothing of the battery current by the bridge's capacitors and the converter's filter [A 3.6 names both].
-    # Chosen by us: four steps of the plant, one slot of a motor board.
+    # Chosen by us: two steps of the plant, one slot of a motor board.
     battery_current_lag_s: float = 0.0005
     # The AD623's range "was not really sufficient" [A 3.8]: highest battery voltage that it passes on. Chosen by
     # us: out of reach by default, so that the firmware's constants hold; 27 V shows the effect.
@@ -132,6 +132,10 @@ class Electrics:
         self.lag_factor = 1.0
         self.electronics_J = 0.0
         self.motor_current_A = 0.0  # of all motors together, mean of the step
+        self.hip_rate = 0.0  # rad/s at the start of the last step; so the next three
+        self.outer_rate = 0.0
+        self.inner_rate = 0.0
+        self.steering_rate = 0.0
         for motor in range(len(MOTOR_NAMES)):
             g, off, gain, battery_g, battery_off, battery_gain, volt_g = BOARD_CONSTANTS[motor]
             volts = ADS7871_REFERENCE_V / 8192.0
@@ -167,15 +171,25 @@ class Electrics:
         outer_rate: cython.double,
         inner_rate: cython.double,
         steering_rate: cython.double,
+        jumped: cython.bint = True,
     ) -> cython.void:
-        """Currents, torques and battery over [t0, t1) ns at these joint (motor over gear) rates, rad/s."""
+        """Currents, torques and battery over [t0, t1) ns; joint (motor over gear) rates at its start, rad/s.
+
+        Unless they have `jumped` since the step before, the windings see them in the step's middle, as they
+        have changed over the step before (EQUATIONS 10.2).
+        """
         V: cython.double = self.battery.voltage_V
         total: cython.double
         h: cython.double = (t1 - t0) * 1e-9
-        self.hip.step_electrical(t0, t1, hip_rate, V)
-        self.outer_ankle.step_electrical(t0, t1, outer_rate, V)
-        self.inner_ankle.step_electrical(t0, t1, inner_rate, V)
-        self.steering.step_electrical(t0, t1, steering_rate, V)
+        half: cython.double = 0.0 if jumped else 0.5
+        self.hip.step_electrical(t0, t1, hip_rate + half * (hip_rate - self.hip_rate), V)
+        self.outer_ankle.step_electrical(t0, t1, outer_rate + half * (outer_rate - self.outer_rate), V)
+        self.inner_ankle.step_electrical(t0, t1, inner_rate + half * (inner_rate - self.inner_rate), V)
+        self.steering.step_electrical(t0, t1, steering_rate + half * (steering_rate - self.steering_rate), V)
+        self.hip_rate = hip_rate
+        self.outer_rate = outer_rate
+        self.inner_rate = inner_rate
+        self.steering_rate = steering_rate
         total = self.hip.battery_current_A + self.outer_ankle.battery_current_A
         total += self.inner_ankle.battery_current_A + self.steering.battery_current_A
         self.motor_current_A = total

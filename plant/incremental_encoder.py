@@ -393,7 +393,7 @@ class IncrementalEncoder:
         rising: cython.bint = self._value(x1) > self._value(x0)
         time: cython.longlong
         _i: cython.longlong
-        for _i in range(40):  # 125 us / 2^40 is far below 1 ns; a fixed number keeps both runs equal
+        for _i in range(40):  # 250 us / 2^40 is far below 1 ns; a fixed number keeps both runs equal
             middle = 0.5 * (low + high)
             if (self._value(middle) < level) == rising:
                 low = middle

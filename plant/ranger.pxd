@@ -23,7 +23,7 @@ cdef class RangerPlant:
     cdef public double[::1] analog_start, analog_end
     cdef public long long time_ns, step_ns, steps, strike_time_ns, lift_off_time_ns, changes
     cdef public double step_s, zero, step_length_m, distance_m
-    cdef public bint fell
+    cdef public bint fell, jumped
     cdef public str fall_cause
     cpdef void hold(
         self, object stance=*, double lean_rad=*, double hip_angle_rad=*, double outer_ankle_rad=*,

@@ -1,6 +1,6 @@
-"""The physical robot in one object: body, motors, battery, sensors, steering, floor; 125 us a step.
+"""The physical robot in one object: body, motors, battery, sensors, steering, floor; 250 us a step.
 
-A step in order (EQUATIONS 15): currents of the motors at the rates of its start, in closed form; the body under
+A step in order (EQUATIONS 15): currents of the motors at the rates of its middle, in closed form; the body under
 their mean torques, events located inside; steering; then everything the boards can see, as straight lines between
 start and end of the step, and every encoder edge with its time.
 
@@ -22,7 +22,7 @@ from plant.parameters import BodyParameters
 from plant.steering import Steering
 from plant.walk_record import RING
 
-STEP_NS = 125_000  # the plant's step; its error is measured in EQUATIONS 15
+STEP_NS = 250_000  # the plant's step; its error is measured in EQUATIONS 15
 
 # What `fill_sample` writes, in this order: name and unit.
 SAMPLES = {
@@ -132,6 +132,7 @@ class RangerPlant:
         self.fell = False
         self.fall_cause = ""
         self.changes = 0
+        self.jumped = True  # rates at the start of the next step do not continue those of the last one
         self.sample_names = SAMPLES
         self.model_file = model_file
         if model_file is not None:
@@ -187,6 +188,7 @@ class RangerPlant:
     def _settle(self) -> cython.void:
         """Sensors as if the robot had stood like this for long, from here on."""
         b: Body = self.body
+        self.jumped = True
         h: cython.double = b.leg_outer - b.leg_inner
         outer: cython.double = b.foot_outer - b.leg_outer + self.zero
         inner: cython.double = b.foot_inner - b.leg_inner + self.zero
@@ -230,7 +232,8 @@ class RangerPlant:
         inner_stands: cython.bint
         yaw0: cython.double = s.yaw
 
-        e.step_motors(t0, t1, h0_rate, p0_rate, n0_rate, s.rate)
+        e.step_motors(t0, t1, h0_rate, p0_rate, n0_rate, s.rate, self.jumped)
+        self.jumped = False
         b.hip_drive = self.hip.drive_Nm
         b.hip_coulomb = self.hip.coulomb_Nm
         b.hip_viscous = self.hip.viscous_Nms
@@ -280,6 +283,7 @@ class RangerPlant:
         """Copy what a harness asks for every step out of the record; only after something happened."""
         r = self.record
         self.changes = self.body.changes
+        self.jumped = True
         self.steps = r.steps
         self.strike_time_ns = r.strike_time_ns
         self.lift_off_time_ns = r.lift_off_time_ns

@@ -17,6 +17,9 @@ from plant import paper_model as pm
 from plant.body import DOUBLE, FLIGHT, HELD, INNER, OUTER, SINGLE, Body
 from plant.floor import Floor
 from plant.parameters import BodyParameters, hip_spring_torque_Nm
+from plant.ranger import STEP_NS
+
+STEP_S = STEP_NS * 1e-9
 
 STATE = ("foot_outer", "leg_outer", "leg_inner", "foot_inner", "motor_outer", "motor_inner")
 
@@ -426,11 +429,11 @@ def test_a_held_robot_swings_its_inner_leg_as_a_pendulum():
     assert body.mode == HELD
     crossings = []
     before = body.hip_angle()
-    for k in range(30000):
-        body.advance(125e-6)
+    for k in range(round(3.75 / STEP_S)):
+        body.advance(STEP_S)
         now = body.hip_angle()
         if before > 0 >= now:
-            crossings.append((k + before / (before - now)) * 125e-6)
+            crossings.append((k + before / (before - now)) * STEP_S)
         before = now
     found = (crossings[-1] - crossings[0]) / (len(crossings) - 1)
     # amplitude 0.01 rad lengthens the period by theta^2/16 of the gravity part: 3e-6; the hanging foot pulls at the
@@ -463,12 +466,12 @@ def test_energy_is_kept_without_friction(mode, foot_inertia, exact_spring):
         body.update_pose()
     before = body.energy_J()
     seconds = 0.03 if mode == DOUBLE else 0.2
-    for _ in range(round(seconds / 125e-6)):
+    for _ in range(round(seconds / STEP_S)):
         if mode == FLIGHT:
-            body.in_air(125e-6, 4)
+            body.in_air(STEP_S, 4)
         else:
-            body.on_feet(125e-6, 4)
-    # fourth order at 125 us: facts on the plant 2 give 4.5e-10 per second at 500 us, so 2e-12 here. The arc is long
+            body.on_feet(STEP_S, 4)
+    # fourth order: facts on the plant 2 give 4.5e-10 per second at 500 us, so 3e-11 at 250 us. The arc is long
     # enough not to roll over its end, where the acceleration jumps (that costs 1e-7).
     assert body.energy_J() == pytest.approx(before, rel=1e-10)
 
@@ -478,22 +481,22 @@ def opening(seed, steps):
     closed_posture(body, RandomStream(seed, "closed"), OUTER)
     worst = []
     for _ in range(steps):
-        body.on_feet(125e-6, 4)
+        body.on_feet(STEP_S, 4)
         body.update_pose()
         worst.append(abs(body.gap_inner))
     return worst
 
 
 def test_the_closed_linkage_stays_closed():
-    # 50 ms on the arcs of both feet: rounding of a hip height of 1 m, integrated twice
-    assert max(opening(4, 400)) < 1e-12
+    # 50 ms on the arcs of both feet: the method's own error, 4e-12 m at 250 us and lost in rounding at 125 us
+    assert max(opening(4, round(0.05 / STEP_S))) < 1e-11
 
 
 def test_a_linkage_opened_by_the_end_of_an_arc_closes_again():
     # This stance rolls over the heel end inside a step: the jump of the acceleration (some 1e3 m/s^2) acts for at most
-    # one step, 0.5 x 1e3 x (125 us)^2 = 8 um, and decays at 100 1/s.
-    worst = opening(3, 800)
-    assert 1e-7 < max(worst) < 1e-5
+    # one step, 0.5 x 1e3 x (250 us)^2 = 31 um, and decays at 100 1/s.
+    worst = opening(3, round(0.1 / STEP_S))
+    assert 1e-7 < max(worst) < 4e-5
     assert worst[-1] < 0.02 * max(worst)
 
 

@@ -10,7 +10,7 @@ from foundation.user_error import UserError
 from plant.motor_parameters import ANKLE_MOTOR, HIP_MOTOR, STEERING_MOTOR, MotorParameters
 from plant.motor_unit import MotorUnit
 
-STEP = 125_000  # ns, the plant's step
+STEP = 125_000  # ns; the formulas are exact for any step
 COUNTS = 600
 
 

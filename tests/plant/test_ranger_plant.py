@@ -47,12 +47,12 @@ def test_motors_and_body_agree_about_gears_rotors_and_smoothing():
     assert plant.hip.inverse_smoothing == body.inverse_smoothing
 
 
-def test_a_step_is_125_us_and_starts_where_the_last_one_ended():
+def test_a_step_is_250_us_and_starts_where_the_last_one_ended():
     plant = RangerPlant(start_ns=7_000)
     plant.hold()
     for n in range(1, 4):
         plant.step()
-        assert plant.time_ns == 7_000 + n * STEP_NS
+        assert plant.time_ns == 7_000 + n * 250_000 == 7_000 + n * STEP_NS
 
 
 def test_encoders_and_words_show_the_body():
@@ -102,10 +102,10 @@ def test_the_gyro_sends_the_outer_legs_rate():
     plant, _ = walking_plant(seconds=2.0)
     for byte in (0xC4, 0xC1, 0x29, 0xC2):
         plant.imu.receive_byte(plant.time_ns, byte)
-    for _ in range(8):
+    for _ in range(1_000_000 // STEP_NS):
         plant.step()
     a_millisecond_ago = plant.body.leg_outer_rate
-    for _ in range(8):
+    for _ in range(1_000_000 // STEP_NS):
         plant.step()
     rate = plant.body.leg_outer_rate
     # bias -0.004 rad/s; the newest sample is at most 1 ms old and has noise of 4 mrad/s, of which four sigma
@@ -212,7 +212,7 @@ def turn(steering, drive, outer, inner, steps=4000, hip_step=0.0):
     x = steering.hip_x
     for _ in range(steps):
         x += hip_step
-        steering.advance(125e-6, drive, 0.02, 0.001, 20.0, outer, inner, x)
+        steering.advance(STEP_NS * 1e-9, drive, 0.02, 0.001, 20.0, outer, inner, x)
 
 
 def test_a_full_twist_in_inner_stance_turns_the_robot_by_five_degrees():

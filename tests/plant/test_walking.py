@@ -13,6 +13,7 @@ from plant.floor import Floor
 from plant.parameters import BodyParameters
 from plant.ranger import RangerPlant
 from tests.plant.walking import (
+    STEP_S,
     ElectricWalker,
     PaperGait,
     RecordGait,
@@ -110,5 +111,5 @@ def test_a_robot_without_current_falls_forward_and_the_walk_ends_with_that():
     assert body.cause in ("fell forward", "fell backward", "legs split", "tripped")
     assert body.record.fall_cause == body.cause
     fallen = body.leg_outer
-    body.advance(125e-6)
+    body.advance(STEP_S)
     assert body.leg_outer == fallen and body.record.fall_time_ns > 0

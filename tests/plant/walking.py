@@ -7,6 +7,7 @@ appendix (eq. 35, smoothed by eq. 43) and the electric power of eq. 32, per moto
 import math
 
 from plant.body import DOUBLE, FALLEN, SINGLE, Body
+from plant.ranger import STEP_NS
 
 K = 0.018  # N m/A, torque constant [appendix table 3]
 R = 1.34  # ohm, with the series inductor [facts on the plant 3]
@@ -14,9 +15,10 @@ V_C = 0.7  # V, brush contacts
 MU = 0.1
 C0 = 0.1  # N m on the robot [facts on the plant 3]
 C1 = 0.01  # N m s/rad
-STEP_S = 125e-6
+STEP_S = STEP_NS * 1e-9
 ZERO = 1.68  # rad, ankle reading with the sweet spot under an upright leg
-TICK = 16  # steps of the plant per controller tick of 2 ms
+TICK = 2_000_000 // STEP_NS  # steps of the plant per controller tick of 2 ms
+SLOT = 500_000 // STEP_NS  # and per slot of a motor board
 
 
 def clip(value, low, high):
@@ -91,12 +93,12 @@ class Walker:
         while b.mode != FALLEN and b.record.steps < steps and self.seconds < seconds:
             if self.count % TICK == 0:
                 self.controller.tick(self)
-            if self.commands is not None and self.count % 4 == 0:
+            if self.commands is not None and self.count % SLOT == 0:
                 self.obey()
             self.hip.spend(b.hip_rate(), STEP_S)
             self.ankles[0].spend(b.motor_outer_rate, STEP_S)
             self.ankles[1].spend(b.motor_inner_rate, STEP_S)
-            b.step_start_ns = self.count * 125_000
+            b.step_start_ns = self.count * STEP_NS
             b.advance(STEP_S)
             self.count += 1
         return b.mode != FALLEN
@@ -378,7 +380,7 @@ def held_start(walker, lean=0.09, rate=0.7, seconds=1.5):
     walker.body.place(lean, 0.35)
     walker.body.hold_standing(lean, 0.35)
     walker.run(1, seconds)
-    walker.body.step_start_ns = walker.count * 125_000
+    walker.body.step_start_ns = walker.count * STEP_NS
     walker.body.release(rate)
 
 
@@ -412,7 +414,7 @@ class ElectricWalker(Walker):
         while not plant.fell and plant.steps < steps and self.seconds < seconds:
             if self.count % TICK == 0:
                 self.controller.tick(self)
-            if self.count % 4 == 0:
+            if self.count % SLOT == 0:
                 self.obey()
             plant.step()
             self.count += 1
