@@ -28,6 +28,8 @@ cdef class Bus:
     cdef public EventQueue commands
     # the bus in absolute bits since power-up
     cdef public long long free_bit, free_time, quiet_bit, advanced, next_bit, next_time
+    cdef public long long[::1] wakes
+    cdef public long long wake_place
     cdef public long long operating, joining
     # transmit buffers, index node * 3 + buffer - 1
     cdef public long long[::1] keys, ready, asked, asked_time, identifiers, flags, lows, highs, busy_until

@@ -135,6 +135,8 @@ class Bus:
         self.advanced = -1
         self.next_bit = NEVER  # where the next frame starts, as far as known
         self.next_time = NEVER
+        self.wakes = integers(1)
+        self.wake_place = 0
         self.operating = 0
         self.joining = 0
         empty = integers(0)
@@ -206,6 +208,11 @@ class Bus:
         seconds: cython.longlong = bit // self.bitrate
         rest: cython.longlong = bit - seconds * self.bitrate
         return seconds * billion + (rest * billion + self.bitrate - 1) // self.bitrate
+
+    def wake(self, wakes, place) -> None:
+        """From now on an earlier `next_time` lowers `wakes[place]` (whole numbers, ns) to it."""
+        self.wakes = wakes
+        self.wake_place = place
 
     # ---- nodes
 
@@ -330,6 +337,8 @@ class Bus:
             self.next_bit = first
         if start < self.next_time:
             self.next_time = start
+            if start < self.wakes[self.wake_place]:
+                self.wakes[self.wake_place] = start
         return True
 
     def _refuse(self, owner, flags) -> None:
@@ -362,6 +371,7 @@ class Bus:
             raise ValueError(f"bus {self.name}: node {node} does not exist")
         self.commands.push(max(time, self.advanced), 0, kind, node, value)
         self.next_time = min(self.next_time, self.commands.head_time)
+        self.wakes[self.wake_place] = min(self.wakes[self.wake_place], self.next_time)
 
     # ---- disturbances
 
@@ -451,11 +461,11 @@ class Bus:
         if until > self.advanced:
             self.advanced = until  # decided, also where nothing starts
         while self.next_time <= until:
-            if self.commands.count == 0 and self.joining == 0:
+            if self.commands.head_time == _NEVER and self.joining == 0:
                 self._attempt(self.next_bit)
             elif not self._change(until):
                 self._attempt(self.next_bit)
-            if self.pending_count == 0 and self.commands.count == 0 and self.joining == 0:
+            if self.pending_count == 0 and self.commands.head_time == _NEVER and self.joining == 0:
                 self.next_bit = _NEVER
                 self.next_time = _NEVER
             else:
@@ -644,7 +654,7 @@ class Bus:
                 if node.receive_errors > 0:
                     self._calm_receiver(node, received)
                 if node.listening:
-                    node.inbox.push(received, node.order, 2, node.controller, identifier, flags, lo, hi)  # CAN_RX
+                    node.inbox.put(received, node.order, 2, node.controller, identifier, flags, lo, hi, 0)  # CAN_RX
                     node.received += 1
                     heard = True
         if received <= self.advanced:
@@ -783,7 +793,7 @@ class Bus:
         else:
             self._remove(slot)
         self.busy_until[slot] = done
-        node.inbox.push(done, node.order, 3, node.controller, slot % 3 + 1, 0)  # CAN_TX_DONE, TX_SENT
+        node.inbox.put(done, node.order, 3, node.controller, slot % 3 + 1, 0, 0, 0, 0)  # CAN_TX_DONE, TX_SENT
         node.sent += 1
         node.sending_end = end
         if node.passive:

@@ -1,7 +1,7 @@
 cimport cython
 
 from foundation.edge_buffer cimport EdgeBuffer
-from foundation.events cimport EventQueue
+from foundation.events cimport EventQueue, Outbox
 from firmware_sim.analog cimport AnalogPins
 from firmware_sim.clock cimport Crystal
 from firmware_sim.scheduler cimport Occasional, Schedule, SlotScheduler, Task, Wait, call, call_with
@@ -23,7 +23,8 @@ cdef class Microcontroller:
     cdef public str name
     cdef public long long hz
     cdef public Crystal crystal
-    cdef public EventQueue inbox, outbox
+    cdef public EventQueue inbox
+    cdef public Outbox outbox
     cdef public long long now, next_time
     cdef public SlotScheduler scheduler
     cdef public InterruptController vic

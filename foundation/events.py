@@ -1,5 +1,5 @@
 # cython: boundscheck=False, wraparound=False, initializedcheck=False
-# (every index below is a slot of the pool)
+# (every index below lies between the head and the tail of the rows, or is the place of an object that is kept)
 """Stamped messages: everything that passes between a board and the rest of the world.
 
 A message is (time, order, kind, six integers, one object). Time is virtual, in ns since the robot's
@@ -51,57 +51,12 @@ TX_SENT = 0
 TX_ABORTED = 1  # aborted on request before it started
 TX_LOST = 2  # single shot that lost arbitration or met an error
 
+ROW = 10  # numbers in a row of a queue
+_NEVER = NEVER  # a C variable when compiled (.pxd)
 
-class EventQueue:
-    """Messages sorted by (time, order, arrival): a doubly linked list in a pool of slots.
 
-    New messages mostly belong near the end, so insertion walks back from there. `take` moves the first
-    message into the fields `time, order, kind, a ... f, ref` of the queue itself.
-    """
-
-    def __init__(self, capacity=256) -> None:
-        self.capacity = 0
-        self.count = 0
-        self.head = -1
-        self.tail = -1
-        self.free = -1
-        self.head_time = 1 << 62
-        self.pushed = 0
-        # a slot is one row: time, order, kind, a ... f, next slot, previous slot, 1 if `refs` has an object
-        self.rows = integers(0)
-        self.refs = []
-        self.time = 0
-        self.order = 0
-        self.kind = 0
-        self.a = 0
-        self.b = 0
-        self.c = 0
-        self.d = 0
-        self.e = 0
-        self.f = 0
-        self.ref = None
-        self.wakes = array.array("q", [0])
-        self.wake_place = 0
-        self._grow(capacity)
-
-    def wake(self, wakes, place) -> None:
-        """From now on a new first message lowers `wakes[place]` (an array of instants in ns) to its time."""
-        self.wakes = wakes
-        self.wake_place = place
-
-    def _grow(self, capacity) -> None:
-        """Enlarge the pool to `capacity` slots, keeping what is queued."""
-        extra = capacity - self.capacity
-        grown = integers(12 * capacity)
-        i: cython.longlong
-        for i in range(12 * self.capacity):
-            grown[i] = self.rows[i]
-        self.rows = grown
-        self.refs.extend([None] * extra)
-        for i in range(self.capacity, capacity):
-            self.rows[12 * i + 9] = self.free
-            self.free = i
-        self.capacity = capacity
+class Outbox:
+    """What takes the stamped messages of a board: a queue, or the wires of the robot, which carry them on at once."""
 
     def push(
         self,
@@ -115,85 +70,169 @@ class EventQueue:
         e: cython.longlong = 0,
         f: cython.longlong = 0,
         ref: object = None,
-    ) -> cython.void:
+    ) -> None:
+        """Take a message: its stamp (ns), `order`, kind, six integers, and an object where the kind has one."""
+
+
+class EventQueue(Outbox):
+    """Messages sorted by (time, order, arrival), as rows that follow each other in one array.
+
+    A new message mostly belongs at the end; else those after it move up by one row. `take` moves the first message
+    into the fields `time, order, kind, a ... f, ref` of the queue itself.
+    """
+
+    def __init__(self, capacity=256) -> None:
+        # a row is ROW numbers: time, order, kind, a ... f, and the place in `refs` of its object (0: it has none)
+        self.rows = integers(ROW * capacity)
+        self.size = ROW * capacity
+        self.head = 0  # where the first row begins
+        self.tail = 0  # where the last row ends
+        self.head_time = NEVER
+        self.pushed = 0
+        self.refs = [None, None]
+        self.time = 0
+        self.order = 0
+        self.kind = 0
+        self.a = 0
+        self.b = 0
+        self.c = 0
+        self.d = 0
+        self.e = 0
+        self.f = 0
+        self.ref = None
+        self.wakes = array.array("q", [0])
+        self.wake_place = 0
+
+    @property
+    def count(self) -> int:
+        """How many messages wait."""
+        return (self.tail - self.head) // ROW
+
+    def wake(self, wakes, place) -> None:
+        """From now on a new first message lowers `wakes[place]` (an array of instants in ns) to its time."""
+        self.wakes = wakes
+        self.wake_place = place
+
+    def _make_room(self) -> None:
+        """The rows have reached the end of the array: move them to its begin, or into one of twice the size."""
+        i: cython.longlong
+        used: cython.longlong = self.tail - self.head
+        rows = self.rows
+        if 2 * used > self.size:
+            self.size = 2 * self.size
+            self.rows = integers(self.size)
+        for i in range(used):
+            self.rows[i] = rows[self.head + i]
+        self.head = 0
+        self.tail = used
+
+    def push(
+        self,
+        time: cython.longlong,
+        order: cython.longlong,
+        kind: cython.longlong,
+        a: cython.longlong = 0,
+        b: cython.longlong = 0,
+        c: cython.longlong = 0,
+        d: cython.longlong = 0,
+        e: cython.longlong = 0,
+        f: cython.longlong = 0,
+        ref: object = None,
+    ) -> None:
         """Add a message; among equal (time, order) it comes after those already there."""
-        slot: cython.longlong
-        before: cython.longlong
-        after: cython.longlong
-        row: cython.longlong
-        if self.free < 0:
-            self._grow(self.capacity * 2)
-        slot = self.free
-        row = slot * 12
-        self.free = self.rows[row + 9]
-        before = self.tail
-        while before >= 0 and self.rows[before * 12] >= time:
-            if self.rows[before * 12] == time and self.rows[before * 12 + 1] <= order:
+        at: cython.longlong = self.put(time, order, kind, a, b, c, d, e, f)
+        place: cython.longlong = 1
+        if ref is not None:
+            while self.refs[place] is not None:  # few messages wait that have one
+                place += 1
+                if place == len(self.refs):
+                    self.refs.append(None)
+            self.refs[place] = ref
+            self.rows[at + 9] = place
+
+    def put(
+        self,
+        time: cython.longlong,
+        order: cython.longlong,
+        kind: cython.longlong,
+        a: cython.longlong,
+        b: cython.longlong,
+        c: cython.longlong,
+        d: cython.longlong,
+        e: cython.longlong,
+        f: cython.longlong,
+    ) -> cython.longlong:
+        """`push` without an object, and with all the numbers: a few instructions. Returns where the row begins."""
+        at: cython.longlong
+        if self.tail == self.size:
+            self._make_room()
+        at = self.tail
+        self.tail = at + 10
+        while at > self.head:
+            if self.rows[at - 10] < time or (self.rows[at - 10] == time and self.rows[at - 9] <= order):
                 break
-            before = self.rows[before * 12 + 10]
-        if before < 0:
-            after = self.head
-            self.head = slot
+            self._move_up(at)
+            at -= 10
+        if cython.compiled:
+            self.rows[at] = time
+            self.rows[at + 1] = order
+            self.rows[at + 2] = kind
+            self.rows[at + 3] = a
+            self.rows[at + 4] = b
+            self.rows[at + 5] = c
+            self.rows[at + 6] = d
+            self.rows[at + 7] = e
+            self.rows[at + 8] = f
+            self.rows[at + 9] = 0
+        else:
+            self.rows[at : at + 10] = (time, order, kind, a, b, c, d, e, f, 0)
+        if at == self.head:
             self.head_time = time
             if time < self.wakes[self.wake_place]:
                 self.wakes[self.wake_place] = time
-        else:
-            after = self.rows[before * 12 + 9]
-            self.rows[before * 12 + 9] = slot
-        if after < 0:
-            self.tail = slot
-        else:
-            self.rows[after * 12 + 10] = slot
-        self.rows[row] = time
-        self.rows[row + 1] = order
-        self.rows[row + 2] = kind
-        self.rows[row + 3] = a
-        self.rows[row + 4] = b
-        self.rows[row + 5] = c
-        self.rows[row + 6] = d
-        self.rows[row + 7] = e
-        self.rows[row + 8] = f
-        self.rows[row + 9] = after
-        self.rows[row + 10] = before
-        self.rows[row + 11] = 0
-        if ref is not None:
-            self.refs[slot] = ref
-            self.rows[row + 11] = 1
-        self.count += 1
         self.pushed += 1
+        return at
+
+    def _move_up(self, at: cython.longlong) -> cython.void:
+        """The row that ends at `at` makes room for one before it."""
+        i: cython.longlong
+        for i in range(at, at + 10):
+            self.rows[i] = self.rows[i - 10]
 
     def take(self) -> cython.bint:
         """Move the first message into the fields of the queue; False when the queue is empty."""
-        slot: cython.longlong = self.head
-        row: cython.longlong = slot * 12
-        after: cython.longlong
-        if slot < 0:
+        at: cython.longlong = self.head
+        place: cython.longlong
+        if at == self.tail:
             return False
-        self.time = self.rows[row]
-        self.order = self.rows[row + 1]
-        self.kind = self.rows[row + 2]
-        self.a = self.rows[row + 3]
-        self.b = self.rows[row + 4]
-        self.c = self.rows[row + 5]
-        self.d = self.rows[row + 6]
-        self.e = self.rows[row + 7]
-        self.f = self.rows[row + 8]
-        if self.rows[row + 11]:
-            self.ref = self.refs[slot]
-            self.refs[slot] = None
+        if cython.compiled:
+            self.time = self.rows[at]
+            self.order = self.rows[at + 1]
+            self.kind = self.rows[at + 2]
+            self.a = self.rows[at + 3]
+            self.b = self.rows[at + 4]
+            self.c = self.rows[at + 5]
+            self.d = self.rows[at + 6]
+            self.e = self.rows[at + 7]
+            self.f = self.rows[at + 8]
+            place = self.rows[at + 9]
+        else:
+            (self.time, self.order, self.kind, self.a, self.b, self.c, self.d, self.e, self.f, place) = self.rows[
+                at : at + 10
+            ]
+        if place:
+            self.ref = self.refs[place]
+            self.refs[place] = None
         elif self.ref is not None:
             self.ref = None
-        after = self.rows[row + 9]
-        self.head = after
-        if after < 0:
-            self.tail = -1
-            self.head_time = 1 << 62
+        at += 10
+        if at == self.tail:
+            self.head = 0
+            self.tail = 0
+            self.head_time = _NEVER
         else:
-            self.rows[after * 12 + 10] = -1
-            self.head_time = self.rows[after * 12]
-        self.rows[row + 9] = self.free
-        self.free = slot
-        self.count -= 1
+            self.head = at
+            self.head_time = self.rows[at]
         return True
 
     def clear(self) -> cython.void:

@@ -3,12 +3,12 @@ cimport cython
 from boards.main_brain.estimator cimport Estimator
 from can_bus.bus cimport Bus
 from firmware_sim.microcontroller cimport Microcontroller
-from foundation.events cimport EventQueue
+from foundation.events cimport Outbox
 from harness.processes.remote_board cimport RemoteBoard
 from harness.recorder cimport Recorder, RowStream
 from foundation.edge_buffer cimport ByteBuffer
+from plant.drive cimport Drive
 from plant.imu cimport Imu
-from plant.motor_unit cimport MotorUnit
 from plant.ranger cimport RangerPlant
 
 @cython.final
@@ -25,21 +25,31 @@ cdef class SspWire:
     cpdef void load(self, object segment) noexcept
 
 @cython.final
+cdef class BoardWires(Outbox):
+    cdef public list buses
+    cdef public long long[::1] nodes
+    cdef public dict can_lines, serial_lines
+    cdef public Drive drive
+    cdef public long long watchdog_pin, low_side_2_pin, low_side_6_pin, imu_uart
+    cdef public bint low_side_2, low_side_6
+    cdef public SspWire link
+    cdef public Imu imu
+
+@cython.final
 cdef class Lockstep:
     cdef public RangerPlant plant
-    cdef public list boards, buses, word_wires, motors
+    cdef public list boards, buses, wires, word_wires
     cdef public Recorder recorder
     cdef public long long time, next_sample, sample_count, stop_steps
     cdef public double stop_distance_m
-    cdef public SspWire ssp
     cdef public Imu imu
     cdef public Microcontroller imu_board, main_brain
-    cdef public object serial_lines, can_lines, imu_tap
+    cdef public object imu_tap
     cdef public Estimator estimator
-    cdef public long long imu_index, imu_uart
+    cdef public long long imu_uart
     cdef public long long swing_leg, strike_seen_ns, strike_count, strikes_unmatched, strikes_missed, steps_noticed
     cdef public double strike_sum_ms, strike_squares_ms2
-    cdef public long long[::1] encoder_boards, due, bus_due, step_times, main_brain_words, bus_of, node_of, watchdog_pin, enable_pins, enables
+    cdef public long long[::1] encoder_boards, due, bus_due, step_times, main_brain_words
     cdef public bint records_words, remote
     cdef public double[::1] sample_row
     cpdef long long run(self, long long until)
@@ -48,7 +58,4 @@ cdef class Lockstep:
     cdef void _show_words(self) noexcept
     cdef void _deliver_bytes(self) noexcept
     cdef int _collect_frames(self) except -1
-    cdef int _route(self, long long index, Microcontroller board) except -1
-    cdef int _can_output(self, long long index, EventQueue out) except -1
-    cdef int _serial_output(self, long long index, EventQueue out) except -1
     cdef int _sample(self, long long now) except -1

@@ -22,11 +22,12 @@ import cython
 from can_bus.bus import Bus
 from firmware_sim.microcontroller import Microcontroller
 from foundation.edge_buffer import ByteBuffer
-from foundation.events import EventQueue
+from foundation.events import Outbox
+from foundation.numbers import integers
 from foundation.user_error import UserError
 from harness.processes.remote_board import RemoteBoard
 from harness.recorder import RowStream
-from plant.motor_unit import MotorUnit
+from plant.drive import Drive
 from plant.ranger import RangerPlant
 
 QUANTUM_NS = 31_250
@@ -70,6 +71,102 @@ class SspWire:
         self.loaded = segment
 
 
+class BoardWires(Outbox):
+    """The wires that lead away from one board: its outbox in the assembled robot.
+
+    What the board puts out is carried on at once, with its stamp: frames to its buses, PWM and pins to its bridge,
+    segments over the link, bytes to whoever listens. A pin, a controller or a UART that is not connected here leads
+    nowhere.
+    """
+
+    def __init__(self) -> None:
+        # by controller 1 ... 4: the bus and the node number there
+        self.buses = [None] * 5
+        self.nodes = integers(5, -1)
+        self.can_lines = {}  # {controller: what takes its requests}, where the bus is outside
+        self.drive = None
+        self.watchdog_pin = -1
+        self.low_side_2_pin = -1
+        self.low_side_6_pin = -1
+        self.low_side_2 = False
+        self.low_side_6 = False
+        self.link = None
+        self.imu = None
+        self.imu_uart = -1
+        self.serial_lines = {}  # {UART: what hears it}, where something outside is connected
+
+    def connect_bus(self, controller, bus, node) -> None:
+        """Controller 1 ... 4 of the board is `node` of `bus`; None for `bus` takes it off."""
+        self.buses[controller] = bus
+        self.nodes[controller] = node
+
+    def connect_drive(self, drive, watchdog_pin, low_side_2_pin, low_side_6_pin) -> None:
+        """The board's PWM unit and three of its pins drive a bridge."""
+        self.drive = drive
+        self.watchdog_pin = watchdog_pin
+        self.low_side_2_pin = low_side_2_pin
+        self.low_side_6_pin = low_side_6_pin
+
+    def push(
+        self,
+        time: cython.longlong,
+        order: cython.longlong,
+        kind: cython.longlong,
+        a: cython.longlong = 0,
+        b: cython.longlong = 0,
+        c: cython.longlong = 0,
+        d: cython.longlong = 0,
+        e: cython.longlong = 0,
+        f: cython.longlong = 0,
+        ref: object = None,
+    ) -> None:
+        """Carry on what the board puts out at `time` (ns)."""
+        bus: Bus
+        drive: Drive = self.drive
+        if kind == 36:  # PIN_OUTPUT
+            if drive is not None:
+                if a == self.watchdog_pin:
+                    drive.watchdog_edge(time)
+                elif a == self.low_side_2_pin:
+                    self.low_side_2 = b != 0
+                    drive.low_side(time, self.low_side_2, self.low_side_6)
+                elif a == self.low_side_6_pin:
+                    self.low_side_6 = b != 0
+                    drive.low_side(time, self.low_side_2, self.low_side_6)
+        elif 32 <= kind <= 34:  # CAN_REQUEST, CAN_ABORT, CAN_MODE
+            bus = self.buses[a]
+            if bus is None:
+                self._to_bus_outside(kind, time, a, b, c, d, e, f)
+            elif kind == 32:
+                bus.request(self.nodes[a], b, time, c, d, e, f)
+            elif kind == 33:
+                bus.abort(self.nodes[a], b, time)
+            else:
+                bus.set_mode(self.nodes[a], b, time)
+        elif kind == 35:  # PWM_UPDATE
+            if drive is not None:
+                drive.write_pwm(time, a, b, c)
+        elif kind == 37:  # SSP_START
+            self.link.start(time, ref)
+        elif kind == 38:  # SSP_LOAD
+            self.link.load(ref)
+        elif kind == 39:  # UART_OUTPUT
+            self._to_serial_line(time, a, b, c, ref)
+
+    def _to_bus_outside(self, kind, time, controller, b, c, d, e, f) -> None:
+        line = self.can_lines.get(controller)
+        if line is not None:
+            line.from_board(kind, time, b, c, d, e, f)
+
+    def _to_serial_line(self, time, uart, byte, count, data) -> None:
+        if self.imu is not None and uart == self.imu_uart:
+            self.imu.receive_byte(time, byte)
+            return
+        line = self.serial_lines.get(uart)
+        if line is not None:
+            line.from_board(time, byte, count, data)
+
+
 class Lockstep:
     """Boards, buses and plant on one clock. Built by `harness.ranger.Ranger`, which wires it."""
 
@@ -89,31 +186,25 @@ class Lockstep:
         self.encoder_boards = array.array("q")  # numbers of the boards with encoders on their pins
         self.step_times = array.array("q", [start_ns, start_ns])  # ns, of the step that the sensors show
         self.word_wires = []
-        self.ssp = None
         self.main_brain_words = array.array("q")
         self.records_words = False
         self.sample_row = array.array("d", [0.0]) * 64
         self.sample_count = 0
         # per board the instant (ns) at which it must run; its inbox lowers it when something comes in earlier
-        self.due = array.array("q", [start_ns]) * len(boards)
+        self.due = integers(len(boards), start_ns)
         for place, board in enumerate(boards):
             board.inbox.wake(self.due, place)
-        self.bus_due = array.array("q", [start_ns]) * len(buses)  # the same of each bus
-        # routing tables, index board * 4 + controller - 1; -1 where nothing is connected
-        self.bus_of = array.array("q", [-1]) * (4 * len(boards))
-        self.node_of = array.array("q", [-1]) * (4 * len(boards))
-        self.motors = [None] * len(boards)
-        self.watchdog_pin = array.array("q", [-1]) * len(boards)
-        self.enable_pins = array.array("q", [-1]) * (2 * len(boards))
-        self.enables = array.array("q", [0]) * (2 * len(boards))
+        self.wires = [BoardWires() for _board in boards]
+        for board, wires in zip(boards, self.wires, strict=True):
+            board.outbox = wires
+        self.bus_due = integers(1, start_ns)  # ns, the first instant of interest of all the buses
+        for bus in buses:
+            bus.wake(self.bus_due, 0)
         self.stop_steps = 1 << 62
         self.stop_distance_m = 1e300
         self.imu = None
         self.imu_board = None
-        self.imu_index = -1
         self.imu_uart = 0
-        self.serial_lines = None  # {(board, UART): what hears it}, when something outside is connected
-        self.can_lines = None  # {(board, controller): what takes its requests}, when its bus is outside
         self.imu_tap = None  # hears what the inertial unit sends, beside its board
         self.estimator = None
         self.swing_leg = 1
@@ -132,12 +223,20 @@ class Lockstep:
         if number not in self.encoder_boards:
             self.encoder_boards = array.array("q", list(self.encoder_boards) + [number])
 
-    def connect_imu(self, imu, board, index, uart) -> None:
-        """The inertial unit's bytes go to UART `uart` of `board`, the board's to the unit."""
+    def connect_imu(self, imu, board, uart) -> None:
+        """The inertial unit's bytes go to UART `uart` of `board`, the board's to the unit; None: no unit is there."""
+        wires: BoardWires = self.wires[self.boards.index(board)]
         self.imu = imu
         self.imu_board = board
-        self.imu_index = index
         self.imu_uart = uart
+        wires.imu = imu
+        wires.imu_uart = uart
+
+    def connect_link(self, wire) -> None:
+        """The serial link `wire` between two boards."""
+        for board in (wire.master, wire.slave):
+            wires: BoardWires = self.wires[self.boards.index(board)]
+            wires.link = wire
 
     def connect_voltage(self, source, board, channel) -> None:
         """Voltage `source` of the plant on analog input `channel` of `board`."""
@@ -166,9 +265,7 @@ class Lockstep:
         due: cython.longlong[::1] = self.due
         bus_due: cython.longlong[::1] = self.bus_due
         bus_count: cython.longlong = len(buses)
-        for i in range(bus_count):
-            bus = self.buses[i]
-            bus_due[i] = bus.next_time
+        bus_due[0] = now = self.time  # between two runs anything may have been done to a bus
         for i in range(board_count):
             # between two runs anything may have been done to a board
             board = self.boards[i]
@@ -189,10 +286,13 @@ class Lockstep:
                 plant.step()
                 self._sense()
                 self._collect_frames()
-            for i in range(bus_count):
-                if bus_due[i] <= now:
+            if bus_due[0] <= now:
+                bus_due[0] = 1 << 62
+                for i in range(bus_count):
                     bus = cython.cast(Bus, buses[i])
-                    bus_due[i] = bus.advance(now)
+                    following = bus.advance(now)
+                    if following < bus_due[0]:
+                        bus_due[0] = following
             if self.remote:
                 for i in range(board_count):
                     if due[i] < then:
@@ -207,8 +307,6 @@ class Lockstep:
                     if board.edge_time < following:
                         following = board.edge_time
                     due[i] = following
-                    if board.outbox.count:
-                        self._route(i, board)
             if self.estimator is not None and self.estimator.swing_leg != self.swing_leg:
                 self._notice_strike()
             self.time = then
@@ -286,7 +384,7 @@ class Lockstep:
                 else:
                     high |= line.values[i + k] << (8 * (k - 4))
             # order 256: stage pins; kind 5: UART_BYTE
-            board.inbox.push(line.times[i + n - 1], 256, 5, self.imu_uart, line.values[i], n, low, high)
+            board.inbox.put(line.times[i + n - 1], 256, 5, self.imu_uart, line.values[i], n, low, high, 0)
             i += n
 
     def _collect_frames(self) -> None:
@@ -298,80 +396,6 @@ class Lockstep:
             if bus.log_count > 0:
                 self.recorder.add_frames(b, bus.log, bus.log_count)
                 bus.log_count = 0
-
-    def _route(self, index: cython.longlong, board: Microcontroller) -> None:
-        """Hand on what a board put out: frames to its bus, PWM and pins to its drive, segments to the link."""
-        out: EventQueue = board.outbox
-        place: cython.longlong
-        bus: Bus
-        motor: MotorUnit
-        ssp: SspWire
-        while out.take():
-            if out.kind == 36:  # PIN_OUTPUT
-                motor = cython.cast(MotorUnit, self.motors[index])
-                if motor is not None:
-                    if out.a == self.watchdog_pin[index]:
-                        motor.drive.watchdog_edge(out.time)
-                        continue
-                    if out.a == self.enable_pins[2 * index]:
-                        self.enables[2 * index] = out.b
-                        motor.drive.low_side(out.time, self.enables[2 * index], self.enables[2 * index + 1])
-                        continue
-                    if out.a == self.enable_pins[2 * index + 1]:
-                        self.enables[2 * index + 1] = out.b
-                        motor.drive.low_side(out.time, self.enables[2 * index], self.enables[2 * index + 1])
-                        continue
-            elif out.kind == 35:  # PWM_UPDATE
-                motor = cython.cast(MotorUnit, self.motors[index])
-                if motor is not None:
-                    motor.drive.write_pwm(out.time, out.a, out.b, out.c)
-            elif out.kind == 32:  # CAN_REQUEST
-                place = 4 * index + out.a - 1
-                if self.bus_of[place] >= 0:
-                    bus = cython.cast(Bus, self.buses[self.bus_of[place]])
-                    bus.request(self.node_of[place], out.b, out.time, out.c, out.d, out.e, out.f)
-                    self.bus_due[self.bus_of[place]] = bus.next_time
-                elif self.can_lines is not None:
-                    self._can_output(index, out)
-            elif out.kind == 37:  # SSP_START
-                ssp = self.ssp
-                ssp.start(out.time, out.ref)
-            elif out.kind == 38:  # SSP_LOAD
-                ssp = self.ssp
-                ssp.load(out.ref)
-            elif out.kind == 33:  # CAN_ABORT
-                place = 4 * index + out.a - 1
-                if self.bus_of[place] >= 0:
-                    bus = cython.cast(Bus, self.buses[self.bus_of[place]])
-                    bus.abort(self.node_of[place], out.b, out.time)
-                    self.bus_due[self.bus_of[place]] = bus.next_time
-                elif self.can_lines is not None:
-                    self._can_output(index, out)
-            elif out.kind == 34:  # CAN_MODE
-                place = 4 * index + out.a - 1
-                if self.bus_of[place] >= 0:
-                    bus = cython.cast(Bus, self.buses[self.bus_of[place]])
-                    bus.set_mode(self.node_of[place], out.b, out.time)
-                    self.bus_due[self.bus_of[place]] = bus.next_time
-                elif self.can_lines is not None:
-                    self._can_output(index, out)
-            elif out.kind == 39:  # UART_OUTPUT
-                if index == self.imu_index and out.a == self.imu_uart and self.imu is not None:
-                    self.imu.receive_byte(out.time, out.b)
-                elif self.serial_lines is not None:
-                    self._serial_output(index, out)
-
-    def _can_output(self, index: cython.longlong, out: EventQueue) -> None:
-        """A controller asks its bus for something, and the bus is outside."""
-        line = self.can_lines.get((index, out.a))
-        if line is not None:
-            line.from_board(out.kind, out.time, out.b, out.c, out.d, out.e, out.f)
-
-    def _serial_output(self, index: cython.longlong, out: EventQueue) -> None:
-        """A UART has put something out: to the outside, if it is connected there."""
-        line = self.serial_lines.get((index, out.a))
-        if line is not None:
-            line.from_board(out.time, out.b, out.c, out.ref)
 
     def _sample(self, now: cython.longlong) -> None:
         """One row of the trace: the body, and when a log is kept the main brain's data table."""

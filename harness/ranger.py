@@ -133,16 +133,14 @@ class Ranger:
                 can_wire.controller,
                 STAGE_BUS * 256 + 16 * place[can_wire.board] + can_wire.controller,
             )
-            loop.bus_of[4 * place[can_wire.board] + can_wire.controller - 1] = can_wire.bus - 1
-            loop.node_of[4 * place[can_wire.board] + can_wire.controller - 1] = node
+            loop.wires[place[can_wire.board]].connect_bus(can_wire.controller, bus, node)
         pins = wiring.MOTOR_PINS
         for name, motor in wiring.MOTORS.items():
-            loop.motors[place[name]] = self.plant.motors[motor]
-            loop.watchdog_pin[place[name]] = pins["motor_watchdog"]
-            loop.enable_pins[2 * place[name]] = pins["low_side_2"]
-            loop.enable_pins[2 * place[name] + 1] = pins["low_side_6"]
-        loop.ssp = lockstep.SspWire(boards["CSR"], boards["MB"], EXCHANGE_NS, empty_segment())
-        loop.connect_imu(self.plant.imu, boards[wiring.IMU_BOARD], place[wiring.IMU_BOARD], wiring.IMU_UART)
+            loop.wires[place[name]].connect_drive(
+                self.plant.motors[motor].drive, pins["motor_watchdog"], pins["low_side_2"], pins["low_side_6"]
+            )
+        loop.connect_link(lockstep.SspWire(boards["CSR"], boards["MB"], EXCHANGE_NS, empty_segment()))
+        loop.connect_imu(self.plant.imu, boards[wiring.IMU_BOARD], wiring.IMU_UART)
         loop.watch_strikes(boards["MB"])
         loop.sample_count = len(self.plant.sample_names)
         loop.main_brain_words = boards["MB"].store.words

@@ -384,7 +384,7 @@ def connect_imu(robot: Ranger, port: Port) -> SerialLine:
     """A real inertial unit at the port, instead of the plant's, on the user interface board's UART."""
     board = robot.boards[wiring.IMU_BOARD]
     line = SerialLine(board.inbox.push, wiring.IMU_UART, port, board.uart1.byte_ns)
-    robot.loop.imu = None
+    robot.loop.connect_imu(None, board, wiring.IMU_UART)
     return _connect(robot, wiring.IMU_BOARD, line)
 
 
@@ -397,8 +397,6 @@ def offer_imu(robot: Ranger, port: Port) -> ImuOffer:
 
 
 def _connect(robot: Ranger, board: str, line: SerialLine) -> SerialLine:
-    lines = dict(robot.loop.serial_lines or {})
-    lines[wiring.BOARDS.index(board), line.uart] = line
-    robot.loop.serial_lines = lines
+    robot.loop.wires[wiring.BOARDS.index(board)].serial_lines[line.uart] = line
     robot.attach(line)
     return line

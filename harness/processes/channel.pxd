@@ -1,4 +1,4 @@
-from foundation.events cimport EventQueue
+from foundation.events cimport EventQueue, Outbox
 from firmware_sim.peripherals.ssp cimport SspSegment
 
 # What a shared word needs that a plain array does not: order between processes, and a bell (an eventfd).
@@ -56,7 +56,7 @@ cdef class Mailbox:
     cdef public list notes
     cpdef bint put(self, EventQueue queue)
     cpdef void send(self) noexcept
-    cpdef bint take(self, EventQueue queue)
+    cpdef bint take(self, Outbox queue)
     cdef long long _write_payload(self, long long kind, object ref, long long at)
     cdef object _read_payload(self, long long at, long long count, long long kind)
     cdef long long _check(self, long long at, long long payload) noexcept

@@ -23,7 +23,7 @@ import array
 import cython
 
 from firmware_sim.peripherals.ssp import SspSegment
-from foundation.events import EventQueue
+from foundation.events import EventQueue, Outbox
 from harness.processes.kinds import FIELDS, KINDS, NOTE_WORDS, PAYLOADS, limits
 
 if not cython.compiled:
@@ -163,7 +163,7 @@ class Mailbox:
             self.closed = 0
             self._damage(f"{used} slots in use, allowed are 0 to {self.slots}")
 
-    def take(self, queue: EventQueue) -> cython.bint:
+    def take(self, queue: Outbox) -> cython.bint:
         """Push the next whole message into `queue` (a kind of ours alone into `notes`); False at the end."""
         at: cython.longlong
         payload: cython.longlong

@@ -11,7 +11,7 @@ cdef class Endpoint:
     cdef public Bell ask, answer
     cdef public Mailbox to_board, from_board
     cdef public Audience audience
-    cdef public EventQueue pending
+    cdef public EventQueue pending, out
     cdef public long long slots_seen, turns, reached, urgent_kinds, promised
     cpdef void serve(self)
     cdef void _advance(self)

@@ -26,6 +26,8 @@ class Endpoint:
     def __init__(self, board, shared, stage, audience, place) -> None:
         shared.check(place)
         self.board = board
+        self.out = EventQueue()
+        board.outbox = self.out  # its wires are in the plant's process
         self.shared = shared
         self.block = shared.words
         self.stage, self.stage_doubles = stage
@@ -130,7 +132,7 @@ class Endpoint:
 
     def _put_out(self) -> cython.bint:
         """What the board put out goes into the mailbox; True when more is left than fits."""
-        out: EventQueue = self.board.outbox
+        out: EventQueue = self.out
         while True:
             if self.from_board.used + 23 > self.from_board.slots:  # longest message: channel.LONGEST
                 self.from_board.send()
@@ -180,7 +182,7 @@ class Endpoint:
 
     def broke_its_promise(self) -> None:
         """An output before the instant that the last answer named: the plant has gone on without it."""
-        out = self.board.outbox
+        out = self.out
         kind = KINDS[out.kind].name if out.kind in KINDS else f"kind {out.kind}"
         raise RuntimeError(f"{kind} put out at {out.time} ns, but nothing was to come before {self.promised} ns")
 

@@ -17,18 +17,16 @@ def move_bus(robot: Any, external: Any, openers: dict, boards: tuple) -> None:
     """
     loop = robot.loop
     number = next(place for place, bus in enumerate(robot.buses) if bus.name == external.name)
-    if loop.can_lines is None:
-        loop.can_lines = {}
     for wire in wiring.CAN:
         if wire.bus != number + 1:
             continue
         place = wiring.BOARDS.index(wire.board)
-        at = 4 * place + wire.controller - 1
-        loop.bus_of[at] = loop.node_of[at] = -1
+        wires = loop.wires[place]
+        wires.connect_bus(wire.controller, None, -1)
         if wire.board not in boards:
             continue
         order = STAGE_BUS * 256 + 16 * place + wire.controller
-        loop.can_lines[place, wire.controller] = external.add_peer(
+        wires.can_lines[wire.controller] = external.add_peer(
             f"{external.name}, {wire.board}",
             robot.boards[wire.board].inbox,
             wire.controller,

@@ -218,12 +218,8 @@ class PlantRun:
 
     def nodes_of(self, name: str) -> list:
         """(bus, node) of every controller of a board."""
-        loop, place = self.robot.loop, wiring.BOARDS.index(name)
-        return [
-            (self.robot.buses[loop.bus_of[4 * place + i]], loop.node_of[4 * place + i])
-            for i in range(4)
-            if loop.bus_of[4 * place + i] >= 0
-        ]
+        wires = self.robot.loop.wires[wiring.BOARDS.index(name)]
+        return [(bus, wires.nodes[controller]) for controller, bus in enumerate(wires.buses) if bus is not None]
 
     def bury(self) -> None:
         """A board that went away is off its buses; its pins stay as they were, so its watchdog line stands still."""

@@ -2,8 +2,8 @@
 
 `inbox` and `outbox` are those of the board that this process built and wired but does not run (its shadow): what
 is pushed into the inbox goes through the channel when the board is next asked to run, what the board put out
-comes back into the outbox. `begin(until)` posts the request, so that all boards of a quantum run at the same time;
-`advance(until)` waits for the answer.
+comes back onto the board's wires. `begin(until)` posts the request, so that all boards of a quantum run at the same
+time; `advance(until)` waits for the answer.
 
 A board is asked only when that can matter. With each answer it says before which instant it puts nothing out;
 until then it is left alone, unless something comes in that may make it answer at once (`urgent_kinds`). It then runs
@@ -87,7 +87,6 @@ class RemoteBoard(Microcontroller):
             return
         if self.gone:
             self.inbox.clear()
-            self.outbox.clear()
             return
         self.stage.update()
         if (
@@ -138,17 +137,17 @@ class RemoteBoard(Microcontroller):
     def _urgent(self, until: cython.longlong) -> cython.bint:
         """True when a message before `until` may make the board put something out at once."""
         inbox: EventQueue = self.inbox
-        slot: cython.longlong = inbox.head
+        at: cython.longlong = inbox.head
         waiting: cython.longlong = 0
         kind: cython.longlong
-        while slot >= 0 and inbox.rows[12 * slot] < until:
-            kind = inbox.rows[12 * slot + 2]
+        while at < inbox.tail and inbox.rows[at] < until:
+            kind = inbox.rows[at + 2]
             if kind >= 60 or self.urgent_kinds >> kind & 1:
                 return True
             waiting += 1
             if waiting > 200:
                 return True
-            slot = inbox.rows[12 * slot + 9]
+            at += 10  # ROW
         return False
 
     def _post(self, command: cython.longlong, until: cython.longlong) -> cython.void:
