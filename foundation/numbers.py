@@ -108,7 +108,10 @@ def float_of_fixed(value: cython.longlong) -> cython.double:
 
 def fixed_multiply(a: cython.longlong, b: cython.longlong) -> cython.longlong:
     """Product of two 16.16 numbers, floored, wrapped to 32 bits as the firmware's arithmetic does."""
-    return ((((a * b) >> 16) + _SIGN) & _MASK) - _SIGN
+    product: cython.longlong = (a * b) >> 16
+    if -0x80000000 <= product <= 0x7FFFFFFF:
+        return product
+    return wrap_i32(product)
 
 
 def divide_toward_zero(numerator: cython.longlong, denominator: cython.longlong) -> cython.longlong:

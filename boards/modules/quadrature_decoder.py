@@ -125,16 +125,12 @@ class QuadratureDecoder:
         speed: cython.longlong
         while here != write:
             elapsed = self.ring[here]
-            after = here + 1
-            if after >= 64:
-                after = 0
+            after = (here + 1) & 63
             if elapsed == 0:
                 self.errors.report(self.glitch_code)
                 if after != write:
                     seen += 1
-                    after += 1
-                    if after >= 64:
-                        after = 0
+                    after = (after + 1) & 63
             elif (elapsed > 0) == forward:
                 total += elapsed
                 valid += 1
@@ -149,9 +145,7 @@ class QuadratureDecoder:
                 else:
                     self.errors.report(self.glitch_code)
                     seen += 1
-                    after += 1
-                    if after >= 64:
-                        after = 0
+                    after = (after + 1) & 63
             seen += 1
             here = after
         # from here on without the sign

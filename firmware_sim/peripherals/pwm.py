@@ -1,3 +1,5 @@
+# cython: cdivision=True
+# (what is divided is never below 0)
 """The PWM unit (PWMMR0 ... PWMMR6, PWMLER): match values take effect at the start of a PWM period.
 
 At 60 MHz and MR0 = 600 a period is 10 us (100 kHz); channel n is high for MRn of MR0 counts. Every latch that
@@ -96,19 +98,19 @@ class Pwm(Peripheral):
 
     def _find_period(self) -> cython.void:
         """Go on to the first period that begins at `now` or later: exactly to its `Crystal.tick_time_ns`."""
-        since: cython.longlong
+        since: cython.longlong = self.chip.now - self.period_start
+        far: cython.bint = True
         periods: cython.longlong
         parts: cython.longlong
         whole: cython.longlong
-        while True:
-            since = self.chip.now - self.period_start
-            if since > 2000000000:  # LONGEST_PERIOD_S
+        while far and since > 0:
+            far = since > 2000000000  # LONGEST_PERIOD_S
+            if far:
                 periods = 2000000000 // self.period_ns
             else:
-                periods = -(-((since * self.rate - self.rest) // 1000000000) // self.period_ns)
+                periods = ((since * self.rate - self.rest) // 1000000000 + self.period_ns - 1) // self.period_ns
             parts = self.rest + periods * self.period_ns * 1000000000
             whole = parts // self.rate
-            self.period_start += whole
             self.rest = parts - whole * self.rate
-            if since <= 2000000000:
-                return
+            self.period_start += whole
+            since -= whole
