@@ -11,8 +11,6 @@ from firmware_sim.peripherals.can_controller cimport CanController
 from firmware_sim.peripherals.gpio cimport Gpio
 from firmware_sim.peripherals.ssp cimport SspPort, SspSegment
 from firmware_sim.peripherals.timer_capture cimport TimerCapture
-from firmware_sim.scheduler cimport Task
-from foundation.events cimport EventQueue
 from foundation.numbers cimport float32, word_of_float
 
 cimport cython
@@ -21,7 +19,6 @@ cimport cython
 cdef class BusReceiver:
     cdef public CanController controller
     cdef public Router router
-    cpdef object on_frame(self, EventQueue queue)
 
 @cython.final
 cdef class CanRouterBoard(Microcontroller):
@@ -50,27 +47,9 @@ cdef class CanRouterBoard(Microcontroller):
     cdef public long long sync_cycles
     cdef public long long code_dnf, code_near_limit, code_task_limit, code_queue_full
     cpdef int report(self, long long code) except -1
-    cpdef object on_segment_timer(self, EventQueue queue)
-    cpdef object on_segment(self, EventQueue queue)
-    cpdef object on_can_error(self, EventQueue queue)
     cpdef long long flush(self, CanController controller) except? <long long>-1
     cpdef bint can_flush(self) except? -1
     cpdef long long main_loop(self) except? <long long>-1
-    cpdef int slot_exceeded(self) except -1
-    cpdef int slot_near_limit(self) except -1
-    cpdef int task_limit(self, Task task) except -1
     cpdef int send_float(self, long long identifier, double value) except -1
-    cpdef int send_time(self) except -1
-    cpdef object update_errors(self)
-    cpdef int count_load(self) except -1
-    cpdef int show_load(self) except -1
-    cpdef int send_error(self) except -1
     cpdef double current_A(self) except? -1
     cpdef double voltage_V(self) except? -1
-    cpdef int send_power(self) except -1
-    cpdef int send_current(self) except -1
-    cpdef int send_voltage(self) except -1
-    cpdef int send_load_1(self) except -1
-    cpdef int send_load_2(self) except -1
-    cpdef int send_load_3(self) except -1
-    cpdef int send_load_4(self) except -1

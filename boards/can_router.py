@@ -79,17 +79,16 @@ class BusReceiver:
         self.controller = controller
         self.router = router
 
-    def on_frame(self, queue) -> object:
+    def on_frame(self, queue) -> None:
         """Copy the older receive buffer and release it."""
         controller: CanController = self.controller
         flags: cython.longlong = 8
         if controller.rx_count == 0:
-            return None
+            return
         if controller.RFS != 524288:  # anything but eight bytes of an ordinary frame
             flags = (controller.RFS >> 16 & 15) | (controller.RFS >> 30 & 1) << 4
         self.router.receive(controller.number, controller.RID, flags, controller.RDA, controller.RDB)
         controller.release()
-        return None
 
 
 class CanRouterBoard(Microcontroller):
@@ -227,13 +226,12 @@ class CanRouterBoard(Microcontroller):
 
     # --- interrupts -------------------------------------------------------------------------------------
 
-    def on_segment_timer(self, queue) -> object:
+    def on_segment_timer(self, queue) -> None:
         """Timer1, every 200 us: the time, and the next exchange with the main brain."""
         self.timer1.clear(1)
         if self.clock.tick():
             self.extra_cycles += self.sync_cycles
         self.ssp.start(self.link.tick(self.now))
-        return None
 
     def on_segment(self, queue) -> object:
         """An exchange is over; returns its half-words, whose FIFO service is charged here in one."""
@@ -243,7 +241,7 @@ class CanRouterBoard(Microcontroller):
         self.link.receive(segment)
         return 31
 
-    def on_can_error(self, queue) -> object:
+    def on_can_error(self, queue) -> None:
         """Read every controller's capture register; restart one that is bus-off."""
         controller: CanController
         cause: cython.longlong
@@ -263,7 +261,6 @@ class CanRouterBoard(Microcontroller):
                 self.report(named[3])
             if cause & 128:
                 self.report(named[4] if cause >> 21 & 1 else named[5])
-        return None
 
     # --- main loop --------------------------------------------------------------------------------------
 

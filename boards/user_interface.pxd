@@ -15,8 +15,6 @@ from firmware_sim.peripherals.can_controller cimport CanController
 from firmware_sim.peripherals.gpio cimport Gpio
 from firmware_sim.peripherals.timer_capture cimport TimerCapture
 from firmware_sim.peripherals.uart cimport Uart
-from firmware_sim.scheduler cimport Task
-from foundation.events cimport EventQueue
 
 cimport cython
 
@@ -43,29 +41,3 @@ cdef class UserInterfaceBoard(Microcontroller):
     cdef public long long slots, imu_start_slots
     cdef public bytes imu_command
     cpdef int report(self, long long code) except -1
-    cpdef object on_uart(self, EventQueue queue)
-    cpdef object on_rc_edge(self, EventQueue queue)
-    cpdef int lcd_tick(self) except -1
-    cpdef int note_overrun(self) except -1
-    cpdef int note_limit(self, Task task) except -1
-    cpdef int note_near_limit(self) except -1
-    cpdef object update_imu(self)
-    cpdef object update_errors(self)
-    cpdef int update_buzzer(self) except -1
-    cpdef object update_sync_light(self)
-    cpdef int watch_sync_key(self) except -1
-    cpdef int send_roll(self) except -1
-    cpdef int send_pitch(self) except -1
-    cpdef int send_yaw(self) except -1
-    cpdef int send_rate_x(self) except -1
-    cpdef int send_rate_y(self) except -1
-    cpdef int send_rate_z(self) except -1
-    cpdef int send_error(self) except -1
-    cpdef int send_buttons(self) except -1
-    cpdef int send_rc_0(self) except -1
-    cpdef int send_rc_1(self) except -1
-    cpdef int send_rc_2(self) except -1
-    cpdef int send_rc_3(self) except -1
-    cpdef int send_status(self) except -1
-    cpdef int send_execution_time(self) except -1
-    cpdef int send_max_execution_time(self) except -1

@@ -185,7 +185,7 @@ class UserInterfaceBoard(Microcontroller):
         """UART1: empty the FIFO into the parser's ring; returns the bytes."""
         return self.imu.receive(self.uart1)
 
-    def on_rc_edge(self, queue) -> object:
+    def on_rc_edge(self, queue) -> None:
         """Timer0: every capture that is flagged."""
         flags: cython.longlong = self.timer0.IR
         channel: cython.longlong
@@ -193,7 +193,6 @@ class UserInterfaceBoard(Microcontroller):
             if flags & (16 << channel):
                 self.rc.capture(channel, self.gpio.level(self.timer0.pins[channel]), self.timer0.CR(channel))
         self.timer0.clear(flags & 240)
-        return None
 
     def lcd_tick(self) -> None:
         """The display's share of the slot timer's interrupt."""

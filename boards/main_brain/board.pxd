@@ -9,8 +9,7 @@ from datatable.store cimport DataStore
 from firmware_sim.microcontroller cimport Microcontroller
 from firmware_sim.peripherals.ssp cimport SspPort, SspSegment
 from firmware_sim.peripherals.uart_hs cimport HsUart
-from firmware_sim.scheduler cimport Schedule, Task
-from foundation.events cimport EventQueue
+from firmware_sim.scheduler cimport Schedule
 
 cdef class MainBrainBoard(Microcontroller):
     cdef public object quirks, distribution, controller
@@ -29,11 +28,4 @@ cdef class MainBrainBoard(Microcontroller):
     cdef public long long code_dnf, code_near_limit, code_task_limit, code_id_out_of_range
     cpdef object load_controller(self, controller)
     cpdef object schedule(self)
-    cpdef object on_segment(self, EventQueue queue)
-    cpdef int beat(self) except -1
-    cpdef int store_execution_time(self) except -1
     cpdef int report(self, long long code) except -1
-    cpdef int id_out_of_range(self) except -1
-    cpdef int slot_exceeded(self) except -1
-    cpdef int slot_near_limit(self) except -1
-    cpdef int task_limit(self, Task task) except -1

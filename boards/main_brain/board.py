@@ -169,12 +169,11 @@ class MainBrainBoard(Microcontroller):
 
     # --- interrupt --------------------------------------------------------------------------------------
 
-    def on_segment(self, queue: EventQueue) -> object:
+    def on_segment(self, queue: EventQueue) -> None:
         """An exchange with the router is over: keep what came, load what goes next."""
         segment: SspSegment = self.ssp.take()
         if segment is not None:
             self.ssp.load(self.link.exchanged(segment))
-        return None
 
     # --- tasks of our own -------------------------------------------------------------------------------
 

@@ -2,7 +2,6 @@ from datatable.store cimport DataStore
 from firmware_sim.microcontroller cimport Microcontroller
 from firmware_sim.peripherals.uart_hs cimport HsUart
 from firmware_sim.vic cimport InterruptSource
-from foundation.events cimport EventQueue
 
 cdef class DataLink:
     cdef public Microcontroller chip
@@ -26,8 +25,6 @@ cdef class DataLink:
     cdef int _put(self, long long number) except -1
     cdef int _byte(self, long long at, long long byte) except -1
     cdef int _word(self, long long at, long long word) except -1
-    cpdef object on_restart(self, EventQueue queue)
-    cpdef object on_sent(self, EventQueue queue)
     cdef int _start(self) except -1
     cpdef object swap_buffers(self)
     cpdef long long waiting(self)

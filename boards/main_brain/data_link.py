@@ -203,19 +203,17 @@ class DataLink:
         self._byte(at + 2, word >> 8 & 255)
         self._byte(at + 3, word & 255)
 
-    def on_restart(self, queue: EventQueue) -> object:
+    def on_restart(self, queue: EventQueue) -> None:
         """Software interrupt: the ring was empty and has a segment again."""
         if not self.uart.busy:
             self._start()
-        return None
 
-    def on_sent(self, queue: EventQueue) -> object:
+    def on_sent(self, queue: EventQueue) -> None:
         """DMA channel 3 is through with a segment: its place is free, the next one goes."""
         self.sending = (self.sending + 1) % 20
         self.used -= 1
         self.segments_sent += 1
         self._start()
-        return None
 
     def _start(self) -> None:
         at: cython.longlong = self.sending * 92

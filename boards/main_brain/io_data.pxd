@@ -8,5 +8,3 @@ cdef class IoData:
     cdef public NetworkTime time
     cdef public long long[::1] send_ids, dividers, turn_ids
     cdef public long long subscriber, timestamp, turn, turn_every, slots
-    cpdef object receive(self)
-    cpdef object send(self)

@@ -3,7 +3,6 @@ from boards.modules.network_time cimport NetworkTime
 from boards.modules.receiver cimport Receiver
 from firmware_sim.microcontroller cimport Microcontroller
 from firmware_sim.peripherals.can_controller cimport CanController
-from foundation.events cimport EventQueue
 from foundation.numbers cimport word_of_float, word_of_i32
 
 cimport cython
@@ -21,9 +20,6 @@ cdef class CanLink:
     cdef public long long[::1] rx_frames, rx_ids, rx_values, rx_times, tx_ids, tx_values, tx_times
     cdef public long long rx_write, rx_read, tx_write, tx_read
     cdef public long long received, delivered, ignored, receive_lost, queued, send_lost, most_waiting
-    cpdef object on_receive(self, EventQueue queue)
-    cpdef object on_error(self, EventQueue queue)
-    cpdef object receive_all(self)
     cpdef bint send_words(self, long long identifier, long long value_word, long long time_word) except? -1
     cpdef bint send_float(self, long long identifier, double value) except? -1
     cpdef bint send_int(self, long long identifier, long long value) except? -1

@@ -110,7 +110,7 @@ class CanLink:
 
     # --- receiving --------------------------------------------------------------------------------------
 
-    def on_receive(self, queue: EventQueue) -> object:
+    def on_receive(self, queue: EventQueue) -> None:
         """Interrupt: copy the frame into the ring and release the hardware buffer."""
         write: cython.longlong = self.rx_write
         after: cython.longlong = (write + 1) & 63
@@ -127,15 +127,14 @@ class CanLink:
             self.rx_write = after
             self.received += 1
         controller.release()
-        return None
 
-    def on_error(self, queue: EventQueue) -> object:
+    def on_error(self, queue: EventQueue) -> None:
         """Interrupt: read CxICR, restart after bus-off, note what it was."""
         cause: cython.longlong = self.controller.read_ICR()
         if self.controller.bus_off:
             self.errors.report(self.code_bus_off)
             self.controller.write_MOD(0)
-            return None
+            return
         if cause & 4:
             self.errors.report(self.code_warning)
         if cause & 8:
@@ -148,7 +147,6 @@ class CanLink:
                 self.errors.report(self.code_bus_rx)
             else:
                 self.errors.report(self.code_bus_tx)
-        return None
 
     def receive_all(self) -> object:
         """Slot task: deliver every frame that waits; returns how many there were."""

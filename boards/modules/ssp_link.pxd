@@ -59,6 +59,7 @@ cdef class RouterSspLink:
 
 cpdef long long checksum(SspSegment segment) noexcept
 cpdef void finish(SspSegment segment, long long used) noexcept
+cpdef void restart(SspSegment segment) noexcept
 cpdef long long add_frame(SspSegment segment, long long header, long long word0, long long word1) noexcept
 cpdef SspSegment empty_segment()
 cpdef SspSegment corrupted_copy(SspSegment segment, long long index, long long flipped_bits)

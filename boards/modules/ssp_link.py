@@ -55,8 +55,17 @@ def finish(segment: SspSegment, used: cython.longlong) -> cython.void:
 def empty_segment() -> SspSegment:
     """A valid segment without frames: 30 zeros and the checksum 1."""
     segment: SspSegment = SspSegment()
-    finish(segment, 0)
+    restart(segment)
     return segment
+
+
+def restart(segment: SspSegment) -> cython.void:
+    """Make it a valid segment without frames again."""
+    i: cython.longlong
+    for i in range(segment.used):
+        segment.words[i] = 0
+    segment.used = 0
+    segment.words[30] = 1
 
 
 def add_frame(
@@ -266,7 +275,7 @@ class MainBrainSspLink:
                 self.report(self.code_transmit_full)
                 return False
             segment = self.queue[(self.queue_read + self.queue_count) % 18]
-            finish(segment, 0)
+            restart(segment)
             self.packing = segment
         self.frames_sent += 1
         if add_frame(segment, (identifier & 0x7FF) | 0x7800, word0, word1) == 30:
@@ -372,7 +381,7 @@ class RouterSspLink:
         if self.last == 24:
             self.last = 0
         self.packing = self.segments[self.last]
-        finish(self.packing, 0)
+        restart(self.packing)
 
     def _put(self, word: cython.longlong) -> cython.void:
         """Append one half-word, without the checksum of frames."""
@@ -419,7 +428,7 @@ class RouterSspLink:
         words = [segment.words[i] for i in range(used, segment.used)]
         words += [self.packing.words[i] for i in range(self.packing.used)]
         finish(segment, used)
-        finish(self.packing, 0)
+        restart(self.packing)
         for word in words:
             self._put(word)
 

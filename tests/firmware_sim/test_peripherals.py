@@ -493,6 +493,18 @@ def test_master_and_slave_put_their_segments_on_the_wire():
     assert (sum(segment.words), segment.used) == (0, 0)
 
 
+def test_a_segment_that_is_loaded_already_goes_out_again_without_a_word():
+    chip = chip_at()
+    port = SspPort(chip)
+    first, second = SspSegment(), SspSegment()
+    told = []
+    for segment in (first, first, second, second, first):
+        port.load(segment)
+        while chip.outbox.take():
+            told.append(chip.outbox.ref)
+    assert told == [first, second, first]
+
+
 def test_a_segment_that_comes_in_interrupts_and_is_taken_once():
     chip = chip_at()
     port = SspPort(chip)
