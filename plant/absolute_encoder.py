@@ -1,5 +1,3 @@
-# cython: boundscheck=False, wraparound=False
-# (`NoiseSource.block` is a place of its table)
 """The absolute joint encoder AM8192B as a device: a 13-bit word for an angle (appendix 3.8; facts
 network-and-boards 4.7).
 
@@ -64,7 +62,7 @@ class AbsoluteEncoder:
             x += self.eccentricity_1 * sin(x + self.phase_1) + self.eccentricity_2 * sin(2.0 * x + self.phase_2)
         x = self.zero + self.counts_per_rad * x + 0.5
         if self.noise_counts > 0.0:
-            x += self.noise_counts * self.noise.table[self.noise.block()]
+            x += self.noise_counts * self.noise.normal()
         n = int(x)
         if x < n:
             n -= 1

@@ -524,6 +524,7 @@ class Body:
 
         Inside, s is the stance (reference) leg and w the other. Accelerations and floor forces of the start of
         the step are left in the fields (EQUATIONS 5, 6); the stages' angles and rates are those of EQUATIONS 15.
+        The pose of the end, hip and gaps, is left there too.
         """
         double_stance: cython.bint = self.mode == 2
         outer_stance: cython.bint = self.stance == 0
@@ -603,6 +604,7 @@ class Body:
             w_drive, w_coulomb, w_viscous = self.outer_drive, self.outer_coulomb, self.outer_viscous
             Xs, Xw, Ys, Yw = self.anchor_inner, self.anchor_outer, self.height_inner, self.height_outer
         m22: cython.double = M * el * el - 2.0 * el * mcs + Js + JH
+        mts: cython.double = M * el - mcs
         i33: cython.double = 1.0 / (Jw + JH)
         half: cython.double = 0.5 * h
         quarter: cython.double = 0.25 * h
@@ -640,8 +642,8 @@ class Body:
                         cG = cos(G)
                 ls = el * st
                 lc = el * ct
-                As = mcs * ct + mws * st
-                Bs = mcs * st - mws * ct
+                Us = mts * ct - mws * st
+                Vs = mts * st + mws * ct
                 Aw = mcw * cw + mww * sw
                 Bw = mcw * sw - mww * cw
                 df = d * cF
@@ -654,9 +656,10 @@ class Body:
                     f -= r * sin(sg)
                     df = -e
                 m11 = M * (e * e + f * f) + Jf
-                m12 = M * (e * lc - f * ls) - As * e + Bs * f
+                m12 = Us * e - Vs * f
                 m13 = Bw * f - Aw * e
                 m23 = -(lc * Aw + ls * Bw) - JH
+                swing = ls * Aw - lc * Bw
                 t13 = m13 * i33
                 t23 = m23 * i33
                 n11 = m11 - t13 * m13
@@ -669,7 +672,7 @@ class Body:
                 pull_s = ks * (p - a_s)
                 pull_w = 0.0 if massless else ks * (n - a_w)
                 spring = self._exact_spring(hip) if exact_spring else kh * hip
-                if brush or double_stance:
+                if brush or double_stance or stage == 3:
                     dfw = d * cG
                     fw = d * sG
                     gg = 0.0
@@ -709,11 +712,11 @@ class Body:
             us2 = us * us
             uw2 = uw * uw
             uF2 = uF * uF
-            # acceleration of the hip without angular accelerations, less gravity (EQUATIONS 5.2)
-            ax = f * uF2 - ls * us2 - gx
-            ay = df * uF2 - lc * us2 - gy
-            Px = M * ax + Bs * us2 + Bw * uw2
-            Py = M * ay + As * us2 + Aw * uw2
+            # acceleration of the stance ankle without angular accelerations, less gravity (EQUATIONS 5.2)
+            ax = f * uF2 - gx
+            ay = df * uF2 - gy
+            Px = M * ax - Vs * us2 + Bw * uw2
+            Py = M * ay - Us * us2 + Aw * uw2
             # torques: cables with the motors behind them, stops, hip
             Ts = pull_s
             Tw = pull_w
@@ -754,8 +757,8 @@ class Body:
                         mn += self.extra_outer
             # generalised forces (EQUATIONS 5.3), unknowns: foot s, leg s, leg w
             Q1 = TF - e * Px - f * Py
-            Q2 = Th - Ts - lc * Px + ls * Py + As * ax - Bs * ay
-            Q3 = Aw * ax - Bw * ay - Th - Tw
+            Q2 = Th - Ts - Us * ax + Vs * ay + swing * uw2
+            Q3 = Aw * ax - Bw * ay - swing * us2 - Th - Tw
             Rx = 0.0
             Ry = 0.0
             if brush and gap < 0.0:
@@ -786,8 +789,8 @@ class Body:
                 om = self.closing_rate
                 vx_ = e * uF + lc * us - ew * uG - lcw * uw
                 vy_ = f * uF - ls * us - fw * uG + lsw * uw
-                bx = fw * uG2 - lsw * uw2 - (ax + gx) - om * (2.0 * vx_ + om * gap_x)
-                by = dfw * uG2 - lcw * uw2 - (ay + gy) - om * (2.0 * vy_ + om * gap)
+                bx = fw * uG2 - lsw * uw2 - f * uF2 + ls * us2 - om * (2.0 * vx_ + om * gap_x)
+                by = dfw * uG2 - lcw * uw2 - df * uF2 + lc * us2 - om * (2.0 * vy_ + om * gap)
                 TG -= Cw * uG
                 r1 = bx - (e * aF + lc * as_ - lcw * aw)
                 r2 = by - (f * aF - ls * as_ + lsw * aw)
@@ -804,8 +807,8 @@ class Body:
                 aG = TG * iJf
             if stage == 0:
                 # force of the floor on the stance foot: rate of the whole momentum less gravity and the other foot
-                Px += (M * e) * aF + (M * lc - As) * as_ - Aw * aw - Rx
-                Py += (M * f) * aF + (Bs - M * ls) * as_ + Bw * aw - Ry
+                Px += M * e * aF + Us * as_ - Aw * aw - Rx
+                Py += M * f * aF - Vs * as_ + Bw * aw - Ry
                 if outer_stance:
                     self.outer_Fx = Px
                     self.outer_Fy = Py
@@ -925,6 +928,18 @@ class Body:
             self.foot_outer_rate = uG
             self.motor_inner_rate = up
             self.motor_outer_rate = un
+        if double_stance:
+            self.update_pose()
+            return
+        # the geometry of stage 3 is that of the end: `update_pose` with what stands here (EQUATIONS 4)
+        self.hip_x = Xs + r * (F - sg) - f + ls
+        self.hip_y = Ys + e + lc
+        if outer_stance:
+            self.gap_outer = 0.0
+            self.gap_inner = gap
+        else:
+            self.gap_outer = gap
+            self.gap_inner = 0.0
 
     def _stop(self, angle: cython.double, rate: cython.double) -> cython.double:
         """Torque of an ankle stop on the foot: a spring and damper that can only push (EQUATIONS 2.5)."""
@@ -1325,7 +1340,6 @@ class Body:
                 self.on_feet(remaining, 4)
                 if (self.outer_Fy < 0.0 or self.inner_Fy < 0.0) and tries < 20 and self._pulled_now(remaining):
                     continue  # a foot left the floor at the start of this piece: nothing has moved yet
-                self.update_pose()
             else:
                 self.in_air(remaining, 4)
                 self.update_pose()
@@ -1537,7 +1551,7 @@ class Body:
             self.on_feet(h, 4)
         else:
             self.in_air(h, 4)
-        self.update_pose()
+            self.update_pose()
         return self._crossed()
 
     def _locate(self, h: cython.double) -> cython.double:

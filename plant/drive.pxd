@@ -5,7 +5,7 @@ cdef class Drive:
     cdef public long long watchdog_ns, mr2, mr6, mr0, power_off_ns, switching_leads, power_losses
     cdef public long long capacity, count, next_change_ns
     cdef public bint enable2, enable6, powered, is_open, sensed_lead_switches
-    cdef public double duty
+    cdef public double duty, ripple
     cdef public long long[::1] times, kinds, values
     cpdef void write_pwm(self, long long time, long long mr2, long long mr6, long long mr0) noexcept
     cpdef void watchdog_edge(self, long long time) noexcept

@@ -23,7 +23,8 @@ class Drive:
 
     `is_open`: no transistor conducts (no power, or a low side off), so the winding can only freewheel through the
     diodes. `switching_leads`: leads that toggle with the PWM. `sensed_lead_switches`: lead 2, where the current
-    sensor sits (chosen by us, because no fact says which), is one of them.
+    sensor sits (chosen by us, because no fact says which), is one of them. `ripple`: (|D| (1 - |D|))^2 of the duty D,
+    to which the loss of the current's ripple is proportional.
     """
 
     def __init__(self, watchdog_ns=10_000_000) -> None:
@@ -36,6 +37,7 @@ class Drive:
         self.powered = False  # nothing has fed the watchdog yet
         self.power_off_ns = 0
         self.duty = 0.0
+        self.ripple = 0.0
         self.is_open = True
         self.switching_leads = 0
         self.sensed_lead_switches = False
@@ -115,9 +117,10 @@ class Drive:
         done: cython.longlong = 0
         i: cython.longlong
         kind: cython.longlong
+        count: cython.longlong = self.count
         if time < self.next_change_ns:
             return
-        while done < self.count and self.times[done] <= time:
+        while done < count and self.times[done] <= time:
             kind = self.kinds[done]
             i = 3 * done
             if kind == 0:
@@ -131,43 +134,53 @@ class Drive:
                 self.enable2 = self.values[i] != 0
                 self.enable6 = self.values[i + 1] != 0
             done += 1
-        if done > 0:
-            self.count -= done
-            for i in range(self.count):
+        count -= done
+        self.count = count
+        if done > 0 and count > 0:
+            for i in range(count):
                 self.times[i] = self.times[i + done]
                 self.kinds[i] = self.kinds[i + done]
-            for i in range(3 * self.count):
+            for i in range(3 * count):
                 self.values[i] = self.values[i + 3 * done]
-        if self.powered and time >= self.power_off_ns:
-            self.powered = False
-            self.power_losses += 1
-        self.next_change_ns = self.times[0] if self.count > 0 else 1 << 62
-        if self.powered and self.power_off_ns < self.next_change_ns:
-            self.next_change_ns = self.power_off_ns
+        self.next_change_ns = self.times[0] if count > 0 else 1 << 62
+        if self.powered:
+            if time >= self.power_off_ns:
+                self.powered = False
+                self.power_losses += 1
+            elif self.power_off_ns < self.next_change_ns:
+                self.next_change_ns = self.power_off_ns
         self._update()
 
     def _update(self) -> cython.void:
         """Duty and switching leads from the registers; a match value at or above MR0 is always on."""
         high2: cython.longlong = self.mr2
         high6: cython.longlong = self.mr6
+        period: cython.longlong = self.mr0
+        duty: cython.double
+        first: cython.bint
+        second: cython.bint
         self.is_open = not (self.powered and self.enable2 and self.enable6)
-        if self.is_open or self.mr0 <= 0:
+        if self.is_open or period <= 0:
             self.duty = 0.0
+            self.ripple = 0.0
             self.switching_leads = 0
             self.sensed_lead_switches = False
             return
-        if high2 > self.mr0:
-            high2 = self.mr0
+        first = 0 < high2 < period
+        if high2 > period:
+            high2 = period
         elif high2 < 0:
             high2 = 0
-        if high6 > self.mr0:
-            high6 = self.mr0
+        second = 0 < high6 < period
+        if high6 > period:
+            high6 = period
         elif high6 < 0:
             high6 = 0
-        self.duty = (high2 - high6) / self.mr0
-        self.sensed_lead_switches = 0 < high2 < self.mr0
-        self.switching_leads = 0
-        if self.sensed_lead_switches:
-            self.switching_leads += 1
-        if 0 < high6 < self.mr0:
-            self.switching_leads += 1
+        duty = (high2 - high6) / period
+        self.duty = duty
+        if duty < 0.0:
+            duty = -duty
+        duty *= 1.0 - duty
+        self.ripple = duty * duty
+        self.sensed_lead_switches = first
+        self.switching_leads = first + second

@@ -18,6 +18,7 @@ cdef class Electrics:
     cdef public bint has_terms
     cdef public double electronics_W, pwm_offset_A, voltage_clip_V, battery_current_lag_s, lag_h, lag_factor
     cdef public double electronics_J, motor_current_A, hip_rate, outer_rate, inner_rate, steering_rate
+    cdef public double steering_rad, steering_shown_rad
     cpdef void step_motors(
         self, long long t0, long long t1, double hip_rate, double outer_rate, double inner_rate, double steering_rate,
         bint jumped=*,

@@ -19,6 +19,7 @@ cdef class Imu:
     cdef public double ring_sum, lagged, rate_x, roll
     cpdef void receive_byte(self, long long time, long long byte) noexcept
     cpdef long long sample_time(self, long long n)
+    cpdef bint is_due(self, long long t1) noexcept
     cpdef void update(
         self, long long t0, long long t1, double lean0, double rate0, double lean1, double rate1,
         double yaw=*, double yaw_rate=*,

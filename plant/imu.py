@@ -122,6 +122,10 @@ class Imu:
         drift += (n % 1000000) * self.ppb * self.sample_ns // 1000000000
         return self.phase_ns + n * self.sample_ns - drift
 
+    def is_due(self, t1: cython.longlong) -> cython.bint:
+        """Whether an `update` up to `t1` (ns) has anything to do, if only to take away the bytes of the last one."""
+        return self.next_sample_ns < t1 or self.acknowledge >= 0 or self.bytes.count > 0
+
     def update(
         self,
         t0: cython.longlong,

@@ -13,9 +13,9 @@ cdef class IncrementalEncoder:
     cdef public double eccentricity_1, phase_1, eccentricity_2, phase_2, jitter
     cdef public RandomStream stream
     cdef public double[::1] errors
-    cdef public bint has_errors, started, broken, has_end
+    cdef public bint has_errors, started, broken, eccentric
     cdef public EdgeBuffer edges
-    cdef public double u0, du, m0, m1, span_ns, end_angle, end_rate, end_u, end_speed
+    cdef public double u0, du, m0, m1, span_ns, edges_per_rad, edges_at_zero
     cdef public double calm_from, calm_to, calm_rad
     cpdef double position(self, double angle) noexcept
     cpdef double speed(self, double angle, double rate) noexcept

@@ -73,12 +73,10 @@ class IncrementalEncoder:
         self.total = 0
         self.started = False
         self.broken = False
-        # where the last `update` ended: joint angle and rate, edges and edges per second there
-        self.end_angle = 0.0
-        self.end_rate = 0.0
-        self.end_u = 0.0
-        self.end_speed = 0.0
-        self.has_end = False
+        # for a disc without eccentricity, whose edges lie evenly: edges per rad of the joint and at its zero
+        self.eccentric = False
+        self.edges_per_rad = 0.0
+        self.edges_at_zero = 0.0
         # joint angles (rad) between which no edge lies, with `calm_rad` to spare on both sides; empty when unknown
         self.calm_from = 1.0
         self.calm_to = -1.0
@@ -134,7 +132,7 @@ class IncrementalEncoder:
         return n
 
     def reset(self, angle: cython.double) -> cython.void:
-        """Stand at an angle without having moved: no edges."""
+        """Stand at an angle without having moved: no edges. Needed after a change of what describes the encoder."""
         u: cython.double = self.position(angle)
         n: cython.longlong = int(u)
         if u < n:
@@ -145,7 +143,9 @@ class IncrementalEncoder:
             n -= 1
         self.cell = n
         self.started = True
-        self.has_end = False
+        self.eccentric = self.eccentricity_1 != 0.0 or self.eccentricity_2 != 0.0
+        self.edges_per_rad = self.edges_per_shaft_rad * self.shaft_per_rad * self.scale
+        self.edges_at_zero = self.edges_per_shaft_rad * self.shaft_per_rad * self.offset_rad
         self.calm_from = 1.0
         self.calm_to = -1.0
         self.edges.clear()
@@ -195,82 +195,73 @@ class IncrementalEncoder:
         buffer: EdgeBuffer = self.edges
         buffer.count = 0
         buffer.read = 0
-        if not self.started:
-            self.reset(angle0)
-        if self.broken:
-            return
         if self.calm_from < angle0 < self.calm_to and self.calm_from < angle1 < self.calm_to:
             # between two edges at both ends; the cubic bulges out by at most 4/27 of each end's rate times the step
             x = rate0 if rate0 > 0.0 else -rate0
             x += rate1 if rate1 > 0.0 else -rate1
             if h * x < self.calm_rad:
-                self.has_end = False
                 return
-        # as a rule a step starts where the last one ended
-        if self.has_end and angle0 == self.end_angle and rate0 == self.end_rate:
-            u0 = self.end_u
-            m0 = h * self.end_speed
-        else:
+        if not self.started:
+            self.reset(angle0)
+        if self.broken:
+            return
+        if self.eccentric:
             u0 = self.position(angle0)
-            m0 = h * self.speed(angle0, rate0)
-        if self.eccentricity_1 != 0.0 or self.eccentricity_2 != 0.0:
             u1 = self.position(angle1)
-            x = self.speed(angle1, rate1)
+            m0 = h * self.speed(angle0, rate0)
+            m1 = h * self.speed(angle1, rate1)
         else:
-            u1 = self.edges_per_shaft_rad * (self.shaft_per_rad * (self.scale * angle1 + self.offset_rad))
-            x = self.edges_per_shaft_rad * self.shaft_per_rad * self.scale * rate1
-        m1 = h * x
-        self.end_angle = angle1
-        self.end_rate = rate1
-        self.end_u = u1
-        self.end_speed = x
-        self.has_end = True
+            x = self.edges_per_rad
+            u0 = x * angle0 + self.edges_at_zero
+            u1 = x * angle1 + self.edges_at_zero
+            x *= h
+            m0 = x * rate0
+            m1 = x * rate1
         du = u1 - u0
+        if m0 * du <= 0.0 or m1 * du <= 0.0:
+            if m0 != 0.0 or m1 != 0.0 or du != 0.0:
+                self._turning(t0, t1, u0, u1, m0, m1)
+            return
+        g0 = du / m0
+        g1 = du / m1
+        if g0 < 0.5 or g0 > 2.0 or g1 < 0.5 or g1 > 2.0:
+            self._turning(t0, t1, u0, u1, m0, m1)
+            return
         cell = self.cell
+        has_errors: cython.bint = self.has_errors
         forward = du > 0.0
         if forward:
-            if m0 < 0.5 * du or m0 > 2.0 * du or m1 < 0.5 * du or m1 > 2.0 * du:
-                self._turning(t0, t1, u0, u1, m0, m1)
-                return
-            level = self.errors[(cell + 1) % self.table_size] + (cell + 1) if self.has_errors else cell + 1
+            level = self.errors[(cell + 1) % self.table_size] + (cell + 1) if has_errors else cell + 1
             if u1 < level:
                 self._calm()
                 return
-        elif du < 0.0:
-            if m0 > 0.5 * du or m0 < 2.0 * du or m1 > 0.5 * du or m1 < 2.0 * du:
-                self._turning(t0, t1, u0, u1, m0, m1)
-                return
-            level = self.errors[cell % self.table_size] + cell if self.has_errors else cell
+            x = u1 - cell
+        else:
+            level = self.errors[cell % self.table_size] + cell if has_errors else cell
             if u1 >= level:
                 self._calm()
                 return
-        else:
-            if m0 != 0.0 or m1 != 0.0:
-                self._turning(t0, t1, u0, u1, m0, m1)
-            return
-        # x(s): fraction of the step at which the fraction s of the way is done
-        inverse = 1.0 / du
-        g0 = du / m0
-        g1 = du / m1
-        b = 3.0 - 2.0 * g0 - g1
-        c = g0 + g1 - 2.0
-        span = t1 - t0
-        last = t0
-        x = u1 - cell if forward else cell - u1
+            x = cell - u1
         while buffer.capacity < x + 3.0:  # an angle may have been set from outside; the disc's errors let in one or two
             buffer.grow()
-        jitter: cython.double = self.jitter
-        has_errors: cython.bint = self.has_errors
+        # ns after t0 at which the fraction s of the way is done: a cubic in s
+        inverse = 1.0 / du
+        span = t1 - t0
+        b = (3.0 - 2.0 * g0 - g1) * span
+        c = (g0 + g1 - 2.0) * span
+        g0 *= span
+        last = t0
+        jitter: cython.double = self.jitter * span
         while True:
             s = (level - u0) * inverse
             x = s * (g0 + s * (b + s * c))
             if jitter > 0.0:
                 x += self.stream.normal() * jitter * (inverse if inverse > 0.0 else -inverse)
-            time = int(x * span)
+            time = int(x)
             time += t0
             if time < last:
                 time = last
-            if time >= t1:
+            elif time >= t1:
                 time = t1 - 1
             last = time
             buffer.times[count] = time
@@ -283,9 +274,10 @@ class IncrementalEncoder:
                 if u1 < level:
                     break
             else:
+                # back over edge `cell`, where both channels take the same level
+                buffer.levels_a[count] = cell & 1
                 buffer.levels_b[count] = cell & 1
                 cell -= 1
-                buffer.levels_a[count] = 1 - (cell & 1)
                 count += 1
                 level = self.errors[cell % self.table_size] + cell if has_errors else cell
                 if u1 >= level:
@@ -298,9 +290,9 @@ class IncrementalEncoder:
 
     def _calm(self) -> cython.void:
         """Find the joint angles between the two edges beside the present position, a tenth of an edge inside."""
-        a: cython.double = self.edges_per_shaft_rad * self.shaft_per_rad * self.scale
-        b: cython.double = self.edges_per_shaft_rad * self.shaft_per_rad * self.offset_rad
-        if self.calm_from < self.calm_to or self.eccentricity_1 != 0.0 or self.eccentricity_2 != 0.0 or a == 0.0:
+        a: cython.double = self.edges_per_rad
+        b: cython.double = self.edges_at_zero
+        if self.calm_from < self.calm_to or self.eccentric or a == 0.0:
             return
         self.calm_from = (self.threshold(self.cell) + 0.1 - b) / a
         self.calm_to = (self.threshold(self.cell + 1) - 0.1 - b) / a

@@ -57,7 +57,8 @@ class MotorUnit:
         self.series_ohm = p.series_resistance_ohm + p.bridge_resistance_ohm
         self.K = p.torque_constant_Nm_per_A  # at the present temperature
         self.inductance_H = p.inductance_H(p.settling_frequency_hz)
-        self.ripple_factor = 1.0 / (p.inductance_H(p.pwm_frequency_hz) * p.pwm_frequency_hz)
+        # of EQUATIONS 10.6, without voltage, resistance and duty
+        self.ripple_per_ohm2 = 1.0 / (12.0 * (p.inductance_H(p.pwm_frequency_hz) * p.pwm_frequency_hz) ** 2)
         self.gate_W_per_V = p.gate_power_W / 30.0 * (p.pwm_frequency_hz / 100e3)
         self.diode_drop_V = p.diode_drop_V
         self.dead_time_fraction = p.dead_time_fraction
@@ -78,10 +79,8 @@ class MotorUnit:
 
         self.bridge_current_A = 0.0  # in the bridge's sense
         self.current_A = 0.0
-        self.mean_current_A = 0.0
         self.battery_current_A = 0.0
         self.heat_W = 0.0  # in the rotor, mean over the last 8 ms
-        self.drive_voltage_V = 0.0  # mean over the step, in the bridge's sense
         self.drive_Nm = 0.0
         self.coulomb_Nm = p.constant_friction_Nm
         self.viscous_Nms = p.viscous_friction_Nms
@@ -90,14 +89,18 @@ class MotorUnit:
         self.drawn_before_J = 0.0  # until the robot was let go; kept by plant/ranger.py
         self.returned_J = 0.0
         self.mechanical_J = 0.0  # K G w I, before friction
-        self.winding_J = 0.0
-        self.series_J = 0.0
-        self.contact_J = 0.0
         self.ripple_J = 0.0
         self.gate_J = 0.0
         self.diode_J = 0.0
-        self.heat_J = 0.0  # in the rotor since its temperature was last computed, and the time since then
+        # since its temperature was last computed: time, and integrals of the current's size and of its square
         self.heat_s = 0.0
+        self.size_As = 0.0
+        self.square_A2s = 0.0
+        # of all the time before: these integrals, heat of the winding and the ripple
+        self.warmed_As = 0.0
+        self.warmed_A2s = 0.0
+        self.warmed_J = 0.0
+        self.warmed_ripple_J = 0.0
         # of a whole step of `known_s` at `known_ohm`: time constant, e^(-t/tau) and two integrals of it
         self.known_s = 0.0
         self.known_ohm = 0.0
@@ -144,9 +147,11 @@ class MotorUnit:
         following: cython.longlong
         h: cython.double = (t1 - t0) * 1e-9
         R: cython.double = self.winding_ohm + self.series_ohm
-        back_emf_V: cython.double = self.mounting * self.K * self.gear * rate_rad_s
+        GK: cython.double = self.mounting * self.gear * self.K
+        leads: cython.longlong
+        contact_V: cython.double = self.contact_drop_V
+        back_emf_V: cython.double = GK * rate_rad_s
         amps: cython.double = self.bridge_current_A
-        open_bridge: cython.bint
         seconds: cython.double
         left: cython.double
         x: cython.double
@@ -162,21 +167,25 @@ class MotorUnit:
         part: cython.double
         charge: cython.double
         absolute: cython.double
-        energy: cython.double
         from_battery_As: cython.double = 0.0
         total_As: cython.double = 0.0
         size_As: cython.double = 0.0
         square_A2s: cython.double = 0.0
-        ripple_J: cython.double = 0.0
-        volt_seconds: cython.double = 0.0
         if t1 <= t0:
             return
         if drive.next_change_ns <= t0:
             drive.apply(t0)
         if amps == 0.0 and drive.switching_leads == 0 and drive.next_change_ns > t1:
             x = drive.duty * battery_V - back_emf_V
-            if -self.contact_drop_V <= x <= self.contact_drop_V:
-                self._rest(h, drive.duty * battery_V)
+            if -contact_V <= x <= contact_V:
+                # nothing drives a current through the contacts and no lead switches: only time passes
+                if self.current_A != 0.0 or self.battery_current_A != 0.0 or self.drive_Nm != 0.0:
+                    self.current_A = 0.0
+                    self.battery_current_A = 0.0
+                    self.load(0.0)
+                self.heat_s += h
+                if self.heat_s >= 0.008:
+                    self._heat()
                 return
         if h != self.known_s or R != self.known_ohm:
             self._know_step(h, R)
@@ -186,14 +195,13 @@ class MotorUnit:
             if following > t1:
                 following = t1
             seconds = (following - now) * 1e-9
-            open_bridge = drive.is_open
             d = drive.duty
-            if open_bridge:
+            if drive.is_open:
                 x = -back_emf_V
-                drop = self.contact_drop_V + battery_V + 2.0 * self.diode_drop_V
+                drop = contact_V + battery_V + 2.0 * self.diode_drop_V
             else:
                 x = d * battery_V - back_emf_V
-                drop = self.contact_drop_V + self.dead_time_fraction * battery_V
+                drop = contact_V + self.dead_time_fraction * battery_V
             charge = 0.0
             absolute = 0.0
             left = seconds
@@ -219,7 +227,12 @@ class MotorUnit:
                     e = exp(-left / tau)
                     e_s = tau * (1.0 - e)
                     ee_s = 0.5 * tau * (1.0 - e * e)
-                if final + above * e < 0.0:
+                part = final + above * e
+                if part >= 0.0:
+                    amps = sign * part
+                    part = left
+                    left = 0.0
+                else:
                     # the current reaches zero inside: there e = -final / above
                     e = -final / above
                     e_s = tau * (1.0 - e)
@@ -229,10 +242,6 @@ class MotorUnit:
                         part = left
                     left -= part
                     amps = 0.0
-                else:
-                    part = left
-                    left = 0.0
-                    amps = sign * (final + above * e)
                 part *= final
                 square_A2s += final * (part + 2.0 * above * e_s) + above * above * ee_s
                 part += above * e_s
@@ -240,73 +249,77 @@ class MotorUnit:
                 absolute += part
             total_As += charge
             size_As += absolute
-            if open_bridge:
+            if drive.is_open:
                 from_battery_As -= absolute
                 self.diode_J += 2.0 * self.diode_drop_V * absolute
             else:
                 # the dead time's drop is the battery's own voltage, switched against the current: it goes back
                 from_battery_As += d * charge - self.dead_time_fraction * absolute
-                volt_seconds += d * battery_V * seconds
-                if d < 0.0:
-                    d = -d
-                if d > 0.0:
-                    energy = battery_V * d * (1.0 - d) * self.ripple_factor
-                    ripple_J += energy * energy * (1.0 / 12.0) * R * seconds
-                if drive.switching_leads > 0 and battery_V > 0.0:
-                    energy = drive.switching_leads * self.gate_W_per_V * seconds
-                    from_battery_As += energy
-                    self.gate_J += energy * battery_V
+                leads = drive.switching_leads
+                if leads > 0:
+                    part = battery_V * R * self.ripple_per_ohm2 * drive.ripple * seconds
+                    x = leads * self.gate_W_per_V * seconds
+                    self.ripple_J += part * battery_V
+                    self.gate_J += x * battery_V
+                    from_battery_As += part + x
             now = following
             if now == drive.next_change_ns:
                 drive.apply(now)
-        if ripple_J > 0.0:
-            from_battery_As += ripple_J / battery_V
-            self.ripple_J += ripple_J
-        part = self.contact_drop_V * size_As
-        self.contact_J += part
-        self.mechanical_J += back_emf_V * total_As
-        energy = self.winding_ohm * square_A2s
-        self.winding_J += energy
-        self.series_J += self.series_ohm * square_A2s
         self.bridge_current_A = amps
         self.current_A = self.mounting * amps
-        self.mean_current_A = self.mounting * total_As / h
         self.battery_current_A = from_battery_As / h
-        self.drive_voltage_V = volt_seconds / h
+        self.mechanical_J += back_emf_V * total_As
+        self.size_As += size_As
+        self.square_A2s += square_A2s
         x = from_battery_As * battery_V
         if x >= 0.0:
             self.drawn_J += x
         else:
             self.returned_J -= x
-        # the ripple heats the winding and the series parts in proportion to their resistance
-        self.heat_J += energy + part + ripple_J * self.winding_ohm / R
         self.heat_s += h
         if self.heat_s >= 0.008:
             self._heat()
-        # the three torque numbers for the body: `load` of the mean current
-        x = self.gear * self.K * self.mean_current_A
+        # the torque numbers for the body: `load` of the mean current
+        x = GK * total_As / h
         self.drive_Nm = x
         self.coulomb_Nm = self.mu * (x if x > 0.0 else -x) + self.C0
-        self.viscous_Nms = self.C1
 
-    def _rest(self, h: cython.double, voltage_V: cython.double) -> cython.void:
-        """A step of `h` seconds without current: the contact drop holds it at zero and no lead switches."""
-        self.current_A = 0.0
-        self.mean_current_A = 0.0
-        self.battery_current_A = 0.0
-        self.drive_voltage_V = voltage_V
-        self.heat_s += h
-        if self.heat_s >= 0.008:
-            self._heat()
-        self.drive_Nm = 0.0
-        self.coulomb_Nm = self.C0
-        self.viscous_Nms = self.C1
+    @property
+    def mean_current_A(self):
+        """Mean of the last step, in the joint's sense."""
+        return self.drive_Nm / (self.gear * self.K)
+
+    @property
+    def contact_J(self):
+        """Heat at the brushes."""
+        return self.contact_drop_V * (self.warmed_As + self.size_As)
+
+    @property
+    def series_J(self):
+        """Heat in the inductor, the bridge and other series resistance."""
+        return self.series_ohm * (self.warmed_A2s + self.square_A2s)
+
+    @property
+    def winding_J(self):
+        """Heat in the winding without its share of the ripple's."""
+        return self.warmed_J + self.winding_ohm * self.square_A2s
 
     def _heat(self) -> cython.void:
-        """Warm the motor with the mean power since it was last warmed."""
-        self.heat_W = self.heat_J / self.heat_s
+        """Warm the motor with the mean power since it was last warmed: winding, brushes, its share of the ripple.
+
+        The ripple heats the winding and the series parts in proportion to their resistance.
+        """
+        winding_J: cython.double = self.winding_ohm * self.square_A2s
+        ripple_J: cython.double = (self.ripple_J - self.warmed_ripple_J) * self.winding_ohm
+        ripple_J /= self.winding_ohm + self.series_ohm
+        self.heat_W = (winding_J + self.contact_drop_V * self.size_As + ripple_J) / self.heat_s
+        self.warmed_J += winding_J
+        self.warmed_A2s += self.square_A2s
+        self.warmed_As += self.size_As
+        self.warmed_ripple_J = self.ripple_J
+        self.square_A2s = 0.0
+        self.size_As = 0.0
         self._warm(self.heat_s)
-        self.heat_J = 0.0
         self.heat_s = 0.0
 
     def _know_step(self, h: cython.double, R: cython.double) -> cython.void:

@@ -274,7 +274,9 @@ class RangerPlant:
         self.words[0] = self.hip_word.word(h1, self.step_s)
         self.words[1] = self.outer_word.word(o1, self.step_s)
         self.words[2] = self.inner_word.word(i1, self.step_s)
-        self.imu.update(t0, t1, lean0, lean0_rate, b.leg_outer, b.leg_outer_rate, s.yaw, (s.yaw - yaw0) / self.step_s)
+        if self.imu.is_due(t1):
+            yaw_rate: cython.double = (s.yaw - yaw0) / self.step_s
+            self.imu.update(t0, t1, lean0, lean0_rate, b.leg_outer, b.leg_outer_rate, s.yaw, yaw_rate)
         e.sense(t0, t1, outer_stands, b.outer_Fy, inner_stands, b.inner_Fy, s.twist)
         if b.changes != self.changes:
             self._note()
