@@ -1,3 +1,5 @@
+# cython: boundscheck=False, wraparound=False
+# (every index below is an id held against the table's size, or a place in a list of ids)
 """IO data: between the serial link and the data table, once per slot each way.
 
 Received frames overwrite value and time stamp together. Every variable of the send list that was written
@@ -12,6 +14,7 @@ import cython
 from boards.modules.network_time import NetworkTime
 from boards.modules.ssp_link import MainBrainSspLink
 from datatable.store import DataStore
+from foundation.user_error import UserError
 
 
 class IoData:
@@ -21,7 +24,7 @@ class IoData:
         self.store = store
         self.link = link
         self.time = time
-        self.send_ids = array.array("q", send_ids)
+        self.send_ids = self.known(send_ids)
         self.subscriber = 1  # SSP, bit of the store's read flags
         self.timestamp = 0  # id of TIMESTAMP
         # for buses slower than the robot's: the first list goes out in every n-th slot (n per entry), of the second one
@@ -34,11 +37,20 @@ class IoData:
 
     def thin(self, send_ids, dividers, turn_ids, turn_every=1) -> None:
         """Send `send_ids` in every n-th slot only, n in `dividers`; of `turn_ids` one every so many slots, in turn."""
-        self.send_ids = array.array("q", send_ids)
+        if len(send_ids) != len(dividers):
+            raise UserError(f"io data: {len(dividers)} dividers for {len(send_ids)} variables")
+        self.send_ids = self.known(send_ids)
         self.dividers = array.array("q", dividers)
-        self.turn_ids = array.array("q", turn_ids)
+        self.turn_ids = self.known(turn_ids)
         self.turn_every = turn_every
         self.turn = 0
+
+    def known(self, numbers):
+        """`numbers` as an array; UserError for one that is no id of the table."""
+        for number in numbers:
+            if not 0 <= number < self.store.size:
+                raise UserError(f"io data: id {number} is not 0 ... {self.store.size - 1}")
+        return array.array("q", numbers)
 
     def receive(self) -> object:
         """All waiting segments into the table; returns the number of frames."""

@@ -195,22 +195,25 @@ class Router:
         mask: cython.longlong
         channel: cython.longlong
         n: cython.longlong = 0
-        table: RoutingTable = self.table
         if not 0 <= identifier <= 2031:
             self.unroutable += 1
             return 0
         self.routed += 1
         if flags & 16 and 1 <= source <= 4:  # FLAG_REMOTE: somebody on that bus asks for the value
-            table.subscribe(identifier, source)
-            channel = table.sources[identifier]
+            self.table.subscribe(identifier, source)
+            channel = self.table.sources[identifier]
             if 1 <= channel <= 4 and channel != source:
                 self.queue(channel, identifier, flags, word0, word1)
                 n += 1
             self.copies += n
             return n
-        if table.sources[identifier] != source:
-            table.learn(identifier, source)
-        mask = table.destinations[identifier] & ~(1 << source)
+        if self.table.sources[identifier] != source:
+            self.table.learn(identifier, source)
+        mask = self.table.destinations[identifier] & ~(1 << source)
+        if mask == 1:  # nearly all that satellites send
+            self.ssp.push(identifier, flags, word0, word1, now)
+            self.copies += 1
+            return 1
         if mask & 1:
             self.ssp.push(identifier, flags, word0, word1, now)
             n += 1

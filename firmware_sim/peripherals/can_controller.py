@@ -16,7 +16,7 @@ RFS, TFI: DLC in bits 16-19, RTR bit 30, extended identifier bit 31.
 
 import cython
 
-from firmware_sim.microcontroller import Microcontroller, Peripheral
+from firmware_sim.microcontroller import Peripheral
 from foundation.events import CAN_RX, CAN_STATUS, CAN_TX_DONE
 from foundation.numbers import integers
 from foundation.user_error import UserError
@@ -124,9 +124,8 @@ class CanController(Peripheral):
 
         IndexError for a buffer that is not 1 ... 3.
         """
-        chip: Microcontroller = self.chip
         if not 1 <= buffer <= 3:
-            raise IndexError(f"{chip.name}: CAN controller {self.number}: transmit buffer {buffer} is not 1 ... 3")
+            raise IndexError(f"{self.chip.name}: CAN controller {self.number}: transmit buffer {buffer} is not 1 ... 3")
         if self.tx_free[buffer] == 0 or self.MOD & 1:
             self.refused += 1
             return False
@@ -137,7 +136,7 @@ class CanController(Peripheral):
         self.tx_free[buffer] = 0
         self.tx_complete[buffer] = 0
         self.requests += 1
-        chip.outbox.push(chip.now, 0, 32, self.number, buffer, identifier, flags, lo, hi)  # CAN_REQUEST
+        self.chip.outbox.push(self.chip.now, 0, 32, self.number, buffer, identifier, flags, lo, hi)  # CAN_REQUEST
         return True
 
     def write_CMR(self, command: cython.longlong) -> cython.longlong:

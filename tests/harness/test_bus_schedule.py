@@ -232,3 +232,10 @@ def test_no_queue_overflows_and_no_slot_overruns_at_one_megabit():
     assert all(bus["lost"] == bus["queue_full"] == bus["single_shot_skipped"] == 0 for bus in summary["can"].values())
     assert all(board["overruns"] == 0 for board in summary["slots"].values())
     assert summary["profile"] == HIL and max(bus["load_mean"] for bus in summary["can"].values()) < 0.45
+
+
+def test_what_is_no_variable_cannot_be_sent():
+    io = MainBrainBoard(Crystal(), Quirks(), 0).io
+    for numbers, dividers, turns in (([1, 99999], [1, 1], []), ([1], [1], [-1]), ([1, 2], [1], [])):
+        with pytest.raises(UserError):
+            io.thin(numbers, dividers, turns)
