@@ -1,5 +1,6 @@
 from foundation.events cimport EventQueue
 from foundation.random_stream cimport RandomStream
+from foundation.row_stream cimport FrameStream
 from can_bus.frame cimport arbitration_key, measure
 
 from libc.math cimport log
@@ -28,6 +29,7 @@ cdef class Bus:
     cdef public EventQueue commands
     # the bus in absolute bits since power-up
     cdef public long long free_bit, free_time, quiet_bit, advanced, next_bit, next_time
+    cdef public long long second_bit, second_ns, bit_ns, bit_rest, intermission_ns, intermission_rest
     cdef public long long[::1] wakes
     cdef public long long wake_place
     cdef public long long operating, joining
@@ -51,6 +53,7 @@ cdef class Bus:
     cdef public long long[::1] log
     cdef public long long log_capacity, log_count, log_dropped
     cdef public object log_sink
+    cdef public FrameStream trace
 
     cpdef long long bit_of(self, long long time) noexcept
     cpdef long long edge_ns(self, long long bit) noexcept
@@ -62,6 +65,7 @@ cdef class Bus:
     cpdef void set_mode(self, long long node, long long mode, long long time)
     cpdef long long advance(self, long long until) except? <long long>-1
     cpdef long long pending_of(self, long long node) noexcept
+    cdef long long _key_of(self, long long identifier, long long flags) except? <long long>-1
     cdef bint _change(self, long long until) except? -1
     cdef long long _next_join(self) except? <long long>-1
     cdef void _look_ahead(self) noexcept

@@ -34,6 +34,7 @@ from foundation.events import (
 )
 from foundation.numbers import integers
 from foundation.random_stream import RandomStream
+from foundation.row_stream import FrameStream
 
 if not cython.compiled:
     from math import log
@@ -159,12 +160,18 @@ class Bus:
         self.strikes_left = 0
         self.strike_position = -1
         self.planned_bits = []
+        # the second in which the last frame began: its first bit and its instant
+        self.second_bit = 0
+        self.second_ns = 0
+        self.bit_ns, self.bit_rest = divmod(1_000_000_000, bitrate)  # a bit in ns, and what is left of it times bitrate
+        self.intermission_ns, self.intermission_rest = divmod(INTERMISSION_BITS * 1_000_000_000, bitrate)
         self.window_bits = max(bitrate // 100, 1)  # 10 ms
         self.log_capacity = log_capacity
         self.log = array.array("q", [0]) * (LOG_FIELDS * log_capacity)
         self.log_count = 0
         self.log_dropped = 0
         self.log_sink = None
+        self.trace = None  # a FrameStream takes the frames instead of the log
         self.reset_statistics(0)
 
     def reset_statistics(self, time) -> None:
@@ -264,7 +271,7 @@ class Bus:
         """
         owner: Node
         slot: cython.longlong
-        length: cython.longlong = flags & 15
+        key: cython.longlong = identifier << 21
         first: cython.longlong
         start: cython.longlong
         second: cython.longlong
@@ -273,13 +280,8 @@ class Bus:
             raise ValueError(f"bus {self.name}: node {node} does not exist")
         if buffer < 1 or buffer > 3:
             raise ValueError(f"bus {self.name}: transmit buffer {buffer} is not one of 1, 2, 3")
-        if flags & 64:  # FLAG_EXTENDED
-            if identifier < 0 or identifier > 0x1FFFFFFF:
-                raise ValueError(f"bus {self.name}: identifier {identifier} does not fit in 29 bits")
-        elif identifier < 0 or identifier > 0x7FF:
-            raise ValueError(f"bus {self.name}: identifier {identifier} does not fit in 11 bits")
-        if flags & ~0x7F:  # length code, remote, single shot, extended
-            raise ValueError(f"bus {self.name}: flags {flags:#x} of identifier {identifier:#x} cannot be sent")
+        if flags & ~32 != 8 or identifier < 0 or identifier > 0x7FF:  # no standard frame of eight bytes
+            key = self._key_of(identifier, flags)
         owner = self.nodes[node]
         slot = node * 3 + buffer - 1
         if time < self.busy_until[slot]:
@@ -289,18 +291,17 @@ class Bus:
             self._refuse(owner, flags)
             owner.inbox.push(time, owner.order, CAN_TX_DONE, owner.controller, buffer, TX_ABORTED)
             return False
-        if length >= 8 and not flags & 16:
-            lo &= _MASK
-            hi &= _MASK
-        elif length == 0 or flags & 16:  # a remote frame carries no data
-            lo = 0
-            hi = 0
-        elif length < 4:
-            lo &= (1 << 8 * length) - 1
-            hi = 0
-        else:
-            lo &= _MASK
-            hi &= (1 << 8 * (length - 4)) - 1
+        lo &= _MASK
+        hi &= _MASK
+        if flags & ~32 != 8:
+            if flags & 16:  # a remote frame carries no data
+                lo = 0
+                hi = 0
+            elif flags & 15 < 4:
+                lo &= (1 << 8 * (flags & 15)) - 1
+                hi = 0
+            elif flags & 15 < 8:
+                hi &= (1 << 8 * ((flags & 15) - 4)) - 1
         if time < self.advanced:
             # stamped before what has been decided: it takes part from here on
             self.late_requests += 1
@@ -319,7 +320,7 @@ class Bus:
         if first < owner.suspend_bit:
             first = owner.suspend_bit
             start = self.edge_ns(first)
-        self.keys[slot] = arbitration_key(identifier, flags) if flags & 80 else identifier << 21
+        self.keys[slot] = key
         self.identifiers[slot] = identifier
         self.flags[slot] = flags
         self.lows[slot] = lo
@@ -340,6 +341,17 @@ class Bus:
             if start < self.wakes[self.wake_place]:
                 self.wakes[self.wake_place] = start
         return True
+
+    def _key_of(self, identifier: cython.longlong, flags: cython.longlong) -> cython.longlong:
+        """The arbitration key of a frame that can be sent; else ValueError."""
+        if flags & 64:  # FLAG_EXTENDED
+            if identifier < 0 or identifier > 0x1FFFFFFF:
+                raise ValueError(f"bus {self.name}: identifier {identifier} does not fit in 29 bits")
+        elif identifier < 0 or identifier > 0x7FF:
+            raise ValueError(f"bus {self.name}: identifier {identifier} does not fit in 11 bits")
+        if flags & ~0x7F:  # length code, remote, single shot, extended
+            raise ValueError(f"bus {self.name}: flags {flags:#x} of identifier {identifier:#x} cannot be sent")
+        return arbitration_key(identifier, flags)
 
     def _refuse(self, owner, flags) -> None:
         self.refused += 1
@@ -635,16 +647,24 @@ class Bus:
             if self._disturbed(k, slot, bits, merged):
                 return self.free_bit
         end = k + bits
-        # edge_ns of end - 1 (the end of the sixth bit of EOF), of end, and of the end of the intermission
+        # edge_ns of `end`; from it those of end - 1 (the end of the sixth bit of EOF) and of the intermission's end
         rate: cython.longlong = self.bitrate
         billion: cython.longlong = 1000000000
-        second: cython.longlong = k // rate
-        rest: cython.longlong = (end - second * rate) * billion + rate - 1
-        received: cython.longlong = second * billion + (rest - billion) // rate
-        done: cython.longlong = second * billion + rest // rate
+        if k - self.second_bit >= rate:
+            self.second_ns = k // rate * billion
+            self.second_bit = k // rate * rate
+        rest: cython.longlong = (end - self.second_bit) * billion + rate - 1
+        done: cython.longlong = rest // rate
+        rest -= done * rate
+        done += self.second_ns
+        received: cython.longlong = done - self.bit_ns
+        if rest < self.bit_rest:
+            received -= 1
         sender: cython.longlong = slot // 3
         self.free_bit = end + 3  # INTERMISSION_BITS
-        self.free_time = second * billion + (rest + 3 * billion) // rate
+        self.free_time = done + self.intermission_ns
+        if rest + self.intermission_rest >= rate:
+            self.free_time += 1
         self.quiet_bit = end - 8  # ACK delimiter and EOF are recessive
         flags &= 0x5F  # single shot is not on the wire
         for node in self.nodes:
@@ -996,6 +1016,10 @@ class Bus:
     ) -> cython.longlong:
         """Append to the frame log; returns how many it holds. A full one is first offered to `log_sink(bus)`."""
         base: cython.longlong
+        trace: FrameStream = self.trace
+        if trace is not None:
+            trace.add(time, identifier, flags, lo, hi)
+            return 0
         if self.log_count >= self.log_capacity:
             if self.log_sink is not None:
                 self.log_sink(self)

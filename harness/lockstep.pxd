@@ -4,8 +4,8 @@ from boards.main_brain.estimator cimport Estimator
 from can_bus.bus cimport Bus
 from firmware_sim.microcontroller cimport Microcontroller
 from foundation.events cimport Outbox
+from foundation.row_stream cimport RowStream
 from harness.processes.remote_board cimport RemoteBoard
-from harness.recorder cimport Recorder, RowStream
 from foundation.edge_buffer cimport ByteBuffer
 from plant.drive cimport Drive
 from plant.imu cimport Imu
@@ -39,7 +39,7 @@ cdef class BoardWires(Outbox):
 cdef class Lockstep:
     cdef public RangerPlant plant
     cdef public list boards, buses, wires, word_wires
-    cdef public Recorder recorder
+    cdef public RowStream samples, words
     cdef public long long time, next_sample, sample_count, stop_steps
     cdef public double stop_distance_m
     cdef public Imu imu
@@ -57,5 +57,4 @@ cdef class Lockstep:
     cdef void _sense(self) noexcept
     cdef void _show_words(self) noexcept
     cdef void _deliver_bytes(self) noexcept
-    cdef int _collect_frames(self) except -1
     cdef int _sample(self, long long now) except -1

@@ -24,9 +24,9 @@ from firmware_sim.microcontroller import Microcontroller
 from foundation.edge_buffer import ByteBuffer
 from foundation.events import Outbox
 from foundation.numbers import integers
+from foundation.row_stream import RowStream
 from foundation.user_error import UserError
 from harness.processes.remote_board import RemoteBoard
-from harness.recorder import RowStream
 from plant.drive import Drive
 from plant.ranger import RangerPlant
 
@@ -179,7 +179,8 @@ class Lockstep:
         self.boards = boards
         self.remote = all(isinstance(board, RemoteBoard) for board in boards)  # each in a process of its own
         self.buses = buses
-        self.recorder = recorder
+        self.samples = recorder.samples
+        self.words = recorder.words
         self.time = start_ns
         self.next_sample = start_ns
         self.main_brain = None
@@ -285,7 +286,6 @@ class Lockstep:
                 self._show_words()
                 plant.step()
                 self._sense()
-                self._collect_frames()
             if bus_due[0] <= now:
                 bus_due[0] = 1 << 62
                 for i in range(bus_count):
@@ -387,33 +387,21 @@ class Lockstep:
             board.inbox.put(line.times[i + n - 1], 256, 5, self.imu_uart, line.values[i], n, low, high, 0)
             i += n
 
-    def _collect_frames(self) -> None:
-        """Move what the buses logged into the canonical trace, bus after bus."""
-        bus: Bus
-        b: cython.longlong
-        for b in range(len(self.buses)):
-            bus = cython.cast(Bus, self.buses[b])
-            if bus.log_count > 0:
-                self.recorder.add_frames(b, bus.log, bus.log_count)
-                bus.log_count = 0
-
     def _sample(self, now: cython.longlong) -> None:
         """One row of the trace: the body, and when a log is kept the main brain's data table."""
-        stream: RowStream = self.recorder.samples
+        stream: RowStream = self.samples
         at: cython.longlong = stream.used
         i: cython.longlong
         self.plant.fill_sample(self.sample_row)
         stream.reals[at] = now * 1e-9
         for i in range(self.sample_count):
             stream.reals[at + 1 + i] = self.sample_row[i]
-        stream.used = at + 1 + self.sample_count
         stream.finish_row(now)
         if self.records_words:
-            stream = self.recorder.words
+            stream = self.words
             at = stream.used
             stream.integers[at] = now
             for i in range(stream.columns - 1):
                 stream.integers[at + 1 + i] = self.main_brain_words[i]
-            stream.used = at + stream.columns
             stream.finish_row(now)
         self.next_sample += SAMPLE_NS

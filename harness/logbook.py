@@ -10,7 +10,6 @@ import numpy as np
 from foundation.user_error import UserError
 from harness.recorder import Recorder
 
-STREAMS = ("frames", "samples", "words")
 WINDOW_S = 10.0  # default window of the logs: some 16 steps
 
 
@@ -26,9 +25,12 @@ class Logbook:
             raise UserError(f"log mode is {mode!r}, allowed are full, window, none")
         self.mode = mode
         self.window_ns = int(window_s * 1e9)
-        self.blocks: dict[str, collections.deque[tuple[int, bytes]]] = {name: collections.deque() for name in STREAMS}
+        self.streams = recorder.streams()
+        self.blocks: dict[str, collections.deque[tuple[int, bytes]]] = {
+            name: collections.deque() for name in self.streams
+        }
         self.spools: dict[str, Any] = {}
-        self.streams = {name: getattr(recorder, name) for name in STREAMS}
+        self.buses = len(recorder.frames)
         if mode == "none":
             return
         for name, stream in self.streams.items():
@@ -80,8 +82,14 @@ class Logbook:
         return rows
 
     def frames(self) -> dict:
-        """Frames seen on the buses: dict of arrays time_ns, bus (0..3), identifier, flags, word0, word1."""
-        rows = self._rows("frames")
+        """Frames seen on the buses: dict of arrays time_ns, bus (0..3), identifier, flags, word0, word1.
+
+        In order of time; at one instant the lower bus comes first.
+        """
+        rows = np.concatenate([self._rows(f"can{number}") for number in range(1, self.buses + 1)])
+        rows = rows[np.argsort(rows[:, 0], kind="stable")]
+        if self.mode == "window" and len(rows):
+            rows = rows[rows[:, 0] >= rows[-1, 0] - self.window_ns]
         first, second, third = rows[:, 0], rows[:, 1], rows[:, 2]
         return {
             "time_ns": first,

@@ -79,10 +79,12 @@ class Ranger:
         # CAN
         self.profile = profile
         rates = {name: bus.bit_rate for name, bus in profile.buses.items()} if profile is not None else {}
-        self.buses = [Bus(f"can{n}", rates.get(f"can{n}", BUS_BIT_RATE), seed) for n in (1, 2, 3, 4)]
-        for bus in self.buses:
+        names = ("can1", "can2", "can3", "can4")
+        self.recorder = Recorder(len(names), len(self.plant.sample_names), all_variables.TABLE_SIZE)
+        self.buses: list[Any] = [Bus(name, rates.get(name, BUS_BIT_RATE), seed, log_capacity=0) for name in names]
+        for bus, stream in zip(self.buses, self.recorder.frames, strict=True):
+            bus.trace = stream
             bus.reset_statistics(self.start_ns)  # loads count from the start of the run
-        self.recorder = Recorder(len(self.plant.sample_names), all_variables.TABLE_SIZE)
         self.logbook = Logbook(self.recorder, log)
         self.loop: Any = lockstep.Lockstep(
             self.plant, [self.boards[name] for name in wiring.BOARDS], self.buses, self.recorder, self.start_ns

@@ -1,9 +1,7 @@
 """Buses of the robot on interfaces outside: the boards' controllers leave the emulated bus and become peers there."""
 
-import array
 from typing import Any
 
-from can_bus.bus import LOG_FIELDS
 from foundation.events import STAGE_BUS
 from harness import wiring
 
@@ -33,12 +31,10 @@ def move_bus(robot: Any, external: Any, openers: dict, boards: tuple) -> None:
             order,
             openers.get(wire.board),
         )
-    row = array.array("q", [0]) * LOG_FIELDS  # as the emulated bus logs a frame
     bus = robot.buses[number]
 
     def note(time_ns: int, identifier: int, flags: int, lo: int, hi: int) -> None:
-        row[0], row[1], row[2], row[3], row[4] = time_ns, identifier, flags, lo, hi
-        robot.recorder.add_frames(number, row, 1)
+        bus.trace.add(time_ns, identifier, flags, lo, hi)
         bus.frames += 1
 
     external.sinks.append(note)

@@ -1,0 +1,75 @@
+# cython: boundscheck=False, wraparound=False
+# (every index below is a place of a block: a block is a whole number of rows and flushed when it is full)
+"""Rows of 64-bit numbers on their way out of a run: collected into blocks, hashed, handed over as bytes."""
+
+import array
+import hashlib
+
+import cython
+
+
+class RowStream:
+    """Rows of 64-bit values collected into blocks. `hashed`: feed the blocks to SHA-256 as well.
+
+    code: "q" for whole numbers, "d" for doubles. A row is written into `integers` or `reals` from `used` on, then
+    told by `finish_row`.
+    """
+
+    def __init__(self, code, columns, hashed, block_rows=512) -> None:
+        self.columns = columns
+        self.capacity = columns * block_rows
+        self.integers = array.array("q", [0]) * (self.capacity if code == "q" else 0)
+        self.reals = array.array("d", [0.0]) * (self.capacity if code == "d" else 0)
+        self.used = 0
+        self.last_time_ns = 0
+        self.is_real = code == "d"
+        self.digest = hashlib.sha256() if hashed else None
+        self.sink = None
+
+    def finish_row(self, time_ns: cython.longlong) -> None:
+        """Close the row that was just written from `used` on."""
+        self.used += self.columns
+        self.last_time_ns = time_ns
+        if self.used == self.capacity:
+            self.flush()
+
+    def flush(self) -> None:
+        """Hash and hand over what the block holds."""
+        if self.used == 0:
+            return
+        block: object = memoryview(self.reals) if self.is_real else memoryview(self.integers)
+        block = block[: self.used]
+        if self.digest is not None:
+            self.digest.update(block)
+        if self.sink is not None:
+            self.sink(self.last_time_ns, block.tobytes())
+        self.used = 0
+
+
+class FrameStream(RowStream):
+    """The frames of bus `bus` (0 ... 15), hashed: three numbers a row, in order of their start.
+
+    They are: the instant (ns) at which receivers have it; word 0 << 12 | flags << 4 | bus; word 1 << 29 | identifier.
+    """
+
+    def __init__(self, bus) -> None:
+        RowStream.__init__(self, "q", 3, True)
+        self.bus = bus
+
+    def add(
+        self,
+        time_ns: cython.longlong,
+        identifier: cython.longlong,
+        flags: cython.longlong,
+        lo: cython.longlong,
+        hi: cython.longlong,
+    ) -> None:
+        """A frame was on the bus."""
+        at: cython.longlong = self.used
+        self.integers[at] = time_ns
+        self.integers[at + 1] = (lo << 12) | (flags << 4) | self.bus
+        self.integers[at + 2] = (hi << 29) | identifier
+        self.used = at + 3
+        self.last_time_ns = time_ns
+        if self.used == self.capacity:
+            self.flush()
