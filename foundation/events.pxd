@@ -16,8 +16,8 @@ cdef class EventQueue(Outbox):
     cdef public list refs
     cdef public long long time, order, kind, a, b, c, d, e, f
     cdef public object ref
-    cdef public long long[::1] wakes
-    cdef public long long wake_place
+    cdef public long long[::1] came, due
+    cdef public long long place, urgent_until
     cpdef long long put(
         self, long long time, long long order, long long kind,
         long long a, long long b, long long c, long long d, long long e, long long f,

@@ -8,8 +8,6 @@ what happens at one instant has a written order: plant, pins, bus, interrupts, s
 The same messages travel in one process or between several.
 """
 
-import array
-
 import cython
 
 from foundation.numbers import integers
@@ -100,18 +98,21 @@ class EventQueue(Outbox):
         self.e = 0
         self.f = 0
         self.ref = None
-        self.wakes = array.array("q", [0])
-        self.wake_place = 0
+        self.came = integers(1)
+        self.due = integers(1)
+        self.place = 0
+        self.urgent_until = -1
 
     @property
     def count(self) -> int:
         """How many messages wait."""
         return (self.tail - self.head) // ROW
 
-    def wake(self, wakes, place) -> None:
-        """From now on a new first message lowers `wakes[place]` (an array of instants in ns) to its time."""
-        self.wakes = wakes
-        self.wake_place = place
+    def wake(self, came, due, place) -> None:
+        """From now on a new first message lowers `came[place]` to its time (ns), and any urgent one `due[place]`."""
+        self.came = came
+        self.due = due
+        self.place = place
 
     def _make_room(self) -> None:
         """The rows have reached the end of the array: move them to its begin, or into one of twice the size."""
@@ -139,9 +140,13 @@ class EventQueue(Outbox):
         f: cython.longlong = 0,
         ref: object = None,
     ) -> None:
-        """Add a message; among equal (time, order) it comes after those already there."""
+        """Add a message; among equal (time, order) it comes after those already there. It is urgent."""
         at: cython.longlong = self.put(time, order, kind, a, b, c, d, e, f)
         place: cython.longlong = 1
+        if time > self.urgent_until:
+            self.urgent_until = time
+        if time < self.due[self.place]:
+            self.due[self.place] = time
         if ref is not None:
             while self.refs[place] is not None:  # few messages wait that have one
                 place += 1
@@ -162,7 +167,11 @@ class EventQueue(Outbox):
         e: cython.longlong,
         f: cython.longlong,
     ) -> cython.longlong:
-        """`push` without an object, and with all the numbers: a few instructions. Returns where the row begins."""
+        """`push` without an object, all the numbers given, and not urgent: a few instructions.
+
+        Not urgent is what waits for a task on most boards: a frame, the end of a transmission, an edge, a byte.
+        Returns where the row begins.
+        """
         at: cython.longlong
         if self.tail == self.size:
             self._make_room()
@@ -188,8 +197,8 @@ class EventQueue(Outbox):
             self.rows[at : at + 10] = (time, order, kind, a, b, c, d, e, f, 0)
         if at == self.head:
             self.head_time = time
-            if time < self.wakes[self.wake_place]:
-                self.wakes[self.wake_place] = time
+            if time < self.came[self.place]:
+                self.came[self.place] = time
         self.pushed += 1
         return at
 

@@ -49,10 +49,12 @@ cdef class Lockstep:
     cdef public long long imu_uart
     cdef public long long swing_leg, strike_seen_ns, strike_count, strikes_unmatched, strikes_missed, steps_noticed
     cdef public double strike_sum_ms, strike_squares_ms2
-    cdef public long long[::1] encoder_boards, due, bus_due, step_times, main_brain_words
+    cdef public long long[::1] encoder_boards, due, came, prompt, step_times, main_brain_words
     cdef public bint records_words, remote
     cdef public double[::1] sample_row
-    cpdef long long run(self, long long until)
+    cpdef long long run(self, long long until) except? <long long>-1
+    cdef long long _walk_is_over(self) except? <long long>-1
+    cdef long long _decide(self, long long until) except? <long long>-1
     cdef void _notice_strike(self)
     cdef void _sense(self) noexcept
     cdef void _show_words(self) noexcept

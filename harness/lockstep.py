@@ -5,11 +5,17 @@
     plant -> sensors -> pins -> interrupts and slots -> data table -> CAN -> router -> main brain
           -> CAN -> slots -> PWM -> plant
 
-Virtual time advances in quanta of 31.25 us, an eighth of the plant's step. That is shorter than the shortest
-frame on Ranger's buses (36 us), so a frame requested within a quantum ends after it: boards that are advanced
-one after the other never miss what another one sends, and the result does not depend on the order in which
-they are advanced. Within a quantum: plant, pins, buses, then the boards with their interrupts and slots, then
-their outputs. A board with nothing to do before the end of the quantum is passed over.
+Virtual time advances in windows of at most 34 us that never reach beyond a step of the plant, each from the first
+instant at which anything is due. That is shorter than the shortest frame on Ranger's buses (its receivers have it
+35.6 us after its start) and than the pause between two exchanges on the serial link (34.67 us), so what one board
+puts out within a window reaches no other board before its end: boards that are advanced one after the other never
+miss what another one sends, and the result depends neither on the order in which they are advanced nor on where the
+windows lie. At one instant: plant, pins, buses, then the boards with their interrupts and slots, then their outputs.
+
+In a window a board runs that has something of its own to do there: an alarm, a slot, a task, an interrupt. Where
+frames, edges and bytes wait for a task (`hears_in_its_slots`) they do not make a board run: it takes them, each at its
+stamp, when its own next event has come, at the latest in the last window of the plant's step, while edges and
+voltages still stand. Nothing that it puts out can be missed, since it puts nothing out before that event.
 
 ROBOT PARITY: the plant moves in steps of 250 us. What a board writes to its bridge acts from the next step on, so up
 to 250 us late; what sensors show is a straight line over a step (voltages) or stands through it (words).
@@ -30,7 +36,7 @@ from harness.processes.remote_board import RemoteBoard
 from plant.drive import Drive
 from plant.ranger import RangerPlant
 
-QUANTUM_NS = 31_250
+WINDOW_NS = 34_000
 SAMPLE_NS = 2_000_000  # the canonical trace samples body and data table at the main brain's rate
 
 # Why `run` returned.
@@ -191,16 +197,18 @@ class Lockstep:
         self.records_words = False
         self.sample_row = array.array("d", [0.0]) * 64
         self.sample_count = 0
-        # per board the instant (ns) at which it must run; its inbox lowers it when something comes in earlier
-        self.due = integers(len(boards), start_ns)
+        # per board the instant (ns) at which it must run, and that at which something comes in that may wait;
+        # behind the boards' the instant at which a bus must decide
+        self.due = integers(len(boards) + 1, start_ns)
+        self.came = integers(len(boards), start_ns)
+        self.prompt = integers(len(boards), 1)
         for place, board in enumerate(boards):
-            board.inbox.wake(self.due, place)
+            board.inbox.wake(self.due, self.due, place)
         self.wires = [BoardWires() for _board in boards]
         for board, wires in zip(boards, self.wires, strict=True):
             board.outbox = wires
-        self.bus_due = integers(1, start_ns)  # ns, the first instant of interest of all the buses
         for bus in buses:
-            bus.wake(self.bus_due, 0)
+            bus.wake(self.due, len(boards))
         self.stop_steps = 1 << 62
         self.stop_distance_m = 1e300
         self.imu = None
@@ -216,6 +224,12 @@ class Lockstep:
         self.steps_noticed = 0
         self.strike_sum_ms = 0.0
         self.strike_squares_ms2 = 0.0
+
+    def hears_in_its_slots(self, board) -> None:
+        """Not urgent messages (`EventQueue.put`) make `board` put nothing out before its own next event."""
+        place = self.boards.index(board)
+        self.prompt[place] = 0
+        board.inbox.wake(self.came, self.due, place)
 
     def connect_encoder(self, encoder, board, pin_a, pin_b) -> None:
         """Channels A and B of `encoder` on two pins of `board`."""
@@ -254,63 +268,99 @@ class Lockstep:
         plant: RangerPlant = self.plant
         board: Microcontroller
         away: RemoteBoard
-        bus: Bus
         i: cython.longlong
         now: cython.longlong
         then: cython.longlong
+        end: cython.longlong
+        late: cython.longlong
+        first: cython.longlong
         following: cython.longlong
+        reason: cython.longlong = 0
         boards: list = self.boards
-        buses: list = self.buses
-        quantum: cython.longlong = QUANTUM_NS
+        window: cython.longlong = WINDOW_NS
         board_count: cython.longlong = len(boards)
         due: cython.longlong[::1] = self.due
-        bus_due: cython.longlong[::1] = self.bus_due
-        bus_count: cython.longlong = len(buses)
-        bus_due[0] = now = self.time  # between two runs anything may have been done to a bus
+        came: cython.longlong[::1] = self.came
+        prompt: cython.longlong[::1] = self.prompt
+        due[board_count] = self.time  # between two runs anything may have been done to a bus
         for i in range(board_count):
             # between two runs anything may have been done to a board
-            board = self.boards[i]
-            due[i] = min(board.next_time, board.inbox.head_time, board.edge_time)
+            board = boards[i]
+            due[i] = came[i] = min(board.next_time, board.inbox.head_time, board.edge_time)
         while self.time < until:
             now = self.time
-            then = now + quantum
             if plant.time_ns <= now:
                 if now >= self.next_sample:
                     self._sample(now)
-                if plant.fell:
-                    return 3
-                if plant.steps >= self.stop_steps:
-                    return 1
-                if plant.distance_m >= self.stop_distance_m:
-                    return 2
+                reason = self._walk_is_over()
+                if reason:
+                    break
                 self._show_words()
                 plant.step()
                 self._sense()
-            if bus_due[0] <= now:
-                bus_due[0] = 1 << 62
-                for i in range(bus_count):
-                    bus = cython.cast(Bus, buses[i])
-                    following = bus.advance(now)
-                    if following < bus_due[0]:
-                        bus_due[0] = following
+            end = plant.time_ns if plant.time_ns < until else until
+            if cython.compiled:
+                first = due[board_count]
+                for i in range(board_count):
+                    if due[i] < first:
+                        first = due[i]
+            else:
+                first = min(due)
+            if first > now:
+                now = first
+            then = now + window
+            late = 0
+            if then >= end:
+                then = end
+                late = end
+            self.time = then
+            if due[board_count] <= now and now < end:
+                due[board_count] = self._decide(now)
             if self.remote:
                 for i in range(board_count):
-                    if due[i] < then:
+                    if due[i] < then or came[i] < late:
                         away = cython.cast(RemoteBoard, boards[i])
                         away.begin(then)
             for i in range(board_count):
-                if due[i] < then:
+                if due[i] < then or came[i] < late:
                     board = cython.cast(Microcontroller, boards[i])
                     following = board.advance(then)
-                    if board.inbox.head_time < following:
-                        following = board.inbox.head_time
-                    if board.edge_time < following:
-                        following = board.edge_time
+                    came[i] = board.inbox.head_time
+                    if board.edge_time < came[i]:
+                        came[i] = board.edge_time
+                    if came[i] < following and (prompt[i] or board.inbox.urgent_until >= then):
+                        following = came[i]
                     due[i] = following
             if self.estimator is not None and self.estimator.swing_leg != self.swing_leg:
                 self._notice_strike()
-            self.time = then
-        return 0
+        due[board_count] = self._decide(self.time - 1)
+        return reason
+
+    def _walk_is_over(self) -> cython.longlong:
+        """One of the reasons above why the walk ends here, or 0."""
+        if self.plant.fell:
+            return FELL
+        if self.plant.steps >= self.stop_steps:
+            return REACHED_STEPS
+        if self.plant.distance_m >= self.stop_distance_m:
+            return REACHED_DISTANCE
+        return REACHED_TIME
+
+    def _decide(self, until: cython.longlong) -> cython.longlong:
+        """Let every bus decide what starts up to and including `until` (ns); returns their next instant of interest."""
+        bus: Bus
+        i: cython.longlong
+        next_time: cython.longlong
+        first: cython.longlong = 1 << 62
+        buses: list = self.buses
+        for i in range(len(buses)):
+            bus = cython.cast(Bus, buses[i])
+            next_time = bus.next_time
+            if next_time <= until:
+                next_time = bus.advance(until)
+            if next_time < first:
+                first = next_time
+        return first
 
     def _notice_strike(self) -> cython.void:
         """The main brain has flipped the swing leg: how long after the body's strike began that slot?"""
@@ -344,8 +394,10 @@ class Lockstep:
         for i in range(len(self.encoder_boards)):
             board = cython.cast(Microcontroller, self.boards[self.encoder_boards[i]])
             first = board.edges_came()
-            if first < self.due[self.encoder_boards[i]]:
-                self.due[self.encoder_boards[i]] = first
+            if first < self.came[self.encoder_boards[i]]:
+                self.came[self.encoder_boards[i]] = first
+                if self.prompt[self.encoder_boards[i]] and first < self.due[self.encoder_boards[i]]:
+                    self.due[self.encoder_boards[i]] = first
         if self.imu is not None and self.imu.bytes.count:
             if self.imu_tap is not None:
                 self.imu_tap.bytes_sent(self.imu.bytes.times, self.imu.bytes.values, self.imu.bytes.count)

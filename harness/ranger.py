@@ -116,6 +116,8 @@ class Ranger:
         """Solder every wire of the tables."""
         loop, boards = self.loop, self.boards
         place = {name: number for number, name in enumerate(wiring.BOARDS)}
+        for name in wiring.HEAR_IN_SLOTS:
+            loop.hears_in_its_slots(boards[name])
         for wire in wiring.ENCODERS:
             pins = wiring.PINS[wire.board]
             encoder = self.plant.encoders[wire.encoder]
@@ -184,7 +186,7 @@ class Ranger:
         """Poll every end that leads outside, when it is time; returns until when the loop may run."""
         now: int = self.loop.time
         if now >= self.next_poll_ns:
-            self.next_poll_ns = max(now + lockstep.QUANTUM_NS, min(end.poll(now) for end in self.polled))
+            self.next_poll_ns = max(now + lockstep.WINDOW_NS, min(end.poll(now) for end in self.polled))
         return self.next_poll_ns
 
     def poll_now(self) -> None:

@@ -12,6 +12,9 @@ from plant import wiring_points as point
 # The order in which boards are advanced and their messages sorted within an instant.
 BOARDS = ("MCH", "MCFO", "MCFI", "MCSI", "UI", "CSR", "MB")
 
+# Boards on which frames, edges and bytes wait for a task: no handler and no main loop answers them at once.
+HEAR_IN_SLOTS = ("MCH", "MCFO", "MCFI", "MCSI", "UI")
+
 
 class CanWire(NamedTuple):
     """Controller `controller` of `board` hangs on bus `bus` (1 ... 4)."""

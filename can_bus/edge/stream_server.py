@@ -18,7 +18,7 @@ BACKLOG_LIMIT = 1 << 20  # bytes that wait for a slow client before its frames a
 HELD_ABOVE = 1 << 16  # bytes; a bus at full speed waits for the client then
 READ_SIZE = 1 << 16
 NEXT_POLL_NS = 1_000_000  # while nothing waits; chosen by us: a frame from outside then waits 1 ms at most
-QUICK_POLL_NS = 31_250  # while frames of clients wait: the lockstep's quantum
+QUICK_POLL_NS = 31_250  # while frames of clients wait: about a window of the lockstep
 COUNTERS = ("clients_seen", "frames_in", "frames_out", "frames_dropped", "malformed", "refused")
 
 

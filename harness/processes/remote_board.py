@@ -2,7 +2,7 @@
 
 `inbox` and `outbox` are those of the board that this process built and wired but does not run (its shadow): what
 is pushed into the inbox goes through the channel when the board is next asked to run, what the board put out
-comes back onto the board's wires. `begin(until)` posts the request, so that all boards of a quantum run at the same
+comes back onto the board's wires. `begin(until)` posts the request, so that all boards of a window run at the same
 time; `advance(until)` waits for the answer.
 
 A board is asked only when that can matter. With each answer it says before which instant it puts nothing out;
@@ -69,7 +69,7 @@ class RemoteBoard(Microcontroller):
             buffer = line.buffer
             while buffer.read < buffer.count:
                 # order 256: stage pins; kind 1: PIN_EDGE
-                self.inbox.push(
+                self.inbox.put(
                     buffer.times[buffer.read],
                     256,
                     1,
@@ -77,6 +77,8 @@ class RemoteBoard(Microcontroller):
                     buffer.levels_a[buffer.read],
                     line.partner_pin,
                     buffer.levels_b[buffer.read],
+                    0,
+                    0,
                 )
                 buffer.read += 1
         return self.edge_time

@@ -4,6 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from foundation.events import NEVER, EventQueue
+from foundation.numbers import integers
 
 
 def drain(queue):
@@ -63,3 +64,15 @@ def test_a_queue_agrees_with_a_stable_sort(moves):
     model.sort(key=lambda message: message[:2])
     assert [message[:3] for message in drain(queue)] == model
     assert queue.count == 0
+
+
+def test_a_message_that_is_not_urgent_only_tells_that_it_came():
+    queue, came, due = EventQueue(), integers(2, NEVER), integers(2, NEVER)
+    queue.wake(came, due, 1)
+    queue.put(50, 0, 1, 0, 0, 0, 0, 0, 0)
+    assert (list(came), list(due)) == ([NEVER, 50], [NEVER, NEVER])
+    queue.push(70, 0, 2)
+    assert (list(came), list(due), queue.urgent_until) == ([NEVER, 50], [NEVER, 70], 70)
+    queue.put(40, 0, 3, 0, 0, 0, 0, 0, 0)
+    assert (list(came), list(due)) == ([NEVER, 40], [NEVER, 70])
+    assert [kind for _, _, kind, *_ in drain(queue)] == [3, 1, 2]

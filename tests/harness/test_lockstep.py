@@ -1,0 +1,48 @@
+"""The loop's freedom: how it cuts time into windows and when it lets a board run changes nothing."""
+
+import pytest
+
+from harness import lockstep, wiring
+from harness.ranger import Ranger
+from harness.scenario import Scenario, StopRule
+
+RUN_S = 0.06
+
+
+def trace(prompt=(), errors_on_can1=0, slice_s=1.0):
+    """(digest of a short run, frames that the hip board lost by going bus-off).
+
+    Boards of `prompt` run as soon as anything comes in.
+    """
+    robot = Ranger(Scenario())
+    for name in prompt:
+        place = wiring.BOARDS.index(name)
+        robot.loop.prompt[place] = 1
+        robot.boards[name].inbox.wake(robot.loop.due, robot.loop.due, place)
+    robot.buses[0].inject_errors(errors_on_can1)
+    while robot.time_s < RUN_S - 1e-9:
+        robot.run(StopRule(time_s=RUN_S), slice_s)
+    hip = next(node for node in robot.buses[0].nodes if node.name == "MCH")
+    return robot.trace_digest(), hip.flushed
+
+
+@pytest.mark.parametrize("window_ns", [1_000, 10_007, 31_250])
+def test_the_trace_does_not_depend_on_where_the_windows_lie(monkeypatch, window_ns):
+    expected = trace()
+    monkeypatch.setattr(lockstep, "WINDOW_NS", window_ns)
+    assert trace() == expected
+
+
+def test_the_trace_does_not_depend_on_how_a_run_is_sliced():
+    assert trace(slice_s=0.0007) == trace(slice_s=0.000_033) == trace()
+
+
+def test_a_board_that_hears_in_its_slots_misses_nothing_by_running_later():
+    assert trace(prompt=wiring.HEAR_IN_SLOTS) == trace()
+
+
+def test_a_board_whose_controller_went_bus_off_restarts_it_at_once_also_when_it_hears_in_its_slots():
+    """Its error interrupt writes the controller's mode register: what the bus tells of errors is urgent."""
+    at_leisure = trace(errors_on_can1=80)
+    assert at_leisure[1] > 0  # frames were lost with bus-off
+    assert trace(prompt=wiring.HEAR_IN_SLOTS, errors_on_can1=80) == at_leisure
