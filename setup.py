@@ -32,6 +32,8 @@ RECORD = "build_record.json"  # in the package foundation
 # no fused multiply-add, no fast-math: both change the last bit of a trajectory
 COMPILE_ARGUMENTS = ["-O2", "-g0", "-ffp-contract=off", "-fno-fast-math", "-w"]
 DIRECTIVES = {
+    "always_allow_keywords": False,  # no keywords for functions of no or one argument: called directly from tables
+    "auto_pickle": False,  # nobody pickles a board: half a megabyte of C less to compile
     "binding": False,  # bound methods in schedule tables are then called in about 10 ns
     "boundscheck": True,
     "wraparound": True,

@@ -62,6 +62,39 @@ class Crystal:
         return float(hz) * (1e9 + self.ppb) / 1e18
 
 
+class TickTrain:
+    """The instants of a timer's ticks on a crystal, one after another: exactly `Crystal.tick_time_ns`, by addition.
+
+    `number` and `time` (true ns) are those of the present tick; tick 0 is at `phase_ns`. The crystal's `ppb` is taken
+    when the train is made.
+    """
+
+    def __init__(self, crystal: Crystal, period_ns, phase_ns) -> None:
+        self.rate = 1_000_000_000 + crystal.ppb
+        self.period_ns = period_ns
+        self.phase_ns = phase_ns
+        self.step_ns, self.step_rest = divmod(period_ns * 1_000_000_000, self.rate)
+        self.number = 0
+        self.time = phase_ns
+        self.rest = 0
+
+    def go_to(self, number) -> None:
+        """Make tick `number` the present one."""
+        whole, self.rest = divmod(number * self.period_ns * 1_000_000_000, self.rate)
+        self.number = number
+        self.time = self.phase_ns + whole
+
+    def next(self) -> cython.longlong:
+        """Go to the next tick; returns its instant."""
+        self.number += 1
+        self.time += self.step_ns
+        self.rest += self.step_rest
+        if self.rest >= self.rate:
+            self.rest -= self.rate
+            self.time += 1
+        return self.time
+
+
 def seeded_crystal(stream, nominal_hz=10_000_000, spread_ppm=30.0) -> Crystal:
     """A crystal as bought: its error uniform within +/-`spread_ppm`, drawn from the RandomStream `stream`.
 

@@ -3,14 +3,14 @@ cimport cython
 from foundation.edge_buffer cimport EdgeBuffer
 from foundation.events cimport EventQueue, Outbox
 from firmware_sim.analog cimport AnalogPins
-from firmware_sim.clock cimport Crystal
-from firmware_sim.scheduler cimport Occasional, Schedule, SlotScheduler, Task, Wait, call, call_with
+from firmware_sim.clock cimport Crystal, TickTrain
+from firmware_sim.scheduler cimport Occasional, Schedule, SlotScheduler, Task, Wait, call, call_with, run
 from firmware_sim.vic cimport InterruptController, InterruptSource
 
 cdef class Peripheral:
     cdef public Microcontroller chip
     cpdef void on_message(self, EventQueue queue)
-    cpdef long long on_pin(self, long long channel, long long level, long long time) except? -1
+    cpdef long long on_pin(self, long long channel, long long level, long long time) except? <long long>-1
     cpdef void on_alarm(self, long long alarm, long long time)
 
 @cython.final
@@ -18,6 +18,7 @@ cdef class EdgeLine:
     cdef public EdgeBuffer buffer
     cdef public long long pin, partner_pin, channel, next_time
     cdef public Peripheral peripheral
+    cdef public EdgeLine following
 
 cdef class Microcontroller:
     cdef public str name
@@ -34,9 +35,10 @@ cdef class Microcontroller:
     cdef public object on_overrun, on_limit, on_near_limit
     cdef public long long extra_cycles
     # pending-event bookkeeping of the loop
-    cdef public long long tick_time, tick_number, tick_period_ns, phase_ns
+    cdef public long long tick_time
+    cdef public TickTrain ticks
     cdef public InterruptSource tick_source
-    cdef public long long code_time, irq_free, fiq_free
+    cdef public long long code_time, stop_time, irq_free, fiq_free
     cdef public bint waiting, check_wait
     cdef public Wait wait_task
     cdef public long long wait_start, wait_stolen, stolen_cycles
@@ -48,32 +50,52 @@ cdef class Microcontroller:
     cdef public list message_table, pin_owners
     cdef public long long[::1] pin_channels
     cdef public list edge_lines
-    cdef public EdgeLine edge_line
-    cdef public long long edge_time
+    cdef public EdgeLine edge_line, first_line
+    cdef public long long edge_time, other_edge_time
+    @cython.final
+    cdef long long _choose_edge_line(self) noexcept
     cdef public long long unclaimed, match_time, instant
     cdef public object on_timer_tick
     cdef public object background
     cdef public bint background_wanted
     cdef public long long horizon
     cpdef long long advance(self, long long until) except? -1
+    cpdef long long main_loop(self) except? <long long>-1
     cpdef bint due(self, long long until) except? -1
     cpdef void spend(self, long long cycles) noexcept
     cpdef long long cycles_since_tick(self) except? -1
     cpdef long long request(self, InterruptSource source) except? -1
     cpdef long long edges_came(self) noexcept
-    cpdef bint nothing_more_at(self, long long time) noexcept
-    cdef long long _serve_now(self) except? -1
-    cdef long long _edges(self, long long until) except? -1
+    @cython.final
+    cdef long long _serve_now(self) except? <long long>-1
+    @cython.final
+    cdef long long _edges(self, long long until) except? <long long>-1
+    @cython.final
     cdef long long _find_first_alarm(self) noexcept
     cpdef long long set_alarm(self, long long index, long long time) except? -1
     cpdef int start(self, Schedule schedule, long long phase_ns) except -1
     cpdef object on_slot_timer(self, EventQueue queue)
-    cdef long long _input(self) except? -1
-    cdef long long _alarm(self, long long time) except? -1
-    cdef long long _timer_match(self) except? -1
-    cdef long long _background(self) except? -1
-    cdef long long _serve(self, InterruptSource source, long long time) except? -1
-    cdef long long _code(self, long long until) except? -1
-    cdef long long _wait_over(self) except? -1
-    cdef long long _charge(self, Task task, long long cycles) except? -1
-    cdef long long _close_slot(self, long long since) except? -1
+    @cython.final
+    cdef long long _input(self) except? <long long>-1
+    @cython.final
+    cdef long long _alarm(self, long long time) except? <long long>-1
+    @cython.final
+    cdef long long _timer_match(self) except? <long long>-1
+    @cython.final
+    cdef long long _background(self) except? <long long>-1
+    @cython.final
+    cdef long long _serve(self, InterruptSource source, long long time) except? <long long>-1
+    @cython.final
+    cdef long long _code(self, long long until) except? <long long>-1
+    @cython.final
+    cdef long long _spent(self, Task task, long long items) except? <long long>-1
+    @cython.final
+    cdef bint _special_task(self, Task task) except? -1
+    @cython.final
+    cdef bint _begin_wait(self, Wait task) except? -1
+    @cython.final
+    cdef long long _wait_over(self) except? <long long>-1
+    @cython.final
+    cdef long long _charge(self, Task task, long long cycles) except? <long long>-1
+    @cython.final
+    cdef long long _close_slot(self, long long since) except? <long long>-1

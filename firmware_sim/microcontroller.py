@@ -19,7 +19,7 @@ import array
 import cython
 
 from firmware_sim.analog import AnalogPins
-from firmware_sim.clock import Crystal
+from firmware_sim.clock import Crystal, TickTrain
 from firmware_sim.scheduler import Occasional, Schedule, SlotScheduler, Task, Wait
 from firmware_sim.vic import SLOT_TIMER, InterruptController, InterruptSource
 from foundation.edge_buffer import EdgeBuffer
@@ -65,6 +65,7 @@ class EdgeLine:
         self.peripheral = peripheral
         self.channel = channel
         self.next_time = NEVER
+        self.following = None  # the line connected after this one
 
 
 class Microcontroller:
@@ -106,13 +107,12 @@ class Microcontroller:
         self.horizon = 0
         self.extra_cycles = 0
         self.tick_time = NEVER
-        self.tick_number = 0
-        self.tick_period_ns = 0
-        self.phase_ns = 0
+        self.ticks = TickTrain(self.crystal, 1, 0)
         self.match_time = 0
         self.tick_source = self.vic.source(SLOT_TIMER, 0)
         self.instant = 0
         self.code_time = 0
+        self.stop_time = 0
         self.irq_free = 0
         self.fiq_free = 0
         self.waiting = False
@@ -131,8 +131,10 @@ class Microcontroller:
         self.pin_owners = [None] * PINS
         self.pin_channels = integers(PINS, -1)
         self.edge_lines = []
+        self.first_line = None
         self.edge_line = None
         self.edge_time = NEVER
+        self.other_edge_time = NEVER
         self.unclaimed = 0
 
     # --- set-up -------------------------------------------------------------------------------------------
@@ -169,29 +171,45 @@ class Microcontroller:
         """Edges of `buffer` arrive on `pin`, claimed before, with the level of `partner_pin`; tell by `edges_came`."""
         if not 0 <= pin < PINS or self.pin_owners[pin] is None:
             raise UserError(f"{self.name}: no peripheral has claimed pin {pin}, so edges there would be lost")
-        self.edge_lines.append(EdgeLine(buffer, pin, partner_pin, self.pin_owners[pin], self.pin_channels[pin]))
+        line = EdgeLine(buffer, pin, partner_pin, self.pin_owners[pin], self.pin_channels[pin])
+        if self.edge_lines:
+            self.edge_lines[-1].following = line
+        else:
+            self.first_line = line
+        self.edge_lines.append(line)
 
     def edges_came(self) -> cython.longlong:
         """The buffers of the edge lines may hold new edges; returns the first one's instant.
 
         Edges of two lines at one instant come in the order in which the lines were connected, and before messages.
         """
-        line: EdgeLine
+        line: EdgeLine = self.first_line
         buffer: EdgeBuffer
-        i: cython.longlong
-        lines: list = self.edge_lines
-        self.edge_time = 1 << 62
-        for i in range(len(lines)):
-            line = cython.cast(EdgeLine, lines[i])
+        while line is not None:
             buffer = line.buffer
+            line.next_time = 1 << 62
             if buffer.read < buffer.count:
                 line.next_time = buffer.times[buffer.read]
-                if line.next_time < self.edge_time:
-                    self.edge_time = line.next_time
-                    self.edge_line = line
-            else:
-                line.next_time = 1 << 62
-        return self.edge_time
+            line = line.following
+        return self._choose_edge_line()
+
+    @cython.final
+    def _choose_edge_line(self) -> cython.longlong:
+        """Which line has the first edge, and when the first of the others comes; returns the first one's instant."""
+        line: EdgeLine = self.first_line
+        first: cython.longlong = 1 << 62
+        second: cython.longlong = 1 << 62
+        while line is not None:
+            if line.next_time < first:
+                second = first
+                first = line.next_time
+                self.edge_line = line
+            elif line.next_time < second:
+                second = line.next_time
+            line = line.following
+        self.edge_time = first
+        self.other_edge_time = second
+        return first
 
     def new_alarm(self, peripheral, number) -> int:
         """An alarm slot; when due, `peripheral.on_alarm(number, time)` runs. Returns the slot."""
@@ -212,10 +230,13 @@ class Microcontroller:
             self.alarm_first = index
             if time < self.next_time:
                 self.next_time = time
+            if time < self.stop_time:
+                self.stop_time = time
         elif index == self.alarm_first:
             self._find_first_alarm()
         return self.alarm_time
 
+    @cython.final
     def _find_first_alarm(self) -> cython.longlong:
         """Which alarm is due first; among equals the one that was made first."""
         i: cython.longlong
@@ -232,10 +253,8 @@ class Microcontroller:
     def start(self, schedule: Schedule, phase_ns: cython.longlong) -> None:
         """Run `schedule`: the first slot begins at `phase_ns`, the later ones by this chip's crystal."""
         cycles: cython.longlong = schedule.slot_ns * self.hz // 1000000000
-        self.scheduler = SlotScheduler(schedule, cycles)
-        self.tick_period_ns = schedule.slot_ns // schedule.divider
-        self.phase_ns = phase_ns
-        self.tick_number = 0
+        self.scheduler = SlotScheduler(schedule, cycles, self.ns_per_cycle)
+        self.ticks = TickTrain(self.crystal, schedule.slot_ns // schedule.divider, phase_ns)
         self.tick_time = phase_ns
         self.next_time = min(self.next_time, phase_ns)
         self.waiting = False
@@ -264,6 +283,10 @@ class Microcontroller:
         self.next_time = self.instant
         return self.vic.raise_source(source)
 
+    def main_loop(self) -> cython.longlong:
+        """One turn of `background`; a board may put its main loop here instead of naming a function."""
+        return call(self.background)
+
     # --- the event loop -----------------------------------------------------------------------------------
 
     def due(self, until: cython.longlong) -> cython.bint:
@@ -279,40 +302,38 @@ class Microcontroller:
         service: cython.longlong
         what: cython.longlong
         if self.next_time >= until and inbox.head_time >= until and self.edge_time >= until:
-            return self.next_time  # idle: by far the most frequent answer in short steps
+            return self.next_time  # idle: a frequent answer in short steps
         self.horizon = until
         while True:
+            # the hardware's next: an alarm (1) or the slot timer (2)
             time = self.alarm_time
             what = 1
             if self.tick_time < time:
                 time = self.tick_time
                 what = 2
-            if vic.fiq_pending != 0:
+            # the processor before that: a handler (3), tasks (4) or the main loop beside them (5)
+            if vic.pending != 0:
                 service = self.fiq_free
-                if service < self.instant:
-                    service = self.instant
-                if service < time:
-                    time = service
-                    what = 3
-            elif vic.irq_pending != 0:
-                service = self.fiq_free
-                if self.irq_free > service:
+                if vic.pending < 65536 and self.irq_free > service:  # no FIQ among them
                     service = self.irq_free
                 if service < self.instant:
                     service = self.instant
                 if service < time:
                     time = service
-                    what = 4
-            if self.code_time < time and not scheduler.done and (not self.waiting or self.check_wait):
-                time = self.code_time
-                what = 5
-            elif self.background is not None and self.background_wanted and scheduler.done:
-                service = self.code_time
-                if service < self.instant:
-                    service = self.instant
-                if service < time:
-                    time = service
-                    what = 6
+                    what = 3
+            if self.code_time < time:
+                if not scheduler.done:
+                    if not self.waiting or self.check_wait:
+                        time = self.code_time
+                        what = 4
+                elif self.background_wanted and self.background is not None:
+                    service = self.code_time
+                    if service < self.instant:
+                        service = self.instant
+                    if service < time:
+                        time = service
+                        what = 5
+            # at one instant inputs come first: edges, then messages
             if self.edge_time <= time and self.edge_time <= inbox.head_time:
                 if self.edge_time >= until:
                     break
@@ -322,51 +343,46 @@ class Microcontroller:
                 if inbox.head_time >= until:
                     break
                 inbox.take()
-                self.instant = inbox.time
-                self.now = inbox.time
                 self._input()
-                if vic.fiq_pending != 0 or vic.irq_pending != 0:
+                if vic.pending != 0:
                     self._serve_now()
                 continue
             if time >= until:
                 break
             self.instant = time
-            if what == 5:
+            if what == 4:
                 self._code(until)
-            elif what == 3:
-                self._serve(vic.next_fiq(), time)
-            elif what == 4:
-                self._serve(vic.next_irq(), time)
-            elif what == 6:
-                self._background()
-            else:
-                if what == 1:
-                    self._alarm(time)
-                else:
-                    self._timer_match()
-                if vic.fiq_pending != 0 or vic.irq_pending != 0:
+            elif what == 1:
+                self._alarm(time)
+                if vic.pending != 0:
                     self._serve_now()
+            elif what == 2:
+                self._timer_match()
+                if vic.pending != 0:
+                    self._serve_now()
+            elif what == 3:
+                self._serve(vic.first_pending(), time)
+            else:
+                self._background()
         self.next_time = time
         return time
 
+    @cython.final
     def _serve_now(self) -> cython.longlong:
         """Serve what is pending if it can be served at this very instant: the common case, without another round."""
-        vic: InterruptController = self.vic
         time: cython.longlong = self.instant
-        if self.fiq_free > time or not self.nothing_more_at(time):
+        if (
+            self.fiq_free > time
+            or (self.irq_free > time and self.vic.pending < 65536)
+            or time >= self.alarm_time
+            or time >= self.tick_time
+            or time >= self.edge_time
+            or time >= self.inbox.head_time
+        ):
             return 0
-        if vic.fiq_pending != 0:
-            return self._serve(vic.next_fiq(), time)
-        if self.irq_free > time:
-            return 0
-        return self._serve(vic.next_irq(), time)
+        return self._serve(self.vic.first_pending(), time)
 
-    def nothing_more_at(self, time: cython.longlong) -> cython.bint:
-        """True when no edge, message, alarm or tick is due at `time` or before: handlers may run."""
-        return (
-            time < self.inbox.head_time and time < self.edge_time and time < self.alarm_time and time < self.tick_time
-        )
-
+    @cython.final
     def _edges(self, until: cython.longlong) -> cython.longlong:
         """Edges from the first one on, each with its fast interrupt, until something else comes first.
 
@@ -376,50 +392,48 @@ class Microcontroller:
         line: EdgeLine
         buffer: EdgeBuffer
         place: cython.longlong
+        level: cython.longlong
         time: cython.longlong
-        lines: list = self.edge_lines
-        other: EdgeLine
-        i: cython.longlong
+        others: cython.longlong = min(self.inbox.head_time, self.tick_time)
         self.background_wanted = True
         while True:
             line = self.edge_line
             buffer = line.buffer
             place = buffer.read
             buffer.read = place + 1
-            time = buffer.times[place]
+            time = self.edge_time
+            level = buffer.levels_a[place]
             self.instant = time
             self.now = time
-            self.pins[line.pin] = buffer.levels_a[place]
+            self.pins[line.pin] = level
             self.pins[line.partner_pin] = buffer.levels_b[place]
             if place + 1 < buffer.count:
-                line.next_time = buffer.times[place + 1]
+                self.edge_time = buffer.times[place + 1]
             else:
-                line.next_time = 1 << 62
-            self.edge_time = 1 << 62
-            for i in range(len(lines)):
-                other = cython.cast(EdgeLine, lines[i])
-                if other.next_time < self.edge_time:
-                    self.edge_time = other.next_time
-                    self.edge_line = other
-            line.peripheral.on_pin(line.channel, buffer.levels_a[place], time)
-            if vic.fiq_pending != 0:
-                if self.fiq_free > time or not self.nothing_more_at(time):
+                self.edge_time = 1 << 62
+            line.next_time = self.edge_time
+            if self.edge_time >= self.other_edge_time:
+                self._choose_edge_line()
+            line.peripheral.on_pin(line.channel, level, time)
+            if vic.pending != 0:
+                if (
+                    self.fiq_free > time
+                    or vic.pending < 65536
+                    or time >= self.edge_time
+                    or time >= self.alarm_time
+                    or time >= others
+                ):
                     return time
-                self._serve(vic.next_fiq(), time)
-                if vic.fiq_pending != 0:
+                self._serve(vic.first_pending(), time)
+                if vic.pending != 0:
                     return time
-            if (
-                vic.irq_pending != 0
-                or self.edge_time >= until
-                or self.edge_time > self.inbox.head_time
-                or self.edge_time > self.alarm_time
-                or self.edge_time > self.tick_time
-                or self.background is not None
-            ):
+            if self.edge_time >= until or self.edge_time > self.alarm_time or self.edge_time > others:
                 return time
-            if self.code_time < self.edge_time and not self.scheduler.done and (not self.waiting or self.check_wait):
-                return time
+            if self.code_time < self.edge_time and (self.background is not None or not self.scheduler.done):
+                if not self.waiting or self.check_wait:
+                    return time
 
+    @cython.final
     def _input(self) -> cython.longlong:
         """The message just taken: hardware first; its interrupt line is raised by the peripheral."""
         inbox: EventQueue = self.inbox
@@ -427,6 +441,8 @@ class Microcontroller:
         channel: cython.longlong
         peripheral: Peripheral
         source: InterruptSource
+        self.instant = inbox.time
+        self.now = inbox.time
         self.background_wanted = True
         if inbox.kind == 1:  # PIN_EDGE
             pin = inbox.a
@@ -435,11 +451,11 @@ class Microcontroller:
                 self.pins[inbox.c] = inbox.d
             channel = self.pin_channels[pin]
             if channel >= 0:
-                peripheral = cython.cast(Peripheral, self.pin_owners[pin])
+                peripheral = self.pin_owners[pin]
                 peripheral.on_pin(channel, inbox.b, inbox.time)
                 return 0
         elif 0 <= inbox.kind < 32 and 0 <= inbox.a < 16:
-            peripheral = cython.cast(Peripheral, self.message_table[inbox.kind * 16 + inbox.a])
+            peripheral = self.message_table[inbox.kind * 16 + inbox.a]
             if peripheral is not None:
                 peripheral.on_message(inbox)
                 return 0
@@ -452,10 +468,11 @@ class Microcontroller:
         self.vic.raise_source(source)
         return 0
 
+    @cython.final
     def _alarm(self, time: cython.longlong) -> cython.longlong:
         """The first alarm is due."""
         i: cython.longlong = self.alarm_first
-        peripheral: Peripheral = cython.cast(Peripheral, self.alarm_owners[i])
+        peripheral: Peripheral = self.alarm_owners[i]
         self.now = time
         self.alarm_times[i] = 1 << 62
         self.alarm_time = 1 << 62  # until the next one is looked for, so that `set_alarm` need not
@@ -468,11 +485,11 @@ class Microcontroller:
                 self.code_time = time
         return time
 
+    @cython.final
     def _timer_match(self) -> cython.longlong:
         """The slot timer matches and restarts: its interrupt is requested."""
         self.match_time = self.tick_time
-        self.tick_number += 1
-        self.tick_time = self.crystal.tick_time_ns(self.tick_number, self.tick_period_ns, self.phase_ns)
+        self.tick_time = self.ticks.next()
         self.vic.raise_source(self.tick_source)
         return self.match_time
 
@@ -485,30 +502,28 @@ class Microcontroller:
                 self.on_overrun()
         return None
 
+    @cython.final
     def _background(self) -> cython.longlong:
         """One turn of the main loop beside the scheduler."""
         if self.code_time < self.instant:
             self.code_time = self.instant
         self.now = self.code_time
-        done = call(self.background)
+        done: cython.longlong = self.main_loop()
         if done <= self.code_time:
             self.background_wanted = False
             return done
         self.code_time = done
         return done
 
+    @cython.final
     def _serve(self, source: InterruptSource, time: cython.longlong) -> cython.longlong:
         """Run the handler of a pending source at `time` and let its cycles pass."""
-        vic: InterruptController = self.vic
-        cycles: cython.longlong = source.base_cycles
-        busy: cython.longlong = source.base_ns
+        cycles: cython.longlong
+        busy: cython.longlong
         items: cython.longlong
         source.pending = False
         source.served += 1
-        if source.slot < 0:
-            vic.fiq_pending &= ~source.bit
-        else:
-            vic.irq_pending &= ~source.bit
+        self.vic.pending &= ~source.bit
         self.background_wanted = True
         self.now = time + source.latency_ns
         if source.keeps_message:
@@ -518,11 +533,14 @@ class Microcontroller:
             result = call_with(source.handler, self.inbox)
         else:
             result = source.handler(self.inbox)
-        if result is not None:
-            items = result
-            cycles += source.per_item * items
-        cycles += self.extra_cycles
-        if cycles != source.base_cycles:
+        if result is None and self.extra_cycles == 0:
+            cycles = source.base_cycles
+            busy = source.base_ns
+        else:
+            items = 0
+            if result is not None:
+                items = result
+            cycles = source.base_cycles + source.per_item * items + self.extra_cycles
             busy = int(cycles * self.ns_per_cycle)
         if source.slot < 0:
             self.fiq_free = time + busy
@@ -544,125 +562,124 @@ class Microcontroller:
             self.scheduler.note_interrupt(source.name, cycles)
         return cycles
 
+    @cython.final
     def _code(self, until: cython.longlong) -> cython.longlong:
-        """Run tasks from `code_time` on, until something else comes first."""
+        """Run tasks from `code_time` on, until something else comes first or the row ends. Returns 0."""
         scheduler: SlotScheduler = self.scheduler
-        vic: InterruptController = self.vic
-        inbox: EventQueue = self.inbox
-        task: Task
-        entry: Task
-        wait: Wait
-        occasional: Occasional
-        cycles: cython.longlong
+        place: cython.longlong
         items: cython.longlong
-        busy: cython.longlong
-        # what comes first of the things that no task can move
-        limit: cython.longlong = until
-        if self.tick_time < limit:
-            limit = self.tick_time
-        if self.edge_time < limit:
-            limit = self.edge_time
-        while True:
+        usual_ns: cython.longlong
+        # what comes first; a task can only bring an alarm or an interrupt nearer
+        self.stop_time = min(until, self.tick_time, self.edge_time, self.inbox.head_time, self.alarm_time)
+        self.extra_cycles = 0
+        if self.waiting:
             self.now = self.code_time
-            self.extra_cycles = 0
-            if self.waiting:
-                self.check_wait = False
-                if not call(self.wait_task.function):
-                    return 0
-                self._wait_over()
-            else:
-                if scheduler.late:
-                    scheduler.late = False
-                    self._close_slot(scheduler.late_time)
-                    scheduler.late_record = None
-                if scheduler.position >= scheduler.end:
-                    scheduler.done = True
-                    self.background_wanted = True
-                    scheduler.finished_time = self.code_time
-                    self._close_slot(scheduler.slot_time)
-                    return 0
-                task = cython.cast(Task, scheduler.tasks[scheduler.position])
-                scheduler.position += 1
-                scheduler.run_tasks += 1
-                cycles = task.cost
-                if task.kind == 0:
-                    if cython.compiled:
-                        result = call(task.function)
-                    else:
-                        result = task.function()
-                    if result is not None:
-                        items = result
-                        cycles += task.per_item * items
-                    cycles += self.extra_cycles
-                    if cycles > task.limit or scheduler.recording:
-                        self._charge(task, cycles)
-                    else:  # the common case, as `_charge` does it
-                        busy = int(cycles * self.ns_per_cycle)
-                        self.code_time += busy
-                        task.calls += 1
-                        task.last_cycles = cycles
-                        task.total_cycles += cycles
-                        if cycles > task.max_cycles:
-                            task.max_cycles = cycles
-                elif task.kind == 1:
-                    occasional = cython.cast(Occasional, task)
-                    entry = occasional.next_task()
-                    if entry is None:
-                        self._charge(task, cycles)
-                    else:
-                        result = call(entry.function)
-                        items = 0
-                        if result is not None:
-                            items = result
-                        items = entry.cost + entry.per_item * items + self.extra_cycles
-                        self._charge(task, cycles)
-                        self._charge(entry, items)
-                else:
-                    wait = cython.cast(Wait, task)
-                    self.wait_task = wait
-                    self.wait_start = self.code_time
-                    self.wait_stolen = self.stolen_cycles
-                    if call(wait.function):
-                        self._wait_over()
-                    else:
-                        wait.waits += 1
-                        self.waiting = True
-                        self.check_wait = False
-                        return 0
-            if (
-                self.code_time >= limit
-                or self.code_time >= inbox.head_time
-                or self.code_time >= self.alarm_time
-                or vic.irq_pending != 0
-                or vic.fiq_pending != 0
-            ):
+            self.check_wait = False
+            if not call(self.wait_task.function):
                 return 0
+            self._wait_over()
+            if self.code_time >= self.stop_time or self.vic.pending != 0:
+                return 0
+        if scheduler.late:
+            scheduler.late = False
+            self._close_slot(scheduler.late_time)
+            scheduler.late_record = None
+        while scheduler.position < scheduler.end:
+            place = scheduler.position
+            scheduler.position = place + 1
+            usual_ns = scheduler.usual_ns[place]
+            self.now = self.code_time
+            if usual_ns >= 0:
+                if cython.compiled:
+                    result = run(scheduler, place)
+                else:
+                    result = scheduler.functions[place]()
+                items = 0
+                if result is not None:
+                    items = result
+                if items == 0 and self.extra_cycles == 0:
+                    self.code_time += usual_ns
+                    scheduler.usual_calls[scheduler.numbers[place]] += 1
+                else:
+                    self._spent(scheduler.tasks[place], items)
+            elif not self._special_task(scheduler.tasks[place]):
+                return 0
+            if self.code_time >= self.stop_time or self.vic.pending != 0:
+                return 0
+        self.now = self.code_time
+        scheduler.done = True
+        self.background_wanted = True
+        scheduler.finished_time = self.code_time
+        self._close_slot(scheduler.slot_time)
+        return 0
 
+    @cython.final
+    def _spent(self, task: Task, items: cython.longlong) -> cython.longlong:
+        """A task that has just run handled `items`; returns the cycles it took."""
+        items = task.base_cycles + task.per_item * items + self.extra_cycles
+        self.extra_cycles = 0
+        return self._charge(task, items)
+
+    @cython.final
+    def _special_task(self, task: Task) -> cython.bint:
+        """A task of which not every call is alike, or whose calls are recorded. False when it has to spin."""
+        entry: Task
+        items: cython.longlong = 0
+        if task.kind == 2:
+            return self._begin_wait(task)
+        if task.kind == 1:
+            entry = cython.cast(Occasional, task).next_task()
+            if entry is None:
+                self._charge(task, task.base_cycles)
+                return True
+            result = call(entry.function)
+            self._charge(task, task.base_cycles)
+            task = entry
+        else:
+            result = call(task.function)
+        if result is not None:
+            items = result
+        self._spent(task, items)
+        return True
+
+    @cython.final
+    def _begin_wait(self, task: Wait) -> cython.bint:
+        """A task that spins begins; False when it has to."""
+        self.wait_task = task
+        self.wait_start = self.code_time
+        self.wait_stolen = self.stolen_cycles
+        if call(task.function):
+            self._wait_over()
+            return True
+        task.waits += 1
+        self.waiting = True
+        self.check_wait = False
+        return False
+
+    @cython.final
     def _wait_over(self) -> cython.longlong:
         """The condition of the spinning task came true: its cycles are the spinning, less what was stolen."""
         task: Wait = self.wait_task
         spun: cython.longlong = int((self.code_time - self.wait_start) * self.cycles_per_ns)
         before: cython.longlong = self.code_time
-        cost: cython.longlong = task.cost + self.extra_cycles
+        cost: cython.longlong = task.base_cycles + self.extra_cycles
         spun -= self.stolen_cycles - self.wait_stolen
         if spun < 0:
             spun = 0
         self.waiting = False
+        self.extra_cycles = 0
         self._charge(task, spun + cost)
         spun = int(cost * self.ns_per_cycle)
         self.code_time = before + spun
         return spun
 
+    @cython.final
     def _charge(self, task: Task, cycles: cython.longlong) -> cython.longlong:
         """Let the cycles of a task pass and hold them against its limit."""
         busy: cython.longlong = int(cycles * self.ns_per_cycle)
         self.code_time += busy
-        task.calls += 1
-        task.last_cycles = cycles
-        task.total_cycles += cycles
-        if cycles > task.max_cycles:
-            task.max_cycles = cycles
-        if cycles > task.limit > 0:
+        task.note(cycles)
+        if cycles > task.most_cycles > 0:
             task.hits += 1
             if self.on_limit is not None:
                 self.on_limit(task)
@@ -670,6 +687,7 @@ class Microcontroller:
             self.scheduler.note_task(task.name, cycles)
         return cycles
 
+    @cython.final
     def _close_slot(self, since: cython.longlong) -> cython.longlong:
         """Record the slot that began at `since` and ends now."""
         scheduler: SlotScheduler = self.scheduler

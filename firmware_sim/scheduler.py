@@ -13,6 +13,7 @@ import array
 
 import cython
 
+from foundation.numbers import integers
 from foundation.user_error import UserError
 
 NORMAL_TASK = 0
@@ -38,17 +39,81 @@ class Task:
             if not isinstance(value, int) or value < 0:
                 raise UserError(f"task {title}: {what} {value!r} must be a whole number of cycles, 0 or more")
         self.function = function
-        self.cost = cost
-        self.limit = limit
+        self.base_cycles = cost
+        self.most_cycles = limit
         self.per_item = per_item
         self.kind = NORMAL_TASK
         self.name = title
         self.item = item
-        self.calls = 0
         self.hits = 0
-        self.last_cycles = 0
-        self.max_cycles = 0
-        self.total_cycles = 0
+        # calls that cost `base_cycles` are counted in the scheduler; these keep the others
+        self.noted_calls = 0
+        self.noted_cycles = 0
+        self.noted_most = 0
+        self.noted_last = 0
+        self.noted_last_call = 0
+        self.scheduler = None
+        self.number = -1
+
+    def note(self, cycles: cython.longlong) -> cython.longlong:
+        """Count a call that took `cycles`; returns the number of calls."""
+        self.noted_calls += 1
+        self.noted_cycles += cycles
+        if cycles > self.noted_most:
+            self.noted_most = cycles
+        self.noted_last = cycles
+        self.noted_last_call = self.noted_calls + self.usual_calls()
+        return self.noted_last_call
+
+    def usual_calls(self) -> cython.longlong:
+        """Calls that took exactly `cost`, since that was last changed."""
+        return 0 if self.scheduler is None else self.scheduler.usual_calls[self.number]
+
+    @property
+    def cost(self):
+        """Modelled cycles of a call without items."""
+        return self.base_cycles
+
+    @cost.setter
+    def cost(self, cycles) -> None:
+        calls, total, most, last = self.calls, self.total_cycles, self.max_cycles, self.last_cycles
+        self.noted_calls, self.noted_cycles, self.noted_most = calls, total, most
+        self.noted_last, self.noted_last_call = last, calls
+        self.base_cycles = cycles
+        if self.scheduler is not None:
+            self.scheduler.usual_calls[self.number] = 0
+            self.scheduler.lay(self)
+
+    @property
+    def limit(self):
+        """Cycles against which a call is held; 0: none."""
+        return self.most_cycles
+
+    @limit.setter
+    def limit(self, cycles) -> None:
+        self.most_cycles = cycles
+        if self.scheduler is not None:
+            self.scheduler.lay(self)
+
+    @property
+    def calls(self):
+        """Calls since power-up."""
+        return self.noted_calls + self.usual_calls()
+
+    @property
+    def total_cycles(self):
+        """Cycles of all calls, interrupts not included."""
+        return self.noted_cycles + self.usual_calls() * self.base_cycles
+
+    @property
+    def max_cycles(self):
+        """Cycles of the longest call."""
+        return max(self.noted_most, self.base_cycles if self.usual_calls() else 0)
+
+    @property
+    def last_cycles(self):
+        """Cycles of the latest call."""
+        return self.noted_last if self.noted_last_call == self.calls else self.base_cycles
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({self.name}, cost={self.cost}, limit={self.limit})"
@@ -188,8 +253,9 @@ class SlotScheduler:
     what the present row still has to run.
     """
 
-    def __init__(self, schedule, slot_cycles) -> None:
+    def __init__(self, schedule, slot_cycles, ns_per_cycle=0.0) -> None:
         self.schedule = schedule
+        self.ns_per_cycle = ns_per_cycle
         self.slot_ns = schedule.slot_ns
         self.slot_cycles = slot_cycles
         self.near_limit_cycles = slot_cycles * 9 // 10  # "approaching" is 90 % (chosen by us)
@@ -198,8 +264,10 @@ class SlotScheduler:
         self.tasks = []
         self.row_starts = []
         self.row_ends = []
+        self.recording = False
         self.layout()
         self.row = self.row_count - 1  # so that the first tick starts row 0
+        self.row_start = 0
         self.position = 0
         self.end = 0
         self.divider_count = schedule.divider - 1  # the first timer tick starts a slot
@@ -212,26 +280,58 @@ class SlotScheduler:
         self.overruns = 0
         self.dropped_tasks = 0
         self.listed_tasks = 0
-        self.run_tasks = 0
+        self.run_before = 0  # tasks run in the rows before this one
         self.last_slot_cycles = 0
         self.max_slot_cycles = 0
         self.total_slot_cycles = 0
         self.near_limits = 0
         self.late = False
         self.late_time = 0
-        self.recording = False
         self.record_length = 0
         self.records = []
         self.record = None
         self.late_record = None
 
     def layout(self) -> None:
-        """One flat list of tasks with each row's first and past-last index."""
+        """The table as flat lists, place by place, with each row's first and past-last place."""
         self.row_count = len(self.schedule.rows)
         for row in range(self.row_count):
             self.row_starts.append(len(self.tasks))
             self.tasks.extend(self.schedule.row_tasks(row))
             self.row_ends.append(len(self.tasks))
+        count = len(self.tasks)
+        self.functions = [None] * count
+        self.usual_ns = integers(max(count, 1))
+        self.numbers = integers(max(count, 1))
+        self.codes = integers(max(count, 1))
+        self.owners = integers(max(count, 1))
+        tasks = self.schedule.all_tasks()
+        self.usual_calls = integers(max(len(tasks), 1))
+        for number in range(len(tasks)):
+            tasks[number].scheduler = self
+            tasks[number].number = number
+            self.lay(tasks[number])
+
+    def lay(self, task: Task) -> None:
+        """Lay down what the event loop needs of `task` at all its places in the table.
+
+        usual_ns: what a call without items takes (ns), or -1 when every call must be looked at more closely.
+        """
+        within = task.base_cycles <= task.most_cycles or task.most_cycles == 0
+        plain = task.kind == NORMAL_TASK and within and not self.recording
+        for place in range(len(self.tasks)):
+            if self.tasks[place] is task:
+                self.numbers[place] = task.number
+                self.functions[place] = task.function
+                self.usual_ns[place] = int(task.base_cycles * self.ns_per_cycle) if plain else -1
+                if cython.compiled:
+                    self.codes[place] = code_of(task.function)
+                    self.owners[place] = owner_of(task.function)
+
+    @property
+    def run_tasks(self):
+        """Tasks that were begun since power-up."""
+        return self.run_before + self.position - self.row_start
 
     def tick(self, timer_time: cython.longlong) -> cython.bint:
         """Timer tick (its hardware instant, ns): step to the next row. True: the old row was unfinished."""
@@ -254,7 +354,9 @@ class SlotScheduler:
         self.row += 1
         if self.row >= self.row_count:
             self.row = 0
-        self.position = self.row_starts[self.row]
+        self.run_before += self.position - self.row_start
+        self.row_start = self.row_starts[self.row]
+        self.position = self.row_start
         self.end = self.row_ends[self.row]
         self.done = False
         self.started = True
@@ -289,6 +391,8 @@ class SlotScheduler:
         """Keep the last `length` slots in `records` (0: none, the default)."""
         self.record_length = length
         self.recording = length > 0
+        for task in self.schedule.all_tasks():
+            self.lay(task)
         self.records = []
         self.record = None
 
@@ -337,7 +441,7 @@ class SlotScheduler:
             name=task.name,
         )
         task.function = checked.function
-        task.cost = checked.cost
+        task.cost = checked.cost  # which lays it down anew
         task.limit = checked.limit
         task.per_item = checked.per_item
         return task

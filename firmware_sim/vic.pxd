@@ -21,8 +21,8 @@ cdef class InterruptController:
     cdef public double ns_per_cycle
     cdef public dict sources
     cdef public list fiq_list, irq_list
-    cdef public long long fiq_pending, irq_pending
+    cdef public long long pending
+    cdef public InterruptSource newest
     cpdef InterruptSource source(self, long long kind, long long index)
-    cpdef InterruptSource next_fiq(self)
-    cpdef InterruptSource next_irq(self)
+    cpdef InterruptSource first_pending(self)
     cpdef bint raise_source(self, InterruptSource source) noexcept

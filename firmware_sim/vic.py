@@ -12,6 +12,7 @@ from foundation.events import EventQueue
 from foundation.user_error import UserError
 
 FIQ = -1
+FIRST_FIQ = 1 << 16  # in the word of pending sources the FIQ sources stand above the 16 slots
 
 # Kinds of sources that are not messages of foundation/events.py (those use their own numbers below 64).
 TIMER_MATCH = 64  # index: timer number; MR0 reached
@@ -103,8 +104,9 @@ class InterruptController:
         self.sources = {}
         self.fiq_list = []
         self.irq_list = [None] * 16
-        self.fiq_pending = 0  # one bit per source, as VICFIQStatus and VICIRQStatus
-        self.irq_pending = 0
+        # one bit per source, as in VICIRQStatus (bits 0-15) and VICFIQStatus (from bit 16 on)
+        self.pending = 0
+        self.newest = None
 
     def source(self, kind: cython.longlong, index: cython.longlong):
         """The line of (kind, index); made on first use, silent until a handler is attached."""
@@ -141,9 +143,9 @@ class InterruptController:
         source.latency_ns = int(source.latency * self.ns_per_cycle)
         source.attached = True
         if slot == FIQ:
-            if len(self.fiq_list) >= 62:
-                raise UserError(f"interrupt {kind}/{index}: more than 62 sources on the FIQ")
-            source.bit = 1 << len(self.fiq_list)
+            if len(self.fiq_list) >= 46:
+                raise UserError(f"interrupt {kind}/{index}: more than 46 sources on the FIQ")
+            source.bit = FIRST_FIQ << len(self.fiq_list)
             self.fiq_list.append(source)
         else:
             source.bit = 1 << slot
@@ -154,11 +156,10 @@ class InterruptController:
         """Take a source out of the controller; a pending request of it is forgotten."""
         if not source.attached:
             return
+        self.pending &= ~source.bit
         if source.slot == FIQ:
-            self.fiq_pending &= ~source.bit
             self.fiq_list[self.fiq_list.index(source)] = None
         else:
-            self.irq_pending &= ~source.bit
             self.irq_list[source.slot] = None
         source.pending = False
         source.attached = False
@@ -172,26 +173,31 @@ class InterruptController:
             source.merged += 1
             return False
         source.pending = True
-        if source.slot < 0:
-            self.fiq_pending |= source.bit
-        else:
-            self.irq_pending |= source.bit
+        self.pending |= source.bit
+        self.newest = source
         return True
 
     @cython.boundscheck(False)
     @cython.wraparound(False)
-    def next_fiq(self):
-        """First pending FIQ source in attaching order; only while `fiq_pending` is not 0."""
+    def first_pending(self):
+        """Who is served next, only while `pending` is not 0: the first FIQ source attached, else the lowest slot."""
         place: cython.longlong = 0
-        while self.fiq_pending >> place & 1 == 0:
-            place += 1
-        return cython.cast(InterruptSource, self.fiq_list[place])
-
-    @cython.boundscheck(False)
-    @cython.wraparound(False)
-    def next_irq(self):
-        """Pending IRQ source with the lowest slot; only while `irq_pending` is not 0."""
-        place: cython.longlong = 0
-        while self.irq_pending >> place & 1 == 0:
+        if self.pending == self.newest.bit:
+            return self.newest  # alone, as nearly always
+        if self.pending >= 65536:  # FIRST_FIQ
+            while self.pending >> (place + 16) & 1 == 0:
+                place += 1
+            return cython.cast(InterruptSource, self.fiq_list[place])
+        while self.pending >> place & 1 == 0:
             place += 1
         return cython.cast(InterruptSource, self.irq_list[place])
+
+    @property
+    def fiq_pending(self):
+        """One bit per FIQ source that waits, in attaching order."""
+        return self.pending >> 16
+
+    @property
+    def irq_pending(self):
+        """One bit per IRQ slot that waits."""
+        return self.pending & 65535

@@ -1,13 +1,16 @@
+cimport cython
+
 from boards.modules.quadrature_decoder cimport QuadratureDecoder
 from firmware_sim.microcontroller cimport Microcontroller
 from firmware_sim.peripherals.timer_capture cimport TimerCapture
 from foundation.events cimport EventQueue
 
+@cython.final
 cdef class WrapCounter:
     cdef public TimerCapture timer
     cdef public long long wraps
-    cpdef object on_wrap(self, EventQueue queue)
 
+@cython.final
 cdef class EncoderCapture:
     cdef public Microcontroller chip
     cdef public TimerCapture timer
@@ -16,4 +19,3 @@ cdef class EncoderCapture:
     cdef public QuadratureDecoder decoder
     cdef public bint armed_rising
     cdef public long long last_wraps, last_capture
-    cpdef object on_capture(self, EventQueue queue)

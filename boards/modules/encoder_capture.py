@@ -44,7 +44,7 @@ class WrapCounter:
 
     def on_wrap(self, queue: EventQueue):
         """Fast interrupt: the timer restarted at 0."""
-        self.timer.clear(1)
+        self.timer.IR &= -2
         self.wraps += 1
 
 
@@ -83,7 +83,7 @@ class EncoderCapture:
         elapsed: cython.longlong
         timer: TimerCapture = self.timer
         level: cython.bint = self.chip.pins[self.pin] != 0
-        capture = timer.CR0 if self.channel == 0 else timer.CR(self.channel)
+        capture = timer.captures[self.channel]
         timer.IR &= ~self.flag
         # a wrap that is not counted yet came before this capture if the capture is a small number
         if timer.IR & 1 and capture < 15000:
@@ -98,4 +98,4 @@ class EncoderCapture:
         else:
             self.decoder.glitch()
         self.armed_rising = not level
-        timer.arm(self.channel, self.armed_rising, not self.armed_rising)
+        timer.arm_one(self.channel, self.armed_rising)

@@ -74,14 +74,13 @@ class QuadratureDecoder:
 
         `elapsed`: cycles since the edge before. Rising with B low counts up, falling inverts.
         """
-        up: cython.bint = rising != partner_high
         self.edges += 1
-        if up:
+        if rising != partner_high:
             self.count += 1
+            self.store(elapsed)
         else:
             self.count -= 1
-            elapsed = -elapsed
-        self.store(elapsed)
+            self.store(-elapsed)
 
     def glitch(self) -> None:
         """The pin's level did not agree with the armed edge: nothing counted, a time of 0 stored."""

@@ -14,16 +14,18 @@ import array
 
 import cython
 
+from firmware_sim.clock import TickTrain
 from firmware_sim.microcontroller import Peripheral
-from firmware_sim.vic import TIMER_MATCH, InterruptSource
+from firmware_sim.vic import TIMER_MATCH
 from foundation.events import PIN_EDGE
+from foundation.numbers import integers
 from foundation.user_error import UserError
 
 
 class TimerCapture(Peripheral):
     """Timer `number` that wraps every `period` counts of `hz` (core clock unless given), from `phase_ns` on.
 
-    `match_interrupt=True` raises (TIMER_MATCH, number) at every wrap. `edges`, `captured`, `lost` per channel.
+    `match_interrupt=True` raises (TIMER_MATCH, number) at every wrap. Edges `captured` and `lost` per channel.
     """
 
     def __init__(self, chip, number=0, period=30000, hz=0, phase_ns=0, match_interrupt=False) -> None:
@@ -38,23 +40,18 @@ class TimerCapture(Peripheral):
         self.period_ns = period * 1_000_000_000 // self.hz
         self.counts_per_ns = chip.crystal.cycles_per_ns(self.hz)
         self.phase_ns = phase_ns
-        self.CR0 = 0
-        self.CR1 = 0
-        self.CR2 = 0
-        self.CR3 = 0
+        self.captures = integers(4)  # CR0 ... CR3
         self.CCR = 0
         self.IR = 0
-        self.wraps = 0
+        self.ticks = TickTrain(chip.crystal, self.period_ns, phase_ns)
         self.wrap_time = phase_ns
-        self.next_wrap_time = chip.crystal.tick_time_ns(1, self.period_ns, phase_ns)
+        self.next_wrap_time = self.ticks.next()
         self.match_interrupt = match_interrupt
         self.match_source = chip.vic.source(TIMER_MATCH, number)
         self.sources = [None] * 4
         self.pins = array.array("q", [-1]) * 4
-        self.edges = array.array("q", [0]) * 4
-        self.captured = array.array("q", [0]) * 4
-        self.lost = array.array("q", [0]) * 4
-        self.capture_times = array.array("q", [0]) * 4
+        self.captured = integers(4)
+        self.lost = integers(4)
         self.alarm = chip.new_alarm(self, 0)
         if match_interrupt:
             chip.set_alarm(self.alarm, self.next_wrap_time)
@@ -83,15 +80,38 @@ class TimerCapture(Peripheral):
         self.IR &= ~mask
         return self.IR
 
+    def arm_one(self, channel: cython.longlong, rising: cython.bint) -> cython.longlong:
+        """Capture only the rising or only the falling edges of a channel, interrupt on; returns T0CCR."""
+        shift: cython.longlong = 3 * channel
+        if rising:
+            self.CCR = self.CCR & ~(7 << shift) | 5 << shift
+        else:
+            self.CCR = self.CCR & ~(7 << shift) | 6 << shift
+        return self.CCR
+
     def CR(self, channel: cython.longlong) -> cython.longlong:
-        """Capture register of a channel by number (CR0 ... CR3 are the same)."""
-        if channel == 0:
-            return self.CR0
-        if channel == 1:
-            return self.CR1
-        if channel == 2:
-            return self.CR2
-        return self.CR3
+        """Capture register of a channel by number."""
+        return self.captures[channel]
+
+    @property
+    def CR0(self):
+        """Capture register of channel 0."""
+        return self.captures[0]
+
+    @property
+    def CR1(self):
+        """Capture register of channel 1."""
+        return self.captures[1]
+
+    @property
+    def CR2(self):
+        """Capture register of channel 2."""
+        return self.captures[2]
+
+    @property
+    def CR3(self):
+        """Capture register of channel 3."""
+        return self.captures[3]
 
     def TC(self) -> cython.longlong:
         """The count at `now`."""
@@ -108,25 +128,20 @@ class TimerCapture(Peripheral):
         return count
 
     def _wrap_to(self, time: cython.longlong) -> cython.longlong:
-        """Bring the wrap that precedes `time` up to date, however far away."""
-        n: cython.longlong = self.wraps + 1
+        """Bring the wrap that precedes `time` up to date, however far away; returns its instant."""
         if time >= self.next_wrap_time + 2 * self.period_ns:
-            n = self.chip.crystal.local_ns(time - self.phase_ns) // self.period_ns
-        self.wrap_time = self.chip.crystal.tick_time_ns(n, self.period_ns, self.phase_ns)
-        self.next_wrap_time = self.chip.crystal.tick_time_ns(n + 1, self.period_ns, self.phase_ns)
+            self.ticks.go_to(self.chip.crystal.local_ns(time - self.phase_ns) // self.period_ns)
+            self.next_wrap_time = self.ticks.time
         while self.next_wrap_time <= time:
-            n += 1
             self.wrap_time = self.next_wrap_time
-            self.next_wrap_time = self.chip.crystal.tick_time_ns(n + 1, self.period_ns, self.phase_ns)
-        self.wraps = n
-        return n
+            self.next_wrap_time = self.ticks.next()
+        return self.wrap_time
 
     def on_pin(self, channel: cython.longlong, level: cython.longlong, time: cython.longlong) -> cython.longlong:
         """An edge at a capture pin; returns 0."""
         count: cython.longlong
         flag: cython.longlong = 16 << channel
         asked: cython.longlong = self.CCR >> (3 * channel)
-        self.edges[channel] += 1
         if asked & (1 if level else 2) == 0:
             self.lost[channel] += 1
             return 0
@@ -135,22 +150,14 @@ class TimerCapture(Peripheral):
         count = int((time - self.wrap_time) * self.counts_per_ns)
         if count > self.MR0:
             count = self.MR0
-        if channel == 0:
-            self.CR0 = count
-        elif channel == 1:
-            self.CR1 = count
-        elif channel == 2:
-            self.CR2 = count
-        else:
-            self.CR3 = count
-        self.capture_times[channel] = time
+        self.captures[channel] = count
         if self.IR & flag:
             self.lost[channel] += 1
             return 0
         self.IR |= flag
         self.captured[channel] += 1
         if asked & 4:
-            self.chip.vic.raise_source(cython.cast(InterruptSource, self.sources[channel]))
+            self.chip.vic.raise_source(self.sources[channel])
         return 0
 
     def on_alarm(self, alarm: cython.longlong, time: cython.longlong) -> cython.void:

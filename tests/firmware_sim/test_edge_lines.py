@@ -47,7 +47,6 @@ class Bench:
         timer = self.timer
         return (
             self.notes,
-            list(timer.edges),
             list(timer.captured),
             list(timer.lost),
             [(each.served, each.merged, each.total_cycles) for each in self.chip.vic.sources.values()],
