@@ -49,7 +49,6 @@ cdef class CanRouterBoard(Microcontroller):
     cpdef int report(self, long long code) except -1
     cpdef long long flush(self, CanController controller) except? <long long>-1
     cpdef bint can_flush(self) except? -1
-    cpdef long long main_loop(self) except? <long long>-1
     cpdef int send_float(self, long long identifier, double value) except -1
     cpdef double current_A(self) except? -1
     cpdef double voltage_V(self) except? -1

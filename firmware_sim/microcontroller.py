@@ -173,7 +173,7 @@ class Microcontroller:
             raise UserError(f"{self.name}: no peripheral has claimed pin {pin}, so edges there would be lost")
         line = EdgeLine(buffer, pin, partner_pin, self.pin_owners[pin], self.pin_channels[pin])
         if self.edge_lines:
-            self.edge_lines[-1].following = line
+            self.edge_lines[len(self.edge_lines) - 1].following = line
         else:
             self.first_line = line
         self.edge_lines.append(line)
