@@ -88,6 +88,8 @@ cdef class Microcontroller:
     @cython.final
     cdef long long _code(self, long long until) except? <long long>-1
     @cython.final
+    cdef bint _edges_between(self, long long until) except? -1
+    @cython.final
     cdef long long _spent(self, Task task, long long items) except? <long long>-1
     @cython.final
     cdef bint _special_task(self, Task task) except? -1

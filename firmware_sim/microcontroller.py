@@ -605,13 +605,25 @@ class Microcontroller:
             elif not self._special_task(scheduler.tasks[place]):
                 return 0
             if self.code_time >= self.stop_time or self.vic.pending != 0:
-                return 0
+                if not self._edges_between(until):
+                    return 0
         self.now = self.code_time
         scheduler.done = True
         self.background_wanted = True
         scheduler.finished_time = self.code_time
         self._close_slot(scheduler.slot_time)
         return 0
+
+    @cython.final
+    def _edges_between(self, until: cython.longlong) -> cython.bint:
+        """Two tasks: if nothing but edges comes between them, take those. True when the next task may run at once."""
+        first: cython.longlong = min(self.tick_time, self.alarm_time, self.inbox.head_time)
+        if self.vic.pending != 0 or self.edge_time > first or self.edge_time >= until or self.edge_time > self.code_time:
+            return False
+        self._edges(until)
+        self.extra_cycles = 0
+        self.stop_time = min(until, self.edge_time, first, self.alarm_time)
+        return self.vic.pending == 0 and self.code_time < self.stop_time
 
     @cython.final
     def _spent(self, task: Task, items: cython.longlong) -> cython.longlong:

@@ -174,7 +174,7 @@ class Endpoint:
     def _next_output(self) -> cython.longlong:
         """Before this instant (ns) the board puts nothing out, whatever comes in of a kind that can wait."""
         board: Microcontroller = self.board
-        if not board.scheduler.done or board.vic.fiq_pending != 0 or board.vic.irq_pending != 0:
+        if not board.scheduler.done or board.vic.pending != 0:
             return 0
         if board.background is not None and board.background_wanted:
             return 0
