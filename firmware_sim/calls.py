@@ -10,8 +10,3 @@ from typing import Any
 def call(function: Callable[[], Any]) -> Any:
     """What `function()` returns."""
     return function()
-
-
-def call_with(function: Callable[[Any], Any], argument: Any) -> Any:
-    """What `function(argument)` returns."""
-    return function(argument)

@@ -4,8 +4,8 @@ from foundation.edge_buffer cimport EdgeBuffer
 from foundation.events cimport EventQueue, Outbox
 from firmware_sim.analog cimport AnalogPins
 from firmware_sim.clock cimport Crystal, TickTrain
-from firmware_sim.scheduler cimport Occasional, Schedule, SlotScheduler, Task, Wait, call, call_with, run
-from firmware_sim.vic cimport InterruptController, InterruptSource
+from firmware_sim.scheduler cimport Occasional, Schedule, SlotScheduler, Task, Wait, call, run
+from firmware_sim.vic cimport InterruptController, InterruptSource, handle
 
 cdef class Peripheral:
     cdef public Microcontroller chip
@@ -72,7 +72,7 @@ cdef class Microcontroller:
     cdef long long _edges(self, long long until) except? <long long>-1
     @cython.final
     cdef long long _find_first_alarm(self) noexcept
-    cpdef long long set_alarm(self, long long index, long long time) except? -1
+    cpdef long long set_alarm(self, long long index, long long time) except? <long long>-1
     cpdef int start(self, Schedule schedule, long long phase_ns) except -1
     cpdef object on_slot_timer(self, EventQueue queue)
     @cython.final

@@ -28,7 +28,7 @@ from foundation.numbers import integers
 from foundation.user_error import UserError
 
 if not cython.compiled:
-    from firmware_sim.calls import call, call_with
+    from firmware_sim.calls import call
 
 PINS = 64  # P0.0 ... P0.31 are 0 ... 31, P1.0 ... P1.31 are 32 ... 63
 MESSAGE_KINDS = 32
@@ -344,26 +344,25 @@ class Microcontroller:
                     break
                 inbox.take()
                 self._input()
-                if vic.pending != 0:
-                    self._serve_now()
-                continue
-            if time >= until:
+            elif time >= until:
                 break
-            self.instant = time
-            if what == 4:
-                self._code(until)
-            elif what == 1:
-                self._alarm(time)
-                if vic.pending != 0:
-                    self._serve_now()
-            elif what == 2:
-                self._timer_match()
-                if vic.pending != 0:
-                    self._serve_now()
-            elif what == 3:
-                self._serve(vic.first_pending(), time)
             else:
-                self._background()
+                self.instant = time
+                if what == 4:
+                    self._code(until)
+                    continue
+                if what == 3:
+                    self._serve(vic.first_pending(), time)
+                    continue
+                if what == 5:
+                    self._background()
+                    continue
+                if what == 1:
+                    self._alarm(time)
+                else:
+                    self._timer_match()
+            if vic.pending != 0:
+                self._serve_now()
         self.next_time = time
         return time
 
@@ -451,11 +450,11 @@ class Microcontroller:
                 self.pins[inbox.c] = inbox.d
             channel = self.pin_channels[pin]
             if channel >= 0:
-                peripheral = self.pin_owners[pin]
+                peripheral = cython.cast(Peripheral, self.pin_owners[pin])
                 peripheral.on_pin(channel, inbox.b, inbox.time)
                 return 0
         elif 0 <= inbox.kind < 32 and 0 <= inbox.a < 16:
-            peripheral = self.message_table[inbox.kind * 16 + inbox.a]
+            peripheral = cython.cast(Peripheral, self.message_table[inbox.kind * 16 + inbox.a])
             if peripheral is not None:
                 peripheral.on_message(inbox)
                 return 0
@@ -472,7 +471,7 @@ class Microcontroller:
     def _alarm(self, time: cython.longlong) -> cython.longlong:
         """The first alarm is due."""
         i: cython.longlong = self.alarm_first
-        peripheral: Peripheral = self.alarm_owners[i]
+        peripheral: Peripheral = cython.cast(Peripheral, self.alarm_owners[i])
         self.now = time
         self.alarm_times[i] = 1 << 62
         self.alarm_time = 1 << 62  # until the next one is looked for, so that `set_alarm` need not
@@ -530,7 +529,7 @@ class Microcontroller:
             source.give_message(self.inbox)
         self.extra_cycles = 0
         if cython.compiled:
-            result = call_with(source.handler, self.inbox)
+            result = handle(source, self.inbox)
         else:
             result = source.handler(self.inbox)
         if result is None and self.extra_cycles == 0:

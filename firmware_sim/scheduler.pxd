@@ -7,7 +7,7 @@ cdef extern from "Python.h":
     plain_call PyCFunction_GET_FUNCTION(object)
     PyObject* PyCFunction_GET_SELF(object)
     int PyCFunction_GET_FLAGS(object)
-    int METH_NOARGS, METH_O
+    int METH_NOARGS
 
 # What stands in a schedule is mostly a bound method of a compiled class. Its C function is then called without the
 # general machinery of Python calls; anything else is called in the ordinary way. (With always_allow_keywords off, as
@@ -16,11 +16,6 @@ cdef inline object call(object function):
     if PyCFunction_CheckExact(function) and PyCFunction_GET_FLAGS(function) == METH_NOARGS:
         return PyCFunction_GET_FUNCTION(function)(PyCFunction_GET_SELF(function), NULL)
     return function()
-
-cdef inline object call_with(object function, object argument):
-    if PyCFunction_CheckExact(function) and PyCFunction_GET_FLAGS(function) == METH_O:
-        return PyCFunction_GET_FUNCTION(function)(PyCFunction_GET_SELF(function), <PyObject*>argument)
-    return function(argument)
 
 # A table's places keep the addresses of C functions and of the objects they belong to (which `functions` keeps alive);
 # code 0: not such a function.
@@ -44,7 +39,7 @@ cdef class Task:
     cdef public long long base_cycles, most_cycles, per_item, kind
     cdef public str name, item
     cdef public long long hits
-    cdef public long long noted_calls, noted_cycles, noted_most, noted_last, noted_last_call
+    cdef public long long noted_calls, noted_cycles, noted_most, noted_last, noted_when
     cdef public SlotScheduler scheduler
     cdef public long long number
     cpdef long long note(self, long long cycles) except? -1

@@ -51,19 +51,19 @@ class Task:
         self.noted_cycles = 0
         self.noted_most = 0
         self.noted_last = 0
-        self.noted_last_call = 0
+        self.noted_when = 0  # usual calls before the latest noted one
         self.scheduler = None
         self.number = -1
 
     def note(self, cycles: cython.longlong) -> cython.longlong:
-        """Count a call that took `cycles`; returns the number of calls."""
+        """Count a call that took `cycles`; returns the number of calls noted so."""
         self.noted_calls += 1
         self.noted_cycles += cycles
         if cycles > self.noted_most:
             self.noted_most = cycles
         self.noted_last = cycles
-        self.noted_last_call = self.noted_calls + self.usual_calls()
-        return self.noted_last_call
+        self.noted_when = self.scheduler.usual_calls[self.number]
+        return self.noted_calls
 
     def usual_calls(self) -> cython.longlong:
         """Calls that took exactly `cost`, since that was last changed."""
@@ -78,7 +78,7 @@ class Task:
     def cost(self, cycles) -> None:
         calls, total, most, last = self.calls, self.total_cycles, self.max_cycles, self.last_cycles
         self.noted_calls, self.noted_cycles, self.noted_most = calls, total, most
-        self.noted_last, self.noted_last_call = last, calls
+        self.noted_last, self.noted_when = last, 0
         self.base_cycles = cycles
         if self.scheduler is not None:
             self.scheduler.usual_calls[self.number] = 0
@@ -113,7 +113,7 @@ class Task:
     @property
     def last_cycles(self):
         """Cycles of the latest call."""
-        return self.noted_last if self.noted_last_call == self.calls else self.base_cycles
+        return self.noted_last if self.noted_when == self.usual_calls() else self.base_cycles
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({self.name}, cost={self.cost}, limit={self.limit})"

@@ -2,11 +2,36 @@ cimport cython
 
 from foundation.events cimport EventQueue
 
+cdef extern from "Python.h":
+    ctypedef struct PyObject
+    ctypedef object (*plain_call "PyCFunction")(PyObject*, PyObject*)
+    bint PyCFunction_CheckExact(object)
+    plain_call PyCFunction_GET_FUNCTION(object)
+    PyObject* PyCFunction_GET_SELF(object)
+    int PyCFunction_GET_FLAGS(object)
+    int METH_O
+
+# As in scheduler.pxd: a handler that is a method of a compiled class is called by the address of its C function, which
+# the source keeps with its owner (`handler` keeps both alive).
+cdef inline object handle(InterruptSource source, EventQueue queue):
+    if source.code != NULL:
+        return source.code(source.owner, <PyObject*>queue)
+    return source.handler(queue)
+
+cdef inline int know_code(InterruptSource source) except -1:
+    source.code = NULL
+    if PyCFunction_CheckExact(source.handler) and PyCFunction_GET_FLAGS(source.handler) == METH_O:
+        source.code = PyCFunction_GET_FUNCTION(source.handler)
+        source.owner = PyCFunction_GET_SELF(source.handler)
+    return 0
+
 @cython.final
 cdef class InterruptSource:
     cdef public long long kind, index
     cdef public str name
     cdef public object handler
+    cdef plain_call code
+    cdef PyObject* owner
     cdef public long long cost, per_item, latency, slot, bit
     cdef public long long base_cycles, base_ns, latency_ns
     cdef public bint attached, pending, keeps_message

@@ -133,6 +133,8 @@ class InterruptController:
             raise UserError(f"interrupt {kind}/{index}: slot {slot} is taken by {self.irq_list[slot].name}")
         self.detach(source)
         source.handler = handler
+        if cython.compiled:
+            know_code(source)
         source.name = name if name is not None else getattr(handler, "__name__", source.name)
         source.cost = cost
         source.per_item = per_item
