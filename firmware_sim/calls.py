@@ -1,6 +1,7 @@
 """Calls of what stands in a schedule or at an interrupt, when the robot runs interpreted.
 
-Compiled, the functions of the same names in scheduler.pxd are used: they call compiled methods directly.
+Compiled, the functions of the same names in scheduler.pxd and vic.pxd are used: they call methods of compiled classes
+by the addresses of their C functions.
 """
 
 from collections.abc import Callable
@@ -10,3 +11,28 @@ from typing import Any
 def call(function: Callable[[], Any]) -> Any:
     """What `function()` returns."""
     return function()
+
+
+def run(scheduler: Any, place: int) -> Any:
+    """What the task at `place` of a scheduler's table returns."""
+    return scheduler.functions[place]()
+
+
+def handle(source: Any, queue: Any) -> Any:
+    """What the handler of an interrupt source returns for the message in the fields of `queue`."""
+    return source.handler(queue)
+
+
+def code_of(function: Callable[..., Any]) -> int:
+    """Address of a method's C function; 0: it has none."""
+    return 0
+
+
+def owner_of(function: Callable[..., Any]) -> int:
+    """Address of the object that a method with a C function belongs to; 0: there is none."""
+    return 0
+
+
+def know_code(source: Any) -> int:
+    """Let an interrupt source know the C function of its handler; returns 0."""
+    return 0

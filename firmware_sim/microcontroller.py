@@ -28,7 +28,7 @@ from foundation.numbers import integers
 from foundation.user_error import UserError
 
 if not cython.compiled:
-    from firmware_sim.calls import call
+    from firmware_sim.calls import call, handle, run
 
 PINS = 64  # P0.0 ... P0.31 are 0 ... 31, P1.0 ... P1.31 are 32 ... 63
 MESSAGE_KINDS = 32
@@ -617,7 +617,7 @@ class Microcontroller:
     def _edges_between(self, until: cython.longlong) -> cython.bint:
         """Two tasks: if nothing but edges comes between them, take those. True when the next task may run at once."""
         first: cython.longlong = min(self.tick_time, self.alarm_time, self.inbox.head_time)
-        if self.vic.pending != 0 or self.edge_time > first or self.edge_time >= until or self.edge_time > self.code_time:
+        if self.vic.pending != 0 or self.edge_time >= until or self.edge_time > min(first, self.code_time):
             return False
         self._edges(until)
         self.extra_cycles = 0

@@ -16,6 +16,9 @@ import cython
 from foundation.numbers import integers
 from foundation.user_error import UserError
 
+if not cython.compiled:
+    from firmware_sim.calls import code_of, owner_of
+
 NORMAL_TASK = 0
 OCCASIONAL_TASK = 1
 WAIT_TASK = 2
@@ -324,9 +327,8 @@ class SlotScheduler:
                 self.numbers[place] = task.number
                 self.functions[place] = task.function
                 self.usual_ns[place] = int(task.base_cycles * self.ns_per_cycle) if plain else -1
-                if cython.compiled:
-                    self.codes[place] = code_of(task.function)
-                    self.owners[place] = owner_of(task.function)
+                self.codes[place] = code_of(task.function)
+                self.owners[place] = owner_of(task.function)
 
     @property
     def run_tasks(self):

@@ -11,6 +11,9 @@ import cython
 from foundation.events import EventQueue
 from foundation.user_error import UserError
 
+if not cython.compiled:
+    from firmware_sim.calls import know_code
+
 FIQ = -1
 FIRST_FIQ = 1 << 16  # in the word of pending sources the FIQ sources stand above the 16 slots
 
@@ -133,8 +136,7 @@ class InterruptController:
             raise UserError(f"interrupt {kind}/{index}: slot {slot} is taken by {self.irq_list[slot].name}")
         self.detach(source)
         source.handler = handler
-        if cython.compiled:
-            know_code(source)
+        know_code(source)
         source.name = name if name is not None else getattr(handler, "__name__", source.name)
         source.cost = cost
         source.per_item = per_item
