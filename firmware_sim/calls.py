@@ -31,8 +31,3 @@ def code_of(function: Callable[..., Any]) -> int:
 def owner_of(function: Callable[..., Any]) -> int:
     """Address of the object that a method with a C function belongs to; 0: there is none."""
     return 0
-
-
-def know_code(source: Any) -> int:
-    """Let an interrupt source know the C function of its handler; returns 0."""
-    return 0

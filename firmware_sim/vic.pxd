@@ -11,27 +11,28 @@ cdef extern from "Python.h":
     int PyCFunction_GET_FLAGS(object)
     int METH_O
 
-# As in scheduler.pxd: a handler that is a method of a compiled class is called by the address of its C function, which
-# the source keeps with its owner (`handler` keeps both alive).
-cdef inline object handle(InterruptSource source, EventQueue queue):
-    if source.code != NULL:
-        return source.code(source.owner, <PyObject*>queue)
-    return source.handler(queue)
-
-cdef inline int know_code(InterruptSource source) except -1:
-    source.code = NULL
-    if PyCFunction_CheckExact(source.handler) and PyCFunction_GET_FLAGS(source.handler) == METH_O:
-        source.code = PyCFunction_GET_FUNCTION(source.handler)
-        source.owner = PyCFunction_GET_SELF(source.handler)
+# As in scheduler.pxd: a handler that is a method of a compiled class is called by the address of its C function.
+cdef inline long long code_of(object function):
+    if PyCFunction_CheckExact(function) and PyCFunction_GET_FLAGS(function) == METH_O:
+        return <long long><void*>PyCFunction_GET_FUNCTION(function)
     return 0
+
+cdef inline long long owner_of(object function):
+    if PyCFunction_CheckExact(function):
+        return <long long><void*>PyCFunction_GET_SELF(function)
+    return 0
+
+cdef inline object handle(InterruptSource source, EventQueue queue):
+    if source.code != 0:
+        return (<plain_call><void*>source.code)(<PyObject*><void*>source.owner, <PyObject*>queue)
+    return source.handler(queue)
 
 @cython.final
 cdef class InterruptSource:
     cdef public long long kind, index
     cdef public str name
     cdef public object handler
-    cdef plain_call code
-    cdef PyObject* owner
+    cdef public long long code, owner
     cdef public long long cost, per_item, latency, slot, bit
     cdef public long long base_cycles, base_ns, latency_ns
     cdef public bint attached, pending, keeps_message

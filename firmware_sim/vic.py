@@ -12,7 +12,7 @@ from foundation.events import EventQueue
 from foundation.user_error import UserError
 
 if not cython.compiled:
-    from firmware_sim.calls import know_code
+    from firmware_sim.calls import code_of, owner_of
 
 FIQ = -1
 FIRST_FIQ = 1 << 16  # in the word of pending sources the FIQ sources stand above the 16 slots
@@ -45,6 +45,9 @@ class InterruptSource:
         self.index = index
         self.name = f"{kind}/{index}"
         self.handler = None
+        # addresses of a compiled handler's C function and of the object it belongs to; 0: call `handler`
+        self.code = 0
+        self.owner = 0
         self.cost = 0
         self.per_item = 0
         self.latency = 0
@@ -136,7 +139,8 @@ class InterruptController:
             raise UserError(f"interrupt {kind}/{index}: slot {slot} is taken by {self.irq_list[slot].name}")
         self.detach(source)
         source.handler = handler
-        know_code(source)
+        source.code = code_of(handler)
+        source.owner = owner_of(handler)
         source.name = name if name is not None else getattr(handler, "__name__", source.name)
         source.cost = cost
         source.per_item = per_item

@@ -89,6 +89,16 @@ class TimerCapture(Peripheral):
             self.CCR = self.CCR & ~(7 << shift) | 6 << shift
         return self.CCR
 
+    @property
+    def wraps(self):
+        """How often the timer has started again, as far as it has been looked at."""
+        return self.ticks.number - 1
+
+    @property
+    def edges(self):
+        """Edges per channel, captured and lost."""
+        return [captured + lost for captured, lost in zip(self.captured, self.lost, strict=True)]
+
     def CR(self, channel: cython.longlong) -> cython.longlong:
         """Capture register of a channel by number."""
         return self.captures[channel]
