@@ -42,8 +42,8 @@ from foundation.events import (
 )
 from foundation.user_error import UserError
 
-# Virtual time between two looks at the interfaces: one step of the plant. Chosen by us: less brings nothing, as the
-# boards' outputs act at the next step, and much more would be seen in the control loops (500 Hz).
+# Virtual time between two looks at the interfaces: half a step of the plant. Chosen by us: less brings nothing, as the
+# boards' outputs act at the plant's next step, and much more would be seen in the control loops (500 Hz).
 POLL_NS = 125_000
 # Frames read at once are handed on one after the other, as a bus would; further ahead than this they are dropped.
 # Chosen by us: ten slots of the main brain, more than any queue in the robot holds.
