@@ -72,6 +72,14 @@ class Task:
         """Calls that took exactly `cost`, since that was last changed."""
         return 0 if self.scheduler is None else self.scheduler.usual_calls[self.number]
 
+    def settle(self) -> None:
+        """Note the usual calls so far: their cost or their scheduler is about to change."""
+        calls, total, most, last = self.calls, self.total_cycles, self.max_cycles, self.last_cycles
+        self.noted_calls, self.noted_cycles, self.noted_most = calls, total, most
+        self.noted_last, self.noted_when = last, 0
+        if self.scheduler is not None:
+            self.scheduler.usual_calls[self.number] = 0
+
     @property
     def cost(self):
         """Modelled cycles of a call without items."""
@@ -79,12 +87,9 @@ class Task:
 
     @cost.setter
     def cost(self, cycles) -> None:
-        calls, total, most, last = self.calls, self.total_cycles, self.max_cycles, self.last_cycles
-        self.noted_calls, self.noted_cycles, self.noted_most = calls, total, most
-        self.noted_last, self.noted_when = last, 0
+        self.settle()
         self.base_cycles = cycles
         if self.scheduler is not None:
-            self.scheduler.usual_calls[self.number] = 0
             self.scheduler.lay(self)
 
     @property
@@ -311,6 +316,7 @@ class SlotScheduler:
         tasks = self.schedule.all_tasks()
         self.usual_calls = integers(max(len(tasks), 1))
         for number in range(len(tasks)):
+            tasks[number].settle()
             tasks[number].scheduler = self
             tasks[number].number = number
             self.lay(tasks[number])

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from firmware_sim.clock import Crystal, seeded_crystal
+from firmware_sim.clock import Crystal, TickTrain, seeded_crystal
 from foundation.random_stream import RandomStream
 from foundation.user_error import UserError
 
@@ -37,6 +37,22 @@ def test_one_cycle_of_60_megahertz_is_16_ns_and_60_are_a_microsecond():
 def test_every_tick_is_the_exact_quotient_rounded_down_even_after_years(n, period, ppb):
     exact = Fraction(n * period) * 10**9 / (10**9 + ppb)
     assert Crystal(10_000_000, ppb).tick_time_ns(n, period, 0) == exact.__floor__()
+
+
+@given(
+    first=st.integers(0, 2**40),
+    period=st.sampled_from([500_000, 1_000_000, 13, 7_777_777]),
+    phase=st.integers(0, 10**9),
+    ppb=st.integers(-(10**6), 10**6),
+)
+def test_ticks_by_addition_are_those_of_the_absolute_count(first, period, phase, ppb):
+    crystal = Crystal(10_000_000, ppb)
+    train = TickTrain(crystal, period, phase)
+    assert (train.number, train.time) == (0, phase)
+    train.go_to(first)
+    assert train.time == crystal.tick_time_ns(first, period, phase)
+    for n in range(first + 1, first + 50):
+        assert (train.next(), train.number) == (crystal.tick_time_ns(n, period, phase), n)
 
 
 @given(ns=st.integers(0, 1000 * 24 * HOUR_NS), ppb=st.integers(-(10**6), 10**6))

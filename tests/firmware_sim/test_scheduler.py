@@ -205,6 +205,45 @@ def test_replacing_an_entry_runs_the_users_function_at_its_declared_cost():
     assert (task.cost, task.limit) == (600, 500)
 
 
+def test_a_tasks_counters_hold_for_calls_with_and_without_items_wherever_it_stands():
+    log = Log()
+    items = iter([None, 0, 3, None, 5, None])
+    task = Task(lambda: next(items), cost=100, per_item=10)
+    seen = []
+
+    def look():
+        seen.append((task.calls, task.last_cycles, task.max_cycles, task.total_cycles))
+
+    log.start(rows=((task, Task(look), task, Task(look)), (Task(look), task, Task(look))))
+    assert (task.calls, task.last_cycles, task.max_cycles, task.total_cycles) == (0, 0, 0, 0)
+    log.chip.advance(1_900_000)
+    assert seen == [
+        (1, 100, 100, 100),
+        (2, 100, 100, 200),
+        (2, 100, 100, 200),
+        (3, 130, 130, 330),
+        (4, 100, 130, 430),
+        (5, 150, 150, 580),
+        (5, 150, 150, 580),
+        (6, 100, 150, 680),
+    ]
+
+
+def test_what_a_task_took_before_its_cost_changed_or_its_table_was_started_again_stays_counted():
+    log = Log()
+    task = log.task("a", 600)
+    log.start(every=(task,))
+    log.chip.advance(1_600_000)
+    task.cost = 60
+    assert (task.calls, task.total_cycles, task.max_cycles, task.last_cycles) == (4, 2400, 600, 600)
+    log.chip.advance(2_600_000)
+    assert (task.calls, task.total_cycles, task.max_cycles, task.last_cycles) == (6, 2520, 600, 60)
+    again = Log()
+    again.start(every=(task,))
+    again.chip.advance(600_000)
+    assert (task.calls, task.total_cycles, task.max_cycles, task.last_cycles) == (8, 2640, 600, 60)
+
+
 def test_replacing_an_entry_that_is_not_there_names_those_that_are():
     log = Log()
     scheduler = log.start(every=(log.task("control", 1),), occasional=(log.task("status", 1),))
