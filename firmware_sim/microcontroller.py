@@ -574,7 +574,7 @@ class Microcontroller:
         if self.waiting:
             self.now = self.code_time
             self.check_wait = False
-            if not call(self.wait_task.function):
+            if not call(self.wait_task.routine):
                 return 0
             self._wait_over()
             if self.code_time >= self.stop_time or self.vic.pending != 0:
@@ -643,11 +643,11 @@ class Microcontroller:
             if entry is None:
                 self._charge(task, task.base_cycles)
                 return True
-            result = call(entry.function)
+            result = call(entry.routine)
             self._charge(task, task.base_cycles)
             task = entry
         else:
-            result = call(task.function)
+            result = call(task.routine)
         if result is not None:
             items = result
         self._spent(task, items)
@@ -659,7 +659,7 @@ class Microcontroller:
         self.wait_task = task
         self.wait_start = self.code_time
         self.wait_stolen = self.stolen_cycles
-        if call(task.function):
+        if call(task.routine):
             self._wait_over()
             return True
         task.waits += 1

@@ -35,7 +35,7 @@ cdef inline object run(SlotScheduler scheduler, long long place):
     return scheduler.functions[place]()
 
 cdef class Task:
-    cdef public object function
+    cdef public object routine
     cdef public long long base_cycles, most_cycles, per_item, kind
     cdef public str name, item
     cdef public long long hits

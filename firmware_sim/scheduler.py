@@ -41,7 +41,7 @@ class Task:
         for what, value in (("cost", cost), ("limit", limit), ("per_item", per_item)):
             if not isinstance(value, int) or value < 0:
                 raise UserError(f"task {title}: {what} {value!r} must be a whole number of cycles, 0 or more")
-        self.function = function
+        self.routine = function
         self.base_cycles = cost
         self.most_cycles = limit
         self.per_item = per_item
@@ -79,6 +79,17 @@ class Task:
         self.noted_last, self.noted_when = last, 0
         if self.scheduler is not None:
             self.scheduler.usual_calls[self.number] = 0
+
+    @property
+    def function(self):
+        """What is called; another one may be put here at any time, and is taken at the next call."""
+        return self.routine
+
+    @function.setter
+    def function(self, function) -> None:
+        self.routine = function
+        if self.scheduler is not None:
+            self.scheduler.lay(self)
 
     @property
     def cost(self):
@@ -331,10 +342,10 @@ class SlotScheduler:
         for place in range(len(self.tasks)):
             if self.tasks[place] is task:
                 self.numbers[place] = task.number
-                self.functions[place] = task.function
+                self.functions[place] = task.routine
                 self.usual_ns[place] = int(task.base_cycles * self.ns_per_cycle) if plain else -1
-                self.codes[place] = code_of(task.function)
-                self.owners[place] = owner_of(task.function)
+                self.codes[place] = code_of(task.routine)
+                self.owners[place] = owner_of(task.routine)
 
     @property
     def run_tasks(self):
@@ -449,7 +460,7 @@ class SlotScheduler:
             name=task.name,
         )
         task.function = checked.function
-        task.cost = checked.cost  # which lays it down anew
+        task.cost = checked.cost
         task.limit = checked.limit
         task.per_item = checked.per_item
         return task

@@ -244,6 +244,20 @@ def test_what_a_task_took_before_its_cost_changed_or_its_table_was_started_again
     assert (task.calls, task.total_cycles, task.max_cycles, task.last_cycles) == (8, 2640, 600, 60)
 
 
+def test_a_function_put_straight_into_an_entry_is_taken_at_the_next_call():
+    log = Log()
+    task = log.task("control", 600)
+    idle = Task(lambda: None)
+    log.start(every=(task,), occasional=(idle,))
+    log.chip.advance(500_000)
+    task.function = log.function("mine")
+    idle.function = log.function("now and then")
+    log.chip.advance(1_000_000)
+    assert log.names() == ["control", "mine"]
+    log.chip.advance(1_500_000)
+    assert log.names() == ["control", "mine", "mine", "now and then"]
+
+
 def test_replacing_an_entry_that_is_not_there_names_those_that_are():
     log = Log()
     scheduler = log.start(every=(log.task("control", 1),), occasional=(log.task("status", 1),))
