@@ -114,7 +114,7 @@ class Program:
         """What the program has said on standard error; it must be about to end."""
         if self.process.poll() is None:
             self.process.kill()
-        return self._said().decode("utf-8", "replace")
+        return self._said()
 
     def type(self, keys):
         os.write(self.master, keys.encode())
