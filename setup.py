@@ -33,7 +33,7 @@ RECORD = "build_record.json"  # in the package foundation
 COMPILE_ARGUMENTS = ["-O2", "-g0", "-ffp-contract=off", "-fno-fast-math", "-w"]
 DIRECTIVES = {
     "always_allow_keywords": False,  # no keywords for functions of no or one argument: called directly from tables
-    "auto_pickle": False,  # nobody pickles a board: half a megabyte of C less to compile
+    "auto_pickle": False,  # nobody pickles a board: less C to compile
     "binding": False,  # bound methods in schedule tables are then called in about 10 ns
     "boundscheck": True,
     "wraparound": True,
