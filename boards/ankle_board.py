@@ -79,8 +79,8 @@ class AnkleBoard(MotorBoard):
         samples = self.quirks.contact_equal_samples
         self.left_foot = FootContact(FOOT_ON_LEVEL, FOOT_OFF_LEVEL, samples)
         self.right_foot = FootContact(FOOT_ON_LEVEL, right_off_level, samples)
-        self.left_switch = LimitSwitch(self.gpio, PINS["limit_switch_left"])
-        self.right_switch = LimitSwitch(self.gpio, PINS["limit_switch_right"])
+        self.left_switch = LimitSwitch(self, PINS["limit_switch_left"])
+        self.right_switch = LimitSwitch(self, PINS["limit_switch_right"])
         board = table.BOARD
         self.safety = AnkleSafety(
             self.encoder,
@@ -108,10 +108,10 @@ class AnkleBoard(MotorBoard):
 
     def update_switches(self) -> None:
         """ls_update: both limit switches and both feet, with the newest converter results."""
-        self.left_switch.sample()
-        self.right_switch.sample()
-        self.right_foot.sample(self.adc_external.results[3])
-        self.left_foot.sample(self.adc_external.results[2])
+        self.left_switch.read()
+        self.right_switch.read()
+        self.right_foot.read(self.adc_external.results[3])
+        self.left_foot.read(self.adc_external.results[2])
 
     def rezero(self) -> None:
         """Motor encoder towards the ankle, only while the foot rests near its upper stop."""
@@ -132,13 +132,13 @@ class AnkleBoard(MotorBoard):
         self.can.send_float(self.id_left_heel_sense, self.adc_external.results[2])
 
     def send_right_contact(self) -> None:
-        self.can.send_float(self.id_right_hs, self.right_foot.contact.state)
+        self.can.send_float(self.id_right_hs, self.right_foot.state)
 
     def send_left_contact(self) -> None:
-        self.can.send_float(self.id_left_hs, self.left_foot.contact.state)
+        self.can.send_float(self.id_left_hs, self.left_foot.state)
 
     def send_right_switch(self) -> None:
-        self.can.send_float(self.id_right_ls, self.right_switch.switch.state)
+        self.can.send_float(self.id_right_ls, self.right_switch.state)
 
     def send_left_switch(self) -> None:
-        self.can.send_float(self.id_left_ls, self.left_switch.switch.state)
+        self.can.send_float(self.id_left_ls, self.left_switch.state)

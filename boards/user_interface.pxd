@@ -20,24 +20,26 @@ cimport cython
 
 @cython.final
 cdef class UserInterfaceBoard(Microcontroller):
+    # what the tasks of every slot and the interrupts touch
+    cdef public ImuParser imu
+    cdef public Uart uart1
+    cdef public Lcd lcd
+    cdef public CanLink can
+    cdef public ErrorModule errors
+    cdef public SyncLight sync_light
+    cdef public Buzzer buzzer
+    cdef public long long slots, imu_start_slots
+    # the rest
     cdef public object quirks
     cdef public NetworkTime time
-    cdef public ErrorModule errors
     cdef public Gpio gpio
     cdef public McuLed mcu_leds
     cdef public Heartbeat heartbeat
     cdef public ExecutionTimer execution
     cdef public CanController can2
-    cdef public CanLink can
     cdef public TimerCapture timer0
     cdef public RcReceiver rc
-    cdef public Uart uart1
-    cdef public ImuParser imu
     cdef public Keypad keypad
-    cdef public Lcd lcd
     cdef public ColourLeds leds
-    cdef public Buzzer buzzer
-    cdef public SyncLight sync_light
-    cdef public long long slots, imu_start_slots
     cdef public bytes imu_command
     cpdef int report(self, long long code) except -1

@@ -99,8 +99,7 @@ class UserInterfaceBoard(Microcontroller):
         self.rc = RcReceiver(self.report)
         captures = self.vic.source(TIMER_MATCH, 0)
         for channel in (0, 1, 3):
-            self.timer0.use_channel(channel, RC_PINS[channel])
-            self.timer0.sources[channel] = captures
+            self.timer0.use_channel(channel, RC_PINS[channel], source=captures)
         self.vic.attach(TIMER_MATCH, 0, self.on_rc_edge, RC_CYCLES, slot=RC_SLOT, name="timer0 capture")
         # what a person touches, sees and hears
         self.keypad = Keypad(self.gpio, self.report)

@@ -2,8 +2,14 @@ cimport cython
 
 @cython.final
 cdef class AnalogPins:
+    # where the three arrays of `feed` begin: pointers are a fraction of what three array fields take in the cache
+    cdef long long* feed_times
+    cdef double* feed_starts
+    cdef double* feed_ends
+    cdef public short[32] places
     cdef public long long count
-    cdef public long long[::1] start_times, end_times, places, feed_times
-    cdef public double[::1] start_values, end_values, feed_starts, feed_ends
+    cdef public long long[32] start_times, end_times
+    cdef public double[32] start_values, end_values
+    cdef public object feed
     cpdef int set_pair(self, long long index, long long t0, double v0, long long t1, double v1) except -1
     cpdef double volts(self, long long index, long long time) except? -1

@@ -1,34 +1,47 @@
+# cython: boundscheck=False, wraparound=False
+# (pins are 0 ... 31, held against that where they are set; places are those of the table that is followed)
 """Analog voltages at a chip's pins: a straight line per pin between two instants, set from outside."""
-
-import array
 
 import cython
 
+from foundation.user_error import UserError
+
+PINS = 32
+
 
 class AnalogPins:
-    """`count` analog pins; each holds one line segment (ns, V) to (ns, V), 0 V until it is first set.
+    """32 analog pins; each holds one line segment (ns, V) to (ns, V), 0 V until it is first set.
 
     A pin may instead follow a table outside (`follow`), in which a whole row of voltages changes at once.
     """
 
-    def __init__(self, count=32) -> None:
-        self.count = count
-        self.start_times = array.array("q", [0]) * count
-        self.end_times = array.array("q", [0]) * count
-        self.start_values = array.array("d", [0.0]) * count
-        self.end_values = array.array("d", [0.0]) * count
-        self.places = array.array("q", [-1]) * count
-        self.feed_times = array.array("q", [0, 0])
-        self.feed_starts = array.array("d", [0.0])
-        self.feed_ends = array.array("d", [0.0])
+    def __init__(self) -> None:
+        self.count = PINS
+        self.start_times = [0] * 32
+        self.end_times = [0] * 32
+        self.start_values = [0.0] * 32
+        self.end_values = [0.0] * 32
+        self.places = [-1] * 32  # in the table outside; -1: the pin has a line of its own
+        self.feed = None
 
-    def follow(self, index, times, starts, ends, place) -> None:
+    def follow(self, index, times: cython.longlong[::1], starts: cython.double[::1], ends: cython.double[::1], place):
         """From now on pin `index` runs from `starts[place]` at `times[0]` to `ends[place]` at `times[1]`, whatever
         stands there when it is read. All pins of a chip follow the same three arrays (int64 ns, V, V)."""
-        self.feed_times = times
-        self.feed_starts = starts
-        self.feed_ends = ends
+        self._check(index)
+        self.feed = (times, starts, ends)  # keeps them alive
+        if cython.compiled:
+            self.feed_times = cython.address(times[0])
+            self.feed_starts = cython.address(starts[0])
+            self.feed_ends = cython.address(ends[0])
+        else:
+            self.feed_times = times
+            self.feed_starts = starts
+            self.feed_ends = ends
         self.places[index] = place
+
+    def _check(self, index) -> None:
+        if not 0 <= index < PINS:
+            raise UserError(f"analog pin {index} is not 0 ... {PINS - 1}")
 
     def set_pair(
         self,
@@ -39,6 +52,7 @@ class AnalogPins:
         v1: cython.double,
     ) -> None:
         """The voltage of pin `index` runs straight from `v0` at `t0` to `v1` at `t1`; it follows nothing more."""
+        self._check(index)
         self.places[index] = -1
         self.start_times[index] = t0
         self.start_values[index] = v0

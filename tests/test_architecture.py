@@ -124,7 +124,7 @@ def declared_classes(text):
             continue
         field = re.match(r"cdef\s+(?:public\s+|readonly\s+)?(.*)$", line)
         if field:
-            without_type = re.sub(r"^(?:unsigned\s+)?(?:long\s+long|[\w.]+)(?:\[[^\]]*\])?\s+", "", field.group(1))
+            without_type = re.sub(r"^(?:unsigned\s+)?(?:long\s+long|[\w.]+)(?:\*|\[[^\]]*\])?\s+", "", field.group(1))
             current[1].update(name.strip() for name in without_type.split(",") if name.strip())
     return classes
 

@@ -1,12 +1,10 @@
 cimport cython
 
-@cython.final
 cdef class Debounce:
-    cdef public long long equal_samples, last, run, state, settled
+    cdef public long long settled, state, last, run, equal_samples
     cpdef void sample(self, long long level) noexcept
 
 @cython.final
-cdef class FootContact:
-    cdef public long long on_level, off_level, level
-    cdef public Debounce contact
-    cpdef void sample(self, long long counts) noexcept
+cdef class FootContact(Debounce):
+    cdef public long long level, on_level, off_level
+    cpdef void read(self, long long counts) noexcept

@@ -29,20 +29,21 @@ class Debounce:
         self.settled = level if level == self.state else -1
 
 
-class FootContact:
-    """A foot sensor's reading (counts) made into contact 0/1: above `on_level` on, below `off_level` off."""
+class FootContact(Debounce):
+    """A foot sensor's reading (counts) made into contact 0/1 (`state`): above `on_level` on, below `off_level`
+    off."""
 
     def __init__(self, on_level, off_level, equal_samples) -> None:
+        Debounce.__init__(self, equal_samples)
         self.on_level = on_level
         self.off_level = off_level
         self.level = 0
-        self.contact = Debounce(equal_samples)
 
-    def sample(self, counts: cython.longlong) -> cython.void:
+    def read(self, counts: cython.longlong) -> cython.void:
         """One reading per slot; between the two levels the old level stays."""
         if counts > self.on_level:
             self.level = 1
         elif counts < self.off_level:
             self.level = 0
-        if self.level != self.contact.settled:
-            self.contact.sample(self.level)
+        if self.level != self.settled:
+            self.sample(self.level)

@@ -17,7 +17,6 @@ import cython
 
 from datatable.generated import errors
 from firmware_sim.peripherals.uart import Uart
-from foundation.numbers import integers
 
 if not cython.compiled:
     from foundation.numbers import float_of_word
@@ -46,8 +45,8 @@ class ImuParser:
         self.has_angles = header == 0xCF
         self.needed = 32 if late_by_one_byte else 31
         self.code_ring_full = errors.MSIMU_RX_OF
-        self.ring = integers(128)
-        self.words = integers(7)  # of the packet that was looked at last: six values and the timer
+        self.ring = [0] * 128
+        self.words = [0] * 7  # of the packet that was looked at last: six values and the timer
         self.ring_write = 0
         self.ring_read = 0
         self.roll = 0.0
@@ -79,9 +78,14 @@ class ImuParser:
     def receive(self, uart: Uart) -> cython.longlong:
         """Store every byte that waits in the FIFO of `uart`; returns how many there were."""
         count: cython.longlong = uart.fifo_count
+        first: cython.longlong = uart.fifo_head
+        write: cython.longlong = self.ring_write
+        i: cython.longlong
         if self.waiting() + count < 128:
-            uart.read_all(self.ring, self.ring_write, 127)
-            self.ring_write = (self.ring_write + count) & 127
+            for i in range(count):
+                self.ring[(write + i) & 127] = uart.fifo[(first + i) & 15]
+            uart.were_read(count)
+            self.ring_write = (write + count) & 127
         else:
             for _byte in range(count):
                 self.push(uart.RBR())

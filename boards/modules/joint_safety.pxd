@@ -22,4 +22,4 @@ cdef class AnkleSafety:
     cdef public CurrentControl control
     cdef public McuLed leds
     cdef public ErrorModule errors
-    cdef public long long code_switch, code_stretch, code_low, code_high, low, high, stretch
+    cdef public long long low, high, stretch, code_switch, code_stretch, code_low, code_high

@@ -85,7 +85,7 @@ class AnkleSafety:
         angle: cython.longlong = self.encoder.angle
         negative: cython.bint = False
         positive: cython.bint = False
-        if self.left.switch.state or self.right.switch.state:
+        if self.left.state or self.right.state:
             negative = True
             self.errors.report(self.code_switch)
         if angle - self.motor.position > self.stretch:

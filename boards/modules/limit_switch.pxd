@@ -1,11 +1,10 @@
 from boards.modules.foot_contact cimport Debounce
-from firmware_sim.peripherals.gpio cimport Gpio
+from firmware_sim.microcontroller cimport Microcontroller
 
 cimport cython
 
 @cython.final
-cdef class LimitSwitch:
-    cdef public Gpio gpio
+cdef class LimitSwitch(Debounce):
+    cdef public Microcontroller chip
     cdef public long long pin
-    cdef public Debounce switch
-    cpdef void sample(self) noexcept
+    cpdef void read(self) noexcept

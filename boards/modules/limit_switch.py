@@ -5,22 +5,22 @@
 import cython
 
 from boards.modules.foot_contact import Debounce
-from firmware_sim.peripherals.gpio import Gpio
+from firmware_sim.microcontroller import Microcontroller
 
 EQUAL_SAMPLES = 3  # the firmware's limit of 2 repetitions: 1.5 ms
 
 
-class LimitSwitch:
-    """One switch on `pin`; `switch.state` is 1 when closed. The pin has a pull-up: unconnected reads open."""
+class LimitSwitch(Debounce):
+    """One switch on `pin`; `state` is 1 when closed. The pin has a pull-up: unconnected reads open."""
 
-    def __init__(self, gpio: Gpio, pin) -> None:
-        self.gpio = gpio
+    def __init__(self, chip: Microcontroller, pin) -> None:
+        Debounce.__init__(self, EQUAL_SAMPLES)
+        self.chip = chip
         self.pin = pin
-        self.gpio.levels[pin] = 1
-        self.switch = Debounce(EQUAL_SAMPLES)
+        chip.pins[pin] = 1
 
-    def sample(self) -> cython.void:
+    def read(self) -> cython.void:
         """One reading per slot."""
-        closed: cython.longlong = 1 - self.gpio.levels[self.pin]
-        if closed != self.switch.settled:
-            self.switch.sample(closed)
+        closed: cython.longlong = 1 - self.chip.pins[self.pin]
+        if closed != self.settled:
+            self.sample(closed)

@@ -5,17 +5,19 @@ from firmware_sim.vic cimport InterruptSource
 
 @cython.final
 cdef class Ads7871(Peripheral):
-    cdef public long long eint, conversion_ns, alarm
-    cdef public double reference_V, scale
-    cdef public long long offset_counts
+    # what a conversion touches
     cdef public InterruptSource source
-    cdef public long long[::1] registers, gains, inputs
-    cdef public bint busy
-    cdef public long long result, conversions, started_time
-    cdef public long long length, step
-    cdef public long long[::1] sequence, sequence_inputs, results
-    cdef public bint done
-    cdef public long long not_finished
+    cdef public long long alarm, conversion_ns, started_time
+    cdef public bint busy, done
+    cdef public long long step, length, result, conversions
+    cdef public short[16] sequence, results
+    cdef public short[32] registers
+    cdef public short[16] inputs
+    cdef public short[8] gains
+    cdef public double scale, reference_V
+    cdef public long long offset_counts
+    # the rest
+    cdef public long long eint, not_finished
     cpdef bint start(self, long long register4) except? -1
     cpdef long long read_result(self) noexcept
     cpdef bint start_sequence(self) except? -1

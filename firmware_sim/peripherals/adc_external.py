@@ -11,8 +11,6 @@ conversion is therefore modelled as 1/48 ms = 20.83 us from the write. The input
 The SSP transfers (16 bits at 10 MHz) are part of the cost of the code that does them.
 """
 
-import array
-
 import cython
 
 from firmware_sim.microcontroller import Peripheral
@@ -54,18 +52,17 @@ class Ads7871(Peripheral):
         self.scale = scale
         self.offset_counts = offset_counts
         self.source = chip.vic.source(EXTERNAL_INTERRUPT, eint)
-        self.registers = array.array("q", [0]) * 32
-        self.gains = array.array("q", GAINS)
-        self.inputs = array.array("q", range(16))
+        self.registers = [0] * 32
+        self.gains = list(GAINS)
+        self.inputs = list(range(16))
         self.busy = False
         self.result = 0
         self.conversions = 0
         self.started_time = 0
         self.length = 0
         self.step = 0
-        self.sequence = array.array("q", [0]) * 16
-        self.sequence_inputs = array.array("q", [0]) * 16
-        self.results = array.array("q", [0]) * 16
+        self.sequence = [0] * 16
+        self.results = [0] * 16
         self.done = True
         self.not_finished = 0
 
@@ -75,7 +72,6 @@ class Ads7871(Peripheral):
             raise UserError(f"{self.chip.name}: ADS7871: {len(entries)} sequence entries; 1 ... 16 are possible")
         for place, (channel_code, gain_code, pin) in enumerate(entries):
             self.sequence[place] = register4(channel_code, gain_code)
-            self.sequence_inputs[place] = pin
             self.inputs[channel_code] = pin
         self.length = len(entries)
 

@@ -7,14 +7,18 @@ cdef long long _DONE
 
 @cython.final
 cdef class AdcInternal(Peripheral):
-    cdef public long long clkdiv, hz, conversion_ns, alarm, CR, GDR, result, channel
-    cdef public double reference_V, scale
-    cdef public long long offset_counts
+    # what a conversion touches
     cdef public InterruptSource source
+    cdef public long long alarm, conversion_ns, started_time, channel
+    cdef public long long CR, GDR, result, clkdiv, conversions
     cdef public bint busy
-    cdef public long long conversions, not_finished, started_time
-    cdef public long long[::1] inputs, channels
+    cdef public double scale, reference_V
+    cdef public long long offset_counts
+    cdef public short[8] inputs
+    # burst mode, and the rest
+    cdef public short[8] channels
     cdef public long long burst_count, burst_start
+    cdef public long long hz, not_finished
     cpdef long long convert(self, double volts) except? <long long>-1
     cpdef bint start(self, long long channel) except? -1
     cpdef long long DR(self, long long channel) except? <long long>-1

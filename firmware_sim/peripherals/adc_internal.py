@@ -7,8 +7,6 @@ counts = floor(scale * 1024 V / reference_V) + offset_counts, clipped to 0 ... 1
 V / VDDA * 1024; scale and offset are those of a board's own divider and converter).
 """
 
-import array
-
 import cython
 
 from firmware_sim.microcontroller import Peripheral
@@ -34,7 +32,7 @@ class AdcInternal(Peripheral):
         self.offset_counts = offset_counts
         self.alarm = chip.new_alarm(self, 0)
         self.source = chip.vic.source(ADC_DONE, 0)
-        self.inputs = array.array("q", range(8))
+        self.inputs = list(range(8))
         self.CR = 0
         self.GDR = 0
         self.result = 0
@@ -43,7 +41,7 @@ class AdcInternal(Peripheral):
         self.conversions = 0
         self.not_finished = 0
         self.started_time = 0
-        self.channels = array.array("q", [0]) * 8
+        self.channels = [0] * 8
         self.burst_count = 0
         self.burst_start = 0
 

@@ -5,14 +5,20 @@ cimport cython
 
 @cython.final
 cdef class CanController(Peripheral):
-    cdef public long long number, MOD, IER, ICR, BTR
-    cdef public long long RFS, RID, RDA, RDB, rx_count
-    cdef public long long second_RFS, second_RID, second_RDA, second_RDB
-    cdef public long long[::1] TFI, TID, TDA, TDB, tx_free, tx_complete
+    # what a frame touches; registers of the chip have 32 bits
+    cdef public InterruptSource rx_source, tx_source
+    cdef public unsigned int MOD, IER, ICR
+    cdef public int number, rx_count
+    cdef public short[4] tx_free, tx_complete
+    cdef public unsigned int RFS, RID, RDA, RDB
+    cdef public unsigned int second_RFS, second_RID, second_RDA, second_RDB
+    cdef public long long received, sent, requests
+    cdef public unsigned int[4] TFI, TID, TDA, TDB
+    # the rest
+    cdef public long long data_overruns, lost, aborted, refused
     cdef public bint overrun, bus_off, error_warning
-    cdef public long long tx_errors, rx_errors
-    cdef public long long received, data_overruns, requests, sent, lost, aborted, refused
-    cdef public InterruptSource rx_source, tx_source, error_source
+    cdef public long long tx_errors, rx_errors, BTR
+    cdef public InterruptSource error_source
     cpdef bint transmit(self, long long buffer, long long identifier, long long flags, long long lo, long long hi) except? -1
     cpdef bint buffer_free(self, long long buffer) noexcept
     cpdef long long write_CMR(self, long long command) except? <long long>-1

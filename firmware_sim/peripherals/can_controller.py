@@ -18,7 +18,6 @@ import cython
 
 from firmware_sim.microcontroller import Peripheral
 from foundation.events import CAN_RX, CAN_STATUS, CAN_TX_DONE
-from foundation.numbers import integers
 from foundation.user_error import UserError
 
 CMR_TR, CMR_AT, CMR_RRB, CMR_CDO, CMR_SRR, CMR_STB1, CMR_STB2, CMR_STB3 = 1, 2, 4, 8, 16, 32, 64, 128
@@ -77,12 +76,12 @@ class CanController(Peripheral):
         self.second_RID = 0
         self.second_RDA = 0
         self.second_RDB = 0
-        self.TFI = integers(4)
-        self.TID = integers(4)
-        self.TDA = integers(4)
-        self.TDB = integers(4)
-        self.tx_free = integers(4, 1)
-        self.tx_complete = integers(4, 1)
+        self.TFI = [0] * 4
+        self.TID = [0] * 4
+        self.TDA = [0] * 4
+        self.TDB = [0] * 4
+        self.tx_free = [1] * 4
+        self.tx_complete = [1] * 4
         self.overrun = False
         self.bus_off = False
         self.error_warning = False

@@ -1,3 +1,5 @@
+# cython: boundscheck=False, wraparound=False
+# (pins are those of the boards' tables, 0 ... 63)
 """General-purpose pins: P0.0 ... P0.31 are pins 0 ... 31, P1.0 ... P1.31 are pins 32 ... 63.
 
 Inputs follow PIN_EDGE messages (the chip keeps their levels); a change of an output sends PIN_OUTPUT.
@@ -8,7 +10,6 @@ the last edge that reported it.
 import cython
 
 from firmware_sim.microcontroller import Peripheral
-from foundation.numbers import integers
 
 
 def p0(bit) -> int:
@@ -22,29 +23,28 @@ def p1(bit) -> int:
 
 
 class Gpio(Peripheral):
-    """The two ports of a chip. `directions[pin]` is 1 once the pin has been written (IODIR)."""
+    """The two ports of a chip, whose levels are `chip.pins`. `IODIR`, per port: bit n is 1 once pin n was written."""
 
     def __init__(self, chip) -> None:
         Peripheral.__init__(self, chip)
-        self.levels = chip.pins
-        self.directions = integers(64)
+        self.IODIR = [0, 0]
 
     def level(self, pin: cython.longlong) -> cython.longlong:
         """0 or 1, as the pin is now."""
-        return self.levels[pin]
+        return self.chip.pins[pin]
 
     def write(self, pin: cython.longlong, level: cython.longlong) -> None:
         """Drive an output; a change is told outside as PIN_OUTPUT at `now`."""
-        if self.directions[pin] == 0 or self.levels[pin] != level:
-            self.directions[pin] = 1
-            self.levels[pin] = level
+        if self.chip.pins[pin] != level or not self.IODIR[pin >> 5] >> (pin & 31) & 1:
+            self.IODIR[pin >> 5] |= 1 << (pin & 31)
+            self.chip.pins[pin] = level
             self.chip.outbox.push(self.chip.now, 0, 36, pin, level)  # PIN_OUTPUT
 
     def toggle(self, pin: cython.longlong) -> None:
         """Invert an output."""
-        level: cython.longlong = 1 - self.levels[pin]
-        self.directions[pin] = 1
-        self.levels[pin] = level
+        level: cython.longlong = 1 - self.chip.pins[pin]
+        self.IODIR[pin >> 5] |= 1 << (pin & 31)
+        self.chip.pins[pin] = level
         self.chip.outbox.push(self.chip.now, 0, 36, pin, level)  # PIN_OUTPUT
 
     def IOSET(self, port: cython.longlong, mask: cython.longlong) -> None:
@@ -66,5 +66,5 @@ class Gpio(Peripheral):
         bit: cython.longlong
         word: cython.longlong = 0
         for bit in range(32):
-            word |= self.levels[port * 32 + bit] << bit
+            word |= self.chip.pins[port * 32 + bit] << bit
         return word

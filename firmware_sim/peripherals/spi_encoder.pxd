@@ -5,9 +5,11 @@ from firmware_sim.vic cimport InterruptSource
 
 @cython.final
 cdef class SpiEncoder(Peripheral):
-    cdef public long long number, word, bits, bit_rate, transfer_ns, mask, alarm
-    cdef public long long SPDR, SPSR, latched, transfers, not_finished
+    # what a transfer touches
     cdef public bint busy
     cdef public InterruptSource source
+    cdef public long long alarm, transfer_ns, word, mask, latched, SPDR, SPSR, transfers
+    # the rest
+    cdef public long long number, bits, bit_rate, not_finished
     cpdef bint start(self) except? -1
     cpdef long long read(self) noexcept

@@ -6,18 +6,18 @@ cimport cython
 
 @cython.final
 cdef class SspSegment:
-    cdef public long long[::1] words
     cdef public long long used
+    cdef public unsigned short[31] words
     cpdef void clear(self) noexcept
     cpdef void copy_from(self, SspSegment other) noexcept
 
 @cython.final
 cdef class SspPort(Peripheral):
-    cdef public long long number, exchanges, overwritten
-    cdef public SspSegment received, loaded
-    cdef public long long received_time
-    cdef public bint fresh
     cdef public InterruptSource source
+    cdef public SspSegment received, loaded
+    cdef public long long received_time, exchanges, number
+    cdef public bint fresh
+    cdef public long long overwritten
     cpdef void start(self, SspSegment segment) noexcept
     cpdef void load(self, SspSegment segment) noexcept
     cpdef SspSegment take(self)

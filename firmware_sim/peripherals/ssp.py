@@ -13,7 +13,6 @@ import cython
 
 from firmware_sim.microcontroller import Peripheral
 from foundation.events import SSP_SEGMENT
-from foundation.numbers import integers
 
 SEGMENT_WORDS = 31
 BIT_RATE = 3_000_000  # 60 MHz / 20
@@ -29,7 +28,7 @@ class SspSegment:
     """31 half-words in `words`, each 0 ... 65535; `used`: how many are filled in."""
 
     def __init__(self) -> None:
-        self.words = integers(SEGMENT_WORDS)
+        self.words = [0] * 31
         self.used = 0
 
     def clear(self) -> cython.void:

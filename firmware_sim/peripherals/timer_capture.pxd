@@ -6,15 +6,23 @@ from firmware_sim.vic cimport InterruptSource
 
 @cython.final
 cdef class TimerCapture(Peripheral):
-    cdef public long long number, MR0, period_ns, phase_ns, hz
+    # what an edge and a wrap touch
+    cdef public long long IR, CCR
+    cdef public long long wrap_time, next_wrap_time
     cdef public double counts_per_ns
-    cdef public long long CCR, IR
-    cdef public TickTrain ticks
-    cdef public long long wrap_time, next_wrap_time, alarm
-    cdef public bint match_interrupt
+    cdef public long long MR0
+    cdef public unsigned int[4] captures
+    cdef public InterruptSource source0, source1, source2, source3
+    cdef public long long[4] captured
     cdef public InterruptSource match_source
-    cdef public list sources
-    cdef public long long[::1] pins, captures, captured, lost
+    cdef public TickTrain ticks
+    cdef public long long alarm
+    # the rest
+    cdef public long long[4] lost
+    cdef public short[4] pins
+    cdef public long long number, period_ns, phase_ns, hz
+    cdef public bint match_interrupt
+    cdef InterruptSource source_of(self, long long channel)
     cpdef long long CR(self, long long channel) except? <long long>-1
     cpdef long long TC(self) except? <long long>-1
     cpdef long long clear(self, long long mask) noexcept

@@ -10,15 +10,12 @@ direction that is not armed is not captured at all. Both are counted in `lost`, 
 IR: bit 0 match 0, bits 4-7 capture 0-3. CCR: per channel three bits, rising, falling, interrupt.
 """
 
-import array
-
 import cython
 
 from firmware_sim.clock import TickTrain
 from firmware_sim.microcontroller import Peripheral
-from firmware_sim.vic import TIMER_MATCH
+from firmware_sim.vic import TIMER_MATCH, InterruptSource
 from foundation.events import PIN_EDGE
-from foundation.numbers import integers
 from foundation.user_error import UserError
 
 
@@ -40,7 +37,7 @@ class TimerCapture(Peripheral):
         self.period_ns = period * 1_000_000_000 // self.hz
         self.counts_per_ns = chip.crystal.cycles_per_ns(self.hz)
         self.phase_ns = phase_ns
-        self.captures = integers(4)  # CR0 ... CR3
+        self.captures = [0] * 4  # CR0 ... CR3
         self.CCR = 0
         self.IR = 0
         self.ticks = TickTrain(chip.crystal, self.period_ns, phase_ns)
@@ -48,23 +45,48 @@ class TimerCapture(Peripheral):
         self.next_wrap_time = self.ticks.next()
         self.match_interrupt = match_interrupt
         self.match_source = chip.vic.source(TIMER_MATCH, number)
-        self.sources = [None] * 4
-        self.pins = array.array("q", [-1]) * 4
-        self.captured = integers(4)
-        self.lost = integers(4)
+        self.source0 = None  # of the pins of channels 0 ... 3
+        self.source1 = None
+        self.source2 = None
+        self.source3 = None
+        self.pins = [-1] * 4
+        self.captured = [0] * 4
+        self.lost = [0] * 4
         self.alarm = chip.new_alarm(self, 0)
         if match_interrupt:
             chip.set_alarm(self.alarm, self.next_wrap_time)
 
-    def use_channel(self, channel, pin, rising=True, falling=True):
-        """Connect `pin` to capture `channel` 0 ... 3 and arm it; returns the interrupt source of the pin."""
+    def use_channel(self, channel, pin, rising=True, falling=True, source=None):
+        """Connect `pin` to capture `channel` 0 ... 3 and arm it; returns the interrupt source that its captures raise.
+
+        `source`: another one than that of the pin.
+        """
         if not 0 <= channel <= 3:
             raise UserError(f"{self.chip.name}: timer {self.number}: channel {channel} is not 0 ... 3")
         self.chip.claim_pin(pin, channel, self)
         self.pins[channel] = pin
-        self.sources[channel] = self.chip.vic.source(PIN_EDGE, pin)
+        if source is None:
+            source = self.chip.vic.source(PIN_EDGE, pin)
+        if channel == 0:
+            self.source0 = source
+        elif channel == 1:
+            self.source1 = source
+        elif channel == 2:
+            self.source2 = source
+        else:
+            self.source3 = source
         self.arm(channel, rising, falling)
-        return self.sources[channel]
+        return source
+
+    def source_of(self, channel: cython.longlong) -> InterruptSource:
+        """The interrupt source that captures of a channel raise."""
+        if channel == 0:
+            return self.source0
+        if channel == 1:
+            return self.source1
+        if channel == 2:
+            return self.source2
+        return self.source3
 
     def arm(self, channel: cython.longlong, rising: cython.bint, falling: cython.bint) -> None:
         """Choose the edges that channel captures (its three bits of T0CCR, interrupt on)."""
@@ -167,7 +189,7 @@ class TimerCapture(Peripheral):
         self.IR |= flag
         self.captured[channel] += 1
         if asked & 4:
-            self.chip.vic.raise_source(self.sources[channel])
+            self.chip.vic.raise_source(self.source_of(channel))
         return 0
 
     def on_alarm(self, alarm: cython.longlong, time: cython.longlong) -> cython.void:

@@ -5,16 +5,20 @@ cimport cython
 
 @cython.final
 cdef class Uart(Peripheral):
-    cdef public long long number, trigger, DL, DIVADDVAL, MULVAL, hz
+    # what a received byte touches
+    cdef public InterruptSource source
+    cdef public long long timeout_alarm, byte_ns, trigger
+    cdef public long long fifo_head, fifo_count, IIR, received
+    cdef public short[16] fifo
+    # the rest
+    cdef public long long overruns, errors
+    cdef public long long number, DL, DIVADDVAL, MULVAL, hz
     cdef public double baud
-    cdef public long long byte_ns, timeout_alarm, transmit_alarm
-    cdef public InterruptSource source, transmit_source
-    cdef public long long[::1] fifo
-    cdef public long long fifo_head, fifo_count, IIR, errors
-    cdef public long long received, overruns, sent, refused, transmit_free
+    cdef public long long transmit_alarm, transmit_free, sent, refused
+    cdef public InterruptSource transmit_source
     cpdef int set_divisor(self, long long DL, long long DIVADDVAL=*, long long MULVAL=*) except -1
     cpdef long long RBR(self) noexcept
     cpdef bint THR(self, long long byte) except? -1
     cpdef long long LSR(self) except? <long long>-1
     cpdef long long waiting(self) noexcept
-    cpdef long long read_all(self, long long[::1] ring, long long write, long long mask) noexcept
+    cpdef void were_read(self, long long count) noexcept

@@ -16,7 +16,6 @@ import cython
 from firmware_sim.microcontroller import Peripheral
 from firmware_sim.vic import UART_TRANSMIT
 from foundation.events import NEVER, UART_BYTE
-from foundation.numbers import integers
 from foundation.user_error import UserError
 
 FIFO_BYTES = 16
@@ -38,7 +37,7 @@ class Uart(Peripheral):
         self.transmit_source = chip.vic.source(UART_TRANSMIT, number)
         self.timeout_alarm = chip.new_alarm(self, 0)
         self.transmit_alarm = chip.new_alarm(self, 1)
-        self.fifo = integers(FIFO_BYTES)
+        self.fifo = [0] * 16
         self.fifo_head = 0
         self.fifo_count = 0
         self.IIR = 1
@@ -120,19 +119,14 @@ class Uart(Peripheral):
             self.chip.set_alarm(self.timeout_alarm, 1 << 62)
         return byte
 
-    def read_all(self, ring: cython.longlong[::1], write: cython.longlong, mask: cython.longlong) -> cython.longlong:
-        """Take every received byte, as reads of RBR do, into `ring` (of mask + 1 places, a power of two) from place
-        `write` on. Returns how many there were."""
-        count: cython.longlong = self.fifo_count
-        i: cython.longlong
-        for i in range(count):
-            ring[(write + i) & mask] = self.fifo[(self.fifo_head + i) & 15]
+    def were_read(self, count: cython.longlong) -> cython.void:
+        """The oldest `count` bytes that wait were read from `fifo` itself, as by reads of RBR."""
         if count > 0:
             self.fifo_head = (self.fifo_head + count) & 15
-            self.fifo_count = 0
-            self.IIR = 1
-            self.chip.set_alarm(self.timeout_alarm, 1 << 62)
-        return count
+            self.fifo_count -= count
+            if self.fifo_count == 0:
+                self.IIR = 1
+                self.chip.set_alarm(self.timeout_alarm, 1 << 62)
 
     def THR(self, byte: cython.longlong) -> cython.bint:
         """Send a byte; False (and `refused` counts) when the FIFO is full."""

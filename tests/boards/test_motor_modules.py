@@ -122,42 +122,42 @@ def test_a_board_sends_a_waiting_error_in_its_occasional_list():
 def test_contact_changes_after_so_many_equal_samples(samples):
     foot = FootContact(2000, 1000, samples)
     for _ in range(samples - 1):
-        foot.sample(2001)
-    assert foot.contact.state == 0
-    foot.sample(2001)
-    assert foot.contact.state == 1
+        foot.read(2001)
+    assert foot.state == 0
+    foot.read(2001)
+    assert foot.state == 1
     for _ in range(samples - 1):
-        foot.sample(999)
-    assert foot.contact.state == 1
-    foot.sample(999)
-    assert foot.contact.state == 0
+        foot.read(999)
+    assert foot.state == 1
+    foot.read(999)
+    assert foot.state == 0
 
 
 def test_one_other_sample_starts_the_counting_anew():
     foot = FootContact(2000, 1000, 10)
     for _ in range(9):
-        foot.sample(3000)
-    foot.sample(500)
+        foot.read(3000)
+    foot.read(500)
     for _ in range(9):
-        foot.sample(3000)
-    assert foot.contact.state == 0
-    foot.sample(3000)
-    assert foot.contact.state == 1
+        foot.read(3000)
+    assert foot.state == 0
+    foot.read(3000)
+    assert foot.state == 1
 
 
 def test_between_the_levels_the_old_level_stays():
     foot = FootContact(2000, 1000, 3)
     for counts in (2001, 1500, 1000):  # 1000 is not below 1000
-        foot.sample(counts)
-    assert foot.contact.state == 1
+        foot.read(counts)
+    assert foot.state == 1
     for _ in range(20):
-        foot.sample(2000)
-    assert foot.contact.state == 1
+        foot.read(2000)
+    assert foot.state == 1
     for _ in range(3):
-        foot.sample(999)
+        foot.read(999)
     for _ in range(20):
-        foot.sample(2000)  # not above 2000
-    assert foot.contact.state == 0
+        foot.read(2000)  # not above 2000
+    assert foot.state == 0
 
 
 def test_a_limit_switch_needs_three_equal_samples():
@@ -174,12 +174,12 @@ def test_the_outer_board_reports_contact_5_or_5_and_a_half_ms_after_the_foot_is_
     bench = Bench("MCFO", quirks).run(ms=5)
     bench.counts("left_foot", 6000, gain=1)
     start = bench.now
-    while bench.board.left_foot.contact.state == 0:
+    while bench.board.left_foot.state == 0:
         bench.run(slots=1)
         assert bench.now - start < 20_000_000
     # the first slot after the change may still see the reading of the sequence before
     assert ms <= (bench.now - start) / 1e6 <= ms + 0.5
-    assert bench.board.right_foot.contact.state == 0
+    assert bench.board.right_foot.state == 0
 
 
 def test_only_the_inner_right_foot_lets_go_at_1500_counts():

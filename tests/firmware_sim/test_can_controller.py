@@ -100,8 +100,8 @@ def test_a_buffer_is_not_free_until_the_bus_answers():
 
 def test_transmit_and_abort_together_is_a_single_shot_and_a_lost_one_frees_the_buffer_incomplete():
     node = Node()
-    node.can.TFI[3] = 8 << 16
-    node.can.TDA[3] = node.can.TDB[3] = 77
+    node.can.TFI = [0, 0, 0, 8 << 16]
+    node.can.TDA = node.can.TDB = [0, 0, 0, 77]
     node.can.write_CMR(CMR_TR | CMR_AT | CMR_STB3)
     assert node.requests() == [(CAN_REQUEST, 1, 3, 0, 8 | FLAG_SINGLE_SHOT, 77, 77)]
     node.tell(CAN_TX_DONE, 3, TX_LOST)

@@ -281,7 +281,7 @@ def test_a_conversion_lasts_a_48_thousandth_of_a_second_and_samples_at_its_start
     chip = chip_at(1_000)
     adc = Ads7871(chip, eint=1)
     chip.analog.set_pair(4, 1_000, 1.0, 101_000, 2.0)
-    adc.inputs[2] = 4
+    adc.inputs = [0, 1, 4, *range(3, 16)]
     times = served(chip, EXTERNAL_INTERRUPT, 1)
     assert adc.start(register4(2, 0))
     assert not adc.start(register4(0, 0))  # busy
@@ -478,7 +478,7 @@ def test_master_and_slave_put_their_segments_on_the_wire():
     chip = chip_at(7_000)
     port = SspPort(chip)
     segment = SspSegment()
-    segment.words[30] = 1
+    segment.words = [0] * 30 + [1]
     segment.used = 31
     port.start(segment)
     port.load(segment)

@@ -60,8 +60,7 @@ class Pair:
 
 def segment_of(words, used):
     segment = SspSegment()
-    for place, word in enumerate(words):
-        segment.words[place] = word
+    segment.words = [*words, *[0] * (31 - len(words))]
     segment.used = used
     return segment
 
