@@ -22,29 +22,32 @@ cdef class BusReceiver:
 
 @cython.final
 cdef class CanRouterBoard(Microcontroller):
-    cdef public object quirks
-    cdef public Gpio gpio
-    cdef public AdcInternal adc
-    cdef public CanController can1, can2, can3, can4
-    cdef public list controllers, error_codes
+    # what the main loop and the interrupts touch
+    cdef public Router router
+    cdef public RouterSspLink link
+    cdef public list controllers
+    cdef public CanLoad load
+    cdef public long long idle_since, flush_next, pair_ns
+    cdef public bint idle
+    cdef public long long[4] route_ns
+    cdef public long long[3] flush_ns
     cdef public SspPort ssp
     cdef public TimerCapture timer1
-    cdef public NetworkTime time
     cdef public NetworkClock clock
-    cdef public CanLoad load
+    # tasks
+    cdef public NetworkTime time
     cdef public ErrorModule errors
+    cdef public AdcInternal adc
+    cdef public bint errors_one_late, report_full
+    cdef public long long error_before, lost_before, own_lost, sync_cycles
+    cdef public short[5] can_leds
+    # the rest
+    cdef public object quirks
+    cdef public Gpio gpio
     cdef public McuLed leds
     cdef public Heartbeat heartbeat
-    cdef public RouterSspLink link
-    cdef public Router router
-    cdef public bint errors_one_late, report_full
-    cdef public long long error_before, lost_before
-    cdef public long long[::1] can_leds
-    cdef public long long own_lost
-    cdef public bint idle
-    cdef public long long idle_since, flush_next, pair_ns
-    cdef public long long[::1] route_ns, flush_ns
-    cdef public long long sync_cycles
+    cdef public CanController can1, can2, can3, can4
+    cdef public list error_codes
     cdef public long long code_dnf, code_near_limit, code_task_limit, code_queue_full
     cpdef int report(self, long long code) except -1
     cpdef long long flush(self, CanController controller) except? <long long>-1

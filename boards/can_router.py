@@ -6,8 +6,6 @@ Facts network-and-boards 1.4-1.6, 3.7, 4.16; appendix 3.7, 3.11. Interrupts fill
 main loop moves frames whenever no slot runs: run the scheduler, then four times "route, flush one bus".
 """
 
-import array
-
 import cython
 
 from boards.modules.can_load import CanLoad
@@ -36,7 +34,6 @@ from firmware_sim.peripherals.timer_capture import TimerCapture
 from firmware_sim.scheduler import Occasional, Schedule, Task
 from firmware_sim.vic import FIQ, TIMER_MATCH
 from foundation.events import CAN_RX, CAN_STATUS, SSP_SEGMENT
-from foundation.numbers import integers
 
 if not cython.compiled:
     from foundation.numbers import float32, word_of_float
@@ -132,7 +129,7 @@ class CanRouterBoard(Microcontroller):
             self.report,
             quirks.router_one_frame_lag,
         )
-        self.can_leds = integers(5)
+        self.can_leds = [0] * 5
         self.own_lost = 0
 
         # bus-off, warning, overrun, passive, error while receiving, while sending; per controller
@@ -159,8 +156,8 @@ class CanRouterBoard(Microcontroller):
         # ns that a turn takes by the frames it moves: one each from three sources; into two transmit buffers
         route_cycles = [ROUTE_IDLE_CYCLES + ROUTE_FRAME_CYCLES * moved for moved in range(4)]
         flush_cycles = [FLUSH_IDLE_CYCLES + FLUSH_FRAME_CYCLES * moved for moved in range(3)]
-        self.route_ns = array.array("q", [int(cycles * self.ns_per_cycle) for cycles in route_cycles])
-        self.flush_ns = array.array("q", [int(cycles * self.ns_per_cycle) for cycles in flush_cycles])
+        self.route_ns = [int(cycles * self.ns_per_cycle) for cycles in route_cycles]
+        self.flush_ns = [int(cycles * self.ns_per_cycle) for cycles in flush_cycles]
         self.sync_cycles = 4 * CYCLES_PER_SYNC
         self.pair_ns = int((ROUTE_IDLE_CYCLES + FLUSH_IDLE_CYCLES + LOOP_CYCLES // 4) * self.ns_per_cycle)
         self.idle = True
@@ -269,7 +266,7 @@ class CanRouterBoard(Microcontroller):
         router: Router = self.router
         channel: cython.longlong = controller.number
         buffer: cython.longlong
-        slot: cython.longlong
+        row: cython.longlong
         read: cython.longlong = router.tx_read[channel]
         moved: cython.longlong = 0
         while read != router.tx_write[channel]:
@@ -279,14 +276,17 @@ class CanRouterBoard(Microcontroller):
                 buffer = 2
             else:
                 break
-            slot = channel * 8 + read
+            row = 4 * (channel * 8 + read)
             if not controller.transmit(
-                buffer, router.tx_id[slot], router.tx_flags[slot], router.tx_word0[slot], router.tx_word1[slot]
+                buffer, router.tx_rows[row], router.tx_rows[row + 1], router.tx_rows[row + 2], router.tx_rows[row + 3]
             ):
                 break
             read = (read + 1) & 7
             moved += 1
         if moved > 0:
+            if read == router.tx_write[channel]:  # empty: the next frame goes to the front again
+                read = 0
+                router.tx_write[channel] = 0
             router.tx_read[channel] = read
             router.waiting -= moved
             self.load.counts[channel] += moved

@@ -32,30 +32,33 @@ cdef class PowerUp(Peripheral):
     cpdef int begin(self, long long phase_ns) except -1
 
 cdef class MotorBoard(Microcontroller):
-    cdef public object table, quirks
-    cdef public NetworkTime time
-    cdef public ErrorModule errors
-    cdef public Gpio gpio
-    cdef public McuLed leds
-    cdef public Heartbeat heartbeat
-    cdef public ExecutionTimer execution
+    # what the tasks of every slot and the interrupts touch
     cdef public Ads7871 adc_external
     cdef public AdcInternal adc_internal
-    cdef public AdcReadings readings
-    cdef public CanController can_controller
-    cdef public CanLink can
-    cdef public Pwm pwm
-    cdef public IntReceiver sleep, shutdown
-    cdef public MotorOutput output
+    cdef public SpiEncoder spi
+    cdef public AbsoluteEncoder encoder
+    cdef public QuadratureDecoder motor
     cdef public CompliantControl compliance
     cdef public MotorLimits limits
     cdef public CurrentControl current_control
-    cdef public QuadratureDecoder motor, cap01, cap23
+    cdef public AdcReadings readings
+    cdef public CanLink can
+    cdef public ErrorModule errors
+    cdef public ExecutionTimer execution
+    # the rest
+    cdef public object table, quirks
+    cdef public NetworkTime time
+    cdef public Gpio gpio
+    cdef public McuLed leds
+    cdef public Heartbeat heartbeat
+    cdef public CanController can_controller
+    cdef public Pwm pwm
+    cdef public IntReceiver sleep, shutdown
+    cdef public MotorOutput output
+    cdef public QuadratureDecoder cap01, cap23
     cdef public EncoderCapture capture01, capture23
     cdef public WrapCounter wraps
     cdef public TimerCapture timer0
-    cdef public AbsoluteEncoder encoder
-    cdef public SpiEncoder spi
     cdef public long long encoder_select
     cdef public PowerUp power_up
     cdef public long long id_error, id_motor_position, id_motor_velocity, id_motor_current, id_batt_power

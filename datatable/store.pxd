@@ -7,13 +7,14 @@ cdef long long _MASK
 @cython.final
 cdef class DataStore:
     cdef public long long size
-    cdef public long long[::1] words, stamps, unread
+    cdef public long long[::1] words
+    cdef public unsigned int[::1] stamps
+    cdef public unsigned char[::1] unread
     cdef public long long out_of_range_count, out_of_range_id
     cdef public object on_out_of_range
 
     cpdef bint has(self, long long number) except? -1
     cpdef bint set_word(self, long long number, long long word, long long stamp) except? -1
-    cpdef int set_words(self, long long count, long long[::1] numbers, long long[::1] words, long long[::1] stamps) except -1
     cpdef long long get_word(self, long long number) except? <long long>-1
     cpdef bint set_float(self, long long number, double value) except? -1
     cpdef double get_float(self, long long number) except? -1

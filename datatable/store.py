@@ -35,8 +35,8 @@ class DataStore:
     def __init__(self, size) -> None:
         self.size = size
         self.words = array.array("q", [0]) * size
-        self.stamps = array.array("q", [0]) * size
-        self.unread = array.array("q", [0x7F]) * size
+        self.stamps = array.array("I", [0]) * size
+        self.unread = array.array("B", [0x7F]) * size
         self.out_of_range_count = 0
         self.out_of_range_id = -1
         self.on_out_of_range = None
@@ -61,23 +61,6 @@ class DataStore:
             self.unread[number] = 0x7F
             return True
         return False
-
-    def set_words(
-        self,
-        count: cython.longlong,
-        numbers: cython.longlong[::1],
-        words: cython.longlong[::1],
-        stamps: cython.longlong[::1],
-    ) -> None:
-        """Store the first `count` of these as `set_word` does, one after the other."""
-        i: cython.longlong
-        number: cython.longlong
-        for i in range(count):
-            number = numbers[i]
-            if 0 <= number < self.size or self.has(number):
-                self.words[number] = words[i] & _MASK
-                self.stamps[number] = stamps[i] & _MASK
-                self.unread[number] = 0x7F
 
     def get_word(self, number: cython.longlong) -> cython.longlong:
         """The value word, 0 ... 2^32-1."""

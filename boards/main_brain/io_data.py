@@ -12,7 +12,7 @@ import array
 import cython
 
 from boards.modules.network_time import NetworkTime
-from boards.modules.ssp_link import MainBrainSspLink
+from boards.modules.ssp_link import MainBrainSspLink, UnpackedFrames
 from datatable.store import DataStore
 from foundation.user_error import UserError
 
@@ -24,7 +24,7 @@ class IoData:
         self.store = store
         self.link = link
         self.time = time
-        self.send_ids = self.known(send_ids)
+        self.send_ids = array.array("h", self.known(send_ids))
         self.subscriber = 1  # SSP, bit of the store's read flags
         self.timestamp = 0  # id of TIMESTAMP
         # for buses slower than the robot's: the first list goes out in every n-th slot (n per entry), of the second one
@@ -39,7 +39,7 @@ class IoData:
         """Send `send_ids` in every n-th slot only, n in `dividers`; of `turn_ids` one every so many slots, in turn."""
         if len(send_ids) != len(dividers):
             raise UserError(f"io data: {len(dividers)} dividers for {len(send_ids)} variables")
-        self.send_ids = self.known(send_ids)
+        self.send_ids = array.array("h", self.known(send_ids))
         self.dividers = array.array("q", dividers)
         self.turn_ids = self.known(turn_ids)
         self.turn_every = turn_every
@@ -57,8 +57,11 @@ class IoData:
         link: MainBrainSspLink = self.link
         store: DataStore = self.store
         time: NetworkTime = self.time
+        frames: UnpackedFrames = link.unpacked
+        i: cython.longlong
         link.parse()
-        store.set_words(link.frames, link.ids, link.words0, link.words1)
+        for i in range(link.frames):
+            store.set_word(frames.rows[3 * i], frames.rows[3 * i + 1], frames.rows[3 * i + 2])
         time.ms = store.stamp(self.timestamp)
         return link.frames
 

@@ -1,11 +1,9 @@
 from boards.modules.receiver cimport Receiver
 
 cdef class Buzzer:
-    cdef public bint beeps, repeats
-    cdef public long long hertz, mr0, mr5
-    cdef public long long frequency_hertz
-    cdef public bint playing
-    cdef public long long note, note_left_ms, beep_left_ms, beep_hertz, beep_next, beeps_waiting, silence_left_ms
+    cdef public bint beeps, repeats, playing
+    cdef public long long silence_left_ms, beep_left_ms, beeps_waiting, hertz, mr0, mr5
+    cdef public long long frequency_hertz, note, note_left_ms, beep_hertz, beep_next
     cdef public long long[::1] tune_hertz, tune_ms, pitches, beep_queue
     cdef public long long tunes_started, beeps_made
     cpdef void tone(self, long long hertz)

@@ -9,17 +9,21 @@ cimport cython
 
 @cython.final
 cdef class CanLink:
-    cdef public Microcontroller chip
+    # what a frame touches
     cdef public CanController controller
     cdef public NetworkTime time
+    cdef public list receivers
+    cdef public long long rx_write, rx_read, tx_write, tx_read
+    cdef public long long received, delivered, queued, ignored, most_waiting
+    cdef public unsigned int[256] rx_rows
+    cdef public unsigned int[24] tx_rows
+    # the rest
+    cdef public Microcontroller chip
     cdef public ErrorModule errors
     cdef public bint report_full
+    cdef public long long receive_lost, send_lost
     cdef public long long code_bus_off, code_warning, code_overrun, code_passive, code_bus_rx, code_bus_tx
     cdef public long long code_receive_full, code_send_full
-    cdef public list receivers
-    cdef public long long[::1] rx_frames, rx_ids, rx_values, rx_times, tx_ids, tx_values, tx_times
-    cdef public long long rx_write, rx_read, tx_write, tx_read
-    cdef public long long received, delivered, ignored, receive_lost, queued, send_lost, most_waiting
     cpdef bint send_words(self, long long identifier, long long value_word, long long time_word) except? -1
     cpdef bint send_float(self, long long identifier, double value) except? -1
     cpdef bint send_int(self, long long identifier, long long value) except? -1

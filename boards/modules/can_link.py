@@ -24,7 +24,6 @@ from firmware_sim.peripherals.can_controller import (
     CanController,
 )
 from foundation.events import CAN_RX, CAN_STATUS, EventQueue
-from foundation.numbers import integers
 from foundation.user_error import UserError
 
 if not cython.compiled:
@@ -73,15 +72,11 @@ class CanLink:
         self.code_receive_full = getattr(codes, prefix + "RX_BUF_OF")
         self.code_send_full = codes.CAN_TX_QUEUE_FULL
         self.receivers = [None] * IDENTIFIERS
-        self.rx_frames = integers(RECEIVE_RING)
-        self.rx_ids = integers(RECEIVE_RING)
-        self.rx_values = integers(RECEIVE_RING)
-        self.rx_times = integers(RECEIVE_RING)
+        # rings of rows: RFS, identifier, value and time; and identifier, value and time
+        self.rx_rows = [0] * 256  # 4 RECEIVE_RING
         self.rx_write = 0
         self.rx_read = 0
-        self.tx_ids = integers(SEND_RING)
-        self.tx_values = integers(SEND_RING)
-        self.tx_times = integers(SEND_RING)
+        self.tx_rows = [0] * 24  # 3 SEND_RING
         self.tx_write = 0
         self.tx_read = 0
         self.received = 0
@@ -114,16 +109,17 @@ class CanLink:
         """Interrupt: copy the frame into the ring and release the hardware buffer."""
         write: cython.longlong = self.rx_write
         after: cython.longlong = (write + 1) & 63
+        row: cython.longlong = 4 * write
         controller: CanController = self.controller
         if after == self.rx_read:
             self.receive_lost += 1
             if self.report_full:
                 self.errors.report(self.code_receive_full)
         else:
-            self.rx_frames[write] = controller.RFS
-            self.rx_ids[write] = controller.RID
-            self.rx_values[write] = controller.RDA
-            self.rx_times[write] = controller.RDB
+            self.rx_rows[row] = controller.RFS
+            self.rx_rows[row + 1] = controller.RID
+            self.rx_rows[row + 2] = controller.RDA
+            self.rx_rows[row + 3] = controller.RDB
             self.rx_write = after
             self.received += 1
         controller.release()
@@ -154,22 +150,25 @@ class CanLink:
         write: cython.longlong = self.rx_write
         frames: cython.longlong = (write - read) & 63
         ignored: cython.longlong = 0
+        row: cython.longlong
         identifier: cython.longlong
         receiver: Receiver
         if frames == 0:
             return 0
         while read != write:
-            identifier = self.rx_ids[read]
+            row = 4 * read
+            identifier = self.rx_rows[row + 1]
             receiver = None
             # DLC 8 and neither remote nor extended, as the bits stand in RFS
-            if self.rx_frames[read] == 524288 and 0 <= identifier < 2048:
+            if self.rx_rows[row] == 524288 and identifier < 2048:
                 receiver = self.receivers[identifier]
             if receiver is None:
                 ignored += 1
             else:
-                receiver.deliver(self.rx_values[read], self.rx_times[read])
+                receiver.deliver(self.rx_rows[row + 2], self.rx_rows[row + 3])
             read = (read + 1) & 63
-        self.rx_read = read
+        self.rx_read = 0  # empty: the next frame goes to the front again, which is in the cache
+        self.rx_write = 0
         self.ignored += ignored
         self.delivered += frames - ignored
         return frames
@@ -183,6 +182,7 @@ class CanLink:
         controller: CanController = self.controller
         write: cython.longlong = self.tx_write
         after: cython.longlong = (write + 1) & 7
+        row: cython.longlong
         waiting: cython.longlong
         if write == self.tx_read and controller.tx_free[1] != 0 and not controller.MOD & 1:
             # nothing waits: straight through the ring
@@ -196,9 +196,10 @@ class CanLink:
             if self.report_full:
                 self.errors.report(self.code_send_full)
             return False
-        self.tx_ids[write] = identifier
-        self.tx_values[write] = value_word
-        self.tx_times[write] = time_word
+        row = 3 * write
+        self.tx_rows[row] = identifier
+        self.tx_rows[row + 1] = value_word
+        self.tx_rows[row + 2] = time_word
         self.tx_write = after
         self.queued += 1
         waiting = (after - self.tx_read) & 7
@@ -227,7 +228,7 @@ class CanLink:
         """
         frames: cython.longlong = 0
         buffer: cython.longlong
-        place: cython.longlong
+        row: cython.longlong
         controller: CanController
         if self.tx_read == self.tx_write:
             return 0
@@ -239,9 +240,9 @@ class CanLink:
                 buffer = 2
             else:
                 break
-            place = self.tx_read
-            if not controller.transmit(buffer, self.tx_ids[place], 8, self.tx_values[place], self.tx_times[place]):
+            row = 3 * self.tx_read
+            if not controller.transmit(buffer, self.tx_rows[row], 8, self.tx_rows[row + 1], self.tx_rows[row + 2]):
                 break
-            self.tx_read = (place + 1) & 7
+            self.tx_read = (self.tx_read + 1) & 7
             frames += 1
         return frames

@@ -4,16 +4,14 @@
 
 import cython
 
-from foundation.numbers import integers
-
 
 class CanLoad:
     """Counters of the four buses, index 1-4; index 0 counts the SSP link and is not reported."""
 
     def __init__(self) -> None:
-        self.counts = integers(5)
-        self.peaks = integers(5)
-        self.last_counts = integers(5)
+        self.counts = [0] * 5
+        self.peaks = [0] * 5
+        self.last_counts = [0] * 5
 
     def count(self, channel: cython.longlong) -> cython.void:
         """One frame more on `channel` in this millisecond."""

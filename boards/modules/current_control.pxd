@@ -10,10 +10,10 @@ cimport cython
 cdef class CurrentControl:
     cdef public MotorLimits limits
     cdef public MotorOutput output
+    cdef public bint block_positive, block_negative
+    cdef public long long calls, integral, integral_limit, error, proportional_gain, integral_gain, duty
     cdef public McuLed leds
     cdef public ErrorModule errors
     cdef public long long code_saturated, code_sum, code_duty, code_stopped
-    cdef public long long proportional_gain, integral_gain, integral_limit, integral, error, duty, calls
-    cdef public bint block_positive, block_negative
     cpdef bint supervise(self, long long current) except? -1
     cpdef int update(self, long long target, long long current) except -1

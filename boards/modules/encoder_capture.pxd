@@ -15,7 +15,7 @@ cdef class EncoderCapture:
     cdef public Microcontroller chip
     cdef public TimerCapture timer
     cdef public WrapCounter wraps
-    cdef public long long channel, flag, pin, partner_pin
     cdef public QuadratureDecoder decoder
     cdef public bint armed_rising
+    cdef public short channel, flag, pin, partner_pin
     cdef public long long last_wraps, last_capture

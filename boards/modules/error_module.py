@@ -37,9 +37,9 @@ class ErrorModule:
         self.flags = integers(CODES)
         self.flagged = integers(CODES)
         self.flagged_count = 0
-        self.codes = integers(RING_SIZE)
-        self.counts = integers(RING_SIZE)
-        self.stamps = integers(RING_SIZE)
+        self.codes = [0] * 32
+        self.counts = [0] * 32
+        self.stamps = [0] * 32
         self.first = 0
         self.waiting = 0
         self.dropped = 0
@@ -102,7 +102,8 @@ class ErrorModule:
         if self.waiting == 0:
             return False
         place: cython.longlong = self.first
-        self.word = (self.codes[place] & 0xFFFF) | (self.board & 0x3F) << 16 | (self.counts[place] & 0x3FF) << 22
+        count: cython.longlong = self.counts[place] & 0x3FF
+        self.word = (self.codes[place] & 0xFFFF) | (self.board & 0x3F) << 16 | count << 22
         self.stamp = self.stamps[place]
         self.first = (self.first + 1) & 31
         self.waiting -= 1

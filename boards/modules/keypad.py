@@ -1,7 +1,5 @@
 """Six keys, active high, not debounced. Source: facts network-and-boards 4.11."""
 
-import array
-
 import cython
 
 from datatable.generated import errors
@@ -16,7 +14,7 @@ class Keypad:
 
     def __init__(self, gpio: Gpio, report) -> None:
         self.gpio = gpio
-        self.pins = array.array("q", KEY_PINS)
+        self.pins = list(KEY_PINS)
         self.report = report
         self.code_index = errors.BUTTON_OOB
 

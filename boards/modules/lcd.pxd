@@ -9,10 +9,10 @@ cdef class CharacterDisplay:
     cpdef int data(self, long long byte) except -1
 
 cdef class Lcd:
+    cdef public long long countdown, state, waiting, position, character
     cdef public CharacterDisplay display
     cdef public object report
     cdef public long long[::1] positions, characters, reads, counts
-    cdef public long long state, countdown, position, character, waiting
     cdef public long long code_full, code_position
     cdef public long long written, lost
     cpdef bint put(self, long long position, long long character)

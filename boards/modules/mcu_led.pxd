@@ -5,9 +5,9 @@ cimport cython
 
 @cython.final
 cdef class McuLed:
+    cdef public long long lit, remaining_green, remaining_red, remaining_blue
     cdef public Gpio gpio
     cdef public double slots_per_ms
-    cdef public long long remaining_green, remaining_red, remaining_blue, lit
     cpdef long long pin(self, long long led) noexcept
     cpdef int set_remaining(self, long long led, long long slots) except -1
     cpdef int flash(self, long long led, long long ms) except -1

@@ -9,10 +9,9 @@ cdef class MotorOutput:
     cdef public Gpio gpio
     cdef public Pwm pwm
     cdef public IntReceiver sleep, shutdown
-    cdef public long long sign, largest, offset
     cdef public bint stopped, second_pattern
-    cdef public long long duty, low_side
-    cdef public long long watchdog_pin, low_side_2_pin, low_side_6_pin
+    cdef public long long sign, largest, offset, low_side, duty
+    cdef public short watchdog_pin, low_side_2_pin, low_side_6_pin
     cpdef bint asleep(self) noexcept
     cpdef bint is_shut_down(self) noexcept
     cpdef bint running(self) noexcept

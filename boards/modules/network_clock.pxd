@@ -10,8 +10,8 @@ cdef long long _MASK
 cdef class NetworkClock:
     cdef public NetworkTime time
     cdef public CanLoad load
-    cdef public list controllers
     cdef public long long ticks, divider
-    cdef public long long[::1] sent, skipped
+    cdef public list controllers
+    cdef public long long[5] sent, skipped
     cpdef bint tick(self) except? -1
     cpdef long long send_sync(self) except? <long long>-1

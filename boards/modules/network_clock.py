@@ -12,7 +12,6 @@ import cython
 from boards.modules.can_load import CanLoad
 from boards.modules.network_time import NetworkTime
 from firmware_sim.peripherals.can_controller import CanController
-from foundation.numbers import integers
 
 TICKS_PER_MS = 5
 SYNC_BUFFER = 3
@@ -33,8 +32,8 @@ class NetworkClock:
         self.load = load
         self.ticks = 0
         self.divider = 0
-        self.sent = integers(5)
-        self.skipped = integers(5)
+        self.sent = [0] * 5
+        self.skipped = [0] * 5
 
     def tick(self) -> cython.bint:
         """One 200 us interrupt; True when a millisecond has passed and sync went out."""

@@ -10,7 +10,6 @@ network-and-boards 4.1; appendix 4.6).
 import cython
 
 from boards.modules.error_module import ErrorModule
-from foundation.numbers import integers
 
 if not cython.compiled:
     from foundation.numbers import divide_toward_zero
@@ -56,7 +55,7 @@ class QuadratureDecoder:
         self.position = 0
         self.rate = 0
         # the interrupt's side
-        self.ring = integers(RING_SIZE)
+        self.ring = [0] * 64
         self.write = 0
         self.read = 0
         self.edges = 0
@@ -178,6 +177,9 @@ class QuadratureDecoder:
             self.rate = (self.rate_gain * self.filtered) >> (self.rate_shift + 15)
         if seen == 0:
             return None
+        if here == write:  # empty: the next time goes to the front again, which is in the cache
+            here = 0
+            self.write = 0
         self.read = here
         return seen
 

@@ -5,7 +5,7 @@ cimport cython
 
 @cython.final
 cdef class RoutingTable:
-    cdef public long long[::1] destinations, sources
+    cdef public short[2032] destinations, sources
     cdef public long long learned, changed
     cpdef object set_destinations(self, identifier, mask)
     cpdef void learn(self, long long identifier, long long channel) noexcept
@@ -13,19 +13,22 @@ cdef class RoutingTable:
 
 @cython.final
 cdef class Router:
+    # what the main loop and a frame touch
+    cdef public long long rx_write, rx_read, own_write, own_read, waiting
     cdef public RoutingTable table
     cdef public RouterSspLink ssp
     cdef public CanLoad load
-    cdef public object report
+    cdef public long long routed, copies
     cdef public bint one_frame_lag
-    cdef public long long[::1] rx_channel, rx_id, rx_flags, rx_word0, rx_word1
-    cdef public long long rx_write, rx_read
-    cdef public long long[::1] tx_id, tx_flags, tx_word0, tx_word1, tx_write, tx_read
-    cdef public long long[::1] own_id, own_flags, own_word0, own_word1
-    cdef public long long own_write, own_read
-    cdef public long long[::1] receive_full_codes
-    cdef public long long waiting, routed, copies, receive_lost, own_lost, unroutable
-    cdef public long long[::1] transmit_lost, receive_lost_from
+    cdef public short[5] tx_write, tx_read
+    cdef public unsigned int[320] rx_rows
+    cdef public unsigned int[32] own_rows
+    cdef public unsigned int[160] tx_rows
+    # the rest
+    cdef public object report
+    cdef public long long receive_lost, own_lost, unroutable
+    cdef public long long[5] transmit_lost, receive_lost_from
+    cdef public short[5] receive_full_codes
     cpdef bint receive(self, long long channel, long long identifier, long long flags, long long word0, long long word1) except? -1
     cpdef bint send(self, long long identifier, long long word0, long long word1) noexcept
     cpdef long long route_step(self, long long now) except? <long long>-1

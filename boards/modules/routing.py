@@ -7,14 +7,11 @@ yet). Frames go to every destination but the channel they came from, in the orde
 Source: facts network-and-boards 1.5.
 """
 
-import array
-
 import cython
 
 from boards.modules.can_load import CanLoad
 from boards.modules.ssp_link import RouterSspLink
 from datatable.generated import errors
-from foundation.numbers import integers
 
 IDENTIFIERS = 2032  # 2032-2047 would begin with seven recessive bits, which CAN forbids
 CHANNEL_SSP = 0
@@ -30,8 +27,8 @@ class RoutingTable:
 
     def __init__(self, routes=()) -> None:
         # every identifier that the table does not name goes to the main brain
-        self.destinations = integers(2032, 1)
-        self.sources = integers(2032, 7)
+        self.destinations = [1] * 2032
+        self.sources = [7] * 2032
         self.learned = 0
         self.changed = 0
         for identifier, mask in routes:
@@ -72,37 +69,31 @@ class Router:
         self.load = load
         self.report = report
         self.one_frame_lag = one_frame_lag
-        self.rx_channel = integers(64)
-        self.rx_id = integers(64)
-        self.rx_flags = integers(64)
-        self.rx_word0 = integers(64)
-        self.rx_word1 = integers(64)
+        # rings of rows: channel, identifier, flags and two words; the two others without the channel
+        self.rx_rows = [0] * 320  # 5 RECEIVE_RING
         self.rx_write = 0
         self.rx_read = 0
-        self.tx_id = integers(40)
-        self.tx_flags = integers(40)
-        self.tx_word0 = integers(40)
-        self.tx_word1 = integers(40)
+        self.tx_rows = [0] * 160  # 4 TRANSMIT_RING for each of five channels
         self.waiting = 0  # frames in the four transmit rings
-        self.tx_write = integers(5)
-        self.tx_read = integers(5)
-        self.own_id = integers(8)
-        self.own_flags = integers(8)
-        self.own_word0 = integers(8)
-        self.own_word1 = integers(8)
+        self.tx_write = [0] * 5
+        self.tx_read = [0] * 5
+        self.own_rows = [0] * 32  # 4 OWN_RING
         self.own_write = 0
         self.own_read = 0
-        self.receive_full_codes = array.array(
-            "q",
-            [0, errors.CAN1_RX_BUF_OF, errors.CAN2_RX_BUF_OF, errors.CAN3_RX_BUF_OF, errors.CAN4_RX_BUF_OF],
-        )
+        self.receive_full_codes = [
+            0,
+            errors.CAN1_RX_BUF_OF,
+            errors.CAN2_RX_BUF_OF,
+            errors.CAN3_RX_BUF_OF,
+            errors.CAN4_RX_BUF_OF,
+        ]
         self.routed = 0
         self.copies = 0
         self.receive_lost = 0
-        self.receive_lost_from = integers(5)  # by channel
+        self.receive_lost_from = [0] * 5  # by channel
         self.own_lost = 0
         self.unroutable = 0
-        self.transmit_lost = integers(5)
+        self.transmit_lost = [0] * 5
 
     def receive(
         self,
@@ -117,7 +108,7 @@ class Router:
         63 frames fit; one more is lost, False, and CANn_RX_BUF_OF reported.
         """
         following: cython.longlong = (self.rx_write + 1) & 63
-        slot: cython.longlong = self.rx_write
+        row: cython.longlong = 5 * self.rx_write
         self.load.counts[channel] += 1
         if following == self.rx_read:
             self.receive_lost += 1
@@ -125,25 +116,26 @@ class Router:
             self.report(self.receive_full_codes[channel])
             return False
         if self.one_frame_lag:
-            slot = following
-        self.rx_channel[slot] = channel
-        self.rx_id[slot] = identifier
-        self.rx_flags[slot] = flags
-        self.rx_word0[slot] = word0
-        self.rx_word1[slot] = word1
+            row = 5 * following
+        self.rx_rows[row] = channel
+        self.rx_rows[row + 1] = identifier
+        self.rx_rows[row + 2] = flags
+        self.rx_rows[row + 3] = word0
+        self.rx_rows[row + 4] = word1
         self.rx_write = following
         return True
 
     def send(self, identifier: cython.longlong, word0: cython.longlong, word1: cython.longlong) -> cython.bint:
         """A frame of the router itself into its own ring (7 fit); False when it is lost."""
         following: cython.longlong = (self.own_write + 1) & 7
+        row: cython.longlong = 4 * self.own_write
         if following == self.own_read:
             self.own_lost += 1
             return False
-        self.own_id[self.own_write] = identifier
-        self.own_flags[self.own_write] = 8
-        self.own_word0[self.own_write] = word0
-        self.own_word1[self.own_write] = word1
+        self.own_rows[row] = identifier
+        self.own_rows[row + 1] = 8
+        self.own_rows[row + 2] = word0
+        self.own_rows[row + 3] = word1
         self.own_write = following
         return True
 
@@ -159,6 +151,7 @@ class Router:
         """Move up to three frames, one each from the link, the CAN ring and the own ring; return how many."""
         moved: cython.longlong = 0
         read: cython.longlong = self.rx_read
+        row: cython.longlong = 5 * read
         ssp: RouterSspLink = self.ssp
         if ssp.received_read != ssp.received_write and ssp.take():
             self.load.counts[0] += 1
@@ -166,19 +159,25 @@ class Router:
             moved += 1
         if read != self.rx_write:
             self.rx_read = (read + 1) & 63
+            if self.rx_read == self.rx_write and not self.one_frame_lag:
+                self.rx_read = 0  # empty: the next frame goes to the front again, which is in the cache
+                self.rx_write = 0
             self.route(
-                self.rx_channel[read],
-                self.rx_id[read],
-                self.rx_flags[read],
-                self.rx_word0[read],
-                self.rx_word1[read],
+                self.rx_rows[row],
+                self.rx_rows[row + 1],
+                self.rx_rows[row + 2],
+                self.rx_rows[row + 3],
+                self.rx_rows[row + 4],
                 now,
             )
             moved += 1
         read = self.own_read
         if read != self.own_write:
+            row = 4 * read
             self.own_read = (read + 1) & 7
-            self.route(5, self.own_id[read], self.own_flags[read], self.own_word0[read], self.own_word1[read], now)
+            self.route(
+                5, self.own_rows[row], self.own_rows[row + 1], self.own_rows[row + 2], self.own_rows[row + 3], now
+            )
             moved += 1
         return moved
 
@@ -239,15 +238,15 @@ class Router:
         """Into the transmit ring of a bus: 7 fit, one more is lost without an error, as on the robot."""
         write: cython.longlong = self.tx_write[channel]
         following: cython.longlong = (write + 1) & 7
-        slot: cython.longlong = channel * 8 + write
+        row: cython.longlong = 4 * (channel * 8 + write)
         if following == self.tx_read[channel]:
             self.transmit_lost[channel] += 1
             return False
         self.waiting += 1
-        self.tx_id[slot] = identifier
-        self.tx_flags[slot] = flags
-        self.tx_word0[slot] = word0
-        self.tx_word1[slot] = word1
+        self.tx_rows[row] = identifier
+        self.tx_rows[row + 1] = flags
+        self.tx_rows[row + 2] = word0
+        self.tx_rows[row + 3] = word1
         self.tx_write[channel] = following
         return True
 

@@ -4,22 +4,22 @@ cimport cython
 
 @cython.final
 cdef class UnpackedFrames:
-    cdef public long long[::1] ids, words0, words1
+    cdef public unsigned int[288] rows
     cpdef long long unpack(self, SspSegment segment, long long place) noexcept
 
 @cython.final
 cdef class MainBrainSspLink:
-    cdef public object report
-    cdef public long long last_id
+    # what a segment touches
     cdef public UnpackedFrames unpacked
-    cdef public long long[::1] ids, words0, words1
-    cdef public long long frames, received_count, received_frames
-    cdef public list received_errors
-    cdef public list queue
     cdef public SspSegment empty, packing
+    cdef public list queue
     cdef public long long queue_read, queue_count
-    cdef public bint first_is_junk
+    cdef public long long received_count, received_frames, last_id, frames
     cdef public long long segments_received, segments_sent, frames_received, frames_sent
+    cdef public bint first_is_junk
+    cdef public list received_errors
+    # the rest
+    cdef public object report
     cdef public long long checksum_errors, receive_full, transmit_full, ids_out_of_range
     cdef public long long code_checksum, code_receive_full, code_transmit_full, code_id_out_of_range
     cpdef SspSegment exchanged(self, SspSegment segment)
@@ -32,18 +32,20 @@ cdef class MainBrainSspLink:
 
 @cython.final
 cdef class RouterSspLink:
-    cdef public object report
-    cdef public bint frames_may_straddle
-    cdef public list segments
-    cdef public long long first, last, half_words
-    cdef public SspSegment packing, empty
-    cdef public long long push_time, push_step_ns
-    cdef public UnpackedFrames unpacked
-    cdef public long long[::1] received_frames
+    # what a frame and a segment touch
     cdef public long long received_write, received_read, position
-    cdef public bint exchange_running, exchange_done
+    cdef public SspSegment packing
+    cdef public long long half_words, push_time, first, last
+    cdef public list segments
+    cdef public UnpackedFrames unpacked
+    cdef public short[8] received_frames
     cdef public long long rx_id, rx_flags, rx_word0, rx_word1
+    cdef public bint exchange_running, exchange_done, frames_may_straddle
+    cdef public SspSegment empty
+    cdef public long long push_step_ns
     cdef public long long segments_sent, segments_received, frames_sent, frames_received
+    # the rest
+    cdef public object report
     cdef public long long checksum_errors, receive_overwritten, transmit_lost, low_rate
     cdef public long long code_receive_overwritten, code_low_rate, code_checksum, code_transmit_full
     cpdef bint push(self, long long identifier, long long flags, long long word0, long long word1, long long now) except? -1

@@ -20,7 +20,6 @@ import cython
 
 from datatable.generated import errors
 from firmware_sim.peripherals.ssp import SspSegment
-from foundation.numbers import integers
 
 SEGMENT_HALF_WORDS = 31
 FRAME_HALF_WORDS = 5
@@ -98,12 +97,10 @@ def corrupted_copy(segment: SspSegment, index: cython.longlong, flipped_bits: cy
 
 
 class UnpackedFrames:
-    """Frames as they come out of segments: `ids`, `words0`, `words1`, by place."""
+    """Frames as they come out of segments, 96 places: `rows` of identifier, first and second word."""
 
-    def __init__(self, count) -> None:
-        self.ids = integers(count)
-        self.words0 = integers(count)
-        self.words1 = integers(count)
+    def __init__(self) -> None:
+        self.rows = [0] * 288
 
     def unpack(self, segment: SspSegment, place: cython.longlong) -> cython.longlong:
         """Put the frames of `segment` from `place` on; returns how many, -1 with a wrong checksum.
@@ -113,6 +110,7 @@ class UnpackedFrames:
         used: cython.longlong = min(segment.used, 30)
         total: cython.longlong = 1
         frames: cython.longlong = 0
+        row: cython.longlong = 3 * place
         i: cython.longlong = 0
         header: cython.longlong
         value_high: cython.longlong
@@ -128,9 +126,10 @@ class UnpackedFrames:
             time_high = segment.words[i + 3]
             time_low = segment.words[i + 4]
             total += header + value_high + value_low + time_high + time_low
-            self.ids[place + frames] = header & 0x7FF
-            self.words0[place + frames] = value_high << 16 | value_low
-            self.words1[place + frames] = time_high << 16 | time_low
+            self.rows[row] = header & 0x7FF
+            self.rows[row + 1] = value_high << 16 | value_low
+            self.rows[row + 2] = time_high << 16 | time_low
+            row += 3
             frames += 1
             i += 5
         while i < used:
@@ -143,8 +142,7 @@ class MainBrainSspLink:
     """The slave's end: 16 segments each way, parsed and filled once per slot of the main brain.
 
     `report(code)` is called for every error; `last_id` is the highest identifier the data table has.
-    After `parse()` the frames stand in `ids`, `words0`, `words1`, indices 0 ... `frames`-1, until the next segment
-    comes in.
+    After `parse()` the first `frames` rows of `unpacked` are what came in, until the next segment does.
     """
 
     def __init__(self, report, last_id, first_is_junk=True) -> None:
@@ -152,10 +150,7 @@ class MainBrainSspLink:
         self.last_id = last_id
         # the receive DMA is armed in the middle of nowhere, so the first segment comes shifted (facts 1.6)
         self.first_is_junk = first_is_junk
-        self.unpacked = UnpackedFrames(16 * 6)
-        self.ids = self.unpacked.ids
-        self.words0 = self.unpacked.words0
-        self.words1 = self.unpacked.words1
+        self.unpacked = UnpackedFrames()
         self.frames = 0
         self.received_count = 0  # segments and frames that wait for `parse`, and what it will report
         self.received_frames = 0
@@ -194,6 +189,7 @@ class MainBrainSspLink:
         frames: cython.longlong
         place: cython.longlong = self.received_frames
         i: cython.longlong
+        unpacked: UnpackedFrames
         if self.received_count == 16:
             self.receive_full += 1
             self.report(self.code_receive_full)
@@ -204,20 +200,36 @@ class MainBrainSspLink:
         self.segments_received += 1
         if segment.used == 0 and segment.words[30] == 1:
             return True
-        frames = self.unpacked.unpack(segment, place)
+        unpacked = self.unpacked
+        frames = unpacked.unpack(segment, place)
         if frames < 0:
             self.received_errors.append(self.code_checksum)
         for i in range(place, place + frames):
-            if self.ids[i] > self.last_id:
+            if unpacked.rows[3 * i] > self.last_id:
                 self.received_errors.append(self.code_id_out_of_range)
                 continue
             if place < i:
-                self.ids[place] = self.ids[i]
-                self.words0[place] = self.words0[i]
-                self.words1[place] = self.words1[i]
+                unpacked.rows[3 * place] = unpacked.rows[3 * i]
+                unpacked.rows[3 * place + 1] = unpacked.rows[3 * i + 1]
+                unpacked.rows[3 * place + 2] = unpacked.rows[3 * i + 2]
             place += 1
         self.received_frames = place
         return True
+
+    @property
+    def ids(self):
+        """Identifiers of the unpacked frames, by place."""
+        return list(self.unpacked.rows)[0::3]
+
+    @property
+    def words0(self):
+        """Their first words."""
+        return list(self.unpacked.rows)[1::3]
+
+    @property
+    def words1(self):
+        """Their second words."""
+        return list(self.unpacked.rows)[2::3]
 
     def shifted(self, segment: SspSegment) -> SspSegment:
         """A copy of `segment` as it looks from its second half-word on."""
@@ -316,8 +328,8 @@ class RouterSspLink:
         self.push_step_ns = 200
         self.empty = empty_segment()
         # what came in, by place: six frames, and how many there are (-1: the checksum is wrong)
-        self.unpacked = UnpackedFrames(8 * 6)
-        self.received_frames = integers(8)
+        self.unpacked = UnpackedFrames()
+        self.received_frames = [0] * 8
         self.received_write = 0
         self.received_read = 0
         self.position = 0
@@ -474,14 +486,16 @@ class RouterSspLink:
         A wrong checksum drops the segment (SSP_BAD_CHKSM). The data length of a frame becomes 8.
         """
         frames: cython.longlong
-        place: cython.longlong
+        row: cython.longlong
+        unpacked: UnpackedFrames
         while self.received_read != self.received_write:
             frames = self.received_frames[self.received_read]
             if self.position < frames:
-                place = self.received_read * 6 + self.position
-                self.rx_id = self.unpacked.ids[place]
-                self.rx_word0 = self.unpacked.words0[place]
-                self.rx_word1 = self.unpacked.words1[place]
+                unpacked = self.unpacked
+                row = 3 * (self.received_read * 6 + self.position)
+                self.rx_id = unpacked.rows[row]
+                self.rx_word0 = unpacked.rows[row + 1]
+                self.rx_word1 = unpacked.rows[row + 2]
                 self.position += 1
                 self.frames_received += 1
                 return True

@@ -21,8 +21,8 @@ def queued(router, channel):
     """Frames in the transmit ring of a bus, oldest first."""
     n = router.frames_for(channel)
     first = router.tx_read[channel]
-    slots = [channel * 8 + (first + i) % 8 for i in range(n)]
-    return [(router.tx_id[s], router.tx_word0[s], router.tx_word1[s]) for s in slots]
+    rows = [4 * (channel * 8 + (first + i) % 8) for i in range(n)]
+    return [(router.tx_rows[r], router.tx_rows[r + 2], router.tx_rows[r + 3]) for r in rows]
 
 
 def to_main_brain(router):
@@ -243,7 +243,7 @@ def drain(router):
     for c in (1, 2, 3, 4):
         for f in queued(router, c):
             out.append((router.table.sources[f[0]], f[1]))
-        router.tx_read[c] = router.tx_write[c]
+    router.tx_read = list(router.tx_write)
     while router.ssp.half_words_waiting():
         router.ssp.next_segment(10**9)
     return out

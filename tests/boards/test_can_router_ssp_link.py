@@ -63,12 +63,10 @@ def test_a_frame_is_header_value_and_time_high_half_first(router):
 
 def test_the_checksum_is_one_plus_the_sum_modulo_65536():
     segment = SspSegment()
-    for i in range(30):
-        segment.words[i] = 0xFFFF
+    segment.words = [0xFFFF] * 30 + [0]
     finish(segment, 0)
     segment.used = 30
-    for i in range(30):
-        segment.words[i] = 0xFFFF
+    segment.words = [0xFFFF] * 30 + [segment.words[30]]
     # 30 * 0xFFFF + 1 = 0x1DFFE3
     assert checksum(segment) == 0xFFE3
 
@@ -302,8 +300,7 @@ def test_every_frame_pushed_comes_out_once_in_order(frames):
 @given(st.lists(st.integers(0, 0xFFFF), min_size=31, max_size=31), st.integers(0, 31))
 def test_no_segment_whatever_it_holds_upsets_either_parser(words, used):
     segment = SspSegment()
-    for i in range(31):
-        segment.words[i] = words[i]
+    segment.words = words
     segment.used = min(used, 30)
     finish(segment, segment.used)  # half of them with a right checksum
     said = []

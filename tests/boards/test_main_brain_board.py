@@ -28,13 +28,11 @@ PERIOD_NS = 200_000
 def segment_of(*frames):
     """A valid segment with up to six frames (id, word, stamp)."""
     segment = empty_segment()
-    i = 0
+    words = []
     for number, word, stamp in frames:
-        for half in (0x7800 | number, word >> 16, word & 0xFFFF, stamp >> 16, stamp & 0xFFFF):
-            segment.words[i] = half
-            i += 1
-    segment.used = i
-    segment.words[30] = (1 + sum(segment.words[k] for k in range(30))) & 0xFFFF
+        words += [0x7800 | number, word >> 16, word & 0xFFFF, stamp >> 16, stamp & 0xFFFF]
+    segment.used = len(words)
+    segment.words = [*words, *[0] * (30 - len(words)), (1 + sum(words)) & 0xFFFF]
     return segment
 
 
