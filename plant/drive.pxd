@@ -2,11 +2,15 @@ cimport cython
 
 @cython.final
 cdef class Drive:
-    cdef public long long watchdog_ns, mr2, mr6, mr0, power_off_ns, switching_leads, power_losses
-    cdef public long long capacity, count, next_change_ns
-    cdef public bint enable2, enable6, powered, is_open, sensed_lead_switches
+    # what a motor looks at in every step stands first, beside each other
+    cdef public long long next_change_ns
     cdef public double duty, ripple
-    cdef public long long[::1] times, kinds, values
+    cdef public bint is_open, sensed_lead_switches
+    cdef public long long switching_leads, power_off_ns, count
+    cdef public bint powered, enable2, enable6
+    cdef public long long mr2, mr6, mr0, watchdog_ns
+    cdef public long long[::1] changes
+    cdef public long long capacity, power_losses
     cpdef void write_pwm(self, long long time, long long mr2, long long mr6, long long mr0) noexcept
     cpdef void watchdog_edge(self, long long time) noexcept
     cpdef void low_side(self, long long time, bint enable2, bint enable6) noexcept

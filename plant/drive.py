@@ -1,5 +1,5 @@
 # cython: boundscheck=False, wraparound=False
-# (places in the queue are below `count`, and `count` below `capacity`)
+# (places in the queue are below `count`, and `count` is at most `capacity`)
 """The H-bridge of a motor board: two PWM leads, low-side enables, and the watchdog that takes its power away.
 
 What a board does arrives stamped (ns) and takes effect at its stamp, also inside a step of the plant; a stamp
@@ -12,10 +12,10 @@ import cython
 
 from foundation.numbers import integers
 
+# Kinds of changes.
 PWM_WRITE = 0
 WATCHDOG_EDGE = 1
 LOW_SIDE_WRITE = 2
-QUEUE_CAPACITY = 16
 
 
 class Drive:
@@ -42,9 +42,8 @@ class Drive:
         self.switching_leads = 0
         self.sensed_lead_switches = False
         self.power_losses = 0  # times the watchdog ran out
-        self.times = integers(16)
-        self.kinds = integers(16)
-        self.values = integers(48)
+        # the queue, five numbers per change: time (ns), kind, what it writes
+        self.changes = integers(5 * 16)
         self.capacity = 16
         self.count = 0
         self.next_change_ns = 1 << 62  # first queued change or the end of the watchdog's time
@@ -67,8 +66,8 @@ class Drive:
         # it keeps its power, as it would if the edge were kept until its time
         self.power_off_ns = time + self.watchdog_ns
         self.next_change_ns = self.power_off_ns
-        if self.count > 0 and self.times[0] < self.next_change_ns:
-            self.next_change_ns = self.times[0]
+        if self.count > 0 and self.changes[0] < self.next_change_ns:
+            self.next_change_ns = self.changes[0]
 
     def low_side(self, time: cython.longlong, enable2: cython.bint, enable6: cython.bint) -> cython.void:
         """The two low-side enables from `time` on."""
@@ -83,72 +82,66 @@ class Drive:
         c: cython.longlong,
     ) -> cython.void:
         """Keep a change until its time; equal times keep their order of arrival."""
-        i: cython.longlong
+        at: cython.longlong = 5 * self.count
+        k: cython.longlong
         if self.count == self.capacity:
             self._grow()
-        i = self.count
-        while i > 0 and self.times[i - 1] > time:
-            self.times[i] = self.times[i - 1]
-            self.kinds[i] = self.kinds[i - 1]
-            self.values[3 * i] = self.values[3 * i - 3]
-            self.values[3 * i + 1] = self.values[3 * i - 2]
-            self.values[3 * i + 2] = self.values[3 * i - 1]
-            i -= 1
-        self.times[i] = time
-        self.kinds[i] = kind
-        self.values[3 * i] = a
-        self.values[3 * i + 1] = b
-        self.values[3 * i + 2] = c
+        while at > 0 and self.changes[at - 5] > time:
+            for k in range(at, at + 5):
+                self.changes[k] = self.changes[k - 5]
+            at -= 5
+        self.changes[at] = time
+        self.changes[at + 1] = kind
+        self.changes[at + 2] = a
+        self.changes[at + 3] = b
+        self.changes[at + 4] = c
         self.count += 1
-        if self.times[0] < self.next_change_ns:
-            self.next_change_ns = self.times[0]
+        if at == 0 and time < self.next_change_ns:
+            self.next_change_ns = time
 
     def _grow(self) -> None:
+        """Double the queue, keeping what is there."""
         self.capacity = 2 * self.capacity
-        for name, width in (("times", 1), ("kinds", 1), ("values", 3)):
-            old = getattr(self, name)
-            grown = integers(width * self.capacity)
-            for i, value in enumerate(old):
-                grown[i] = value
-            setattr(self, name, grown)
+        grown = integers(5 * self.capacity)
+        for k, number in enumerate(self.changes):
+            grown[k] = number
+        self.changes = grown
 
     def apply(self, time: cython.longlong) -> cython.void:
         """Let everything stamped up to and including `time` take effect, then judge the watchdog at `time`."""
-        done: cython.longlong = 0
-        i: cython.longlong
+        at: cython.longlong = 0
+        k: cython.longlong
         kind: cython.longlong
-        count: cython.longlong = self.count
+        left: cython.longlong = self.count
+        following: cython.longlong = 1 << 62
         if time < self.next_change_ns:
             return
-        while done < count and self.times[done] <= time:
-            kind = self.kinds[done]
-            i = 3 * done
+        while left > 0 and self.changes[at] <= time:
+            kind = self.changes[at + 1]
             if kind == 0:
-                self.mr2 = self.values[i]
-                self.mr6 = self.values[i + 1]
-                self.mr0 = self.values[i + 2]
+                self.mr2 = self.changes[at + 2]
+                self.mr6 = self.changes[at + 3]
+                self.mr0 = self.changes[at + 4]
             elif kind == 1:
                 self.powered = True
-                self.power_off_ns = self.times[done] + self.watchdog_ns
+                self.power_off_ns = self.changes[at] + self.watchdog_ns
             else:
-                self.enable2 = self.values[i] != 0
-                self.enable6 = self.values[i + 1] != 0
-            done += 1
-        count -= done
-        self.count = count
-        if done > 0 and count > 0:
-            for i in range(count):
-                self.times[i] = self.times[i + done]
-                self.kinds[i] = self.kinds[i + done]
-            for i in range(3 * count):
-                self.values[i] = self.values[i + 3 * done]
-        self.next_change_ns = self.times[0] if count > 0 else 1 << 62
+                self.enable2 = self.changes[at + 2] != 0
+                self.enable6 = self.changes[at + 3] != 0
+            at += 5
+            left -= 1
+        self.count = left
+        if left > 0:
+            following = self.changes[at]
+            for k in range(5 * left):
+                self.changes[k] = self.changes[k + at]
         if self.powered:
             if time >= self.power_off_ns:
                 self.powered = False
                 self.power_losses += 1
-            elif self.power_off_ns < self.next_change_ns:
-                self.next_change_ns = self.power_off_ns
+            elif self.power_off_ns < following:
+                following = self.power_off_ns
+        self.next_change_ns = following
         self._update()
 
     def _update(self) -> cython.void:
@@ -156,31 +149,32 @@ class Drive:
         high2: cython.longlong = self.mr2
         high6: cython.longlong = self.mr6
         period: cython.longlong = self.mr0
+        leads: cython.longlong = 0
         duty: cython.double
-        first: cython.bint
-        second: cython.bint
+        self.sensed_lead_switches = False
         self.is_open = not (self.powered and self.enable2 and self.enable6)
         if self.is_open or period <= 0:
             self.duty = 0.0
             self.ripple = 0.0
             self.switching_leads = 0
-            self.sensed_lead_switches = False
             return
-        first = 0 < high2 < period
-        if high2 > period:
+        if 0 < high2 < period:
+            self.sensed_lead_switches = True
+            leads = 1
+        elif high2 > period:
             high2 = period
         elif high2 < 0:
             high2 = 0
-        second = 0 < high6 < period
-        if high6 > period:
+        if 0 < high6 < period:
+            leads += 1
+        elif high6 > period:
             high6 = period
         elif high6 < 0:
             high6 = 0
+        self.switching_leads = leads
         duty = (high2 - high6) / period
         self.duty = duty
         if duty < 0.0:
             duty = -duty
         duty *= 1.0 - duty
         self.ripple = duty * duty
-        self.sensed_lead_switches = first
-        self.switching_leads = first + second
