@@ -101,6 +101,9 @@ class MotorUnit:
         self.warmed_A2s = 0.0
         self.warmed_J = 0.0
         self.warmed_ripple_J = 0.0
+        # of a step in pieces: charge through the winding in the joint's sense, charge from the battery
+        self.total_As = 0.0
+        self.from_battery_As = 0.0
         # of a whole step of `known_s` at `known_ohm`: time constant, e^(-t/tau) and two integrals of it
         self.known_s = 0.0
         self.known_ohm = 0.0
@@ -139,44 +142,32 @@ class MotorUnit:
     ) -> cython.void:
         """Winding, bridge and heat from `t0` to `t1` (ns) at a constant joint rate and battery voltage.
 
-        Pieces between changes of the bridge; in each the current runs to its final value, or to zero and on from
-        there, and its integral, that of its size and that of its square are summed (EQUATIONS 10.2-10.7).
+        Here where the bridge does not change and the current stays on its side of zero, which is nearly always;
+        in pieces otherwise (EQUATIONS 10.2-10.7).
         """
         drive: Drive = self.drive
-        now: cython.longlong = t0
-        following: cython.longlong
         h: cython.double = (t1 - t0) * 1e-9
         R: cython.double = self.winding_ohm + self.series_ohm
         GK: cython.double = self.mounting * self.gear * self.K
-        leads: cython.longlong
         contact_V: cython.double = self.contact_drop_V
         back_emf_V: cython.double = GK * rate_rad_s
         amps: cython.double = self.bridge_current_A
-        seconds: cython.double
-        left: cython.double
+        d: cython.double
         x: cython.double
         drop: cython.double
-        d: cython.double
-        sign: cython.double
-        final: cython.double
-        above: cython.double
-        tau: cython.double
-        e: cython.double
-        e_s: cython.double
-        ee_s: cython.double
-        part: cython.double
-        charge: cython.double
-        absolute: cython.double
+        sign: cython.double = 0.0
+        final: cython.double = 0.0
+        above: cython.double = 0.0
+        part: cython.double = -1.0
+        total_As: cython.double
         from_battery_As: cython.double = 0.0
-        total_As: cython.double = 0.0
-        size_As: cython.double = 0.0
-        square_A2s: cython.double = 0.0
         if t1 <= t0:
             return
         if drive.next_change_ns <= t0:
             drive.apply(t0)
+        d = drive.duty
         if amps == 0.0 and drive.switching_leads == 0 and drive.next_change_ns > t1:
-            x = drive.duty * battery_V - back_emf_V
+            x = d * battery_V - back_emf_V
             if -contact_V <= x <= contact_V:
                 # nothing drives a current through the contacts and no lead switches: only time passes
                 if self.current_A != 0.0 or self.battery_current_A != 0.0 or self.drive_Nm != 0.0:
@@ -189,7 +180,103 @@ class MotorUnit:
                 return
         if h != self.known_s or R != self.known_ohm:
             self._know_step(h, R)
-        tau = self.tau_s
+        if drive.next_change_ns > t1:
+            if drive.is_open:
+                x = -back_emf_V
+                drop = contact_V + battery_V + 2.0 * self.diode_drop_V
+            else:
+                x = d * battery_V - back_emf_V
+                drop = contact_V + self.dead_time_fraction * battery_V
+            # `sign`: side of zero the current is on or goes to; `final` and `above` are measured on that side
+            if amps > 0.0 or amps == 0.0 and x > drop:
+                sign = 1.0
+            elif amps < 0.0 or x < -drop:
+                sign = -1.0
+            if sign != 0.0:
+                final = (sign * x - drop) / R
+                above = sign * amps - final
+                part = final + above * self.decay
+        if part >= 0.0:
+            amps = sign * part
+            part = h * final
+            x = above * self.decay_s
+            self.square_A2s += final * (part + 2.0 * x) + above * above * self.decay_squared_s
+            part += x
+            self.size_As += part
+            total_As = sign * part
+            if drive.is_open:
+                from_battery_As -= part
+                self.diode_J += 2.0 * self.diode_drop_V * part
+            else:
+                # the dead time's drop is the battery's own voltage, switched against the current: it goes back
+                from_battery_As += d * total_As - self.dead_time_fraction * part
+                if drive.switching_leads > 0:
+                    part = battery_V * R * self.ripple_per_ohm2 * drive.ripple * h
+                    x = drive.switching_leads * self.gate_W_per_V * h
+                    self.ripple_J += part * battery_V
+                    self.gate_J += x * battery_V
+                    from_battery_As += part + x
+        else:
+            self._step_in_pieces(t0, t1, back_emf_V, battery_V)
+            amps = self.bridge_current_A
+            total_As = self.total_As
+            from_battery_As = self.from_battery_As
+        self.bridge_current_A = amps
+        self.current_A = self.mounting * amps
+        self.battery_current_A = from_battery_As / h
+        self.mechanical_J += back_emf_V * total_As
+        x = from_battery_As * battery_V
+        if x >= 0.0:
+            self.drawn_J += x
+        else:
+            self.returned_J -= x
+        self.heat_s += h
+        if self.heat_s >= 0.008:
+            self._heat()
+        # the torque numbers for the body: `load` of the mean current
+        x = GK * total_As / h
+        self.drive_Nm = x
+        self.coulomb_Nm = self.mu * (x if x > 0.0 else -x) + self.C0
+
+    def _step_in_pieces(
+        self,
+        t0: cython.longlong,
+        t1: cython.longlong,
+        back_emf_V: cython.double,
+        battery_V: cython.double,
+    ) -> cython.void:
+        """`step_electrical` over changes of the bridge and zeros of the current: leaves the current, `total_As` and
+        `from_battery_As`, and counts the heat's integrals and the energies of ripple, gates and diodes.
+
+        Pieces between changes of the bridge; in each the current runs to its final value, or to zero and on from
+        there, and its integral, that of its size and that of its square are summed (EQUATIONS 10.2-10.7).
+        """
+        drive: Drive = self.drive
+        now: cython.longlong = t0
+        following: cython.longlong
+        h: cython.double = self.known_s
+        R: cython.double = self.known_ohm
+        tau: cython.double = self.tau_s
+        contact_V: cython.double = self.contact_drop_V
+        amps: cython.double = self.bridge_current_A
+        seconds: cython.double
+        left: cython.double
+        x: cython.double
+        drop: cython.double
+        d: cython.double
+        sign: cython.double
+        final: cython.double
+        above: cython.double
+        e: cython.double
+        e_s: cython.double
+        ee_s: cython.double
+        part: cython.double
+        charge: cython.double
+        absolute: cython.double
+        from_battery_As: cython.double = 0.0
+        total_As: cython.double = 0.0
+        size_As: cython.double = 0.0
+        square_A2s: cython.double = 0.0
         while now < t1:
             following = drive.next_change_ns
             if following > t1:
@@ -255,10 +342,9 @@ class MotorUnit:
             else:
                 # the dead time's drop is the battery's own voltage, switched against the current: it goes back
                 from_battery_As += d * charge - self.dead_time_fraction * absolute
-                leads = drive.switching_leads
-                if leads > 0:
+                if drive.switching_leads > 0:
                     part = battery_V * R * self.ripple_per_ohm2 * drive.ripple * seconds
-                    x = leads * self.gate_W_per_V * seconds
+                    x = drive.switching_leads * self.gate_W_per_V * seconds
                     self.ripple_J += part * battery_V
                     self.gate_J += x * battery_V
                     from_battery_As += part + x
@@ -266,23 +352,10 @@ class MotorUnit:
             if now == drive.next_change_ns:
                 drive.apply(now)
         self.bridge_current_A = amps
-        self.current_A = self.mounting * amps
-        self.battery_current_A = from_battery_As / h
-        self.mechanical_J += back_emf_V * total_As
+        self.total_As = total_As
+        self.from_battery_As = from_battery_As
         self.size_As += size_As
         self.square_A2s += square_A2s
-        x = from_battery_As * battery_V
-        if x >= 0.0:
-            self.drawn_J += x
-        else:
-            self.returned_J -= x
-        self.heat_s += h
-        if self.heat_s >= 0.008:
-            self._heat()
-        # the torque numbers for the body: `load` of the mean current
-        x = GK * total_As / h
-        self.drive_Nm = x
-        self.coulomb_Nm = self.mu * (x if x > 0.0 else -x) + self.C0
 
     @property
     def mean_current_A(self):
