@@ -8,17 +8,22 @@ from plant.noise cimport NoiseSource
 
 @cython.final
 cdef class Electrics:
-    cdef public object parameters
-    cdef public Battery battery
+    # what every step looks at stands first, beside each other
     cdef public MotorUnit hip, outer_ankle, inner_ankle, steering
-    cdef public list motors
+    cdef public Battery battery
+    cdef public double hip_rate, outer_rate, inner_rate, steering_rate
+    cdef public double electronics_W, electronics_J, motor_current_A
     cdef public FootSensors outer_feet, inner_feet
+    cdef public list motors
     cdef public NoiseSource noise
-    cdef public double[::1] analog_start, analog_end, values, zero_V, slope_V, noise_V, lines, scale, offset, lag_s, state, battery_A
+    cdef public double lag_h, lag_factor, pwm_offset_A, voltage_clip_V, steering_rad, steering_shown_rad
     cdef public bint has_terms
-    cdef public double electronics_W, pwm_offset_A, voltage_clip_V, battery_current_lag_s, lag_h, lag_factor
-    cdef public double electronics_J, motor_current_A, hip_rate, outer_rate, inner_rate, steering_rate
-    cdef public double steering_rad, steering_shown_rad
+    cdef public double[4] battery_A
+    cdef public double[19] values, zero_V, slope_V, noise_V
+    cdef public double[::1] analog_end, analog_start
+    cdef public double battery_current_lag_s
+    cdef public double[19] scale, offset, lag_s, state
+    cdef public object parameters
     cpdef void step_motors(
         self, long long t0, long long t1, double hip_rate, double outer_rate, double inner_rate, double steering_rate,
         bint jumped=*,
@@ -30,4 +35,5 @@ cdef class Electrics:
     cpdef void settle(
         self, bint outer_contact, double outer_load_N, bint inner_contact, double inner_load_N, double steering_rad,
     ) noexcept
-    cpdef void _read(self, double h, double steering_rad) noexcept
+    cdef void _read(self, double h, double steering_rad) noexcept
+    cdef void _apply_terms(self, double h) noexcept

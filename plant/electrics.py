@@ -34,6 +34,7 @@ from plant.wiring_points import ANALOG_COUNT, MOTOR_NAMES
 
 if not cython.compiled:
     from math import exp
+    from operator import add, mul
 
 ADS7871_REFERENCE_V = 2.5  # facts network-and-boards 4.5 (external reference; 2.5 V as the internal one)
 INTERNAL_REFERENCE_V = 3.3
@@ -113,18 +114,17 @@ class Electrics:
         self.noise = NoiseSource(seed, "analog sensors")
         self.analog_start = reals([0.0] * ANALOG_COUNT)
         self.analog_end = reals([0.0] * ANALOG_COUNT)
-        self.values = reals([0.0] * ANALOG_COUNT)  # what is measured: A, V, rad
-        self.zero_V = reals([0.0] * ANALOG_COUNT)
-        self.slope_V = reals([0.0] * ANALOG_COUNT)  # volts per ampere, volt or rad
-        self.noise_V = reals([0.0] * ANALOG_COUNT)
-        self.lines = reals([0.0] * (3 * ANALOG_COUNT))  # zero_V, slope_V, noise_V of one after the other
+        self.values = [0.0] * 19  # what is measured: A, V, rad
+        self.zero_V = [0.0] * 19
+        self.slope_V = [0.0] * 19  # volts per ampere, volt or rad
+        self.noise_V = [0.0] * 19
         # additional terms of a model file, in the unit of the quantity
         self.has_terms = False
-        self.scale = reals([1.0] * ANALOG_COUNT)
-        self.offset = reals([0.0] * ANALOG_COUNT)
-        self.lag_s = reals([0.0] * ANALOG_COUNT)
-        self.state = reals([0.0] * ANALOG_COUNT)
-        self.battery_A = reals([0.0] * len(MOTOR_NAMES))  # smoothed, per motor
+        self.scale = [1.0] * 19
+        self.offset = [0.0] * 19
+        self.lag_s = [0.0] * 19
+        self.state = [0.0] * 19
+        self.battery_A = [0.0] * 4  # smoothed, per motor
         self.steering_rad = 0.0  # twist of the feet, and what its sensor makes of it
         self.steering_shown_rad = 0.0
         self.pwm_offset_A = p.pwm_offset_A
@@ -233,10 +233,6 @@ class Electrics:
         self.inner_feet.settle(inner_contact, inner_load_N)
         self.lag_h = 0.0
         self.lag_factor = 1.0
-        for i in range(19):
-            self.lines[3 * i] = self.zero_V[i]
-            self.lines[3 * i + 1] = self.slope_V[i]
-            self.lines[3 * i + 2] = self.noise_V[i]
         self._read(0.0, steering_rad)
         for i in range(19):
             self.analog_start[i] = self.analog_end[i]
@@ -252,25 +248,24 @@ class Electrics:
         value: cython.double
         place: cython.longlong
         motor: cython.longlong
-        i: cython.longlong
+        i: cython.longlong = 0
         unit: MotorUnit
-        values: cython.double[::1] = self.values
-        start: cython.double[::1] = self.analog_start
-        end: cython.double[::1] = self.analog_end
         motors: list = self.motors
+        values: cython.p_double = self.values
+        battery_A: cython.p_double = self.battery_A
         for motor in range(4):
             # what the three sensors of a motor board measure
             unit = motors[motor]
             amps = unit.current_A
             if unit.drive.sensed_lead_switches:
                 amps += unit.mounting * self.pwm_offset_A
-            value = self.battery_A[motor]
+            value = battery_A[motor]
             value += (unit.battery_current_A - value) * lag
-            self.battery_A[motor] = value
-            i = 3 * motor
+            battery_A[motor] = value
             values[i] = amps
             values[i + 1] = value
             values[i + 2] = seen
+            i += 3
         feet: FootSensors = self.outer_feet
         values[12] = feet.left_V
         values[13] = feet.right_V
@@ -287,21 +282,27 @@ class Electrics:
         values[17] = self.electronics_W / V if V > 0.0 else 0.0
         values[18] = V
         if self.has_terms:
-            for i in range(19):  # ANALOG_COUNT
-                value = self.scale[i] * values[i] + self.offset[i]
-                if self.lag_s[i] > 0.0:
-                    if h > 0.0:
-                        value = self.state[i] + (value - self.state[i]) * (1.0 - exp(-h / self.lag_s[i]))
-                    self.state[i] = value
-                values[i] = value
-        noise: cython.double[::1] = self.noise.table
-        lines: cython.double[::1] = self.lines
-        place = self.noise.block()
+            self._apply_terms(h)
+        noise: NoiseSource = self.noise
+        place = noise.block()
         if cython.compiled:
             for i in range(19):
-                start[i] = end[i]
-                end[i] = lines[3 * i] + lines[3 * i + 1] * values[i] + lines[3 * i + 2] * noise[place + i]
+                value = self.zero_V[i] + self.slope_V[i] * values[i] + self.noise_V[i] * noise.table[place + i]
+                self.analog_start[i] = self.analog_end[i]
+                self.analog_end[i] = value
         else:  # the same in a fraction of the time: a fifth of a step of the plant went into this loop
-            start[:] = end
-            rows = zip(lines[::3], lines[1::3], values, lines[2::3], noise[place : place + 19], strict=True)
-            end[:] = [zero + slope * value + noise_V * normal for zero, slope, value, noise_V, normal in rows]
+            self.analog_start[:] = self.analog_end
+            volts = map(add, self.zero_V, map(mul, self.slope_V, values))
+            self.analog_end[:] = map(add, volts, map(mul, self.noise_V, noise.table[place : place + 19]))
+
+    def _apply_terms(self, h: cython.double) -> cython.void:
+        """Scale, offset and lag of a model file on what is measured."""
+        i: cython.longlong
+        value: cython.double
+        for i in range(19):
+            value = self.scale[i] * self.values[i] + self.offset[i]
+            if self.lag_s[i] > 0.0:
+                if h > 0.0:
+                    value = self.state[i] + (value - self.state[i]) * (1.0 - exp(-h / self.lag_s[i]))
+                self.state[i] = value
+            self.values[i] = value
