@@ -162,6 +162,7 @@ class IncrementalEncoder:
             n -= 1
         return 1 - (n & 1)
 
+    @cython.cdivision(True)  # what is divided by is not zero
     def update(
         self,
         t0: cython.longlong,
@@ -170,8 +171,11 @@ class IncrementalEncoder:
         rate0: cython.double,
         angle1: cython.double,
         rate1: cython.double,
-    ) -> cython.void:
-        """All edges of [t0, t1) into `edges`, stamped in ns: joint angles (rad) and rates (rad/s) at both ends."""
+    ) -> cython.longlong:
+        """All edges of [t0, t1) into `edges`, stamped in ns: joint angles (rad) and rates (rad/s) at both ends.
+
+        Returns their number.
+        """
         h: cython.double = (t1 - t0) * 1e-9
         u0: cython.double
         u1: cython.double
@@ -184,14 +188,16 @@ class IncrementalEncoder:
         c: cython.double
         s: cython.double
         x: cython.double
-        level: cython.double
         inverse: cython.double
         span: cython.double
         time: cython.longlong
-        last: cython.longlong
-        cell: cython.longlong
-        count: cython.longlong = 0
-        forward: cython.bint
+        last: cython.longlong = t0
+        edge: cython.longlong
+        end: cython.longlong
+        count: cython.longlong
+        place: cython.longlong
+        forward: cython.longlong = 0
+        direction: cython.longlong = -1
         buffer: EdgeBuffer = self.edges
         buffer.count = 0
         buffer.read = 0
@@ -200,11 +206,11 @@ class IncrementalEncoder:
             x = rate0 if rate0 > 0.0 else -rate0
             x += rate1 if rate1 > 0.0 else -rate1
             if h * x < self.calm_rad:
-                return
+                return 0
         if not self.started:
             self.reset(angle0)
         if self.broken:
-            return
+            return 0
         if self.eccentric:
             u0 = self.position(angle0)
             u1 = self.position(angle1)
@@ -221,38 +227,89 @@ class IncrementalEncoder:
         if m0 * du <= 0.0 or m1 * du <= 0.0:
             if m0 != 0.0 or m1 != 0.0 or du != 0.0:
                 self._turning(t0, t1, u0, u1, m0, m1)
-            return
+            return buffer.count
         g0 = du / m0
         g1 = du / m1
         if g0 < 0.5 or g0 > 2.0 or g1 < 0.5 or g1 > 2.0:
             self._turning(t0, t1, u0, u1, m0, m1)
-            return
-        cell = self.cell
-        has_errors: cython.bint = self.has_errors
-        forward = du > 0.0
-        if forward:
-            level = self.errors[(cell + 1) % self.table_size] + (cell + 1) if has_errors else cell + 1
-            if u1 < level:
-                self._calm()
-                return
-            x = u1 - cell
+            return buffer.count
+        if self.has_errors or self.jitter > 0.0:
+            return self._one_way(t0, t1, u0, u1, g0, g1)
+        end = int(u1)
+        if u1 < end:
+            end -= 1
+        edge = self.cell
+        if du > 0.0:
+            forward = 1
+            direction = 1
+            count = end - edge
+            edge += 1
         else:
-            level = self.errors[cell % self.table_size] + cell if has_errors else cell
-            if u1 >= level:
-                self._calm()
-                return
-            x = cell - u1
-        while buffer.capacity < x + 3.0:  # an angle may have been set from outside; the disc's errors let in one or two
+            count = edge - end
+        if count <= 0:
+            self._calm()
+            return 0
+        self.cell = end
+        self.total += count
+        self.calm_from = 1.0
+        self.calm_to = -1.0
+        while buffer.capacity < count:  # an angle may have been set from outside
             buffer.grow()
+        buffer.count = count
         # ns after t0 at which the fraction s of the way is done: a cubic in s
         inverse = 1.0 / du
         span = t1 - t0
         b = (3.0 - 2.0 * g0 - g1) * span
         c = (g0 + g1 - 2.0) * span
         g0 *= span
-        last = t0
+        for place in range(count):
+            s = (edge - u0) * inverse
+            time = int(s * (g0 + s * (b + s * c)))
+            time += t0
+            if time < last:
+                time = last
+            elif time >= t1:
+                time = t1 - 1
+            last = time
+            buffer.times[place] = time
+            # B is low at even edges; A rises there on the way forward, and falls on the way back
+            buffer.levels_b[place] = edge & 1
+            buffer.levels_a[place] = edge & 1 ^ forward
+            edge += direction
+        return count
+
+    def _one_way(
+        self,
+        t0: cython.longlong,
+        t1: cython.longlong,
+        u0: cython.double,
+        u1: cython.double,
+        g0: cython.double,
+        g1: cython.double,
+    ) -> cython.longlong:
+        """As the end of `update`, for a disc with errors or jitter; `g0`, `g1`: way over speed at both ends."""
+        inverse: cython.double = 1.0 / (u1 - u0)
+        span: cython.double = t1 - t0
+        b: cython.double = (3.0 - 2.0 * g0 - g1) * span
+        c: cython.double = (g0 + g1 - 2.0) * span
         jitter: cython.double = self.jitter * span
-        while True:
+        s: cython.double
+        x: cython.double
+        level: cython.double
+        time: cython.longlong
+        last: cython.longlong = t0
+        cell: cython.longlong = self.cell
+        count: cython.longlong = 0
+        forward: cython.bint = u1 > u0
+        buffer: EdgeBuffer = self.edges
+        level = self.threshold(cell + 1) if forward else self.threshold(cell)
+        if u1 < level if forward else u1 >= level:
+            self._calm()
+            return 0
+        while buffer.capacity < (u1 - cell if forward else cell - u1) + 3.0:  # the errors let in one or two more
+            buffer.grow()
+        g0 *= span
+        while u1 >= level if forward else u1 < level:
             s = (level - u0) * inverse
             x = s * (g0 + s * (b + s * c))
             if jitter > 0.0:
@@ -269,24 +326,20 @@ class IncrementalEncoder:
                 cell += 1
                 buffer.levels_a[count] = 1 - (cell & 1)
                 buffer.levels_b[count] = cell & 1
-                count += 1
-                level = self.errors[(cell + 1) % self.table_size] + (cell + 1) if has_errors else cell + 1
-                if u1 < level:
-                    break
+                level = self.threshold(cell + 1)
             else:
                 # back over edge `cell`, where both channels take the same level
                 buffer.levels_a[count] = cell & 1
                 buffer.levels_b[count] = cell & 1
                 cell -= 1
-                count += 1
-                level = self.errors[cell % self.table_size] + cell if has_errors else cell
-                if u1 >= level:
-                    break
+                level = self.threshold(cell)
+            count += 1
         self.cell = cell
         self.calm_from = 1.0
         self.calm_to = -1.0
         buffer.count = count
         self.total += count
+        return count
 
     def _calm(self) -> cython.void:
         """Find the joint angles between the two edges beside the present position, a tenth of an edge inside."""
@@ -315,7 +368,7 @@ class IncrementalEncoder:
         u1: cython.double,
         m0: cython.double,
         m1: cython.double,
-    ) -> cython.void:
+    ) -> None:
         """Edges of a step in which the position may turn round: pieces between the cubic's turning points."""
         a: cython.double
         b: cython.double
@@ -362,7 +415,7 @@ class IncrementalEncoder:
         self.calm_to = -1.0
         self.total += self.edges.count - before
 
-    def _piece(self, x0: cython.double, x1: cython.double) -> cython.void:
+    def _piece(self, x0: cython.double, x1: cython.double) -> None:
         """Edges between two fractions of the step in which the cubic runs one way."""
         start: cython.double = self._value(x0)
         end: cython.double = self._value(x1) if x1 < 1.0 else self.u0 + self.du
@@ -375,9 +428,7 @@ class IncrementalEncoder:
                 self.cell -= 1
                 self._emit(x0, x1, self.threshold(self.cell + 1), (self.cell + 1) & 1)
 
-    def _emit(
-        self, x0: cython.double, x1: cython.double, level: cython.double, level_b: cython.longlong
-    ) -> cython.void:
+    def _emit(self, x0: cython.double, x1: cython.double, level: cython.double, level_b: cython.longlong) -> None:
         """One edge where the cubic passes `level` between two fractions of the step (bisection)."""
         low: cython.double = x0
         high: cython.double = x1
