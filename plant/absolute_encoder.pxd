@@ -6,11 +6,13 @@ from plant.noise cimport NoiseSource
 
 @cython.final
 cdef class AbsoluteEncoder:
-    cdef public str name
-    cdef public long long zero, sign, flipped
-    cdef public double noise_counts, bit_flip, counts_per_rad, scale, offset_rad, lag_s, angle
-    cdef public double eccentricity_1, phase_1, eccentricity_2, phase_2
-    cdef public bint started
+    # what every word asks for stands first, beside each other
     cdef public NoiseSource noise
+    cdef public double scale, offset_rad, lag_s, eccentricity_1, eccentricity_2, counts_per_rad, noise_counts, bit_flip
+    cdef public long long zero
+    cdef public double phase_1, phase_2, angle
+    cdef public bint started
     cdef public RandomStream flips
+    cdef public long long sign, flipped
+    cdef public str name
     cpdef long long word(self, double angle, double h=*) noexcept

@@ -4,31 +4,38 @@ from libc.math cimport cos, fabs, sin, sqrt, tanh
 
 @cython.final
 cdef class Body:
-    cdef public object parameters, floor, record, terms
-    cdef public str cause
-    cdef public long long mode, stance, last_strike_leg, step_start_ns, event, changes
-    cdef public bint outer_armed, inner_armed, foothold_due, lock_hip, standing, brush
-    cdef public bint brushing, exact_spring, unilateral, lift_leading
-    cdef public double[::1] saved, matrix, solution
+    # what every step looks at stands first, beside each other
+    cdef public long long mode, stance, step_start_ns, changes, event, last_strike_leg
     cdef public double foot_outer, leg_outer, leg_inner, foot_inner, motor_outer, motor_inner
     cdef public double foot_outer_rate, leg_outer_rate, leg_inner_rate, foot_inner_rate, motor_outer_rate, motor_inner_rate
+    cdef public double hip_x, hip_y, hip_vx, hip_vy
     cdef public double known_foot_outer, sin_foot_outer, cos_foot_outer, known_leg_outer, sin_leg_outer, cos_leg_outer
     cdef public double known_leg_inner, sin_leg_inner, cos_leg_inner, known_foot_inner, sin_foot_inner, cos_foot_inner
-    cdef public double hip_x, hip_y, hip_vx, hip_vy, anchor_outer, anchor_inner
-    cdef public double height_outer, height_inner, gap_outer, gap_inner, scuff_time_s, passing_gap
-    cdef public double friction_ratio_max, slip_s, normal_force_min, brush_s, sole_k, sole_c
-    cdef public double sole_v, strike_ahead, pull_s, mu, outer_Fx, outer_Fy
-    cdef public double inner_Fx, inner_Fy, foot_outer_acc, leg_outer_acc, leg_inner_acc, foot_inner_acc
-    cdef public double motor_outer_acc, motor_inner_acc, hip_ay, hip_drive, hip_coulomb, hip_viscous
+    cdef public double hip_drive, hip_coulomb, hip_viscous
     cdef public double outer_drive, outer_coulomb, outer_viscous, inner_drive, inner_coulomb, inner_viscous
-    cdef public double extra_hip, extra_outer, extra_inner, extra_outer_motor, extra_inner_motor, M
-    cdef public double mc_outer, mc_inner, mw_outer, mw_inner, J_outer, J_inner
-    cdef public double Jf, JH, JA, el, r, d
-    cdef public double kh, ks, spring_ab, spring_aabb, spring_l0, spring_k
-    cdef public double gx, gy, C_outer, C_inner, heel, toe
-    cdef public double stop_low, stop_high, stop_k, stop_c, inverse_smoothing, closing_rate
-    cdef public double fall_lean, fall_height, fall_split, stall_s, time_s, released_s
-    cdef public double elapsed, P_stance_x, P_stance_y, P_swing_x, P_swing_y
+    cdef public double outer_Fx, outer_Fy, inner_Fx, inner_Fy
+    cdef public double foot_outer_acc, leg_outer_acc, leg_inner_acc, foot_inner_acc, motor_outer_acc, motor_inner_acc
+    cdef public double anchor_outer, anchor_inner, height_outer, height_inner, gap_outer, gap_inner
+    cdef public bint brush, brushing, exact_spring, standing, outer_armed, inner_armed, foothold_due, lock_hip
+    cdef public object terms
+    cdef public double M, el, r, d, gx, gy, kh, ks, Jf, JH, JA, heel, toe, stop_low, stop_high, inverse_smoothing
+    cdef public double mc_outer, mc_inner, mw_outer, mw_inner, J_outer, J_inner, C_outer, C_inner
+    cdef public double elapsed, time_s, released_s, stall_s, strike_ahead, passing_gap
+    cdef public double friction_ratio_max, mu, normal_force_min, fall_height, fall_lean, fall_split
+    cdef public double[16] saved
+    # the rest serves double stance, the sole, events and additional terms
+    cdef public double closing_rate, sole_k, sole_c, sole_v, stop_k, stop_c, hip_ay
+    cdef public double scuff_time_s, slip_s, brush_s, pull_s
+    cdef public double spring_ab, spring_aabb, spring_l0, spring_k
+    cdef public double extra_hip, extra_outer, extra_inner, extra_outer_motor, extra_inner_motor
+    cdef public double P_stance_x, P_stance_y, P_swing_x, P_swing_y
+    cdef public bint unilateral, lift_leading
+    cdef public double[110] matrix
+    cdef public double[10] solution
+    cdef public object parameters, floor, record
+    cdef public str cause
+    cpdef int advance(self, double h) except -1
+    cpdef bint stands(self, long long leg) noexcept
     cpdef void set_slope(self, double slope_rad) noexcept
     cpdef double chain_x(self, double foot, double leg) noexcept
     cpdef double chain_y(self, double foot, double leg) noexcept
@@ -39,7 +46,6 @@ cdef class Body:
     cpdef double ankle_x(self, long long leg) noexcept
     cpdef void update_pose(self) noexcept
     cpdef void update_hip_rates(self) noexcept
-    cpdef bint stands(self, long long leg) noexcept
     cpdef double hip_angle(self) noexcept
     cpdef double hip_rate(self) noexcept
     cpdef dict snapshot(self)
@@ -59,9 +65,8 @@ cdef class Body:
         double ra_s, double ra_w, double up, double un,
     )
     cpdef void in_air(self, double h, long long stages)
-    cpdef void impact(self, bint outer, bint inner)
+    cpdef int impact(self, bint outer, bint inner) except -1
     cpdef void _eliminate(self, long long n) noexcept
-    cpdef void advance(self, double h)
     cdef void _save(self) noexcept
     cdef void _restore(self) noexcept
     cdef double _rise(self, long long leg) noexcept
@@ -73,10 +78,10 @@ cdef class Body:
     cdef double _ahead(self) noexcept
     cdef double _try(self, double h)
     cdef double _locate(self, double h)
-    cdef void _act(self)
+    cdef int _act(self) except -1
     cpdef long long event_time_ns(self) noexcept
-    cdef void _touch(self, long long foot)
-    cdef void _leave(self, long long foot)
-    cdef void _watch(self, double h)
+    cdef int _touch(self, long long foot) except -1
+    cdef int _leave(self, long long foot) except -1
+    cdef int _watch(self, double h) except -1
     cpdef void _keep_forces(self, double h) noexcept
-    cpdef void _fall(self, cause)
+    cpdef int _fall(self, cause) except -1

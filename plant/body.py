@@ -15,7 +15,6 @@ robot, along the (sloped) floor and normal to it.
 
 import cython
 
-from foundation.numbers import reals
 from plant.floor import Floor
 from plant.parameters import BodyParameters
 from plant.walk_record import WalkRecord
@@ -61,7 +60,7 @@ class Body:
         self.hip_y = 0.0
         self.hip_vx = 0.0
         self.hip_vy = 0.0
-        self.saved = reals([0.0] * 16)
+        self.saved = [0.0] * 16
 
         # sines and cosines of the four angles that are named here; `_know_angles` brings them up to date
         self.known_foot_outer = 0.0
@@ -192,8 +191,8 @@ class Body:
         self.P_stance_y = 0.0
         self.P_swing_x = 0.0
         self.P_swing_y = 0.0
-        self.matrix = reals([0.0] * 110)
-        self.solution = reals([0.0] * 10)
+        self.matrix = [0.0] * 110
+        self.solution = [0.0] * 10
         self.place(0.0, 0.3)
 
     def set_slope(self, slope_rad: cython.double) -> cython.void:
@@ -628,6 +627,11 @@ class Body:
         kF = ks_ = kw = kG = kp = kn = 0.0
         qF = qs = qw = qG = qp = qn = 0.0
         for stage in range(stages):
+            # torques of the motors, first: they are calls, and before a call everything in registers is put aside
+            hd = us - uw
+            mp = s_drive - s_coulomb * tanh(up * eps) - s_viscous * up
+            mn = w_drive - w_coulomb * tanh(un * eps) - w_viscous * un
+            Th = hip_drive - hip_coulomb * tanh(hd * eps) - hip_viscous * hd
             if stage != 2:
                 # what depends on angles alone; stages 1 and 2 look at the same ones
                 if stage > 0:
@@ -720,8 +724,9 @@ class Body:
             # torques: cables with the motors behind them, stops, hip
             Ts = pull_s
             Tw = pull_w
-            mp = s_drive - s_coulomb * tanh(up * eps) - s_viscous * up - Ts
-            mn = w_drive - w_coulomb * tanh(un * eps) - w_viscous * un - Tw
+            mp -= Ts
+            mn -= Tw
+            Th -= spring
             if a_s < low or a_s > high:
                 Ts += self._stop(a_s, uF - us)
             if a_w < low or a_w > high:
@@ -729,8 +734,6 @@ class Body:
                 Tw += stop
                 if massless:
                     mn += stop
-            hd = us - uw
-            Th = hip_drive - hip_coulomb * tanh(hd * eps) - hip_viscous * hd - spring
             TF = Ts - Cs * uF
             TG = Tw
             if with_terms:
@@ -1193,7 +1196,7 @@ class Body:
 
     # ---- impacts ----------------------------------------------------------------------------------------------
 
-    def impact(self, outer: cython.bint, inner: cython.bint) -> cython.void:
+    def impact(self, outer: cython.bint, inner: cython.bint) -> None:
         """Rates just after the feet named here are at rest on the floor (EQUATIONS 8).
 
         The motors, behind their cables, keep their rates. Impulses are left in P_stance_* and P_swing_*, where
@@ -1222,7 +1225,7 @@ class Body:
             self.foot_outer_rate,
             self.foot_inner_rate,
         )
-        a = self.matrix
+        a: cython.p_double = self.matrix
         for row in range(110):
             a[row] = 0.0
         # rows of 11: unknowns vx, vy, leg o, leg i, foot o, foot i, impulses; last column the right-hand side
@@ -1271,7 +1274,7 @@ class Body:
                 a[11 * column + row + 1] = -a[11 * (row + 1) + column]
             row += 2
         self._eliminate(n)
-        x = self.solution
+        x: cython.p_double = self.solution
         self.hip_vx = x[0]
         self.hip_vy = x[1]
         self.leg_outer_rate = x[2]
@@ -1301,8 +1304,8 @@ class Body:
         best: cython.longlong
         factor: cython.double
         held: cython.double
-        a = self.matrix
-        x = self.solution
+        a: cython.p_double = self.matrix
+        x: cython.p_double = self.solution
         for k in range(n):
             best = k
             for i in range(k + 1, n):
@@ -1327,7 +1330,7 @@ class Body:
 
     # ---- a step with its events -------------------------------------------------------------------------------
 
-    def advance(self, h: cython.double) -> cython.void:
+    def advance(self, h: cython.double) -> None:
         """Move on by `h` seconds under constant laws of the motors' torques, events located inside (EQUATIONS 15)."""
         remaining: cython.double = h
         used: cython.double
@@ -1358,7 +1361,7 @@ class Body:
             self._watch(h)
 
     def _save(self) -> cython.void:
-        s = self.saved
+        s: cython.p_double = self.saved
         s[0] = self.foot_outer
         s[1] = self.leg_outer
         s[2] = self.leg_inner
@@ -1377,7 +1380,7 @@ class Body:
         s[15] = self.hip_vy
 
     def _restore(self) -> cython.void:
-        s = self.saved
+        s: cython.p_double = self.saved
         self.foot_outer = s[0]
         self.leg_outer = s[1]
         self.leg_inner = s[2]
@@ -1593,7 +1596,7 @@ class Body:
         self._try(high)
         return high
 
-    def _act(self) -> cython.void:
+    def _act(self) -> None:
         """Do what the located event asks for."""
         self.update_hip_rates()
         if self.event == 1:
@@ -1609,7 +1612,7 @@ class Body:
         """Instant of the running event, ns."""
         return self.step_start_ns + int(self.elapsed * 1e9 + 0.5)
 
-    def _touch(self, foot: cython.longlong) -> cython.void:
+    def _touch(self, foot: cython.longlong) -> None:
         """The foot meets the floor: anchor it, take the impact, count a step when it strikes ahead."""
         other: cython.longlong = 1 - foot
         was_flight: cython.bint = self.mode == 3
@@ -1674,7 +1677,7 @@ class Body:
         if self.mode == 1 and self.Jf == 0.0:
             self.limp_foot(other)
 
-    def _leave(self, foot: cython.longlong) -> cython.void:
+    def _leave(self, foot: cython.longlong) -> None:
         """The foot goes off the floor; the other one carries, or none does."""
         if foot == 0:
             self.outer_armed = False
@@ -1696,7 +1699,7 @@ class Body:
         self.record.leave(self.event_time_ns(), foot, self.mode == 3)
         self.changes += 1
 
-    def _watch(self, h: cython.double) -> cython.void:
+    def _watch(self, h: cython.double) -> None:
         """Once per step: arm feet that are clear, draw footholds, keep the extremes, judge falls."""
         s: cython.double
         w: cython.double
@@ -1733,8 +1736,6 @@ class Body:
             if gap < self.passing_gap and -0.05 < self.el * (s - w) < 0.05:
                 self.passing_gap = gap
         self._keep_forces(h)
-        if self.mode == 4:
-            return
         if self.hip_y < self.fall_height * self.el or s > self.fall_lean or s < -self.fall_lean:
             if self.scuff_time_s >= 0.0 and self.time_s - self.scuff_time_s < 0.5:
                 self._fall("tripped")
@@ -1767,7 +1768,7 @@ class Body:
         if self.inner_Fy < self.normal_force_min:
             self.normal_force_min = self.inner_Fy
 
-    def _fall(self, cause) -> cython.void:
+    def _fall(self, cause) -> None:
         """The walk ends here: the body lies still, with the cause."""
         self.mode = 4
         self.cause = cause

@@ -9,21 +9,23 @@ cdef long long _MASK, _TEN_BITS
 
 @cython.final
 cdef class Imu:
-    cdef public double bias_rad_s, noise_rad_s, roll_bias_rad, roll_noise_rad, rate_scale, lag_s, cross_x_from_z
-    cdef public long long filter_samples, latency_ns, baud, sample_ns, fusion_divider, ppb, phase_ns
-    cdef public RandomStream stream
+    # what every step and every packet look at stands first, beside each other
     cdef public ByteBuffer bytes
-    cdef public long long samples, next_sample_ns, line_free_ns, byte_ns, packets, mode, command
-    cdef public long long acknowledge, acknowledge_ns, checksum
-    cdef public double[::1] ring
-    cdef public double ring_sum, lagged, rate_x, roll
+    cdef public long long next_sample_ns, acknowledge, line_free_ns, byte_ns, checksum, mode, samples, packets
+    cdef public double rate_scale, lag_s, cross_x_from_z, bias_rad_s, noise_rad_s, roll_bias_rad, roll_noise_rad
+    cdef public RandomStream stream
+    cdef public long long filter_samples, latency_ns, baud, sample_ns, fusion_divider, ppb, phase_ns
+    cdef public double lagged, rate_x, roll
+    cdef public long long command, acknowledge_ns
+    cdef public double ring_sum
+    cdef public double[64] ring
     cpdef void receive_byte(self, long long time, long long byte) noexcept
     cpdef long long sample_time(self, long long n)
     cpdef bint is_due(self, long long t1) noexcept
-    cpdef void update(
+    cpdef int update(
         self, long long t0, long long t1, double lean0, double rate0, double lean1, double rate1,
         double yaw=*, double yaw_rate=*,
-    )
+    ) except -1
     cpdef void _begin(self) noexcept
     cpdef void _send(self, long long byte) noexcept
     cpdef void _word(self, long long word) noexcept

@@ -22,7 +22,6 @@ ROBOT PARITY: fused angles are the true ones with noise and bias; the device's s
 import cython
 
 from foundation.edge_buffer import ByteBuffer
-from foundation.numbers import reals
 from foundation.random_stream import RandomStream
 from foundation.user_error import UserError
 
@@ -95,7 +94,7 @@ class Imu:
         self.command = 0  # bytes of a command received so far
         self.acknowledge = -1  # command byte to acknowledge
         self.acknowledge_ns = 0
-        self.ring = reals([0.0] * MAX_FILTER)
+        self.ring = [0.0] * 64  # MAX_FILTER
         self.ring_sum = 0.0
         self.lagged = 0.0
         self.rate_x = 0.0  # of the last sample
@@ -136,7 +135,7 @@ class Imu:
         rate1: cython.double,
         yaw: cython.double = 0.0,
         yaw_rate: cython.double = 0.0,
-    ) -> cython.void:
+    ) -> None:
         """Take all samples of [t0, t1) and send what is due: lean (rad) and lean rate (rad/s) at both ends."""
         fraction: cython.double
         rate: cython.double

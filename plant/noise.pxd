@@ -4,8 +4,8 @@ from foundation.random_stream cimport RandomStream
 
 @cython.final
 cdef class NoiseSource:
-    cdef public RandomStream stream
+    cdef public long long left, word
     cdef public double[::1] table
-    cdef public long long word, left
+    cdef public RandomStream stream
     cpdef double normal(self) noexcept
     cpdef long long block(self) noexcept

@@ -11,13 +11,13 @@ Seen from the boards: `motors` with their drives, `encoders` with their edges, `
 import cython
 import numpy as np
 
-from foundation.numbers import integers
 from plant.absolute_encoder import AbsoluteEncoder
 from plant.body import Body
 from plant.electrics import Electrics
 from plant.floor import Floor
 from plant.imu import Imu
 from plant.incremental_encoder import IncrementalEncoder
+from plant.motor_unit import MotorUnit
 from plant.parameters import BodyParameters
 from plant.steering import Steering
 from plant.walk_record import RING
@@ -118,7 +118,7 @@ class RangerPlant:
         self.hip_word = AbsoluteEncoder("hip", 4590, 1, seed=seed)
         self.outer_word = AbsoluteEncoder("outer_ankle", 6562, -1, seed=seed)
         self.inner_word = AbsoluteEncoder("inner_ankle", 1572, 1, seed=seed)
-        self.words = integers(3)
+        self.words = [0, 0, 0]  # of the three absolute encoders
         self.imu = Imu(seed, phase_ns=start_ns)
         self.analog_start = self.electrics.analog_start
         self.analog_end = self.electrics.analog_end
@@ -205,25 +205,30 @@ class RangerPlant:
 
     # ---- passing time -----------------------------------------------------------------------------------------
 
-    def step(self) -> cython.void:
+    def step(self) -> None:
         """Integrate over [time_ns, time_ns + step_ns]; sensors then show this step."""
         b: Body = self.body
         e: Electrics = self.electrics
         s: Steering = self.steering
+        motor: MotorUnit
+        h: cython.double = self.step_s
+        zero: cython.double = self.zero
         t0: cython.longlong = self.time_ns
         t1: cython.longlong = t0 + self.step_ns
-        h0: cython.double = b.leg_outer - b.leg_inner
-        h0_rate: cython.double = b.leg_outer_rate - b.leg_inner_rate
         lean0: cython.double = b.leg_outer
         lean0_rate: cython.double = b.leg_outer_rate
-        p0: cython.double = b.motor_outer + self.zero
+        h0: cython.double = lean0 - b.leg_inner
+        h0_rate: cython.double = lean0_rate - b.leg_inner_rate
+        p0: cython.double = b.motor_outer + zero
         p0_rate: cython.double = b.motor_outer_rate
-        n0: cython.double = b.motor_inner + self.zero
+        n0: cython.double = b.motor_inner + zero
         n0_rate: cython.double = b.motor_inner_rate
-        o0: cython.double = b.foot_outer - b.leg_outer + self.zero
-        o0_rate: cython.double = b.foot_outer_rate - b.leg_outer_rate
-        i0: cython.double = b.foot_inner - b.leg_inner + self.zero
+        o0: cython.double = b.foot_outer - lean0 + zero
+        o0_rate: cython.double = b.foot_outer_rate - lean0_rate
+        i0: cython.double = b.foot_inner - b.leg_inner + zero
         i0_rate: cython.double = b.foot_inner_rate - b.leg_inner_rate
+        lean1: cython.double
+        lean1_rate: cython.double
         h1: cython.double
         h1_rate: cython.double
         o1: cython.double
@@ -234,54 +239,59 @@ class RangerPlant:
 
         e.step_motors(t0, t1, h0_rate, p0_rate, n0_rate, s.rate, self.jumped)
         self.jumped = False
-        b.hip_drive = self.hip.drive_Nm
-        b.hip_coulomb = self.hip.coulomb_Nm
-        b.hip_viscous = self.hip.viscous_Nms
-        b.outer_drive = self.outer_ankle.drive_Nm
-        b.outer_coulomb = self.outer_ankle.coulomb_Nm
-        b.outer_viscous = self.outer_ankle.viscous_Nms
-        b.inner_drive = self.inner_ankle.drive_Nm
-        b.inner_coulomb = self.inner_ankle.coulomb_Nm
-        b.inner_viscous = self.inner_ankle.viscous_Nms
+        motor = self.hip
+        b.hip_drive = motor.drive_Nm
+        b.hip_coulomb = motor.coulomb_Nm
+        b.hip_viscous = motor.viscous_Nms
+        motor = self.outer_ankle
+        b.outer_drive = motor.drive_Nm
+        b.outer_coulomb = motor.coulomb_Nm
+        b.outer_viscous = motor.viscous_Nms
+        motor = self.inner_ankle
+        b.inner_drive = motor.drive_Nm
+        b.inner_coulomb = motor.coulomb_Nm
+        b.inner_viscous = motor.viscous_Nms
 
         b.step_start_ns = t0
-        b.advance(self.step_s)
+        b.advance(h)
 
         outer_stands = b.stands(0)
         inner_stands = b.stands(1)
+        motor = self.steering_motor
         s.advance(
-            self.step_s,
-            self.steering_motor.drive_Nm,
-            self.steering_motor.coulomb_Nm,
-            self.steering_motor.viscous_Nms,
-            self.steering_motor.inverse_smoothing,
+            h,
+            motor.drive_Nm,
+            motor.coulomb_Nm,
+            motor.viscous_Nms,
+            motor.inverse_smoothing,
             outer_stands,
             inner_stands,
             b.hip_x,
         )
 
         self.time_ns = t1
-        h1 = b.leg_outer - b.leg_inner
-        h1_rate = b.leg_outer_rate - b.leg_inner_rate
-        o1 = b.foot_outer - b.leg_outer + self.zero
-        i1 = b.foot_inner - b.leg_inner + self.zero
+        lean1 = b.leg_outer
+        lean1_rate = b.leg_outer_rate
+        h1 = lean1 - b.leg_inner
+        h1_rate = lean1_rate - b.leg_inner_rate
+        o1 = b.foot_outer - lean1 + zero
+        i1 = b.foot_inner - b.leg_inner + zero
         self.hip_joint.update(t0, t1, h0, h0_rate, h1, h1_rate)
         self.hip_motor.update(t0, t1, h0, h0_rate, h1, h1_rate)
-        self.outer_motor.update(t0, t1, p0, p0_rate, b.motor_outer + self.zero, b.motor_outer_rate)
-        self.outer_joint.update(t0, t1, o0, o0_rate, o1, b.foot_outer_rate - b.leg_outer_rate)
-        self.inner_motor.update(t0, t1, n0, n0_rate, b.motor_inner + self.zero, b.motor_inner_rate)
+        self.outer_motor.update(t0, t1, p0, p0_rate, b.motor_outer + zero, b.motor_outer_rate)
+        self.outer_joint.update(t0, t1, o0, o0_rate, o1, b.foot_outer_rate - lean1_rate)
+        self.inner_motor.update(t0, t1, n0, n0_rate, b.motor_inner + zero, b.motor_inner_rate)
         self.inner_joint.update(t0, t1, i0, i0_rate, i1, b.foot_inner_rate - b.leg_inner_rate)
-        self.words[0] = self.hip_word.word(h1, self.step_s)
-        self.words[1] = self.outer_word.word(o1, self.step_s)
-        self.words[2] = self.inner_word.word(i1, self.step_s)
+        self.words[0] = self.hip_word.word(h1, h)
+        self.words[1] = self.outer_word.word(o1, h)
+        self.words[2] = self.inner_word.word(i1, h)
         if self.imu.is_due(t1):
-            yaw_rate: cython.double = (s.yaw - yaw0) / self.step_s
-            self.imu.update(t0, t1, lean0, lean0_rate, b.leg_outer, b.leg_outer_rate, s.yaw, yaw_rate)
+            self.imu.update(t0, t1, lean0, lean0_rate, lean1, lean1_rate, s.yaw, (s.yaw - yaw0) / h)
         e.sense(t0, t1, outer_stands, b.outer_Fy, inner_stands, b.inner_Fy, s.twist)
         if b.changes != self.changes:
             self._note()
 
-    def _note(self) -> cython.void:
+    def _note(self) -> None:
         """Copy what a harness asks for every step out of the record; only after something happened."""
         r = self.record
         self.changes = self.body.changes
