@@ -11,7 +11,6 @@ from boards.modules.motor_limits cimport MotorLimits
 from boards.modules.motor_output cimport MotorOutput
 from boards.modules.network_time cimport NetworkTime
 from boards.modules.quadrature_decoder cimport QuadratureDecoder
-from boards.modules.receiver cimport IntReceiver
 from firmware_sim.microcontroller cimport Microcontroller, Peripheral
 from firmware_sim.peripherals.adc_external cimport Ads7871
 from firmware_sim.peripherals.adc_internal cimport AdcInternal
@@ -53,7 +52,6 @@ cdef class MotorBoard(Microcontroller):
     cdef public Heartbeat heartbeat
     cdef public CanController can_controller
     cdef public Pwm pwm
-    cdef public IntReceiver sleep, shutdown
     cdef public MotorOutput output
     cdef public QuadratureDecoder cap01, cap23
     cdef public EncoderCapture capture01, capture23

@@ -35,7 +35,6 @@ from boards.modules.motor_output import PERIOD_COUNTS, MotorOutput
 from boards.modules.motor_output import PINS as MOTOR_PINS
 from boards.modules.network_time import NetworkTime
 from boards.modules.quadrature_decoder import QuadratureDecoder
-from boards.modules.receiver import IntReceiver
 from boards.quirks import Quirks
 from datatable.generated import errors as codes
 from firmware_sim.microcontroller import Microcontroller, Peripheral
@@ -189,13 +188,9 @@ class MotorBoard(Microcontroller):
         self.can.attach(receive_slot=CAN_RECEIVE_SLOT, error_slot=CAN_ERROR_SLOT)
         # motor
         self.pwm = Pwm(self, period=PERIOD_COUNTS, phase_ns=phase_ns)
-        self.sleep = IntReceiver()
-        self.shutdown = IntReceiver()
         self.output = MotorOutput(
             self.gpio,
             self.pwm,
-            self.sleep,
-            self.shutdown,
             sign=sign,
             largest=largest_duty,
             offset=quirks.alternating_offset_counts,
@@ -250,11 +245,11 @@ class MotorBoard(Microcontroller):
         name = self.table.BOARD + "_"
         for suffix, receiver in (
             ("MOTOR_TARGET_CURRENT", GainReceiver(self.compliance, TARGET)),
-            ("SHUTDOWN", self.shutdown),
+            ("SHUTDOWN", self.output.shutdown),
             ("COMMAND_CURRENT", GainReceiver(self.compliance, COMMAND)),
             ("STIFFNESS", GainReceiver(self.compliance, STIFFNESS)),
             ("DAMPNESS", GainReceiver(self.compliance, DAMPNESS)),
-            ("SLEEP", self.sleep),
+            ("SLEEP", self.output.sleep),
         ):
             self.can.listen(getattr(self.table, name + suffix), receiver)
         self.can.listen(self.table.TIMESTAMP, self.time)
@@ -313,8 +308,8 @@ class MotorBoard(Microcontroller):
     # --- tasks ------------------------------------------------------------------------------------------
 
     def start_internal_adc(self) -> None:
-        """adci_convert_all: battery voltage on AIN1."""
-        if not self.adc_internal.start(BATTERY_VOLTAGE_CHANNEL):
+        """adci_convert_all: battery voltage on AIN1 (BATTERY_VOLTAGE_CHANNEL)."""
+        if not self.adc_internal.start(1):
             self.errors.report(CODE_ADCI_DNF)
 
     def start_absolute_encoder(self) -> None:

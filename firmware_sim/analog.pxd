@@ -12,4 +12,4 @@ cdef class AnalogPins:
     cdef public double[32] start_values, end_values
     cdef public object feed
     cpdef int set_pair(self, long long index, long long t0, double v0, long long t1, double v1) except -1
-    cpdef double volts(self, long long index, long long time) except? -1
+    cpdef double volts(self, long long index, long long time) noexcept

@@ -1,5 +1,6 @@
-# cython: boundscheck=False, wraparound=False
-# (pins are 0 ... 31, held against that where they are set; places are those of the table that is followed)
+# cython: boundscheck=False, wraparound=False, cdivision=True
+# (pins are 0 ... 31, held against that where they are set; places are those of the table that is followed; what is
+# divided by is above 0)
 """Analog voltages at a chip's pins: a straight line per pin between two instants, set from outside."""
 
 import cython
@@ -66,6 +67,8 @@ class AnalogPins:
         t1: cython.longlong
         v0: cython.double
         v1: cython.double
+        passed: cython.double
+        length: cython.double
         if place >= 0:
             t0 = self.feed_times[0]
             t1 = self.feed_times[1]
@@ -80,4 +83,6 @@ class AnalogPins:
             return v1
         if time <= t0:
             return v0
-        return v0 + (v1 - v0) * ((time - t0) / (t1 - t0))
+        passed = time - t0
+        length = t1 - t0
+        return v0 + (v1 - v0) * (passed / length)

@@ -130,7 +130,7 @@ class BuzzerFrequency(Receiver):
         Receiver.__init__(self)
         self.buzzer = buzzer
 
-    def deliver(self, value_word: cython.longlong, time_word: cython.longlong) -> cython.void:
+    def deliver(self, value_word: cython.longlong, time_word: cython.longlong) -> None:
         """A frame came; a negative number is beyond what the buzzer sounds."""
         self.frames += 1
         self.buzzer.frequency_hertz = value_word
@@ -143,7 +143,7 @@ class TuneStart(Receiver):
         Receiver.__init__(self)
         self.buzzer = buzzer
 
-    def deliver(self, value_word: cython.longlong, time_word: cython.longlong) -> cython.void:
+    def deliver(self, value_word: cython.longlong, time_word: cython.longlong) -> None:
         """A frame came."""
         self.frames += 1
         if value_word != 0:
@@ -160,7 +160,7 @@ class ErrorSound(Receiver):
         Receiver.__init__(self)
         self.buzzer = buzzer
 
-    def deliver(self, value_word: cython.longlong, time_word: cython.longlong) -> cython.void:
+    def deliver(self, value_word: cython.longlong, time_word: cython.longlong) -> None:
         """A frame came."""
         self.frames += 1
         if value_word & 0xFFFF:

@@ -82,7 +82,7 @@ class LedReceiver(Receiver):
         self.chip = chip
         self.cycles = 3 * CYCLES_PER_WRITE
 
-    def deliver(self, value_word: cython.longlong, time_word: cython.longlong) -> cython.void:
+    def deliver(self, value_word: cython.longlong, time_word: cython.longlong) -> None:
         """A frame came; the time word is not looked at."""
         self.frames += 1
         self.leds.set_led(self.led, value_word)

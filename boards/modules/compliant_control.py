@@ -68,7 +68,7 @@ class GainReceiver(Receiver):
         self.control = control
         self.what = what
 
-    def deliver(self, value_word: cython.longlong, time_word: cython.longlong) -> cython.void:
+    def deliver(self, value_word: cython.longlong, time_word: cython.longlong) -> None:
         value: cython.longlong = fixed_of_float(float_of_word(value_word))
         self.frames += 1
         if self.what == 0:

@@ -170,7 +170,7 @@ class LcdQuarter(Receiver):
         self.lcd = lcd
         self.quarter = quarter
 
-    def deliver(self, value_word: cython.longlong, time_word: cython.longlong) -> cython.void:
+    def deliver(self, value_word: cython.longlong, time_word: cython.longlong) -> None:
         """A frame came; the time word is not looked at."""
         self.frames += 1
         self.lcd.set_quarter(self.quarter, value_word)

@@ -6,10 +6,10 @@ cimport cython
 @cython.final
 cdef class MotorLimits:
     # what every slot touches
-    cdef public long long thermal, thermal_rate, thermal_limit, thermal_soft, thermal_multiplier
-    cdef public long long excess, excess_multiplier, current_min, current_max
+    cdef public long long thermal, excess
+    cdef public int thermal_rate, thermal_limit, thermal_soft, thermal_multiplier, excess_multiplier
+    cdef public int current_min, current_max, target_min, target_max, speed_soft
     cdef public bint too_hot, overloaded, derating, peak, speed
-    cdef public long long target_min, target_max, speed_soft
     # the rest
     cdef public ErrorModule errors
     cdef public long long thermal_slope, excess_limit, excess_fade, speed_max

@@ -1,17 +1,23 @@
 from boards.modules.receiver cimport IntReceiver
 from firmware_sim.peripherals.gpio cimport Gpio
 from firmware_sim.peripherals.pwm cimport Pwm
+from foundation.numbers cimport wrap_i32
 
 cimport cython
 
 @cython.final
+cdef class OffRequest(IntReceiver):
+    cdef public MotorOutput output
+    cdef public long long bit
+
+@cython.final
 cdef class MotorOutput:
+    cdef public bint stopped, second_pattern
+    cdef public short requests, watchdog_pin, low_side_2_pin, low_side_6_pin
     cdef public Gpio gpio
     cdef public Pwm pwm
-    cdef public IntReceiver sleep, shutdown
-    cdef public bint stopped, second_pattern
     cdef public long long sign, largest, offset, low_side, duty
-    cdef public short watchdog_pin, low_side_2_pin, low_side_6_pin
+    cdef public OffRequest sleep, shutdown
     cpdef bint asleep(self) noexcept
     cpdef bint is_shut_down(self) noexcept
     cpdef bint running(self) noexcept

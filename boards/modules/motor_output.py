@@ -9,6 +9,9 @@ from boards.modules.receiver import IntReceiver
 from firmware_sim.peripherals.gpio import Gpio, p0, p1
 from firmware_sim.peripherals.pwm import Pwm
 
+if not cython.compiled:
+    from foundation.numbers import wrap_i32
+
 PINS = {
     "pwm_lead_2": p0(7),
     "pwm_lead_6": p0(9),
@@ -19,19 +22,41 @@ PINS = {
 PERIOD_COUNTS = 600  # 100 kHz at 60 MHz
 
 
+SLEEP = 1  # bits of `requests`
+SHUTDOWN = 2
+
+
+class OffRequest(IntReceiver):
+    """SLEEP or SHUTDOWN as the main brain sent it last: `bit` of the output's `requests` is set unless its low 15 bits
+    are 0."""
+
+    def __init__(self, output, bit) -> None:
+        IntReceiver.__init__(self)
+        self.output = output
+        self.bit = bit
+
+    def deliver(self, value_word: cython.longlong, time_word: cython.longlong) -> None:
+        self.frames += 1
+        self.value = wrap_i32(value_word)
+        self.output.requests &= ~self.bit
+        if value_word & 0x7FFF != 0:
+            self.output.requests |= self.bit
+
+
 class MotorOutput:
     """Writes a duty (counts of 600, positive drives the motor forward) to alternating leads.
 
     `sign`: of the motor's mounting. `largest`: the duty is clipped to +/- this. `offset`: counts that the
-    second of the two patterns drives more (14 in the firmware of 2016). `sleep`, `shutdown`: what the main
-    brain asked for; only their low 15 bits count. `stopped`: the limits switched the motor off.
+    second of the two patterns drives more (14 in the firmware of 2016). `sleep`, `shutdown`: receivers of what the
+    main brain asks for. `stopped`: the limits switched the motor off.
     """
 
-    def __init__(self, gpio: Gpio, pwm: Pwm, sleep: IntReceiver, shutdown: IntReceiver, sign, largest, offset) -> None:
+    def __init__(self, gpio: Gpio, pwm: Pwm, sign, largest, offset) -> None:
         self.gpio = gpio
         self.pwm = pwm
-        self.sleep = sleep
-        self.shutdown = shutdown
+        self.requests = 0
+        self.sleep = OffRequest(self, SLEEP)
+        self.shutdown = OffRequest(self, SHUTDOWN)
         self.sign = sign
         self.largest = largest
         self.offset = offset
@@ -45,19 +70,19 @@ class MotorOutput:
 
     def asleep(self) -> cython.bint:
         """SLEEP is set: the bridge is open, the watchdog stays fed."""
-        return self.sleep.value & 0x7FFF != 0
+        return self.requests & 1 != 0  # SLEEP
 
     def is_shut_down(self) -> cython.bint:
         """SHUTDOWN is set: no duty, and the watchdog starves."""
-        return self.shutdown.value & 0x7FFF != 0
+        return self.requests & 2 != 0  # SHUTDOWN
 
     def running(self) -> cython.bint:
         """True when the motor may be driven."""
-        return not self.stopped and (self.sleep.value | self.shutdown.value) & 0x7FFF == 0
+        return not self.stopped and self.requests == 0
 
     def feed_watchdog(self) -> None:
         """Toggle the watchdog pin, unless the motor is off or shut down."""
-        if not self.stopped and self.shutdown.value & 0x7FFF == 0:
+        if not self.stopped and self.requests & 2 == 0:  # SHUTDOWN
             self.gpio.toggle(self.watchdog_pin)
 
     def enable_low_side(self, on: cython.longlong) -> None:
@@ -76,7 +101,7 @@ class MotorOutput:
         MR2: cython.longlong = 0
         MR6: cython.longlong = 0
         low_side: cython.longlong = 1
-        if self.stopped or (self.sleep.value | self.shutdown.value) & 0x7FFF:
+        if self.stopped or self.requests != 0:
             duty = 0
             if self.asleep():
                 low_side = 0

@@ -16,7 +16,7 @@ class NetworkTime(Receiver):
         Receiver.__init__(self)
         self.ms = 0
 
-    def deliver(self, value_word: cython.longlong, time_word: cython.longlong) -> cython.void:
+    def deliver(self, value_word: cython.longlong, time_word: cython.longlong) -> None:
         """Both words of the sync frame hold the count; the time word is used, as on the robot."""
         self.frames += 1
         self.ms = time_word

@@ -6,10 +6,11 @@ from foundation.numbers cimport divide_toward_zero
 @cython.final
 cdef class QuadratureDecoder:
     # what an edge and a slot touch
-    cdef public long long count, write, read, edges
-    cdef public long long position, position_gain, position_shift
-    cdef public long long rate, rate_gain, rate_shift, filter_exponent
-    cdef public long long sign, mean, idle, speed, filtered
+    cdef public long long count, position
+    cdef public int position_gain
+    cdef public short position_shift, filter_exponent, write, read, rate_shift, sign
+    cdef public int rate_gain, mean
+    cdef public long long idle, speed, filtered, rate, edges
     cdef public int[64] ring
     # the rest
     cdef public long long glitches, dropped_times

@@ -4,14 +4,13 @@ cimport cython
 
 cdef class Receiver:
     cdef public long long frames
-    cpdef void deliver(self, long long value_word, long long time_word)
+    cpdef int deliver(self, long long value_word, long long time_word) except -1
 
 @cython.final
 cdef class FloatReceiver(Receiver):
     cdef public double value
     cdef public long long fixed
 
-@cython.final
 cdef class IntReceiver(Receiver):
     cdef public long long value
 

@@ -12,7 +12,7 @@ class Receiver:
     def __init__(self) -> None:
         self.frames = 0
 
-    def deliver(self, value_word: cython.longlong, time_word: cython.longlong) -> cython.void:
+    def deliver(self, value_word: cython.longlong, time_word: cython.longlong) -> None:
         """A frame of this identifier was received. Satellites ignore the time word of commands."""
         self.frames += 1
 
@@ -25,7 +25,7 @@ class FloatReceiver(Receiver):
         self.value = 0.0
         self.fixed = 0
 
-    def deliver(self, value_word: cython.longlong, time_word: cython.longlong) -> cython.void:
+    def deliver(self, value_word: cython.longlong, time_word: cython.longlong) -> None:
         self.frames += 1
         self.value = float_of_word(value_word)
         self.fixed = fixed_of_float(self.value)
@@ -38,7 +38,7 @@ class IntReceiver(Receiver):
         Receiver.__init__(self)
         self.value = 0
 
-    def deliver(self, value_word: cython.longlong, time_word: cython.longlong) -> cython.void:
+    def deliver(self, value_word: cython.longlong, time_word: cython.longlong) -> None:
         self.frames += 1
         self.value = wrap_i32(value_word)
 

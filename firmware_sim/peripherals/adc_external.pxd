@@ -6,20 +6,19 @@ from firmware_sim.vic cimport InterruptSource
 @cython.final
 cdef class Ads7871(Peripheral):
     # what a conversion touches
-    cdef public InterruptSource source
-    cdef public long long alarm, conversion_ns, started_time
     cdef public bint busy, done
-    cdef public long long step, length, result, conversions
-    cdef public short[16] sequence, results
-    cdef public short[32] registers
-    cdef public short[16] inputs
-    cdef public short[8] gains
+    cdef public InterruptSource source
+    cdef public long long started_time
+    cdef public short alarm, step, length, register4
+    cdef public long long result, conversions, conversion_ns
     cdef public double scale, reference_V
     cdef public long long offset_counts
+    cdef public short[8] gains
+    cdef public short[16] inputs, sequence, results
     # the rest
     cdef public long long eint, not_finished
     cpdef bint start(self, long long register4) except? -1
     cpdef long long read_result(self) noexcept
     cpdef bint start_sequence(self) except? -1
     cpdef bint sequence_done(self) noexcept
-    cpdef long long convert(self, double volts, long long gain_code) except? <long long>-1
+    cpdef long long convert(self, double volts, long long gain_code) noexcept

@@ -1,5 +1,5 @@
-# cython: boundscheck=False, wraparound=False
-# (entries of the sequence are 0 ... 15, codes are masked to their registers)
+# cython: boundscheck=False, wraparound=False, cdivision=True
+# (entries of the sequence are 0 ... 15, codes are masked to their registers; the reference is above 0)
 """The external 14-bit converter ADS7871 on the SSP, its BUSY pin on an external interrupt.
 
 Writing register 4 with bit 7 set starts a conversion of the channel (bits 0-3) at the gain (bits 4-6); BUSY
@@ -52,7 +52,7 @@ class Ads7871(Peripheral):
         self.scale = scale
         self.offset_counts = offset_counts
         self.source = chip.vic.source(EXTERNAL_INTERRUPT, eint)
-        self.registers = [0] * 32
+        self.register4 = 0
         self.gains = list(GAINS)
         self.inputs = list(range(16))
         self.busy = False
@@ -100,7 +100,7 @@ class Ads7871(Peripheral):
         """Write register 4; False when a conversion is under way (the write is lost)."""
         if self.busy:
             return False
-        self.registers[4] = register4 & 127
+        self.register4 = register4 & 127
         if register4 & 128 == 0:
             return True
         self.busy = True
@@ -110,13 +110,16 @@ class Ads7871(Peripheral):
 
     def on_alarm(self, alarm: cython.longlong, time: cython.longlong) -> cython.void:
         """The conversion is over: result registers 1 and 0 are loaded, BUSY falls."""
-        volts: cython.double = self.chip.analog.volts(self.inputs[self.registers[4] & 15], self.started_time)
-        self.result = self.convert(volts, self.registers[4] >> 4 & 7)
-        self.registers[0] = self.result << 2 & 255
-        self.registers[1] = self.result >> 6 & 255
+        volts: cython.double = self.chip.analog.volts(self.inputs[self.register4 & 15], self.started_time)
+        self.result = self.convert(volts, self.register4 >> 4 & 7)
         self.busy = False
         self.conversions += 1
         self.chip.vic.raise_source(self.source)
+
+    @property
+    def registers(self):
+        """The 32 registers: result in 0 and 1, what was written in 4."""
+        return [self.result << 2 & 255, self.result >> 6 & 255, 0, 0, self.register4] + [0] * 27
 
     def read_result(self) -> cython.longlong:
         """Registers 1 and 0 as one signed number, -8192 ... 8191."""

@@ -3,15 +3,13 @@ cimport cython
 from firmware_sim.microcontroller cimport Peripheral
 from firmware_sim.vic cimport InterruptSource
 
-cdef long long _DONE
-
 @cython.final
 cdef class AdcInternal(Peripheral):
     # what a conversion touches
-    cdef public InterruptSource source
-    cdef public long long alarm, conversion_ns, started_time, channel
-    cdef public long long CR, GDR, result, clkdiv, conversions
     cdef public bint busy
+    cdef public short alarm, channel
+    cdef public InterruptSource source
+    cdef public long long conversion_ns, started_time, CR, GDR, clkdiv, conversions, result
     cdef public double scale, reference_V
     cdef public long long offset_counts
     cdef public short[8] inputs
@@ -19,6 +17,6 @@ cdef class AdcInternal(Peripheral):
     cdef public short[8] channels
     cdef public long long burst_count, burst_start
     cdef public long long hz, not_finished
-    cpdef long long convert(self, double volts) except? <long long>-1
+    cpdef long long convert(self, double volts) noexcept
     cpdef bint start(self, long long channel) except? -1
     cpdef long long DR(self, long long channel) except? <long long>-1

@@ -1,3 +1,5 @@
+# cython: boundscheck=False, wraparound=False
+# (channels are 0 ... 7)
 """The internal 10-bit converter (ADCR, ADGDR, ADDR0 ... ADDR7): single conversions, or burst over channels.
 
 A conversion takes 11 clocks of core clock / clkdiv: 60 MHz / 200 = 300 kHz gives 36.7 us. The input is
@@ -12,9 +14,6 @@ import cython
 from firmware_sim.microcontroller import Peripheral
 from firmware_sim.vic import ADC_DONE
 from foundation.user_error import UserError
-
-# A C variable when compiled (.pxd): Cython makes a Python object of every literal above 31 bits.
-_DONE = 1 << 31
 
 
 class AdcInternal(Peripheral):
@@ -45,6 +44,7 @@ class AdcInternal(Peripheral):
         self.burst_count = 0
         self.burst_start = 0
 
+    @cython.cdivision(True)  # the reference is above 0
     def convert(self, volts: cython.double) -> cython.longlong:
         """Counts for a voltage at the pin."""
         scaled: cython.double = self.scale * volts / self.reference_V * 1024.0
@@ -75,8 +75,9 @@ class AdcInternal(Peripheral):
 
     def on_alarm(self, alarm: cython.longlong, time: cython.longlong) -> cython.void:
         """The conversion is over: ADGDR holds result, channel and the DONE bit."""
+        done: cython.longlong = 128  # bit 31 of ADGDR, above the channel
         self.result = self.convert(self.chip.analog.volts(self.inputs[self.channel], self.started_time))
-        self.GDR = self.result << 6 | self.channel << 24 | _DONE
+        self.GDR = self.result << 6 | (done | self.channel) << 24
         self.busy = False
         self.conversions += 1
         self.chip.vic.raise_source(self.source)

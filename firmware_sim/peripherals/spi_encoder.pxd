@@ -7,8 +7,10 @@ from firmware_sim.vic cimport InterruptSource
 cdef class SpiEncoder(Peripheral):
     # what a transfer touches
     cdef public bint busy
+    cdef public short alarm, word
     cdef public InterruptSource source
-    cdef public long long alarm, transfer_ns, word, mask, latched, SPDR, SPSR, transfers
+    cdef public int mask, latched, SPDR, SPSR
+    cdef public long long transfer_ns, transfers
     # the rest
     cdef public long long number, bits, bit_rate, not_finished
     cpdef bint start(self) except? -1

@@ -13,11 +13,11 @@ cdef class SspSegment:
 
 @cython.final
 cdef class SspPort(Peripheral):
+    cdef public bint fresh
+    cdef public int number
     cdef public InterruptSource source
     cdef public SspSegment received, loaded
-    cdef public long long received_time, exchanges, number
-    cdef public bint fresh
-    cdef public long long overwritten
+    cdef public long long received_time, exchanges, overwritten
     cpdef void start(self, SspSegment segment) noexcept
     cpdef void load(self, SspSegment segment) noexcept
     cpdef SspSegment take(self)

@@ -7,20 +7,21 @@ from firmware_sim.vic cimport InterruptSource
 @cython.final
 cdef class TimerCapture(Peripheral):
     # what an edge and a wrap touch
-    cdef public long long IR, CCR
+    cdef public short IR, CCR
+    cdef public int alarm
     cdef public long long wrap_time, next_wrap_time
+    cdef public TickTrain ticks
+    cdef public long long period_ns
     cdef public double counts_per_ns
     cdef public long long MR0
     cdef public unsigned int[4] captures
     cdef public InterruptSource source0, source1, source2, source3
     cdef public long long[4] captured
     cdef public InterruptSource match_source
-    cdef public TickTrain ticks
-    cdef public long long alarm
     # the rest
     cdef public long long[4] lost
     cdef public short[4] pins
-    cdef public long long number, period_ns, phase_ns, hz
+    cdef public long long number, phase_ns, hz
     cdef public bint match_interrupt
     cdef InterruptSource source_of(self, long long channel)
     cpdef long long CR(self, long long channel) except? <long long>-1
