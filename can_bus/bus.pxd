@@ -9,51 +9,55 @@ cimport cython
 
 cdef long long _MASK, _NEVER
 
+# In both classes what every frame touches stands in front: few lines of the processor's cache.
+
 @cython.final
 cdef class Node:
-    cdef public str name
-    cdef public long long index, controller, order
     cdef public EventQueue inbox
-    cdef public bint listening, passive, warning
-    cdef public long long mode, transmit_errors, receive_errors
+    cdef public Node following
+    cdef public int order, controller, mode
+    cdef public bint listening
+    cdef public int transmit_errors, receive_errors
+    cdef public bint passive, warning
+    cdef public long long sent, received
+    cdef public str name
+    cdef public long long index
     cdef public long long sequences_left, join_from, suspend_bit, sending_end
-    cdef public long long accepted, refused, sent, received, aborted, single_shot_skipped, flushed
+    cdef public long long refused, aborted, single_shot_skipped, flushed
     cdef public long long arbitrations_lost, retries
 
 @cython.final
 cdef class Bus:
-    cdef public str name
-    cdef public long long bitrate
-    cdef public object seed
-    cdef public list nodes
-    cdef public EventQueue commands
     # the bus in absolute bits since power-up
-    cdef public long long free_bit, free_time, quiet_bit, advanced, next_bit, next_time
-    cdef public long long second_bit, second_ns, bit_ns, bit_rest, intermission_ns, intermission_rest
-    cdef public long long[::1] wakes
+    cdef public long long next_time, next_bit, advanced, free_time, free_bit, bitrate, next_change
+    # transmit buffers
+    cdef public long long first, pending_count, node_count, operating, joining, suspended_until
+    cdef public long long[::1] rows
+    cdef public long long next_strike, second_bit, second_ns, bit_ns, bit_rest, intermission_ns, intermission_rest
+    cdef public list nodes
+    cdef public FrameStream trace
+    cdef public long long frames, bits, window_busy, window_end
+    cdef public long long[::1] identifiers
     cdef public long long wake_place
-    cdef public long long operating, joining
-    # transmit buffers, index node * 3 + buffer - 1
-    cdef public long long[::1] keys, ready, asked, asked_time, identifiers, flags, lows, highs, busy_until
-    cdef public long long[::1] pending
-    cdef public long long pending_count
+    cdef public long long[::1] wakes
+    cdef public str name
+    cdef public object seed
+    cdef public EventQueue commands
     # disturbances
     cdef public RandomStream noise
     cdef public double bit_error_rate
-    cdef public long long next_noise_bit, next_planned_bit, next_strike, strikes_left, strike_position
+    cdef public long long next_noise_bit, next_planned_bit, strikes_left, strike_position
     cdef public list planned_bits
     # statistics
-    cdef public long long accepted, frames, merged, bits, lost, single_shot_skipped, retries, errors, refused
+    cdef public long long merged, lost, single_shot_skipped, single_shot_dropped, retries, errors, refused
     cdef public long long arbitrations_lost, aborted, flushed, late_results, late_requests
-    cdef public long long[::1] frames_by_identifier, response_max_ns
     cdef public dict frames_by_extended_identifier
-    cdef public long long origin_bit, window_bits, window_end, window_busy, window_busy_max, window_count
+    cdef public long long origin_bit, window_bits, window_busy_max, window_count
     cdef public long long[::1] windows
     # frame log
     cdef public long long[::1] log
     cdef public long long log_capacity, log_count, log_dropped
     cdef public object log_sink
-    cdef public FrameStream trace
 
     cpdef long long bit_of(self, long long time) noexcept
     cpdef long long edge_ns(self, long long bit) noexcept
@@ -65,15 +69,14 @@ cdef class Bus:
     cpdef void set_mode(self, long long node, long long mode, long long time)
     cpdef long long advance(self, long long until) except? <long long>-1
     cpdef long long pending_of(self, long long node) noexcept
-    cdef long long _key_of(self, long long identifier, long long flags) except? <long long>-1
     cdef bint _change(self, long long until) except? -1
     cdef long long _next_join(self) except? <long long>-1
     cdef void _look_ahead(self) noexcept
-    cdef void _remove(self, long long slot) noexcept
+    cdef void _remove(self, long long row) noexcept
     cdef long long _attempt(self, long long k) except? <long long>-1
-    cdef long long _arbitrate(self, long long k) noexcept
-    cdef bint _contend(self, long long k, long long best) except? -1
-    cdef long long _finish_sender(self, Node node, long long slot, long long end, long long done) except? <long long>-1
+    cdef long long _key(self, long long row) noexcept
+    cdef long long _arbitrate(self, long long k) except? <long long>-1
+    cdef bint _contend(self, long long k, long long best, long long best_key) except? -1
     cdef void _split_windows(self, long long first) noexcept
     cdef void _roll(self, long long bit) noexcept
     cdef long long _record(

@@ -1,4 +1,4 @@
-# cython: boundscheck=False, wraparound=False
+# cython: boundscheck=False, wraparound=False, initializedcheck=False
 # (every index below counts nodes, transmit buffers or logged frames, or is an identifier that `request` has checked)
 """One CAN bus to the bit: arbitration, timing, acknowledgement, errors and load.
 
@@ -30,11 +30,11 @@ from foundation.events import (
     NEVER,
     TX_ABORTED,
     TX_LOST,
+    TX_SENT,
     EventQueue,
 )
 from foundation.numbers import integers
 from foundation.random_stream import RandomStream
-from foundation.row_stream import FrameStream
 
 if not cython.compiled:
     from math import log
@@ -70,6 +70,17 @@ WINDOW_RING = 1024  # closed load windows kept, 10.24 s
 COMMAND_ABORT = 1
 COMMAND_MODE = 2
 
+# A transmit buffer is a row of eight numbers in `Bus.rows`; buffer 1 ... 3 of a node begins at node * 32 + buffer * 8.
+ROW = 8
+FREE_AT = 0  # instant from which it takes a frame, ns; NEVER while it holds one
+READY = 1  # bit at which its frame may start; NEVER + that bit while its node is joining
+ASKED = 2  # instant of the request, ns
+NEXT = 3  # the row that waits behind this one, -1 for none
+IDENTIFIER = 4
+FLAGS = 5
+LOW = 6  # word 0
+HIGH = 7  # word 1
+
 # C variables when compiled (.pxd): Cython makes a Python object of every literal above 31 bits.
 _MASK = 0xFFFFFFFF
 _NEVER = NEVER
@@ -78,30 +89,31 @@ _NEVER = NEVER
 class Node:
     """A controller on a bus, with its error counters (ISO 11898-1) and what it did so far.
 
-    `listening`: it wants what it receives (a node that does not still acknowledges). `flushed`: frames
-    that waited when it went bus-off. `refused`: requests into an occupied buffer or while off the bus.
+    `following`: the next one of the bus; behind the last comes the first. `listening`: it wants what it receives (a
+    node that does not still acknowledges). `flushed`: frames that waited when it went bus-off. `refused`: requests
+    into an occupied buffer or while off the bus.
     """
 
     def __init__(self, name, index, inbox, controller, order) -> None:
-        self.name = name
-        self.index = index
         self.inbox = inbox
-        self.controller = controller
+        self.following = self
         self.order = order
-        self.listening = True
+        self.controller = controller
         self.mode = 0  # OPERATING
+        self.listening = True
         self.transmit_errors = 0
         self.receive_errors = 0
         self.passive = False
         self.warning = False
+        self.sent = 0
+        self.received = 0
+        self.name = name
+        self.index = index
         self.sequences_left = 0
         self.join_from = 0
         self.suspend_bit = 0
         self.sending_end = -1
-        self.accepted = 0
         self.refused = 0
-        self.sent = 0
-        self.received = 0
         self.aborted = 0
         self.single_shot_skipped = 0
         self.flushed = 0
@@ -129,28 +141,19 @@ class Bus:
         self.bitrate = bitrate
         self.seed = seed
         self.nodes = []
+        self.node_count = 0
+        self.operating = 0
+        self.joining = 0
+        self.suspended_until = 0  # the last bit up to which a node has been suspended
         self.commands = EventQueue(16)
-        self.free_bit = 0  # after the intermission of the last frame; its instant:
-        self.free_time = 0
-        self.quiet_bit = 0
+        self.next_change = NEVER  # the instant of the first command; -1 while a node is joining
         self.advanced = -1
         self.next_bit = NEVER  # where the next frame starts, as far as known
         self.next_time = NEVER
         self.wakes = integers(1)
         self.wake_place = 0
-        self.operating = 0
-        self.joining = 0
-        empty = integers(0)
-        self.keys = empty
-        self.ready = empty
-        self.asked = empty
-        self.asked_time = empty
-        self.identifiers = empty
-        self.flags = empty
-        self.lows = empty
-        self.highs = empty
-        self.busy_until = empty
-        self.pending = empty
+        self.rows = integers(0)
+        self.first = -1  # of the rows that wait, in no order
         self.pending_count = 0
         self.noise = None
         self.bit_error_rate = 0.0
@@ -160,6 +163,8 @@ class Bus:
         self.strikes_left = 0
         self.strike_position = -1
         self.planned_bits = []
+        self.free_bit = 0  # after the intermission of the last frame; its instant:
+        self.free_time = 0
         # the second in which the last frame began: its first bit and its instant
         self.second_bit = 0
         self.second_ns = 0
@@ -176,12 +181,12 @@ class Bus:
 
     def reset_statistics(self, time) -> None:
         """Set every statistic to zero; loads count from `time` (ns) on. Waiting frames count as accepted."""
-        self.accepted = self.pending_count
         self.frames = 0
         self.merged = 0
         self.bits = 0
         self.lost = 0
         self.single_shot_skipped = 0
+        self.single_shot_dropped = 0
         self.retries = 0
         self.errors = 0
         self.refused = 0
@@ -190,8 +195,7 @@ class Bus:
         self.flushed = 0
         self.late_results = 0
         self.late_requests = 0
-        self.frames_by_identifier = integers(2048)
-        self.response_max_ns = integers(2048)
+        self.identifiers = integers(2 * 2048)  # by standard identifier: frames, longest response in ns
         self.frames_by_extended_identifier = {}
         self.origin_bit = self.bit_of(time)
         self.window_end = self.origin_bit + self.window_bits
@@ -199,6 +203,22 @@ class Bus:
         self.window_busy_max = 0
         self.window_count = 0
         self.windows = integers(WINDOW_RING)
+
+    @property
+    def accepted(self) -> int:
+        """Requests taken; what waited when the statistics were set to zero counts."""
+        over = self.frames + self.merged + self.aborted + self.flushed + self.single_shot_dropped
+        return over + self.pending_count
+
+    @property
+    def frames_by_identifier(self) -> list:
+        """Frames sent whole, by standard identifier."""
+        return list(self.identifiers[0::2])
+
+    @property
+    def response_max_ns(self) -> list:
+        """Longest time from a request to the end of its frame, by standard identifier, ns."""
+        return list(self.identifiers[1::2])
 
     # ---- time
 
@@ -229,26 +249,19 @@ class Bus:
         `inbox`: EventQueue that gets CAN_RX, CAN_TX_DONE and CAN_STATUS, with `controller` as field a and
         `order` (stage * 256 + source) as the queue's order.
         """
+        node: Node
         index = len(self.nodes)
-        self.nodes.append(Node(name, index, inbox, controller, order))
+        node = Node(name, index, inbox, controller, order)
+        if self.nodes:
+            node.following = self.nodes[0]
+            self.nodes[index - 1].following = node
+        self.nodes.append(node)
+        self.node_count += 1
         self.operating += 1
-        for field, filler in (
-            ("keys", 0),
-            ("ready", NEVER),
-            ("asked", 0),
-            ("asked_time", 0),
-            ("identifiers", 0),
-            ("flags", 0),
-            ("lows", 0),
-            ("highs", 0),
-            ("busy_until", 0),
-            ("pending", 0),
-        ):
-            before = getattr(self, field)
-            grown = integers(len(before) + BUFFERS, filler)
-            for slot in range(len(before)):
-                grown[slot] = before[slot]
-            setattr(self, field, grown)
+        before = self.rows
+        self.rows = integers(4 * ROW * self.node_count)
+        for place in range(len(before)):
+            self.rows[place] = before[place]
         return index
 
     @cython.cdivision(True)  # instants are not negative
@@ -269,28 +282,15 @@ class Bus:
         node is off the bus. FLAG_SINGLE_SHOT: one attempt; a lost arbitration or an error ends it with
         TX_LOST. ValueError for a node, buffer, identifier or flag that does not exist.
         """
-        owner: Node
-        slot: cython.longlong
-        key: cython.longlong = identifier << 21
         first: cython.longlong
         start: cython.longlong
         second: cython.longlong
         billion: cython.longlong = 1000000000
-        if node < 0 or node >= len(self.nodes):
-            raise ValueError(f"bus {self.name}: node {node} does not exist")
-        if buffer < 1 or buffer > 3:
-            raise ValueError(f"bus {self.name}: transmit buffer {buffer} is not one of 1, 2, 3")
+        row: cython.longlong = (node << 5) + (buffer << 3)
+        if node < 0 or node >= self.node_count or buffer < 1 or buffer > 3:
+            self._no_such_buffer(node, buffer)
         if flags & ~32 != 8 or identifier < 0 or identifier > 0x7FF:  # no standard frame of eight bytes
-            key = self._key_of(identifier, flags)
-        owner = self.nodes[node]
-        slot = node * 3 + buffer - 1
-        if time < self.busy_until[slot]:
-            self._refuse(owner, flags)
-            return False
-        if owner.mode == 1 or owner.mode == 2:  # RESET, BUS_OFF
-            self._refuse(owner, flags)
-            owner.inbox.push(time, owner.order, CAN_TX_DONE, owner.controller, buffer, TX_ABORTED)
-            return False
+            self._check_frame(identifier, flags)
         lo &= _MASK
         hi &= _MASK
         if flags & ~32 != 8:
@@ -302,6 +302,11 @@ class Bus:
                 hi = 0
             elif flags & 15 < 8:
                 hi &= (1 << 8 * ((flags & 15) - 4)) - 1
+        if time < self.rows[row]:  # FREE_AT
+            self._refuse(node, flags)
+            return False
+        if self.operating < self.node_count and self._is_off(node, buffer, time, flags):
+            return False
         if time < self.advanced:
             # stamped before what has been decided: it takes part from here on
             self.late_requests += 1
@@ -315,25 +320,25 @@ class Bus:
             first = (time - second * billion) * self.bitrate // billion + 1
             start = second * billion + (first * billion + self.bitrate - 1) // self.bitrate
             first += second * self.bitrate
-        self.asked[slot] = first
-        self.asked_time[slot] = time
-        if first < owner.suspend_bit:
-            first = owner.suspend_bit
+        if first < self.suspended_until:
+            first = self._after_suspension(node, first)
             start = self.edge_ns(first)
-        self.keys[slot] = key
-        self.identifiers[slot] = identifier
-        self.flags[slot] = flags
-        self.lows[slot] = lo
-        self.highs[slot] = hi
-        self.busy_until[slot] = _NEVER
-        self.pending[self.pending_count] = slot
+        if cython.compiled:
+            self.rows[row] = _NEVER
+            self.rows[row + 1] = first
+            self.rows[row + 2] = time
+            self.rows[row + 3] = self.first
+            self.rows[row + 4] = identifier
+            self.rows[row + 5] = flags
+            self.rows[row + 6] = lo
+            self.rows[row + 7] = hi
+        else:
+            self.rows[row : row + 8] = (_NEVER, first, time, self.first, identifier, flags, lo, hi)
+        self.first = row
         self.pending_count += 1
-        self.accepted += 1
-        owner.accepted += 1
-        if owner.mode == 3:  # JOINING: held until the node takes part
-            self.ready[slot] = _NEVER
+        if self.joining > 0 and self.nodes[node].mode == JOINING:  # held until the node takes part
+            self.rows[row + 1] += _NEVER  # READY
             return True
-        self.ready[slot] = first
         if first < self.next_bit:
             self.next_bit = first
         if start < self.next_time:
@@ -342,8 +347,13 @@ class Bus:
                 self.wakes[self.wake_place] = start
         return True
 
-    def _key_of(self, identifier: cython.longlong, flags: cython.longlong) -> cython.longlong:
-        """The arbitration key of a frame that can be sent; else ValueError."""
+    def _no_such_buffer(self, node, buffer) -> None:
+        if node < 0 or node >= self.node_count:
+            raise ValueError(f"bus {self.name}: node {node} does not exist")
+        raise ValueError(f"bus {self.name}: transmit buffer {buffer} is not one of 1, 2, 3")
+
+    def _check_frame(self, identifier, flags) -> None:
+        """ValueError for a frame that cannot be sent."""
         if flags & 64:  # FLAG_EXTENDED
             if identifier < 0 or identifier > 0x1FFFFFFF:
                 raise ValueError(f"bus {self.name}: identifier {identifier} does not fit in 29 bits")
@@ -351,14 +361,28 @@ class Bus:
             raise ValueError(f"bus {self.name}: identifier {identifier} does not fit in 11 bits")
         if flags & ~0x7F:  # length code, remote, single shot, extended
             raise ValueError(f"bus {self.name}: flags {flags:#x} of identifier {identifier:#x} cannot be sent")
-        return arbitration_key(identifier, flags)
 
-    def _refuse(self, owner, flags) -> None:
+    def _refuse(self, node, flags) -> None:
+        owner: Node = self.nodes[node]
         self.refused += 1
         owner.refused += 1
         if flags & 32:  # FLAG_SINGLE_SHOT
             self.single_shot_skipped += 1
             owner.single_shot_skipped += 1
+
+    def _is_off(self, node, buffer, time, flags) -> bool:
+        """True, and its request is refused and answered, when a node is off the bus."""
+        owner: Node = self.nodes[node]
+        if owner.mode != RESET and owner.mode != BUS_OFF:
+            return False
+        self._refuse(node, flags)
+        owner.inbox.push(time, owner.order, CAN_TX_DONE, owner.controller, buffer, TX_ABORTED)
+        return True
+
+    def _after_suspension(self, node, first) -> int:
+        """The bit `first`, or a later one up to which the node is suspended."""
+        owner: Node = self.nodes[node]
+        return max(first, owner.suspend_bit)
 
     def abort(self, node: cython.longlong, buffer: cython.longlong, time: cython.longlong) -> cython.void:
         """Take back, at `time` (ns), the frame waiting in a transmit buffer.
@@ -382,6 +406,7 @@ class Bus:
         if node < 0 or node >= len(self.nodes):
             raise ValueError(f"bus {self.name}: node {node} does not exist")
         self.commands.push(max(time, self.advanced), 0, kind, node, value)
+        self._note_changes()
         self.next_time = min(self.next_time, self.commands.head_time)
         self.wakes[self.wake_place] = min(self.wakes[self.wake_place], self.next_time)
 
@@ -396,6 +421,7 @@ class Bus:
         """
         self.strikes_left = count
         self.strike_position = position
+        self._aim()
 
     def inject_error_at(self, time) -> None:
         """Invert the bus level during the bit at `time` (ns); an idle bit feels nothing.
@@ -408,7 +434,7 @@ class Bus:
         self.planned_bits.append(bit)
         self.planned_bits.sort()
         self.next_planned_bit = self.planned_bits[0]
-        self.next_strike = min(self.next_planned_bit, self.next_noise_bit)
+        self._aim()
 
     def set_bit_error_rate(self, rate) -> None:
         """Invert each bit with probability `rate` (0 ... 0.1) from now on, from a stream of its own."""
@@ -419,7 +445,11 @@ class Bus:
         self.bit_error_rate = rate
         self.next_noise_bit = max(self.bit_of(self.advanced), 0)
         self._draw_noise()
-        self.next_strike = min(self.next_planned_bit, self.next_noise_bit)
+        self._aim()
+
+    def _aim(self) -> None:
+        """Set `next_strike` to the next bit that is hit, -1 when the next frame is, wherever it lies."""
+        self.next_strike = -1 if self.strikes_left > 0 else min(self.next_planned_bit, self.next_noise_bit)
 
     def _draw_noise(self) -> None:
         """The next disturbed bit: distances between them are exponential with mean 1 / rate."""
@@ -448,9 +478,9 @@ class Bus:
             # what fell on idle bits is forgotten; the distance to the next one has no memory
             self.next_noise_bit = first - 1
             self._draw_noise()
-            self.next_strike = min(self.next_planned_bit, self.next_noise_bit)
-        if self.next_strike < last and position < 0:
-            position = self.next_strike - first
+        if min(self.next_planned_bit, self.next_noise_bit) < last and position < 0:
+            position = min(self.next_planned_bit, self.next_noise_bit) - first
+        self._aim()
         if position < 0:
             return -1
         return min(max(position, vulnerable), last - first - 1)
@@ -459,7 +489,6 @@ class Bus:
         """The first planned disturbance is over."""
         self.planned_bits.pop(0)
         self.next_planned_bit = self.planned_bits[0] if self.planned_bits else NEVER
-        self.next_strike = min(self.next_planned_bit, self.next_noise_bit)
 
     # ---- passing of time
 
@@ -473,16 +502,18 @@ class Bus:
         if until > self.advanced:
             self.advanced = until  # decided, also where nothing starts
         while self.next_time <= until:
-            if self.commands.head_time == _NEVER and self.joining == 0:
+            if self.next_change > until or not self._change(until):
                 self._attempt(self.next_bit)
-            elif not self._change(until):
-                self._attempt(self.next_bit)
-            if self.pending_count == 0 and self.commands.head_time == _NEVER and self.joining == 0:
+            if self.first < 0 and self.next_change == _NEVER:
                 self.next_bit = _NEVER
                 self.next_time = _NEVER
             else:
                 self._look_ahead()
         return self.next_time
+
+    def _note_changes(self) -> None:
+        """Set `next_change` after a command came or went, or a node began or ended to join."""
+        self.next_change = -1 if self.joining > 0 else self.commands.head_time
 
     def _change(self, until: cython.longlong) -> cython.bint:
         """Carry out the abort or mode change, or let the nodes join, that come before the next frame, if any do."""
@@ -495,6 +526,8 @@ class Bus:
         if join <= last and join <= self.next_bit:
             self._join(join)
             return True
+        if self.joining > 0:
+            self._count_sequences(self.next_bit)
         return False
 
     def _next_join(self) -> cython.longlong:
@@ -506,7 +539,7 @@ class Bus:
             return first
         for node in self.nodes:
             if node.mode == 3:  # JOINING
-                join = max(self.quiet_bit, node.join_from) + 11 * node.sequences_left
+                join = max(self.free_bit - 11, node.join_from) + 11 * node.sequences_left
                 if join < first:
                     first = join
         return first
@@ -514,24 +547,23 @@ class Bus:
     def _look_ahead(self) -> cython.void:
         """Set `next_bit` and `next_time` from what waits."""
         first: cython.longlong = _NEVER
-        ready: cython.longlong
-        i: cython.longlong
-        for i in range(self.pending_count):
-            ready = self.ready[self.pending[i]]
-            if ready < first:
-                first = ready
+        row: cython.longlong = self.first
+        while row >= 0:
+            if self.rows[row + 1] < first:  # READY
+                first = self.rows[row + 1]
+            row = self.rows[row + 3]  # NEXT
         if first <= self.free_bit:
             self.next_bit = self.free_bit
             self.next_time = self.free_time
         else:
             self.next_bit = first
             self.next_time = self.edge_ns(first) if first < _NEVER else _NEVER
-        if self.joining > 0:
+        if self.next_change < _NEVER:
             first = self._next_join()
             if first < self.next_bit:
                 self.next_time = self.edge_ns(first)
-        if self.commands.head_time < self.next_time:
-            self.next_time = self.commands.head_time
+            if self.commands.head_time < self.next_time:
+                self.next_time = self.commands.head_time
 
     def _execute(self) -> None:
         """Carry out the first abort or mode change."""
@@ -541,13 +573,13 @@ class Bus:
         time = commands.time
         node = self.nodes[commands.a]
         if commands.kind == COMMAND_ABORT:
-            slot = commands.a * BUFFERS + commands.b - 1
-            if 1 <= commands.b <= BUFFERS and self.busy_until[slot] == NEVER:
+            row = (4 * commands.a + commands.b) * ROW
+            if 1 <= commands.b <= BUFFERS and self.rows[row] == NEVER:  # FREE_AT
                 self.aborted += 1
                 node.aborted += 1
                 if node.mode == OPERATING:
-                    time = max(time, self.edge_ns(self.ready[slot]))  # after a failed attempt: at its end
-                self._drop(node, slot, time, TX_ABORTED)
+                    time = max(time, self.edge_ns(self.rows[row + READY]))  # after a failed attempt: at its end
+                self._drop(node, row, time, TX_ABORTED)
         elif commands.b == RESET:
             if node.mode == OPERATING:
                 self.operating -= 1
@@ -556,15 +588,16 @@ class Bus:
                 self.joining -= 1
                 # reset does not spare a bus-off node its recovery
                 node.mode = BUS_OFF if node.transmit_errors >= BUS_OFF_LIMIT else RESET
-            for slot in self._waiting(node):
+            for row in self._waiting(node):
                 self.aborted += 1
                 node.aborted += 1
-                self._drop(node, slot, time, TX_ABORTED)
+                self._drop(node, row, time, TX_ABORTED)
         elif node.mode == RESET or node.mode == BUS_OFF:
             node.sequences_left = RECOVERY_SEQUENCES if node.mode == BUS_OFF else 1
             node.join_from = self.bit_of(time) + 1
             node.mode = JOINING
             self.joining += 1
+        self._note_changes()
 
     def _join(self, bit) -> None:
         """Let every node whose sequences are complete at `bit` take part."""
@@ -572,7 +605,7 @@ class Bus:
         for node in self.nodes:
             if node.mode != JOINING:
                 continue
-            if max(self.quiet_bit, node.join_from) + SEQUENCE_BITS * node.sequences_left > bit:
+            if max(self.free_bit - SEQUENCE_BITS, node.join_from) + SEQUENCE_BITS * node.sequences_left > bit:
                 continue
             node.mode = OPERATING
             node.sequences_left = 0
@@ -584,132 +617,226 @@ class Bus:
                 node.passive = False
                 node.warning = False
                 self._tell(node, self.edge_ns(bit), ICR_ERROR_WARNING)
-            for slot in self._waiting(node):
-                self.ready[slot] = max(self.asked[slot], bit)
+            for row in self._waiting(node):
+                self.rows[row + READY] = max(self.rows[row + READY] - NEVER, bit)
+        self._note_changes()
 
     def _waiting(self, node) -> list:
-        """Slots of a node that wait, lowest buffer first."""
-        first = node.index * BUFFERS
-        return [slot for slot in range(first, first + BUFFERS) if self.busy_until[slot] == NEVER]
+        """Rows of a node that wait, lowest buffer first."""
+        rows = [(4 * node.index + buffer) * ROW for buffer in range(1, BUFFERS + 1)]
+        return [row for row in rows if self.rows[row] == NEVER]  # FREE_AT
+
+    def rows_waiting(self) -> list:
+        """Rows of all nodes that wait, in no order."""
+        found = []
+        row = self.first
+        while row >= 0:
+            found.append(row)
+            row = self.rows[row + NEXT]
+        return found
+
+    def alone_and_passive(self) -> bool:
+        """True while what waits cannot be acknowledged, by nobody, and only repeats."""
+        if self.pending_count == 0 or self.operating >= 2 or self.joining or self.commands.count:
+            return False
+        return all(self.nodes[row // (4 * ROW)].passive for row in self.rows_waiting())
+
+    def hold_off(self, bit) -> None:
+        """No attempt before `bit`: what waits is not ready before."""
+        for row in self.rows_waiting():
+            self.rows[row + READY] = max(self.rows[row + READY], bit)
+        self.next_time = max(self.next_time, self.edge_ns(bit))
 
     def pending_of(self, node: cython.longlong) -> cython.longlong:
         """Frames that wait in the transmit buffers of `node`."""
         count: cython.longlong = 0
-        i: cython.longlong
-        for i in range(self.pending_count):
-            if self.pending[i] // 3 == node:
+        row: cython.longlong = self.first
+        while row >= 0:
+            if row >> 5 == node:
                 count += 1
+            row = self.rows[row + 3]  # NEXT
         return count
 
-    def _remove(self, slot: cython.longlong) -> cython.void:
-        """Take a slot off the list of those that wait."""
-        i: cython.longlong
-        last: cython.longlong = self.pending_count - 1
-        for i in range(last + 1):
-            if self.pending[i] == slot:
-                self.pending[i] = self.pending[last]
-                break
-        self.pending_count = last
+    def _remove(self, row: cython.longlong) -> cython.void:
+        """Take a row off the list of those that wait."""
+        before: cython.longlong = self.first
+        following: cython.longlong = self.rows[row + 3]  # NEXT
+        self.pending_count -= 1
+        if before == row:
+            self.first = following
+            return
+        while self.rows[before + 3] != row:
+            before = self.rows[before + 3]
+        self.rows[before + 3] = following
 
-    def _drop(self, node, slot, time, status) -> None:
+    def _drop(self, node, row, time, status) -> None:
         """End a waiting request without success, answered at `time`."""
-        self._remove(slot)
-        self.busy_until[slot] = time
+        self._remove(row)
+        self.rows[row] = time  # FREE_AT
         if time <= self.advanced:
             self.late_results += 1
-        node.inbox.push(time, node.order, CAN_TX_DONE, node.controller, slot % BUFFERS + 1, status)
+        node.inbox.push(time, node.order, CAN_TX_DONE, node.controller, row // ROW % 4, status)
 
     # ---- one frame
 
-    @cython.cdivision(True)  # bits and slots are not negative
+    @cython.cdivision(True)  # bits are not negative
     def _attempt(self, k: cython.longlong) -> cython.longlong:
-        """The frame that starts at bit k: arbitration, then an error frame, or a whole frame and results to everybody.
+        """The frame that starts at bit k: arbitration; then an error frame, or a whole one and results to everybody.
 
         Returns the bit at which the bus is free again.
         """
-        slot: cython.longlong = self.pending[0]
+        row: cython.longlong = self.first
         merged: cython.bint = False
         heard: cython.bint = False
-        bits: cython.longlong
+        identifier: cython.longlong
+        flags: cython.longlong
+        lo: cython.longlong
+        hi: cython.longlong
         end: cython.longlong
-        node: Node
-        if self.pending_count > 1:
-            slot = self._arbitrate(k)
-            merged = self._contend(k, slot)
-        if self.joining > 0:
-            self._count_sequences(k)
-        identifier: cython.longlong = self.identifiers[slot]
-        flags: cython.longlong = self.flags[slot]
-        lo: cython.longlong = self.lows[slot]
-        hi: cython.longlong = self.highs[slot]
-        bits = measure(identifier, flags, lo, hi) & 0xFFFF
-        if merged or self.operating < 2 or self.strikes_left > 0 or self.next_strike < k + bits - 1:
-            if self._disturbed(k, slot, bits, merged):
-                return self.free_bit
-        end = k + bits
-        # edge_ns of `end`; from it those of end - 1 (the end of the sixth bit of EOF) and of the intermission's end
+        done: cython.longlong
+        received: cython.longlong
+        rest: cython.longlong
+        asked: cython.longlong
+        bits: cython.longlong
         rate: cython.longlong = self.bitrate
         billion: cython.longlong = 1000000000
+        sender: Node
+        node: Node
+        if self.pending_count > 1:
+            row = self._arbitrate(k)
+            if row < 0:  # another node sends the same arbitration field
+                row = -row
+                merged = True
+        if cython.compiled:
+            asked = self.rows[row + 2]
+            identifier = self.rows[row + 4]
+            flags = self.rows[row + 5]
+            lo = self.rows[row + 6]
+            hi = self.rows[row + 7]
+        else:
+            _, _, asked, _, identifier, flags, lo, hi = self.rows[row : row + 8]
+        bits = measure(identifier, flags, lo, hi) & 0xFFFF
+        end = k + bits
+        if merged or self.operating < 2 or self.next_strike < end - 1:
+            if self._disturbed(k, row, bits, merged):
+                return self.free_bit
+        # edge_ns of `end`; from it those of end - 1 (the end of the sixth bit of EOF) and of the intermission's end
         if k - self.second_bit >= rate:
             self.second_ns = k // rate * billion
             self.second_bit = k // rate * rate
-        rest: cython.longlong = (end - self.second_bit) * billion + rate - 1
-        done: cython.longlong = rest // rate
+        rest = (end - self.second_bit) * billion + rate - 1
+        done = rest // rate
         rest -= done * rate
         done += self.second_ns
-        received: cython.longlong = done - self.bit_ns
+        received = done - self.bit_ns
         if rest < self.bit_rest:
             received -= 1
-        sender: cython.longlong = slot // 3
-        self.free_bit = end + 3  # INTERMISSION_BITS
+        bits += 3  # INTERMISSION_BITS
+        self.free_bit = k + bits
         self.free_time = done + self.intermission_ns
         if rest + self.intermission_rest >= rate:
             self.free_time += 1
-        self.quiet_bit = end - 8  # ACK delimiter and EOF are recessive
+        self.frames += 1
+        self.bits += bits
+        self.window_busy += bits
+        if self.free_bit > self.window_end:
+            self._split_windows(k)
+        if received <= self.advanced:
+            self.late_results += 1
+        # the sender's buffer is free from `done` on
+        if self.pending_count == 1:
+            self.first = -1
+            self.pending_count = 0
+        else:
+            self._remove(row)
+        self.rows[row] = done  # FREE_AT
+        sender = self.nodes[row >> 5]
+        sender.sent += 1
+        sender.inbox.put(done, sender.order, 3, sender.controller, row >> 3 & 3, 0, 0, 0, 0)  # CAN_TX_DONE, TX_SENT
+        if sender.transmit_errors > 0 or sender.passive:
+            self._after_success(sender, end, done)
         flags &= 0x5F  # single shot is not on the wire
-        for node in self.nodes:
-            if node.index == sender:
-                self._finish_sender(node, slot, end, done)
-            elif node.mode == 0 and not (merged and node.sending_end == end):  # OPERATING
+        node = sender.following
+        while node is not sender:
+            if node.mode == 0 and not (merged and node.sending_end == end):  # OPERATING
                 if node.receive_errors > 0:
                     self._calm_receiver(node, received)
                 if node.listening:
                     node.inbox.put(received, node.order, 2, node.controller, identifier, flags, lo, hi, 0)  # CAN_RX
                     node.received += 1
                     heard = True
-        if received <= self.advanced:
-            self.late_results += 1
+            node = node.following
         if not heard:
             self.lost += 1
-        self.frames += 1
         if flags & 64:  # FLAG_EXTENDED
             self._count_extended(identifier)
         else:
-            self.frames_by_identifier[identifier] += 1
-            if done - self.asked_time[slot] > self.response_max_ns[identifier]:
-                self.response_max_ns[identifier] = done - self.asked_time[slot]
-        self.bits += bits + 3  # INTERMISSION_BITS
-        self.window_busy += bits + 3
-        if self.free_bit > self.window_end:
-            self._split_windows(k)
-        self._record(received, identifier, flags, lo, hi, sender)
+            self.identifiers[2 * identifier] += 1
+            if done - asked > self.identifiers[2 * identifier + 1]:
+                self.identifiers[2 * identifier + 1] = done - asked
+        if self.trace is not None:
+            self.trace.add(received, identifier, flags, lo, hi)
+        else:
+            self._record(received, identifier, flags, lo, hi, row >> 5)
         return self.free_bit
 
+    def _key(self, row: cython.longlong) -> cython.longlong:
+        """The arbitration field of the frame in a row: the lower one wins."""
+        return arbitration_key(self.rows[row + 4], self.rows[row + 5])  # IDENTIFIER, FLAGS
+
     def _arbitrate(self, k: cython.longlong) -> cython.longlong:
-        """The slot that wins the frame that starts at bit k."""
+        """The row that wins the frame that starts at bit k; negative when another node offers the very same field."""
         best: cython.longlong = -1
         best_key: cython.longlong = 0
-        i: cython.longlong
-        slot: cython.longlong
+        ready: cython.longlong = 0
+        row: cython.longlong = self.first
         key: cython.longlong
-        for i in range(self.pending_count):
-            slot = self.pending[i]
-            if self.ready[slot] <= k:
-                key = self.keys[slot]
-                if best < 0 or key < best_key or (key == best_key and slot < best):
-                    best = slot
+        while row >= 0:
+            if self.rows[row + 1] <= k:  # READY
+                ready += 1
+                key = self._key(row)
+                if best < 0 or key < best_key or (key == best_key and row < best):
+                    best = row
                     best_key = key
-        return best
+            row = self.rows[row + 3]  # NEXT
+        return -best if ready > 1 and self._contend(k, best, best_key) else best
+
+    def _contend(self, k: cython.longlong, best: cython.longlong, best_key: cython.longlong) -> cython.bint:
+        """Settle with the losers of an arbitration; True when another node offers the very same field."""
+        row: cython.longlong = self.first
+        other: cython.longlong
+        key: cython.longlong
+        other_key: cython.longlong
+        offered: cython.bint
+        merged: cython.bint = False
+        loser: Node
+        skipped = None
+        while row >= 0:
+            if row >> 5 != best >> 5 and self.rows[row + 1] <= k:  # another node's, READY
+                key = self._key(row)
+                offered = True  # a node puts only its lowest frame on the bus
+                other = self.first
+                while other >= 0:
+                    if other >> 5 == row >> 5 and other != row and self.rows[other + 1] <= k:
+                        other_key = self._key(other)
+                        if other_key < key or (other_key == key and other < row):
+                            offered = False
+                    other = self.rows[other + 3]
+                if offered and key == best_key:
+                    merged = True
+                elif offered:
+                    loser = self.nodes[row >> 5]
+                    loser.arbitrations_lost += 1
+                    self.arbitrations_lost += 1
+                    if self.rows[row + 5] & 32:  # FLAG_SINGLE_SHOT
+                        if skipped is None:
+                            skipped = []
+                        skipped.append(row)
+            row = self.rows[row + 3]  # NEXT
+        if skipped is not None:
+            for lost in sorted(skipped):
+                self._skip(lost, self.edge_ns(k + self._bits_until_loss(lost, best)))
+        return merged
 
     def _disturbed(self, k, best, bits, merged) -> bool:
         """Settle the frame on bits k ... k + bits - 1 where something may be wrong; True when it failed."""
@@ -719,115 +846,79 @@ class Bus:
             position = self._collision(senders)
         acknowledged = self.operating > len(senders)
         if position < 0:
-            vulnerable = 41 if self.flags[best] & 64 else 17  # see inject_errors
+            vulnerable = 41 if self.rows[best + FLAGS] & 64 else 17  # see inject_errors
             position = self._strike_of(k, k + bits - 1, vulnerable)
         if not acknowledged and (position < 0 or position > bits - 9):
             position = bits - 9  # the ACK slot stays recessive
         if position >= 0:
             self._fail(k, senders, position, acknowledged)
             return True
-        for slot in senders:
-            if slot != best:
+        for row in senders:
+            if row != best:
                 self.merged += 1
-                self._finish_sender(self.nodes[slot // BUFFERS], slot, k + bits, self.edge_ns(k + bits))
+                self._finish_merged(self.nodes[row // (4 * ROW)], row, k + bits)
         return False
 
-    @cython.cdivision(True)  # slots are not negative
-    def _contend(self, k: cython.longlong, best: cython.longlong) -> cython.bint:
-        """Settle with the losers of an arbitration; True when another node offers the very same field."""
-        i: cython.longlong
-        j: cython.longlong
-        slot: cython.longlong
-        other: cython.longlong
-        node: cython.longlong
-        offered: cython.bint
-        merged: cython.bint = False
-        loser: Node
-        skipped = None
-        for i in range(self.pending_count):
-            slot = self.pending[i]
-            node = slot // 3
-            if node == best // 3 or self.ready[slot] > k:
-                continue
-            offered = True  # a node puts only its lowest frame on the bus
-            for j in range(self.pending_count):
-                other = self.pending[j]
-                if other // 3 == node and other != slot and self.ready[other] <= k:
-                    if self.keys[other] < self.keys[slot] or (self.keys[other] == self.keys[slot] and other < slot):
-                        offered = False
-            if not offered:
-                continue
-            if self.keys[slot] == self.keys[best]:
-                merged = True
-                continue
-            loser = self.nodes[node]
-            loser.arbitrations_lost += 1
-            self.arbitrations_lost += 1
-            if self.flags[slot] & 32:  # FLAG_SINGLE_SHOT
-                if skipped is None:
-                    skipped = []
-                skipped.append(slot)
-        if skipped is not None:
-            for lost in sorted(skipped):
-                self._skip(lost, self.edge_ns(k + self._bits_until_loss(lost, best)))
-        return merged
-
-    def _bits_until_loss(self, slot, best) -> int:
-        """Bits from the start of frame to the end of the bit at which `slot` saw that `best` wins."""
-        own = wire(self.identifiers[slot], self.flags[slot], self.lows[slot], self.highs[slot])[0]
-        winner = wire(self.identifiers[best], self.flags[best], self.lows[best], self.highs[best])[0]
-        return next(i for i, (a, b) in enumerate(zip(own, winner, strict=False)) if a != b) + 1
-
-    def _skip(self, slot, time) -> None:
-        """End a single shot that did not get through."""
-        node: Node = self.nodes[slot // BUFFERS]
-        node.single_shot_skipped += 1
-        self.single_shot_skipped += 1
-        self._drop(node, slot, time, TX_LOST)
-
-    def _senders(self, k, best) -> list:
-        """Slots that send together: of each node its first slot with the winning field."""
-        found: dict = {}
-        for i in range(self.pending_count):
-            slot = self.pending[i]
-            if self.ready[slot] <= k and self.keys[slot] == self.keys[best]:
-                node = slot // BUFFERS
-                found[node] = min(slot, found.get(node, slot))
-        return sorted(found.values())
-
-    def _collision(self, senders) -> int:
-        """First bit at which frames with one arbitration field differ, or -1 when they are equal."""
-        frames = [wire(self.identifiers[s], self.flags[s], self.lows[s], self.highs[s])[0] for s in senders]
-        for position, levels in enumerate(zip(*frames, strict=False)):
-            if len(set(levels)) > 1:
-                return position
-        return -1
-
-    @cython.cdivision(True)  # slots are not negative
-    def _finish_sender(
-        self, node: Node, slot: cython.longlong, end: cython.longlong, done: cython.longlong
-    ) -> cython.longlong:
-        """The sender of a whole frame that ended at bit `end`, `done` in ns: its buffer is free from `done` on."""
-        if self.pending_count == 1:
-            self.pending_count = 0
-        else:
-            self._remove(slot)
-        self.busy_until[slot] = done
-        node.inbox.put(done, node.order, 3, node.controller, slot % 3 + 1, 0, 0, 0, 0)  # CAN_TX_DONE, TX_SENT
-        node.sent += 1
+    def _finish_merged(self, node, row, end) -> None:
+        """A node sent the same frame as the winner, up to bit `end`: it is a sender too, no receiver."""
+        done = self.edge_ns(end)
+        self._remove(row)
+        self.rows[row] = done  # FREE_AT
         node.sending_end = end
+        node.sent += 1
+        node.inbox.put(done, node.order, CAN_TX_DONE, node.controller, row // ROW % 4, TX_SENT, 0, 0, 0)
+        self._after_success(node, end, done)
+
+    def _after_success(self, node, end, done) -> None:
+        """What a frame sent whole, to bit `end`, at `done` in ns, means for a sender that has had errors."""
         if node.passive:
             self._suspend(node, end + INTERMISSION_BITS)
         if node.transmit_errors > 0:
             node.transmit_errors -= 1
             self._confine(node, done, 0)
-        return done
+
+    def _bits_until_loss(self, row, best) -> int:
+        """Bits from the start of frame to the end of the bit at which the sender of `row` saw that `best` wins."""
+        own = self._wire(row)[0]
+        winner = self._wire(best)[0]
+        return next(i for i, (a, b) in enumerate(zip(own, winner, strict=False)) if a != b) + 1
+
+    def _wire(self, row) -> tuple:
+        """The bits of the frame in a row and their fields."""
+        identifier, flags, lo, hi = (self.rows[row + place] for place in (IDENTIFIER, FLAGS, LOW, HIGH))
+        return wire(identifier, flags, lo, hi)
+
+    def _skip(self, row, time) -> None:
+        """End a single shot that did not get through."""
+        node: Node = self.nodes[row // (4 * ROW)]
+        node.single_shot_skipped += 1
+        self.single_shot_skipped += 1
+        self.single_shot_dropped += 1
+        self._drop(node, row, time, TX_LOST)
+
+    def _senders(self, k, best) -> list:
+        """Rows whose frames go out together: of each node its first one with the winning field."""
+        found: dict = {}
+        for row in self.rows_waiting():
+            if self.rows[row + READY] <= k and self._key(row) == self._key(best):
+                node = row // (4 * ROW)
+                found[node] = min(row, found.get(node, row))
+        return sorted(found.values())
+
+    def _collision(self, senders) -> int:
+        """First bit at which frames with one arbitration field differ, or -1 when they are equal."""
+        frames = [self._wire(row)[0] for row in senders]
+        for position, levels in enumerate(zip(*frames, strict=False)):
+            if len(set(levels)) > 1:
+                return position
+        return -1
 
     def _suspend(self, node, free) -> None:
         """An error-passive sender waits eight bits more after the intermission (ISO 11898-1)."""
         node.suspend_bit = free + 8
-        for slot in self._waiting(node):
-            self.ready[slot] = max(self.ready[slot], node.suspend_bit)
+        self.suspended_until = node.suspend_bit
+        for row in self._waiting(node):
+            self.rows[row + READY] = max(self.rows[row + READY], node.suspend_bit)
 
     def _calm_receiver(self, node, time) -> None:
         """Receive counter after a good frame (ISO 11898-1: above 127 back to 119 ... 127, we take 119)."""
@@ -843,11 +934,11 @@ class Bus:
         A receiver in error-passive state is taken to need the same time (chosen by us).
         """
         node: Node
-        frames = [wire(self.identifiers[s], self.flags[s], self.lows[s], self.highs[s]) for s in senders]
+        frames = [self._wire(row) for row in senders]
         bits, fields = frames[0]
         levels = {frame[0][position] for frame in frames}
         seen = 0 if len(levels) > 1 else 1 - bits[position]
-        owners = [slot // BUFFERS for slot in senders]
+        owners = [row // (4 * ROW) for row in senders]
         level = 1 if all(self.nodes[owner].passive for owner in owners) else 0
         stuffed = position < len(bits) - 10
         delay = 0
@@ -861,7 +952,6 @@ class Bus:
         over = k + position + 1 + 6 + delay + 8
         self.free_bit = over + INTERMISSION_BITS
         self.free_time = self.edge_ns(self.free_bit)
-        self.quiet_bit = over - 8
         self.errors += 1
         self.bits += self.free_bit - k
         self.window_busy += self.free_bit - k
@@ -887,13 +977,13 @@ class Bus:
                     capture | ICR_RECEIVING | kind << ICR_KIND_SHIFT,
                 )
         end = self.edge_ns(over)
-        for slot in senders:
-            node = self.nodes[slot // BUFFERS]
-            if self.flags[slot] & 32:  # FLAG_SINGLE_SHOT
-                self._skip(slot, end)
+        for row in senders:
+            node = self.nodes[row // (4 * ROW)]
+            if self.rows[row + FLAGS] & 32:  # FLAG_SINGLE_SHOT
+                self._skip(row, end)
             elif node.mode == OPERATING:
                 # offered again as soon as the bus is free (a passive sender: 8 bits later)
-                self.ready[slot] = max(self.ready[slot], self.free_bit)
+                self.rows[row + READY] = max(self.rows[row + READY], self.free_bit)
                 self.retries += 1
                 node.retries += 1
             if node.mode == BUS_OFF:
@@ -902,10 +992,9 @@ class Bus:
                     node.flushed += 1
                     self.lost += 1
                     self._drop(node, waiting, end, TX_ABORTED)
-        slot = senders[0]
-        self._record(
-            end, self.identifiers[slot], self.flags[slot] & 0x5F | FLAG_ERROR, fields[position], position, owners[0]
-        )
+        row = senders[0]
+        flags = self.rows[row + FLAGS] & 0x5F | FLAG_ERROR
+        self._record(end, self.rows[row + IDENTIFIER], flags, fields[position], position, owners[0])
 
     def _confine(self, node, time, interrupts) -> None:
         """Fault confinement after a counter moved (ISO 11898-1): state changes, told with the counters."""
@@ -935,7 +1024,7 @@ class Bus:
         node: Node
         for node in self.nodes:
             if node.mode == JOINING:
-                run = k - max(self.quiet_bit, node.join_from)
+                run = k - max(self.free_bit - SEQUENCE_BITS, node.join_from)
                 node.sequences_left -= max(run, 0) // SEQUENCE_BITS
 
     # ---- load and log
@@ -1016,9 +1105,8 @@ class Bus:
     ) -> cython.longlong:
         """Append to the frame log; returns how many it holds. A full one is first offered to `log_sink(bus)`."""
         base: cython.longlong
-        trace: FrameStream = self.trace
-        if trace is not None:
-            trace.add(time, identifier, flags, lo, hi)
+        if self.trace is not None:
+            self.trace.add(time, identifier, flags, lo, hi)
             return 0
         if self.log_count >= self.log_capacity:
             if self.log_sink is not None:

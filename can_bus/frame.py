@@ -7,7 +7,7 @@ transmit registers CxTDA/TDB of the LPC2194 hold them (facts network-and-boards 
 Layout (ISO 11898-1): start of frame, arbitration and control field, data, CRC-15: all of these are
 stuffed; then CRC delimiter, acknowledge slot and delimiter, seven bits end of frame: 10 bits unstuffed.
 The three bits of intermission belong to the bus, not to the frame: `INTERMISSION_BITS`.
-Both chains, CRC and stuffing, go byte by byte through tables; the tables are made from the bitwise rules.
+The rules of both chains, CRC and stuffing, stand in `_feed`, bit by bit; tables made from them do it piece by piece.
 """
 
 import cython
@@ -40,151 +40,186 @@ FIELD_END = 26
 FIELD_ACK_DELIMITER = 27
 
 
-def _crc_of_byte(byte: int, zeros: int) -> int:
-    """CRC register after a byte (most significant bit first) and `zeros` zero bits entered it empty."""
-    register = 0
-    for position in range(7, -1 - zeros, -1):
-        feedback = (byte >> position & 1 if position >= 0 else 0) ^ (register >> 14 & 1)
+# Both chains in one number, as `_feed` takes and returns it: bits 0-14 the CRC register; bits 15-17 the state of the
+# stuffing, level * 4 + run - 1 with run 1 ... 4 equal bits seen last; from bit 18 the stuff bits so far.
+# Before a frame: an empty register, and a recessive bit, so that the start of frame begins a run.
+IDLE = 1 << 17
+
+
+def _feed(chain: cython.longlong, value: cython.longlong, count: cython.longlong) -> cython.longlong:
+    """Both chains after the `count` low bits of `value`, the highest of them first: the rules, bit by bit.
+
+    The fifth equal bit is followed at once by its complement, which begins a run of its own.
+    """
+    register: cython.longlong = chain & 0x7FFF
+    run: cython.longlong = (chain >> 15 & 3) + 1
+    level: cython.longlong = chain >> 17 & 1
+    stuffed: cython.longlong = chain >> 18
+    position: cython.longlong
+    bit: cython.longlong
+    feedback: cython.longlong
+    for position in range(count - 1, -1, -1):
+        bit = value >> position & 1
+        feedback = bit ^ register >> 14
         register = register << 1 & 0x7FFF
         if feedback:
-            register ^= CRC_POLYNOMIAL
-    return register
-
-
-def _stuff_of_byte(state: int, byte: int) -> int:
-    """Stuffing of one byte: next state << 8 | stuff bits inserted.
-
-    A state is level * 4 + run - 1 with run 1..4 equal bits seen last: the fifth equal bit is followed at
-    once by its complement, which begins a run of its own.
-    """
-    level = state >> 2
-    run = (state & 3) + 1
-    inserted = 0
-    for position in range(7, -1, -1):
-        bit = byte >> position & 1
-        if bit == level:
-            run += 1
-        else:
-            level = bit
-            run = 1
+            register ^= 0x4599  # CRC_POLYNOMIAL
+        run = run + 1 if bit == level else 1
+        level = bit
         if run == 5:
-            inserted += 1
-            level = 1 - level
+            stuffed += 1
+            level = 1 - bit
             run = 1
-    return (level * 4 + run - 1) << 8 | inserted
+    return stuffed << 18 | level << 17 | (run - 1) << 15 | register
 
 
-# CRC_n: a byte that n - 1 further bytes follow; the CRC is linear, so four bytes go in at once.
-# HEADER_CRC, HEADER_STUFF: both chains after the start of frame and the upper ten bits of a standard identifier.
-# Compiled, the tables are C arrays (declared in the .pxd).
-if not cython.compiled:
-    CRC_1, CRC_2, CRC_3, CRC_4 = ([0] * 256 for _ in range(4))
-    STUFF_STEP = [0] * 2048
-    HEADER_CRC, HEADER_STUFF = ([0] * 1024 for _ in range(2))
+def _header(identifier: cython.longlong, flags: cython.longlong) -> cython.longlong:
+    """The bits from the start of frame to the data length code: 19, extended 39."""
+    low: cython.longlong = (flags & 16) << 2 | (flags & 15)
+    if flags & 64:  # FLAG_EXTENDED: SOF id28-18 SRR IDE id17-0 RTR r1 r0 DLC
+        return ((identifier >> 18 & 0x7FF) << 20 | 0xC0000 | (identifier & 0x3FFFF)) << 7 | low
+    return (identifier & 0x7FF) << 7 | low  # SOF id10-0 RTR IDE r0 DLC
 
 
-def _fill_tables() -> None:
-    for byte in range(256):
-        CRC_1[byte] = _crc_of_byte(byte, 0)
-        CRC_2[byte] = _crc_of_byte(byte, 8)
-        CRC_3[byte] = _crc_of_byte(byte, 16)
-        CRC_4[byte] = _crc_of_byte(byte, 24)
-        for state in range(8):
-            STUFF_STEP[state * 256 + byte] = _stuff_of_byte(state, byte)
-    for upper in range(1024):
-        # SOF id10-9 | id8-1, filled up in front as `measure` says
-        HEADER_CRC[upper] = CRC_2[upper >> 8] ^ CRC_1[upper & 0xFF]
-        first = STUFF_STEP[upper >> 8 | 0xA8]
-        HEADER_STUFF[upper] = STUFF_STEP[(first & 0x700) | (upper & 0xFF)] + (first & 0xFF)
-
-
-_fill_tables()
-
-
-@cython.boundscheck(False)  # table places are masked to 8, 10 and 11 bits: no index can leave its table
-@cython.wraparound(False)
-def measure(
+def _measure_bitwise(
     identifier: cython.longlong, flags: cython.longlong, lo: cython.longlong, hi: cython.longlong
 ) -> cython.longlong:
-    """CRC-15 and length of a frame with this very content: crc << 16 | bits, in one pass over the bytes.
-
-    Bits: from start of frame to the end of EOF, stuff bits included, intermission not.
-    The header is 19 bits (extended: 39). Its first byte is filled up in front: zeros leave an empty CRC
-    register empty, and for the stuffing an alternating pattern that ends recessive, so that the dominant
-    start of frame begins a new run.
-    """
+    """`measure` of any frame by the rules alone."""
+    place: cython.longlong
     crc: cython.longlong
-    stuff: cython.longlong
-    total: cython.longlong
-    byte: cython.longlong
-    second: cython.longlong
-    third: cython.longlong
-    fourth: cython.longlong
-    word: cython.longlong
-    bits: cython.longlong
     length: cython.longlong = flags & 15
+    bits: cython.longlong = 64 if flags & 64 else 44
+    chain: cython.longlong = _feed(131072, _header(identifier, flags), bits - 25)  # IDLE
     if length > 8:
         length = 8  # codes 9-15 also mean eight bytes (ISO 11898-1)
     if flags & 16:  # FLAG_REMOTE
         length = 0
-    bits = 44 + 8 * length
-    if flags & 64:  # FLAG_EXTENDED: SOF id28-23 | id22-18 SRR IDE id17 | id16-9 | id8-1 | id0 RTR r1 r0 DLC
-        bits += 20
-        byte = identifier >> 23 & 0x3F
-        crc = CRC_1[byte]
-        stuff = STUFF_STEP[byte | 0x80]
-        total = stuff
-        byte = (identifier >> 15 & 0xF8) | 6 | (identifier >> 17 & 1)
-        crc = ((crc << 8) ^ CRC_1[(crc >> 7) ^ byte]) & 0x7FFF
-        stuff = STUFF_STEP[(stuff & 0x700) | byte]
-        total += stuff
-        byte = identifier >> 9 & 0xFF
-        crc = ((crc << 8) ^ CRC_1[(crc >> 7) ^ byte]) & 0x7FFF
-        stuff = STUFF_STEP[(stuff & 0x700) | byte]
-        total += stuff
-        byte = identifier >> 1 & 0xFF
-        crc = ((crc << 8) ^ CRC_1[(crc >> 7) ^ byte]) & 0x7FFF
-        stuff = STUFF_STEP[(stuff & 0x700) | byte]
-        total += stuff
-    else:  # SOF id10-9 | id8-1 | id0 RTR IDE r0 DLC
-        crc = HEADER_CRC[identifier >> 1 & 0x3FF]
-        stuff = HEADER_STUFF[identifier >> 1 & 0x3FF]
-        total = stuff
-    byte = (identifier << 7 & 0x80) | (flags << 2 & 0x40) | (flags & 15)
-    crc = ((crc << 8) ^ CRC_1[(crc >> 7) ^ byte]) & 0x7FFF
-    stuff = STUFF_STEP[(stuff & 0x700) | byte]
-    total += stuff
-    word = lo
-    while length > 0:
-        if length >= 4:
-            byte = word & 0xFF
-            second = word >> 8 & 0xFF
-            third = word >> 16 & 0xFF
-            fourth = word >> 24 & 0xFF
-            crc = CRC_4[(crc >> 7) ^ byte] ^ CRC_3[(crc << 1 & 0xFF) ^ second] ^ CRC_2[third] ^ CRC_1[fourth]
-            stuff = STUFF_STEP[(stuff & 0x700) | byte]
-            total += stuff
-            stuff = STUFF_STEP[(stuff & 0x700) | second]
-            total += stuff
-            stuff = STUFF_STEP[(stuff & 0x700) | third]
-            total += stuff
-            stuff = STUFF_STEP[(stuff & 0x700) | fourth]
-            total += stuff
-            length -= 4
-            word = hi
-        else:
-            byte = word & 0xFF
-            crc = ((crc << 8) ^ CRC_1[(crc >> 7) ^ byte]) & 0x7FFF
-            stuff = STUFF_STEP[(stuff & 0x700) | byte]
-            total += stuff
-            word = word >> 8
-            length -= 1
-    stuff = STUFF_STEP[(stuff & 0x700) | crc >> 7]
-    total += stuff
-    # the last 7 bits, filled up behind with the complement of the last one, which never adds a stuff bit
-    total += STUFF_STEP[(stuff & 0x700) | (crc << 1 & 0xFE) | (crc & 1 ^ 1)]
-    # the states summed above bit 8 do not matter; at most 29 stuff bits
-    return crc << 16 | (bits + (total & 0xFF))
+    for place in range(length):
+        chain = _feed(chain, (lo if place < 4 else hi) >> 8 * (place & 3), 8)
+    crc = chain & 0x7FFF
+    chain = _feed(chain, crc, 15)
+    return crc << 16 | (bits + 8 * length + (chain >> 18))
+
+
+# A standard frame of eight bytes, which nearly every frame is, goes through tables, piece by piece. The CRC is linear:
+# each piece of the data adds what stands in the table of its place. For the stuffing a piece is a map from the state
+# before it to the state behind it.
+#
+# Compiled, a piece has five bits: the tables of bytes would be pushed out of the processor's cache from frame to frame,
+# those of five bits are 17 lines of it, which stay. From the last bit of the data length code to the end of the CRC
+# there are 80 bits, 16 pieces; only the first 13 hold data, and the first of them only four bits.
+# CRC_OF_PIECE: by place * 32 + piece. STUFF: by piece; by eight bits per state: next state << 3 | stuff bits << 6.
+# BEGUN: by identifier; CRC of the header << 16 | stuff bits << 8 | state << 3, these before the header's last bit.
+if not cython.compiled:
+    CRC_OF_PIECE, STUFF, BEGUN = [0] * 416, [0] * 32, [0] * 2048
+
+# Interpreted, a piece is a byte, and the states are lists: by byte what comes behind it, the last item is the number of
+# stuff bits so far. CRC_OF_BYTE: by place, by byte. WALK: by stuff bits, by state. WALKS: by identifier, as `_begin`.
+CRC_OF_BYTE: list = []
+WALK: list = []
+WALKS: dict = {}
+
+
+def _fill_tables() -> None:
+    """The tables of the compiled `measure`."""
+    place: cython.longlong
+    piece: cython.longlong
+    state: cython.longlong
+    identifier: cython.longlong
+    header: cython.longlong
+    chain: cython.longlong
+    steps: cython.ulonglong
+    step: cython.ulonglong
+    for piece in range(32):
+        for place in range(13):
+            CRC_OF_PIECE[place * 32 + piece] = _feed(_feed(0, piece, 5), 0, 60 - 5 * place) & 0x7FFF
+        steps = 0
+        for state in range(8):
+            chain = _feed(state << 15, piece, 5)
+            step = (chain >> 18) << 6 | (chain >> 15 & 7) << 3
+            steps |= step << (8 * state)
+        STUFF[piece] = steps
+    for identifier in range(2048):
+        header = _header(identifier, 8)
+        chain = _feed(131072, header >> 1, 18)  # IDLE
+        BEGUN[identifier] = (
+            (_feed(_feed(0, header, 19), 0, 64) & 0x7FFF) << 16 | (chain >> 18) << 8 | (chain >> 15 & 7) << 3
+        )
+
+
+def _fill_lists() -> None:
+    """The lists of the interpreted `measure`."""
+    for place in range(8):
+        CRC_OF_BYTE.append([_feed(_feed(0, byte, 8), 0, 56 - 8 * place) & 0x7FFF for byte in range(256)])
+    steps = [[_feed(state << 15, byte, 8) for byte in range(256)] for state in range(8)]
+    most = worst_case_bits(8) - unstuffed_bits(8)
+    WALK.extend([[] for _ in range(8)] for _ in range(most + 1))
+    for stuffed, states in enumerate(WALK):
+        for state, branches in enumerate(states):
+            for after in steps[state]:
+                branches.append(WALK[min(stuffed + (after >> 18), most)][after >> 15 & 7])
+            branches.append(stuffed)
+
+
+def _begin(identifier):
+    """CRC of the header of a standard frame of eight bytes with 64 bits 0 behind it, and where on the walk it ends."""
+    chain = _feed(IDLE, _header(identifier, 8), 19)
+    WALKS[identifier] = (_feed(chain, 0, 64) & 0x7FFF, WALK[chain >> 18][chain >> 15 & 7])
+    return WALKS[identifier]
+
+
+def _in_wire_order(word: cython.uint) -> cython.uint:
+    """The four bytes of a word, the lowest of which goes first, as bits in their order on the wire."""
+    return (word & 0xFF) << 24 | (word & 0xFF00) << 8 | (word >> 8 & 0xFF00) | word >> 24
+
+
+@cython.boundscheck(False)  # pieces are masked to 5 bits
+@cython.wraparound(False)
+def _measure_by_pieces(identifier: cython.longlong, lo: cython.longlong, hi: cython.longlong) -> cython.longlong:
+    """`measure` of a standard frame of eight bytes, compiled."""
+    crc: cython.longlong = BEGUN[identifier] >> 16
+    steps: cython.ulonglong = BEGUN[identifier] & 56  # its six low bits: where in the next map the next state stands
+    stuffed: cython.ulonglong = (BEGUN[identifier] & 0xFF00) >> 2  # times 64, as in the maps
+    data: cython.ulonglong = _in_wire_order(lo)
+    piece: cython.ulonglong
+    place: cython.longlong
+    data = data << 32 | _in_wire_order(hi)
+    piece = data >> 60
+    data <<= 4
+    for place in range(0, 416, 32):
+        crc ^= CRC_OF_PIECE[place + piece]
+        steps = STUFF[piece] >> (steps & 63)
+        stuffed += steps & 192
+        piece = data >> 59
+        data <<= 5
+    steps = STUFF[crc >> 10] >> (steps & 63)
+    stuffed += steps & 192
+    steps = STUFF[crc >> 5 & 31] >> (steps & 63)
+    stuffed += steps & 192
+    steps = STUFF[crc & 31] >> (steps & 63)
+    stuffed += steps & 192
+    return crc << 16 | (108 + (stuffed >> 6))
+
+
+def measure(
+    identifier: cython.longlong, flags: cython.longlong, lo: cython.longlong, hi: cython.longlong
+) -> cython.longlong:
+    """CRC-15 and length of a frame with this very content: crc << 16 | bits.
+
+    Bits: from start of frame to the end of EOF, stuff bits included, intermission not.
+    """
+    if flags & ~32 != 8 or identifier < 0 or identifier > 0x7FF:  # FLAG_SINGLE_SHOT does not show on the wire
+        return _measure_bitwise(identifier, flags, lo, hi)
+    if cython.compiled:
+        return _measure_by_pieces(identifier, lo, hi)
+    else:
+        crc, walk = WALKS.get(identifier) or _begin(identifier)
+        a, b, c, d, e, f, g, h = (hi << 32 | lo).to_bytes(8, "little")
+        t, u, v, w, x, y, z, s = CRC_OF_BYTE
+        crc ^= t[a] ^ u[b] ^ v[c] ^ w[d] ^ x[e] ^ y[f] ^ z[g] ^ s[h]
+        # the last byte is filled up with the complement of the last bit, which never adds a stuff bit
+        stuffed = walk[a][b][c][d][e][f][g][h][crc >> 7][(crc << 1 & 0xFE) | (crc & 1 ^ 1)][-1]
+        return crc << 16 | (108 + stuffed)
 
 
 def crc15(
@@ -290,3 +325,9 @@ def wire(identifier: int, flags: int, lo: int, hi: int) -> tuple[list[int], list
     bits += [RECESSIVE] * TAIL_BITS
     fields += [FIELD_CRC_DELIMITER, FIELD_ACK_SLOT, FIELD_ACK_DELIMITER] + [FIELD_END] * 7
     return bits, fields
+
+
+if cython.compiled:
+    _fill_tables()
+else:
+    _fill_lists()

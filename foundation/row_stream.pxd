@@ -1,8 +1,9 @@
 cimport cython
 
 cdef class RowStream:
-    cdef public long long columns, capacity, used, last_time_ns
+    cdef public long long used, capacity, last_time_ns, number
     cdef public long long[::1] integers
+    cdef public long long columns
     cdef public double[::1] reals
     cdef public bint is_real
     cdef public object digest, sink
@@ -11,5 +12,4 @@ cdef class RowStream:
 
 @cython.final
 cdef class FrameStream(RowStream):
-    cdef public long long bus
     cpdef int add(self, long long time_ns, long long identifier, long long flags, long long lo, long long hi) except -1

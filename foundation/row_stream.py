@@ -1,4 +1,4 @@
-# cython: boundscheck=False, wraparound=False
+# cython: boundscheck=False, wraparound=False, initializedcheck=False
 # (every index below is a place of a block: a block is a whole number of rows and flushed when it is full)
 """Rows of 64-bit numbers on their way out of a run: collected into blocks, hashed, handed over as bytes."""
 
@@ -12,10 +12,11 @@ class RowStream:
     """Rows of 64-bit values collected into blocks. `hashed`: feed the blocks to SHA-256 as well.
 
     code: "q" for whole numbers, "d" for doubles. A row is written into `integers` or `reals` from `used` on, then
-    told by `finish_row`.
+    told by `finish_row`. `number` tells streams of one kind apart.
     """
 
-    def __init__(self, code, columns, hashed, block_rows=512) -> None:
+    def __init__(self, code, columns, hashed, block_rows=512, number=0) -> None:
+        self.number = number
         self.columns = columns
         self.capacity = columns * block_rows
         self.integers = array.array("q", [0]) * (self.capacity if code == "q" else 0)
@@ -53,8 +54,7 @@ class FrameStream(RowStream):
     """
 
     def __init__(self, bus) -> None:
-        RowStream.__init__(self, "q", 3, True)
-        self.bus = bus
+        RowStream.__init__(self, "q", 3, True, number=bus)
 
     def add(
         self,
@@ -67,7 +67,7 @@ class FrameStream(RowStream):
         """A frame was on the bus."""
         at: cython.longlong = self.used
         self.integers[at] = time_ns
-        self.integers[at + 1] = (lo << 12) | (flags << 4) | self.bus
+        self.integers[at + 1] = (lo << 12) | (flags << 4) | self.number
         self.integers[at + 2] = (hi << 29) | identifier
         self.used = at + 3
         self.last_time_ns = time_ns

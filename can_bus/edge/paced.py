@@ -85,7 +85,7 @@ class PacedBus:
         for _ in range(BURST):
             hears = taps.poll(self.time)
             due = min(bus.next_time, hears)
-            waits = bus.operating < 2 and due <= until and self._alone()
+            waits = bus.operating < 2 and due <= until and bus.alone_and_passive()
             if waits:
                 due = hears  # what happened before is still told
             if due > until:
@@ -96,31 +96,16 @@ class PacedBus:
                 bus.advance(self.time)
         else:
             return self.time
-        alone = bus.operating < 2 and self._alone()
+        alone = bus.operating < 2 and bus.alone_and_passive()
         if self.speed != 0.0:
             self.time = max(self.time, until)
         if alone:
-            self._pass_over(self.time)
+            bus.hold_off(bus.bit_of(self.time) + 1)
         if self.speed != 0.0:
             bus.advance(self.time)
             hears = taps.poll(self.time)
         return hears if alone else min(bus.next_time, hears)
 
-    def _alone(self) -> bool:
-        """True while what waits cannot be acknowledged, by nobody, and only repeats."""
-        bus = self.bus
-        if not bus.pending_count or bus.operating >= 2 or bus.joining or bus.commands.count:
-            return False
-        return all(bus.nodes[bus.pending[i] // 3].passive for i in range(bus.pending_count))
-
     def held(self) -> bool:
         """True when time waits: at full speed the bus waits for its slowest reader; by the clock it does not."""
         return self.speed == 0.0 and any(tap.held for tap in self.taps.taps)
-
-    def _pass_over(self, until: int) -> None:
-        """No attempt up to `until`: every waiting frame is ready from the bit after it."""
-        bus = self.bus
-        first = bus.bit_of(until) + 1
-        for i in range(bus.pending_count):
-            bus.ready[bus.pending[i]] = max(bus.ready[bus.pending[i]], first)
-        bus.next_time = max(bus.next_time, bus.edge_ns(first))
