@@ -10,7 +10,7 @@ import cython
 
 from boards.modules.can_load import CanLoad
 from boards.modules.error_module import ErrorModule
-from boards.modules.mcu_led import Heartbeat, McuLed
+from boards.modules.mcu_led import Heartbeat
 from boards.modules.network_clock import CYCLES_PER_SYNC, NetworkClock
 from boards.modules.network_time import NetworkTime
 from boards.modules.routing import Router, RoutingTable
@@ -108,8 +108,7 @@ class CanRouterBoard(Microcontroller):
             table.BOARD_NUMBER, self.time, quirks.errors_counted_per_event, quirks.new_errors_lost_after_repeat
         )
         self.gpio = Gpio(self)
-        self.leds = McuLed(self.gpio, 1000)
-        self.heartbeat = Heartbeat(self.time, self.leds)
+        self.leds = self.heartbeat = Heartbeat(self.time, self.gpio, 1000)
         self.adc = AdcInternal(self, clkdiv=182)
         interrupts = ICR_RI | ICR_EI | ICR_DOI | ICR_EPI | ICR_BEI
         self.can1 = CanController(self, 1, IER=interrupts)

@@ -29,7 +29,7 @@ from boards.modules.encoder_capture import EncoderCapture, WrapCounter
 from boards.modules.error_module import ErrorModule
 from boards.modules.execution_timer import ExecutionTimer
 from boards.modules.mcu_led import PINS as LED_PINS
-from boards.modules.mcu_led import Heartbeat, McuLed
+from boards.modules.mcu_led import Heartbeat
 from boards.modules.motor_limits import MotorLimits
 from boards.modules.motor_output import PERIOD_COUNTS, MotorOutput
 from boards.modules.motor_output import PINS as MOTOR_PINS
@@ -156,8 +156,7 @@ class MotorBoard(Microcontroller):
             lose_new_after_repeat=quirks.new_errors_lost_after_repeat,
         )
         self.gpio = Gpio(self)
-        self.leds = McuLed(self.gpio, table.SLOT_US)
-        self.heartbeat = Heartbeat(self.time, self.leds)
+        self.leds = self.heartbeat = Heartbeat(self.time, self.gpio, table.SLOT_US)
         self.execution = ExecutionTimer(self, self.time)
         # converters
         self.adc_external = Ads7871(self, eint=1)

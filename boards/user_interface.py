@@ -20,7 +20,7 @@ from boards.modules.imu_parser import (
 from boards.modules.keypad import KEY_PINS, Keypad
 from boards.modules.lcd import Lcd, LcdQuarter
 from boards.modules.mcu_led import PINS as LED_PINS
-from boards.modules.mcu_led import Heartbeat, McuLed
+from boards.modules.mcu_led import Heartbeat
 from boards.modules.network_time import NetworkTime
 from boards.modules.rc_receiver import RcReceiver
 from boards.modules.sync_light import SYNC_PIN, SyncLight
@@ -77,8 +77,7 @@ class UserInterfaceBoard(Microcontroller):
             lose_new_after_repeat=quirks.new_errors_lost_after_repeat,
         )
         self.gpio = Gpio(self)
-        self.mcu_leds = McuLed(self.gpio, table.SLOT_US)
-        self.heartbeat = Heartbeat(self.time, self.mcu_leds)
+        self.mcu_leds = self.heartbeat = Heartbeat(self.time, self.gpio, table.SLOT_US)
         self.execution = ExecutionTimer(self, self.time)
         # network
         interrupts = ICR_RI | ICR_EI | ICR_DOI | ICR_EPI | ICR_BEI

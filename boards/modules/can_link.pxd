@@ -12,6 +12,7 @@ cdef class CanLink:
     # what a frame touches
     cdef public CanController controller
     cdef public NetworkTime time
+    cdef public long long time_identifier
     cdef public list receivers
     cdef public long long rx_write, rx_read, tx_write, tx_read
     cdef public long long received, delivered, queued, ignored, most_waiting

@@ -72,6 +72,7 @@ class CanLink:
         self.code_receive_full = getattr(codes, prefix + "RX_BUF_OF")
         self.code_send_full = codes.CAN_TX_QUEUE_FULL
         self.receivers = [None] * IDENTIFIERS
+        self.time_identifier = -1  # whose frames bring `time`: every third frame
         # rings of rows: RFS, identifier, value and time; and identifier, value and time
         self.rx_rows = [0] * 256  # 4 RECEIVE_RING
         self.rx_write = 0
@@ -102,6 +103,8 @@ class CanLink:
         if self.receivers[identifier] is not None:
             raise UserError(f"{self.chip.name}: identifier {identifier} has two receivers")
         self.receivers[identifier] = receiver
+        if receiver is self.time:
+            self.time_identifier = identifier
 
     # --- receiving --------------------------------------------------------------------------------------
 
@@ -161,7 +164,10 @@ class CanLink:
             receiver = None
             # DLC 8 and neither remote nor extended, as the bits stand in RFS
             if self.rx_rows[row] == 524288 and identifier < 2048:
-                receiver = self.receivers[identifier]
+                if identifier == self.time_identifier:
+                    receiver = self.time
+                else:
+                    receiver = self.receivers[identifier]
             if receiver is None:
                 ignored += 1
             else:

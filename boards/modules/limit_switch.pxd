@@ -6,5 +6,5 @@ cimport cython
 @cython.final
 cdef class LimitSwitch(Debounce):
     cdef public Microcontroller chip
-    cdef public long long pin
+    cdef public short pin
     cpdef void read(self) noexcept

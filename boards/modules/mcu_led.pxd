@@ -3,9 +3,8 @@ from firmware_sim.peripherals.gpio cimport Gpio
 
 cimport cython
 
-@cython.final
 cdef class McuLed:
-    cdef public long long lit, remaining_green, remaining_red, remaining_blue
+    cdef public int lit, remaining_green, remaining_red, remaining_blue
     cdef public Gpio gpio
     cdef public double slots_per_ms
     cpdef long long pin(self, long long led) noexcept
@@ -15,7 +14,6 @@ cdef class McuLed:
     cpdef int off(self, long long led) except -1
 
 @cython.final
-cdef class Heartbeat:
+cdef class Heartbeat(McuLed):
     cdef public NetworkTime time
-    cdef public McuLed leds
     cdef public long long last_bit, beats

@@ -78,12 +78,13 @@ class McuLed:
                 self.set_remaining(2, 0)
 
 
-class Heartbeat:
-    """A flash of 50 ms of the blue LED whenever the network time's bit 8 goes from 0 to 1, so every 512 ms."""
+class Heartbeat(McuLed):
+    """The LEDs of a board, whose blue one flashes for 50 ms when the network time's bit 8 goes from 0 to 1, so every
+    512 ms."""
 
-    def __init__(self, time: NetworkTime, leds: McuLed) -> None:
+    def __init__(self, time: NetworkTime, gpio: Gpio, slot_us) -> None:
+        McuLed.__init__(self, gpio, slot_us)
         self.time = time
-        self.leds = leds
         self.last_bit = 0
         self.beats = 0
 
@@ -94,4 +95,4 @@ class Heartbeat:
             self.last_bit = bit
             if bit:
                 self.beats += 1
-                self.leds.flash(2, 50)  # BLUE, HEARTBEAT_MS
+                self.flash(2, 50)  # BLUE, HEARTBEAT_MS

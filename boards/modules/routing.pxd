@@ -5,7 +5,7 @@ cimport cython
 
 @cython.final
 cdef class RoutingTable:
-    cdef public short[4064] rows
+    cdef public short[2032] rows
     cdef public long long learned, changed
     cpdef object set_destinations(self, identifier, mask)
     cpdef void learn(self, long long identifier, long long channel) noexcept

@@ -26,8 +26,8 @@ class RoutingTable:
     """Destinations and learned sources of every identifier. `routes`: pairs (identifier, mask)."""
 
     def __init__(self, routes=()) -> None:
-        # rows of destinations and source; every identifier that the table does not name goes to the main brain
-        self.rows = [1, 7] * 2032
+        # destinations + 256 x source; every identifier that the table does not name goes to the main brain
+        self.rows = [1793] * 2032  # 1 + 256 x 7
         self.learned = 0
         self.changed = 0
         for identifier, mask in routes:
@@ -37,32 +37,32 @@ class RoutingTable:
         """Replace the destinations of `identifier`; IndexError above 2031."""
         if not 0 <= identifier < IDENTIFIERS:
             raise IndexError(f"routing table: identifier {identifier} is not 0 ... {IDENTIFIERS - 1}")
-        self.rows[2 * identifier] = mask & 0x1F
+        self.rows[identifier] = self.rows[identifier] & ~0xFF | mask & 0x1F
 
     @property
     def destinations(self):
         """Masks by identifier."""
-        return list(self.rows)[0::2]
+        return [row & 0xFF for row in list(self.rows)]
 
     @property
     def sources(self):
         """Channels by identifier; 7: none yet."""
-        return list(self.rows)[1::2]
+        return [row >> 8 for row in list(self.rows)]
 
     def learn(self, identifier: cython.longlong, channel: cython.longlong) -> cython.void:
         """Note where `identifier` comes from; a source that changed is accepted without a word."""
-        before: cython.longlong = self.rows[2 * identifier + 1]
+        before: cython.longlong = self.rows[identifier] >> 8
         if before == channel:
             return
         if before == 7:
             self.learned += 1
         else:
             self.changed += 1
-        self.rows[2 * identifier + 1] = channel
+        self.rows[identifier] = self.rows[identifier] & 0xFF | channel << 8
 
     def subscribe(self, identifier: cython.longlong, channel: cython.longlong) -> cython.void:
         """A remote frame came from `channel`: send `identifier` there too from now on."""
-        self.rows[2 * identifier] |= 1 << channel
+        self.rows[identifier] |= 1 << channel
 
 
 class Router:
@@ -209,15 +209,16 @@ class Router:
         self.routed += 1
         if flags & 16 and 1 <= source <= 4:  # FLAG_REMOTE: somebody on that bus asks for the value
             self.table.subscribe(identifier, source)
-            channel = self.table.rows[2 * identifier + 1]
+            channel = self.table.rows[identifier] >> 8
             if 1 <= channel <= 4 and channel != source:
                 self.queue(channel, identifier, flags, word0, word1)
                 n += 1
             self.copies += n
             return n
-        if self.table.rows[2 * identifier + 1] != source:
+        mask = self.table.rows[identifier]
+        if mask >> 8 != source:
             self.table.learn(identifier, source)
-        mask = self.table.rows[2 * identifier] & ~(1 << source)
+        mask = mask & 0xFF & ~(1 << source)
         if mask == 1:  # nearly all that satellites send
             self.ssp.push(identifier, flags, word0, word1, now)
             self.copies += 1

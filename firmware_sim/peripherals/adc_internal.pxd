@@ -9,9 +9,11 @@ cdef class AdcInternal(Peripheral):
     cdef public bint busy
     cdef public short alarm, channel
     cdef public InterruptSource source
-    cdef public long long conversion_ns, started_time, CR, GDR, clkdiv, conversions, result
+    cdef public long long started_time
+    cdef public int conversion_ns, clkdiv
+    cdef public unsigned int CR, GDR
     cdef public double scale, reference_V
-    cdef public long long offset_counts
+    cdef public long long result, offset_counts, conversions
     cdef public short[8] inputs
     # burst mode, and the rest
     cdef public short[8] channels

@@ -8,9 +8,9 @@ cdef class SpiEncoder(Peripheral):
     # what a transfer touches
     cdef public bint busy
     cdef public short alarm, word
+    cdef public int mask, latched, SPDR, SPSR, transfer_ns
     cdef public InterruptSource source
-    cdef public int mask, latched, SPDR, SPSR
-    cdef public long long transfer_ns, transfers
+    cdef public long long transfers
     # the rest
     cdef public long long number, bits, bit_rate, not_finished
     cpdef bint start(self) except? -1

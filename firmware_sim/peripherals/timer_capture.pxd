@@ -10,6 +10,7 @@ cdef class TimerCapture(Peripheral):
     cdef public short IR, CCR
     cdef public int alarm
     cdef public long long wrap_time, next_wrap_time
+    cdef public InterruptSource match_source
     cdef public TickTrain ticks
     cdef public long long period_ns
     cdef public double counts_per_ns
@@ -17,7 +18,6 @@ cdef class TimerCapture(Peripheral):
     cdef public unsigned int[4] captures
     cdef public InterruptSource source0, source1, source2, source3
     cdef public long long[4] captured
-    cdef public InterruptSource match_source
     # the rest
     cdef public long long[4] lost
     cdef public short[4] pins
