@@ -167,7 +167,7 @@ class CanLink:
                 if identifier == self.time_identifier:
                     receiver = self.time
                 else:
-                    receiver = self.receivers[identifier]
+                    receiver = cython.cast(Receiver, self.receivers[identifier])
             if receiver is None:
                 ignored += 1
             else:

@@ -246,7 +246,7 @@ class MainBrainSspLink:
         self.segments_sent += 1
         if self.queue_count == 0:
             return self.empty
-        segment = self.queue[self.queue_read]
+        segment = cython.cast(SspSegment, self.queue[self.queue_read])
         self.queue_read += 1
         if self.queue_read == 18:
             self.queue_read = 0
@@ -392,7 +392,7 @@ class RouterSspLink:
         self.last += 1
         if self.last == 24:
             self.last = 0
-        self.packing = self.segments[self.last]
+        self.packing = cython.cast(SspSegment, self.segments[self.last])
         restart(self.packing)
 
     def _put(self, word: cython.longlong) -> cython.void:
@@ -413,7 +413,7 @@ class RouterSspLink:
         self.segments_sent += 1
         if self.half_words == 0:
             return self.empty
-        segment = self.segments[self.first]
+        segment = cython.cast(SspSegment, self.segments[self.first])
         if now - self.push_time < 5 * self.push_step_ns:
             take = self.half_words - 5
             if now > self.push_time:

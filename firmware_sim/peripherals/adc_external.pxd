@@ -1,4 +1,5 @@
 cimport cython
+from libc.math cimport copysign
 
 from firmware_sim.microcontroller cimport Peripheral
 from firmware_sim.vic cimport InterruptSource

@@ -18,6 +18,9 @@ from firmware_sim.vic import EXTERNAL_INTERRUPT
 from foundation.events import NEVER
 from foundation.user_error import UserError
 
+if not cython.compiled:
+    from math import copysign
+
 CONVERSION_NS = 20_833  # 48 kSamples/s, SLAS370C
 GAINS = (1, 2, 4, 5, 8, 10, 16, 20)  # by gain code 0 ... 7, SLAS370C
 REFERENCE_V = 2.5  # full scale at gain 1; external reference of the usual 2.5 V (chosen by us, as the internal one)
@@ -85,10 +88,7 @@ class Ads7871(Peripheral):
             scaled = 16384.0
         if scaled < -16384.0:
             scaled = -16384.0
-        if scaled >= 0.0:
-            counts = int(scaled + 0.5)
-        else:
-            counts = int(scaled - 0.5)
+        counts = int(scaled + copysign(0.5, scaled))
         counts += self.offset_counts
         if counts > 8191:
             return 8191

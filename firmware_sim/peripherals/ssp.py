@@ -76,7 +76,7 @@ class SspPort(Peripheral):
         """The other side's segment is in."""
         if self.fresh:
             self.overwritten += 1
-        self.received = queue.ref
+        self.received = cython.cast(SspSegment, queue.ref)  # the only thing such a message brings
         self.received_time = queue.time
         self.fresh = True
         self.exchanges += 1
