@@ -59,6 +59,7 @@ class EncoderCapture:
         self.wraps = wraps
         self.channel = channel
         self.flag = 16 << channel
+        self.edge_bits = 3 << 3 * channel  # rising and falling in T0CCR
         self.pin = pin
         self.partner_pin = partner_pin
         self.decoder = decoder
@@ -95,7 +96,7 @@ class EncoderCapture:
         self.last_capture = capture
         if level == self.armed_rising:
             self.decoder.edge(level, self.chip.pins[self.partner_pin] != 0, elapsed)
+            self.armed_rising = not level
+            timer.CCR ^= self.edge_bits  # from one of the two to the other
         else:
-            self.decoder.glitch()
-        self.armed_rising = not level
-        timer.arm_one(self.channel, self.armed_rising)
+            self.decoder.glitch()  # the edge that would leave the other level stays armed

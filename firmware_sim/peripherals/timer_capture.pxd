@@ -23,11 +23,9 @@ cdef class TimerCapture(Peripheral):
     cdef public short[4] pins
     cdef public long long number, phase_ns, hz
     cdef public bint match_interrupt
-    cdef InterruptSource source_of(self, long long channel)
     cpdef long long CR(self, long long channel) except? <long long>-1
     cpdef long long TC(self) except? <long long>-1
     cpdef long long clear(self, long long mask) noexcept
     cpdef int arm(self, long long channel, bint rising, bint falling) except -1
-    cpdef long long arm_one(self, long long channel, bint rising) noexcept
     cpdef long long count_at(self, long long time) except? <long long>-1
     cdef long long _wrap_to(self, long long time) except? <long long>-1

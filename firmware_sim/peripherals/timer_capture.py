@@ -14,7 +14,7 @@ import cython
 
 from firmware_sim.clock import TickTrain
 from firmware_sim.microcontroller import Peripheral
-from firmware_sim.vic import TIMER_MATCH, InterruptSource
+from firmware_sim.vic import TIMER_MATCH
 from foundation.events import PIN_EDGE
 from foundation.user_error import UserError
 
@@ -78,16 +78,6 @@ class TimerCapture(Peripheral):
         self.arm(channel, rising, falling)
         return source
 
-    def source_of(self, channel: cython.longlong) -> InterruptSource:
-        """The interrupt source that captures of a channel raise."""
-        if channel == 0:
-            return self.source0
-        if channel == 1:
-            return self.source1
-        if channel == 2:
-            return self.source2
-        return self.source3
-
     def arm(self, channel: cython.longlong, rising: cython.bint, falling: cython.bint) -> None:
         """Choose the edges that channel captures (its three bits of T0CCR, interrupt on)."""
         bits: cython.longlong = 4
@@ -101,15 +91,6 @@ class TimerCapture(Peripheral):
         """Write T0IR: the bits of `mask` are cleared, the channels may capture again. Returns what is left."""
         self.IR &= ~mask
         return self.IR
-
-    def arm_one(self, channel: cython.longlong, rising: cython.bint) -> cython.longlong:
-        """Capture only the rising or only the falling edges of a channel, interrupt on; returns T0CCR."""
-        shift: cython.longlong = 3 * channel
-        if rising:
-            self.CCR = self.CCR & ~(7 << shift) | 5 << shift
-        else:
-            self.CCR = self.CCR & ~(7 << shift) | 6 << shift
-        return self.CCR
 
     @property
     def wraps(self):
@@ -189,7 +170,14 @@ class TimerCapture(Peripheral):
         self.IR |= flag
         self.captured[channel] += 1
         if asked & 4:
-            self.chip.vic.raise_source(self.source_of(channel))
+            if channel == 0:
+                self.chip.vic.raise_source(self.source0)
+            elif channel == 1:
+                self.chip.vic.raise_source(self.source1)
+            elif channel == 2:
+                self.chip.vic.raise_source(self.source2)
+            else:
+                self.chip.vic.raise_source(self.source3)
         return 0
 
     def on_alarm(self, alarm: cython.longlong, time: cython.longlong) -> cython.void:
