@@ -7,42 +7,44 @@ from libc.math cimport log
 
 cimport cython
 
-cdef long long _MASK, _NEVER
-
 # In both classes what every frame touches stands in front: few lines of the processor's cache.
 
 @cython.final
 cdef class Node:
     cdef public EventQueue inbox
     cdef public Node following
-    cdef public int order, controller, mode
-    cdef public bint listening
-    cdef public int transmit_errors, receive_errors
-    cdef public bint passive, warning
-    cdef public long long sent, received
+    cdef public int index, order
+    cdef public short controller, mode, transmit_errors, receive_errors
+    cdef public bint listening, passive
+    cdef public int sent, received
+    cdef public bint warning
     cdef public str name
-    cdef public long long index
     cdef public long long sequences_left, join_from, suspend_bit, sending_end
     cdef public long long refused, aborted, single_shot_skipped, flushed
     cdef public long long arbitrations_lost, retries
 
 @cython.final
 cdef class Bus:
-    # the bus in absolute bits since power-up
-    cdef public long long next_time, next_bit, advanced, free_time, free_bit, bitrate, next_change
-    # transmit buffers
-    cdef public long long first, pending_count, node_count, operating, joining, suspended_until
-    cdef public long long[::1] rows
-    cdef public long long next_strike, second_bit, second_ns, bit_ns, bit_rest, intermission_ns, intermission_rest
-    cdef public list nodes
+    # times in ns and in bits since power-up, transmit buffers: what a request and a frame touch
+    cdef public long long next_time, next_bit, advanced, free_time, free_bit, suspended_until, next_change
+    cdef long long* slots
+    cdef public long long bitrate, first
+    cdef public int pending_count, node_count, operating, wake_place
+    cdef long long* due
+    # what a frame touches
+    cdef public long long next_strike, second_bit, second_ns
+    cdef public int bit_ns, bit_rest, intermission_ns, intermission_rest
+    cdef public Node first_node
     cdef public FrameStream trace
     cdef public long long frames, bits, window_busy, window_end
-    cdef public long long[::1] identifiers
-    cdef public long long wake_place
-    cdef public long long[::1] wakes
+    cdef long long* counts
+    # what those three addresses lead into: kept here, exchanged only by methods that set them too
+    cdef readonly long long[::1] rows, identifiers, wakes
+    cdef public list nodes
     cdef public str name
     cdef public object seed
     cdef public EventQueue commands
+    cdef public long long joining
     # disturbances
     cdef public RandomStream noise
     cdef public double bit_error_rate
