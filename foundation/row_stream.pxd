@@ -2,8 +2,9 @@ cimport cython
 
 cdef class RowStream:
     cdef public long long used, capacity, last_time_ns, number
-    cdef public long long[::1] integers
+    cdef long long* numbers
     cdef public long long columns
+    cdef readonly long long[::1] integers
     cdef public double[::1] reals
     cdef public bint is_real
     cdef public object digest, sink

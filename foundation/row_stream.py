@@ -21,6 +21,8 @@ class RowStream:
         self.capacity = columns * block_rows
         self.integers = array.array("q", [0]) * (self.capacity if code == "q" else 0)
         self.reals = array.array("d", [0.0]) * (self.capacity if code == "d" else 0)
+        # compiled, where `integers` begins: beside the other fields of every row, where a memoryview is 208 bytes away
+        self.numbers = cython.address(self.integers[0]) if cython.compiled else self.integers
         self.used = 0
         self.last_time_ns = 0
         self.is_real = code == "d"
@@ -66,9 +68,9 @@ class FrameStream(RowStream):
     ) -> None:
         """A frame was on the bus."""
         at: cython.longlong = self.used
-        self.integers[at] = time_ns
-        self.integers[at + 1] = (lo << 12) | (flags << 4) | self.number
-        self.integers[at + 2] = (hi << 29) | identifier
+        self.numbers[at] = time_ns
+        self.numbers[at + 1] = (lo << 12) | (flags << 4) | self.number
+        self.numbers[at + 2] = (hi << 29) | identifier
         self.used = at + 3
         self.last_time_ns = time_ns
         if self.used == self.capacity:
