@@ -8,15 +8,14 @@ from foundation.edge_buffer cimport EdgeBuffer
 cdef class IncrementalEncoder:
     # what every step looks at stands first, beside each other
     cdef public EdgeBuffer edges
-    cdef public double calm_from, calm_to, calm_rad, edges_per_rad, edges_at_zero
-    cdef public bint started, broken, eccentric, has_errors
-    cdef public double jitter
+    cdef public double calm_rad, calm_from, calm_to, edges_per_rad, edges_at_zero
+    cdef public bint started, eccentric, uneven, has_errors
     cdef public long long cell, total
     # the running piece
     cdef public double u0, du, m0, m1, span_ns
     cdef public long long t0, last_time
     # what describes the encoder
-    cdef public double scale, offset_rad, shaft_per_rad, edges_per_shaft_rad, gear
+    cdef public double jitter, scale, offset_rad, shaft_per_rad, edges_per_shaft_rad, gear
     cdef public double eccentricity_1, phase_1, eccentricity_2, phase_2
     cdef public long long lines, sign, table_size
     cdef public RandomStream stream

@@ -66,21 +66,21 @@ class IncrementalEncoder:
         self.table_size = 2 * lines
         self.errors = reals([0.0] * (2 * lines))
         self.has_errors = False
+        self.uneven = False  # edges are not where they should be: errors of the disc, or jitter
         self.seed = seed
         self.set_disc(line_error, duty_error)
         self.edges = EdgeBuffer()
         self.cell = 0
         self.total = 0
         self.started = False
-        self.broken = False
         # for a disc without eccentricity, whose edges lie evenly: edges per rad of the joint and at its zero
         self.eccentric = False
         self.edges_per_rad = 0.0
         self.edges_at_zero = 0.0
-        # joint angles (rad) between which no edge lies, with `calm_rad` to spare on both sides; empty when unknown
-        self.calm_from = 1.0
-        self.calm_to = -1.0
+        # joint angles (rad) between which no edge lies, with `calm_rad` to spare on both sides; 0.0 when unknown
         self.calm_rad = 0.0
+        self.calm_from = 0.0
+        self.calm_to = 0.0
         # the running piece, as fields so that the helpers need no long argument lists
         self.u0 = 0.0
         self.du = 0.0
@@ -146,8 +146,8 @@ class IncrementalEncoder:
         self.eccentric = self.eccentricity_1 != 0.0 or self.eccentricity_2 != 0.0
         self.edges_per_rad = self.edges_per_shaft_rad * self.shaft_per_rad * self.scale
         self.edges_at_zero = self.edges_per_shaft_rad * self.shaft_per_rad * self.offset_rad
-        self.calm_from = 1.0
-        self.calm_to = -1.0
+        self.uneven = self.has_errors or self.jitter > 0.0
+        self.calm_rad = 0.0
         self.edges.clear()
 
     def level_a(self) -> cython.longlong:
@@ -201,7 +201,7 @@ class IncrementalEncoder:
         buffer: EdgeBuffer = self.edges
         buffer.count = 0
         buffer.read = 0
-        if self.calm_from < angle0 < self.calm_to and self.calm_from < angle1 < self.calm_to:
+        if self.calm_rad > 0.0 and self.calm_from < angle0 < self.calm_to and self.calm_from < angle1 < self.calm_to:
             # between two edges at both ends; the cubic bulges out by at most 4/27 of each end's rate times the step
             x = rate0 if rate0 > 0.0 else -rate0
             x += rate1 if rate1 > 0.0 else -rate1
@@ -209,8 +209,6 @@ class IncrementalEncoder:
                 return 0
         if not self.started:
             self.reset(angle0)
-        if self.broken:
-            return 0
         if self.eccentric:
             u0 = self.position(angle0)
             u1 = self.position(angle1)
@@ -224,16 +222,13 @@ class IncrementalEncoder:
             m0 = x * rate0
             m1 = x * rate1
         du = u1 - u0
-        if m0 * du <= 0.0 or m1 * du <= 0.0:
+        g0 = du / m0 if m0 != 0.0 else 0.0
+        g1 = du / m1 if m1 != 0.0 else 0.0
+        if g0 < 0.5 or g0 > 2.0 or g1 < 0.5 or g1 > 2.0:
             if m0 != 0.0 or m1 != 0.0 or du != 0.0:
                 self._turning(t0, t1, u0, u1, m0, m1)
             return buffer.count
-        g0 = du / m0
-        g1 = du / m1
-        if g0 < 0.5 or g0 > 2.0 or g1 < 0.5 or g1 > 2.0:
-            self._turning(t0, t1, u0, u1, m0, m1)
-            return buffer.count
-        if self.has_errors or self.jitter > 0.0:
+        if self.uneven:
             return self._one_way(t0, t1, u0, u1, g0, g1)
         end = int(u1)
         if u1 < end:
@@ -251,8 +246,7 @@ class IncrementalEncoder:
             return 0
         self.cell = end
         self.total += count
-        self.calm_from = 1.0
-        self.calm_to = -1.0
+        self.calm_rad = 0.0
         while buffer.capacity < count:  # an angle may have been set from outside
             buffer.grow()
         buffer.count = count
@@ -335,8 +329,7 @@ class IncrementalEncoder:
                 level = self.threshold(cell)
             count += 1
         self.cell = cell
-        self.calm_from = 1.0
-        self.calm_to = -1.0
+        self.calm_rad = 0.0
         buffer.count = count
         self.total += count
         return count
@@ -345,7 +338,7 @@ class IncrementalEncoder:
         """Find the joint angles between the two edges beside the present position, a tenth of an edge inside."""
         a: cython.double = self.edges_per_rad
         b: cython.double = self.edges_at_zero
-        if self.calm_from < self.calm_to or self.eccentric or a == 0.0:
+        if self.calm_rad > 0.0 or self.eccentric or a == 0.0:
             return
         self.calm_from = (self.threshold(self.cell) + 0.1 - b) / a
         self.calm_to = (self.threshold(self.cell + 1) - 0.1 - b) / a
@@ -411,8 +404,7 @@ class IncrementalEncoder:
             self._piece(x1, x2)
         if x2 < 1.0 and x1 < x2:
             self._piece(x2, 1.0)
-        self.calm_from = 1.0
-        self.calm_to = -1.0
+        self.calm_rad = 0.0
         self.total += self.edges.count - before
 
     def _piece(self, x0: cython.double, x1: cython.double) -> None:

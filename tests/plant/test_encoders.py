@@ -58,6 +58,21 @@ def test_counts_times_the_firmwares_gain_are_the_angle():
         assert count * rad == pytest.approx(angle, abs=1.1 * abs(rad) + 1e-5 * angle)
 
 
+def test_the_loop_for_uneven_discs_finds_an_even_ones_edges():
+    # a jitter too small to move any stamp sends the same motion through the other loop
+    even, uneven = IncrementalEncoder("e", 512, 34.0), IncrementalEncoder("e", 512, 34.0, jitter=1e-300)
+    angle, count = 0.3, 0
+    for k in range(400):
+        rate = 8.0 * math.cos(0.05 * k)
+        following = angle + 1.01 * rate * STEP * 1e-9
+        for encoder in (even, uneven):
+            assert encoder.update(k * STEP, (k + 1) * STEP, angle, rate, following, rate) == encoder.edges.count
+        assert edges(even) == edges(uneven) and even.cell == uneven.cell
+        count += even.edges.count
+        angle = following
+    assert even.total == uneven.total == count > 500
+
+
 def test_forward_motion_rises_with_b_low_and_falls_with_b_high():
     encoder = IncrementalEncoder("e", 100)
     encoder.reset(0.001)
