@@ -198,26 +198,19 @@ class Imu:
     def _word(self, word: cython.longlong) -> cython.void:
         """Four bytes, the highest first."""
         line: ByteBuffer = self.bytes
-        times: cython.longlong[::1] = line.times
-        values: cython.longlong[::1] = line.values
         at: cython.longlong = line.count
-        a: cython.longlong = word >> 24 & 255
-        b: cython.longlong = word >> 16 & 255
-        c: cython.longlong = word >> 8 & 255
-        d: cython.longlong = word & 255
         time: cython.longlong = self.line_free_ns
-        step: cython.longlong = self.byte_ns
-        times[at] = time + step
-        times[at + 1] = time + 2 * step
-        times[at + 2] = time + 3 * step
-        times[at + 3] = time + 4 * step
-        values[at] = a
-        values[at + 1] = b
-        values[at + 2] = c
-        values[at + 3] = d
-        self.line_free_ns = time + 4 * step
-        self.checksum += a + b + c + d
-        line.count = at + 4
+        shift: cython.longlong
+        byte: cython.longlong
+        for shift in range(24, -8, -8):
+            byte = word >> shift & 255
+            time += self.byte_ns
+            line.times[at] = time
+            line.values[at] = byte
+            self.checksum += byte
+            at += 1
+        self.line_free_ns = time
+        line.count = at
 
     def _sum(self) -> cython.void:
         """The 16-bit sum of everything since the header."""
