@@ -155,9 +155,9 @@ class MotorUnit:
         d: cython.double
         x: cython.double
         drop: cython.double
-        sign: cython.double = 0.0
-        final: cython.double = 0.0
-        above: cython.double = 0.0
+        sign: cython.double
+        final: cython.double
+        above: cython.double
         part: cython.double = -1.0
         total_As: cython.double
         from_battery_As: cython.double = 0.0
@@ -192,6 +192,8 @@ class MotorUnit:
                 sign = 1.0
             elif amps < 0.0 or x < -drop:
                 sign = -1.0
+            else:
+                sign = 0.0
             if sign != 0.0:
                 final = (sign * x - drop) / R
                 above = sign * amps - final
