@@ -110,6 +110,7 @@ class HipBoard(MotorBoard):
                 Task(board.send_max_execution_time,    420,  560,   0, "",      "MCH_MAX_EXECUTION_TIME"),
             ),
             extra_idle_call=self.quirks.occasional_idle_call,
+            speakers=("can_tx1",),
             last=(
                 Task(board.execution.record,            60,   80,   0, "",      "execution_time_record"),
             ),

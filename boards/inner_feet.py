@@ -102,6 +102,7 @@ class InnerFeetBoard(AnkleBoard):
                 Task(board.rezero,                     700,  940,   0, "",      "motor_encoder_rezero"),
             ),
             extra_idle_call=self.quirks.occasional_idle_call,
+            speakers=("can_tx2",),
             last=(
                 Task(board.execution.record,            60,   80,   0, "",      "execution_time_record"),
             ),

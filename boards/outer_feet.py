@@ -102,6 +102,7 @@ class OuterFeetBoard(AnkleBoard):
                 right_heel,
             ),
             extra_idle_call=self.quirks.occasional_idle_call,
+            speakers=("can_tx1",),
             last=(
                 Task(board.execution.record,            60,   80,   0, "",      "execution_time_record"),
             ),

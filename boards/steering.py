@@ -101,6 +101,7 @@ class SteeringBoard(MotorBoard):
                 Task(board.send_max_execution_time,    420,  560,   0, "",      "MCSI_MAX_EXECUTION_TIME"),
             ),
             extra_idle_call=self.quirks.occasional_idle_call,
+            speakers=("can_tx2",),
             last=(
                 Task(board.execution.record,            60,   80,   0, "",      "execution_time_record"),
             ),

@@ -174,6 +174,7 @@ class UserInterfaceBoard(Microcontroller):
                 Task(self.send_rc_3,            cost=260,      limit=500),
             ),
             extra_idle_call=self.quirks.occasional_idle_call,
+            speakers=("feed",),
             last=(Task(execution.record,       cost=40,       limit=80, name="record_execution_time"),),
         )  # fmt: skip
 

@@ -23,8 +23,8 @@ def handle(source: Any, queue: Any) -> Any:
     return source.handler(queue)
 
 
-def code_of(function: Callable[..., Any]) -> int:
-    """Address of a method's C function; 0: it has none."""
+def code_of(function: Callable[..., Any], arguments: int) -> int:
+    """Address of the C function of a method that takes so many arguments; 0: it has none."""
     return 0
 
 

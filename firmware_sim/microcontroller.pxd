@@ -20,56 +20,57 @@ cdef class EdgeLine:
     cdef public Peripheral peripheral
     cdef public EdgeLine following
 
+# Fields that nearly every event touches come first, close together; then those of alarms, edges and messages.
 cdef class Microcontroller:
+    cdef public long long now, instant, code_time, stop_time, extra_cycles
+    cdef public long long alarm_time, tick_time, edge_time, other_edge_time, next_time, horizon
+    cdef public long long irq_free, fiq_free, stolen_cycles
+    cdef public bint waiting, check_wait, background_wanted
+    cdef public double ns_per_cycle
+    cdef public EventQueue inbox
+    cdef public InterruptController vic
+    cdef public SlotScheduler scheduler
+    cdef public Outbox outbox
+    cdef public object background
+    cdef public long long alarm_first, alarm_count
+    cdef public list alarm_owners
+    cdef public long long[16] alarm_times
+    cdef public long long[16] alarm_numbers
+    cdef public EdgeLine edge_line, first_line
+    cdef public list message_table
+    cdef public AnalogPins analog
+    cdef public TickTrain ticks
+    cdef public InterruptSource tick_source
+    cdef public long long match_time
+    cdef public object on_timer_tick
+    cdef public double cycles_per_ns
+    cdef public Wait wait_task
+    cdef public long long wait_start, wait_stolen
+    cdef public long long[64] pin_channels
+    cdef public long long[::1] pins, words
+    cdef public list pin_owners, edge_lines
     cdef public str name
     cdef public long long hz
     cdef public Crystal crystal
-    cdef public EventQueue inbox
-    cdef public Outbox outbox
-    cdef public long long now, next_time
-    cdef public SlotScheduler scheduler
-    cdef public InterruptController vic
-    cdef public AnalogPins analog
-    cdef public long long[::1] words, pins
-    cdef public double ns_per_cycle, cycles_per_ns
     cdef public object on_overrun, on_limit, on_near_limit
-    cdef public long long extra_cycles
-    # pending-event bookkeeping of the loop
-    cdef public long long tick_time
-    cdef public TickTrain ticks
-    cdef public InterruptSource tick_source
-    cdef public long long code_time, stop_time, irq_free, fiq_free
-    cdef public bint waiting, check_wait
-    cdef public Wait wait_task
-    cdef public long long wait_start, wait_stolen, stolen_cycles
-    cdef public long long alarm_time, alarm_count
-    cdef public long long[::1] alarm_times
-    cdef public list alarm_owners
-    cdef public long long[::1] alarm_numbers
-    cdef public long long alarm_first
-    cdef public list message_table, pin_owners
-    cdef public long long[::1] pin_channels
-    cdef public list edge_lines
-    cdef public EdgeLine edge_line, first_line
-    cdef public long long edge_time, other_edge_time
+    cdef public long long unclaimed
     @cython.final
     cdef long long _choose_edge_line(self) noexcept
-    cdef public long long unclaimed, match_time, instant
-    cdef public object on_timer_tick
-    cdef public object background
-    cdef public bint background_wanted
-    cdef public long long horizon
     cpdef long long advance(self, long long until) except? -1
     cpdef long long main_loop(self) except? <long long>-1
     cpdef bint due(self, long long until) except? -1
     cpdef void spend(self, long long cycles) noexcept
+    cpdef long long stop_at(self, long long time) noexcept
     cpdef long long cycles_since_tick(self) except? -1
     cpdef long long request(self, InterruptSource source) except? -1
     cpdef long long edges_came(self) noexcept
     @cython.final
-    cdef long long _serve_now(self) except? <long long>-1
+    cdef long long _service_time(self) noexcept
     @cython.final
-    cdef long long _edges(self, long long until) except? <long long>-1
+    cdef long long _own_next(self) noexcept
+    cpdef long long speaks_from(self) except? <long long>-1
+    @cython.final
+    cdef long long _edges(self) except? <long long>-1
     @cython.final
     cdef long long _find_first_alarm(self) noexcept
     cpdef long long set_alarm(self, long long index, long long time) except? <long long>-1
@@ -86,9 +87,9 @@ cdef class Microcontroller:
     @cython.final
     cdef long long _serve(self, InterruptSource source, long long time) except? <long long>-1
     @cython.final
-    cdef long long _code(self, long long until) except? <long long>-1
+    cdef long long _code(self, long long first) except? <long long>-1
     @cython.final
-    cdef bint _edges_between(self, long long until) except? -1
+    cdef bint _edges_between(self) except? -1
     @cython.final
     cdef long long _spent(self, Task task, long long items) except? <long long>-1
     @cython.final

@@ -31,6 +31,8 @@ if not cython.compiled:
     from firmware_sim.calls import call, handle, run
 
 PINS = 64  # P0.0 ... P0.31 are 0 ... 31, P1.0 ... P1.31 are 32 ... 63
+WORDS = 16
+ALARMS = 16
 MESSAGE_KINDS = 32
 INDICES_PER_KIND = 16
 
@@ -96,7 +98,7 @@ class Microcontroller:
         self.scheduler = SlotScheduler(Schedule(), 1)
         self.vic = InterruptController(self.ns_per_cycle)
         self.analog = AnalogPins()
-        self.words = array.array("q", [0]) * 16
+        self.words = array.array("q", [0]) * WORDS
         self.pins = integers(PINS)
         self.on_overrun = None
         self.on_limit = None
@@ -123,13 +125,13 @@ class Microcontroller:
         self.stolen_cycles = 0
         self.alarm_time = NEVER
         self.alarm_count = 0
-        self.alarm_times = integers(16, NEVER)
+        self.alarm_times = [NEVER] * 16  # ALARMS
         self.alarm_owners = []
-        self.alarm_numbers = integers(16)
+        self.alarm_numbers = [0] * 16
         self.alarm_first = 0
         self.message_table = [None] * (MESSAGE_KINDS * INDICES_PER_KIND)
         self.pin_owners = [None] * PINS
-        self.pin_channels = integers(PINS, -1)
+        self.pin_channels = [-1] * 64  # PINS
         self.edge_lines = []
         self.first_line = None
         self.edge_line = None
@@ -215,8 +217,8 @@ class Microcontroller:
         """An alarm slot; when due, `peripheral.on_alarm(number, time)` runs. Returns the slot."""
         self._check_peripheral(peripheral)
         index = self.alarm_count
-        if index >= 16:
-            raise UserError(f"{self.name}: more than 16 peripheral alarms")
+        if index >= ALARMS:
+            raise UserError(f"{self.name}: more than {ALARMS} peripheral alarms")
         self.alarm_count = index + 1
         self.alarm_owners.append(peripheral)
         self.alarm_numbers[index] = number
@@ -283,6 +285,14 @@ class Microcontroller:
         self.next_time = self.instant
         return self.vic.raise_source(source)
 
+    def stop_at(self, time: cython.longlong) -> cython.longlong:
+        """While the chip runs: it shall run no further than to `time` (ns). Returns the instant at which it stops."""
+        if time < self.horizon:
+            self.horizon = time
+            if time < self.stop_time:
+                self.stop_time = time
+        return self.horizon
+
     def main_loop(self) -> cython.longlong:
         """One turn of `background`; a board may put its main loop here instead of naming a function."""
         return call(self.background)
@@ -294,95 +304,106 @@ class Microcontroller:
         return self.next_time < until or self.inbox.head_time < until or self.edge_time < until
 
     def advance(self, until: cython.longlong) -> cython.longlong:
-        """Run everything with an instant before `until` (ns); returns `next_time`."""
+        """Run everything with an instant before `until` (ns), or before `horizon` where an output brought that nearer.
+
+        Returns `next_time`.
+        """
         inbox: EventQueue = self.inbox
         vic: InterruptController = self.vic
         scheduler: SlotScheduler = self.scheduler
+        first: cython.longlong
         time: cython.longlong
-        service: cython.longlong
-        what: cython.longlong
+        self.horizon = until
         if self.next_time >= until and inbox.head_time >= until and self.edge_time >= until:
             return self.next_time  # idle: a frequent answer in short steps
-        self.horizon = until
         while True:
-            # the hardware's next: an alarm (1) or the slot timer (2)
-            time = self.alarm_time
-            what = 1
-            if self.tick_time < time:
-                time = self.tick_time
-                what = 2
-            # the processor before that: a handler (3), tasks (4) or the main loop beside them (5)
+            # what comes in, or comes due by itself
+            first = self.alarm_time
+            if self.tick_time < first:
+                first = self.tick_time
+            if inbox.head_time < first:
+                first = inbox.head_time
+            if self.edge_time < first:
+                first = self.edge_time
+            # what the processor does before that: a handler, tasks, or the main loop beside them
             if vic.pending != 0:
-                service = self.fiq_free
-                if vic.pending < 65536 and self.irq_free > service:  # no FIQ among them
-                    service = self.irq_free
-                if service < self.instant:
-                    service = self.instant
-                if service < time:
-                    time = service
-                    what = 3
-            if self.code_time < time:
-                if not scheduler.done:
-                    if not self.waiting or self.check_wait:
-                        time = self.code_time
-                        what = 4
-                elif self.background_wanted and self.background is not None:
-                    service = self.code_time
-                    if service < self.instant:
-                        service = self.instant
-                    if service < time:
-                        time = service
-                        what = 5
-            # at one instant inputs come first: edges, then messages
-            if self.edge_time <= time and self.edge_time <= inbox.head_time:
-                if self.edge_time >= until:
-                    break
-                self._edges(until)
-                continue
-            if inbox.head_time <= time:
-                if inbox.head_time >= until:
-                    break
-                inbox.take()
-                self._input()
-            elif time >= until:
-                break
-            else:
-                self.instant = time
-                if what == 4:
-                    self._code(until)
-                    continue
-                if what == 3:
+                time = self._service_time()
+                if time < first:
+                    if time >= self.horizon:
+                        break
+                    self.instant = time
                     self._serve(vic.first_pending(), time)
                     continue
-                if what == 5:
+            elif not scheduler.done:
+                if self.code_time < first and (not self.waiting or self.check_wait):
+                    if self.code_time >= self.horizon:
+                        break
+                    self.instant = self.code_time
+                    self._code(first)
+                    continue
+            elif self.background_wanted and self.background is not None:
+                time = self.code_time
+                if time < self.instant:
+                    time = self.instant
+                if time < first:
+                    if time >= self.horizon:
+                        break
+                    self.instant = time
                     self._background()
                     continue
-                if what == 1:
-                    self._alarm(time)
+            if first >= self.horizon:
+                break
+            # at one instant: edges, messages, alarms, the slot timer
+            if self.edge_time == first:
+                self._edges()
+            elif inbox.head_time == first:
+                inbox.take()
+                self._input()
+            else:
+                self.instant = first
+                if self.alarm_time == first:
+                    self._alarm(first)
                 else:
                     self._timer_match()
-            if vic.pending != 0:
-                self._serve_now()
-        self.next_time = time
-        return time
+        return self._own_next()
 
     @cython.final
-    def _serve_now(self) -> cython.longlong:
-        """Serve what is pending if it can be served at this very instant: the common case, without another round."""
-        time: cython.longlong = self.instant
-        if (
-            self.fiq_free > time
-            or (self.irq_free > time and self.vic.pending < 65536)
-            or time >= self.alarm_time
-            or time >= self.tick_time
-            or time >= self.edge_time
-            or time >= self.inbox.head_time
-        ):
-            return 0
-        return self._serve(self.vic.first_pending(), time)
+    def _service_time(self) -> cython.longlong:
+        """When the first of the pending interrupts can be served."""
+        time: cython.longlong = self.fiq_free
+        if self.vic.pending < 65536 and self.irq_free > time:  # no FIQ among them
+            time = self.irq_free
+        return time if time > self.instant else self.instant
 
     @cython.final
-    def _edges(self, until: cython.longlong) -> cython.longlong:
+    def _own_next(self) -> cython.longlong:
+        """Set and return `next_time`: when something happens here if nothing comes in."""
+        time: cython.longlong = self.alarm_time if self.alarm_time < self.tick_time else self.tick_time
+        own: cython.longlong = time
+        if self.vic.pending != 0:
+            own = self._service_time()
+        elif not self.scheduler.done:
+            if not self.waiting or self.check_wait:
+                own = self.code_time
+        elif self.background_wanted and self.background is not None:
+            own = self.code_time if self.code_time > self.instant else self.instant
+        self.next_time = own if own < time else time
+        return self.next_time
+
+    def speaks_from(self) -> cython.longlong:
+        """Before this instant (ns) the board puts nothing on a bus, unless an urgent message comes in.
+
+        That is its next event, or later where its schedule names the tasks that speak (`Schedule.speakers`).
+        """
+        time: cython.longlong = self.code_time
+        if not self.scheduler.announces or self.vic.pending != 0 or self.background is not None:
+            return self.next_time
+        if self.waiting and self.horizon > time:  # what the task spins for has not come until then
+            time = self.horizon
+        return self.scheduler.speaks_from(time, self.tick_time)
+
+    @cython.final
+    def _edges(self) -> cython.longlong:
         """Edges from the first one on, each with its fast interrupt, until something else comes first.
 
         Hardware first: the capture happens at the edge's stamp whatever the processor does. Returns the last instant.
@@ -426,7 +447,7 @@ class Microcontroller:
                 self._serve(vic.first_pending(), time)
                 if vic.pending != 0:
                     return time
-            if self.edge_time >= until or self.edge_time > self.alarm_time or self.edge_time > others:
+            if self.edge_time >= self.horizon or self.edge_time > self.alarm_time or self.edge_time > others:
                 return time
             if self.code_time < self.edge_time and (self.background is not None or not self.scheduler.done):
                 if not self.waiting or self.check_wait:
@@ -459,7 +480,7 @@ class Microcontroller:
                 peripheral.on_message(inbox)
                 return 0
         source = self.vic.sources.get((inbox.kind, inbox.a))
-        if source is None or not source.attached:
+        if source is None or source.bit == 0:
             if inbox.kind != 1:
                 self.unclaimed += 1
             return 0
@@ -520,7 +541,6 @@ class Microcontroller:
         cycles: cython.longlong
         busy: cython.longlong
         items: cython.longlong
-        source.pending = False
         source.served += 1
         self.vic.pending &= ~source.bit
         self.background_wanted = True
@@ -541,6 +561,10 @@ class Microcontroller:
                 items = result
             cycles = source.base_cycles + source.per_item * items + self.extra_cycles
             busy = int(cycles * self.ns_per_cycle)
+            source.noted += 1
+            source.noted_cycles += cycles
+            if cycles > source.noted_most:
+                source.noted_most = cycles
         if source.slot < 0:
             self.fiq_free = time + busy
             if self.irq_free > time:
@@ -551,9 +575,6 @@ class Microcontroller:
             self.code_time = time + busy
         else:
             self.code_time += busy
-        source.total_cycles += cycles
-        if cycles > source.max_cycles:
-            source.max_cycles = cycles
         self.stolen_cycles += cycles
         if self.waiting:
             self.check_wait = True
@@ -562,14 +583,17 @@ class Microcontroller:
         return cycles
 
     @cython.final
-    def _code(self, until: cython.longlong) -> cython.longlong:
-        """Run tasks from `code_time` on, until something else comes first or the row ends. Returns 0."""
+    def _code(self, first: cython.longlong) -> cython.longlong:
+        """Run tasks from `code_time` on, until something else comes first or the row ends. Returns 0.
+
+        `first`: the first edge, message, alarm or tick.
+        """
         scheduler: SlotScheduler = self.scheduler
         place: cython.longlong
         items: cython.longlong
         usual_ns: cython.longlong
         # what comes first; a task can only bring an alarm or an interrupt nearer
-        self.stop_time = min(until, self.tick_time, self.edge_time, self.inbox.head_time, self.alarm_time)
+        self.stop_time = self.horizon if self.horizon < first else first
         self.extra_cycles = 0
         if self.waiting:
             self.now = self.code_time
@@ -586,7 +610,7 @@ class Microcontroller:
         while scheduler.position < scheduler.end:
             place = scheduler.position
             scheduler.position = place + 1
-            usual_ns = scheduler.usual_ns[place]
+            usual_ns = scheduler.places[4 * place + 2]  # PLACE
             self.now = self.code_time
             if usual_ns >= 0:
                 if cython.compiled:
@@ -598,13 +622,13 @@ class Microcontroller:
                     items = result
                 if items == 0 and self.extra_cycles == 0:
                     self.code_time += usual_ns
-                    scheduler.usual_calls[scheduler.numbers[place]] += 1
+                    scheduler.usual_calls[scheduler.places[4 * place + 3]] += 1
                 else:
                     self._spent(scheduler.tasks[place], items)
             elif not self._special_task(scheduler.tasks[place]):
                 return 0
             if self.code_time >= self.stop_time or self.vic.pending != 0:
-                if not self._edges_between(until):
+                if not self._edges_between():
                     return 0
         self.now = self.code_time
         scheduler.done = True
@@ -614,14 +638,14 @@ class Microcontroller:
         return 0
 
     @cython.final
-    def _edges_between(self, until: cython.longlong) -> cython.bint:
+    def _edges_between(self) -> cython.bint:
         """Two tasks: if nothing but edges comes between them, take those. True when the next task may run at once."""
         first: cython.longlong = min(self.tick_time, self.alarm_time, self.inbox.head_time)
-        if self.vic.pending != 0 or self.edge_time >= until or self.edge_time > min(first, self.code_time):
+        if self.vic.pending != 0 or self.edge_time >= self.horizon or self.edge_time > min(first, self.code_time):
             return False
-        self._edges(until)
+        self._edges()
         self.extra_cycles = 0
-        self.stop_time = min(until, self.edge_time, first, self.alarm_time)
+        self.stop_time = min(self.horizon, self.edge_time, first, self.alarm_time)
         return self.vic.pending == 0 and self.code_time < self.stop_time
 
     @cython.final

@@ -1,5 +1,7 @@
 cimport cython
 
+cdef long long _NEVER
+
 cdef extern from "Python.h":
     ctypedef struct PyObject
     ctypedef object (*plain_call "PyCFunction")(PyObject*, PyObject*)
@@ -8,6 +10,7 @@ cdef extern from "Python.h":
     PyObject* PyCFunction_GET_SELF(object)
     int PyCFunction_GET_FLAGS(object)
     int METH_NOARGS
+    int METH_O
 
 # What stands in a schedule is mostly a bound method of a compiled class. Its C function is then called without the
 # general machinery of Python calls; anything else is called in the ordinary way. (With always_allow_keywords off, as
@@ -17,10 +20,10 @@ cdef inline object call(object function):
         return PyCFunction_GET_FUNCTION(function)(PyCFunction_GET_SELF(function), NULL)
     return function()
 
-# A table's places keep the addresses of C functions and of the objects they belong to (which `functions` keeps alive);
-# code 0: not such a function.
-cdef inline long long code_of(object function):
-    if PyCFunction_CheckExact(function) and PyCFunction_GET_FLAGS(function) == METH_NOARGS:
+# Address of the C function of a method that takes `arguments` (0 or 1), and of the object it belongs to, which whoever
+# keeps the addresses must keep alive; 0: it has none.
+cdef inline long long code_of(object function, int arguments):
+    if PyCFunction_CheckExact(function) and PyCFunction_GET_FLAGS(function) == (METH_O if arguments else METH_NOARGS):
         return <long long><void*>PyCFunction_GET_FUNCTION(function)
     return 0
 
@@ -29,19 +32,24 @@ cdef inline long long owner_of(object function):
         return <long long><void*>PyCFunction_GET_SELF(function)
     return 0
 
+cdef inline object call_with(long long code, long long owner, object argument):
+    return (<plain_call><void*>code)(<PyObject*><void*>owner, <PyObject*>argument)
+
 cdef inline object run(SlotScheduler scheduler, long long place):
-    if scheduler.codes[place] != 0:
-        return (<plain_call><void*>scheduler.codes[place])(<PyObject*><void*>scheduler.owners[place], NULL)
+    cdef long long code = scheduler.places[4 * place]
+    if code != 0:
+        return (<plain_call><void*>code)(<PyObject*><void*>scheduler.places[4 * place + 1], NULL)
     return scheduler.functions[place]()
 
 cdef class Task:
-    cdef public object routine
-    cdef public long long base_cycles, most_cycles, per_item, kind
-    cdef public str name, item
-    cdef public long long hits
+    cdef public long long kind, base_cycles, per_item, most_cycles
     cdef public long long noted_calls, noted_cycles, noted_most, noted_last, noted_when
-    cdef public SlotScheduler scheduler
     cdef public long long number
+    cdef public SlotScheduler scheduler
+    cdef public object routine
+    cdef public bint speaks
+    cdef public long long hits
+    cdef public str name, item
     cpdef long long note(self, long long cycles) except? -1
     cpdef long long usual_calls(self) except? -1
 
@@ -60,7 +68,7 @@ cdef class Occasional(Task):
 cdef class Schedule:
     cdef public long long slot_ns, divider, tick_cost, tick_slot, tick_latency
     cdef public list every, rows, last
-    cdef public bint completion_flag
+    cdef public bint completion_flag, announces
 
 @cython.final
 cdef class SlotRecord:
@@ -69,25 +77,30 @@ cdef class SlotRecord:
     cdef public list tasks
     cdef public dict interrupts
 
+# Fields that a slot touches come first, close together; a memoryview has its address in its first bytes.
 @cython.final
 cdef class SlotScheduler:
+    cdef public long long position, end
+    cdef public bint done, late, recording, started
+    cdef public long long[::1] places
+    cdef public long long[::1] usual_calls
+    cdef public long long row, row_count, divider_count, divider
+    cdef public long long row_start, run_before, slot_count, listed_tasks, slot_time, tick_time, finished_time
+    cdef public long long slot_cycles, near_limit_cycles, histogram_step
+    cdef public long long last_slot_cycles, total_slot_cycles, max_slot_cycles
+    cdef public bint announces
+    cdef public long long[::1] leads
+    cdef public long long[::1] row_leads
+    cdef public long long[::1] row_starts
+    cdef public long long[21] histogram
+    cdef public list tasks, functions
     cdef public Schedule schedule
-    cdef public list tasks, functions, row_starts, row_ends
     cdef public double ns_per_cycle
-    cdef public long long[::1] usual_ns, usual_calls, numbers, codes, owners
-    cdef public long long row_count, row, position, end, divider_count, slot_ns
-    cdef public bint done, started
-    cdef public long long slot_time, tick_time, finished_time
-    cdef public long long slot_count, overruns, dropped_tasks, listed_tasks, run_before, row_start
-    cdef public long long slot_cycles, near_limit_cycles, last_slot_cycles, max_slot_cycles, total_slot_cycles
-    cdef public long long near_limits
-    cdef public long long[::1] histogram
-    cdef public long long histogram_step
-    cdef public bint late
+    cdef public long long slot_ns, overruns, dropped_tasks, near_limits
     cdef public long long late_time
-    cdef public bint recording
     cdef public long long record_length
     cdef public list records
     cdef public SlotRecord record, late_record
     cpdef bint tick(self, long long timer_time) except? -1
     cpdef bint close(self, long long cycles) except? -1
+    cpdef long long speaks_from(self, long long code_time, long long tick_time) except? <long long>-1

@@ -1,3 +1,5 @@
+# cython: boundscheck=False, wraparound=False
+# (every index below is a place, a row or a number of a table that `layout` has laid down)
 """The cooperative slot scheduler: what runs when, what it costs, and what an overrun drops.
 
 A timer tick starts a slot and steps to the next row of the table. A slot runs the every-slot tasks, the
@@ -9,10 +11,9 @@ Cost and limit are two things: a task spends `cost + per_item * items` modelled 
 against `limit`. The event loop that spends the time is in microcontroller.py; here is the book-keeping.
 """
 
-import array
-
 import cython
 
+from foundation.events import NEVER
 from foundation.numbers import integers
 from foundation.user_error import UserError
 
@@ -24,6 +25,8 @@ OCCASIONAL_TASK = 1
 WAIT_TASK = 2
 
 HISTOGRAM_BINS = 21  # twenty of 5 % of a slot, the last for overruns
+PLACE = 4  # numbers per place of a table laid out: code, owner, usual_ns, number of the task
+_NEVER = NEVER  # a C variable when compiled (.pxd)
 
 
 class Task:
@@ -48,6 +51,7 @@ class Task:
         self.kind = NORMAL_TASK
         self.name = title
         self.item = item
+        self.speaks = True  # may put something on a bus; a Schedule knows better, but not of a user's function
         self.hits = 0
         # calls that cost `base_cycles` are counted in the scheduler; these keep the others
         self.noted_calls = 0
@@ -88,6 +92,7 @@ class Task:
     @function.setter
     def function(self, function) -> None:
         self.routine = function
+        self.speaks = True
         if self.scheduler is not None:
             self.scheduler.lay(self)
 
@@ -190,6 +195,9 @@ class Schedule:
     of tasks (or an Occasional) called once per pass, at the end of row `occasional_row`.
     `divider`: timer ticks per slot (the timer then runs at slot/divider). `completion_flag=False`: the
     runner keeps no DONE flag, so an overrun drops tasks but tells nobody (main-brain scheduler).
+    `speakers`: names of those tasks in `every` and `last` that may put something on a bus (None: any of them);
+    tasks of rows and of the occasional list always may. It lets the rest of the robot run ahead of a board that has
+    nothing to say, and changes no result.
     `tick_slot`: VIC slot of the timer interrupt (or FIQ); `tick_cost`: its cycles.
     """
 
@@ -208,6 +216,7 @@ class Schedule:
         tick_latency=None,
         slot_ns=None,
         extra_idle_call=True,
+        speakers=None,
     ) -> None:
         self.slot_ns = slot_ns if slot_ns is not None else slot_us * 1000
         self.every = list(every)
@@ -231,6 +240,15 @@ class Schedule:
         for task in self.every + self.last + [task for row in self.rows for task in row]:
             if not isinstance(task, Task):
                 raise UserError(f"schedule: {task!r} is not a Task")
+        self.announces = speakers is not None
+        if speakers is not None:
+            names = [task.name for task in self.every + self.last]
+            for name in speakers:
+                if name not in names:
+                    there = ", ".join(names)
+                    raise UserError(f"schedule: speaker {name!r} is no task of every slot; there are {there}")
+            for task in self.every + self.last:
+                task.speaks = task.name in speakers
 
     def row_tasks(self, row: cython.longlong) -> list:
         """Everything that a slot of this row runs, in order."""
@@ -277,12 +295,11 @@ class SlotScheduler:
         self.ns_per_cycle = ns_per_cycle
         self.slot_ns = schedule.slot_ns
         self.slot_cycles = slot_cycles
+        self.divider = schedule.divider
+        self.announces = schedule.announces
         self.near_limit_cycles = slot_cycles * 9 // 10  # "approaching" is 90 % (chosen by us)
         self.histogram_step = max(1, slot_cycles // 20)
-        self.histogram = array.array("q", [0]) * HISTOGRAM_BINS
-        self.tasks = []
-        self.row_starts = []
-        self.row_ends = []
+        self.histogram = [0] * 21  # HISTOGRAM_BINS
         self.recording = False
         self.layout()
         self.row = self.row_count - 1  # so that the first tick starts row 0
@@ -312,18 +329,25 @@ class SlotScheduler:
         self.late_record = None
 
     def layout(self) -> None:
-        """The table as flat lists, place by place, with each row's first and past-last place."""
+        """The table as flat lists, place by place; row r has the places row_starts[r] ... row_starts[r + 1] - 1.
+
+        `places` has PLACE numbers for each: addresses of a compiled task's C function and of the object that it belongs
+        to (code 0: call what stands in `functions`), usual_ns, and the task's number.
+        usual_ns: what a call without items takes (ns), or -1 when every call must be looked at more closely.
+        `leads`: ns from the start of the task at a place to that of the first one from there that may speak, at least;
+        `row_leads`: the same from the start of a row.
+        """
         self.row_count = len(self.schedule.rows)
+        self.row_starts = integers(self.row_count + 1)
+        self.tasks = []
         for row in range(self.row_count):
-            self.row_starts.append(len(self.tasks))
             self.tasks.extend(self.schedule.row_tasks(row))
-            self.row_ends.append(len(self.tasks))
+            self.row_starts[row + 1] = len(self.tasks)
         count = len(self.tasks)
         self.functions = [None] * count
-        self.usual_ns = integers(max(count, 1))
-        self.numbers = integers(max(count, 1))
-        self.codes = integers(max(count, 1))
-        self.owners = integers(max(count, 1))
+        self.places = integers(PLACE * max(count, 1))
+        self.leads = integers(max(count, 1), _NEVER)
+        self.row_leads = integers(self.row_count, _NEVER)
         tasks = self.schedule.all_tasks()
         self.usual_calls = integers(max(len(tasks), 1))
         for number in range(len(tasks)):
@@ -333,19 +357,47 @@ class SlotScheduler:
             self.lay(tasks[number])
 
     def lay(self, task: Task) -> None:
-        """Lay down what the event loop needs of `task` at all its places in the table.
-
-        usual_ns: what a call without items takes (ns), or -1 when every call must be looked at more closely.
-        """
+        """Lay down what the event loop needs of `task` at all its places in the table."""
         within = task.base_cycles <= task.most_cycles or task.most_cycles == 0
         plain = task.kind == NORMAL_TASK and within and not self.recording
         for place in range(len(self.tasks)):
             if self.tasks[place] is task:
-                self.numbers[place] = task.number
                 self.functions[place] = task.routine
-                self.usual_ns[place] = int(task.base_cycles * self.ns_per_cycle) if plain else -1
-                self.codes[place] = code_of(task.routine)
-                self.owners[place] = owner_of(task.routine)
+                self.places[PLACE * place] = code_of(task.routine, 0)
+                self.places[PLACE * place + 1] = owner_of(task.routine)
+                self.places[PLACE * place + 2] = int(task.base_cycles * self.ns_per_cycle) if plain else -1
+                self.places[PLACE * place + 3] = task.number
+        self.lay_leads()
+
+    def lay_leads(self) -> None:
+        """From the end of each row back to its start: how long a place is ahead of the row's next speaker."""
+        for row in range(self.row_count):
+            lead = _NEVER
+            for place in range(self.row_starts[row + 1] - 1, self.row_starts[row] - 1, -1):
+                task = self.tasks[place]
+                if task.speaks:
+                    lead = 0
+                elif lead < _NEVER:
+                    lead += int(task.base_cycles * self.ns_per_cycle)
+                self.leads[place] = lead
+            self.row_leads[row] = lead
+
+    def speaks_from(self, code_time: cython.longlong, tick_time: cython.longlong) -> cython.longlong:
+        """Before this instant (ns) no task puts anything on a bus.
+
+        `code_time`: no task of the row that runs starts earlier; `tick_time`: no slot.
+        """
+        row: cython.longlong = self.row + 1
+        first: cython.longlong
+        lead: cython.longlong
+        if row >= self.row_count:
+            row = 0
+        first = tick_time + self.row_leads[row]  # both at most NEVER, so their sum fits
+        if not self.done and self.position < self.end:
+            lead = code_time + self.leads[self.position]
+            if lead < first:
+                first = lead
+        return first
 
     @property
     def run_tasks(self):
@@ -357,7 +409,7 @@ class SlotScheduler:
         overrun: cython.bint = False
         self.tick_time = timer_time
         self.divider_count += 1
-        if self.divider_count < self.schedule.divider:
+        if self.divider_count < self.divider:
             return False
         self.divider_count = 0
         if not self.done:
@@ -376,7 +428,7 @@ class SlotScheduler:
         self.run_before += self.position - self.row_start
         self.row_start = self.row_starts[self.row]
         self.position = self.row_start
-        self.end = self.row_ends[self.row]
+        self.end = self.row_starts[self.row + 1]
         self.done = False
         self.started = True
         self.slot_time = timer_time

@@ -1,42 +1,24 @@
 cimport cython
 
 from foundation.events cimport EventQueue
-
-cdef extern from "Python.h":
-    ctypedef struct PyObject
-    ctypedef object (*plain_call "PyCFunction")(PyObject*, PyObject*)
-    bint PyCFunction_CheckExact(object)
-    plain_call PyCFunction_GET_FUNCTION(object)
-    PyObject* PyCFunction_GET_SELF(object)
-    int PyCFunction_GET_FLAGS(object)
-    int METH_O
-
-# As in scheduler.pxd: a handler that is a method of a compiled class is called by the address of its C function.
-cdef inline long long code_of(object function):
-    if PyCFunction_CheckExact(function) and PyCFunction_GET_FLAGS(function) == METH_O:
-        return <long long><void*>PyCFunction_GET_FUNCTION(function)
-    return 0
-
-cdef inline long long owner_of(object function):
-    if PyCFunction_CheckExact(function):
-        return <long long><void*>PyCFunction_GET_SELF(function)
-    return 0
+from firmware_sim.scheduler cimport call_with, code_of, owner_of
 
 cdef inline object handle(InterruptSource source, EventQueue queue):
     if source.code != 0:
-        return (<plain_call><void*>source.code)(<PyObject*><void*>source.owner, <PyObject*>queue)
+        return call_with(source.code, source.owner, queue)
     return source.handler(queue)
 
+# In both classes the fields that every request and every service touches come first, close together.
 @cython.final
 cdef class InterruptSource:
-    cdef public long long kind, index
-    cdef public str name
+    cdef public long long bit, code, owner, latency_ns, base_ns, slot, served
+    cdef public bint keeps_message
+    cdef public long long base_cycles, per_item
+    cdef public long long noted, noted_cycles, noted_most, merged, forgotten
     cdef public object handler
-    cdef public long long code, owner
-    cdef public long long cost, per_item, latency, slot, bit
-    cdef public long long base_cycles, base_ns, latency_ns
-    cdef public bint attached, pending, keeps_message
-    cdef public long long requests, merged, served, total_cycles, max_cycles
+    cdef public InterruptController controller
+    cdef public long long kind, index, cost, latency
+    cdef public str name
     cdef public long long time, order, a, b, c, d, e, f
     cdef public object ref
     cpdef int keep_message(self, EventQueue queue) except -1
@@ -44,11 +26,11 @@ cdef class InterruptSource:
 
 @cython.final
 cdef class InterruptController:
-    cdef public double ns_per_cycle
-    cdef public dict sources
-    cdef public list fiq_list, irq_list
     cdef public long long pending
     cdef public InterruptSource newest
+    cdef public list fiq_list, irq_list
+    cdef public double ns_per_cycle
+    cdef public dict sources
     cpdef InterruptSource source(self, long long kind, long long index)
     cpdef InterruptSource first_pending(self)
     cpdef bint raise_source(self, InterruptSource source) noexcept

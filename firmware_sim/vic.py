@@ -36,11 +36,14 @@ IRQ_LATENCY = 25
 class InterruptSource:
     """One interrupt line. Cycle counts and `requests`, `merged`, `served` are ground truth for tests.
 
-    A source whose message no peripheral stores keeps that one message (`keeps_message`): while it waits,
-    a newer message overwrites the older one (counted in `merged`).
+    `bit`: its place in the controller's word of pending sources, 0 while nobody listens. A service that takes
+    `base_cycles` is only counted (`served`), the others are noted with their cycles. A source whose message no
+    peripheral stores keeps that one message (`keeps_message`): while it waits, a newer message overwrites the older
+    one (counted in `merged`).
     """
 
-    def __init__(self, kind, index) -> None:
+    def __init__(self, kind, index, controller=None) -> None:
+        self.controller = controller
         self.kind = kind
         self.index = index
         self.name = f"{kind}/{index}"
@@ -56,14 +59,13 @@ class InterruptSource:
         self.base_cycles = 0
         self.base_ns = 0
         self.latency_ns = 0
-        self.attached = False
-        self.pending = False
         self.keeps_message = False
-        self.requests = 0
-        self.merged = 0
         self.served = 0
-        self.total_cycles = 0
-        self.max_cycles = 0
+        self.merged = 0  # requests while it was pending already
+        self.forgotten = 0  # pending when it was detached
+        self.noted = 0
+        self.noted_cycles = 0
+        self.noted_most = 0
         self.time = 0
         self.order = 0
         self.a = 0
@@ -73,6 +75,36 @@ class InterruptSource:
         self.e = 0
         self.f = 0
         self.ref = None
+
+    @property
+    def attached(self):
+        """True while a handler listens."""
+        return self.bit != 0
+
+    @property
+    def pending(self):
+        """True while a request waits for its service."""
+        return self.controller is not None and self.controller.pending & self.bit != 0
+
+    @property
+    def requests(self):
+        """Requests while somebody listened."""
+        return self.served + self.merged + self.forgotten + int(self.pending)
+
+    @property
+    def total_cycles(self):
+        """Cycles of all services."""
+        return self.noted_cycles + (self.served - self.noted) * self.base_cycles
+
+    @property
+    def max_cycles(self):
+        """Cycles of the longest service."""
+        return max(self.noted_most, self.base_cycles if self.served > self.noted else 0)
+
+    def settle(self) -> None:
+        """Note the services so far: their cost is about to change."""
+        self.noted_cycles, self.noted_most = self.total_cycles, self.max_cycles
+        self.noted = self.served
 
     def keep_message(self, queue: EventQueue) -> None:
         """Keep the message in the fields of `queue` until it is served."""
@@ -118,7 +150,7 @@ class InterruptController:
         """The line of (kind, index); made on first use, silent until a handler is attached."""
         found = self.sources.get((kind, index))
         if found is None:
-            found = InterruptSource(kind, index)
+            found = InterruptSource(kind, index, self)
             self.sources[(kind, index)] = found
         return found
 
@@ -138,8 +170,9 @@ class InterruptController:
         if slot != FIQ and self.irq_list[slot] not in (None, source):
             raise UserError(f"interrupt {kind}/{index}: slot {slot} is taken by {self.irq_list[slot].name}")
         self.detach(source)
+        source.settle()
         source.handler = handler
-        source.code = code_of(handler)
+        source.code = code_of(handler, 1)
         source.owner = owner_of(handler)
         source.name = name if name is not None else getattr(handler, "__name__", source.name)
         source.cost = cost
@@ -149,7 +182,6 @@ class InterruptController:
         source.base_cycles = source.latency + cost
         source.base_ns = int(source.base_cycles * self.ns_per_cycle)
         source.latency_ns = int(source.latency * self.ns_per_cycle)
-        source.attached = True
         if slot == FIQ:
             if len(self.fiq_list) >= 46:
                 raise UserError(f"interrupt {kind}/{index}: more than 46 sources on the FIQ")
@@ -164,23 +196,21 @@ class InterruptController:
         """Take a source out of the controller; a pending request of it is forgotten."""
         if not source.attached:
             return
+        source.forgotten += int(source.pending)
         self.pending &= ~source.bit
         if source.slot == FIQ:
             self.fiq_list[self.fiq_list.index(source)] = None
         else:
             self.irq_list[source.slot] = None
-        source.pending = False
-        source.attached = False
+        source.bit = 0
 
     def raise_source(self, source: InterruptSource) -> cython.bint:
         """Request service; False when nobody listens or the request merged with a pending one."""
-        if not source.attached:
-            return False
-        source.requests += 1
-        if source.pending:
+        if self.pending & source.bit:
             source.merged += 1
             return False
-        source.pending = True
+        if source.bit == 0:
+            return False
         self.pending |= source.bit
         self.newest = source
         return True

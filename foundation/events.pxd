@@ -11,13 +11,14 @@ cdef class Outbox:
 
 @cython.final
 cdef class EventQueue(Outbox):
-    cdef public long long size, head, tail, head_time, pushed
-    cdef public long long[::1] rows
-    cdef public list refs
     cdef public long long time, order, kind, a, b, c, d, e, f
     cdef public object ref
-    cdef public long long[::1] came, due
-    cdef public long long place, urgent_until
+    cdef public long long head, tail, head_time, size, pushed, place
+    cdef public long long[::1] rows
+    cdef public long long urgent_until
+    cdef public long long[::1] came
+    cdef public list refs
+    cdef public long long[::1] due
     cpdef long long put(
         self, long long time, long long order, long long kind,
         long long a, long long b, long long c, long long d, long long e, long long f,

@@ -172,7 +172,6 @@ def _apply_to_satellite(board: Any, schedule: BusSchedule, description: Board) -
     if len(rows) == len(scheduler.schedule.rows):
         return
     scheduler.schedule.rows = rows
-    scheduler.tasks, scheduler.row_starts, scheduler.row_ends = [], [], []
     scheduler.layout()
     scheduler.row = scheduler.row_count - 1  # the first tick starts row 0
 

@@ -26,21 +26,23 @@ cdef class SspWire:
 
 @cython.final
 cdef class BoardWires(Outbox):
-    cdef public list buses
-    cdef public long long[::1] nodes
-    cdef public dict can_lines, serial_lines
+    cdef public Microcontroller board
     cdef public Drive drive
-    cdef public long long watchdog_pin, low_side_2_pin, low_side_6_pin, imu_uart
+    cdef public long long window_ns, silent_until, watchdog_pin, low_side_2_pin, low_side_6_pin
     cdef public bint low_side_2, low_side_6
+    cdef public list buses
+    cdef public long long[5] nodes
     cdef public SspWire link
     cdef public Imu imu
+    cdef public long long imu_uart
+    cdef public dict can_lines, serial_lines
 
 @cython.final
 cdef class Lockstep:
     cdef public RangerPlant plant
     cdef public list boards, buses, wires, word_wires
     cdef public RowStream samples, words
-    cdef public long long time, next_sample, sample_count, stop_steps
+    cdef public long long time, window_ns, next_sample, sample_count, stop_steps
     cdef public double stop_distance_m
     cdef public Imu imu
     cdef public Microcontroller imu_board, main_brain
@@ -54,6 +56,8 @@ cdef class Lockstep:
     cdef public double[::1] sample_row
     cpdef long long run(self, long long until) except? <long long>-1
     cdef long long _walk_is_over(self) except? <long long>-1
+    @cython.final
+    cdef long long _advance(self, long long place, long long until) except? <long long>-1
     cdef long long _decide(self, long long until) except? <long long>-1
     cdef void _notice_strike(self)
     cdef void _sense(self) noexcept

@@ -5,17 +5,19 @@
     plant -> sensors -> pins -> interrupts and slots -> data table -> CAN -> router -> main brain
           -> CAN -> slots -> PWM -> plant
 
-Virtual time advances in windows of at most 34 us that never reach beyond a step of the plant, each from the first
-instant at which anything is due. That is shorter than the shortest frame on Ranger's buses (its receivers have it
+Virtual time advances in windows of 34 us that never reach beyond a step of the plant, each from the first instant at
+which anything is due. That is shorter than the shortest frame on Ranger's buses (its receivers have it
 35.6 us after its start) and than the pause between two exchanges on the serial link (34.67 us), so what one board
 puts out within a window reaches no other board before its end: boards that are advanced one after the other never
 miss what another one sends, and the result depends neither on the order in which they are advanced nor on where the
 windows lie. At one instant: plant, pins, buses, then the boards with their interrupts and slots, then their outputs.
 
-In a window a board runs that has something of its own to do there: an alarm, a slot, a task, an interrupt. Where
-frames, edges and bytes wait for a task (`hears_in_its_slots`) they do not make a board run: it takes them, each at its
-stamp, when its own next event has come, at the latest in the last window of the plant's step, while edges and
-voltages still stand. Nothing that it puts out can be missed, since it puts nothing out before that event.
+In a window a board runs that has something to do there: an alarm, a slot, a task, an interrupt, a message. Where
+frames, edges and bytes wait for a task (`hears_in_its_slots`) a board runs only when it may put something on a bus
+(`Microcontroller.speaks_from`): it does everything else, each thing at its instant, when that has come, at the latest
+in the last window of the plant's step, while edges and voltages still stand. Nothing that it puts out can be missed.
+Where one board alone has something to do, its window reaches 34 us beyond the instant at which the next one has, and
+ends where something that it puts out could come back to it.
 
 ROBOT PARITY: the plant moves in steps of 250 us. What a board writes to its bridge acts from the next step on, so up
 to 250 us late; what sensors show is a straight line over a step (voltages) or stands through it (words).
@@ -85,10 +87,12 @@ class BoardWires(Outbox):
     nowhere.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, board, window_ns) -> None:
+        self.board = board
+        self.window_ns = window_ns  # nothing that the board puts out comes back to it sooner
         # by controller 1 ... 4: the bus and the node number there
         self.buses = [None] * 5
-        self.nodes = integers(5, -1)
+        self.nodes = [-1] * 5
         self.can_lines = {}  # {controller: what takes its requests}, where the bus is outside
         self.drive = None
         self.watchdog_pin = -1
@@ -96,6 +100,7 @@ class BoardWires(Outbox):
         self.low_side_6_pin = -1
         self.low_side_2 = False
         self.low_side_6 = False
+        self.silent_until = 0  # ns: before that the board was to put nothing on a bus
         self.link = None
         self.imu = None
         self.imu_uart = -1
@@ -141,10 +146,14 @@ class BoardWires(Outbox):
                     drive.low_side(time, self.low_side_2, self.low_side_6)
         elif 32 <= kind <= 34:  # CAN_REQUEST, CAN_ABORT, CAN_MODE
             bus = self.buses[a]
+            if kind == 32 and time < self.silent_until:
+                self._spoke_early(time)
             if bus is None:
                 self._to_bus_outside(kind, time, a, b, c, d, e, f)
             elif kind == 32:
                 bus.request(self.nodes[a], b, time, c, d, e, f)
+                if time + self.window_ns < self.board.horizon:
+                    self.board.stop_at(time + self.window_ns)
             elif kind == 33:
                 bus.abort(self.nodes[a], b, time)
             else:
@@ -154,10 +163,17 @@ class BoardWires(Outbox):
                 drive.write_pwm(time, a, b, c)
         elif kind == 37:  # SSP_START
             self.link.start(time, ref)
+            self.board.stop_at(time + self.link.exchange_ns + self.window_ns)
         elif kind == 38:  # SSP_LOAD
             self.link.load(ref)
         elif kind == 39:  # UART_OUTPUT
             self._to_serial_line(time, a, b, c, ref)
+
+    def _spoke_early(self, time) -> None:
+        raise UserError(
+            f"{self.board.name}: a frame was sent at {time} ns, but by its schedule's `speakers` none could be before"
+            f" {self.silent_until} ns: name the task that sends there, or leave `speakers` out"
+        )
 
     def _to_bus_outside(self, kind, time, controller, b, c, d, e, f) -> None:
         line = self.can_lines.get(controller)
@@ -188,6 +204,7 @@ class Lockstep:
         self.samples = recorder.samples
         self.words = recorder.words
         self.time = start_ns
+        self.window_ns = WINDOW_NS
         self.next_sample = start_ns
         self.main_brain = None
         self.encoder_boards = array.array("q")  # numbers of the boards with encoders on their pins
@@ -204,7 +221,7 @@ class Lockstep:
         self.prompt = integers(len(boards), 1)
         for place, board in enumerate(boards):
             board.inbox.wake(self.due, self.due, place)
-        self.wires = [BoardWires() for _board in boards]
+        self.wires = [BoardWires(board, WINDOW_NS) for board in boards]
         for board, wires in zip(boards, self.wires, strict=True):
             board.outbox = wires
         for bus in buses:
@@ -226,7 +243,7 @@ class Lockstep:
         self.strike_squares_ms2 = 0.0
 
     def hears_in_its_slots(self, board) -> None:
-        """Not urgent messages (`EventQueue.put`) make `board` put nothing out before its own next event."""
+        """Not urgent messages (`EventQueue.put`) make `board` put nothing on a bus before its tasks do."""
         place = self.boards.index(board)
         self.prompt[place] = 0
         board.inbox.wake(self.came, self.due, place)
@@ -274,14 +291,13 @@ class Lockstep:
         end: cython.longlong
         late: cython.longlong
         first: cython.longlong
-        following: cython.longlong
+        second: cython.longlong
+        alone: cython.longlong
         reason: cython.longlong = 0
         boards: list = self.boards
-        window: cython.longlong = WINDOW_NS
         board_count: cython.longlong = len(boards)
         due: cython.longlong[::1] = self.due
         came: cython.longlong[::1] = self.came
-        prompt: cython.longlong[::1] = self.prompt
         due[board_count] = self.time  # between two runs anything may have been done to a bus
         for i in range(board_count):
             # between two runs anything may have been done to a board
@@ -299,23 +315,34 @@ class Lockstep:
                 plant.step()
                 self._sense()
             end = plant.time_ns if plant.time_ns < until else until
-            if cython.compiled:
-                first = due[board_count]
-                for i in range(board_count):
+            first = second = due[board_count]
+            alone = -1
+            for i in range(board_count):
+                if due[i] < second:
                     if due[i] < first:
+                        second = first
                         first = due[i]
-            else:
-                first = min(due)
+                        alone = i
+                    else:
+                        second = due[i]
             if first > now:
                 now = first
-            then = now + window
+            then = now + self.window_ns
+            if due[board_count] <= now and now < end:
+                due[board_count] = self._decide(now)
+            elif alone >= 0 and second > now and not self.remote:
+                # one board has something to do, and until `second` no other: it may run ahead
+                then = second + self.window_ns
+                if then > end:
+                    then = end
+                due[alone] = self._advance(alone, then)
+                board = cython.cast(Microcontroller, boards[alone])
+                then = board.horizon
             late = 0
             if then >= end:
                 then = end
                 late = end
             self.time = then
-            if due[board_count] <= now and now < end:
-                due[board_count] = self._decide(now)
             if self.remote:
                 for i in range(board_count):
                     if due[i] < then or came[i] < late:
@@ -323,18 +350,28 @@ class Lockstep:
                         away.begin(then)
             for i in range(board_count):
                 if due[i] < then or came[i] < late:
-                    board = cython.cast(Microcontroller, boards[i])
-                    following = board.advance(then)
-                    came[i] = board.inbox.head_time
-                    if board.edge_time < came[i]:
-                        came[i] = board.edge_time
-                    if came[i] < following and (prompt[i] or board.inbox.urgent_until >= then):
-                        following = came[i]
-                    due[i] = following
+                    due[i] = self._advance(i, then)
             if self.estimator is not None and self.estimator.swing_leg != self.swing_leg:
                 self._notice_strike()
         due[board_count] = self._decide(self.time - 1)
         return reason
+
+    @cython.final
+    def _advance(self, place: cython.longlong, until: cython.longlong) -> cython.longlong:
+        """Run a board to `until` (ns) or less; returns when it is due again."""
+        board: Microcontroller = cython.cast(Microcontroller, self.boards[place])
+        wires: BoardWires
+        following: cython.longlong = board.advance(until)
+        if board.inbox.head_time < following:
+            following = board.inbox.head_time
+        if board.edge_time < following:
+            following = board.edge_time
+        self.came[place] = following
+        if self.prompt[place] == 0 and board.inbox.urgent_until < board.horizon:
+            following = board.speaks_from()
+            wires = cython.cast(BoardWires, self.wires[place])
+            wires.silent_until = following
+        return following
 
     def _walk_is_over(self) -> cython.longlong:
         """One of the reasons above why the walk ends here, or 0."""

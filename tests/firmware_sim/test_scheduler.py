@@ -351,3 +351,55 @@ def test_a_faulty_task_is_refused():
         Task(3, cost=1)
     with pytest.raises(UserError, match="plain Task"):
         Occasional((Wait(bool),))
+
+
+def speaking(**table):
+    """A log whose board runs a table of tasks "a" ... "f" of 600 cycles (10 us) each."""
+    log = Log()
+    task = {name: log.task(name, 600) for name in "abcdef"}
+    log.start(every=(task["a"], task["b"], task["c"]), rows=((task["d"],), ()), last=(task["e"],), **table)
+    return log
+
+
+def test_a_schedule_that_names_no_speakers_promises_silence_only_until_the_next_event():
+    log = speaking()
+    assert log.chip.speaks_from() == log.chip.next_time == 0
+    log.chip.advance(505_000)
+    assert log.chip.speaks_from() == log.chip.next_time > 505_000
+
+
+def test_a_schedule_that_names_its_speakers_promises_silence_until_the_next_of_them():
+    """The tasks of rows always count: d of row 0; a, c and e are silent. Row 1 has none of its own."""
+    chip = speaking(speakers=("b",)).chip
+    assert chip.speaks_from() == 10_000  # a before the first b of the slot that begins at 0
+    chip.advance(TICK_NS + 5_000)
+    assert chip.speaks_from() == TICK_NS + 10_000  # a runs
+    chip.advance(TICK_NS + 15_000)
+    assert chip.speaks_from() == TICK_NS + 30_000  # b has begun, c follows, then d
+    chip.advance(TICK_NS + 35_000)
+    assert chip.speaks_from() == 510_000  # d has begun, nothing more in this slot
+    chip.advance(500_000 + TICK_NS + 15_000)
+    assert chip.speaks_from() == 1_010_000  # in row 1 nothing follows b
+
+
+def test_a_replaced_function_may_speak_whatever_the_schedule_said():
+    log = speaking(speakers=("b",))
+    log.chip.advance(TICK_NS + 15_000)
+    log.chip.scheduler.replace("c", lambda: None)
+    assert log.chip.speaks_from() == TICK_NS + 20_000
+
+
+def test_a_speaker_that_is_no_task_of_every_slot_is_refused():
+    log = Log()
+    with pytest.raises(UserError, match="speaker 'x' is no task of every slot; there are a, b"):
+        Schedule(every=(log.task("a", 1),), last=(log.task("b", 1),), speakers=("x",))
+
+
+def test_a_chip_told_to_stop_while_it_runs_stops_there_and_goes_on_later():
+    log = Log()
+    stop = Task(lambda: log.chip.stop_at(TICK_NS + 15_000) and None, cost=600, name="b")
+    log.start(every=(log.task("a", 600), stop, log.task("c", 600)))
+    log.chip.advance(400_000)
+    assert log.names() == ["a"] and log.chip.horizon == TICK_NS + 15_000
+    log.chip.advance(400_000)
+    assert log.entries[-1] == ("c", TICK_NS + 20_000)

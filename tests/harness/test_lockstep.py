@@ -2,6 +2,7 @@
 
 import pytest
 
+from foundation.user_error import UserError
 from harness import lockstep, wiring
 from harness.ranger import Ranger
 from harness.scenario import Scenario, StopRule
@@ -41,8 +42,42 @@ def test_a_board_that_hears_in_its_slots_misses_nothing_by_running_later():
     assert trace(prompt=wiring.HEAR_IN_SLOTS) == trace()
 
 
-def test_a_board_whose_controller_went_bus_off_restarts_it_at_once_also_when_it_hears_in_its_slots():
-    """Its error interrupt writes the controller's mode register: what the bus tells of errors is urgent."""
+def test_a_board_whose_controller_went_bus_off_restarts_it_at_once_also_when_it_hears_in_its_slots(monkeypatch):
+    """Its error interrupt writes the controller's mode register: what the bus tells of errors is urgent.
+
+    An error shows within a bit (333 ns), so only windows shorter than that leave no freedom at all here.
+    """
+    monkeypatch.setattr(lockstep, "WINDOW_NS", 300)
     at_leisure = trace(errors_on_can1=80)
     assert at_leisure[1] > 0  # frames were lost with bus-off
     assert trace(prompt=wiring.HEAR_IN_SLOTS, errors_on_can1=80) == at_leisure
+
+
+def test_a_task_that_sends_though_its_schedule_says_it_does_not_is_named_as_a_mistake():
+    """The others have gone on by then: what it sent would come too late for them."""
+    robot = Ranger(Scenario())
+    board = robot.boards["MCH"]
+    beat = board.scheduler.find("hb_beat")
+    ordinary = beat.function
+
+    def chatty():
+        ordinary()
+        board.can.send_int(0x123, 1)
+
+    beat.function = chatty  # a user's function: it may speak, and does
+    robot.run(StopRule(time_s=0.01), 1.0)
+    sent = board.can.queued
+    assert sent > 15 and beat.speaks
+    beat.speaks = False
+    board.scheduler.lay(beat)
+    with pytest.raises(UserError, match="MCH: a frame was sent at [0-9]+ ns, but by its schedule's `speakers` none"):
+        robot.run(StopRule(time_s=0.02), 1.0)
+
+
+def test_a_board_that_announces_when_it_speaks_gives_the_trace_of_one_that_does_not():
+    expected = trace()
+    robot = Ranger(Scenario())
+    for board in robot.boards.values():
+        board.scheduler.announces = False
+    robot.run(StopRule(time_s=RUN_S), 1.0)
+    assert robot.trace_digest() == expected[0]
