@@ -64,10 +64,6 @@ cdef class Microcontroller:
     cpdef long long cycles_since_tick(self) except? -1
     cpdef long long request(self, InterruptSource source) except? -1
     cpdef long long edges_came(self) noexcept
-    @cython.final
-    cdef long long _service_time(self) noexcept
-    @cython.final
-    cdef long long _own_next(self) noexcept
     cpdef long long speaks_from(self) except? <long long>-1
     @cython.final
     cdef long long _edges(self) except? <long long>-1

@@ -28,7 +28,7 @@ from foundation.numbers import integers
 from foundation.user_error import UserError
 
 if not cython.compiled:
-    from firmware_sim.calls import call, handle, run
+    from firmware_sim.calls import call, handle, own_code, run
 
 PINS = 64  # P0.0 ... P0.31 are 0 ... 31, P1.0 ... P1.31 are 32 ... 63
 WORDS = 16
@@ -312,7 +312,7 @@ class Microcontroller:
         vic: InterruptController = self.vic
         scheduler: SlotScheduler = self.scheduler
         first: cython.longlong
-        time: cython.longlong
+        own: cython.longlong
         self.horizon = until
         if self.next_time >= until and inbox.head_time >= until and self.edge_time >= until:
             return self.next_time  # idle: a frequent answer in short steps
@@ -327,30 +327,39 @@ class Microcontroller:
                 first = self.edge_time
             # what the processor does before that: a handler, tasks, or the main loop beside them
             if vic.pending != 0:
-                time = self._service_time()
-                if time < first:
-                    if time >= self.horizon:
+                own = self.fiq_free
+                if vic.pending < 65536 and self.irq_free > own:  # no FIQ among them
+                    own = self.irq_free
+                if self.instant > own:
+                    own = self.instant
+                if own < first:
+                    if own >= self.horizon:
                         break
-                    self.instant = time
-                    self._serve(vic.first_pending(), time)
+                    self.instant = own
+                    self._serve(vic.first_pending(), own)
                     continue
             elif not scheduler.done:
-                if self.code_time < first and (not self.waiting or self.check_wait):
-                    if self.code_time >= self.horizon:
-                        break
-                    self.instant = self.code_time
-                    self._code(first)
-                    continue
-            elif self.background_wanted and self.background is not None:
-                time = self.code_time
-                if time < self.instant:
-                    time = self.instant
-                if time < first:
-                    if time >= self.horizon:
-                        break
-                    self.instant = time
-                    self._background()
-                    continue
+                own = 1 << 62
+                if not self.waiting or self.check_wait:
+                    own = self.code_time
+                    if own < first:
+                        if own >= self.horizon:
+                            break
+                        self.instant = own
+                        self._code(first)
+                        continue
+            else:
+                own = 1 << 62
+                if self.background_wanted and self.background is not None:
+                    own = self.code_time
+                    if self.instant > own:
+                        own = self.instant
+                    if own < first:
+                        if own >= self.horizon:
+                            break
+                        self.instant = own
+                        self._background()
+                        continue
             if first >= self.horizon:
                 break
             # at one instant: edges, messages, alarms, the slot timer
@@ -365,30 +374,12 @@ class Microcontroller:
                     self._alarm(first)
                 else:
                     self._timer_match()
-        return self._own_next()
-
-    @cython.final
-    def _service_time(self) -> cython.longlong:
-        """When the first of the pending interrupts can be served."""
-        time: cython.longlong = self.fiq_free
-        if self.vic.pending < 65536 and self.irq_free > time:  # no FIQ among them
-            time = self.irq_free
-        return time if time > self.instant else self.instant
-
-    @cython.final
-    def _own_next(self) -> cython.longlong:
-        """Set and return `next_time`: when something happens here if nothing comes in."""
-        time: cython.longlong = self.alarm_time if self.alarm_time < self.tick_time else self.tick_time
-        own: cython.longlong = time
-        if self.vic.pending != 0:
-            own = self._service_time()
-        elif not self.scheduler.done:
-            if not self.waiting or self.check_wait:
-                own = self.code_time
-        elif self.background_wanted and self.background is not None:
-            own = self.code_time if self.code_time > self.instant else self.instant
-        self.next_time = own if own < time else time
-        return self.next_time
+        if self.alarm_time < own:
+            own = self.alarm_time
+        if self.tick_time < own:
+            own = self.tick_time
+        self.next_time = own
+        return own
 
     def speaks_from(self) -> cython.longlong:
         """Before this instant (ns) the board puts nothing on a bus, unless an urgent message comes in.
@@ -735,3 +726,7 @@ class Microcontroller:
         if scheduler.close(cycles) and self.on_near_limit is not None:
             self.on_near_limit()
         return cycles
+
+
+if not cython.compiled:
+    Microcontroller.__init_subclass__ = classmethod(own_code)
