@@ -40,7 +40,7 @@ cdef class CanRouterBoard(Microcontroller):
     cdef public AdcInternal adc
     cdef public bint errors_one_late, report_full
     cdef public long long error_before, lost_before, own_lost, sync_cycles
-    cdef public short[5] can_leds
+    cdef public long long[5] can_leds
     # the rest
     cdef public object quirks
     cdef public Gpio gpio

@@ -13,10 +13,10 @@ cimport cython
 cdef class Node:
     cdef public EventQueue inbox
     cdef public Node following
-    cdef public int index, order
-    cdef public short controller, mode, transmit_errors, receive_errors
+    cdef public long long index, order
+    cdef public long long controller, mode, transmit_errors, receive_errors
     cdef public bint listening, passive
-    cdef public int sent, received
+    cdef public long long sent, received
     cdef public bint warning
     cdef public str name
     cdef public long long sequences_left, join_from, suspend_bit, sending_end
@@ -29,11 +29,11 @@ cdef class Bus:
     cdef public long long next_time, next_bit, advanced, free_time, free_bit, suspended_until, next_change
     cdef long long* slots
     cdef public long long bitrate, first
-    cdef public int pending_count, node_count, operating, wake_place
+    cdef public long long pending_count, node_count, operating, wake_place
     cdef long long* due
     # what a frame touches
     cdef public long long next_strike, second_bit, second_ns
-    cdef public int bit_ns, bit_rest, intermission_ns, intermission_rest
+    cdef public long long bit_ns, bit_rest, intermission_ns, intermission_rest
     cdef public Node first_node
     cdef public FrameStream trace
     cdef public long long frames, bits, window_busy, window_end

@@ -8,7 +8,7 @@ cdef long long _MASK
 cdef class DataStore:
     cdef public long long size
     cdef public long long[::1] words
-    cdef public unsigned int[::1] stamps
+    cdef public long long[::1] stamps
     cdef public unsigned char[::1] unread
     cdef public long long out_of_range_count, out_of_range_id
     cdef public object on_out_of_range

@@ -35,7 +35,7 @@ class DataStore:
     def __init__(self, size) -> None:
         self.size = size
         self.words = array.array("q", [0]) * size
-        self.stamps = array.array("I", [0]) * size
+        self.stamps = array.array("q", [0]) * size
         self.unread = array.array("B", [0x7F]) * size
         self.out_of_range_count = 0
         self.out_of_range_id = -1

@@ -6,7 +6,7 @@ cdef class AnalogPins:
     cdef long long* feed_times
     cdef double* feed_starts
     cdef double* feed_ends
-    cdef public short[32] places
+    cdef public long long[32] places
     cdef public long long count
     cdef public long long[32] start_times, end_times
     cdef public double[32] start_values, end_values

@@ -5,18 +5,19 @@
     plant -> sensors -> pins -> interrupts and slots -> data table -> CAN -> router -> main brain
           -> CAN -> slots -> PWM -> plant
 
-Virtual time advances in windows of 34 us that never reach beyond a step of the plant, each from the first instant at
-which anything is due. That is shorter than the shortest frame on Ranger's buses (its receivers have it
-35.6 us after its start) and than the pause between two exchanges on the serial link (34.67 us), so what one board
-puts out within a window reaches no other board before its end: boards that are advanced one after the other never
-miss what another one sends, and the result depends neither on the order in which they are advanced nor on where the
-windows lie. At one instant: plant, pins, buses, then the boards with their interrupts and slots, then their outputs.
+Virtual time advances in windows of 31 us that never reach beyond a step of the plant, each from the first instant at
+which anything is due. That is shorter than the shortest frame on Ranger's buses (its receivers have it 35.6 us after
+its start) and than the pause between two exchanges on the serial link: 34.67 us, less the 1.7 us by which a frame's
+interrupt can hold up the start of the first. So what one board puts out within a window reaches no other board before
+its end: boards that are advanced one after the other never miss what another one sends, and the result depends neither
+on the order in which they are advanced nor on where the windows lie. At one instant: plant, pins, buses, then the
+boards with their interrupts and slots, then their outputs.
 
 In a window a board runs that has something to do there: an alarm, a slot, a task, an interrupt, a message. Where
 frames, edges and bytes wait for a task (`hears_in_its_slots`) a board runs only when it may put something on a bus
 (`Microcontroller.speaks_from`): it does everything else, each thing at its instant, when that has come, at the latest
 in the last window of the plant's step, while edges and voltages still stand. Nothing that it puts out can be missed.
-Where one board alone has something to do, its window reaches 34 us beyond the instant at which the next one has, and
+Where one board alone has something to do, its window reaches 31 us beyond the instant at which the next one has, and
 ends where something that it puts out could come back to it.
 
 ROBOT PARITY: the plant moves in steps of 250 us. What a board writes to its bridge acts from the next step on, so up
@@ -38,7 +39,7 @@ from harness.processes.remote_board import RemoteBoard
 from plant.drive import Drive
 from plant.ranger import RangerPlant
 
-WINDOW_NS = 34_000
+WINDOW_NS = 31_000
 SAMPLE_NS = 2_000_000  # the canonical trace samples body and data table at the main brain's rate
 
 # Why `run` returned.
@@ -369,7 +370,7 @@ class Lockstep:
         self.came[place] = following
         if self.prompt[place] == 0 and board.inbox.urgent_until < board.horizon:
             following = board.speaks_from()
-            wires = cython.cast(BoardWires, self.wires[place])
+            wires = board.outbox
             wires.silent_until = following
         return following
 

@@ -4,7 +4,7 @@ cdef long long _MASK
 
 cdef class ButterworthFilter:
     cdef public double b0, b1, b2, a1, a2
-    cdef public long long longest_gap, violations, stamp
+    cdef public long longest_gap, violations, stamp
     cdef public bint started
     cdef public double x1, x2, y1, y2, output
     cpdef int rest_at(self, double value) except -1

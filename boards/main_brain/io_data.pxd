@@ -7,5 +7,5 @@ cdef class IoData:
     cdef public MainBrainSspLink link
     cdef public NetworkTime time
     cdef public long long subscriber, timestamp, turn, turn_every, slots
-    cdef public short[::1] send_ids
+    cdef public long long[::1] send_ids
     cdef public long long[::1] dividers, turn_ids

@@ -24,7 +24,7 @@ class IoData:
         self.store = store
         self.link = link
         self.time = time
-        self.send_ids = array.array("h", self.known(send_ids))
+        self.send_ids = array.array("q", self.known(send_ids))
         self.subscriber = 1  # SSP, bit of the store's read flags
         self.timestamp = 0  # id of TIMESTAMP
         # for buses slower than the robot's: the first list goes out in every n-th slot (n per entry), of the second one
@@ -39,7 +39,7 @@ class IoData:
         """Send `send_ids` in every n-th slot only, n in `dividers`; of `turn_ids` one every so many slots, in turn."""
         if len(send_ids) != len(dividers):
             raise UserError(f"io data: {len(dividers)} dividers for {len(send_ids)} variables")
-        self.send_ids = array.array("h", self.known(send_ids))
+        self.send_ids = array.array("q", self.known(send_ids))
         self.dividers = array.array("q", dividers)
         self.turn_ids = self.known(turn_ids)
         self.turn_every = turn_every

@@ -16,8 +16,8 @@ cdef class CanLink:
     cdef public list receivers
     cdef public long long rx_write, rx_read, tx_write, tx_read
     cdef public long long received, delivered, queued, ignored, most_waiting
-    cdef public unsigned int[256] rx_rows
-    cdef public unsigned int[24] tx_rows
+    cdef public long long[256] rx_rows
+    cdef public long long[24] tx_rows
     # the rest
     cdef public Microcontroller chip
     cdef public ErrorModule errors

@@ -17,5 +17,5 @@ cdef class EncoderCapture:
     cdef public WrapCounter wraps
     cdef public QuadratureDecoder decoder
     cdef public bint armed_rising
-    cdef public short channel, flag, edge_bits, pin, partner_pin
+    cdef public long long channel, flag, edge_bits, pin, partner_pin
     cdef public long long last_wraps, last_capture

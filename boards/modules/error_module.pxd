@@ -10,7 +10,7 @@ cdef class ErrorModule:
     cdef public NetworkTime time
     cdef public bint per_event, lose_new_after_repeat
     cdef public long long first, dropped, word, stamp, board
-    cdef public short[32] codes, counts
+    cdef public long long[32] codes, counts
     cdef public long long[32] stamps
     cdef public long long[::1] totals, flags, flagged
     cpdef void report(self, long long code) noexcept

@@ -7,6 +7,6 @@ cimport cython
 cdef class ExecutionTimer:
     cdef public Microcontroller chip
     cdef public NetworkTime time
-    cdef public long long longest, longest_ever
+    cdef public long longest, longest_ever
     cpdef double seconds(self) noexcept
     cpdef double longest_seconds(self) noexcept

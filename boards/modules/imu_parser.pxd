@@ -6,8 +6,8 @@ cimport cython
 @cython.final
 cdef class ImuParser:
     cdef public long long ring_write, ring_read, header, needed
-    cdef public short[128] ring
-    cdef public unsigned int[7] words
+    cdef public long long[128] ring
+    cdef public long long[7] words
     cdef public bint has_angles
     cdef public double rate_x, rate_y, rate_z
     cdef public double roll, pitch, yaw

@@ -2,7 +2,7 @@ from firmware_sim.peripherals.gpio cimport Gpio
 
 cdef class Keypad:
     cdef public Gpio gpio
-    cdef public short[6] pins
+    cdef public long long[6] pins
     cdef public object report
     cdef public long long code_index
     cpdef bint pressed(self, long long key)

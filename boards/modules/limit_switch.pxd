@@ -6,5 +6,5 @@ cimport cython
 @cython.final
 cdef class LimitSwitch(Debounce):
     cdef public Microcontroller chip
-    cdef public short pin
+    cdef public long long pin
     cpdef void read(self) noexcept

@@ -4,7 +4,7 @@ from firmware_sim.peripherals.gpio cimport Gpio
 cimport cython
 
 cdef class McuLed:
-    cdef public int lit, remaining_green, remaining_red, remaining_blue
+    cdef public long long lit, remaining_green, remaining_red, remaining_blue
     cdef public Gpio gpio
     cdef public double slots_per_ms
     cpdef long long pin(self, long long led) noexcept

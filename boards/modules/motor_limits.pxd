@@ -7,8 +7,8 @@ cimport cython
 cdef class MotorLimits:
     # what every slot touches
     cdef public long long thermal, excess
-    cdef public int thermal_rate, thermal_limit, thermal_soft, thermal_multiplier, excess_multiplier
-    cdef public int current_min, current_max, target_min, target_max, speed_soft
+    cdef public long long thermal_rate, thermal_limit, thermal_soft, thermal_multiplier, excess_multiplier
+    cdef public long long current_min, current_max, target_min, target_max, speed_soft
     cdef public bint too_hot, overloaded, derating, peak, speed
     # the rest
     cdef public ErrorModule errors

@@ -13,7 +13,7 @@ cdef class OffRequest(IntReceiver):
 @cython.final
 cdef class MotorOutput:
     cdef public bint stopped, second_pattern
-    cdef public short requests, watchdog_pin, low_side_2_pin, low_side_6_pin
+    cdef public long long requests, watchdog_pin, low_side_2_pin, low_side_6_pin
     cdef public Gpio gpio
     cdef public Pwm pwm
     cdef public long long sign, largest, offset, low_side, duty

@@ -7,11 +7,11 @@ from foundation.numbers cimport divide_toward_zero
 cdef class QuadratureDecoder:
     # what an edge and a slot touch
     cdef public long long count, position
-    cdef public int position_gain
-    cdef public short position_shift, filter_exponent, write, read, rate_shift, sign
-    cdef public int rate_gain, mean
+    cdef public long long position_gain
+    cdef public long long position_shift, filter_exponent, write, read, rate_shift, sign
+    cdef public long long rate_gain, mean
     cdef public long long idle, speed, filtered, rate, edges
-    cdef public int[64] ring
+    cdef public long long[64] ring
     # the rest
     cdef public long long glitches, dropped_times
     cdef public ErrorModule errors

@@ -5,7 +5,7 @@ cimport cython
 
 @cython.final
 cdef class RoutingTable:
-    cdef public short[2032] rows
+    cdef public long long[2032] rows
     cdef public long long learned, changed
     cpdef object set_destinations(self, identifier, mask)
     cpdef void learn(self, long long identifier, long long channel) noexcept
@@ -20,15 +20,15 @@ cdef class Router:
     cdef public CanLoad load
     cdef public long long routed, copies
     cdef public bint one_frame_lag
-    cdef public short[5] tx_write, tx_read
-    cdef public unsigned int[320] rx_rows
-    cdef public unsigned int[32] own_rows
-    cdef public unsigned int[160] tx_rows
+    cdef public long long[5] tx_write, tx_read
+    cdef public long long[320] rx_rows
+    cdef public long long[32] own_rows
+    cdef public long long[160] tx_rows
     # the rest
     cdef public object report
     cdef public long long receive_lost, own_lost, unroutable
     cdef public long long[5] transmit_lost, receive_lost_from
-    cdef public short[5] receive_full_codes
+    cdef public long long[5] receive_full_codes
     cpdef bint receive(self, long long channel, long long identifier, long long flags, long long word0, long long word1) except? -1
     cpdef bint send(self, long long identifier, long long word0, long long word1) noexcept
     cpdef long long route_step(self, long long now) except? <long long>-1

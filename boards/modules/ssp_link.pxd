@@ -4,7 +4,7 @@ cimport cython
 
 @cython.final
 cdef class UnpackedFrames:
-    cdef public unsigned int[288] rows
+    cdef public long long[288] rows
     cpdef long long unpack(self, SspSegment segment, long long place) noexcept
 
 @cython.final
@@ -38,7 +38,7 @@ cdef class RouterSspLink:
     cdef public long long half_words, push_time, first, last
     cdef public list segments
     cdef public UnpackedFrames unpacked
-    cdef public short[8] received_frames
+    cdef public long long[8] received_frames
     cdef public long long rx_id, rx_flags, rx_word0, rx_word1
     cdef public bint exchange_running, exchange_done, frames_may_straddle
     cdef public SspSegment empty

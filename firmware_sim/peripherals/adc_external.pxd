@@ -8,15 +8,15 @@ from firmware_sim.vic cimport InterruptSource
 cdef class Ads7871(Peripheral):
     # what a conversion touches
     cdef public bint busy, done
-    cdef public short alarm, step, length, register4
+    cdef public long long alarm, step, length, register4
     cdef public long long started_time
     cdef public InterruptSource source
-    cdef public int conversion_ns, offset_counts
-    cdef public short[16] sequence, inputs
-    cdef public short[8] gains
+    cdef public long long conversion_ns, offset_counts
+    cdef public long long[16] sequence, inputs
+    cdef public long long[8] gains
     cdef public double scale, reference_V
     cdef public long long result, conversions
-    cdef public short[16] results
+    cdef public long long[16] results
     # the rest
     cdef public long long eint, not_finished
     cpdef bint start(self, long long register4) except? -1

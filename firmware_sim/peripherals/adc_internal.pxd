@@ -7,16 +7,16 @@ from firmware_sim.vic cimport InterruptSource
 cdef class AdcInternal(Peripheral):
     # what a conversion touches
     cdef public bint busy
-    cdef public short alarm, channel
+    cdef public long long alarm, channel
     cdef public InterruptSource source
     cdef public long long started_time
-    cdef public int conversion_ns, clkdiv
-    cdef public unsigned int CR, GDR
+    cdef public long long conversion_ns, clkdiv
+    cdef public long long CR, GDR
     cdef public double scale, reference_V
     cdef public long long result, offset_counts, conversions
-    cdef public short[8] inputs
+    cdef public long long[8] inputs
     # burst mode, and the rest
-    cdef public short[8] channels
+    cdef public long long[8] channels
     cdef public long long burst_count, burst_start
     cdef public long long hz, not_finished
     cpdef long long convert(self, double volts) noexcept

@@ -7,13 +7,13 @@ cimport cython
 cdef class CanController(Peripheral):
     # what a frame touches; registers of the chip have 32 bits
     cdef public InterruptSource rx_source, tx_source
-    cdef public unsigned int MOD, IER, ICR
-    cdef public int number, rx_count
-    cdef public short[4] tx_free, tx_complete
-    cdef public unsigned int RFS, RID, RDA, RDB
-    cdef public unsigned int second_RFS, second_RID, second_RDA, second_RDB
+    cdef public long long MOD, IER, ICR
+    cdef public long long number, rx_count
+    cdef public long long[4] tx_free, tx_complete
+    cdef public long long RFS, RID, RDA, RDB
+    cdef public long long second_RFS, second_RID, second_RDA, second_RDB
     cdef public long long received, sent, requests
-    cdef public unsigned int[4] TFI, TID, TDA, TDB
+    cdef public long long[4] TFI, TID, TDA, TDB
     # the rest
     cdef public long long data_overruns, lost, aborted, refused
     cdef public bint overrun, bus_off, error_warning

@@ -7,8 +7,8 @@ from firmware_sim.vic cimport InterruptSource
 cdef class SpiEncoder(Peripheral):
     # what a transfer touches
     cdef public bint busy
-    cdef public short alarm, word
-    cdef public int mask, latched, SPDR, SPSR, transfer_ns
+    cdef public long long alarm, word
+    cdef public long long mask, latched, SPDR, SPSR, transfer_ns
     cdef public InterruptSource source
     cdef public long long transfers
     # the rest

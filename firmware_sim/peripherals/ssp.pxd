@@ -7,14 +7,14 @@ cimport cython
 @cython.final
 cdef class SspSegment:
     cdef public long long used
-    cdef public unsigned short[31] words
+    cdef public long long[31] words
     cpdef void clear(self) noexcept
     cpdef void copy_from(self, SspSegment other) noexcept
 
 @cython.final
 cdef class SspPort(Peripheral):
     cdef public bint fresh
-    cdef public int number
+    cdef public long long number
     cdef public InterruptSource source
     cdef public SspSegment received, loaded
     cdef public long long received_time, exchanges, overwritten

@@ -9,7 +9,7 @@ cdef class Uart(Peripheral):
     cdef public InterruptSource source
     cdef public long long timeout_alarm, byte_ns, trigger
     cdef public long long fifo_head, fifo_count, IIR, received
-    cdef public short[16] fifo
+    cdef public long long[16] fifo
     # the rest
     cdef public long long overruns, errors
     cdef public long long number, DL, DIVADDVAL, MULVAL, hz

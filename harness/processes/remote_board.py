@@ -101,6 +101,7 @@ class RemoteBoard(Microcontroller):
 
     def advance(self, until: cython.longlong) -> cython.longlong:
         """What the board put out before `until` comes into the outbox; returns the instant of its next event."""
+        self.horizon = until
         if not self.posted:
             self.begin(until)
         if self.posted:
