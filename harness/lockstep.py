@@ -285,6 +285,7 @@ class Lockstep:
         """Advance to `until` (ns) or until the walk is over; returns one of the reasons above."""
         plant: RangerPlant = self.plant
         board: Microcontroller
+        wires: BoardWires
         away: RemoteBoard
         i: cython.longlong
         now: cython.longlong
@@ -304,6 +305,8 @@ class Lockstep:
             # between two runs anything may have been done to a board
             board = boards[i]
             due[i] = came[i] = min(board.next_time, board.inbox.head_time, board.edge_time)
+            wires = self.wires[i]
+            wires.silent_until = 0
         while self.time < until:
             now = self.time
             if plant.time_ns <= now:

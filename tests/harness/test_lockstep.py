@@ -72,6 +72,7 @@ def test_a_board_whose_controller_went_bus_off_restarts_it_at_once_also_when_it_
 def test_a_task_that_sends_though_its_schedule_says_it_does_not_is_named_as_a_mistake():
     """The others have gone on by then: what it sent would come too late for them."""
     robot = Ranger(Scenario())
+    robot.run(StopRule(time_s=0.0051), 1.0)
     board = robot.boards["MCH"]
     beat = board.scheduler.find("hb_beat")
     ordinary = beat.function
