@@ -69,24 +69,36 @@ def test_a_board_whose_controller_went_bus_off_restarts_it_at_once_also_when_it_
     assert trace(prompt=wiring.HEAR_IN_SLOTS, errors_on_can1=80) == at_leisure
 
 
-def test_a_task_that_sends_though_its_schedule_says_it_does_not_is_named_as_a_mistake():
-    """The others have gone on by then: what it sent would come too late for them."""
-    robot = Ranger(Scenario())
-    robot.run(StopRule(time_s=0.0051), 1.0)
-    board = robot.boards["MCH"]
+def chatty(board):
+    """Makes the heartbeat of a board send a frame at every call; returns its task."""
     beat = board.scheduler.find("hb_beat")
     ordinary = beat.function
 
-    def chatty():
+    def talk():
         ordinary()
         board.can.send_int(0x123, 1)
 
-    beat.function = chatty  # a user's function: it may speak, and does
-    robot.run(StopRule(time_s=0.01), 1.0)
+    beat.function = talk
+    return beat
+
+
+@pytest.mark.parametrize("when_ms", [5.0, 5.1, 5.2, 5.3, 5.4])
+def test_a_users_function_may_send_from_any_task_and_from_any_moment_on(when_ms):
+    robot = Ranger(Scenario())
+    robot.run(StopRule(time_s=when_ms * 1e-3), 1.0)
+    board = robot.boards["MCH"]
     sent = board.can.queued
-    assert sent > 15 and beat.speaks
+    assert chatty(board).speaks
+    robot.run(StopRule(time_s=0.01), 1.0)
+    assert board.can.queued > sent + 15
+
+
+def test_a_task_that_sends_though_its_schedule_says_it_does_not_is_named_as_a_mistake():
+    """The others have gone on by then: what it sent would come too late for them."""
+    robot = Ranger(Scenario())
+    beat = chatty(robot.boards["MCH"])
     beat.speaks = False
-    board.scheduler.lay(beat)
+    robot.boards["MCH"].scheduler.lay(beat)
     with pytest.raises(UserError, match="MCH: a frame was sent at [0-9]+ ns, but by its schedule's `speakers` none"):
         robot.run(StopRule(time_s=0.02), 1.0)
 
