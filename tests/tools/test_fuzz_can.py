@@ -3,6 +3,7 @@
 import pytest
 
 from can_bus.bus import RESET
+from firmware_sim.microcontroller import Microcontroller
 from foundation.user_error import UserError
 from tools import fuzz_can
 
@@ -21,7 +22,9 @@ def test_the_checks_notice():
         fuzz.slice()
     board = fuzz.robot.boards["MCH"]
     board.scheduler.slot_time -= 6_000_000
-    fuzz.robot.loop.boards = [each for each in fuzz.robot.loop.boards if each is not board]
+    dead = Microcontroller("MCH")
+    dead.inbox, dead.outbox = board.inbox, board.outbox
+    fuzz.robot.loop.boards = [dead if each is board else each for each in fuzz.robot.loop.boards]
     with pytest.raises(UserError, match="board MCH has stopped"):
         fuzz.slice()
     fuzz.robot.buses[0].nodes[0].mode = RESET
