@@ -196,8 +196,8 @@ class Schedule:
     `divider`: timer ticks per slot (the timer then runs at slot/divider). `completion_flag=False`: the
     runner keeps no DONE flag, so an overrun drops tasks but tells nobody (main-brain scheduler).
     `speakers`: names of those tasks in `every` and `last` that may put something on a bus (None: any of them);
-    tasks of rows and of the occasional list always may. It lets the rest of the robot run ahead of a board that has
-    nothing to say, and changes no result.
+    tasks of rows and of the occasional list always may. To be named only where no interrupt handler and no main loop
+    sends. It lets the rest of the robot run ahead of a board that has nothing to say, and changes no result.
     `tick_slot`: VIC slot of the timer interrupt (or FIQ); `tick_cost`: its cycles.
     """
 
