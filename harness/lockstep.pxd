@@ -57,6 +57,10 @@ cdef class Lockstep:
     cpdef long long run(self, long long until) except? <long long>-1
     cdef long long _walk_is_over(self) except? <long long>-1
     @cython.final
+    cdef long long _run_in_turn(self, long long end) except? <long long>-1
+    @cython.final
+    cdef long long _run_side_by_side(self, long long end) except? <long long>-1
+    @cython.final
     cdef long long _advance(self, long long place, long long until) except? <long long>-1
     cdef long long _decide(self, long long until) except? <long long>-1
     cdef void _notice_strike(self)

@@ -5,20 +5,21 @@
     plant -> sensors -> pins -> interrupts and slots -> data table -> CAN -> router -> main brain
           -> CAN -> slots -> PWM -> plant
 
-Virtual time advances in windows of 31 us that never reach beyond a step of the plant, each from the first instant at
-which anything is due. That is shorter than the shortest frame on Ranger's buses (its receivers have it 35.6 us after
-its start) and than the pause between two exchanges on the serial link: 34.67 us, less the 1.7 us by which a frame's
-interrupt can hold up the start of the first. So what one board puts out within a window reaches no other board before
-its end: boards that are advanced one after the other never miss what another one sends, and the result depends neither
-on the order in which they are advanced nor on where the windows lie. At one instant: plant, pins, buses, then the
-boards with their interrupts and slots, then their outputs.
+Within a step of the plant the board that is due first runs, and it runs ahead: to 31 us beyond the instant at which
+the next board or bus is due, or less far where something that it puts out could come back to it (`stop_at`). Those
+31 us are shorter than the shortest frame on Ranger's buses (its receivers have it 35.6 us after its start) and than
+the pause between two exchanges on the serial link: 34.67 us, less the 1.7 us by which a frame's interrupt can hold up
+the start of the first. So nothing that any board puts out can reach a board that has run on already, and the result
+depends neither on the order in which boards run nor on how far. At one instant: plant, pins, buses, then the boards
+with their interrupts and slots, then their outputs.
 
-In a window a board runs that has something to do there: an alarm, a slot, a task, an interrupt, a message. Where
-frames, edges and bytes wait for a task (`hears_in_its_slots`) a board runs only when it may put something on a bus
-(`Microcontroller.speaks_from`): it does everything else, each thing at its instant, when that has come, at the latest
-in the last window of the plant's step, while edges and voltages still stand. Nothing that it puts out can be missed.
-Where one board alone has something to do, its window reaches 31 us beyond the instant at which the next one has, and
-ends where something that it puts out could come back to it.
+A board is due when it has something to do: an alarm, a slot, a task, an interrupt, a message. Where frames, edges and
+bytes wait for a task (`hears_in_its_slots`) it is due only when it may put something on a bus
+(`Microcontroller.speaks_from`): it does everything else, each thing at its instant, when that has come, or at the end
+of the plant's step, while edges and voltages still stand.
+
+Boards in processes of their own run side by side instead: in windows of 31 us, each from the first instant at which
+anything is due, all boards that are due in a window at once.
 
 ROBOT PARITY: the plant moves in steps of 250 us. What a board writes to its bridge acts from the next step on, so up
 to 250 us late; what sensors show is a straight line over a step (voltages) or stands through it (words).
@@ -286,15 +287,9 @@ class Lockstep:
         plant: RangerPlant = self.plant
         board: Microcontroller
         wires: BoardWires
-        away: RemoteBoard
         i: cython.longlong
         now: cython.longlong
-        then: cython.longlong
         end: cython.longlong
-        late: cython.longlong
-        first: cython.longlong
-        second: cython.longlong
-        alone: cython.longlong
         reason: cython.longlong = 0
         boards: list = self.boards
         board_count: cython.longlong = len(boards)
@@ -319,46 +314,87 @@ class Lockstep:
                 plant.step()
                 self._sense()
             end = plant.time_ns if plant.time_ns < until else until
-            first = second = due[board_count]
-            alone = -1
-            for i in range(board_count):
-                if due[i] < second:
-                    if due[i] < first:
-                        second = first
-                        first = due[i]
-                        alone = i
-                    else:
-                        second = due[i]
-            if first > now:
-                now = first
-            then = now + self.window_ns
-            if due[board_count] <= now and now < end:
-                due[board_count] = self._decide(now)
-            elif alone >= 0 and second > now and not self.remote:
-                # one board has something to do, and until `second` no other: it may run ahead
-                then = second + self.window_ns
-                if then > end:
-                    then = end
-                due[alone] = self._advance(alone, then)
-                board = cython.cast(Microcontroller, boards[alone])
-                then = board.horizon
-            late = 0
-            if then >= end:
-                then = end
-                late = end
-            self.time = then
             if self.remote:
-                for i in range(board_count):
-                    if due[i] < then or came[i] < late:
-                        away = cython.cast(RemoteBoard, boards[i])
-                        away.begin(then)
-            for i in range(board_count):
-                if due[i] < then or came[i] < late:
-                    due[i] = self._advance(i, then)
+                self._run_side_by_side(end)
+            else:
+                self._run_in_turn(end)
+            self.time = end
             if self.estimator is not None and self.estimator.swing_leg != self.swing_leg:
                 self._notice_strike()
         due[board_count] = self._decide(self.time - 1)
         return reason
+
+    @cython.final
+    def _run_in_turn(self, end: cython.longlong) -> cython.longlong:
+        """Run boards and buses to `end` (ns), always the one that is due first; returns when the next one is."""
+        i: cython.longlong
+        alone: cython.longlong
+        first: cython.longlong
+        second: cython.longlong
+        time: cython.longlong
+        later: cython.longlong
+        due: cython.longlong[::1] = self.due
+        came: cython.longlong[::1] = self.came
+        board_count: cython.longlong = len(self.boards)
+        while True:
+            if cython.compiled:  # without a branch: no processor could foresee which board is next
+                alone = board_count
+                first = due[board_count]
+                second = 1 << 62
+                for i in range(board_count):
+                    time = due[i]
+                    later = first if first > time else time
+                    second = later if later < second else second
+                    alone = i if time < first else alone
+                    first = time if time < first else first
+            else:
+                first, second, *_ = sorted(due)
+                alone = due.index(first) if first < due[board_count] else board_count
+            if first >= end:
+                break
+            if alone == board_count:
+                due[board_count] = self._decide(first)
+            else:
+                second += self.window_ns
+                due[alone] = self._advance(alone, second if second < end else end)
+        for i in range(board_count):
+            if came[i] < end:
+                due[i] = self._advance(i, end)
+        return first
+
+    @cython.final
+    def _run_side_by_side(self, end: cython.longlong) -> cython.longlong:
+        """Run boards in processes of their own, and buses, to `end` (ns) in windows; returns how many there were."""
+        i: cython.longlong
+        now: cython.longlong = self.time
+        late: cython.longlong = 0
+        windows: cython.longlong = 0
+        first: cython.longlong
+        away: RemoteBoard
+        due: cython.longlong[::1] = self.due
+        came: cython.longlong[::1] = self.came
+        board_count: cython.longlong = len(self.boards)
+        while now < end:
+            first = due[board_count]
+            for i in range(board_count):
+                if due[i] < first:
+                    first = due[i]
+            if first > now:
+                now = first
+            if due[board_count] <= now < end:
+                due[board_count] = self._decide(now)
+            now += self.window_ns
+            if now >= end:
+                now = late = end
+            for i in range(board_count):
+                if due[i] < now or came[i] < late:
+                    away = cython.cast(RemoteBoard, self.boards[i])
+                    away.begin(now)
+            for i in range(board_count):
+                if due[i] < now or came[i] < late:
+                    due[i] = self._advance(i, now)
+            windows += 1
+        return windows
 
     @cython.final
     def _advance(self, place: cython.longlong, until: cython.longlong) -> cython.longlong:
