@@ -7,18 +7,14 @@ to anything. The board is a steering board in a process of its own, as `ranger-s
 from __future__ import annotations
 
 import contextlib
-import os
 from typing import Any
 
 from foundation import wallclock
 from foundation.random_stream import RandomStream
 from foundation.user_error import UserError
-from harness import wiring
 from harness.processes import block as places
-from harness.processes import board_process, kernel
-from harness.processes.block import Block, new_stage
-from harness.processes.channel import SLOT_WORDS, Bell
-from harness.processes.settings import Settings
+from harness.processes.channel import SLOT_WORDS
+from harness.processes.lone_board import LoneBoard
 from harness.ranger import Ranger
 
 BOARD = "MCSI"
@@ -31,16 +27,9 @@ class Fuzz:
 
     def __init__(self, robot: Ranger, seed: int = 1) -> None:
         self.stream: Any = RandomStream(seed, "channel fuzz")
-        self.block = Block(BOARD, wiring.BOARDS.index(BOARD), 0)
+        self.board = LoneBoard(robot, BOARD)
+        self.block = self.board.block
         self.words = self.block.words
-        stage = new_stage()
-        parent = os.getpid()
-        self.process = os.fork()
-        if self.process == 0:
-            kernel.die_with_parent(parent)
-            os._exit(board_process.serve(robot, BOARD, self.block, stage, Settings(real_time=False), False))
-        self.ask = Bell(self.words, places.ASKED, places.BOARD_SLEEPS, self.block.ask_descriptor)
-        self.answer = Bell(self.words, places.ANSWERED, places.PLANT_SLEEPS, self.block.answer_descriptor)
         self.until = 0
         self.turn()
 
@@ -55,13 +44,9 @@ class Fuzz:
         return (self.number(1 << 32) << 32 | self.number(1 << 32)) - (1 << 63)
 
     def turn(self, command: int = places.COMMAND_ADVANCE, until: int | None = None) -> None:
-        """One turn; UserError when the board has ended instead."""
+        """One turn; UserError when the board has ended instead, or does not answer."""
         self.until = max(self.until, self.words[places.REACHED]) + TURN_NS
-        self.words[places.COMMAND] = command
-        self.words[places.UNTIL] = self.until if until is None else until
-        self.ask.ring()
-        while not self.answer.wait(self.ask.rung):
-            pass
+        self.board.turn(self.until if until is None else until, command)
         self.words[places.ASK_USED] = 0
 
     def case(self) -> None:
@@ -89,9 +74,7 @@ class Fuzz:
 
     def end(self) -> None:
         """Let the board's process end; UserError when it had ended before."""
-        self.words[places.COMMAND] = places.COMMAND_STOP
-        self.ask.ring()
-        code = os.waitstatus_to_exitcode(os.waitpid(self.process, 0)[1])
+        code = self.board.end()
         if code != 0:
             raise UserError(f"channel fuzz: the board's process ended with {code}: {self.block.fault()}")
 
@@ -100,11 +83,12 @@ def benchmark(cases: int) -> dict:
     """Run so many cases; the figure is cases per second."""
     with contextlib.closing(Ranger()) as robot:
         fuzz = Fuzz(robot)
-        started = wallclock.monotonic_s()
-        for _ in range(cases):
-            fuzz.case()
-        seconds = wallclock.monotonic_s() - started
-        fuzz.end()
+        with contextlib.closing(fuzz.board):
+            started = wallclock.monotonic_s()
+            for _ in range(cases):
+                fuzz.case()
+            seconds = wallclock.monotonic_s() - started
+            fuzz.end()
     return {
         "figure": cases / seconds,
         "unit": "cases per s",

@@ -2,67 +2,52 @@
 
 import contextlib
 import os
+import signal
 
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from foundation.events import PIN_EDGE, EventQueue
-from harness import wiring
+from foundation.user_error import UserError
 from harness.processes import block as places
-from harness.processes import board_process
-from harness.processes.block import Block, new_stage
-from harness.processes.channel import SLOT_WORDS, Bell, Mailbox
+from harness.processes.channel import SLOT_WORDS, Mailbox
 from harness.processes.kinds import TO_BOARD
-from harness.processes.settings import Settings
+from harness.processes.lone_board import LoneBoard
 from harness.ranger import Ranger
 
 STEP_NS = 100_000
 
 
-class Served:
-    """A board process and our end of its channel."""
+class Served(LoneBoard):
+    """A board that goes on in steps, and what is written to it."""
 
     def __init__(self, robot, name):
-        self.name = name
-        self.place = wiring.BOARDS.index(name)
-        self.block = Block(name, self.place, 0)
-        self.words = self.block.words
-        self.stage = new_stage()
-        self.process = os.fork()
-        if self.process == 0:
-            code = 9
-            try:
-                code = board_process.serve(robot, name, self.block, self.stage, Settings(real_time=False), False)
-            finally:
-                os._exit(code)
-        self.ask = Bell(self.words, places.ASKED, places.BOARD_SLEEPS, self.block.ask_descriptor)
-        self.answer = Bell(self.words, places.ANSWERED, places.PLANT_SLEEPS, self.block.answer_descriptor)
+        super().__init__(robot, name)
         self.mailbox = Mailbox(
             self.words, "of the test", self.block.to_board_first, places.SLOTS, places.ASK_USED, TO_BOARD
         )
         self.until = 0
 
-    def turn(self, command=places.COMMAND_ADVANCE, until=None):
+    def step(self, command=places.COMMAND_ADVANCE, until=None):
         self.until += STEP_NS
-        self.words[places.COMMAND] = command
-        self.words[places.UNTIL] = self.until if until is None else until
-        self.ask.ring()
-        while not self.answer.wait(self.ask.rung):
-            pass
-
-    def end(self):
-        self.words[places.COMMAND] = places.COMMAND_STOP
-        self.ask.ring()
-        return os.waitstatus_to_exitcode(os.waitpid(self.process, 0)[1])
+        self.turn(self.until if until is None else until, command)
 
 
 @pytest.fixture(scope="module")
 def served():
-    with contextlib.closing(Ranger()) as robot:
-        board = Served(robot, "MCSI")
+    with contextlib.closing(Ranger()) as robot, contextlib.closing(Served(robot, "MCSI")) as board:
+        board.step()  # a board that has not run yet may be told any instant, as a restarted one is
         yield board
         assert board.end() == 0
+
+
+@pytest.fixture
+def lone():
+    """lone(patience_s=...): a board of its own for a test that ends it."""
+    with contextlib.ExitStack() as stack:
+        robot = stack.enter_context(contextlib.closing(Ranger()))
+        yield lambda **how: stack.enter_context(contextlib.closing(LoneBoard(robot, "MCSI", **how)))
 
 
 @given(
@@ -82,14 +67,14 @@ def test_a_board_survives_whatever_stands_in_its_channel(served, damage, used, u
         served.words[served.block.to_board_first + place] = value
     served.words[places.ASK_USED] = used
     before = served.words[places.DAMAGED]
-    served.turn(command, until)
+    served.step(command, until)
     if command == places.COMMAND_ADVANCE and until is None and used != 0:
         assert served.words[places.DAMAGED] > before
     served.words[places.ASK_USED] = 0
     served.until = max(served.until, served.words[places.REACHED])
     slots = served.words[places.SLOT_COUNT]
     for _ in range(6):
-        served.turn()
+        served.step()
     assert served.words[places.SLOT_COUNT] == slots + 1 or served.words[places.SLOT_COUNT] == slots + 2
 
 
@@ -100,7 +85,7 @@ def test_a_whole_message_after_damaged_ones_reaches_the_chip(served):
     served.mailbox.put(queue)
     served.mailbox.send()
     before = served.words[places.DAMAGED]
-    served.turn()
+    served.step()
     served.words[places.ASK_USED] = 0
     # its number is not the one that follows the last whole one: that is counted, and it is delivered all the same
     assert served.words[places.DAMAGED] <= before + 1
@@ -113,12 +98,43 @@ def test_a_program_that_raises_says_what_and_where():
             return 1 // 0
 
         robot.replace("MCSI", "mc_compliant_control", divide, cost=100)
-        board = Served(robot, "MCSI")
-        board.words[places.COMMAND] = places.COMMAND_ADVANCE
-        board.words[places.UNTIL] = 20_000_000
-        board.ask.ring()
-        code = os.waitstatus_to_exitcode(os.waitpid(board.process, 0)[1])
-    assert code == board_process.FAILED
-    assert board.block.fault().startswith(
-        "ZeroDivisionError: integer division or modulo by zero (test_board_process.py:"
-    )
+        with (
+            contextlib.closing(LoneBoard(robot, "MCSI")) as board,
+            pytest.raises(
+                UserError,
+                match=r"^MCSI \(process \d+\) ended with code 4: "
+                r"ZeroDivisionError: integer division or modulo by zero \(test_board_process.py:",
+            ),
+        ):
+            board.turn(20_000_000)
+
+
+@pytest.mark.parametrize("turns", [0, 1])
+def test_who_waits_for_a_board_whose_process_was_killed_is_told(lone, turns):
+    """Also when it was killed before its first answer."""
+    board = lone()
+    for turn in range(turns):
+        board.turn((turn + 1) * STEP_NS)
+    os.kill(board.process, signal.SIGKILL)
+    with pytest.raises(UserError, match=r"^MCSI \(process \d+\) was killed by signal 9$"):
+        while True:  # one turn may still be answered before the signal arrives
+            board.turn(STEP_NS)
+    assert board.end() == -signal.SIGKILL
+
+
+def test_who_waits_for_a_board_that_stands_still_is_told_and_it_is_killed(lone):
+    board = lone(patience_s=0.001)
+    os.kill(board.process, signal.SIGSTOP)
+    os.waitpid(board.process, os.WUNTRACED)
+    with pytest.raises(UserError, match=r"^MCSI \(process \d+\) hangs: no answer for 0.001 s; it is killed$"):
+        board.turn(STEP_NS)
+    assert board.code == -signal.SIGKILL
+
+
+def test_who_waits_for_a_stopped_board_to_end_is_told_and_it_is_killed(lone):
+    board = lone(patience_s=0.001)
+    os.kill(board.process, signal.SIGSTOP)
+    os.waitpid(board.process, os.WUNTRACED)
+    with pytest.raises(UserError, match="hangs: no end for 0.001 s; it is killed$"):
+        board.end()
+    assert board.code == -signal.SIGKILL

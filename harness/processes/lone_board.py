@@ -1,0 +1,94 @@
+"""A board in a process of its own without a plant: its turns are given by hand. For tests and the damaged channel.
+
+Nobody supervises it, so who waits for its answer watches its process as well, and no wait is without a limit.
+"""
+
+import gc
+import os
+import select
+import signal
+from typing import Any
+
+from foundation.user_error import UserError
+from harness import wiring
+from harness.processes import block as places
+from harness.processes import board_process, kernel
+from harness.processes.block import Block, new_stage
+from harness.processes.channel import Bell
+from harness.processes.settings import Settings
+
+PATIENCE_S = 60.0  # a turn takes some microseconds; the rest is for a busy machine
+
+
+class LoneBoard:
+    """Board `name` of the wired, never run `robot`, served by a process, and the other end of its channel."""
+
+    def __init__(self, robot: Any, name: str, patience_s: float = PATIENCE_S) -> None:
+        self.name = name
+        self.patience_s = patience_s
+        place = wiring.BOARDS.index(name)
+        self.block = Block(name, place, 0)
+        self.words = self.block.words
+        self.code: int | None = None
+        stage = new_stage()
+        parent = os.getpid()
+        self.process = os.fork()
+        if self.process == 0:
+            code = board_process.FAILED
+            try:
+                kernel.die_with_parent(parent)
+                gc.freeze()  # what lies about in the parent's program is not for this process to finalize
+                code = board_process.serve(robot, name, self.block, stage, Settings(real_time=False), False)
+            finally:
+                os._exit(code)
+        self.watch = os.pidfd_open(self.process)
+        self.ask = Bell(self.words, places.ASKED, places.BOARD_SLEEPS, self.block.ask_descriptor)
+
+    def turn(self, until: int, command: int = places.COMMAND_ADVANCE) -> None:
+        """Ask the board and wait for its answer; UserError when it has ended instead, or does not answer."""
+        self._ring(command, until)
+        answer = self.block.answer_descriptor
+        ready = select.select([answer, self.watch], [], [], self.patience_s)[0]
+        if answer in ready:
+            os.eventfd_read(answer)
+        elif ready:
+            code = self._reap()
+            how = f"was killed by signal {-code}" if code < 0 else f"ended with code {code}"
+            why = self.block.fault()
+            raise UserError(f"{self.name} (process {self.process}) {how}{': ' + why if why else ''}")
+        else:
+            self._hangs("no answer")
+
+    def end(self) -> int:
+        """Tell its process to end, and return the exit code; UserError when it does not end."""
+        if self.code is None:
+            self._ring(places.COMMAND_STOP, 0)
+            if not select.select([self.watch], [], [], self.patience_s)[0]:
+                self._hangs("no end")
+        return self._reap()
+
+    def close(self) -> None:
+        """Whatever became of it, it is gone after this."""
+        if self.code is None:
+            os.kill(self.process, signal.SIGKILL)
+        self._reap()
+        os.close(self.watch)
+
+    def _ring(self, command: int, until: int) -> None:
+        self.words[places.COMMAND] = command
+        self.words[places.UNTIL] = until
+        self.words[places.PLANT_SLEEPS] = 1  # said before it is asked, so that every answer is posted
+        self.ask.ring()
+
+    def _hangs(self, missing: str) -> None:
+        os.kill(self.process, signal.SIGKILL)
+        self._reap()
+        raise UserError(
+            f"{self.name} (process {self.process}) hangs: {missing} for {self.patience_s:g} s; it is killed"
+        )
+
+    def _reap(self) -> int:
+        """The exit code of the process, which has ended or is about to."""
+        if self.code is None:
+            self.code = os.waitstatus_to_exitcode(os.waitpid(self.process, 0)[1])
+        return self.code
