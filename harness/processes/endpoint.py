@@ -174,6 +174,8 @@ class Endpoint:
     def _next_output(self) -> cython.longlong:
         """Before this instant (ns) the board puts nothing out, whatever comes in of a kind that can wait."""
         board: Microcontroller = self.board
+        if self.out.count > 0:  # more than the mailbox held: it goes out in the next turn, whatever that turn is
+            return 0
         if not board.scheduler.done or board.vic.pending != 0:
             return 0
         if board.background is not None and board.background_wanted:

@@ -5,18 +5,19 @@ import os
 import signal
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from foundation.events import PIN_EDGE, EventQueue
 from foundation.user_error import UserError
 from harness.processes import block as places
 from harness.processes.channel import SLOT_WORDS, Mailbox
-from harness.processes.kinds import TO_BOARD
+from harness.processes.kinds import FROM_BOARD, TO_BOARD
 from harness.processes.lone_board import LoneBoard
 from harness.ranger import Ranger
 
 STEP_NS = 100_000
+LONG_TURN_NS = 900_000_000  # MCSI puts out six times what its mailbox holds
 
 
 class Served(LoneBoard):
@@ -58,6 +59,7 @@ def lone():
     until=st.one_of(st.none(), st.integers(-(2**62), 2**62)),
     command=st.one_of(st.just(places.COMMAND_ADVANCE), st.integers(-5, 1000)),
 )
+@example(damage=[(0, 0)], used=20, until=LONG_TURN_NS, command=places.COMMAND_ADVANCE)  # and the answer does not fit
 @settings(max_examples=200, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_a_board_survives_whatever_stands_in_its_channel(served, damage, used, until, command):
     """It answers, counts what it could not read, and goes on with its slots."""
@@ -107,6 +109,33 @@ def test_a_program_that_raises_says_what_and_where():
             ),
         ):
             board.turn(20_000_000)
+
+
+def put_out(board, instants):
+    """Everything the board puts out when it is asked up to one instant after the other: stamps, kinds and fields."""
+    reader = Mailbox(
+        board.words, "of the test", board.block.from_board_first, places.SLOTS, places.ANSWER_USED, FROM_BOARD
+    )
+    arrived = EventQueue()
+    for reader.until in instants:
+        command, more = places.COMMAND_ADVANCE, True
+        while more:
+            board.turn(reader.until, command)
+            reader.open()
+            while reader.take(arrived):
+                pass
+            command, more = places.COMMAND_MORE, board.words[places.RESULT] == places.RESULT_MORE
+    assert reader.damaged == 0
+    found = []
+    while arrived.take():
+        found.append((arrived.time, arrived.order, arrived.kind, arrived.a, arrived.b, arrived.c, arrived.d))
+    return found
+
+
+def test_what_does_not_fit_in_one_answer_comes_in_the_next_ones(lone):
+    in_short_turns = put_out(lone(), range(1_000_000, LONG_TURN_NS + 1, 1_000_000))
+    assert len(in_short_turns) > 5 * places.SLOTS
+    assert put_out(lone(), [LONG_TURN_NS]) == in_short_turns
 
 
 @pytest.mark.parametrize("turns", [0, 1])
