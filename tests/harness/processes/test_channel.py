@@ -1,5 +1,6 @@
 """The stamped channel: what goes in comes out, and what is damaged is named and never delivered."""
 
+import contextlib
 import os
 
 import pytest
@@ -10,11 +11,16 @@ from firmware_sim.peripherals.ssp import SspSegment
 from foundation import events
 from foundation.events import EventQueue
 from foundation.user_error import UserError
+from harness import wiring
 from harness.processes import block as places
 from harness.processes import kinds, plain
-from harness.processes.block import SLOTS, Block
+from harness.processes.block import SLOTS, Block, new_stage
 from harness.processes.channel import SLOT_WORDS, Bell, Mailbox
 from harness.processes.kinds import FROM_BOARD, KINDS, TO_BOARD
+from harness.processes.remote_board import RemoteBoard
+from harness.processes.stage import Stage
+from harness.ranger import Ranger
+from tests.harness.processes.child import Child
 
 NEAR = 1_000_000  # ns; stamps of the tests
 
@@ -245,24 +251,71 @@ def test_what_ended_a_process_is_kept_and_cut_to_what_fits():
     assert block.fault() == "x" * 504
 
 
-def test_a_bell_between_two_processes_rings_as_often_as_it_was_rung():
+@pytest.fixture
+def bells():
+    """(block, ask, answer): the bells of a board's block."""
     block = Block("MCH", 0, 0)
-    child = os.fork()
-    ask = Bell(block.words, places.ASKED, places.BOARD_SLEEPS, block.ask_descriptor)
-    answer = Bell(block.words, places.ANSWERED, places.PLANT_SLEEPS, block.answer_descriptor)
-    if child == 0:
+    return (
+        block,
+        Bell(block.words, places.ASKED, places.BOARD_SLEEPS, block.ask_descriptor),
+        Bell(block.words, places.ANSWERED, places.PLANT_SLEEPS, block.answer_descriptor),
+    )
+
+
+def test_a_bell_between_two_processes_rings_as_often_as_it_was_rung(bells):
+    block, ask, answer = bells
+
+    def count():
         for turn in range(1, 2001):
             while not ask.wait(turn):
                 pass
             block.words[places.NEXT_TIME] += turn
             answer.ring()
-        os._exit(0)
-    for turn in range(1, 2001):
-        ask.ring()
-        while not answer.wait(turn):
+        return 0
+
+    with Child(block, count) as child:
+        for turn in range(1, 2001):
+            ask.ring()
+            child.answered(answer, turn)
+            assert block.words[places.NEXT_TIME] == turn * (turn + 1) // 2
+        assert child.ended().si_status == 0
+
+
+def test_who_sleeps_on_the_bell_of_a_process_that_ends_is_woken_and_told(bells):
+    block, ask, answer = bells
+
+    def end_when_asked():
+        while not ask.wait(1):
             pass
-        assert block.words[places.NEXT_TIME] == turn * (turn + 1) // 2
-    assert os.waitpid(child, 0)[1] == 0
+        return 7
+
+    with Child(block, end_when_asked) as child:
+        ask.ring()
+        with pytest.raises(AssertionError, match="no answer in turn 1: ended with 7"):
+            child.answered(answer, 1)
+
+
+def test_a_board_that_ends_in_its_turn_is_gone_for_the_plant_and_not_asked_again():
+    with contextlib.closing(Ranger()) as robot:
+        shadow = robot.boards["MCSI"]
+        block = Block("MCSI", wiring.BOARDS.index("MCSI"), 0)
+        words, doubles = new_stage()
+        stage = Stage(words, doubles, robot.plant, robot.loop.step_times, [])
+        remote = RemoteBoard(shadow, block, stage, wiring.BOARDS.index("MCSI"), False)
+        ask = Bell(block.words, places.ASKED, places.BOARD_SLEEPS, block.ask_descriptor)
+
+        def end_when_asked():
+            while not ask.wait(1):
+                pass
+            return 7
+
+        with Child(block, end_when_asked):
+            assert remote.advance(1_000_000) == 1 << 62
+        assert remote.gone
+        remote.catch_up(2_000_000)
+        remote.command(places.COMMAND_SNAPSHOT)
+        with pytest.raises(UserError, match="MCSI is gone"):
+            remote.send(kinds.SET_WORD, 2_000_000, 1, 1)
 
 
 def test_a_ring_from_a_third_side_wakes_without_being_an_answer():

@@ -1,0 +1,67 @@
+"""A process that a test forks, and a second one that watches it: nobody waits for ever for one that is gone."""
+
+import os
+import select
+import signal
+
+from harness.processes import block as places
+from harness.processes import kernel
+
+PATIENCE_S = 60.0  # a guard against waiting for ever; nothing asserts on it
+
+
+def fork(body):
+    """A process that runs `body`, leaves with what that returns, and does not outlive the test's; its number."""
+    parent = os.getpid()
+    process = os.fork()
+    if process == 0:
+        code = 9
+        try:
+            kernel.die_with_parent(parent)
+            code = body()
+        finally:
+            os._exit(code)
+    return process
+
+
+class Child:
+    """Runs `body` on the board's side of `block`.
+
+    As the supervisor does with a board's process, the one that watches marks the block and rings the answer's bell
+    when the child has ended. It does so as well when the child stands still: after PATIENCE_S.
+    """
+
+    def __init__(self, block, body):
+        self.block = block
+        self.process = fork(body)
+        self.watch = os.pidfd_open(self.process)
+        self.watcher = fork(self._look_after)
+
+    def _look_after(self):
+        select.select([self.watch], [], [], PATIENCE_S)
+        self.block.words[places.FATE] = 1
+        os.eventfd_write(self.block.answer_descriptor, 1)
+        return 0
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        for process in (self.process, self.watcher):
+            os.kill(process, signal.SIGKILL)
+            os.waitpid(process, 0)
+        os.close(self.watch)
+
+    def answered(self, bell, turn):
+        """Wait until it has rung `turn` times; fails when it has ended instead or stands still."""
+        while not bell.wait(turn):
+            assert self.block.words[places.FATE] == 0, f"no answer in turn {turn}: {self._fate()}"
+
+    def ended(self):
+        """Wait for its end; how it ended, as os.waitid has it. Fails when it stands still."""
+        assert select.select([self.watch], [], [], PATIENCE_S)[0], f"does not end: {self._fate()}"
+        return os.waitid(os.P_PID, self.process, os.WEXITED | os.WNOWAIT)
+
+    def _fate(self):
+        end = os.waitid(os.P_PID, self.process, os.WEXITED | os.WNOWAIT | os.WNOHANG)
+        return f"stood still for {PATIENCE_S} s" if end is None else f"ended with {end.si_status}"
