@@ -44,13 +44,14 @@ def hosted(*channels, name=None, speed=1.0, servers=(), **options):
         except Exception as fault:  # shown by the test, not by the thread
             faults.append(fault)
 
-    thread = threading.Thread(target=turns)
+    thread = threading.Thread(target=turns, daemon=True)
     thread.start()
     try:
         yield name, host
     finally:
         ending.set()
-        thread.join()
+        thread.join(PATIENCE_S)
+        assert not thread.is_alive(), f"a turn of the host of {', '.join(taps)} does not end"
         host.close()
         assert not faults, faults
 
@@ -87,7 +88,7 @@ class Program:
     def __exit__(self, *_):
         if self.process.poll() is None:
             self.process.kill()
-        self.process.wait()
+        self.process.wait(PATIENCE_S)
         if self.process.stderr is not None:
             self.process.stderr.close()
         if self.process.stdout is not None:
@@ -102,9 +103,8 @@ class Program:
             if found:
                 self.text = self.text[found.end() :]
                 return found
-            ready = select.select([self.output], [], [], PATIENCE_S)[0]
             try:
-                data = os.read(self.output, 65536) if ready else b""
+                data = os.read(self.output, 65536) if self._comes() else b""
             except OSError:  # the program's end of the terminal is closed
                 data = b""
             assert data, f"{pattern!r} never came; output {self.text!r}, errors {self.errors()!r}"
@@ -126,13 +126,17 @@ class Program:
         """(exit code, standard error) once it has ended by itself."""
         if self.master is not None:
             with contextlib.suppress(OSError):
-                while os.read(self.master, 65536):
+                while self._comes() and os.read(self.master, 65536):
                     pass
         elif self.process.stderr is None:
-            while os.read(self.output, 65536):  # or it would wait for a reader
+            while self._comes() and os.read(self.output, 65536):  # or it would wait for a reader
                 pass
         code = self.process.wait(PATIENCE_S)
         return code, self._said()
+
+    def _comes(self):
+        """Wait for output or its end; False when neither comes."""
+        return bool(select.select([self.output], [], [], PATIENCE_S)[0])
 
     def _said(self):
         return self.process.stderr.read().decode("utf-8", "replace") if self.process.stderr is not None else ""

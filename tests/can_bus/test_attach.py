@@ -21,7 +21,7 @@ from foundation.events import FLAG_ERROR, FLAG_EXTENDED, FLAG_REMOTE, FLAG_SINGL
 from foundation.random_stream import RandomStream
 from foundation.user_error import UserError
 
-from .hosting import fresh_name, hosted
+from .hosting import PATIENCE_S, fresh_name, hosted
 
 RATE = 1_000_000
 STEP_NS = 31_250
@@ -322,6 +322,7 @@ def test_a_frame_directly_behind_the_welcome_is_not_forgotten():
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as listener:
         listener.bind(wire.SOCKET_PREFIX + name)
         listener.listen()
+        listener.settimeout(PATIENCE_S)
         welcome = wire.record(wire.WELCOME, wire.WELCOME_BODY.pack(1, 64, RATE, 0) + b"can1")
         frame = wire.frame_record(wire.FRAME, 5, 0x77, 0, 0, 0)
 
@@ -331,10 +332,11 @@ def test_a_frame_directly_behind_the_welcome_is_not_forgotten():
             connections.append(connection)
 
         connections = []
-        thread = threading.Thread(target=answer)
+        thread = threading.Thread(target=answer, daemon=True)
         thread.start()
         link = links.AttachedLink(name, "can1")
-        thread.join()
+        thread.join(PATIENCE_S)
+        assert connections, "the connection is never answered"
         assert link.receive(0) == (RECEIVED, 5, 0x77, 0, 0, 0)
         link.close()
         connections[0].close()

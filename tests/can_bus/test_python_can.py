@@ -221,12 +221,13 @@ def test_a_sender_that_waits_for_room_says_so_and_goes_on_when_there_is_some(bus
     alone = bus(speed="max")
     told = threading.Event()
     caplog.handler.addFilter(lambda record: told.set() or True)
-    thread = threading.Thread(target=lambda: [alone.send(message(number)) for number in range(100)])
+    thread = threading.Thread(target=lambda: [alone.send(message(number)) for number in range(100)], daemon=True)
     thread.start()
     assert told.wait(60)
     other = bus()
     assert [other.recv(60).arbitration_id for _ in range(100)] == list(range(100))
-    thread.join()
+    thread.join(60)
+    assert not thread.is_alive(), "the last frame is heard, but sending it does not end"
     (entry,) = caplog.records
     assert "nobody acknowledges, so sending waits" in entry.getMessage()
 
@@ -317,7 +318,8 @@ def test_periodic_sending_by_python_cans_thread(bus, caplog):
     while b.recv(60).data[0] != 1:
         pass
     a.shutdown()  # the task's thread may be in the middle of a message
-    task.thread.join()
+    task.thread.join(60)
+    assert not task.thread.is_alive(), "the task's thread goes on"
     assert not [entry for entry in caplog.records if entry.levelno >= logging.WARNING]
 
 
@@ -435,7 +437,8 @@ def test_threads_may_send_and_receive_on_one_attached_bus(bus):
         a, b = bus(f"{name}/can1", private=False), bus(f"{name}/can1", private=False)
         threads = [
             threading.Thread(
-                target=lambda one=one, n=n: [one.send(message(n, i.to_bytes(2)), 60) for i in range(count)]
+                target=lambda one=one, n=n: [one.send(message(n, i.to_bytes(2)), 60) for i in range(count)],
+                daemon=True,
             )
             for n, one in enumerate((a, a, b, b))
         ]
@@ -443,7 +446,8 @@ def test_threads_may_send_and_receive_on_one_attached_bus(bus):
             thread.start()
         heard = [[one.recv(60) for _ in range(2 * count)] for one in (a, b)]
         for thread in threads:
-            thread.join()
+            thread.join(60)
+            assert not thread.is_alive(), "everything is heard, but sending it does not end"
     for messages, senders in zip(heard, ((2, 3), (0, 1)), strict=True):
         for sender in senders:
             mine = [int.from_bytes(each.data) for each in messages if each.arbitration_id == sender]

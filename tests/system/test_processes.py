@@ -69,6 +69,14 @@ class Up:
             assert wallclock.monotonic_s() < end, f"does not run:\n{self.read()}"
             wallclock.sleep_s(0.02)
 
+    def until(self, met, what):
+        """The first status for which `met(status)`; fails when none comes, or the robot has ended before."""
+        end = wallclock.monotonic_s() + PATIENCE_S
+        while not met(status := self.status()):
+            assert wallclock.monotonic_s() < end, f"never {what} within {PATIENCE_S} s:\n{self.read()}"
+            wallclock.sleep_s(0.02)
+        return status
+
     def processes(self):
         """Process ids by name, as the robot tells them, once it runs."""
         status = self.running()
@@ -110,7 +118,7 @@ class Up:
     def close(self):
         with contextlib.suppress(ProcessLookupError):
             os.killpg(self.started.pid, signal.SIGKILL)
-        self.started.wait()
+        self.started.wait(PATIENCE_S)
         self.started.stdout.close()
 
 
@@ -146,6 +154,7 @@ def walked():
         capture_output=True,
         text=True,
         check=True,
+        timeout=600,
     )
     return json.loads(done.stdout)
 
@@ -194,9 +203,8 @@ def test_a_stopped_board_stalls_the_run_and_loses_nothing(up, walked):
     status = robot.running()
     board = status["boards"]["CSR"]["process"]
     os.kill(board, signal.SIGSTOP)
-    while robot.status()["boards"]["CSR"]["state"] != "stopped":
-        wallclock.sleep_s(0.02)
-    stalled = robot.status()["boards"]["CSR"]["slots"]
+    status = robot.until(lambda status: status["boards"]["CSR"]["state"] == "stopped", "stopped")
+    stalled = status["boards"]["CSR"]["slots"]
     with pytest.raises(UserError, match="CSR is stopped: all wait for it"):
         control.ask(robot.name, {"do": "pause"})
     assert robot.status()["boards"]["CSR"]["slots"] == stalled
@@ -266,11 +274,8 @@ def test_a_dead_board_is_restarted_where_that_is_the_policy(up):
     before = robot.processes()["UI"]
     os.kill(before, signal.SIGKILL)
     robot.wait_for(r"UI restarted at ")
-    while robot.status()["boards"]["UI"]["state"] != "running":
-        wallclock.sleep_s(0.02)
-    slots = robot.status()["boards"]["UI"]["slots"]
-    while robot.status()["boards"]["UI"]["slots"] < slots + 5:
-        wallclock.sleep_s(0.02)
+    slots = robot.until(lambda status: status["boards"]["UI"]["state"] == "running", "running")["boards"]["UI"]["slots"]
+    robot.until(lambda status: status["boards"]["UI"]["slots"] >= slots + 5, "five slots later")
     assert robot.status()["boards"]["UI"]["process"] != before
     assert robot.interrupt() == 130
 
@@ -288,8 +293,7 @@ def test_pausing_stops_virtual_time_and_nothing_is_lost(up, command, walked):
     robot = up("--steps", "2", "--json", "-", speed="0.5")
     robot.running()
     paused = float(re.search(r"at ([\d.]+) s", command("ctl", "pause", "--name", robot.name).stdout).group(1))
-    while not (status := robot.status())["paused"]:
-        wallclock.sleep_s(0.02)
+    status = robot.until(lambda status: status["paused"], "paused")
     for _ in range(50):
         assert robot.status()["time_s"] == status["time_s"] == pytest.approx(paused, abs=1e-4)
     resumed = float(re.search(r"at ([\d.]+) s", command("ctl", "resume", "--name", robot.name).stdout).group(1))
