@@ -194,7 +194,7 @@ class Supervisor:
 
     @contextlib.contextmanager
     def signals_noted(self) -> Iterator[None]:
-        """Signals wake the loop and are handled there."""
+        """Signals wake the loop and are handled there; also those that whoever started us had blocked."""
 
         def note(number: int, _frame: Any) -> None:
             self.signals.append(number)
@@ -204,9 +204,11 @@ class Supervisor:
         watched = (signal.SIGCHLD, signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
         before = {number: signal.signal(number, note) for number in watched}
         wakeup = signal.set_wakeup_fd(self.wakeup_write.fileno(), warn_on_full_buffer=False)
+        mask = signal.pthread_sigmask(signal.SIG_UNBLOCK, watched)
         try:
             yield
         finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, mask)
             signal.set_wakeup_fd(wakeup)
             for number, handler in before.items():
                 signal.signal(number, handler)
@@ -260,10 +262,13 @@ class Supervisor:
             if child.state == STOPPED:
                 os.kill(child.process, signal.SIGCONT)  # it has to finish as well
 
-    def order(self, content: dict) -> None:
-        """Tell the plant's process something."""
-        with contextlib.suppress(OSError):  # it is gone: `reap` has the news
-            self.link.send(json.dumps(content).encode())
+    def order(self, content: dict, listening: bool = False) -> None:
+        """Tell the plant's process something.
+
+        Without waiting, unless it is known to be listening: it may hang, and we are the one that notices.
+        """
+        with contextlib.suppress(OSError):  # it is gone (`reap` has the news), or has left hundreds of orders unread
+            self.link.send(json.dumps(content).encode(), 0 if listening else socket.MSG_DONTWAIT)
 
     def hear_plant(self) -> None:
         """What the plant's process has sent."""
@@ -288,7 +293,7 @@ class Supervisor:
             if "over" in news:
                 self.look()
                 self.view.close()
-                self.order({"do": "finish"})
+                self.order({"do": "finish"}, listening=True)
 
     def answered(self, news: dict) -> None:
         """The plant's process has carried out an order, or says why not."""
@@ -312,6 +317,7 @@ class Supervisor:
                 return
             if process == 0:
                 return
+            self.hear_plant()  # it may have told this child to end since we last listened
             child = next((each for each in self.children.values() if each.process == process), None)
             if child is None:
                 continue

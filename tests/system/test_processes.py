@@ -269,6 +269,23 @@ def test_a_hanging_board_is_named_and_its_motor_loses_its_power(up):
     assert robot.end() == 0
 
 
+BLOCKED = """
+import signal, sys
+from tools.cli import main
+
+signal.pthread_sigmask(signal.SIG_BLOCK, signal.valid_signals())
+sys.exit(main(["up", *sys.argv[1:]]))
+"""
+
+
+def test_a_run_started_with_all_signals_blocked_ends_and_can_be_interrupted(up):
+    """Blocked signals are inherited from whoever starts it; the end of a process is one."""
+    assert up("--time", "0.02s", script=BLOCKED, speed="max").end() == 0
+    robot = up(script=BLOCKED)
+    robot.processes()
+    assert robot.interrupt() == 130
+
+
 def test_a_dead_board_is_restarted_where_that_is_the_policy(up):
     robot = up("--restart", "on-failure", speed="0.2")
     before = robot.processes()["UI"]

@@ -1,0 +1,63 @@
+"""The supervisor alone: what it does with news, without the processes of a robot."""
+
+import contextlib
+import json
+import os
+
+import pytest
+
+from harness.processes import supervisor
+from harness.processes.settings import Settings
+from harness.processes.supervisor import Supervisor, View
+from harness.ranger import Ranger
+from harness.scenario import StopRule
+from tests.harness.processes.child import Child, fork
+
+
+class Said(View):
+    """Everything that was said."""
+
+    def __init__(self):
+        self.lines = []
+
+    def say(self, text):
+        self.lines.append(text)
+
+
+@pytest.fixture
+def alone():
+    """A supervisor that has started nothing."""
+    with contextlib.closing(Ranger()) as robot:
+        settings = Settings(None, name=f"test-{os.getpid()}", real_time=False)
+        made = Supervisor(robot, settings, StopRule(time_s=1.0), lambda *_: 0, Said())
+        yield made
+        made.control.close()
+        for each in (made.link, made.plant_link, made.wakeup_read, made.wakeup_write):
+            each.close()
+
+
+def test_orders_to_a_plant_that_does_not_listen_are_not_waited_for(alone):
+    """Whoever waited would notice neither that it hangs nor Ctrl-C."""
+
+    def order():
+        for number in range(5000):
+            alone.order({"do": "pause", "number": number})
+        return 0
+
+    with Child(alone.blocks["MCH"], order) as child:
+        assert child.ended().si_status == 0
+
+
+def test_a_board_that_ended_because_it_was_told_to_is_no_news_even_when_it_is_found_first(alone):
+    """The plant's process has said that it collects, and nobody has listened since."""
+
+    def find():
+        process = fork(lambda: 0)
+        os.waitid(os.P_PID, process, os.WEXITED | os.WNOWAIT)
+        alone.children["MCH"] = supervisor.Child("MCH", process)
+        alone.plant_link.send(json.dumps({"collecting": True}).encode())
+        alone.reap()
+        return len(alone.view.lines) + (alone.children["MCH"].state != supervisor.GONE)
+
+    with Child(alone.blocks["MCH"], find) as child:  # which has no children but its own
+        assert child.ended().si_status == 0
