@@ -15,6 +15,7 @@ from harness.processes import snapshot
 from harness.processes.channel import Bell, Mailbox
 from harness.processes.kinds import FROM_BOARD, KINDS, NOTE, NOTE_SNAPSHOT, NOTE_WORDS, SET_WORD, TO_BOARD
 from harness.processes.lateness import bin_of
+from harness.wiring import HEAR_IN_SLOTS
 
 EVERYTHING = 0xFFFF  # bits of all message kinds to a board
 NOTE_BYTES = 8 * (NOTE_WORDS - 1)
@@ -47,8 +48,8 @@ class Endpoint:
         self.totals: object = None if errors is None else errors.totals
         self.router = getattr(board, "router", None)
         self.urgent_kinds = EVERYTHING
-        if hasattr(board, "can"):
-            # a motor board or the user interface: edges, frames, bytes and buffers that come free wait for a task
+        if board.name in HEAR_IN_SLOTS:
+            # edges, frames, bytes and buffers that come free wait for a task
             self.urgent_kinds &= ~(1 << PIN_EDGE | 1 << CAN_RX | 1 << CAN_TX_DONE | 1 << UART_BYTE)
         self.promised = 0
         self.estimator = getattr(board, "estimator", None)
