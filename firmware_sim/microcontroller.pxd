@@ -15,15 +15,20 @@ cdef class Peripheral:
 
 @cython.final
 cdef class EdgeLine:
+    cdef public long long next_time
     cdef public EdgeBuffer buffer
-    cdef public long long pin, partner_pin, channel, next_time
+    cdef public long long pin, partner_pin, channel
     cdef public Peripheral peripheral
-    cdef public EdgeLine following
+    cdef public InterruptSource source
+    @cython.final
+    cdef long long find_next(self) noexcept
+    @cython.final
+    cdef long long take(self) noexcept
 
 # Fields that nearly every event touches come first, close together; then those of alarms, edges and messages.
 cdef class Microcontroller:
     cdef public long long now, instant, code_time, stop_time, extra_cycles
-    cdef public long long alarm_time, tick_time, edge_time, other_edge_time, next_time, horizon
+    cdef public long long alarm_time, tick_time, edge_time, next_time, horizon
     cdef public long long irq_free, fiq_free, stolen_cycles
     cdef public bint waiting, check_wait, background_wanted
     cdef public double ns_per_cycle
@@ -36,7 +41,6 @@ cdef class Microcontroller:
     cdef public list alarm_owners
     cdef public long long[16] alarm_times
     cdef public long long[16] alarm_numbers
-    cdef public EdgeLine edge_line, first_line
     cdef public list message_table
     cdef public AnalogPins analog
     cdef public TickTrain ticks
@@ -47,15 +51,14 @@ cdef class Microcontroller:
     cdef public Wait wait_task
     cdef public long long wait_start, wait_stolen
     cdef public long long[64] pin_channels
+    cdef public list pin_owners, pin_sources
+    cdef public EdgeLine first_line, second_line
     cdef public long long[::1] pins, words
-    cdef public list pin_owners, edge_lines
     cdef public str name
     cdef public long long hz
     cdef public Crystal crystal
     cdef public object on_overrun, on_limit, on_near_limit
     cdef public long long unclaimed
-    @cython.final
-    cdef long long _choose_edge_line(self) noexcept
     cpdef long long advance(self, long long until) except? -1
     cpdef long long main_loop(self) except? <long long>-1
     cpdef bint due(self, long long until) except? -1

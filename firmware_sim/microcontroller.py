@@ -23,7 +23,7 @@ from firmware_sim.clock import Crystal, TickTrain
 from firmware_sim.scheduler import Occasional, Schedule, SlotScheduler, Task, Wait
 from firmware_sim.vic import SLOT_TIMER, InterruptController, InterruptSource
 from foundation.edge_buffer import EdgeBuffer
-from foundation.events import NEVER, EventQueue
+from foundation.events import NEVER, PIN_EDGE, EventQueue
 from foundation.numbers import integers
 from foundation.user_error import UserError
 
@@ -47,7 +47,7 @@ class Peripheral:
         """A message of a kind claimed by this peripheral; it is in the fields of `queue`."""
 
     def on_pin(self, channel: cython.longlong, level: cython.longlong, time: cython.longlong) -> cython.longlong:
-        """The pin of `channel` changed to `level` at `time`; returns 0."""
+        """The pin of `channel` changed to `level` at `time`; returns 1 to ask for the pin's interrupt, else 0."""
         return 0
 
     def on_alarm(self, alarm: cython.longlong, time: cython.longlong) -> cython.void:
@@ -60,14 +60,31 @@ class EdgeLine:
     Channel A changes on `pin`; channel B, whose level each edge brings along, hangs on `partner_pin`.
     """
 
-    def __init__(self, buffer: EdgeBuffer, pin, partner_pin, peripheral: Peripheral, channel) -> None:
+    def __init__(self, buffer: EdgeBuffer, pin=0, partner_pin=0, peripheral=None, channel=0, source=None) -> None:
         self.buffer = buffer
         self.pin = pin
         self.partner_pin = partner_pin
         self.peripheral = peripheral
         self.channel = channel
+        self.source = source
         self.next_time = NEVER
-        self.following = None  # the line connected after this one
+
+    @cython.final
+    def find_next(self) -> cython.longlong:
+        """The instant of the first edge that has not been taken."""
+        if self.buffer.read < self.buffer.count:
+            self.next_time = self.buffer.packed[self.buffer.read] >> 2
+        else:
+            self.next_time = 1 << 62
+        return self.next_time
+
+    @cython.final
+    def take(self) -> cython.longlong:
+        """Take the first edge, which is there; returns it as the buffer has it."""
+        edge: cython.longlong = self.buffer.packed[self.buffer.read]
+        self.buffer.read += 1
+        self.find_next()
+        return edge
 
 
 class Microcontroller:
@@ -132,11 +149,10 @@ class Microcontroller:
         self.message_table = [None] * (MESSAGE_KINDS * INDICES_PER_KIND)
         self.pin_owners = [None] * PINS
         self.pin_channels = [-1] * 64  # PINS
-        self.edge_lines = []
-        self.first_line = None
-        self.edge_line = None
+        self.pin_sources = [None] * PINS
+        self.first_line = EdgeLine(EdgeBuffer(1))  # no encoder: never an edge
+        self.second_line = self.first_line
         self.edge_time = NEVER
-        self.other_edge_time = NEVER
         self.unclaimed = 0
 
     # --- set-up -------------------------------------------------------------------------------------------
@@ -159,8 +175,11 @@ class Microcontroller:
             raise UserError(f"{self.name}: messages of kind {kind}, index {index} are claimed twice")
         self.message_table[place] = peripheral
 
-    def claim_pin(self, pin, channel, peripheral) -> None:
-        """Edges of `pin` go to `peripheral.on_pin(channel, level, time)`."""
+    def claim_pin(self, pin, channel, peripheral, source=None) -> InterruptSource:
+        """Edges of `pin` go to `peripheral.on_pin(channel, level, time)`.
+
+        `source`: the interrupt that it may ask for, (PIN_EDGE, pin) unless given. Returns that.
+        """
         self._check_peripheral(peripheral)
         if not 0 <= pin < PINS:
             raise UserError(f"{self.name}: pin {pin} is not 0 ... {PINS - 1}")
@@ -168,50 +187,31 @@ class Microcontroller:
             raise UserError(f"{self.name}: pin {pin} is claimed twice")
         self.pin_owners[pin] = peripheral
         self.pin_channels[pin] = channel
+        self.pin_sources[pin] = source if source is not None else self.vic.source(PIN_EDGE, pin)
+        return self.pin_sources[pin]
 
     def listen_to_edges(self, buffer: EdgeBuffer, pin, partner_pin) -> None:
-        """Edges of `buffer` arrive on `pin`, claimed before, with the level of `partner_pin`; tell by `edges_came`."""
+        """Edges of `buffer` arrive on `pin`, claimed before, with the level of `partner_pin`; tell by `edges_came`.
+
+        Two encoders can be connected so; the edges of more would have to come as messages.
+        """
         if not 0 <= pin < PINS or self.pin_owners[pin] is None:
             raise UserError(f"{self.name}: no peripheral has claimed pin {pin}, so edges there would be lost")
-        line = EdgeLine(buffer, pin, partner_pin, self.pin_owners[pin], self.pin_channels[pin])
-        if self.edge_lines:
-            self.edge_lines[len(self.edge_lines) - 1].following = line
-        else:
+        line = EdgeLine(buffer, pin, partner_pin, self.pin_owners[pin], self.pin_channels[pin], self.pin_sources[pin])
+        if self.first_line.peripheral is None:
             self.first_line = line
-        self.edge_lines.append(line)
+        elif self.second_line.peripheral is None:
+            self.second_line = line
+        else:
+            raise UserError(f"{self.name}: pin {pin} would be the third with the edges of an encoder")
 
     def edges_came(self) -> cython.longlong:
         """The buffers of the edge lines may hold new edges; returns the first one's instant.
 
         Edges of two lines at one instant come in the order in which the lines were connected, and before messages.
         """
-        line: EdgeLine = self.first_line
-        buffer: EdgeBuffer
-        while line is not None:
-            buffer = line.buffer
-            line.next_time = 1 << 62
-            if buffer.read < buffer.count:
-                line.next_time = buffer.times[buffer.read]
-            line = line.following
-        return self._choose_edge_line()
-
-    @cython.final
-    def _choose_edge_line(self) -> cython.longlong:
-        """Which line has the first edge, and when the first of the others comes; returns the first one's instant."""
-        line: EdgeLine = self.first_line
-        first: cython.longlong = 1 << 62
-        second: cython.longlong = 1 << 62
-        while line is not None:
-            if line.next_time < first:
-                second = first
-                first = line.next_time
-                self.edge_line = line
-            elif line.next_time < second:
-                second = line.next_time
-            line = line.following
-        self.edge_time = first
-        self.other_edge_time = second
-        return first
+        self.edge_time = min(self.first_line.find_next(), self.second_line.find_next())
+        return self.edge_time
 
     def new_alarm(self, peripheral, number) -> int:
         """An alarm slot; when due, `peripheral.on_alarm(number, time)` runs. Returns the slot."""
@@ -401,44 +401,32 @@ class Microcontroller:
         """
         vic: InterruptController = self.vic
         line: EdgeLine
-        buffer: EdgeBuffer
-        place: cython.longlong
-        level: cython.longlong
+        edge: cython.longlong
         time: cython.longlong
-        others: cython.longlong = min(self.inbox.head_time, self.tick_time)
         self.background_wanted = True
+        # what comes first; a handler may set an alarm before it
+        self.stop_time = min(self.horizon, self.alarm_time, self.tick_time, self.inbox.head_time)
         while True:
-            line = self.edge_line
-            buffer = line.buffer
-            place = buffer.read
-            buffer.read = place + 1
             time = self.edge_time
-            level = buffer.levels_a[place]
+            line = self.first_line if self.first_line.next_time == time else self.second_line
+            edge = line.take()
+            self.edge_time = min(self.first_line.next_time, self.second_line.next_time)
             self.instant = time
             self.now = time
-            self.pins[line.pin] = level
-            self.pins[line.partner_pin] = buffer.levels_b[place]
-            if place + 1 < buffer.count:
-                self.edge_time = buffer.times[place + 1]
-            else:
-                self.edge_time = 1 << 62
-            line.next_time = self.edge_time
-            if self.edge_time >= self.other_edge_time:
-                self._choose_edge_line()
-            line.peripheral.on_pin(line.channel, level, time)
-            if vic.pending != 0:
+            self.pins[line.pin] = edge >> 1 & 1
+            self.pins[line.partner_pin] = edge & 1
+            if line.peripheral.on_pin(line.channel, edge >> 1 & 1, time):
                 if (
                     self.fiq_free > time
-                    or vic.pending < 65536
+                    or vic.pending >= 65536
+                    or line.source.bit < 65536
                     or time >= self.edge_time
-                    or time >= self.alarm_time
-                    or time >= others
+                    or time >= self.stop_time
                 ):
+                    vic.raise_source(line.source)
                     return time
-                self._serve(vic.first_pending(), time)
-                if vic.pending != 0:
-                    return time
-            if self.edge_time >= self.horizon or self.edge_time > self.alarm_time or self.edge_time > others:
+                self._serve(line.source, time)  # at once: the fast interrupt is free and nobody else waits for it
+            if vic.pending != 0 or self.edge_time >= self.stop_time:
                 return time
             if self.code_time < self.edge_time and (self.background is not None or not self.scheduler.done):
                 if not self.waiting or self.check_wait:
@@ -463,7 +451,8 @@ class Microcontroller:
             channel = self.pin_channels[pin]
             if channel >= 0:
                 peripheral = cython.cast(Peripheral, self.pin_owners[pin])
-                peripheral.on_pin(channel, inbox.b, inbox.time)
+                if peripheral.on_pin(channel, inbox.b, inbox.time):
+                    self.vic.raise_source(cython.cast(InterruptSource, self.pin_sources[pin]))
                 return 0
         elif 0 <= inbox.kind < 32 and 0 <= inbox.a < 16:
             peripheral = cython.cast(Peripheral, self.message_table[inbox.kind * 16 + inbox.a])

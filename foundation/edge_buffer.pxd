@@ -2,8 +2,11 @@ cimport cython
 
 @cython.final
 cdef class EdgeBuffer:
-    cdef public long long capacity, count, read
-    cdef public long long[::1] times, levels_a, levels_b
+    cdef public long long count, read
+    cdef long long* packed
+    cdef public long long capacity
+    cdef readonly long long[::1] kept
+    cpdef int _keep(self, storage) except -1
     cpdef void clear(self) noexcept
     cpdef int grow(self) except -1
     cpdef void push(self, long long time, long long level_a, long long level_b) noexcept

@@ -12,8 +12,8 @@ from foundation.numbers import integers
 
 
 class EdgeBuffer:
-    """Edges of channel A: `times` (ns), the level that A takes, the level of B then. `count` are valid, of which the
-    first `read` have been taken.
+    """Edges of channel A: `packed`, each time (ns) x 4 + the level that A takes x 2 + the level of B then. `count` are
+    valid, of which the first `read` have been taken.
 
     It grows when it is full, so no edge is ever lost; `clear` keeps the storage.
     """
@@ -22,9 +22,15 @@ class EdgeBuffer:
         self.capacity = capacity
         self.count = 0
         self.read = 0
-        self.times = integers(capacity)
-        self.levels_a = integers(capacity)
-        self.levels_b = integers(capacity)
+        self._keep(integers(capacity))
+
+    def _keep(self, storage) -> None:
+        """Hold the array `storage` under `kept`, and its address, in the line of the other fields, as `packed`."""
+        self.kept = storage
+        if cython.compiled:
+            self.packed = cython.address(self.kept[0])
+        else:
+            self.packed = storage
 
     def clear(self) -> cython.void:
         """Forget the edges."""
@@ -33,22 +39,24 @@ class EdgeBuffer:
 
     def grow(self) -> None:
         """Double the storage, keeping what is there."""
+        old = self.kept
+        grown = integers(2 * self.capacity)
+        for place in range(self.capacity):
+            grown[place] = old[place]
         self.capacity = 2 * self.capacity
-        for name in ("times", "levels_a", "levels_b"):
-            old = getattr(self, name)
-            grown = integers(self.capacity)
-            for place in range(len(old)):
-                grown[place] = old[place]
-            setattr(self, name, grown)
+        self._keep(grown)
 
     def push(self, time: cython.longlong, level_a: cython.longlong, level_b: cython.longlong) -> cython.void:
         """Add an edge; the caller keeps the order of time."""
         if self.count == self.capacity:
             self.grow()
-        self.times[self.count] = time
-        self.levels_a[self.count] = level_a
-        self.levels_b[self.count] = level_b
+        self.packed[self.count] = time << 2 | level_a << 1 | level_b
         self.count += 1
+
+    def edge(self, place):
+        """Edge number `place` as (time, level of A, level of B)."""
+        packed = self.kept[place]
+        return packed >> 2, packed >> 1 & 1, packed & 1
 
 
 class ByteBuffer:

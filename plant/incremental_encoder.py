@@ -1,5 +1,5 @@
 # cython: boundscheck=False, wraparound=False
-# (places in the disc's table are taken modulo its size, places in the edge buffer are below its capacity)
+# (places in the disc's table are taken modulo its size)
 """An incremental encoder: every edge of channel A with the level of channel B, from angle and rate.
 
 Position is counted in edges of A, u = sign x gear x lines / pi x angle: two edges per line, as the 2X decoder
@@ -196,8 +196,9 @@ class IncrementalEncoder:
         end: cython.longlong
         count: cython.longlong
         place: cython.longlong
-        forward: cython.longlong = 0
-        direction: cython.longlong = -1
+        levels: cython.longlong  # of A x 2 + of B: each edge changes both
+        direction: cython.double = 1.0
+        packed: cython.p_longlong
         buffer: EdgeBuffer = self.edges
         buffer.count = 0
         buffer.read = 0
@@ -234,13 +235,15 @@ class IncrementalEncoder:
         if u1 < end:
             end -= 1
         edge = self.cell
+        # B is low at even edges; A rises there on the way forward, and falls on the way back
         if du > 0.0:
-            forward = 1
-            direction = 1
             count = end - edge
             edge += 1
+            levels = 1 if edge & 1 else 2
         else:
             count = edge - end
+            levels = 3 if edge & 1 else 0
+            direction = -1.0
         if count <= 0:
             self._calm()
             return 0
@@ -256,8 +259,10 @@ class IncrementalEncoder:
         b = (3.0 - 2.0 * g0 - g1) * span
         c = (g0 + g1 - 2.0) * span
         g0 *= span
+        x = edge
+        packed = buffer.packed
         for place in range(count):
-            s = (edge - u0) * inverse
+            s = (x - u0) * inverse
             time = int(s * (g0 + s * (b + s * c)))
             time += t0
             if time < last:
@@ -265,11 +270,9 @@ class IncrementalEncoder:
             elif time >= t1:
                 time = t1 - 1
             last = time
-            buffer.times[place] = time
-            # B is low at even edges; A rises there on the way forward, and falls on the way back
-            buffer.levels_b[place] = edge & 1
-            buffer.levels_a[place] = edge & 1 ^ forward
-            edge += direction
+            packed[place] = time << 2 | levels
+            levels ^= 3
+            x += direction
         return count
 
     def _one_way(
@@ -315,16 +318,13 @@ class IncrementalEncoder:
             elif time >= t1:
                 time = t1 - 1
             last = time
-            buffer.times[count] = time
             if forward:
                 cell += 1
-                buffer.levels_a[count] = 1 - (cell & 1)
-                buffer.levels_b[count] = cell & 1
+                buffer.packed[count] = time << 2 | (1 if cell & 1 else 2)
                 level = self.threshold(cell + 1)
             else:
                 # back over edge `cell`, where both channels take the same level
-                buffer.levels_a[count] = cell & 1
-                buffer.levels_b[count] = cell & 1
+                buffer.packed[count] = time << 2 | (3 if cell & 1 else 0)
                 cell -= 1
                 level = self.threshold(cell)
             count += 1

@@ -18,4 +18,4 @@ cdef class EncoderCapture:
     cdef public QuadratureDecoder decoder
     cdef public bint armed_rising
     cdef public long long channel, flag, edge_bits, pin, partner_pin
-    cdef public long long last_wraps, last_capture
+    cdef public long long last

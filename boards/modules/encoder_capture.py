@@ -64,8 +64,7 @@ class EncoderCapture:
         self.partner_pin = partner_pin
         self.decoder = decoder
         self.armed_rising = True
-        self.last_wraps = 0
-        self.last_capture = 0
+        self.last = 0  # cycles at the edge before
         source = self.timer.use_channel(channel, pin, rising=True, falling=False)
         chip.vic.attach(
             source.kind,
@@ -77,7 +76,7 @@ class EncoderCapture:
             name=f"encoder_edge_{channel}",
         )
 
-    def on_capture(self, queue: EventQueue):
+    def on_capture(self, queue: object):
         """Fast interrupt: count the edge and keep the time since the one before."""
         capture: cython.longlong
         wraps: cython.longlong = self.wraps.wraps
@@ -89,11 +88,11 @@ class EncoderCapture:
         # a wrap that is not counted yet came before this capture if the capture is a small number
         if timer.IR & 1 and capture < 15000:
             wraps += 1
-        elapsed = (wraps - self.last_wraps) * 30000 + capture - self.last_capture
+        capture += 30000 * wraps
+        elapsed = capture - self.last
+        self.last = capture
         if elapsed > 0x7F000000:  # LONGEST_TIME
             elapsed = 0x7F000000
-        self.last_wraps = wraps
-        self.last_capture = capture
         if level == self.armed_rising:
             self.decoder.edge(level, self.chip.pins[self.partner_pin] != 0, elapsed)
             self.armed_rising = not level

@@ -116,7 +116,7 @@ class QuadratureDecoder:
         seen: cython.longlong = 0
         here: cython.longlong = self.read
         write: cython.longlong = self.write
-        forward: cython.bint = self.sign > 0
+        sign: cython.longlong = self.sign
         after: cython.longlong
         elapsed: cython.longlong
         other: cython.longlong
@@ -124,20 +124,20 @@ class QuadratureDecoder:
         while here != write:
             elapsed = self.ring[here]
             after = (here + 1) & 63
-            if elapsed == 0:
+            if elapsed * sign > 0:
+                total += elapsed
+                valid += 1
+            elif elapsed == 0:
                 self.errors.report(self.glitch_code)
                 if after != write:
                     seen += 1
                     after = (after + 1) & 63
-            elif (elapsed > 0) == forward:
-                total += elapsed
-                valid += 1
             elif after == write:
                 break  # alone at the end: judged when its successor is here
             else:
                 other = self.ring[after]
-                if other != 0 and (other > 0) == (elapsed > 0):
-                    forward = not forward
+                if other * sign < 0:
+                    sign = -sign
                     total = elapsed
                     valid = 1
                 else:
@@ -146,7 +146,7 @@ class QuadratureDecoder:
                     after = (after + 1) & 63
             seen += 1
             here = after
-        # from here on without the sign
+        total *= sign  # from here on without the sign
         if valid == 0:
             # the longer the silence, the slower it must be: the rate falls with the inverse of the silence
             valid = 1
@@ -158,19 +158,12 @@ class QuadratureDecoder:
                 total = self.idle
         else:
             self.idle = 0
-            if not forward:
-                total = -total
         speed = valid * (0x7FFFFFFF // total)
         if valid > 1:
             total = total // valid
-        if forward:
-            self.sign = 1
-            self.speed = speed
-            self.mean = total
-        else:
-            self.sign = -1
-            self.speed = -speed
-            self.mean = -total
+        self.sign = sign
+        self.speed = sign * speed
+        self.mean = sign * total
         self.filtered += (self.speed - self.filtered) >> self.filter_exponent
         # counts/cycle x 2^31 times rad x 60e6/count x 2^shift: 31 - 16 = 15 more bits go for 16.16
         if self.rate_shift + 15 >= 0:

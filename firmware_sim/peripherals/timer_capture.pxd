@@ -6,19 +6,19 @@ from firmware_sim.vic cimport InterruptSource
 
 @cython.final
 cdef class TimerCapture(Peripheral):
-    # what an edge and a wrap touch
+    # what an edge touches
     cdef public long long IR, CCR
-    cdef public long long alarm
     cdef public long long wrap_time, next_wrap_time
-    cdef public InterruptSource match_source
-    cdef public TickTrain ticks
-    cdef public long long period_ns
     cdef public double counts_per_ns
     cdef public long long MR0
     cdef public long long[4] captures
-    cdef public InterruptSource source0, source1, source2, source3
     cdef public long long[4] captured
+    # what a wrap touches besides
+    cdef public long long alarm
+    cdef public InterruptSource match_source
+    cdef public TickTrain ticks
     # the rest
+    cdef public long long period_ns
     cdef public long long[4] lost
     cdef public long long[4] pins
     cdef public long long number, phase_ns, hz

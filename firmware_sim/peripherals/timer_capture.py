@@ -15,7 +15,6 @@ import cython
 from firmware_sim.clock import TickTrain
 from firmware_sim.microcontroller import Peripheral
 from firmware_sim.vic import TIMER_MATCH
-from foundation.events import PIN_EDGE
 from foundation.user_error import UserError
 
 
@@ -45,10 +44,6 @@ class TimerCapture(Peripheral):
         self.next_wrap_time = self.ticks.next()
         self.match_interrupt = match_interrupt
         self.match_source = chip.vic.source(TIMER_MATCH, number)
-        self.source0 = None  # of the pins of channels 0 ... 3
-        self.source1 = None
-        self.source2 = None
-        self.source3 = None
         self.pins = [-1] * 4
         self.captured = [0] * 4
         self.lost = [0] * 4
@@ -63,18 +58,8 @@ class TimerCapture(Peripheral):
         """
         if not 0 <= channel <= 3:
             raise UserError(f"{self.chip.name}: timer {self.number}: channel {channel} is not 0 ... 3")
-        self.chip.claim_pin(pin, channel, self)
+        source = self.chip.claim_pin(pin, channel, self, source)
         self.pins[channel] = pin
-        if source is None:
-            source = self.chip.vic.source(PIN_EDGE, pin)
-        if channel == 0:
-            self.source0 = source
-        elif channel == 1:
-            self.source1 = source
-        elif channel == 2:
-            self.source2 = source
-        else:
-            self.source3 = source
         self.arm(channel, rising, falling)
         return source
 
@@ -151,34 +136,22 @@ class TimerCapture(Peripheral):
         return self.wrap_time
 
     def on_pin(self, channel: cython.longlong, level: cython.longlong, time: cython.longlong) -> cython.longlong:
-        """An edge at a capture pin; returns 0."""
+        """An edge at a capture pin; 1 when it asks for the interrupt."""
         count: cython.longlong
-        flag: cython.longlong = 16 << channel
-        asked: cython.longlong = self.CCR >> (3 * channel)
+        asked: cython.longlong = self.CCR >> 3 * channel
         if asked & (1 if level else 2) == 0:
             self.lost[channel] += 1
             return 0
         if time >= self.next_wrap_time:
             self._wrap_to(time)
         count = int((time - self.wrap_time) * self.counts_per_ns)
-        if count > self.MR0:
-            count = self.MR0
-        self.captures[channel] = count
-        if self.IR & flag:
+        self.captures[channel] = count if count < self.MR0 else self.MR0
+        if self.IR >> 4 + channel & 1:
             self.lost[channel] += 1
             return 0
-        self.IR |= flag
+        self.IR |= 16 << channel
         self.captured[channel] += 1
-        if asked & 4:
-            if channel == 0:
-                self.chip.vic.raise_source(self.source0)
-            elif channel == 1:
-                self.chip.vic.raise_source(self.source1)
-            elif channel == 2:
-                self.chip.vic.raise_source(self.source2)
-            else:
-                self.chip.vic.raise_source(self.source3)
-        return 0
+        return asked >> 2 & 1
 
     def on_alarm(self, alarm: cython.longlong, time: cython.longlong) -> cython.void:
         """The timer matched MR0 and restarted (an edge at this very instant may have told already)."""

@@ -1,5 +1,4 @@
 from firmware_sim.microcontroller cimport EdgeLine, Microcontroller
-from foundation.edge_buffer cimport EdgeBuffer
 from foundation.events cimport EventQueue
 from harness.processes.channel cimport Bell, Mailbox, load
 from harness.processes.stage cimport Stage
@@ -14,6 +13,7 @@ cdef class RemoteBoard(Microcontroller):
     cdef public bint posted, gone, follows_steps
     cdef public long long place, quiet_until, urgent_kinds, turns, reached
     cpdef long long edges_came(self) noexcept
+    cdef void _send_edges(self, EdgeLine line)
     cpdef void begin(self, long long until)
     cpdef long long advance(self, long long until) except? -1
     cdef bint _urgent(self, long long until) noexcept

@@ -13,7 +13,6 @@ the missed time later, and reads its sensors from the stage's rows of that time.
 import cython
 
 from firmware_sim.microcontroller import EdgeLine, Microcontroller
-from foundation.edge_buffer import EdgeBuffer
 from foundation.events import EventQueue
 from foundation.user_error import UserError
 from harness.processes import block as places
@@ -37,7 +36,8 @@ class RemoteBoard(Microcontroller):
         self.shadow = shadow
         self.inbox = shadow.inbox
         self.outbox = shadow.outbox
-        self.edge_lines = shadow.edge_lines
+        self.first_line = shadow.first_line
+        self.second_line = shadow.second_line
         self.next_time = shadow.next_time
         self.block = shared.words
         self.ask = Bell(shared.words, places.ASKED, places.BOARD_SLEEPS, shared.ask_descriptor)
@@ -61,27 +61,17 @@ class RemoteBoard(Microcontroller):
 
     def edges_came(self) -> cython.longlong:
         """Edges travel as messages to a board that cannot see the sensor's buffer."""
-        line: EdgeLine
-        buffer: EdgeBuffer
-        i: cython.longlong
-        for i in range(len(self.edge_lines)):
-            line = cython.cast(EdgeLine, self.edge_lines[i])
-            buffer = line.buffer
-            while buffer.read < buffer.count:
-                # order 256: stage pins; kind 1: PIN_EDGE
-                self.inbox.put(
-                    buffer.times[buffer.read],
-                    256,
-                    1,
-                    line.pin,
-                    buffer.levels_a[buffer.read],
-                    line.partner_pin,
-                    buffer.levels_b[buffer.read],
-                    0,
-                    0,
-                )
-                buffer.read += 1
+        self._send_edges(self.first_line)
+        self._send_edges(self.second_line)
         return self.edge_time
+
+    def _send_edges(self, line: EdgeLine) -> cython.void:
+        """Make messages of the edges that have come on one line."""
+        edge: cython.longlong
+        while line.find_next() < 1 << 62:
+            edge = line.take()
+            # order 256: stage pins; kind 1: PIN_EDGE
+            self.inbox.put(edge >> 2, 256, 1, line.pin, edge >> 1 & 1, line.partner_pin, edge & 1, 0, 0)
 
     def begin(self, until: cython.longlong) -> cython.void:
         """Ask the board to run everything before `until` (ns), if that can matter already."""

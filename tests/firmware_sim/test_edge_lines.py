@@ -18,18 +18,25 @@ STEP_NS = 125_000
 
 
 class Bench:
-    """A chip with two encoders on a timer, slots of two tasks and a frame interrupt; it writes down what happens."""
+    """A chip with two encoders on a timer, slots of two tasks and a frame interrupt; it writes down what happens.
 
-    def __init__(self, cost):
+    `second_slot`: where the second encoder's interrupt goes, None for nowhere. `recording`: with records of slots.
+    """
+
+    def __init__(self, cost, second_slot=FIQ, recording=False):
         self.chip = chip = Microcontroller("TEST")
         self.timer = TimerCapture(chip, period=30_000)
         self.notes = []
         for channel, (pin, partner) in enumerate(PINS):
             self.timer.use_channel(channel, pin)
-            chip.vic.attach(PIN_EDGE, pin, self.edge(channel, pin, partner), cost=cost, slot=FIQ)
+            slot = second_slot if channel else FIQ
+            if slot is not None:
+                chip.vic.attach(PIN_EDGE, pin, self.edge(channel, pin, partner), cost=cost, slot=slot)
         chip.vic.attach(CAN_RX, 1, lambda queue: self.notes.append(("frame", chip.now, queue.b)), cost=700, slot=3)
         tasks = (Task(self.task("first"), cost=3_000), Task(self.task("second"), cost=2_000))
         chip.start(Schedule(slot_us=500, every=tasks), 7_000)  # so that ticks fall between the ends of steps
+        if recording:
+            chip.scheduler.record_slots(3)
 
     def edge(self, channel, pin, partner):
         def served(queue):
@@ -51,12 +58,13 @@ class Bench:
             list(timer.lost),
             [(each.served, each.merged, each.total_cycles) for each in self.chip.vic.sources.values()],
             self.chip.scheduler.total_slot_cycles,
+            [(record.cycles, record.tasks, record.interrupts) for record in self.chip.scheduler.records],
         )
 
 
-def run(cost, trains, frames, by_lines):
+def run(cost, trains, frames, by_lines, **bench):
     """Two milliseconds with the edges (time, level A, level B) of both encoders, in steps as a plant gives them."""
-    bench = Bench(cost)
+    bench = Bench(cost, **bench)
     buffers = [EdgeBuffer(1) for _ in PINS]
     if by_lines:
         for buffer, (pin, partner) in zip(buffers, PINS, strict=True):
@@ -94,6 +102,13 @@ def test_edges_from_the_sensors_buffer_do_what_the_same_edges_do_as_messages(cos
     assert run(cost, (first, second), frames, True) == run(cost, (first, second), frames, False)
 
 
+@settings(max_examples=60, deadline=None)
+@given(st.sampled_from([150, 500]), trains, trains, st.sampled_from([FIQ, 5, None]), st.booleans())
+def test_it_is_so_too_with_other_interrupts_and_with_records(cost, first, second, slot, recording):
+    bench = dict(second_slot=slot, recording=recording)
+    assert run(cost, (first, second), (), True, **bench) == run(cost, (first, second), (), False, **bench)
+
+
 def test_a_handler_longer_than_the_time_between_edges_loses_captures_and_a_short_one_none():
     # appendix 4.6: 107,520 edges/s are 558 cycles apart; a second encoder shares the fast interrupt
     every_ns = 9_300
@@ -123,6 +138,15 @@ def test_a_chip_with_edges_waiting_is_due_and_one_without_is_not():
 def test_edges_for_a_pin_that_nobody_claimed_are_refused():
     with pytest.raises(UserError, match="TEST: no peripheral has claimed pin 5"):
         Microcontroller("TEST").listen_to_edges(EdgeBuffer(), 5, 6)
+
+
+def test_a_third_encoder_on_one_chip_is_refused():
+    bench = Bench(150)
+    bench.timer.use_channel(2, 9)
+    for pin in (22, 16):
+        bench.chip.listen_to_edges(EdgeBuffer(), pin, 27)
+    with pytest.raises(UserError, match="TEST: pin 9 would be the third with the edges of an encoder"):
+        bench.chip.listen_to_edges(EdgeBuffer(), 9, 27)
 
 
 @pytest.mark.parametrize(("kind", "index"), [(32, 0), (-1, 0), (3, 16), (3, -1)])

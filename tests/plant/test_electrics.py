@@ -226,7 +226,7 @@ for k in range(4000):
     out.append(struct.pack("<20d", *e.analog_end, e.battery.charge))
     out.append(struct.pack("<q", word.word(sin(k * 0.01))))
     for i in range(encoder.edges.count):
-        out.append(struct.pack("<3q", encoder.edges.times[i], encoder.edges.levels_a[i], encoder.edges.levels_b[i]))
+        out.append(struct.pack("<3q", *encoder.edges.edge(i)))
     for i in range(imu.bytes.count):
         out.append(struct.pack("<2q", imu.bytes.times[i], imu.bytes.values[i]))
 for unit in (e.hip, e.outer_ankle, e.inner_ankle, e.steering):

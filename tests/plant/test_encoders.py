@@ -16,15 +16,13 @@ STEP = 125_000
 def decode(encoder):
     """Count of a 2X decoder that sees the edges of the last step: rising with B low counts up, falling inverts."""
     count = 0
-    for k in range(encoder.edges.count):
-        rising = encoder.edges.levels_a[k] == 1
-        count += 1 if rising != (encoder.edges.levels_b[k] == 1) else -1
+    for _, a, b in edges(encoder):
+        count += 1 if a != b else -1
     return count
 
 
 def edges(encoder):
-    n = encoder.edges.count
-    return [(encoder.edges.times[k], encoder.edges.levels_a[k], encoder.edges.levels_b[k]) for k in range(n)]
+    return [encoder.edges.edge(k) for k in range(encoder.edges.count)]
 
 
 def test_one_turn_of_the_shaft_gives_two_edges_per_line():

@@ -81,7 +81,7 @@ def test_edges_lie_in_their_step_in_order():
         start = plant.time_ns
         plant.step()
         for encoder in plant.encoders:
-            times = [encoder.edges.times[i] for i in range(encoder.edges.count)]
+            times = [encoder.edges.edge(i)[0] for i in range(encoder.edges.count)]
             assert times == sorted(times)
             assert all(start <= t < plant.time_ns for t in times)
             seen += len(times)
