@@ -11,7 +11,7 @@ from boards.modules.motor_limits cimport MotorLimits
 from boards.modules.motor_output cimport MotorOutput
 from boards.modules.network_time cimport NetworkTime
 from boards.modules.quadrature_decoder cimport QuadratureDecoder
-from firmware_sim.microcontroller cimport Microcontroller, Peripheral
+from firmware_sim.microcontroller cimport Alarm, Microcontroller, Peripheral
 from firmware_sim.peripherals.adc_external cimport Ads7871
 from firmware_sim.peripherals.adc_internal cimport AdcInternal
 from firmware_sim.peripherals.can_controller cimport CanController
@@ -27,7 +27,7 @@ cdef long long BATTERY_VOLTAGE_CHANNEL
 
 cdef class PowerUp(Peripheral):
     cdef public MotorBoard board
-    cdef public long long first, second
+    cdef public Alarm first, second
     cpdef int begin(self, long long phase_ns) except -1
 
 cdef class MotorBoard(Microcontroller):

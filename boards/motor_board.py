@@ -113,10 +113,10 @@ class PowerUp(Peripheral):
 
     def begin(self, phase_ns: cython.longlong) -> None:
         """Power comes at `phase_ns`."""
-        self.chip.set_alarm(self.first, phase_ns + START_VALUES_NS)
-        self.chip.set_alarm(self.second, phase_ns + SLOTS_BEGIN_NS - 1)
+        self.first.set(phase_ns + START_VALUES_NS)
+        self.second.set(phase_ns + SLOTS_BEGIN_NS - 1)
 
-    def on_alarm(self, alarm: cython.longlong, time: cython.longlong) -> cython.void:
+    def on_alarm(self, alarm: cython.longlong, time: cython.longlong) -> None:
         if alarm == 0:
             self.board.read_sensors_once()
         else:

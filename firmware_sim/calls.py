@@ -14,14 +14,14 @@ def call(function: Callable[[], Any]) -> Any:
     return function()
 
 
-def run(scheduler: Any, place: int) -> Any:
-    """What the task at `place` of a scheduler's table returns."""
-    return scheduler.functions[place]()
+def run(scheduler: Any, number: int) -> Any:
+    """What the task of this number in a scheduler's table returns, None as 0."""
+    return scheduler.functions[number]() or 0
 
 
 def handle(source: Any, queue: Any) -> Any:
-    """What the handler of an interrupt source returns for the message in the fields of `queue`."""
-    return source.handler(queue)
+    """What the handler of an interrupt source returns for the message in the fields of `queue`, None as 0."""
+    return source.service(queue) or 0
 
 
 def code_of(function: Callable[..., Any], arguments: int) -> int:

@@ -7,11 +7,29 @@ from firmware_sim.clock cimport Crystal, TickTrain
 from firmware_sim.scheduler cimport Occasional, Schedule, SlotScheduler, Task, Wait, call, run
 from firmware_sim.vic cimport InterruptController, InterruptSource, handle
 
+# `on_message` and `on_alarm` return an object, which is None, so that those written in Python need not return a number.
 cdef class Peripheral:
     cdef public Microcontroller chip
-    cpdef void on_message(self, EventQueue queue)
+    cpdef object on_message(self, EventQueue queue)
     cpdef long long on_pin(self, long long channel, long long level, long long time) except? <long long>-1
-    cpdef void on_alarm(self, long long alarm, long long time)
+    cpdef object on_alarm(self, long long alarm, long long time)
+
+@cython.final
+cdef class Unclaimed(Peripheral):
+    pass
+
+@cython.final
+cdef class Alarm:
+    cdef public Microcontroller chip
+    cdef public Peripheral owner
+    cdef public long long number, place, time
+    cpdef long long set(self, long long time) noexcept
+    @cython.final
+    cdef long long _take_back(self) noexcept
+    @cython.final
+    cdef void _move(self, long long a, long long b) noexcept
+    @cython.final
+    cdef int _ring(self, long long time) except -1
 
 @cython.final
 cdef class EdgeLine:
@@ -37,11 +55,12 @@ cdef class Microcontroller:
     cdef public SlotScheduler scheduler
     cdef public Outbox outbox
     cdef public object background
-    cdef public long long alarm_first, alarm_count
-    cdef public list alarm_owners
-    cdef public long long[16] alarm_times
-    cdef public long long[16] alarm_numbers
+    cdef public list alarms
+    cdef public long long alarms_set
+    cdef public long long[17] alarm_times
+    cdef public long long[17] alarm_places
     cdef public list message_table
+    cdef public Peripheral others
     cdef public AnalogPins analog
     cdef public TickTrain ticks
     cdef public InterruptSource tick_source
@@ -70,21 +89,18 @@ cdef class Microcontroller:
     cpdef long long speaks_from(self) except? <long long>-1
     @cython.final
     cdef long long _edges(self) except? <long long>-1
-    @cython.final
-    cdef long long _find_first_alarm(self) noexcept
-    cpdef long long set_alarm(self, long long index, long long time) except? <long long>-1
     cpdef int start(self, Schedule schedule, long long phase_ns) except -1
     cpdef object on_slot_timer(self, EventQueue queue)
     @cython.final
-    cdef long long _input(self) except? <long long>-1
+    cdef int _input(self, EventQueue queue) except -1
     @cython.final
-    cdef long long _alarm(self, long long time) except? <long long>-1
+    cdef int _pin_edge(self, EventQueue queue) except -1
     @cython.final
-    cdef long long _timer_match(self) except? <long long>-1
+    cdef int _timer_match(self) except -1
     @cython.final
     cdef long long _background(self) except? <long long>-1
     @cython.final
-    cdef long long _serve(self, InterruptSource source, long long time) except? <long long>-1
+    cdef int _serve(self, InterruptSource source, EventQueue queue, long long time) except -1
     @cython.final
     cdef long long _code(self, long long first) except? <long long>-1
     @cython.final

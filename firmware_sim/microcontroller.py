@@ -43,15 +43,100 @@ class Peripheral:
     def __init__(self, chip) -> None:
         self.chip = chip
 
-    def on_message(self, queue: EventQueue) -> cython.void:
+    def on_message(self, queue: EventQueue) -> None:
         """A message of a kind claimed by this peripheral; it is in the fields of `queue`."""
 
     def on_pin(self, channel: cython.longlong, level: cython.longlong, time: cython.longlong) -> cython.longlong:
         """The pin of `channel` changed to `level` at `time`; returns 1 to ask for the pin's interrupt, else 0."""
         return 0
 
-    def on_alarm(self, alarm: cython.longlong, time: cython.longlong) -> cython.void:
+    def on_alarm(self, alarm: cython.longlong, time: cython.longlong) -> None:
         """The alarm that this peripheral numbered `alarm` is due."""
+
+
+class Unclaimed(Peripheral):
+    """Where messages end that no peripheral has claimed."""
+
+    def on_message(self, queue: EventQueue) -> None:
+        """The interrupt source of its kind and index keeps it, if anybody listens there."""
+        source: InterruptSource = self.chip.vic.sources.get((queue.kind, queue.a))
+        if source is not None and source.bit != 0:
+            source.keep_message(queue)
+            self.chip.vic.raise_source(source)
+        elif queue.kind != PIN_EDGE:
+            self.chip.unclaimed += 1
+
+
+class Alarm:
+    """An alarm of a chip: when it is due, `owner.on_alarm(number, time)` runs.
+
+    The chip keeps those that are set in the order of their instants, the first one last; of two at one instant the
+    one that was made first comes first.
+    """
+
+    def __init__(self, chip, owner: Peripheral, number, place) -> None:
+        self.chip = chip
+        self.owner = owner
+        self.number = number
+        self.place = place  # in the order of making
+        self.time = NEVER
+
+    def set(self, time: cython.longlong) -> cython.longlong:
+        """It is due at `time` (ns); NEVER takes it back. Returns the instant of the chip's first alarm."""
+        never: cython.longlong = 1 << 62
+        at: cython.longlong = self.chip.alarms_set
+        if self.time < never:
+            at = self._take_back()
+        self.time = time
+        if time < never:
+            self.chip.alarms_set = at + 1
+            while self.chip.alarm_times[at - 1] <= time and (
+                self.chip.alarm_times[at - 1] < time or self.chip.alarm_places[at - 1] < self.place
+            ):
+                self._move(at - 1, at)
+                at -= 1
+            self.chip.alarm_times[at] = time
+            self.chip.alarm_places[at] = self.place
+            if time < self.chip.alarm_time:
+                self.chip.alarm_time = time
+                if time < self.chip.next_time:
+                    self.chip.next_time = time
+                if time < self.chip.stop_time:
+                    self.chip.stop_time = time
+        return self.chip.alarm_time
+
+    @cython.final
+    def _take_back(self) -> cython.longlong:
+        """It is no longer set; returns how many are."""
+        at: cython.longlong = 1
+        left: cython.longlong = self.chip.alarms_set - 1
+        while self.chip.alarm_places[at] != self.place:
+            at += 1
+        while at < left:
+            self._move(at + 1, at)
+            at += 1
+        self.chip.alarms_set = left
+        self.chip.alarm_time = self.chip.alarm_times[left - 1]
+        return left
+
+    @cython.final
+    def _move(self, a: cython.longlong, b: cython.longlong) -> cython.void:
+        """What stands at `a` in the chip's order goes to `b`."""
+        self.chip.alarm_times[b] = self.chip.alarm_times[a]
+        self.chip.alarm_places[b] = self.chip.alarm_places[a]
+
+    @cython.final
+    def _ring(self, time: cython.longlong) -> None:
+        """It is the chip's first one, and due."""
+        self.chip.now = time
+        self.chip.alarms_set -= 1
+        self.chip.alarm_time = self.chip.alarm_times[self.chip.alarms_set - 1]
+        self.time = 1 << 62
+        self.owner.on_alarm(self.number, time)
+        if self.chip.waiting:
+            self.chip.check_wait = True
+            if self.chip.code_time < time:
+                self.chip.code_time = time
 
 
 class EdgeLine:
@@ -132,8 +217,8 @@ class Microcontroller:
         self.instant = 0
         self.code_time = 0
         self.stop_time = 0
-        self.irq_free = 0
-        self.fiq_free = 0
+        self.irq_free = 0  # from when on an IRQ may be served, never before
+        self.fiq_free = 0  # a FIQ
         self.waiting = False
         self.check_wait = False
         self.wait_task = None
@@ -141,12 +226,13 @@ class Microcontroller:
         self.wait_stolen = 0
         self.stolen_cycles = 0
         self.alarm_time = NEVER
-        self.alarm_count = 0
-        self.alarm_times = [NEVER] * 16  # ALARMS
-        self.alarm_owners = []
-        self.alarm_numbers = [0] * 16
-        self.alarm_first = 0
-        self.message_table = [None] * (MESSAGE_KINDS * INDICES_PER_KIND)
+        self.alarms = []
+        # those that are set: instants and places in `alarms`, the first to come last; at 0 stands one that never comes
+        self.alarm_times = [NEVER] * 17  # ALARMS + 1
+        self.alarm_places = [0] * 17
+        self.alarms_set = 1  # where the next one would stand
+        self.others = Unclaimed(self)
+        self.message_table = [self.others] * (MESSAGE_KINDS * INDICES_PER_KIND)
         self.pin_owners = [None] * PINS
         self.pin_channels = [-1] * 64  # PINS
         self.pin_sources = [None] * PINS
@@ -171,7 +257,7 @@ class Microcontroller:
                 f" or index {index} not 0 ... {INDICES_PER_KIND - 1}"
             )
         place = kind * INDICES_PER_KIND + index
-        if self.message_table[place] is not None:
+        if self.message_table[place] is not self.others:
             raise UserError(f"{self.name}: messages of kind {kind}, index {index} are claimed twice")
         self.message_table[place] = peripheral
 
@@ -213,44 +299,14 @@ class Microcontroller:
         self.edge_time = min(self.first_line.find_next(), self.second_line.find_next())
         return self.edge_time
 
-    def new_alarm(self, peripheral, number) -> int:
-        """An alarm slot; when due, `peripheral.on_alarm(number, time)` runs. Returns the slot."""
+    def new_alarm(self, peripheral, number) -> Alarm:
+        """An alarm; when due, `peripheral.on_alarm(number, time)` runs."""
         self._check_peripheral(peripheral)
-        index = self.alarm_count
-        if index >= ALARMS:
+        if len(self.alarms) >= ALARMS:
             raise UserError(f"{self.name}: more than {ALARMS} peripheral alarms")
-        self.alarm_count = index + 1
-        self.alarm_owners.append(peripheral)
-        self.alarm_numbers[index] = number
-        return index
-
-    def set_alarm(self, index: cython.longlong, time: cython.longlong) -> cython.longlong:
-        """Alarm `index` is due at `time` (ns); NEVER takes it back. Returns the first alarm's instant."""
-        self.alarm_times[index] = time
-        if time < self.alarm_time:
-            self.alarm_time = time
-            self.alarm_first = index
-            if time < self.next_time:
-                self.next_time = time
-            if time < self.stop_time:
-                self.stop_time = time
-        elif index == self.alarm_first:
-            self._find_first_alarm()
-        return self.alarm_time
-
-    @cython.final
-    def _find_first_alarm(self) -> cython.longlong:
-        """Which alarm is due first; among equals the one that was made first."""
-        i: cython.longlong
-        first: cython.longlong = 0
-        time: cython.longlong = self.alarm_times[0]
-        for i in range(1, self.alarm_count):
-            if self.alarm_times[i] < time:
-                time = self.alarm_times[i]
-                first = i
-        self.alarm_time = time
-        self.alarm_first = first
-        return time
+        alarm = Alarm(self, peripheral, number, len(self.alarms))
+        self.alarms.append(alarm)
+        return alarm
 
     def start(self, schedule: Schedule, phase_ns: cython.longlong) -> None:
         """Run `schedule`: the first slot begins at `phase_ns`, the later ones by this chip's crystal."""
@@ -286,7 +342,10 @@ class Microcontroller:
         return self.vic.raise_source(source)
 
     def stop_at(self, time: cython.longlong) -> cython.longlong:
-        """While the chip runs: it shall run no further than to `time` (ns). Returns the instant at which it stops."""
+        """While the chip runs: it shall run no further than to `time` (ns), which is later than now.
+
+        Returns the instant at which it stops.
+        """
         if time < self.horizon:
             self.horizon = time
             if time < self.stop_time:
@@ -327,16 +386,14 @@ class Microcontroller:
                 first = self.edge_time
             # what the processor does before that: a handler, tasks, or the main loop beside them
             if vic.pending != 0:
-                own = self.fiq_free
-                if vic.pending < 65536 and self.irq_free > own:  # no FIQ among them
-                    own = self.irq_free
+                own = self.fiq_free if vic.pending >= 65536 else self.irq_free  # FIRST_FIQ
                 if self.instant > own:
                     own = self.instant
                 if own < first:
                     if own >= self.horizon:
                         break
                     self.instant = own
-                    self._serve(vic.first_pending(), own)
+                    self._serve(vic.first_pending(), inbox, own)
                     continue
             elif not scheduler.done:
                 own = 1 << 62
@@ -365,15 +422,20 @@ class Microcontroller:
             # at one instant: edges, messages, alarms, the slot timer
             if self.edge_time == first:
                 self._edges()
-            elif inbox.head_time == first:
+                continue
+            if inbox.head_time == first:
                 inbox.take()
-                self._input()
+                self._input(inbox)
             else:
                 self.instant = first
                 if self.alarm_time == first:
-                    self._alarm(first)
+                    cython.cast(Alarm, self.alarms[self.alarm_places[self.alarms_set - 1]])._ring(first)
                 else:
                     self._timer_match()
+            # mostly this is an interrupt for which the processor is free, and nothing else comes at this instant
+            if vic.pending != 0 and self.irq_free <= first:
+                if self.alarm_time > first and inbox.head_time > first and self.tick_time > first:
+                    self._serve(vic.newest if vic.pending == vic.newest.bit else vic.first_pending(), inbox, first)
         if self.alarm_time < own:
             own = self.alarm_time
         if self.tick_time < own:
@@ -425,7 +487,9 @@ class Microcontroller:
                 ):
                     vic.raise_source(line.source)
                     return time
-                self._serve(line.source, time)  # at once: the fast interrupt is free and nobody else waits for it
+                self._serve(
+                    line.source, self.inbox, time
+                )  # at once: the fast interrupt is free and nobody else waits for it
             if vic.pending != 0 or self.edge_time >= self.stop_time:
                 return time
             if self.code_time < self.edge_time and (self.background is not None or not self.scheduler.done):
@@ -433,65 +497,38 @@ class Microcontroller:
                     return time
 
     @cython.final
-    def _input(self) -> cython.longlong:
+    def _input(self, queue) -> None:
         """The message just taken: hardware first; its interrupt line is raised by the peripheral."""
-        inbox: EventQueue = self.inbox
-        pin: cython.longlong
-        channel: cython.longlong
-        peripheral: Peripheral
-        source: InterruptSource
-        self.instant = inbox.time
-        self.now = inbox.time
+        self.instant = queue.time
+        self.now = queue.time
         self.background_wanted = True
-        if inbox.kind == 1:  # PIN_EDGE
-            pin = inbox.a
-            self.pins[pin] = inbox.b
-            if inbox.c >= 0:
-                self.pins[inbox.c] = inbox.d
-            channel = self.pin_channels[pin]
-            if channel >= 0:
-                peripheral = cython.cast(Peripheral, self.pin_owners[pin])
-                if peripheral.on_pin(channel, inbox.b, inbox.time):
-                    self.vic.raise_source(cython.cast(InterruptSource, self.pin_sources[pin]))
-                return 0
-        elif 0 <= inbox.kind < 32 and 0 <= inbox.a < 16:
-            peripheral = cython.cast(Peripheral, self.message_table[inbox.kind * 16 + inbox.a])
-            if peripheral is not None:
-                peripheral.on_message(inbox)
-                return 0
-        source = self.vic.sources.get((inbox.kind, inbox.a))
-        if source is None or source.bit == 0:
-            if inbox.kind != 1:
-                self.unclaimed += 1
-            return 0
-        source.keep_message(inbox)
-        self.vic.raise_source(source)
-        return 0
+        if queue.kind == 1:  # PIN_EDGE
+            self._pin_edge(queue)
+        elif 0 <= queue.kind < 32 and 0 <= queue.a < 16:
+            cython.cast(Peripheral, self.message_table[queue.kind * 16 + queue.a]).on_message(queue)
+        else:
+            self.others.on_message(queue)
 
     @cython.final
-    def _alarm(self, time: cython.longlong) -> cython.longlong:
-        """The first alarm is due."""
-        i: cython.longlong = self.alarm_first
-        peripheral: Peripheral = cython.cast(Peripheral, self.alarm_owners[i])
-        self.now = time
-        self.alarm_times[i] = 1 << 62
-        self.alarm_time = 1 << 62  # until the next one is looked for, so that `set_alarm` need not
-        self.alarm_first = -1
-        peripheral.on_alarm(self.alarm_numbers[i], time)
-        self._find_first_alarm()
-        if self.waiting:
-            self.check_wait = True
-            if self.code_time < time:
-                self.code_time = time
-        return time
+    def _pin_edge(self, queue) -> None:
+        """An edge that came as a message."""
+        pin: cython.longlong = queue.a
+        channel: cython.longlong = self.pin_channels[pin]
+        self.pins[pin] = queue.b
+        if queue.c >= 0:
+            self.pins[queue.c] = queue.d
+        if channel >= 0:
+            if cython.cast(Peripheral, self.pin_owners[pin]).on_pin(channel, queue.b, queue.time):
+                self.vic.raise_source(cython.cast(InterruptSource, self.pin_sources[pin]))
+        else:
+            self.others.on_message(queue)
 
     @cython.final
-    def _timer_match(self) -> cython.longlong:
+    def _timer_match(self) -> None:
         """The slot timer matches and restarts: its interrupt is requested."""
         self.match_time = self.tick_time
         self.tick_time = self.ticks.next()
         self.vic.raise_source(self.tick_source)
-        return self.match_time
 
     def on_slot_timer(self, queue: EventQueue) -> object:
         """Handler of the slot timer: publish the next row."""
@@ -516,51 +553,38 @@ class Microcontroller:
         return done
 
     @cython.final
-    def _serve(self, source: InterruptSource, time: cython.longlong) -> cython.longlong:
-        """Run the handler of a pending source at `time` and let its cycles pass."""
+    def _serve(self, source, queue, time: cython.longlong) -> None:
+        """Run the handler of `source` at `time` and let its cycles pass."""
         cycles: cython.longlong
         busy: cython.longlong
         items: cython.longlong
-        source.served += 1
         self.vic.pending &= ~source.bit
+        source.served += 1
         self.background_wanted = True
         self.now = time + source.latency_ns
-        if source.keeps_message:
-            source.give_message(self.inbox)
         self.extra_cycles = 0
         if cython.compiled:
-            result = handle(source, self.inbox)
+            items = handle(source, queue)
         else:
-            result = source.handler(self.inbox)
-        if result is None and self.extra_cycles == 0:
+            items = source.service(queue) or 0
+        if items == 0 and self.extra_cycles == 0:
             cycles = source.base_cycles
             busy = source.base_ns
         else:
-            items = 0
-            if result is not None:
-                items = result
             cycles = source.base_cycles + source.per_item * items + self.extra_cycles
             busy = int(cycles * self.ns_per_cycle)
             source.noted += 1
             source.noted_cycles += cycles
             if cycles > source.noted_most:
                 source.noted_most = cycles
-        if source.slot < 0:
+        if source.bit >= 65536:  # FIRST_FIQ
             self.fiq_free = time + busy
-            if self.irq_free > time:
-                self.irq_free += busy
-        else:
-            self.irq_free = time + busy
-        if self.code_time < time:
-            self.code_time = time + busy
-        else:
-            self.code_time += busy
+        self.irq_free = (self.irq_free if self.irq_free > time else time) + busy
+        self.code_time = (self.code_time if self.code_time > time else time) + busy
         self.stolen_cycles += cycles
-        if self.waiting:
-            self.check_wait = True
+        self.check_wait = True
         if self.scheduler.recording:
             self.scheduler.note_interrupt(source.name, cycles)
-        return cycles
 
     @cython.final
     def _code(self, first: cython.longlong) -> cython.longlong:
@@ -569,7 +593,7 @@ class Microcontroller:
         `first`: the first edge, message, alarm or tick.
         """
         scheduler: SlotScheduler = self.scheduler
-        place: cython.longlong
+        number: cython.longlong
         items: cython.longlong
         usual_ns: cython.longlong
         # what comes first; a task can only bring an alarm or an interrupt nearer
@@ -588,27 +612,24 @@ class Microcontroller:
             self._close_slot(scheduler.late_time)
             scheduler.late_record = None
         while scheduler.position < scheduler.end:
-            place = scheduler.position
-            scheduler.position = place + 1
-            usual_ns = scheduler.places[4 * place + 2]  # PLACE
+            number = scheduler.numbers[scheduler.position]
+            scheduler.position += 1
+            usual_ns = scheduler.table[4 * number + 2]  # ENTRY
             self.now = self.code_time
             if usual_ns >= 0:
                 if cython.compiled:
-                    result = run(scheduler, place)
+                    items = run(scheduler, number)
                 else:
-                    result = scheduler.functions[place]()
-                items = 0
-                if result is not None:
-                    items = result
+                    items = scheduler.functions[number]() or 0
                 if items == 0 and self.extra_cycles == 0:
                     self.code_time += usual_ns
-                    scheduler.usual_calls[scheduler.places[4 * place + 3]] += 1
+                    scheduler.table[4 * number + 3] += 1
                 else:
-                    self._spent(scheduler.tasks[place], items)
-            elif not self._special_task(scheduler.tasks[place]):
+                    self._spent(cython.cast(Task, scheduler.tasks[number]), items)
+            elif not self._special_task(cython.cast(Task, scheduler.tasks[number])):
                 return 0
             if self.code_time >= self.stop_time or self.vic.pending != 0:
-                if not self._edges_between():
+                if self.edge_time > self.code_time or not self._edges_between():
                     return 0
         self.now = self.code_time
         scheduler.done = True
@@ -629,14 +650,14 @@ class Microcontroller:
         return self.vic.pending == 0 and self.code_time < self.stop_time
 
     @cython.final
-    def _spent(self, task: Task, items: cython.longlong) -> cython.longlong:
+    def _spent(self, task, items: cython.longlong) -> cython.longlong:
         """A task that has just run handled `items`; returns the cycles it took."""
         items = task.base_cycles + task.per_item * items + self.extra_cycles
         self.extra_cycles = 0
         return self._charge(task, items)
 
     @cython.final
-    def _special_task(self, task: Task) -> cython.bint:
+    def _special_task(self, task) -> cython.bint:
         """A task of which not every call is alike, or whose calls are recorded. False when it has to spin."""
         entry: Task
         items: cython.longlong = 0
@@ -689,7 +710,7 @@ class Microcontroller:
         return spun
 
     @cython.final
-    def _charge(self, task: Task, cycles: cython.longlong) -> cython.longlong:
+    def _charge(self, task, cycles: cython.longlong) -> cython.longlong:
         """Let the cycles of a task pass and hold them against its limit."""
         busy: cython.longlong = int(cycles * self.ns_per_cycle)
         self.code_time += busy

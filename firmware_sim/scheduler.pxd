@@ -35,11 +35,14 @@ cdef inline long long owner_of(object function):
 cdef inline object call_with(long long code, long long owner, object argument):
     return (<plain_call><void*>code)(<PyObject*><void*>owner, <PyObject*>argument)
 
-cdef inline object run(SlotScheduler scheduler, long long place):
-    cdef long long code = scheduler.places[4 * place]
+# What the task of this number in a scheduler's table returns, None as 0.
+cdef inline long long run(SlotScheduler scheduler, long long number) except? -1:
+    cdef long long code = scheduler.table[4 * number]
     if code != 0:
-        return (<plain_call><void*>code)(<PyObject*><void*>scheduler.places[4 * place + 1], NULL)
-    return scheduler.functions[place]()
+        items = (<plain_call><void*>code)(<PyObject*><void*>scheduler.table[4 * number + 1], NULL)
+    else:
+        items = scheduler.functions[number]()
+    return 0 if items is None else items
 
 cdef class Task:
     cdef public long long kind, base_cycles, per_item, most_cycles
@@ -50,7 +53,8 @@ cdef class Task:
     cdef public bint speaks
     cdef public long long hits
     cdef public str name, item
-    cpdef long long note(self, long long cycles) except? -1
+    @cython.final
+    cdef void note(self, long long cycles) noexcept
     cpdef long long usual_calls(self) except? -1
 
 @cython.final
@@ -82,8 +86,9 @@ cdef class SlotRecord:
 cdef class SlotScheduler:
     cdef public long long position, end
     cdef public bint done, late, recording, started
-    cdef public long long[::1] places
-    cdef public long long[::1] usual_calls
+    cdef long long* table
+    cdef readonly unsigned char[::1] numbers
+    cdef public list tasks, functions
     cdef public long long row, row_count, divider_count, divider
     cdef public long long row_start, run_before, slot_count, listed_tasks, slot_time, tick_time, finished_time
     cdef public long long slot_cycles, near_limit_cycles, histogram_step
@@ -93,7 +98,7 @@ cdef class SlotScheduler:
     cdef public long long[::1] row_leads
     cdef public long long[::1] row_starts
     cdef public long long[21] histogram
-    cdef public list tasks, functions
+    cdef readonly long long[::1] table_kept  # what the address `table` leads into
     cdef public Schedule schedule
     cdef public double ns_per_cycle
     cdef public long long slot_ns, overruns, dropped_tasks, near_limits

@@ -25,7 +25,7 @@ OCCASIONAL_TASK = 1
 WAIT_TASK = 2
 
 HISTOGRAM_BINS = 21  # twenty of 5 % of a slot, the last for overruns
-PLACE = 4  # numbers per place of a table laid out: code, owner, usual_ns, number of the task
+ENTRY = 4  # numbers per task in the table laid out: code, owner, usual_ns, usual calls
 _NEVER = NEVER  # a C variable when compiled (.pxd)
 
 
@@ -62,19 +62,19 @@ class Task:
         self.scheduler = None
         self.number = -1
 
-    def note(self, cycles: cython.longlong) -> cython.longlong:
-        """Count a call that took `cycles`; returns the number of calls noted so."""
+    @cython.final
+    def note(self, cycles: cython.longlong) -> cython.void:
+        """Count a call that took `cycles`."""
         self.noted_calls += 1
         self.noted_cycles += cycles
         if cycles > self.noted_most:
             self.noted_most = cycles
         self.noted_last = cycles
-        self.noted_when = self.scheduler.usual_calls[self.number]
-        return self.noted_calls
+        self.noted_when = self.scheduler.table[4 * self.number + 3]  # ENTRY
 
     def usual_calls(self) -> cython.longlong:
         """Calls that took exactly `cost`, since that was last changed."""
-        return 0 if self.scheduler is None else self.scheduler.usual_calls[self.number]
+        return 0 if self.scheduler is None else self.scheduler.table[4 * self.number + 3]
 
     def settle(self) -> None:
         """Note the usual calls so far: their cost or their scheduler is about to change."""
@@ -82,7 +82,7 @@ class Task:
         self.noted_calls, self.noted_cycles, self.noted_most = calls, total, most
         self.noted_last, self.noted_when = last, 0
         if self.scheduler is not None:
-            self.scheduler.usual_calls[self.number] = 0
+            self.scheduler.table[4 * self.number + 3] = 0
 
     @property
     def function(self):
@@ -329,44 +329,48 @@ class SlotScheduler:
         self.late_record = None
 
     def layout(self) -> None:
-        """The table as flat lists, place by place; row r has the places row_starts[r] ... row_starts[r + 1] - 1.
+        """The schedule as flat lists; row r has the places row_starts[r] ... row_starts[r + 1] - 1.
 
-        `places` has PLACE numbers for each: addresses of a compiled task's C function and of the object that it belongs
-        to (code 0: call what stands in `functions`), usual_ns, and the task's number.
+        `numbers`: of the task at each place, among `tasks` and their `functions`. `table` has ENTRY numbers for each
+        task: addresses of its C function and of the object that it belongs to, when it is compiled (code 0: call what
+        stands in `functions`), usual_ns, and how many calls took that.
         usual_ns: what a call without items takes (ns), or -1 when every call must be looked at more closely.
         `leads`: ns from the start of the task at a place to that of the first one from there that may speak, at least;
         `row_leads`: the same from the start of a row.
         """
-        self.row_count = len(self.schedule.rows)
+        schedule = self.schedule
+        self.row_count = len(schedule.rows)
+        self.tasks = schedule.all_tasks()
+        if len(self.tasks) > 256:
+            raise UserError(f"schedule: {len(self.tasks)} different tasks; at most 256 are possible")
+        self.functions = [task.routine for task in self.tasks]
+        places = [self.tasks.index(task) for row in range(self.row_count) for task in schedule.row_tasks(row)]
         self.row_starts = integers(self.row_count + 1)
-        self.tasks = []
         for row in range(self.row_count):
-            self.tasks.extend(self.schedule.row_tasks(row))
-            self.row_starts[row + 1] = len(self.tasks)
-        count = len(self.tasks)
-        self.functions = [None] * count
-        self.places = integers(PLACE * max(count, 1))
-        self.leads = integers(max(count, 1), _NEVER)
+            self.row_starts[row + 1] = self.row_starts[row] + len(schedule.row_tasks(row))
+        self.numbers = bytearray(places or [0])
+        self.table_kept = integers(ENTRY * max(len(self.tasks), 1))
+        if cython.compiled:
+            self.table = cython.address(self.table_kept[0])
+        else:
+            self.table = self.table_kept
+        self.leads = integers(max(len(places), 1), _NEVER)
         self.row_leads = integers(self.row_count, _NEVER)
-        tasks = self.schedule.all_tasks()
-        self.usual_calls = integers(max(len(tasks), 1))
-        for number in range(len(tasks)):
-            tasks[number].settle()
-            tasks[number].scheduler = self
-            tasks[number].number = number
-            self.lay(tasks[number])
+        for number, task in enumerate(self.tasks):
+            task.settle()
+            task.scheduler = self
+            task.number = number
+            self.lay(task)
 
     def lay(self, task: Task) -> None:
-        """Lay down what the event loop needs of `task` at all its places in the table."""
+        """Lay down what the event loop needs of `task`."""
+        at: cython.longlong = ENTRY * task.number
         within = task.base_cycles <= task.most_cycles or task.most_cycles == 0
         plain = task.kind == NORMAL_TASK and within and not self.recording
-        for place in range(len(self.tasks)):
-            if self.tasks[place] is task:
-                self.functions[place] = task.routine
-                self.places[PLACE * place] = code_of(task.routine, 0)
-                self.places[PLACE * place + 1] = owner_of(task.routine)
-                self.places[PLACE * place + 2] = int(task.base_cycles * self.ns_per_cycle) if plain else -1
-                self.places[PLACE * place + 3] = task.number
+        self.functions[task.number] = task.routine
+        self.table[at] = code_of(task.routine, 0)
+        self.table[at + 1] = owner_of(task.routine)
+        self.table[at + 2] = int(task.base_cycles * self.ns_per_cycle) if plain else -1
         self.lay_leads()
 
     def lay_leads(self) -> None:
@@ -374,7 +378,7 @@ class SlotScheduler:
         for row in range(self.row_count):
             lead = _NEVER
             for place in range(self.row_starts[row + 1] - 1, self.row_starts[row] - 1, -1):
-                task = self.tasks[place]
+                task = self.tasks[self.numbers[place]]
                 if task.speaks:
                     lead = 0
                 elif lead < _NEVER:

@@ -3,21 +3,19 @@ cimport cython
 from foundation.events cimport EventQueue
 from firmware_sim.scheduler cimport call_with, code_of, owner_of
 
-cdef inline object handle(InterruptSource source, EventQueue queue):
-    if source.code != 0:
-        return call_with(source.code, source.owner, queue)
-    return source.handler(queue)
+# What the handler returns for the message in the fields of `queue`, None as 0.
+cdef inline long long handle(InterruptSource source, EventQueue queue) except? -1:
+    items = call_with(source.code, source.owner, queue) if source.code != 0 else source.service(queue)
+    return 0 if items is None else items
 
 # In both classes the fields that every request and every service touches come first, close together.
 @cython.final
 cdef class InterruptSource:
-    cdef public long long bit, code, owner, latency_ns, base_ns, slot, served
-    cdef public bint keeps_message
-    cdef public long long base_cycles, per_item
+    cdef public long long bit, code, owner, latency_ns, base_ns, base_cycles, served, per_item
     cdef public long long noted, noted_cycles, noted_most, merged, forgotten
-    cdef public object handler
+    cdef public object handler, service
     cdef public InterruptController controller
-    cdef public long long kind, index, cost, latency
+    cdef public long long kind, index, cost, latency, slot
     cdef public str name
     cdef public long long time, order, a, b, c, d, e, f
     cdef public object ref

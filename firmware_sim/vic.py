@@ -38,7 +38,7 @@ class InterruptSource:
 
     `bit`: its place in the controller's word of pending sources, 0 while nobody listens. A service that takes
     `base_cycles` is only counted (`served`), the others are noted with their cycles. A source whose message no
-    peripheral stores keeps that one message (`keeps_message`): while it waits, a newer message overwrites the older
+    peripheral stores keeps that one message (`keep_message`): while it waits, a newer message overwrites the older
     one (counted in `merged`).
     """
 
@@ -48,6 +48,7 @@ class InterruptSource:
         self.index = index
         self.name = f"{kind}/{index}"
         self.handler = None
+        self.service = None  # what is called: the handler, or before it what gives it the message
         # addresses of a compiled handler's C function and of the object it belongs to; 0: call `handler`
         self.code = 0
         self.owner = 0
@@ -59,7 +60,6 @@ class InterruptSource:
         self.base_cycles = 0
         self.base_ns = 0
         self.latency_ns = 0
-        self.keeps_message = False
         self.served = 0
         self.merged = 0  # requests while it was pending already
         self.forgotten = 0  # pending when it was detached
@@ -108,7 +108,9 @@ class InterruptSource:
 
     def keep_message(self, queue: EventQueue) -> None:
         """Keep the message in the fields of `queue` until it is served."""
-        self.keeps_message = True
+        if self.code != 0 or self.service is self.handler:
+            self.service = self.serve_message
+            self.code = 0
         self.time = queue.time
         self.order = queue.order
         self.a = queue.a
@@ -132,6 +134,11 @@ class InterruptSource:
         queue.f = self.f
         queue.ref = self.ref
         self.ref = None
+
+    def serve_message(self, queue: EventQueue) -> object:
+        """Call the handler with the kept message."""
+        self.give_message(queue)
+        return self.handler(queue)
 
 
 class InterruptController:
@@ -171,7 +178,7 @@ class InterruptController:
             raise UserError(f"interrupt {kind}/{index}: slot {slot} is taken by {self.irq_list[slot].name}")
         self.detach(source)
         source.settle()
-        source.handler = handler
+        source.handler = source.service = handler
         source.code = code_of(handler, 1)
         source.owner = owner_of(handler)
         source.name = name if name is not None else getattr(handler, "__name__", source.name)

@@ -1,14 +1,15 @@
 cimport cython
 from libc.math cimport copysign
 
-from firmware_sim.microcontroller cimport Peripheral
+from firmware_sim.microcontroller cimport Alarm, Peripheral
 from firmware_sim.vic cimport InterruptSource
 
 @cython.final
 cdef class Ads7871(Peripheral):
     # what a conversion touches
     cdef public bint busy, done
-    cdef public long long alarm, step, length, register4
+    cdef public long long step, length, register4
+    cdef public Alarm alarm
     cdef public long long started_time
     cdef public InterruptSource source
     cdef public long long conversion_ns, offset_counts

@@ -105,10 +105,10 @@ class Ads7871(Peripheral):
             return True
         self.busy = True
         self.started_time = self.chip.now
-        self.chip.set_alarm(self.alarm, self.chip.now + self.conversion_ns)
+        self.alarm.set(self.chip.now + self.conversion_ns)
         return True
 
-    def on_alarm(self, alarm: cython.longlong, time: cython.longlong) -> cython.void:
+    def on_alarm(self, alarm: cython.longlong, time: cython.longlong) -> None:
         """The conversion is over: result registers 1 and 0 are loaded, BUSY falls."""
         volts: cython.double = self.chip.analog.volts(self.inputs[self.register4 & 15], self.started_time)
         self.result = self.convert(volts, self.register4 >> 4 & 7)
@@ -154,4 +154,4 @@ class Ads7871(Peripheral):
 
     def unplug(self) -> None:
         """A dead converter: the conversion under way never ends."""
-        self.chip.set_alarm(self.alarm, NEVER)
+        self.alarm.set(NEVER)

@@ -1,13 +1,14 @@
 cimport cython
 
-from firmware_sim.microcontroller cimport Peripheral
+from firmware_sim.microcontroller cimport Alarm, Peripheral
 from firmware_sim.vic cimport InterruptSource
 
 @cython.final
 cdef class AdcInternal(Peripheral):
     # what a conversion touches
     cdef public bint busy
-    cdef public long long alarm, channel
+    cdef public long long channel
+    cdef public Alarm alarm
     cdef public InterruptSource source
     cdef public long long started_time
     cdef public long long conversion_ns, clkdiv

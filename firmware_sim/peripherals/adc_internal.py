@@ -70,10 +70,10 @@ class AdcInternal(Peripheral):
         self.channel = channel
         self.started_time = self.chip.now
         self.CR = 1 << channel | (self.clkdiv - 1) << 8 | 1 << 21 | 1 << 24
-        self.chip.set_alarm(self.alarm, self.chip.now + self.conversion_ns)
+        self.alarm.set(self.chip.now + self.conversion_ns)
         return True
 
-    def on_alarm(self, alarm: cython.longlong, time: cython.longlong) -> cython.void:
+    def on_alarm(self, alarm: cython.longlong, time: cython.longlong) -> None:
         """The conversion is over: ADGDR holds result, channel and the DONE bit."""
         done: cython.longlong = 128  # bit 31 of ADGDR, above the channel
         self.result = self.convert(self.chip.analog.volts(self.inputs[self.channel], self.started_time))

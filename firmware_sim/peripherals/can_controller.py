@@ -164,7 +164,7 @@ class CanController(Peripheral):
 
     # --- receive ----------------------------------------------------------------------------------------
 
-    def on_message(self, queue) -> cython.void:
+    def on_message(self, queue) -> None:
         """What the bus tells: a frame received, the end of a transmission, a change of the error state."""
         flag: cython.longlong
         buffer: cython.longlong

@@ -1,13 +1,14 @@
 cimport cython
 
-from firmware_sim.microcontroller cimport Peripheral
+from firmware_sim.microcontroller cimport Alarm, Peripheral
 from firmware_sim.vic cimport InterruptSource
 
 @cython.final
 cdef class SpiEncoder(Peripheral):
     # what a transfer touches
     cdef public bint busy
-    cdef public long long alarm, word
+    cdef public Alarm alarm
+    cdef public long long word
     cdef public long long mask, latched, SPDR, SPSR, transfer_ns
     cdef public InterruptSource source
     cdef public long long transfers

@@ -47,10 +47,10 @@ class SpiEncoder(Peripheral):
         self.busy = True
         self.SPSR = 0
         self.latched = self.chip.words[self.word] & self.mask
-        self.chip.set_alarm(self.alarm, self.chip.now + self.transfer_ns)
+        self.alarm.set(self.chip.now + self.transfer_ns)
         return True
 
-    def on_alarm(self, alarm: cython.longlong, time: cython.longlong) -> cython.void:
+    def on_alarm(self, alarm: cython.longlong, time: cython.longlong) -> None:
         """The transfer is complete: SPIF (bit 7 of S0SPSR) is set."""
         self.SPDR = self.latched
         self.SPSR = 128

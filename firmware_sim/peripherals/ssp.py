@@ -72,7 +72,7 @@ class SspPort(Peripheral):
         self.loaded = segment
         self.chip.outbox.push(self.chip.now, 0, 38, self.number, 0, 0, 0, 0, 0, segment)  # SSP_LOAD
 
-    def on_message(self, queue) -> cython.void:
+    def on_message(self, queue) -> None:
         """The other side's segment is in."""
         if self.fresh:
             self.overwritten += 1

@@ -1,7 +1,7 @@
 cimport cython
 
 from firmware_sim.clock cimport TickTrain
-from firmware_sim.microcontroller cimport Peripheral
+from firmware_sim.microcontroller cimport Alarm, Peripheral
 from firmware_sim.vic cimport InterruptSource
 
 @cython.final
@@ -14,7 +14,7 @@ cdef class TimerCapture(Peripheral):
     cdef public long long[4] captures
     cdef public long long[4] captured
     # what a wrap touches besides
-    cdef public long long alarm
+    cdef public Alarm alarm
     cdef public InterruptSource match_source
     cdef public TickTrain ticks
     # the rest

@@ -49,7 +49,7 @@ class TimerCapture(Peripheral):
         self.lost = [0] * 4
         self.alarm = chip.new_alarm(self, 0)
         if match_interrupt:
-            chip.set_alarm(self.alarm, self.next_wrap_time)
+            self.alarm.set(self.next_wrap_time)
 
     def use_channel(self, channel, pin, rising=True, falling=True, source=None):
         """Connect `pin` to capture `channel` 0 ... 3 and arm it; returns the interrupt source that its captures raise.
@@ -153,10 +153,10 @@ class TimerCapture(Peripheral):
         self.captured[channel] += 1
         return asked >> 2 & 1
 
-    def on_alarm(self, alarm: cython.longlong, time: cython.longlong) -> cython.void:
+    def on_alarm(self, alarm: cython.longlong, time: cython.longlong) -> None:
         """The timer matched MR0 and restarted (an edge at this very instant may have told already)."""
         if time >= self.next_wrap_time:
             self._wrap_to(time)
-        self.chip.set_alarm(self.alarm, self.next_wrap_time)
+        self.alarm.set(self.next_wrap_time)
         self.IR |= 1
         self.chip.vic.raise_source(self.match_source)

@@ -1,4 +1,4 @@
-from firmware_sim.microcontroller cimport Peripheral
+from firmware_sim.microcontroller cimport Alarm, Peripheral
 from firmware_sim.vic cimport InterruptSource
 
 cimport cython
@@ -7,14 +7,15 @@ cimport cython
 cdef class Uart(Peripheral):
     # what a received byte touches
     cdef public InterruptSource source
-    cdef public long long timeout_alarm, byte_ns, trigger
+    cdef public long long byte_ns, trigger
     cdef public long long fifo_head, fifo_count, IIR, received
     cdef public long long[16] fifo
     # the rest
     cdef public long long overruns, errors
     cdef public long long number, DL, DIVADDVAL, MULVAL, hz
     cdef public double baud
-    cdef public long long transmit_alarm, transmit_free, sent, refused
+    cdef public long long transmit_free, sent, refused
+    cdef public Alarm timeout_alarm, transmit_alarm
     cdef public InterruptSource transmit_source
     cpdef int set_divisor(self, long long DL, long long DIVADDVAL=*, long long MULVAL=*) except -1
     cpdef long long RBR(self) noexcept

@@ -65,7 +65,7 @@ class Uart(Peripheral):
         """Received bytes that wait in the FIFO."""
         return self.fifo_count
 
-    def on_message(self, queue) -> cython.void:
+    def on_message(self, queue) -> None:
         """A byte came in, or up to eight that followed each other without a gap, stamped with the last's end.
 
         A group is taken at once: with the trigger at or above its size the interrupt comes at the same
@@ -91,12 +91,12 @@ class Uart(Peripheral):
         self.fifo_count += count
         if self.fifo_count == 0:
             return
-        self.chip.set_alarm(self.timeout_alarm, queue.time + 4 * self.byte_ns)
+        self.timeout_alarm.set(queue.time + 4 * self.byte_ns)
         if self.fifo_count >= self.trigger:
             self.IIR = 4
             self.chip.vic.raise_source(self.source)
 
-    def on_alarm(self, alarm: cython.longlong, time: cython.longlong) -> cython.void:
+    def on_alarm(self, alarm: cython.longlong, time: cython.longlong) -> None:
         """Character time-out (0) or transmit FIFO empty (1)."""
         if alarm == 0:
             if self.fifo_count > 0:
@@ -116,7 +116,7 @@ class Uart(Peripheral):
         self.fifo_count -= 1
         if self.fifo_count == 0:
             self.IIR = 1
-            self.chip.set_alarm(self.timeout_alarm, 1 << 62)
+            self.timeout_alarm.set(1 << 62)
         return byte
 
     def were_read(self, count: cython.longlong) -> cython.void:
@@ -126,7 +126,7 @@ class Uart(Peripheral):
             self.fifo_count -= count
             if self.fifo_count == 0:
                 self.IIR = 1
-                self.chip.set_alarm(self.timeout_alarm, 1 << 62)
+                self.timeout_alarm.set(1 << 62)
 
     def THR(self, byte: cython.longlong) -> cython.bint:
         """Send a byte; False (and `refused` counts) when the FIFO is full."""
@@ -140,7 +140,7 @@ class Uart(Peripheral):
         self.sent += 1
         self.chip.outbox.push(self.transmit_free, 0, 39, self.number, byte & 255)  # UART_OUTPUT
         if self.transmit_source.attached:
-            self.chip.set_alarm(self.transmit_alarm, max(now, self.transmit_free - self.byte_ns))
+            self.transmit_alarm.set(max(now, self.transmit_free - self.byte_ns))
         return True
 
     def LSR(self) -> cython.longlong:
@@ -158,4 +158,4 @@ class Uart(Peripheral):
     def unplug(self) -> None:
         """Forget what waits, as after a reset of both FIFOs (UnFCR)."""
         self.fifo_count = 0
-        self.chip.set_alarm(self.timeout_alarm, NEVER)
+        self.timeout_alarm.set(NEVER)

@@ -1,8 +1,9 @@
-from firmware_sim.microcontroller cimport Peripheral
+from firmware_sim.microcontroller cimport Alarm, Peripheral
 from firmware_sim.vic cimport InterruptSource
 
 cdef class HsUart(Peripheral):
-    cdef public long long number, rate, byte_ns, done_alarm
+    cdef public long long number, rate, byte_ns
+    cdef public Alarm done_alarm
     cdef public double baud
     cdef public InterruptSource source
     cdef public bint busy, waits_for_cts, clear_to_send, overrun

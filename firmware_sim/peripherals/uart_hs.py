@@ -75,7 +75,7 @@ class HsUart(Peripheral):
         end: cython.longlong = time + count * self.byte_ns
         self.sent += count
         self.chip.outbox.push(end, 0, 39, self.number, 0, count, 0, 0, 0, data)  # UART_OUTPUT
-        self.chip.set_alarm(self.done_alarm, end)
+        self.done_alarm.set(end)
 
     def on_pin(self, channel: cython.longlong, level: cython.longlong, time: cython.longlong) -> cython.longlong:
         """Clear to send: low lets a held transfer begin."""
@@ -88,14 +88,14 @@ class HsUart(Peripheral):
             self._begin(data, time)
         return 0
 
-    def on_alarm(self, alarm: cython.longlong, time: cython.longlong) -> cython.void:
+    def on_alarm(self, alarm: cython.longlong, time: cython.longlong) -> None:
         """The last stop bit is out."""
         self.busy = False
         self.chip.vic.raise_source(self.source)
 
     # --- receive ----------------------------------------------------------------------------------------
 
-    def on_message(self, queue) -> cython.void:
+    def on_message(self, queue) -> None:
         """One byte, or up to eight that followed each other."""
         i: cython.longlong
         if queue.c > 1:

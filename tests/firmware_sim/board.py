@@ -50,4 +50,4 @@ class Raiser(Peripheral):
 
 def raise_at(chip, source, time):
     """Let `source` be requested at `time`."""
-    chip.set_alarm(Raiser(chip, source).alarm, time)
+    Raiser(chip, source).alarm.set(time)
