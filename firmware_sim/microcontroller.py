@@ -487,9 +487,8 @@ class Microcontroller:
                 ):
                     vic.raise_source(line.source)
                     return time
-                self._serve(
-                    line.source, self.inbox, time
-                )  # at once: the fast interrupt is free and nobody else waits for it
+                # at once: the fast interrupt is free and nobody else waits for it
+                self._serve(line.source, self.inbox, time)
             if vic.pending != 0 or self.edge_time >= self.stop_time:
                 return time
             if self.code_time < self.edge_time and (self.background is not None or not self.scheduler.done):

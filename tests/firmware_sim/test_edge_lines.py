@@ -17,16 +17,31 @@ PINS_ORDER = 256  # stage pins
 STEP_NS = 125_000
 
 
+class Note(Peripheral):
+    """Writes down when it rings."""
+
+    def __init__(self, chip, notes):
+        Peripheral.__init__(self, chip)
+        self.notes = notes
+        self.alarm = chip.new_alarm(self, 0)
+
+    def on_alarm(self, alarm, time):
+        self.notes.append(("alarm", time))
+
+
 class Bench:
     """A chip with two encoders on a timer, slots of two tasks and a frame interrupt; it writes down what happens.
 
     `second_slot`: where the second encoder's interrupt goes, None for nowhere. `recording`: with records of slots.
+    `delay_ns`: after every edge of the first encoder an alarm rings, 0 for none.
     """
 
-    def __init__(self, cost, second_slot=FIQ, recording=False):
+    def __init__(self, cost, second_slot=FIQ, recording=False, delay_ns=0):
         self.chip = chip = Microcontroller("TEST")
         self.timer = TimerCapture(chip, period=30_000)
         self.notes = []
+        self.delay_ns = delay_ns
+        self.alarm = Note(chip, self.notes).alarm
         for channel, (pin, partner) in enumerate(PINS):
             self.timer.use_channel(channel, pin)
             slot = second_slot if channel else FIQ
@@ -44,6 +59,8 @@ class Bench:
                 (channel, self.chip.now, self.timer.CR(channel), self.chip.pins[pin], self.chip.pins[partner])
             )
             self.timer.clear(16 << channel)
+            if self.delay_ns and channel == 0:
+                self.alarm.set(self.chip.now + self.delay_ns)
 
         return served
 
@@ -95,6 +112,8 @@ trains = st.lists(st.tuples(instants, st.integers(0, 1), st.integers(0, 1)), min
     lambda edges: sorted(edges, key=lambda edge: edge[0])
 )
 
+delays = st.sampled_from([0, 1, 4_000, 60_000])
+
 
 @settings(max_examples=150, deadline=None)
 @given(st.sampled_from([10, 150, 500, 6_000]), trains, trains, st.lists(instants, max_size=6))
@@ -103,9 +122,11 @@ def test_edges_from_the_sensors_buffer_do_what_the_same_edges_do_as_messages(cos
 
 
 @settings(max_examples=60, deadline=None)
-@given(st.sampled_from([150, 500]), trains, trains, st.sampled_from([FIQ, 5, None]), st.booleans())
-def test_it_is_so_too_with_other_interrupts_and_with_records(cost, first, second, slot, recording):
-    bench = dict(second_slot=slot, recording=recording)
+@given(st.sampled_from([150, 500]), trains, trains, st.sampled_from([FIQ, 5, None]), st.booleans(), delays)
+def test_it_is_so_too_with_other_interrupts_with_records_and_with_alarms(
+    cost, first, second, slot, recording, delay_ns
+):
+    bench = dict(second_slot=slot, recording=recording, delay_ns=delay_ns)
     assert run(cost, (first, second), (), True, **bench) == run(cost, (first, second), (), False, **bench)
 
 
