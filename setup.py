@@ -1,5 +1,9 @@
 """Builds every module that has a .pxd beside it; without a C compiler the plain sources are used.
 
+All of them go into one shared library, foundation._compiled: Python's constants, entry points and numbers are then in
+one place instead of one per module, and what runs lies together, apart from what does not (LAYOUT below). The whole
+robot runs some 4 % faster than with a library of each module.
+
 All or nothing: a compiled module reads the fields of another's classes at fixed places, so compiled and interpreted
 modules must not be mixed. When anything fails, this is told, the reason is written to foundation/build_record.json,
 and the whole robot runs interpreted (foundation/__init__.py reads the record).
@@ -13,9 +17,11 @@ import os
 import pathlib
 import sys
 import tempfile
+from concurrent.futures import ThreadPoolExecutor
 
 from setuptools import Extension, setup
 from setuptools.command.build_ext import build_ext
+from setuptools.modified import newer_group
 
 HERE = pathlib.Path(__file__).resolve().parent
 PACKAGES = (
@@ -28,6 +34,7 @@ PACKAGES = (
     "harness",
     "tools",
 )
+LIBRARY = "foundation._compiled"
 RECORD = "build_record.json"  # in the package foundation
 # no fused multiply-add, no fast-math: both change the last bit of a trajectory
 COMPILE_ARGUMENTS = ["-O2", "-g0", "-ffp-contract=off", "-fno-fast-math", "-w"]
@@ -41,6 +48,62 @@ DIRECTIVES = {
     "initializedcheck": False,  # every array field is set in __init__
     "embedsignature": True,
 }
+# Where code lies, for tool chains that know these arguments (a trial tells). Of 10 MB of code a walk runs 130 KB: first
+# methods, then what tables call by address, last getters, setters, constructors and initialisation; fewer gaps between.
+LAYOUT_COMPILING = [
+    "-ffunction-sections",
+    "-fno-align-jumps",
+    "-fno-align-labels",
+    "-fno-align-loops",
+    "-fno-plt",
+    "-fvisibility=hidden",
+]
+LAYOUT_SCRIPT = """\
+SECTIONS
+{
+  .text.methods : { *(.text.__pyx_f_*) *(.text.__pyx_pw_* .text.__pyx_pf_*) }
+}
+INSERT BEFORE .text;
+"""
+# Python finds one module in a library by the last part of its name, and ours holds many: it gets a directory of them.
+DIRECTORY = """\
+#include <Python.h>
+
+%(declarations)s
+
+static const struct {
+    const char *name;
+    PyObject *(*definition)(void);
+} modules[] = {
+%(entries)s
+    {NULL, NULL},
+};
+
+/* The module that a spec names, not yet executed (PEP 489). */
+static PyObject *create(PyObject *self, PyObject *spec) {
+    PyObject *name = PyObject_GetAttrString(spec, "name");
+    if (!name)
+        return NULL;
+    int i = 0;
+    while (modules[i].name && PyUnicode_CompareWithASCIIString(name, modules[i].name) != 0)
+        i++;
+    if (!modules[i].name)
+        PyErr_Format(PyExc_ImportError, "no compiled module %%R", name);
+    Py_DECREF(name);
+    return modules[i].name ? PyModule_FromDefAndSpec((PyModuleDef *)modules[i].definition(), spec) : NULL;
+}
+
+static int add_names(PyObject *self) {
+    return PyModule_AddStringConstant(self, "names", "%(names)s");
+}
+
+static PyMethodDef functions[] = {{"create", create, METH_O, NULL}, {NULL}};
+static PyModuleDef_Slot slots[] = {{Py_mod_exec, add_names}, {0}};
+static PyModuleDef directory = {
+    PyModuleDef_HEAD_INIT, .m_name = "%(library)s", .m_methods = functions, .m_slots = slots};
+
+PyMODINIT_FUNC PyInit__compiled(void) { return PyModuleDef_Init(&directory); }
+"""
 
 
 class NotCompiledError(Exception):
@@ -57,9 +120,9 @@ class OptionalBuild(build_ext):
         jobs = int(os.environ.get("RANGER_SIM_BUILD_JOBS", "0")) or os.cpu_count() or 1
         try:
             self.check_wish_and_compiler()
-            self.translate(jobs)
-            self.parallel = jobs
+            self.modules, self.jobs = self.translate(jobs), jobs
             super().run()
+            self.remove_libraries_of_one_module()
         except NotCompiledError as why:
             reason = str(why)
         except Exception as error:  # noqa: BLE001  (whatever the tool chain throws, we fall back)
@@ -83,20 +146,18 @@ class OptionalBuild(build_ext):
 
         compiler = new_compiler()
         customize_compiler(compiler)
-        with tempfile.TemporaryDirectory() as folder:
-            program = pathlib.Path(folder) / "trial.c"
-            program.write_text("#include <Python.h>\nint ranger_sim_trial;\n", encoding="ascii")
-            try:
-                compiler.compile([str(program)], output_dir=folder, include_dirs=[get_python_inc()])
-            except Exception as error:  # noqa: BLE001  (each tool chain has its own)
-                tool = " ".join(getattr(compiler, "compiler_so", ["cc"])[:1])
-                raise NotCompiledError(
-                    f"the C compiler {tool!r} cannot compile a file that includes Python.h "
-                    "(are a compiler and Python's development files installed?)"
-                ) from error
+        compiler.add_include_dir(get_python_inc())
+        try:
+            try_out(compiler)
+        except Exception as error:  # noqa: BLE001  (each tool chain has its own)
+            tool = " ".join(getattr(compiler, "compiler_so", ["cc"])[:1])
+            raise NotCompiledError(
+                f"the C compiler {tool!r} cannot compile a file that includes Python.h "
+                "(are a compiler and Python's development files installed?)"
+            ) from error
 
     def translate(self, jobs):
-        """Python to C, into build/cython; only what changed."""
+        """Python to C, into build/cython; only what changed. Returns {name of a module: its C file}."""
         try:
             from Cython.Build import cythonize
         except ImportError as error:
@@ -104,7 +165,7 @@ class OptionalBuild(build_ext):
         os.chdir(HERE)
         try:
             translated = cythonize(
-                self.extensions,
+                [Extension(name, [name.replace(".", "/") + ".py"]) for name in declared_modules()],
                 build_dir="build/cython",
                 language_level=3,
                 nthreads=jobs if jobs > 1 else 0,
@@ -112,10 +173,64 @@ class OptionalBuild(build_ext):
             )
         except Exception as error:  # noqa: BLE001  (Cython has printed the place)
             raise NotCompiledError(f"Cython could not translate the sources ({one_line(error)})") from error
-        by_name = {extension.name: extension for extension in translated}
-        for extension in self.extensions:
-            extension.sources = by_name[extension.name].sources
-            extension.depends = by_name[extension.name].depends
+        return {extension.name: extension.sources[0] for extension in translated}
+
+    def build_extension(self, library):
+        """The library: an object file of each module, and the directory of them."""
+        compiling, linking = self.layout()
+        with ThreadPoolExecutor(self.jobs) as pool:
+            objects = list(pool.map(lambda name: self.compile_module(name, compiling), self.modules))
+        library.sources = [self.write_directory()]
+        library.extra_objects = library.depends = objects
+        library.extra_link_args = linking
+        super().build_extension(library)
+
+    def layout(self):
+        """Further arguments (for the compiler, for the linker); none for a tool chain that does not know them."""
+        script = pathlib.Path(self.build_temp, "layout.ld").absolute()
+        script.parent.mkdir(parents=True, exist_ok=True)
+        script.write_text(LAYOUT_SCRIPT, encoding="ascii")
+        linking = [f"-Wl,-T,{script}"]
+        try:
+            try_out(self.compiler, LAYOUT_COMPILING, linking)
+        except Exception:  # noqa: BLE001  (each tool chain has its own)
+            return [], []
+        return LAYOUT_COMPILING, linking
+
+    def compile_module(self, name, layout):
+        """The object file of one module; compiled only when its C file or this file is newer."""
+        source = self.modules[name]
+        [compiled] = self.compiler.object_filenames([source], output_dir=self.build_temp)
+        if self.force or newer_group([source, __file__], compiled):
+            self.compiler.compile(
+                [source],
+                output_dir=self.build_temp,
+                # last parts of names are not unique, and nobody outside the library looks for them
+                macros=[("CYTHON_NO_PYINIT_EXPORT", None), ("PyInit_" + name.rpartition(".")[2], entry(name))],
+                extra_postargs=COMPILE_ARGUMENTS + layout,
+            )
+        return compiled
+
+    def write_directory(self):
+        """The C file with the names of all modules; left alone when it holds them already."""
+        text = DIRECTORY % {
+            "declarations": "\n".join(f"PyObject *{entry(name)}(void);" for name in self.modules),
+            "entries": "\n".join(f'    {{"{name}", {entry(name)}}},' for name in self.modules),
+            "names": " ".join(self.modules),
+            "library": LIBRARY,
+        }
+        path = pathlib.Path("build/cython/directory.c")
+        if not path.exists() or path.read_text(encoding="ascii") != text:
+            path.write_text(text, encoding="ascii")
+        return path.as_posix()
+
+    def remove_libraries_of_one_module(self):
+        """What earlier versions built: nobody loads them any more, and no wheel shall hold them."""
+        for package in PACKAGES:
+            for folder in (HERE, HERE / self.build_lib):
+                for path in (folder / package).rglob("*.so"):
+                    if not path.name.startswith("_compiled."):
+                        path.unlink()
 
     def write_record(self, reason):
         """Beside the modules it speaks of: in the source tree or in the folder that becomes the wheel."""
@@ -131,16 +246,27 @@ def one_line(error):
     return text if len(text) < 300 else text[:300] + " ..."
 
 
-def extensions():
-    """One extension per compiled module, as paths relative to this folder (setuptools wants them so)."""
-    found = []
+def entry(name):
+    """The C function that gives a module's definition."""
+    return "PyInit_" + name.replace(".", "__")
+
+
+def try_out(compiler, compiling=(), linking=None):
+    """Compiles a C file that includes Python's header, and links it if there are arguments for that; or raises."""
+    with tempfile.TemporaryDirectory() as folder:
+        program = pathlib.Path(folder) / "trial.c"
+        program.write_text("#include <Python.h>\nint ranger_sim_trial;\n", encoding="ascii")
+        objects = compiler.compile([str(program)], output_dir=folder, extra_postargs=list(compiling))
+        if linking is not None:
+            compiler.link_shared_object(objects, str(program.with_suffix(".so")), extra_postargs=list(linking))
+
+
+def declared_modules():
+    """Names of the modules to compile."""
     for package in PACKAGES:
         for declaration in sorted((HERE / package).rglob("*.pxd")):
-            source = declaration.with_suffix(".py").relative_to(HERE)
-            name = ".".join(source.with_suffix("").parts)
-            found.append(Extension(name, [source.as_posix()], extra_compile_args=COMPILE_ARGUMENTS))
-    return found
+            yield ".".join(declaration.relative_to(HERE).with_suffix("").parts)
 
 
 if __name__ == "__main__":
-    setup(ext_modules=extensions(), cmdclass={"build_ext": OptionalBuild})
+    setup(ext_modules=[Extension(LIBRARY, [])], cmdclass={"build_ext": OptionalBuild})

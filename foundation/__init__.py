@@ -1,12 +1,15 @@
 """The ground every room stands on: numbers, stamped events, seeded randomness, and the one wall clock.
 
-Importing any package of this project imports `foundation` first. Here it is decided, for all packages at once,
-whether compiled modules may be used: not when the environment variable ``RANGER_SIM_INTERPRETED`` is set to anything
-but an empty string or ``0``, and not when the last build failed (setup.py leaves a record of it). A finder then loads
-the plain Python sources of our packages even where a compiled module lies beside them.
+Importing any package of this project imports `foundation` first. Here it is decided, for all packages at once, whether
+compiled modules run. They are all in one shared library, `foundation._compiled` (setup.py builds it, and says why one).
+It is not used when the environment variable ``RANGER_SIM_INTERPRETED`` is set to anything but an empty string or
+``0``, and not when the last build failed (setup.py leaves a record of it). A finder then loads a module of our packages
+from the library, or else from its plain Python source, and from nothing else that may lie beside it.
 """
 
+import importlib
 import importlib.machinery
+import importlib.util
 import json
 import os
 import sys
@@ -33,7 +36,7 @@ def interpreted_is_forced() -> bool:
 
 
 def why_not_compiled() -> str:
-    """Why the plain sources run, in one line; empty when the last build compiled everything."""
+    """Why there are no compiled modules to use, in one line; empty when the last build compiled everything."""
     if interpreted_is_forced():
         return "RANGER_SIM_INTERPRETED is set"
     try:
@@ -46,8 +49,27 @@ def why_not_compiled() -> str:
         return f"{BUILD_RECORD} is not readable ({error!r}): build again"
 
 
-class SourceOnlyFinder:
-    """Meta-path finder: the modules of our packages from their .py files, never from built ones."""
+def load_library() -> tuple[Any, str]:
+    """The library of compiled modules, or None; why the plain sources run, or an empty string."""
+    reason = why_not_compiled()
+    if reason:
+        return None, reason
+    try:
+        return importlib.import_module("foundation._compiled"), ""
+    except ImportError as error:
+        return None, f"the compiled modules cannot be loaded ({error}): build again"
+
+
+class LibraryLoader(importlib.machinery.ExtensionFileLoader):
+    """Loads one module out of the library; CPython's own loader knows only libraries that hold a single module."""
+
+    def create_module(self, spec: importlib.machinery.ModuleSpec) -> ModuleType:
+        """The module that the spec names, not yet executed (PEP 489)."""
+        return LIBRARY.create(spec)
+
+
+class OurFinder:
+    """Meta-path finder for the modules of our packages: from the library if that holds them, or from .py files."""
 
     @staticmethod
     def find_spec(
@@ -56,6 +78,9 @@ class SourceOnlyFinder:
         """The spec of a module inside one of our packages; None for everything else."""
         if path is None or fullname.partition(".")[0] not in OUR_PACKAGES:
             return None
+        if fullname in COMPILED_MODULES:
+            loader = LibraryLoader(fullname, LIBRARY.__file__)
+            return importlib.util.spec_from_file_location(fullname, LIBRARY.__file__, loader=loader)
         sources = (importlib.machinery.SourceFileLoader, importlib.machinery.SOURCE_SUFFIXES)
         for folder in path:
             spec = importlib.machinery.FileFinder(folder, sources).find_spec(fullname)
@@ -69,9 +94,11 @@ def plain_cast(_: object, value: Any) -> Any:
     return value
 
 
-RUNS_INTERPRETED_BECAUSE = why_not_compiled()  # decided once: modules are not exchanged while a process runs
-if RUNS_INTERPRETED_BECAUSE and SourceOnlyFinder not in sys.meta_path:
-    sys.meta_path.insert(0, SourceOnlyFinder)
+# decided once: modules are not exchanged while a process runs
+LIBRARY, RUNS_INTERPRETED_BECAUSE = load_library()
+COMPILED_MODULES = frozenset(LIBRARY.names.split() if LIBRARY else ())
+sys.meta_path.insert(0, OurFinder)
+if LIBRARY is None:
     import cython
 
     cython.cast = plain_cast

@@ -22,14 +22,10 @@ def compiled_modules() -> tuple[list[str], list[str]]:
 
 
 def is_compiled() -> bool:
-    """True when the loop of the harness runs compiled."""
-    from harness import lockstep
-
-    return not (lockstep.__file__ or "").endswith(".py")
+    """True when the robot runs compiled: all of it or nothing."""
+    return not foundation.RUNS_INTERPRETED_BECAUSE
 
 
 def why_interpreted() -> str:
     """Why the plain sources run, in one line; empty when the robot runs compiled."""
-    if is_compiled():
-        return ""
-    return foundation.RUNS_INTERPRETED_BECAUSE or "the built modules are not there: build again"
+    return foundation.RUNS_INTERPRETED_BECAUSE

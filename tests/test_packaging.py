@@ -1,5 +1,6 @@
 """What is built, what is shipped, and what happens where there is no compiler."""
 
+import importlib
 import json
 import os
 import pathlib
@@ -69,6 +70,13 @@ def test_every_declared_module_is_compiled_where_a_compiler_is():
         assert "C compiler" in build.why_interpreted()
 
 
+def test_modules_with_the_same_last_name_are_not_confused():
+    for name in ("boards.steering", "plant.steering", "boards.modules.absolute_encoder", "plant.absolute_encoder"):
+        module = importlib.import_module(name)
+        assert module.__name__ == module.__spec__.name == name
+        assert name in {each.__module__ for each in vars(module).values() if isinstance(each, type)}
+
+
 def test_interpreted_is_forced_for_every_package_by_plain_imports(tmp_path):
     """In the tree where built modules lie beside the sources, and from elsewhere through the installation."""
     names = list(declared_modules())
@@ -102,18 +110,13 @@ def test_interpreted_is_forced_under_pytest(tmp_path):
 
 @pytest.fixture(scope="module")
 def shipped(tmp_path_factory):
-    """The folder of packages that a wheel holds, with this tree's built modules."""
+    """The folder of packages that a wheel holds, with this tree's library of compiled modules."""
     folder = tmp_path_factory.mktemp("shipped")
     done = run(["setup.py", "-q", "build_py", "--build-lib", folder], ROOT)
     assert done.returncode == 0, done.stderr
-    for name in declared_modules():
-        place = pathlib.Path(*name.split("."))
-        for built in (ROOT / place.parent).glob(f"{place.name}.*"):
-            if built.suffix in BUILT:
-                shutil.copy(built, folder / place.parent)
-    record = ROOT / "foundation" / "build_record.json"
-    if record.exists():
-        shutil.copy(record, folder / "foundation")
+    for pattern in ("_compiled.*", "build_record.json"):
+        for built in (ROOT / "foundation").glob(pattern):
+            shutil.copy(built, folder / "foundation")
     return folder
 
 
@@ -183,20 +186,33 @@ def how_it_runs(folder):
     return list(files_of(names, folder).values()), done.stdout.strip()
 
 
+def times_of_objects(folder):
+    """{name of an object file: when it was written, ns}."""
+    return {path.name: path.stat().st_mtime_ns for path in (folder / "build").rglob("*.o")}
+
+
 @needs_compiler
 def test_a_build_compiles_rebuilds_only_what_changed_and_survives_a_broken_declaration(small_house):
     build_in(small_house)
     files, reason = how_it_runs(small_house)
-    assert all(file.endswith(BUILT) for file in files) and reason == ""
+    [library] = map(pathlib.Path, set(files))
+    assert library.name.endswith(BUILT) and reason == ""
     assert not list((small_house / "foundation").glob("*.c"))
 
     # "touched": one second ahead of what was built, so that no clock resolution matters
-    built = {file: pathlib.Path(file).stat().st_mtime_ns for file in files}
+    built = times_of_objects(small_house)
     source = small_house / "foundation" / "numbers.py"
-    ahead = max(built.values()) + 1_000_000_000
+    ahead = library.stat().st_mtime_ns + 1_000_000_000
     os.utime(source, ns=(ahead, ahead))
     told = build_in(small_house).stdout
     assert re.findall(r"Cythonizing (\S+)", told) == ["foundation/numbers.py"]
+    changed = {name for name, time in times_of_objects(small_house).items() if time != built[name]}
+    assert changed == {"numbers.o", "directory.o"}
+    assert set(how_it_runs(small_house)[0]) == {str(library)}
+
+    library.write_bytes(b"from another machine")
+    files, reason = how_it_runs(small_house)
+    assert all(file.endswith(".py") for file in files) and "cannot be loaded" in reason
 
     # a declaration that does not translate: loud, and nothing compiled is mixed with what is not
     declaration = small_house / "foundation" / "numbers.pxd"
@@ -206,6 +222,22 @@ def test_a_build_compiles_rebuilds_only_what_changed_and_survives_a_broken_decla
     files, reason = how_it_runs(small_house)
     assert all(file.endswith(".py") for file in files)
     assert "could not translate" in reason
+
+
+@needs_compiler
+def test_a_tool_chain_that_knows_no_layout_builds_as_well_and_what_older_builds_left_is_not_used(small_house):
+    left = small_house / "foundation" / ("numbers" + sysconfig.get_config_var("EXT_SUFFIX"))
+    left.write_bytes(b"the library of one module, as they were built once")
+    files, reason = how_it_runs(small_house)
+    assert all(file.endswith(".py") for file in files) and reason == "nothing was built here"
+
+    compiler = small_house / "cc"
+    compiler.write_text(f'#!/bin/sh\ncase "$*" in *-fno-plt*) exit 1;; esac\nexec {COMPILER} "$@"\n', encoding="ascii")
+    compiler.chmod(0o755)
+    build_in(small_house, CC=str(compiler))
+    assert not left.exists()
+    files, reason = how_it_runs(small_house)
+    assert all(file.endswith(BUILT) for file in files) and reason == ""
 
 
 def test_without_a_compiler_the_sources_run_and_the_reason_is_told(small_house):
