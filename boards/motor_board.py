@@ -46,7 +46,7 @@ from firmware_sim.peripherals.pwm import Pwm
 from firmware_sim.peripherals.spi_encoder import SpiEncoder
 from firmware_sim.peripherals.timer_capture import TimerCapture
 from firmware_sim.scheduler import Schedule, Task
-from firmware_sim.vic import ADC_DONE, EXTERNAL_INTERRUPT, SPI_DONE
+from firmware_sim.vic import ADC_DONE, EXTERNAL_INTERRUPT, SPI_DONE, InterruptSource
 from foundation.events import EventQueue
 from foundation.user_error import UserError
 
@@ -116,11 +116,12 @@ class PowerUp(Peripheral):
         self.first.set(phase_ns + START_VALUES_NS)
         self.second.set(phase_ns + SLOTS_BEGIN_NS - 1)
 
-    def on_alarm(self, alarm: cython.longlong, time: cython.longlong) -> None:
+    def on_alarm(self, alarm: cython.longlong, time: cython.longlong) -> InterruptSource | None:
         if alarm == 0:
             self.board.read_sensors_once()
         else:
             self.board.set_start_values()
+        return None
 
 
 class MotorBoard(Microcontroller):

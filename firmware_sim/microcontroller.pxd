@@ -7,12 +7,11 @@ from firmware_sim.clock cimport Crystal, TickTrain
 from firmware_sim.scheduler cimport Occasional, Schedule, SlotScheduler, Task, Wait, call, run
 from firmware_sim.vic cimport InterruptController, InterruptSource, handle
 
-# `on_message` and `on_alarm` return an object, which is None, so that those written in Python need not return a number.
 cdef class Peripheral:
     cdef public Microcontroller chip
-    cpdef object on_message(self, EventQueue queue)
+    cpdef InterruptSource on_message(self, EventQueue queue)
     cpdef long long on_pin(self, long long channel, long long level, long long time) except? <long long>-1
-    cpdef object on_alarm(self, long long alarm, long long time)
+    cpdef InterruptSource on_alarm(self, long long alarm, long long time)
 
 @cython.final
 cdef class Unclaimed(Peripheral):
@@ -25,11 +24,11 @@ cdef class Alarm:
     cdef public long long number, place, time
     cpdef long long set(self, long long time) noexcept
     @cython.final
-    cdef long long _take_back(self) noexcept
+    cdef long long _set_again(self, long long time) noexcept
     @cython.final
     cdef void _move(self, long long a, long long b) noexcept
     @cython.final
-    cdef int _ring(self, long long time) except -1
+    cdef InterruptSource _ring(self, long long time)
 
 @cython.final
 cdef class EdgeLine:
@@ -92,11 +91,11 @@ cdef class Microcontroller:
     cpdef int start(self, Schedule schedule, long long phase_ns) except -1
     cpdef object on_slot_timer(self, EventQueue queue)
     @cython.final
-    cdef int _input(self, EventQueue queue) except -1
+    cdef InterruptSource _input(self, EventQueue queue)
     @cython.final
-    cdef int _pin_edge(self, EventQueue queue) except -1
+    cdef InterruptSource _pin_edge(self, EventQueue queue)
     @cython.final
-    cdef int _timer_match(self) except -1
+    cdef InterruptSource _timer_match(self)
     @cython.final
     cdef long long _background(self) except? <long long>-1
     @cython.final

@@ -43,28 +43,34 @@ class Peripheral:
     def __init__(self, chip) -> None:
         self.chip = chip
 
-    def on_message(self, queue: EventQueue) -> None:
-        """A message of a kind claimed by this peripheral; it is in the fields of `queue`."""
+    def on_message(self, queue: EventQueue) -> InterruptSource | None:
+        """A message of a kind claimed by this peripheral; it is in the fields of `queue`.
+
+        Returns the interrupt source that shall be served because of it, if any.
+        """
+        return None
 
     def on_pin(self, channel: cython.longlong, level: cython.longlong, time: cython.longlong) -> cython.longlong:
         """The pin of `channel` changed to `level` at `time`; returns 1 to ask for the pin's interrupt, else 0."""
         return 0
 
-    def on_alarm(self, alarm: cython.longlong, time: cython.longlong) -> None:
-        """The alarm that this peripheral numbered `alarm` is due."""
+    def on_alarm(self, alarm: cython.longlong, time: cython.longlong) -> InterruptSource | None:
+        """The alarm that this peripheral numbered `alarm` is due; returns what `on_message` does."""
+        return None
 
 
 class Unclaimed(Peripheral):
     """Where messages end that no peripheral has claimed."""
 
-    def on_message(self, queue: EventQueue) -> None:
+    def on_message(self, queue: EventQueue) -> InterruptSource | None:
         """The interrupt source of its kind and index keeps it, if anybody listens there."""
         source: InterruptSource = self.chip.vic.sources.get((queue.kind, queue.a))
         if source is not None and source.bit != 0:
             source.keep_message(queue)
-            self.chip.vic.raise_source(source)
-        elif queue.kind != PIN_EDGE:
+            return source
+        if queue.kind != PIN_EDGE:
             self.chip.unclaimed += 1
+        return None
 
 
 class Alarm:
@@ -86,7 +92,7 @@ class Alarm:
         never: cython.longlong = 1 << 62
         at: cython.longlong = self.chip.alarms_set
         if self.time < never:
-            at = self._take_back()
+            return self._set_again(time)
         self.time = time
         if time < never:
             self.chip.alarms_set = at + 1
@@ -106,18 +112,18 @@ class Alarm:
         return self.chip.alarm_time
 
     @cython.final
-    def _take_back(self) -> cython.longlong:
-        """It is no longer set; returns how many are."""
+    def _set_again(self, time: cython.longlong) -> cython.longlong:
+        """It is set already: take it out, and set it."""
         at: cython.longlong = 1
-        left: cython.longlong = self.chip.alarms_set - 1
         while self.chip.alarm_places[at] != self.place:
             at += 1
-        while at < left:
+        self.chip.alarms_set -= 1
+        while at < self.chip.alarms_set:
             self._move(at + 1, at)
             at += 1
-        self.chip.alarms_set = left
-        self.chip.alarm_time = self.chip.alarm_times[left - 1]
-        return left
+        self.chip.alarm_time = self.chip.alarm_times[at - 1]
+        self.time = 1 << 62
+        return self.set(time)
 
     @cython.final
     def _move(self, a: cython.longlong, b: cython.longlong) -> cython.void:
@@ -126,17 +132,17 @@ class Alarm:
         self.chip.alarm_places[b] = self.chip.alarm_places[a]
 
     @cython.final
-    def _ring(self, time: cython.longlong) -> None:
-        """It is the chip's first one, and due."""
+    def _ring(self, time: cython.longlong) -> InterruptSource | None:
+        """It is the chip's first one, and due. Returns what its owner does."""
         self.chip.now = time
         self.chip.alarms_set -= 1
         self.chip.alarm_time = self.chip.alarm_times[self.chip.alarms_set - 1]
         self.time = 1 << 62
-        self.owner.on_alarm(self.number, time)
         if self.chip.waiting:
             self.chip.check_wait = True
             if self.chip.code_time < time:
                 self.chip.code_time = time
+        return self.owner.on_alarm(self.number, time)
 
 
 class EdgeLine:
@@ -256,7 +262,7 @@ class Microcontroller:
                 f"{self.name}: kind {kind} is not 0 ... {MESSAGE_KINDS - 1}"
                 f" or index {index} not 0 ... {INDICES_PER_KIND - 1}"
             )
-        place = kind * INDICES_PER_KIND + index
+        place = index * MESSAGE_KINDS + kind
         if self.message_table[place] is not self.others:
             raise UserError(f"{self.name}: messages of kind {kind}, index {index} are claimed twice")
         self.message_table[place] = peripheral
@@ -370,6 +376,7 @@ class Microcontroller:
         inbox: EventQueue = self.inbox
         vic: InterruptController = self.vic
         scheduler: SlotScheduler = self.scheduler
+        asking: InterruptSource
         first: cython.longlong
         own: cython.longlong
         self.horizon = until
@@ -425,17 +432,26 @@ class Microcontroller:
                 continue
             if inbox.head_time == first:
                 inbox.take()
-                self._input(inbox)
+                asking = self._input(inbox)
             else:
                 self.instant = first
                 if self.alarm_time == first:
-                    cython.cast(Alarm, self.alarms[self.alarm_places[self.alarms_set - 1]])._ring(first)
+                    asking = cython.cast(Alarm, self.alarms[self.alarm_places[self.alarms_set - 1]])._ring(first)
                 else:
-                    self._timer_match()
-            # mostly this is an interrupt for which the processor is free, and nothing else comes at this instant
-            if vic.pending != 0 and self.irq_free <= first:
-                if self.alarm_time > first and inbox.head_time > first and self.tick_time > first:
-                    self._serve(vic.newest if vic.pending == vic.newest.bit else vic.first_pending(), inbox, first)
+                    asking = self._timer_match()
+            if asking is not None:
+                # mostly the processor is free for it, and nothing else comes at this instant
+                if (
+                    vic.pending == 0
+                    and self.irq_free <= first
+                    and self.alarm_time > first
+                    and inbox.head_time > first
+                    and self.tick_time > first
+                    and asking.bit != 0
+                ):
+                    self._serve(asking, inbox, first)
+                else:
+                    vic.raise_source(asking)
         if self.alarm_time < own:
             own = self.alarm_time
         if self.tick_time < own:
@@ -496,38 +512,37 @@ class Microcontroller:
                     return time
 
     @cython.final
-    def _input(self, queue) -> None:
-        """The message just taken: hardware first; its interrupt line is raised by the peripheral."""
+    def _input(self, queue) -> InterruptSource | None:
+        """The message just taken: hardware first. Returns the interrupt source that it makes ask for service."""
         self.instant = queue.time
         self.now = queue.time
         self.background_wanted = True
         if queue.kind == 1:  # PIN_EDGE
-            self._pin_edge(queue)
-        elif 0 <= queue.kind < 32 and 0 <= queue.a < 16:
-            cython.cast(Peripheral, self.message_table[queue.kind * 16 + queue.a]).on_message(queue)
-        else:
-            self.others.on_message(queue)
+            return self._pin_edge(queue)
+        if 0 <= queue.kind < 32 and 0 <= queue.a < 16:
+            return cython.cast(Peripheral, self.message_table[queue.a * 32 + queue.kind]).on_message(queue)
+        return self.others.on_message(queue)
 
     @cython.final
-    def _pin_edge(self, queue) -> None:
+    def _pin_edge(self, queue) -> InterruptSource | None:
         """An edge that came as a message."""
         pin: cython.longlong = queue.a
         channel: cython.longlong = self.pin_channels[pin]
         self.pins[pin] = queue.b
         if queue.c >= 0:
             self.pins[queue.c] = queue.d
-        if channel >= 0:
-            if cython.cast(Peripheral, self.pin_owners[pin]).on_pin(channel, queue.b, queue.time):
-                self.vic.raise_source(cython.cast(InterruptSource, self.pin_sources[pin]))
-        else:
-            self.others.on_message(queue)
+        if channel < 0:
+            return self.others.on_message(queue)
+        if cython.cast(Peripheral, self.pin_owners[pin]).on_pin(channel, queue.b, queue.time):
+            return cython.cast(InterruptSource, self.pin_sources[pin])
+        return None
 
     @cython.final
-    def _timer_match(self) -> None:
-        """The slot timer matches and restarts: its interrupt is requested."""
+    def _timer_match(self) -> InterruptSource:
+        """The slot timer matches and restarts. Returns its interrupt source."""
         self.match_time = self.tick_time
         self.tick_time = self.ticks.next()
-        self.vic.raise_source(self.tick_source)
+        return self.tick_source
 
     def on_slot_timer(self, queue: EventQueue) -> object:
         """Handler of the slot timer: publish the next row."""

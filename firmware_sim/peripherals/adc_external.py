@@ -14,7 +14,7 @@ The SSP transfers (16 bits at 10 MHz) are part of the cost of the code that does
 import cython
 
 from firmware_sim.microcontroller import Peripheral
-from firmware_sim.vic import EXTERNAL_INTERRUPT
+from firmware_sim.vic import EXTERNAL_INTERRUPT, InterruptSource
 from foundation.events import NEVER
 from foundation.user_error import UserError
 
@@ -108,13 +108,13 @@ class Ads7871(Peripheral):
         self.alarm.set(self.chip.now + self.conversion_ns)
         return True
 
-    def on_alarm(self, alarm: cython.longlong, time: cython.longlong) -> None:
+    def on_alarm(self, alarm: cython.longlong, time: cython.longlong) -> InterruptSource | None:
         """The conversion is over: result registers 1 and 0 are loaded, BUSY falls."""
         volts: cython.double = self.chip.analog.volts(self.inputs[self.register4 & 15], self.started_time)
         self.result = self.convert(volts, self.register4 >> 4 & 7)
         self.busy = False
         self.conversions += 1
-        self.chip.vic.raise_source(self.source)
+        return self.source
 
     @property
     def registers(self):

@@ -12,7 +12,7 @@ V / VDDA * 1024; scale and offset are those of a board's own divider and convert
 import cython
 
 from firmware_sim.microcontroller import Peripheral
-from firmware_sim.vic import ADC_DONE
+from firmware_sim.vic import ADC_DONE, InterruptSource
 from foundation.user_error import UserError
 
 
@@ -73,14 +73,14 @@ class AdcInternal(Peripheral):
         self.alarm.set(self.chip.now + self.conversion_ns)
         return True
 
-    def on_alarm(self, alarm: cython.longlong, time: cython.longlong) -> None:
+    def on_alarm(self, alarm: cython.longlong, time: cython.longlong) -> InterruptSource | None:
         """The conversion is over: ADGDR holds result, channel and the DONE bit."""
         done: cython.longlong = 128  # bit 31 of ADGDR, above the channel
         self.result = self.convert(self.chip.analog.volts(self.inputs[self.channel], self.started_time))
         self.GDR = self.result << 6 | (done | self.channel) << 24
         self.busy = False
         self.conversions += 1
-        self.chip.vic.raise_source(self.source)
+        return self.source
 
     def start_burst(self, *channels) -> None:
         """Convert `channels` in turn from `now` on, without interrupts."""

@@ -17,6 +17,7 @@ RFS, TFI: DLC in bits 16-19, RTR bit 30, extended identifier bit 31.
 import cython
 
 from firmware_sim.microcontroller import Peripheral
+from firmware_sim.vic import InterruptSource
 from foundation.events import CAN_RX, CAN_STATUS, CAN_TX_DONE
 from foundation.user_error import UserError
 
@@ -164,13 +165,13 @@ class CanController(Peripheral):
 
     # --- receive ----------------------------------------------------------------------------------------
 
-    def on_message(self, queue) -> None:
+    def on_message(self, queue) -> InterruptSource | None:
         """What the bus tells: a frame received, the end of a transmission, a change of the error state."""
         flag: cython.longlong
         buffer: cython.longlong
         if queue.kind == 2:  # CAN_RX
             if self.MOD & 1:
-                return
+                return None
             if self.rx_count == 0:
                 self.RFS = 524288 if queue.c == 8 else frame_word(queue.c)
                 self.RID = queue.b
@@ -186,13 +187,13 @@ class CanController(Peripheral):
                 self.overrun = True
                 self.ICR |= 8
                 if self.IER & 8:
-                    self.chip.vic.raise_source(self.error_source)
-                return
+                    return self.error_source
+                return None
             self.received += 1
             self.rx_count += 1
             self.ICR |= 1
             if self.IER & 1:
-                self.chip.vic.raise_source(self.rx_source)
+                return self.rx_source
         elif queue.kind == 3:  # CAN_TX_DONE
             buffer = queue.b & 3
             self.tx_free[buffer] = 1
@@ -206,7 +207,7 @@ class CanController(Peripheral):
             flag = 2 if buffer == 1 else 256 << (buffer - 1)
             self.ICR |= flag
             if self.IER & flag:
-                self.chip.vic.raise_source(self.tx_source)
+                return self.tx_source
         else:  # CAN_STATUS
             self.tx_errors = queue.c
             self.rx_errors = queue.d
@@ -217,7 +218,8 @@ class CanController(Peripheral):
             elif not queue.e:
                 self.bus_off = False
             if self.IER & queue.b:
-                self.chip.vic.raise_source(self.error_source)
+                return self.error_source
+        return None
 
     def _bus_off(self) -> cython.void:
         """Too many transmit errors: reset mode, nothing is sent or received until software restarts it."""

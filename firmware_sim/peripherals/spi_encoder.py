@@ -9,7 +9,7 @@ after which (SPI_DONE, number) is raised. The value is the low 13 bits, 0 ... 81
 import cython
 
 from firmware_sim.microcontroller import Peripheral
-from firmware_sim.vic import SPI_DONE
+from firmware_sim.vic import SPI_DONE, InterruptSource
 from foundation.user_error import UserError
 
 
@@ -50,13 +50,13 @@ class SpiEncoder(Peripheral):
         self.alarm.set(self.chip.now + self.transfer_ns)
         return True
 
-    def on_alarm(self, alarm: cython.longlong, time: cython.longlong) -> None:
+    def on_alarm(self, alarm: cython.longlong, time: cython.longlong) -> InterruptSource | None:
         """The transfer is complete: SPIF (bit 7 of S0SPSR) is set."""
         self.SPDR = self.latched
         self.SPSR = 128
         self.busy = False
         self.transfers += 1
-        self.chip.vic.raise_source(self.source)
+        return self.source
 
     def read(self) -> cython.longlong:
         """Read S0SPDR, which clears SPIF."""

@@ -12,6 +12,7 @@ handler, which returns the number of half-words.
 import cython
 
 from firmware_sim.microcontroller import Peripheral
+from firmware_sim.vic import InterruptSource
 from foundation.events import SSP_SEGMENT
 
 SEGMENT_WORDS = 31
@@ -72,7 +73,7 @@ class SspPort(Peripheral):
         self.loaded = segment
         self.chip.outbox.push(self.chip.now, 0, 38, self.number, 0, 0, 0, 0, 0, segment)  # SSP_LOAD
 
-    def on_message(self, queue) -> None:
+    def on_message(self, queue) -> InterruptSource | None:
         """The other side's segment is in."""
         if self.fresh:
             self.overwritten += 1
@@ -80,7 +81,7 @@ class SspPort(Peripheral):
         self.received_time = queue.time
         self.fresh = True
         self.exchanges += 1
-        self.chip.vic.raise_source(self.source)
+        return self.source
 
     def take(self):
         """The segment that came in last, or None when it has been taken already."""

@@ -14,7 +14,7 @@ import cython
 
 from firmware_sim.clock import TickTrain
 from firmware_sim.microcontroller import Peripheral
-from firmware_sim.vic import TIMER_MATCH
+from firmware_sim.vic import TIMER_MATCH, InterruptSource
 from foundation.user_error import UserError
 
 
@@ -153,10 +153,10 @@ class TimerCapture(Peripheral):
         self.captured[channel] += 1
         return asked >> 2 & 1
 
-    def on_alarm(self, alarm: cython.longlong, time: cython.longlong) -> None:
+    def on_alarm(self, alarm: cython.longlong, time: cython.longlong) -> InterruptSource | None:
         """The timer matched MR0 and restarted (an edge at this very instant may have told already)."""
         if time >= self.next_wrap_time:
             self._wrap_to(time)
         self.alarm.set(self.next_wrap_time)
         self.IR |= 1
-        self.chip.vic.raise_source(self.match_source)
+        return self.match_source

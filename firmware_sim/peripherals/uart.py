@@ -14,7 +14,7 @@ the FIFO has become empty, (UART_TRANSMIT, number) is raised.
 import cython
 
 from firmware_sim.microcontroller import Peripheral
-from firmware_sim.vic import UART_TRANSMIT
+from firmware_sim.vic import UART_TRANSMIT, InterruptSource
 from foundation.events import NEVER, UART_BYTE
 from foundation.user_error import UserError
 
@@ -65,7 +65,7 @@ class Uart(Peripheral):
         """Received bytes that wait in the FIFO."""
         return self.fifo_count
 
-    def on_message(self, queue) -> None:
+    def on_message(self, queue) -> InterruptSource | None:
         """A byte came in, or up to eight that followed each other without a gap, stamped with the last's end.
 
         A group is taken at once: with the trigger at or above its size the interrupt comes at the same
@@ -90,21 +90,22 @@ class Uart(Peripheral):
             bytes_left >>= 8
         self.fifo_count += count
         if self.fifo_count == 0:
-            return
+            return None
         self.timeout_alarm.set(queue.time + 4 * self.byte_ns)
         if self.fifo_count >= self.trigger:
             self.IIR = 4
-            self.chip.vic.raise_source(self.source)
+            return self.source
+        return None
 
-    def on_alarm(self, alarm: cython.longlong, time: cython.longlong) -> None:
+    def on_alarm(self, alarm: cython.longlong, time: cython.longlong) -> InterruptSource | None:
         """Character time-out (0) or transmit FIFO empty (1)."""
         if alarm == 0:
-            if self.fifo_count > 0:
-                self.IIR = 12
-                self.chip.vic.raise_source(self.source)
-        else:
-            self.IIR = 2
-            self.chip.vic.raise_source(self.transmit_source)
+            if self.fifo_count == 0:
+                return None
+            self.IIR = 12
+            return self.source
+        self.IIR = 2
+        return self.transmit_source
 
     def RBR(self) -> cython.longlong:
         """Take the oldest received byte; 0 when there is none (see LSR bit 0)."""

@@ -16,7 +16,7 @@ import array
 import cython
 
 from firmware_sim.microcontroller import Peripheral
-from firmware_sim.vic import DMA_DONE
+from firmware_sim.vic import DMA_DONE, InterruptSource
 from foundation.events import UART_BYTE
 from foundation.user_error import UserError
 
@@ -88,14 +88,14 @@ class HsUart(Peripheral):
             self._begin(data, time)
         return 0
 
-    def on_alarm(self, alarm: cython.longlong, time: cython.longlong) -> None:
+    def on_alarm(self, alarm: cython.longlong, time: cython.longlong) -> InterruptSource | None:
         """The last stop bit is out."""
         self.busy = False
-        self.chip.vic.raise_source(self.source)
+        return self.source
 
     # --- receive ----------------------------------------------------------------------------------------
 
-    def on_message(self, queue) -> None:
+    def on_message(self, queue) -> InterruptSource | None:
         """One byte, or up to eight that followed each other."""
         i: cython.longlong
         if queue.c > 1:
@@ -103,6 +103,7 @@ class HsUart(Peripheral):
                 self._store((queue.d >> 8 * i if i < 4 else queue.e >> 8 * (i - 4)) & 255)
         else:
             self._store(queue.b & 255)
+        return None
 
     def _store(self, byte: cython.longlong) -> cython.void:
         if self.filled >= self.buffer_bytes:
