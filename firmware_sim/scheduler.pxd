@@ -87,18 +87,18 @@ cdef class SlotScheduler:
     cdef public long long position, end
     cdef public bint done, late, recording, started
     cdef long long* table
-    cdef readonly unsigned char[::1] numbers
+    cdef long long* leads
+    cdef public long long row, row_count
+    cdef public bint announces
     cdef public list tasks, functions
-    cdef public long long row, row_count, divider_count, divider
+    cdef readonly unsigned char[::1] numbers
+    cdef public long long divider_count, divider
     cdef public long long row_start, run_before, slot_count, listed_tasks, slot_time, tick_time, finished_time
     cdef public long long slot_cycles, near_limit_cycles, histogram_step
     cdef public long long last_slot_cycles, total_slot_cycles, max_slot_cycles
-    cdef public bint announces
-    cdef public long long[::1] leads
-    cdef public long long[::1] row_leads
     cdef public long long[::1] row_starts
     cdef public long long[21] histogram
-    cdef readonly long long[::1] table_kept  # what the address `table` leads into
+    cdef readonly long long[::1] table_kept, leads_kept  # what the two addresses lead into
     cdef public Schedule schedule
     cdef public double ns_per_cycle
     cdef public long long slot_ns, overruns, dropped_tasks, near_limits

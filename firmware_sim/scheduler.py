@@ -329,14 +329,14 @@ class SlotScheduler:
         self.late_record = None
 
     def layout(self) -> None:
-        """The schedule as flat lists; row r has the places row_starts[r] ... row_starts[r + 1] - 1.
+        """The schedule as flat lists; row r has the places from row_starts[r] on, and one more that is its end.
 
         `numbers`: of the task at each place, among `tasks` and their `functions`. `table` has ENTRY numbers for each
         task: addresses of its C function and of the object that it belongs to, when it is compiled (code 0: call what
         stands in `functions`), usual_ns, and how many calls took that.
         usual_ns: what a call without items takes (ns), or -1 when every call must be looked at more closely.
         `leads`: ns from the start of the task at a place to that of the first one from there that may speak, at least;
-        `row_leads`: the same from the start of a row.
+        NEVER where none follows in its row.
         """
         schedule = self.schedule
         self.row_count = len(schedule.rows)
@@ -344,18 +344,20 @@ class SlotScheduler:
         if len(self.tasks) > 256:
             raise UserError(f"schedule: {len(self.tasks)} different tasks; at most 256 are possible")
         self.functions = [task.routine for task in self.tasks]
-        places = [self.tasks.index(task) for row in range(self.row_count) for task in schedule.row_tasks(row)]
         self.row_starts = integers(self.row_count + 1)
+        places: list = []
         for row in range(self.row_count):
-            self.row_starts[row + 1] = self.row_starts[row] + len(schedule.row_tasks(row))
-        self.numbers = bytearray(places or [0])
+            places += [self.tasks.index(task) for task in schedule.row_tasks(row)] + [0]
+            self.row_starts[row + 1] = len(places)
+        self.numbers = bytearray(places)
+        self.leads_kept = integers(len(places), _NEVER)
         self.table_kept = integers(ENTRY * max(len(self.tasks), 1))
         if cython.compiled:
+            self.leads = cython.address(self.leads_kept[0])
             self.table = cython.address(self.table_kept[0])
         else:
+            self.leads = self.leads_kept
             self.table = self.table_kept
-        self.leads = integers(max(len(places), 1), _NEVER)
-        self.row_leads = integers(self.row_count, _NEVER)
         for number, task in enumerate(self.tasks):
             task.settle()
             task.scheduler = self
@@ -377,30 +379,24 @@ class SlotScheduler:
         """From the end of each row back to its start: how long a place is ahead of the row's next speaker."""
         for row in range(self.row_count):
             lead = _NEVER
-            for place in range(self.row_starts[row + 1] - 1, self.row_starts[row] - 1, -1):
+            for place in range(self.row_starts[row + 1] - 2, self.row_starts[row] - 1, -1):
                 task = self.tasks[self.numbers[place]]
                 if task.speaks:
                     lead = 0
                 elif lead < _NEVER:
                     lead += int(task.base_cycles * self.ns_per_cycle)
-                self.leads[place] = lead
-            self.row_leads[row] = lead
+                self.leads_kept[place] = lead
 
     def speaks_from(self, code_time: cython.longlong, tick_time: cython.longlong) -> cython.longlong:
         """Before this instant (ns) no task puts anything on a bus.
 
         `code_time`: no task of the row that runs starts earlier; `tick_time`: no slot.
         """
-        row: cython.longlong = self.row + 1
-        first: cython.longlong
-        lead: cython.longlong
-        if row >= self.row_count:
-            row = 0
-        first = tick_time + self.row_leads[row]  # both at most NEVER, so their sum fits
-        if not self.done and self.position < self.end:
-            lead = code_time + self.leads[self.position]
-            if lead < first:
-                first = lead
+        next_row: cython.longlong = self.end + 1 if self.row + 1 < self.row_count else 0
+        # an instant and a lead are at most NEVER, so their sum fits
+        first: cython.longlong = tick_time + self.leads[next_row]
+        if not self.done and code_time + self.leads[self.position] < first:
+            first = code_time + self.leads[self.position]
         return first
 
     @property
@@ -432,7 +428,7 @@ class SlotScheduler:
         self.run_before += self.position - self.row_start
         self.row_start = self.row_starts[self.row]
         self.position = self.row_start
-        self.end = self.row_starts[self.row + 1]
+        self.end = self.row_starts[self.row + 1] - 1
         self.done = False
         self.started = True
         self.slot_time = timer_time

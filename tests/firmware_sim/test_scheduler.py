@@ -5,6 +5,7 @@ import pytest
 from firmware_sim.clock import Crystal
 from firmware_sim.scheduler import Occasional, Schedule, Task, Wait
 from firmware_sim.vic import EXTERNAL_INTERRUPT
+from foundation.events import NEVER
 from foundation.user_error import UserError
 from tests.firmware_sim.board import TICK_CYCLES, TICK_NS, Log, raise_at
 
@@ -380,6 +381,27 @@ def test_a_schedule_that_names_its_speakers_promises_silence_until_the_next_of_t
     assert chip.speaks_from() == 510_000  # d has begun, nothing more in this slot
     chip.advance(500_000 + TICK_NS + 15_000)
     assert chip.speaks_from() == 1_010_000  # in row 1 nothing follows b
+
+
+def test_a_row_without_tasks_is_silent_and_the_row_after_it_is_not():
+    log = Log()
+    log.start(rows=((log.task("a", 600),), (), (log.task("b", 600),)), speakers=())
+    chip = log.chip
+    assert chip.speaks_from() == 0  # a of row 0
+    chip.advance(TICK_NS + 5_000)
+    assert chip.speaks_from() > NEVER // 2  # nothing before the end of row 1
+    chip.advance(500_000 + TICK_NS)
+    assert chip.speaks_from() == 1_000_000  # b of row 2
+    chip.advance(1_000_000 + TICK_NS + 5_000)
+    assert chip.speaks_from() == 1_500_000  # a again
+
+
+def test_a_schedule_has_at_most_256_different_tasks():
+    log = Log()
+    tasks = tuple(log.task(str(number), 1) for number in range(257))
+    log.start(every=tasks[:256])
+    with pytest.raises(UserError, match="257 different tasks; at most 256"):
+        log.start(every=tasks)
 
 
 def test_a_replaced_function_may_speak_whatever_the_schedule_said():
