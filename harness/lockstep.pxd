@@ -57,7 +57,7 @@ cdef class Lockstep:
     cpdef long long run(self, long long until) except? <long long>-1
     cdef long long _walk_is_over(self) except? <long long>-1
     @cython.final
-    cdef long long _run_in_turn(self, long long end) except? <long long>-1
+    cdef long long _run_in_turn(self, long long end, bint last) except? <long long>-1
     @cython.final
     cdef long long _run_side_by_side(self, long long end) except? <long long>-1
     @cython.final

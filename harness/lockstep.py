@@ -16,7 +16,7 @@ with their interrupts and slots, then their outputs.
 A board is due when it has something to do: an alarm, a slot, a task, an interrupt, a message. Where frames, edges and
 bytes wait for a task (`hears_in_its_slots`) it is due only when it may put something on a bus
 (`Microcontroller.speaks_from`): it does everything else, each thing at its instant, when that has come, or at the end
-of the plant's step, while edges and voltages still stand.
+of the plant's step, while edges and voltages still stand; what it hears alone does not even need that.
 
 Boards in processes of their own run side by side instead: in windows of 31 us, each from the first instant at which
 anything is due, all boards that are due in a window at once.
@@ -245,7 +245,7 @@ class Lockstep:
         self.strike_squares_ms2 = 0.0
 
     def hears_in_its_slots(self, board) -> None:
-        """Not urgent messages (`EventQueue.put`) make `board` put nothing on a bus before its tasks do."""
+        """Not urgent messages (`EventQueue.put`) wait for tasks of `board`: no handler sends or looks at a sensor."""
         place = self.boards.index(board)
         self.prompt[place] = 0
         board.inbox.wake(self.came, self.due, place)
@@ -317,7 +317,7 @@ class Lockstep:
             if self.remote:
                 self._run_side_by_side(end)
             else:
-                self._run_in_turn(end)
+                self._run_in_turn(end, end == until)
             self.time = end
             if self.estimator is not None and self.estimator.swing_leg != self.swing_leg:
                 self._notice_strike()
@@ -325,8 +325,12 @@ class Lockstep:
         return reason
 
     @cython.final
-    def _run_in_turn(self, end: cython.longlong) -> cython.longlong:
-        """Run boards and buses to `end` (ns), always the one that is due first; returns when the next one is."""
+    def _run_in_turn(self, end: cython.longlong, last: cython.bint) -> cython.longlong:
+        """Run boards and buses to `end` (ns), always the one that is due first; returns when the next one is.
+
+        `last`: somebody looks at the boards then. Otherwise a board that has only heard something is left alone.
+        """
+        board: Microcontroller
         i: cython.longlong
         alone: cython.longlong
         first: cython.longlong
@@ -359,7 +363,9 @@ class Lockstep:
                 due[alone] = self._advance(alone, second if second < end else end)
         for i in range(board_count):
             if came[i] < end:
-                due[i] = self._advance(i, end)
+                board = cython.cast(Microcontroller, self.boards[i])
+                if self.prompt[i] or last or board.next_time < end or board.edge_time < end:
+                    due[i] = self._advance(i, end)
         return first
 
     @cython.final

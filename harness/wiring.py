@@ -12,7 +12,8 @@ from plant import wiring_points as point
 # The order in which boards are advanced and their messages sorted within an instant.
 BOARDS = ("MCH", "MCFO", "MCFI", "MCSI", "UI", "CSR", "MB")
 
-# Boards on which frames, edges and bytes wait for a task: no handler and no main loop answers them at once.
+# Boards on which frames, edges and bytes wait for a task: no handler and no main loop answers them at once, or looks at
+# a sensor because of them.
 HEAR_IN_SLOTS = ("MCH", "MCFO", "MCFI", "MCSI", "UI")
 
 

@@ -58,6 +58,19 @@ def test_a_board_that_hears_in_its_slots_misses_nothing_by_running_later():
     assert trace(prompt=wiring.HEAR_IN_SLOTS) == trace()
 
 
+def test_whoever_looks_between_two_runs_finds_every_board_up_to_date():
+    """Within a run a board that has only heard something is left alone, over many steps of the plant."""
+    robot = Ranger(Scenario())
+    for _ in range(40):  # some slices end between a frame and the slot that reads it
+        robot.run(StopRule(time_s=RUN_S), 0.000_31)
+        waiting = {
+            name: board.inbox.head_time
+            for name, board in robot.boards.items()
+            if min(board.inbox.head_time, board.edge_time, board.next_time) < robot.loop.time
+        }
+        assert waiting == {}
+
+
 def test_a_board_whose_controller_went_bus_off_restarts_it_at_once_also_when_it_hears_in_its_slots(monkeypatch):
     """Its error interrupt writes the controller's mode register: what the bus tells of errors is urgent.
 
