@@ -392,38 +392,26 @@ class Microcontroller:
             if self.edge_time < first:
                 first = self.edge_time
             # what the processor does before that: a handler, tasks, or the main loop beside them
+            own = 1 << 62
             if vic.pending != 0:
                 own = self.fiq_free if vic.pending >= 65536 else self.irq_free  # FIRST_FIQ
-                if self.instant > own:
-                    own = self.instant
-                if own < first:
-                    if own >= self.horizon:
-                        break
-                    self.instant = own
-                    self._serve(vic.first_pending(), inbox, own)
-                    continue
+                own = own if own > self.instant else self.instant
             elif not scheduler.done:
-                own = 1 << 62
                 if not self.waiting or self.check_wait:
                     own = self.code_time
-                    if own < first:
-                        if own >= self.horizon:
-                            break
-                        self.instant = own
-                        self._code(first)
-                        continue
-            else:
-                own = 1 << 62
-                if self.background_wanted and self.background is not None:
-                    own = self.code_time
-                    if self.instant > own:
-                        own = self.instant
-                    if own < first:
-                        if own >= self.horizon:
-                            break
-                        self.instant = own
-                        self._background()
-                        continue
+            elif self.background_wanted and self.background is not None:
+                own = self.code_time if self.code_time > self.instant else self.instant
+            if own < first:
+                if own >= self.horizon:
+                    break
+                self.instant = own
+                if vic.pending != 0:
+                    self._serve(vic.first_pending(), inbox, own)
+                elif not scheduler.done:
+                    self._code(first)
+                else:
+                    self._background()
+                continue
             if first >= self.horizon:
                 break
             # at one instant: edges, messages, alarms, the slot timer

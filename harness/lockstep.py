@@ -364,7 +364,7 @@ class Lockstep:
         for i in range(board_count):
             if came[i] < end:
                 board = cython.cast(Microcontroller, self.boards[i])
-                if self.prompt[i] or last or board.next_time < end or board.edge_time < end:
+                if last or board.next_time < end or board.edge_time < end:
                     due[i] = self._advance(i, end)
         return first
 
