@@ -1,6 +1,7 @@
 cimport cython
 
-from libc.math cimport cos, fabs, sin, sqrt, tanh
+from libc.math cimport cos, fabs, sin, sqrt
+from plant.friction cimport smoothed_sign
 
 @cython.final
 cdef class Body:

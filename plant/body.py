@@ -20,7 +20,9 @@ from plant.parameters import BodyParameters
 from plant.walk_record import WalkRecord
 
 if not cython.compiled:
-    from math import cos, fabs, sin, sqrt, tanh
+    from math import cos, fabs, sin, sqrt
+
+    from plant.friction import smoothed_sign
 
 OUTER = 0
 INNER = 1
@@ -629,9 +631,9 @@ class Body:
         for stage in range(stages):
             # torques of the motors, first: they are calls, and before a call everything in registers is put aside
             hd = us - uw
-            mp = s_drive - s_coulomb * tanh(up * eps) - s_viscous * up
-            mn = w_drive - w_coulomb * tanh(un * eps) - w_viscous * un
-            Th = hip_drive - hip_coulomb * tanh(hd * eps) - hip_viscous * hd
+            mp = s_drive - s_coulomb * smoothed_sign(up * eps) - s_viscous * up
+            mn = w_drive - w_coulomb * smoothed_sign(un * eps) - w_viscous * un
+            Th = hip_drive - hip_coulomb * smoothed_sign(hd * eps) - hip_viscous * hd
             if stage != 2:
                 # what depends on angles alone; stages 1 and 2 look at the same ones
                 if stage > 0:
@@ -768,7 +770,7 @@ class Body:
                 # the swing foot brushes the floor with its sole: normal force and sliding friction (EQUATIONS 9)
                 Ry = -self.sole_k * gap - self.sole_c * (f * uF - ls * us - fw * uG + lsw * uw)
                 if Ry > 0.0:
-                    Rx = -self.mu * Ry * tanh((e * uF + lc * us - ew * uG - lcw * uw) * self.sole_v)
+                    Rx = -self.mu * Ry * smoothed_sign((e * uF + lc * us - ew * uG - lcw * uw) * self.sole_v)
                     push = -ew * Rx - fw * Ry
                     Q1 += e * Rx + f * Ry
                     Q2 += lc * Rx - ls * Ry
@@ -1050,8 +1052,8 @@ class Body:
                 spring = self._exact_spring(th - tw) if exact_spring else kh * (th - tw)
             Ts = pull_s
             Tw = pull_w
-            mp = o_drive - o_coulomb * tanh(up * eps) - o_viscous * up - Ts
-            mn = i_drive - i_coulomb * tanh(un * eps) - i_viscous * un - Tw
+            mp = o_drive - o_coulomb * smoothed_sign(up * eps) - o_viscous * up - Ts
+            mn = i_drive - i_coulomb * smoothed_sign(un * eps) - i_viscous * un - Tw
             if a_s < low or a_s > high:
                 stop = self._stop(a_s, uF - us)
                 Ts += stop
@@ -1065,7 +1067,7 @@ class Body:
             hd = us - uw
             Th = 0.0
             if not locked:
-                Th = hip_drive - hip_coulomb * tanh(hd * eps) - hip_viscous * hd - spring
+                Th = hip_drive - hip_coulomb * smoothed_sign(hd * eps) - hip_viscous * hd - spring
             if with_terms:
                 self._ask_terms(True, th - tw, a_s, a_w, p, n, hd, uF - us, uG - uw, up, un)
                 Th += self.extra_hip

@@ -1,6 +1,7 @@
 cimport cython
 
-from libc.math cimport exp, log, tanh
+from libc.math cimport exp, log
+from plant.friction cimport smoothed_sign
 from plant.drive cimport Drive
 
 @cython.final
@@ -8,7 +9,7 @@ cdef class MotorUnit:
     # what every step looks at stands first, beside each other
     cdef public Drive drive
     cdef public double mounting, gear, K, winding_ohm, series_ohm, contact_drop_V, dead_time_fraction
-    cdef public double bridge_current_A, known_s, known_ohm, decay, decay_s, decay_squared_s
+    cdef public double bridge_current_A, known_s, known_ohm, per_s, per_ohm, decay, decay_s, decay_squared_s
     cdef public double gate_W_per_V, ripple_per_ohm2, mu, C0
     # what a step leaves behind
     cdef public double heat_s, size_As, square_A2s, mechanical_J, drawn_J, returned_J, ripple_J, gate_J

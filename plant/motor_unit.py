@@ -32,7 +32,9 @@ from plant.drive import Drive
 from plant.motor_parameters import MotorParameters
 
 if not cython.compiled:
-    from math import exp, log, tanh
+    from math import exp, log
+
+    from plant.friction import smoothed_sign
 
 
 class MotorUnit:
@@ -107,6 +109,8 @@ class MotorUnit:
         # of a whole step of `known_s` at `known_ohm`: time constant, e^(-t/tau) and two integrals of it
         self.known_s = 0.0
         self.known_ohm = 0.0
+        self.per_s = 0.0  # one over each
+        self.per_ohm = 0.0
         self.tau_s = 0.0
         self.decay = 0.0
         self.decay_s = 0.0
@@ -124,7 +128,9 @@ class MotorUnit:
         """Torque at the joint for a current and a joint rate, without the rotor's inertia."""
         GKI: cython.double = self.gear * self.K * current_A
         load: cython.double = GKI if GKI > 0.0 else -GKI
-        return GKI - (self.mu * load + self.C0) * tanh(rate_rad_s * self.inverse_smoothing) - self.C1 * rate_rad_s
+        return (
+            GKI - (self.mu * load + self.C0) * smoothed_sign(rate_rad_s * self.inverse_smoothing) - self.C1 * rate_rad_s
+        )
 
     def load(self, current_A: cython.double) -> cython.void:
         """Set the three torque numbers for the body from a current in the joint's sense."""
@@ -195,7 +201,7 @@ class MotorUnit:
             else:
                 sign = 0.0
             if sign != 0.0:
-                final = (sign * x - drop) / R
+                final = (sign * x - drop) * self.per_ohm
                 above = sign * amps - final
                 part = final + above * self.decay
         if part >= 0.0:
@@ -225,7 +231,7 @@ class MotorUnit:
             from_battery_As = self.from_battery_As
         self.bridge_current_A = amps
         self.current_A = self.mounting * amps
-        self.battery_current_A = from_battery_As / h
+        self.battery_current_A = from_battery_As * self.per_s
         self.mechanical_J += back_emf_V * total_As
         x = from_battery_As * battery_V
         if x >= 0.0:
@@ -236,7 +242,7 @@ class MotorUnit:
         if self.heat_s >= 0.008:
             self._heat()
         # the torque numbers for the body: `load` of the mean current
-        x = GK * total_As / h
+        x = GK * total_As * self.per_s
         self.drive_Nm = x
         self.coulomb_Nm = self.mu * (x if x > 0.0 else -x) + self.C0
 
@@ -306,7 +312,7 @@ class MotorUnit:
                     sign = -1.0
                 else:
                     break  # the contact drop holds the current at zero
-                final = (sign * x - drop) / R
+                final = (sign * x - drop) * self.per_ohm
                 above = sign * amps - final
                 if left == h:
                     e = self.decay
@@ -401,6 +407,8 @@ class MotorUnit:
         """Keep what a step of `h` seconds at a loop resistance of `R` ohm needs of the exponential."""
         self.known_s = h
         self.known_ohm = R
+        self.per_s = 1.0 / h
+        self.per_ohm = 1.0 / R
         self.tau_s = self.inductance_H / R
         self.decay = exp(-h / self.tau_s)
         self.decay_s = self.tau_s * (1.0 - self.decay)

@@ -1,6 +1,7 @@
 cimport cython
 
-from libc.math cimport cos, sin, tanh
+from libc.math cimport cos, sin
+from plant.friction cimport smoothed_sign
 
 @cython.final
 cdef class Steering:

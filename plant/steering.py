@@ -14,7 +14,9 @@ Positive is to the left, seen from above. With all feet on the floor the twist i
 import cython
 
 if not cython.compiled:
-    from math import cos, sin, tanh
+    from math import cos, sin
+
+    from plant.friction import smoothed_sign
 
 
 class Steering:
@@ -78,7 +80,7 @@ class Steering:
                 h
                 * (
                     drive
-                    - coulomb * tanh(rate * inverse_smoothing)
+                    - coulomb * smoothed_sign(rate * inverse_smoothing)
                     - (viscous + self.damping) * rate
                     - self.stiffness * before
                 )

@@ -1,6 +1,7 @@
 cimport cython
 
-from libc.math cimport exp, sin, tanh
+from libc.math cimport exp, sin
+from plant.friction cimport smoothed_sign
 
 @cython.final
 cdef class TermTorques:

@@ -26,7 +26,9 @@ import array
 import cython
 
 if not cython.compiled:
-    from math import exp, sin, tanh
+    from math import exp, sin
+
+    from plant.friction import smoothed_sign
 
 STRIBECK = 0
 COULOMB = 1
@@ -97,13 +99,13 @@ class TermTorques:
         y: cython.double
         if form == 0:
             x = w / p1
-            return -p0 * exp(-x * x) * tanh(w * self.inverse_smoothing)
+            return -p0 * exp(-x * x) * smoothed_sign(w * self.inverse_smoothing)
         if form == 1:
-            return -p0 * tanh(w * self.inverse_smoothing)
+            return -p0 * smoothed_sign(w * self.inverse_smoothing)
         if form == 2:
             return -p0 * w
         if form == 3:
-            x = tanh(w * self.inverse_smoothing)
+            x = smoothed_sign(w * self.inverse_smoothing)
             y = w
             if x < 0.0:
                 x = -x
