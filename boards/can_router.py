@@ -260,8 +260,11 @@ class CanRouterBoard(Microcontroller):
 
     # --- main loop --------------------------------------------------------------------------------------
 
-    def flush(self, controller: CanController) -> cython.longlong:
-        """Fill transmit buffers 1 and 2 from the ring of the controller's bus; returns frames moved."""
+    def flush(self, controller: CanController, began: cython.longlong) -> cython.longlong:
+        """Fill transmit buffers 1 and 2, those free when the turn `began` (ns), from the ring of the controller's bus.
+
+        Returns frames moved.
+        """
         router: Router = self.router
         channel: cython.longlong = controller.number
         buffer: cython.longlong
@@ -269,9 +272,9 @@ class CanRouterBoard(Microcontroller):
         read: cython.longlong = router.tx_read[channel]
         moved: cython.longlong = 0
         while read != router.tx_write[channel]:
-            if controller.tx_free[1] != 0:
+            if controller.free_at(1, began):
                 buffer = 1
-            elif controller.tx_free[2] != 0:
+            elif controller.free_at(2, began):
                 buffer = 2
             else:
                 break
@@ -291,15 +294,20 @@ class CanRouterBoard(Microcontroller):
             self.load.counts[channel] += moved
         return moved
 
-    def can_flush(self) -> cython.bint:
-        """True when a frame waits for a bus that has a free transmit buffer and is not in reset."""
+    def can_flush(self, at: cython.longlong) -> cython.bint:
+        """True when at `at` (ns) a frame waits for a bus that has a free transmit buffer and is not in reset.
+
+        Where both buffers are taken, the end of a transmission will wake the main loop.
+        """
         router: Router = self.router
         controller: CanController
         channel: cython.longlong
         for channel in range(1, 5):
             if router.tx_read[channel] != router.tx_write[channel]:
                 controller = self.controllers[channel - 1]
-                if (controller.tx_free[1] != 0 or controller.tx_free[2] != 0) and not controller.MOD & 1:
+                if not controller.free_at(1, at) and not controller.free_at(2, at):
+                    controller.tell_first_end()
+                elif not controller.MOD & 1:
                     return True
         return False
 
@@ -311,6 +319,7 @@ class CanRouterBoard(Microcontroller):
         pair in progress to end and is met wherever the loop happens to be.
         """
         at: cython.longlong = self.now
+        began: cython.longlong
         passed: cython.longlong
         pairs: cython.longlong
         moved: cython.longlong
@@ -320,8 +329,9 @@ class CanRouterBoard(Microcontroller):
             router.rx_read != router.rx_write
             or link.received_read != link.received_write
             or router.own_read != router.own_write
-            or (router.waiting > 0 and self.can_flush())
+            or (router.waiting > 0 and self.can_flush(at))
         ):
+            began = at
             if self.idle:
                 self.idle = False
                 passed = at - self.idle_since
@@ -336,7 +346,7 @@ class CanRouterBoard(Microcontroller):
             moved = 0
             if router.waiting > 0:
                 self.now = at
-                moved = self.flush(self.controllers[self.flush_next])
+                moved = self.flush(self.controllers[self.flush_next], began)
             at += self.flush_ns[moved]
             self.flush_next = (self.flush_next + 1) & 3
             if at >= self.horizon or at >= self.alarm_time or at >= self.tick_time or at >= self.inbox.head_time:

@@ -2,6 +2,7 @@ from foundation.events cimport EventQueue
 from foundation.random_stream cimport RandomStream
 from foundation.row_stream cimport FrameStream
 from can_bus.frame cimport arbitration_key, measure
+from can_bus.transmit_ends cimport TransmitEnds
 
 from libc.math cimport log
 
@@ -13,6 +14,7 @@ cimport cython
 cdef class Node:
     cdef public EventQueue inbox
     cdef public Node following
+    cdef public TransmitEnds ends
     cdef public long long index, order
     cdef public long long controller, mode, transmit_errors, receive_errors
     cdef public bint listening, passive

@@ -14,7 +14,8 @@ requests stamped before t are known, and results do not depend on how time is cu
 Order. The lowest arbitration field among the controllers ready wins; a controller offers the lowest of its
 three buffers, ties by buffer number (LPC2194 with TPM = 0). Nothing is pre-empted.
 
-A frame is decided at its start: its results are pushed, stamped in the future, into the nodes' inboxes.
+A frame is decided at its start: its results are pushed, stamped in the future, into the nodes' inboxes; its end is
+written down for the sender where that looks for it (`Node.connect`).
 Receivers have the frame at the end of the sixth bit of EOF, its sender is done at the end of the seventh.
 """
 
@@ -23,6 +24,7 @@ import array
 import cython
 
 from can_bus.frame import INTERMISSION_BITS, arbitration_key, measure, wire
+from can_bus.transmit_ends import TransmitEnds
 from foundation.events import (
     CAN_STATUS,
     CAN_TX_DONE,
@@ -87,11 +89,13 @@ class Node:
 
     `following`: the next one of the bus; behind the last comes the first. `listening`: it wants what it receives (a
     node that does not still acknowledges). `flushed`: frames that waited when it went bus-off. `refused`: requests
-    into an occupied buffer or while off the bus.
+    into an occupied buffer or while off the bus. `ends`: where the ends of its transmissions are written, unless they
+    shall be messages.
     """
 
     def __init__(self, name, index, inbox, controller, order) -> None:
         self.inbox = inbox
+        self.ends = TransmitEnds(by_message=True)
         self.following = self
         self.order = order
         self.controller = controller
@@ -115,6 +119,11 @@ class Node:
         self.flushed = 0
         self.arbitrations_lost = 0
         self.retries = 0
+
+    def connect(self, ends) -> None:
+        """The ends of transmissions are written into `ends` from now on, None: all are messages."""
+        self.ends = TransmitEnds(by_message=True) if ends is None else ends
+        self.ends.order = self.order
 
 
 class Bus:
@@ -260,7 +269,7 @@ class Bus:
         """Put a controller on the bus; returns its node number.
 
         `inbox`: EventQueue that gets CAN_RX, CAN_TX_DONE and CAN_STATUS, with `controller` as field a and
-        `order` (stage * 256 + source) as the queue's order.
+        `order` (stage * 256 + source) as the queue's order. `Node.connect` spares it most of CAN_TX_DONE.
         """
         node: Node
         index = len(self.nodes)
@@ -394,7 +403,8 @@ class Bus:
         if owner.mode != RESET and owner.mode != BUS_OFF:
             return False
         self._refuse(node, flags)
-        owner.inbox.push(time, owner.order, CAN_TX_DONE, owner.controller, buffer, TX_ABORTED)
+        if not owner.ends.write(buffer, time, TX_ABORTED):
+            owner.inbox.push(time, owner.order, CAN_TX_DONE, owner.controller, buffer, TX_ABORTED)
         return True
 
     def _after_suspension(self, node, first) -> int:
@@ -696,7 +706,8 @@ class Bus:
         self.rows[row] = time  # FREE_AT
         if time <= self.advanced:
             self.late_results += 1
-        node.inbox.push(time, node.order, CAN_TX_DONE, node.controller, row // ROW % 4, status)
+        if not node.ends.write(row // ROW % 4, time, status):
+            node.inbox.push(time, node.order, CAN_TX_DONE, node.controller, row // ROW % 4, status)
 
     # ---- one frame
 
@@ -774,7 +785,8 @@ class Bus:
         sender = self.first_node
         while sender.index != row >> 5:
             sender = sender.following
-        sender.inbox.put(done, sender.order, 3, sender.controller, row >> 3 & 3, 0, 0, 0, 0)  # CAN_TX_DONE, TX_SENT
+        if not sender.ends.write(row >> 3 & 3, done, 0):  # TX_SENT
+            sender.inbox.put(done, sender.order, 3, sender.controller, row >> 3 & 3, 0, 0, 0, 0)  # CAN_TX_DONE
         sender.sent += 1
         if sender.transmit_errors > 0 or sender.passive:
             self._after_success(sender, end, done)
@@ -889,7 +901,8 @@ class Bus:
         self.rows[row] = done  # FREE_AT
         node.sending_end = end
         node.sent += 1
-        node.inbox.put(done, node.order, CAN_TX_DONE, node.controller, row // ROW % 4, TX_SENT, 0, 0, 0)
+        if not node.ends.write(row // ROW % 4, done, TX_SENT):
+            node.inbox.put(done, node.order, CAN_TX_DONE, node.controller, row // ROW % 4, TX_SENT, 0, 0, 0)
         self._after_success(node, end, done)
 
     def _after_success(self, node, end, done) -> None:

@@ -30,14 +30,14 @@ import array
 import cython
 
 from can_bus.bus import Bus
-from firmware_sim.microcontroller import Microcontroller
+from firmware_sim.microcontroller import MESSAGE_KINDS, Microcontroller
+from firmware_sim.peripherals.can_controller import CanController
 from foundation.edge_buffer import ByteBuffer
-from foundation.events import Outbox
+from foundation.events import CAN_TX_DONE, Outbox
 from foundation.numbers import integers
 from foundation.row_stream import RowStream
 from foundation.user_error import UserError
 from harness.processes.remote_board import RemoteBoard
-from plant.drive import Drive
 from plant.ranger import RangerPlant
 
 WINDOW_NS = 31_000
@@ -109,9 +109,23 @@ class BoardWires(Outbox):
         self.serial_lines = {}  # {UART: what hears it}, where something outside is connected
 
     def connect_bus(self, controller, bus, node) -> None:
-        """Controller 1 ... 4 of the board is `node` of `bus`; None for `bus` takes it off."""
+        """Controller 1 ... 4 of the board is `node` of `bus`; None for `bus` takes it off.
+
+        The bus writes the ends of its transmissions where the controller looks for them.
+        """
+        if bus is not None and not isinstance(bus, Bus):  # taken for one without asking again
+            raise UserError(f"{self.board.name}: {bus!r} is no Bus")
+        self.end_by_message(controller)
         self.buses[controller] = bus
         self.nodes[controller] = node
+        owner = self.board.message_table[controller * MESSAGE_KINDS + CAN_TX_DONE]
+        if bus is not None and isinstance(owner, CanController):
+            bus.nodes[node].connect(owner.ends)
+
+    def end_by_message(self, controller) -> None:
+        """The ends of a controller's transmissions are messages from now on: the one that looks is not here."""
+        if self.buses[controller] is not None:
+            self.buses[controller].nodes[self.nodes[controller]].connect(None)
 
     def connect_drive(self, drive, watchdog_pin, low_side_2_pin, low_side_6_pin) -> None:
         """The board's PWM unit and three of its pins drive a bridge."""
@@ -134,35 +148,34 @@ class BoardWires(Outbox):
         ref: object = None,
     ) -> None:
         """Carry on what the board puts out at `time` (ns)."""
-        bus: Bus
-        drive: Drive = self.drive
-        if kind == 36:  # PIN_OUTPUT
-            if drive is not None:
-                if a == self.watchdog_pin:
-                    drive.watchdog_edge(time)
-                elif a == self.low_side_2_pin:
-                    self.low_side_2 = b != 0
-                    drive.low_side(time, self.low_side_2, self.low_side_6)
-                elif a == self.low_side_6_pin:
-                    self.low_side_6 = b != 0
-                    drive.low_side(time, self.low_side_2, self.low_side_6)
-        elif 32 <= kind <= 34:  # CAN_REQUEST, CAN_ABORT, CAN_MODE
-            bus = self.buses[a]
-            if kind == 32 and time < self.silent_until:
+        if kind == 32:  # CAN_REQUEST
+            if time < self.silent_until:
                 self._spoke_early(time)
-            if bus is None:
+            if self.buses[a] is None:
                 self._to_bus_outside(kind, time, a, b, c, d, e, f)
-            elif kind == 32:
-                bus.request(self.nodes[a], b, time, c, d, e, f)
+            else:
+                cython.cast(Bus, self.buses[a]).request(self.nodes[a], b, time, c, d, e, f)
                 if time + self.window_ns < self.board.horizon:
                     self.board.stop_at(time + self.window_ns)
-            elif kind == 33:
-                bus.abort(self.nodes[a], b, time)
-            else:
-                bus.set_mode(self.nodes[a], b, time)
+        elif kind == 36:  # PIN_OUTPUT
+            if a == self.watchdog_pin:
+                self.drive.watchdog_edge(time)
+            elif a == self.low_side_2_pin:
+                self.low_side_2 = b != 0
+                self.drive.low_side(time, self.low_side_2, self.low_side_6)
+            elif a == self.low_side_6_pin:
+                self.low_side_6 = b != 0
+                self.drive.low_side(time, self.low_side_2, self.low_side_6)
         elif kind == 35:  # PWM_UPDATE
-            if drive is not None:
-                drive.write_pwm(time, a, b, c)
+            if self.drive is not None:
+                self.drive.write_pwm(time, a, b, c)
+        elif kind == 33 or kind == 34:  # CAN_ABORT, CAN_MODE
+            if self.buses[a] is None:
+                self._to_bus_outside(kind, time, a, b, c, d, e, f)
+            elif kind == 33:
+                self.buses[a].abort(self.nodes[a], b, time)
+            else:
+                self.buses[a].set_mode(self.nodes[a], b, time)
         elif kind == 37:  # SSP_START
             self.link.start(time, ref)
             self.board.stop_at(time + self.link.exchange_ns + self.window_ns)

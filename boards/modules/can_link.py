@@ -190,7 +190,7 @@ class CanLink:
         after: cython.longlong = (write + 1) & 7
         row: cython.longlong
         waiting: cython.longlong
-        if write == self.tx_read and controller.tx_free[1] != 0 and not controller.MOD & 1:
+        if write == self.tx_read and controller.buffer_free(1) and not controller.MOD & 1:
             # nothing waits: straight through the ring
             controller.transmit(1, identifier, 8, value_word, time_word)
             self.queued += 1
@@ -240,9 +240,9 @@ class CanLink:
             return 0
         controller = self.controller
         while self.tx_read != self.tx_write:
-            if controller.tx_free[1] != 0:
+            if controller.buffer_free(1):
                 buffer = 1
-            elif controller.tx_free[2] != 0:
+            elif controller.buffer_free(2):
                 buffer = 2
             else:
                 break

@@ -52,7 +52,7 @@ class NetworkClock:
         ms: cython.longlong = self.time.ms
         for controller in self.controllers:
             # 40: eight bytes, single shot
-            if controller.tx_free[3] != 0 and controller.transmit(3, 0, 40, ms, ms):
+            if controller.free_at(3, controller.chip.instant) and controller.transmit(3, 0, 40, ms, ms):
                 self.sent[controller.number] += 1
                 self.load.count(controller.number)
             else:

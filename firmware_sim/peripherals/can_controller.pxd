@@ -1,3 +1,4 @@
+from can_bus.transmit_ends cimport TransmitEnds
 from firmware_sim.microcontroller cimport Microcontroller, Peripheral
 from firmware_sim.vic cimport InterruptSource
 
@@ -7,7 +8,10 @@ cimport cython
 cdef class CanController(Peripheral):
     # what a frame touches; registers of the chip have 32 bits
     cdef public InterruptSource rx_source, tx_source
-    cdef public long long MOD, IER, ICR
+    cdef public long long MOD
+    cdef public TransmitEnds ends
+    cdef readonly long long IER
+    cdef public long long ICR
     cdef public long long number, rx_count
     cdef public long long[4] tx_free, tx_complete
     cdef public long long RFS, RID, RDA, RDB
@@ -20,7 +24,11 @@ cdef class CanController(Peripheral):
     cdef public long long tx_errors, rx_errors, BTR
     cdef public InterruptSource error_source
     cpdef bint transmit(self, long long buffer, long long identifier, long long flags, long long lo, long long hi) except? -1
+    cpdef bint free_at(self, long long buffer, long long time) noexcept
     cpdef bint buffer_free(self, long long buffer) noexcept
+    cpdef int tell_end(self, long long buffer) except -1
+    cpdef int tell_first_end(self) except -1
+    cpdef int write_IER(self, long long value) except -1
     cpdef long long write_CMR(self, long long command) except? <long long>-1
     cpdef void write_MOD(self, long long mode) noexcept
     cpdef void release(self) noexcept
@@ -28,6 +36,9 @@ cdef class CanController(Peripheral):
     cpdef long long SR(self) noexcept
     cpdef long long GSR(self) noexcept
     cpdef double bit_rate(self) except? -1
+    cdef void _end(self, long long buffer, long long status) noexcept
+    cdef void _look(self) noexcept
     cdef void _bus_off(self) noexcept
 
 cdef long long frame_word(long long flags) noexcept
+cdef long long transmit_flag(long long buffer) noexcept

@@ -3,10 +3,12 @@
 """One CAN controller of the LPC2194 (CxMOD, CxCMR, CxGSR, CxSR, CxICR, CxIER, CxBTR, CxRFS, CxRID, CxRDA,
 CxRDB, and CxTFI1-3, CxTID1-3, CxTDA1-3, CxTDB1-3 as TFI[1] ... TDB[3]).
 
-Three transmit buffers: a request goes out as CAN_REQUEST; the bus answers CAN_TX_DONE. Transmit and abort in
-one command is single shot. Receive: two hardware buffers, the older in RFS ... RDB; a third frame is a data
-overrun and lost. Interrupts: (CAN_RX, n) while a frame waits, (CAN_TX_DONE, n), and (CAN_STATUS, n) for errors,
-each if CxIER allows it. Bus-off puts the controller into reset mode; writing MOD = 0 begins the recovery.
+Three transmit buffers: a request goes out as CAN_REQUEST. Its end comes as CAN_TX_DONE, or the bus writes it into
+`ends` beforehand, and the controller takes it in when a register that depends on it is looked at; then it is a message
+only where somebody waits for it, an interrupt or who asked for it (`tell_end`). Transmit and abort in one command is
+single shot. Receive: two hardware buffers, the older in RFS ... RDB; a third frame is a data overrun and lost.
+Interrupts: (CAN_RX, n) while a frame waits, (CAN_TX_DONE, n), and (CAN_STATUS, n) for errors, each if CxIER allows it.
+Bus-off puts the controller into reset mode; writing MOD = 0 begins the recovery.
 
 CMR: TR 1, AT 2, RRB 4, CDO 8, SRR 16, STB1-3 32, 64, 128.
 ICR, IER: RI 1, TI1 2, EI 4, DOI 8, EPI 32, ALI 64, BEI 128, TI2 512, TI3 1024.
@@ -16,6 +18,7 @@ RFS, TFI: DLC in bits 16-19, RTR bit 30, extended identifier bit 31.
 
 import cython
 
+from can_bus.transmit_ends import TransmitEnds
 from firmware_sim.microcontroller import Peripheral
 from firmware_sim.vic import InterruptSource
 from foundation.events import CAN_RX, CAN_STATUS, CAN_TX_DONE
@@ -55,8 +58,16 @@ def frame_word(flags: cython.longlong) -> cython.longlong:
     return (flags & 15) << 16 | (flags >> 4 & 1) << 30 | (flags >> 6 & 1) << 31
 
 
+def transmit_flag(buffer: cython.longlong) -> cython.longlong:
+    """TI1 ... TI3 of CxICR and CxIER."""
+    return 2 if buffer == 1 else 256 << (buffer - 1)
+
+
 class CanController(Peripheral):
-    """Controller `number` (1 ... 4), field a of all its messages. Counters are ground truth for tests."""
+    """Controller `number` (1 ... 4), field a of all its messages. Counters are ground truth for tests.
+
+    `sent`, `aborted` and `lost` count the ends that have been taken in.
+    """
 
     def __init__(self, chip, number=1, btr=0x00254001, IER=ICR_RI) -> None:
         # 0x00254001: BRP 1, SJW 1, TSEG1 5, TSEG2 2: 3 Mbit/s at 60 MHz, sampled at 70 %
@@ -64,6 +75,7 @@ class CanController(Peripheral):
         if not 1 <= number <= 4:
             raise UserError(f"{chip.name}: CAN controller {number} is not 1 ... 4")
         self.number = number
+        self.ends = TransmitEnds()
         self.MOD = 0
         self.IER = IER
         self.ICR = 0
@@ -108,9 +120,65 @@ class CanController(Peripheral):
 
     # --- transmit ---------------------------------------------------------------------------------------
 
+    def free_at(self, buffer: cython.longlong, time: cython.longlong) -> cython.bint:
+        """TBS of a transmit buffer 1 ... 3 by what has happened up to `time` (ns)."""
+        if self.ends.times[buffer & 3] <= time:
+            self._end(buffer & 3, self.ends.statuses[buffer & 3])
+        return self.tx_free[buffer & 3] != 0
+
     def buffer_free(self, buffer: cython.longlong) -> cython.bint:
         """TBS of a transmit buffer 1 ... 3."""
-        return self.tx_free[buffer & 3] != 0
+        return self.free_at(buffer, self.chip.now)
+
+    def tell_end(self, buffer: cython.longlong) -> None:
+        """The next end of a transmission from a buffer shall come as a message."""
+        never: cython.longlong = 1 << 62
+        end: cython.longlong = self.ends.times[buffer]
+        status: cython.longlong = self.ends.statuses[buffer]
+        self.ends.times[buffer] = never + 1  # BY_MESSAGE
+        if end < never:
+            self.chip.inbox.put(end, self.ends.order, 3, self.number, buffer, status, 0, 0, 0)  # CAN_TX_DONE
+            if end < self.chip.stop_time:
+                self.chip.stop_time = end
+
+    def tell_first_end(self) -> None:
+        """Buffers 1 and 2 are not free: the end that frees one of them first shall come as a message."""
+        never: cython.longlong = 1 << 62
+        if self.ends.times[1] < never:
+            self.tell_end(1)
+        elif self.ends.times[2] < never:
+            self.tell_end(2)
+        else:  # neither has started
+            self.tell_end(1)
+            self.tell_end(2)
+
+    def write_IER(self, value: cython.longlong) -> None:
+        """Write the interrupt enable register; it counts for what is under way as well."""
+        buffer: cython.longlong
+        self._look()
+        self.IER = value
+        for buffer in range(1, 4):
+            if value & transmit_flag(buffer) and self.tx_source.bit != 0:
+                self.tell_end(buffer)
+
+    def _look(self) -> cython.void:
+        """Take in every end that has come."""
+        buffer: cython.longlong
+        for buffer in range(1, 4):
+            self.free_at(buffer, self.chip.now)
+
+    def _end(self, buffer: cython.longlong, status: cython.longlong) -> cython.void:
+        """The transmission from a buffer has ended."""
+        self.ends.times[buffer] = 1 << 62
+        self.tx_free[buffer] = 1
+        if status == 0:
+            self.sent += 1
+            self.tx_complete[buffer] = 1
+        elif status == 1:
+            self.aborted += 1
+        else:
+            self.lost += 1
+        self.ICR |= transmit_flag(buffer)
 
     def transmit(
         self,
@@ -126,6 +194,8 @@ class CanController(Peripheral):
         """
         if not 1 <= buffer <= 3:
             raise IndexError(f"{self.chip.name}: CAN controller {self.number}: transmit buffer {buffer} is not 1 ... 3")
+        if self.ends.times[buffer] <= self.chip.now:
+            self._end(buffer, self.ends.statuses[buffer])
         if self.tx_free[buffer] == 0 or self.MOD & 1:
             self.refused += 1
             return False
@@ -137,6 +207,8 @@ class CanController(Peripheral):
         self.tx_complete[buffer] = 0
         self.requests += 1
         self.chip.outbox.push(self.chip.now, 0, 32, self.number, buffer, identifier, flags, lo, hi)  # CAN_REQUEST
+        if self.IER & 1538 and self.IER & transmit_flag(buffer) and self.tx_source.bit != 0:
+            self.tell_end(buffer)
         return True
 
     def write_CMR(self, command: cython.longlong) -> cython.longlong:
@@ -159,7 +231,7 @@ class CanController(Peripheral):
                         flags |= 32
                     self.transmit(buffer, self.TID[buffer], flags, self.TDA[buffer], self.TDB[buffer])
                     self.TFI[buffer] = frame  # with the bits that do not travel
-                elif self.tx_free[buffer] == 0:
+                elif not self.buffer_free(buffer):
                     self.chip.outbox.push(self.chip.now, 0, 33, self.number, buffer)  # CAN_ABORT
         return command
 
@@ -167,7 +239,6 @@ class CanController(Peripheral):
 
     def on_message(self, queue) -> InterruptSource | None:
         """What the bus tells: a frame received, the end of a transmission, a change of the error state."""
-        flag: cython.longlong
         buffer: cython.longlong
         if queue.kind == 2:  # CAN_RX
             if self.MOD & 1:
@@ -196,17 +267,8 @@ class CanController(Peripheral):
                 return self.rx_source
         elif queue.kind == 3:  # CAN_TX_DONE
             buffer = queue.b & 3
-            self.tx_free[buffer] = 1
-            if queue.c == 0:
-                self.sent += 1
-                self.tx_complete[buffer] = 1
-            elif queue.c == 1:
-                self.aborted += 1
-            else:
-                self.lost += 1
-            flag = 2 if buffer == 1 else 256 << (buffer - 1)
-            self.ICR |= flag
-            if self.IER & flag:
+            self._end(buffer, queue.c)
+            if self.IER & transmit_flag(buffer):
                 return self.tx_source
         else:  # CAN_STATUS
             self.tx_errors = queue.c
@@ -259,7 +321,9 @@ class CanController(Peripheral):
 
     def read_ICR(self) -> cython.longlong:
         """Interrupt and capture register; the read clears all but the receive bit."""
-        value: cython.longlong = self.ICR
+        value: cython.longlong
+        self._look()
+        value = self.ICR
         self.ICR &= 1
         return value
 
@@ -268,6 +332,7 @@ class CanController(Peripheral):
         buffer: cython.longlong
         word: cython.longlong = 0
         common: cython.longlong = 0
+        self._look()
         if self.rx_count > 0:
             common |= 1
         if self.overrun:

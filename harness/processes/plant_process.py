@@ -65,6 +65,9 @@ class PlantRun:
         }
         loop.boards = list(self.remotes.values())
         loop.remote = True
+        for wires in loop.wires:
+            for controller in range(1, 5):  # those that look for what a bus writes down are in the other processes
+                wires.end_by_message(controller)
         loop.main_brain_words = blocks["MB"].table()
         robot.boards["MB"].store.words = blocks["MB"].table()
         for name, remote in self.remotes.items():

@@ -1,0 +1,37 @@
+# cython: boundscheck=False, wraparound=False
+# (every index below is a transmit buffer, 1 ... 3, as bus and controller have checked)
+"""The ends of transmissions, which a bus knows from the starts of their frames on and nearly nobody waits for.
+
+Bus and controller hold the same object: the bus writes the end down, and the controller takes it in when a register
+that depends on it is looked at. Only an end that somebody waits for travels as a message (CAN_TX_DONE), or one between
+processes.
+"""
+
+import cython
+
+from foundation.events import NEVER
+
+BY_MESSAGE = NEVER + 1
+
+
+class TransmitEnds:
+    """By transmit buffer 1 ... 3: `times`, the instant (ns) from which it is free again, and `statuses`, TX_*.
+
+    A time is NEVER while the frame has not started, and when the controller has taken the end in; BY_MESSAGE where the
+    bus shall send a message. `order`: of such messages.
+    """
+
+    def __init__(self, by_message=False) -> None:
+        unknown: cython.longlong = BY_MESSAGE if by_message else NEVER
+        self.times = [unknown] * 4
+        self.statuses = [0] * 4
+        self.order = 0
+
+    def write(self, buffer: cython.longlong, time: cython.longlong, status: cython.longlong) -> cython.bint:
+        """The bus: the transmission from `buffer` ends at `time`. False when it shall send a message instead."""
+        never: cython.longlong = 1 << 62
+        if self.times[buffer] != never:
+            return False
+        self.times[buffer] = time
+        self.statuses[buffer] = status
+        return True
