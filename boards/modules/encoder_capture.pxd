@@ -16,6 +16,5 @@ cdef class EncoderCapture:
     cdef public TimerCapture timer
     cdef public WrapCounter wraps
     cdef public QuadratureDecoder decoder
-    cdef public bint armed_rising
-    cdef public long long channel, flag, edge_bits, pin, partner_pin
+    cdef public long long armed_level, channel, flag, edge_bits, pin, partner_pin
     cdef public long long last

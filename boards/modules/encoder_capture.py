@@ -63,7 +63,7 @@ class EncoderCapture:
         self.pin = pin
         self.partner_pin = partner_pin
         self.decoder = decoder
-        self.armed_rising = True
+        self.armed_level = 1  # which the edge that the channel waits for leaves
         self.last = 0  # cycles at the edge before
         source = self.timer.use_channel(channel, pin, rising=True, falling=False)
         chip.vic.attach(
@@ -77,13 +77,12 @@ class EncoderCapture:
         )
 
     def on_capture(self, queue: object):
-        """Fast interrupt: count the edge and keep the time since the one before."""
-        capture: cython.longlong
-        wraps: cython.longlong = self.wraps.wraps
-        elapsed: cython.longlong
+        """Fast interrupt: count the edge and keep the time since the one before. Rising with B low counts up."""
         timer: TimerCapture = self.timer
-        level: cython.bint = self.chip.pins[self.pin] != 0
-        capture = timer.captures[self.channel]
+        level: cython.longlong = self.chip.pins[self.pin]
+        wraps: cython.longlong = self.wraps.wraps
+        capture: cython.longlong = timer.captures[self.channel]
+        elapsed: cython.longlong
         timer.IR &= ~self.flag
         # a wrap that is not counted yet came before this capture if the capture is a small number
         if timer.IR & 1 and capture < 15000:
@@ -93,9 +92,9 @@ class EncoderCapture:
         self.last = capture
         if elapsed > 0x7F000000:  # LONGEST_TIME
             elapsed = 0x7F000000
-        if level == self.armed_rising:
-            self.decoder.edge(level, self.chip.pins[self.partner_pin] != 0, elapsed)
-            self.armed_rising = not level
+        if level == self.armed_level:
+            self.armed_level = 1 - level
             timer.CCR ^= self.edge_bits  # from one of the two to the other
+            self.decoder.edge(2 * (level ^ self.chip.pins[self.partner_pin]) - 1, elapsed)
         else:
             self.decoder.glitch()  # the edge that would leave the other level stays armed

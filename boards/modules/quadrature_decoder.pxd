@@ -17,7 +17,6 @@ cdef class QuadratureDecoder:
     cdef public ErrorModule errors
     cdef public long long glitch_code, full_code
     cdef public double rad_per_count
-    cpdef int edge(self, bint rising, bint partner_high, long long elapsed) except -1
+    cpdef int edge(self, long long step, long long elapsed) except -1
     cpdef int glitch(self) except -1
-    cpdef int store(self, long long elapsed) except -1
     cpdef int set_position(self, long long position) except -1

@@ -68,36 +68,26 @@ class QuadratureDecoder:
         self.speed = 0  # counts per cycle x 2^31, unfiltered
         self.filtered = 0
 
-    def edge(self, rising: cython.bint, partner_high: cython.bint, elapsed: cython.longlong) -> None:
-        """An edge of channel A as the fast interrupt sees it.
+    def edge(self, step: cython.longlong, elapsed: cython.longlong) -> None:
+        """An edge of channel A as the fast interrupt sees it: `step` 1 or -1, `elapsed` cycles since the edge before.
 
-        `elapsed`: cycles since the edge before. Rising with B low counts up, falling inverts.
+        The time is kept for the next slot with the sign of the step; when the ring is full it is lost, the count is
+        not.
         """
+        after: cython.longlong = (self.write + 1) & 63  # RING_SIZE
         self.edges += 1
-        if rising != partner_high:
-            self.count += 1
-            self.store(elapsed)
-        else:
-            self.count -= 1
-            self.store(-elapsed)
-
-    def glitch(self) -> None:
-        """The pin's level did not agree with the armed edge: nothing counted, a time of 0 stored."""
-        self.edges += 1
-        self.glitches += 1
-        self.store(0)
-
-    def store(self, elapsed: cython.longlong) -> None:
-        """Keep a signed time for the next slot; when the ring is full the time is lost, the count is not."""
-        after: cython.longlong = self.write + 1
-        if after >= 64:  # RING_SIZE
-            after = 0
+        self.count += step
         if after == self.read:
             self.dropped_times += 1
             self.errors.report(self.full_code)
         else:
-            self.ring[self.write] = elapsed
+            self.ring[self.write] = step * elapsed
             self.write = after
+
+    def glitch(self) -> None:
+        """The pin's level did not agree with the armed edge: nothing counted, a time of 0 stored."""
+        self.glitches += 1
+        self.edge(0, 0)
 
     def update_angle(self) -> None:
         """Slot task: position from the count, floored."""

@@ -29,3 +29,4 @@ cdef class TimerCapture(Peripheral):
     cpdef int arm(self, long long channel, bint rising, bint falling) except -1
     cpdef long long count_at(self, long long time) except? <long long>-1
     cdef long long _wrap_to(self, long long time) except? <long long>-1
+    cdef long long _late_pin(self, long long channel, long long level, long long time) except? <long long>-1

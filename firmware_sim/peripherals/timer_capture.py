@@ -137,21 +137,28 @@ class TimerCapture(Peripheral):
 
     def on_pin(self, channel: cython.longlong, level: cython.longlong, time: cython.longlong) -> cython.longlong:
         """An edge at a capture pin; 1 when it asks for the interrupt."""
-        count: cython.longlong
         asked: cython.longlong = self.CCR >> 3 * channel
-        if asked & (1 if level else 2) == 0:
+        flag: cython.longlong = 16
+        count: cython.longlong
+        if time >= self.next_wrap_time:
+            return self._late_pin(channel, level, time)
+        if asked & 2 - level == 0:
             self.lost[channel] += 1
             return 0
-        if time >= self.next_wrap_time:
-            self._wrap_to(time)
         count = int((time - self.wrap_time) * self.counts_per_ns)
         self.captures[channel] = count if count < self.MR0 else self.MR0
-        if self.IR >> 4 + channel & 1:
+        flag <<= channel
+        if self.IR & flag:
             self.lost[channel] += 1
             return 0
-        self.IR |= 16 << channel
+        self.IR |= flag
         self.captured[channel] += 1
         return asked >> 2 & 1
+
+    def _late_pin(self, channel: cython.longlong, level: cython.longlong, time: cython.longlong) -> cython.longlong:
+        """An edge after a wrap that has not been looked at."""
+        self._wrap_to(time)
+        return self.on_pin(channel, level, time)
 
     def on_alarm(self, alarm: cython.longlong, time: cython.longlong) -> InterruptSource | None:
         """The timer matched MR0 and restarted (an edge at this very instant may have told already)."""

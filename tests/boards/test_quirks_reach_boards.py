@@ -69,7 +69,7 @@ def test_the_rate_follows_by_its_share_per_slot(name, exponent):
     for decoder in (board.cap01, board.cap23):
         decoder.filtered = 0
         for _ in range(2):
-            decoder.store(10_000)
+            decoder.edge(1, 10_000)
         decoder.update_rate()
         # unfiltered: two counts, 10 000 cycles each
         assert decoder.speed == 2 * (0x7FFFFFFF // 20_000)
