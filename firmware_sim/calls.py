@@ -20,17 +20,17 @@ def run(scheduler: Any, number: int) -> Any:
 
 
 def handle(source: Any, queue: Any) -> Any:
-    """What the handler of an interrupt source returns for the message in the fields of `queue`, None as 0."""
-    return source.service(queue) or 0
+    """What the handler of an interrupt source returns for the message in the fields of `queue`."""
+    return source.service(queue)
 
 
 def code_of(function: Callable[..., Any], arguments: int) -> int:
-    """Address of the C function of a method that takes so many arguments; 0: it has none."""
+    """The first of the two addresses by which compiled code calls a function; interpreted there is none."""
     return 0
 
 
-def owner_of(function: Callable[..., Any]) -> int:
-    """Address of the object that a method with a C function belongs to; 0: there is none."""
+def owner_of(function: Callable[..., Any], arguments: int) -> int:
+    """The second of them."""
     return 0
 
 

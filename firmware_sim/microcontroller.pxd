@@ -32,15 +32,13 @@ cdef class Alarm:
 
 @cython.final
 cdef class EdgeLine:
-    cdef public long long next_time
+    cdef public long long next_time, levels
     cdef public EdgeBuffer buffer
     cdef public long long pin, partner_pin, channel
     cdef public Peripheral peripheral
     cdef public InterruptSource source
     @cython.final
     cdef long long find_next(self) noexcept
-    @cython.final
-    cdef long long take(self) noexcept
 
 # Fields that nearly every event touches come first, close together; then those of alarms, edges and messages.
 cdef class Microcontroller:
@@ -100,6 +98,8 @@ cdef class Microcontroller:
     cdef long long _background(self) except? <long long>-1
     @cython.final
     cdef int _serve(self, InterruptSource source, EventQueue queue, long long time) except -1
+    @cython.final
+    cdef long long _note_service(self, InterruptSource source, long long items) except? <long long>-1
     @cython.final
     cdef long long _code(self, long long first) except? <long long>-1
     @cython.final

@@ -159,23 +159,19 @@ class EdgeLine:
         self.channel = channel
         self.source = source
         self.next_time = NEVER
+        self.levels = 0
 
     @cython.final
     def find_next(self) -> cython.longlong:
-        """The instant of the first edge that has not been taken."""
+        """Look at the first edge of the buffer that has not been taken: its instant, NEVER for none, and its levels."""
+        edge: cython.longlong
         if self.buffer.read < self.buffer.count:
-            self.next_time = self.buffer.packed[self.buffer.read] >> 2
+            edge = self.buffer.packed[self.buffer.read]
+            self.next_time = edge >> 2
+            self.levels = edge & 3  # of A x 2 + of B
         else:
             self.next_time = 1 << 62
         return self.next_time
-
-    @cython.final
-    def take(self) -> cython.longlong:
-        """Take the first edge, which is there; returns it as the buffer has it."""
-        edge: cython.longlong = self.buffer.packed[self.buffer.read]
-        self.buffer.read += 1
-        self.find_next()
-        return edge
 
 
 class Microcontroller:
@@ -406,7 +402,7 @@ class Microcontroller:
                     break
                 self.instant = own
                 if vic.pending != 0:
-                    self._serve(vic.first_pending(), inbox, own)
+                    self._serve(vic.take_first(), inbox, own)
                 elif not scheduler.done:
                     self._code(first)
                 else:
@@ -418,15 +414,14 @@ class Microcontroller:
             if self.edge_time == first:
                 self._edges()
                 continue
+            self.instant = first
             if inbox.head_time == first:
                 inbox.take()
                 asking = self._input(inbox)
+            elif self.alarm_time == first:
+                asking = cython.cast(Alarm, self.alarms[self.alarm_places[self.alarms_set - 1]])._ring(first)
             else:
-                self.instant = first
-                if self.alarm_time == first:
-                    asking = cython.cast(Alarm, self.alarms[self.alarm_places[self.alarms_set - 1]])._ring(first)
-                else:
-                    asking = self._timer_match()
+                asking = self._timer_match()
             if asking is not None:
                 # mostly the processor is free for it, and nothing else comes at this instant
                 if (
@@ -465,23 +460,26 @@ class Microcontroller:
 
         Hardware first: the capture happens at the edge's stamp whatever the processor does. Returns the last instant.
         """
+        inbox: EventQueue = self.inbox
         vic: InterruptController = self.vic
         line: EdgeLine
-        edge: cython.longlong
+        level: cython.longlong
         time: cython.longlong
-        self.background_wanted = True
         # what comes first; a handler may set an alarm before it
-        self.stop_time = min(self.horizon, self.alarm_time, self.tick_time, self.inbox.head_time)
+        self.stop_time = min(self.horizon, self.alarm_time, self.tick_time, inbox.head_time)
+        self.background_wanted = True
         while True:
             time = self.edge_time
             line = self.first_line if self.first_line.next_time == time else self.second_line
-            edge = line.take()
-            self.edge_time = min(self.first_line.next_time, self.second_line.next_time)
+            level = line.levels >> 1
             self.instant = time
             self.now = time
-            self.pins[line.pin] = edge >> 1 & 1
-            self.pins[line.partner_pin] = edge & 1
-            if line.peripheral.on_pin(line.channel, edge >> 1 & 1, time):
+            self.pins[line.pin] = level
+            self.pins[line.partner_pin] = line.levels & 1
+            line.buffer.read += 1
+            line.find_next()
+            self.edge_time = min(self.first_line.next_time, self.second_line.next_time)
+            if line.peripheral.on_pin(line.channel, level, time):
                 if (
                     self.fiq_free > time
                     or vic.pending >= 65536
@@ -492,7 +490,7 @@ class Microcontroller:
                     vic.raise_source(line.source)
                     return time
                 # at once: the fast interrupt is free and nobody else waits for it
-                self._serve(line.source, self.inbox, time)
+                self._serve(line.source, inbox, time)
             if vic.pending != 0 or self.edge_time >= self.stop_time:
                 return time
             if self.code_time < self.edge_time and (self.background is not None or not self.scheduler.done):
@@ -502,8 +500,7 @@ class Microcontroller:
     @cython.final
     def _input(self, queue) -> InterruptSource | None:
         """The message just taken: hardware first. Returns the interrupt source that it makes ask for service."""
-        self.instant = queue.time
-        self.now = queue.time
+        self.now = self.instant
         self.background_wanted = True
         if queue.kind == 1:  # PIN_EDGE
             return self._pin_edge(queue)
@@ -556,37 +553,34 @@ class Microcontroller:
 
     @cython.final
     def _serve(self, source, queue, time: cython.longlong) -> None:
-        """Run the handler of `source` at `time` and let its cycles pass."""
-        cycles: cython.longlong
+        """Run the handler of `source`, which waits no longer, at `time` and let its cycles pass."""
         busy: cython.longlong
-        items: cython.longlong
-        self.vic.pending &= ~source.bit
         source.served += 1
         self.background_wanted = True
         self.now = time + source.latency_ns
         self.extra_cycles = 0
-        if cython.compiled:
-            items = handle(source, queue)
-        else:
-            items = source.service(queue) or 0
-        if items == 0 and self.extra_cycles == 0:
-            cycles = source.base_cycles
+        items = handle(source, queue) if cython.compiled else source.service(queue)
+        if items is None and self.extra_cycles == 0 and not self.scheduler.recording:
+            self.stolen_cycles += source.base_cycles
             busy = source.base_ns
         else:
-            cycles = source.base_cycles + source.per_item * items + self.extra_cycles
-            busy = int(cycles * self.ns_per_cycle)
-            source.noted += 1
-            source.noted_cycles += cycles
-            if cycles > source.noted_most:
-                source.noted_most = cycles
+            busy = self._note_service(source, 0 if items is None else items)
         if source.bit >= 65536:  # FIRST_FIQ
             self.fiq_free = time + busy
         self.irq_free = (self.irq_free if self.irq_free > time else time) + busy
         self.code_time = (self.code_time if self.code_time > time else time) + busy
-        self.stolen_cycles += cycles
         self.check_wait = True
+
+    @cython.final
+    def _note_service(self, source, items: cython.longlong) -> cython.longlong:
+        """A service that handled `items`, took extra cycles or is recorded; returns how long it took (ns)."""
+        cycles: cython.longlong = source.base_cycles + source.per_item * items + self.extra_cycles
+        busy: cython.longlong = int(cycles * self.ns_per_cycle)
+        self.stolen_cycles += cycles
+        source.note(cycles)
         if self.scheduler.recording:
             self.scheduler.note_interrupt(source.name, cycles)
+        return busy
 
     @cython.final
     def _code(self, first: cython.longlong) -> cython.longlong:

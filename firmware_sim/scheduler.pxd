@@ -20,28 +20,31 @@ cdef inline object call(object function):
         return PyCFunction_GET_FUNCTION(function)(PyCFunction_GET_SELF(function), NULL)
     return function()
 
-# Address of the C function of a method that takes `arguments` (0 or 1), and of the object it belongs to, which whoever
-# keeps the addresses must keep alive; 0: it has none.
-cdef inline long long code_of(object function, int arguments):
-    if PyCFunction_CheckExact(function) and PyCFunction_GET_FLAGS(function) == (METH_O if arguments else METH_NOARGS):
-        return <long long><void*>PyCFunction_GET_FUNCTION(function)
-    return 0
+cdef inline bint is_method(object function, int arguments):
+    return PyCFunction_CheckExact(function) and PyCFunction_GET_FLAGS(function) == (METH_O if arguments else METH_NOARGS)
 
-cdef inline long long owner_of(object function):
-    if PyCFunction_CheckExact(function):
-        return <long long><void*>PyCFunction_GET_SELF(function)
-    return 0
+cdef inline object call_anything(PyObject* function, PyObject* nothing):
+    return (<object>function)()
+
+cdef inline object call_anything_with(PyObject* function, PyObject* argument):
+    return (<object>function)(<object>argument)
+
+# By these two addresses a function of `arguments` (0 or 1) is called: of a method's C function, and of the object that
+# it belongs to; or of a call in the ordinary way, and of what is called. Who keeps them must keep `function` alive.
+cdef inline long long code_of(object function, int arguments):
+    if is_method(function, arguments):
+        return <long long><void*>PyCFunction_GET_FUNCTION(function)
+    return <long long><void*>(call_anything_with if arguments else call_anything)
+
+cdef inline long long owner_of(object function, int arguments):
+    return <long long><void*>(PyCFunction_GET_SELF(function) if is_method(function, arguments) else <PyObject*>function)
 
 cdef inline object call_with(long long code, long long owner, object argument):
     return (<plain_call><void*>code)(<PyObject*><void*>owner, <PyObject*>argument)
 
 # What the task of this number in a scheduler's table returns, None as 0.
 cdef inline long long run(SlotScheduler scheduler, long long number) except? -1:
-    cdef long long code = scheduler.table[4 * number]
-    if code != 0:
-        items = (<plain_call><void*>code)(<PyObject*><void*>scheduler.table[4 * number + 1], NULL)
-    else:
-        items = scheduler.functions[number]()
+    items = (<plain_call><void*>scheduler.table[4 * number])(<PyObject*><void*>scheduler.table[4 * number + 1], NULL)
     return 0 if items is None else items
 
 cdef class Task:

@@ -332,8 +332,7 @@ class SlotScheduler:
         """The schedule as flat lists; row r has the places from row_starts[r] on, and one more that is its end.
 
         `numbers`: of the task at each place, among `tasks` and their `functions`. `table` has ENTRY numbers for each
-        task: addresses of its C function and of the object that it belongs to, when it is compiled (code 0: call what
-        stands in `functions`), usual_ns, and how many calls took that.
+        task: the two addresses by which its function is called when compiled, usual_ns, and how many calls took that.
         usual_ns: what a call without items takes (ns), or -1 when every call must be looked at more closely.
         `leads`: ns from the start of the task at a place to that of the first one from there that may speak, at least;
         NEVER where none follows in its row.
@@ -371,7 +370,7 @@ class SlotScheduler:
         plain = task.kind == NORMAL_TASK and within and not self.recording
         self.functions[task.number] = task.routine
         self.table[at] = code_of(task.routine, 0)
-        self.table[at + 1] = owner_of(task.routine)
+        self.table[at + 1] = owner_of(task.routine, 0)
         self.table[at + 2] = int(task.base_cycles * self.ns_per_cycle) if plain else -1
         self.lay_leads()
 

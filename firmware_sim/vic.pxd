@@ -3,10 +3,9 @@ cimport cython
 from foundation.events cimport EventQueue
 from firmware_sim.scheduler cimport call_with, code_of, owner_of
 
-# What the handler returns for the message in the fields of `queue`, None as 0.
-cdef inline long long handle(InterruptSource source, EventQueue queue) except? -1:
-    items = call_with(source.code, source.owner, queue) if source.code != 0 else source.service(queue)
-    return 0 if items is None else items
+# What the handler returns for the message in the fields of `queue`.
+cdef inline object handle(InterruptSource source, EventQueue queue):
+    return call_with(source.code, source.owner, queue)
 
 # In both classes the fields that every request and every service touches come first, close together.
 @cython.final
@@ -19,6 +18,8 @@ cdef class InterruptSource:
     cdef public str name
     cdef public long long time, order, a, b, c, d, e, f
     cdef public object ref
+    @cython.final
+    cdef void note(self, long long cycles) noexcept
     cpdef int keep_message(self, EventQueue queue) except -1
     cpdef int give_message(self, EventQueue queue) except -1
 
@@ -30,5 +31,5 @@ cdef class InterruptController:
     cdef public double ns_per_cycle
     cdef public dict sources
     cpdef InterruptSource source(self, long long kind, long long index)
-    cpdef InterruptSource first_pending(self)
+    cpdef InterruptSource take_first(self)
     cpdef bint raise_source(self, InterruptSource source) noexcept

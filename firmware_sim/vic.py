@@ -49,7 +49,7 @@ class InterruptSource:
         self.name = f"{kind}/{index}"
         self.handler = None
         self.service = None  # what is called: the handler, or before it what gives it the message
-        # addresses of a compiled handler's C function and of the object it belongs to; 0: call `handler`
+        # the two addresses by which compiled code calls `service`
         self.code = 0
         self.owner = 0
         self.cost = 0
@@ -101,6 +101,20 @@ class InterruptSource:
         """Cycles of the longest service."""
         return max(self.noted_most, self.base_cycles if self.served > self.noted else 0)
 
+    def serve_by(self, service) -> None:
+        """Call `service` when it is served."""
+        self.service = service
+        self.code = code_of(service, 1)
+        self.owner = owner_of(service, 1)
+
+    @cython.final
+    def note(self, cycles: cython.longlong) -> cython.void:
+        """Note a service that took `cycles`."""
+        self.noted += 1
+        self.noted_cycles += cycles
+        if cycles > self.noted_most:
+            self.noted_most = cycles
+
     def settle(self) -> None:
         """Note the services so far: their cost is about to change."""
         self.noted_cycles, self.noted_most = self.total_cycles, self.max_cycles
@@ -108,9 +122,8 @@ class InterruptSource:
 
     def keep_message(self, queue: EventQueue) -> None:
         """Keep the message in the fields of `queue` until it is served."""
-        if self.code != 0 or self.service is self.handler:
-            self.service = self.serve_message
-            self.code = 0
+        if self.service is self.handler:
+            self.serve_by(self.serve_message)
         self.time = queue.time
         self.order = queue.order
         self.a = queue.a
@@ -178,9 +191,8 @@ class InterruptController:
             raise UserError(f"interrupt {kind}/{index}: slot {slot} is taken by {self.irq_list[slot].name}")
         self.detach(source)
         source.settle()
-        source.handler = source.service = handler
-        source.code = code_of(handler, 1)
-        source.owner = owner_of(handler)
+        source.handler = handler
+        source.serve_by(handler)
         source.name = name if name is not None else getattr(handler, "__name__", source.name)
         source.cost = cost
         source.per_item = per_item
@@ -224,18 +236,16 @@ class InterruptController:
 
     @cython.boundscheck(False)
     @cython.wraparound(False)
-    def first_pending(self):
-        """Who is served next, only while `pending` is not 0: the first FIQ source attached, else the lowest slot."""
-        place: cython.longlong = 0
-        if self.pending == self.newest.bit:
-            return self.newest  # alone, as nearly always
-        if self.pending >= 65536:  # FIRST_FIQ
-            while self.pending >> (place + 16) & 1 == 0:
+    def take_first(self):
+        """Who is served now, only while `pending` is not 0: the first FIQ source attached, else the lowest slot."""
+        first: InterruptSource = self.newest
+        place: cython.longlong = 16 if self.pending >= 65536 else 0  # FIRST_FIQ
+        if self.pending != first.bit:  # not alone, as it nearly always is
+            while self.pending >> place & 1 == 0:
                 place += 1
-            return cython.cast(InterruptSource, self.fiq_list[place])
-        while self.pending >> place & 1 == 0:
-            place += 1
-        return cython.cast(InterruptSource, self.irq_list[place])
+            first = self.fiq_list[place - 16] if place >= 16 else self.irq_list[place]
+        self.pending &= ~first.bit
+        return first
 
     @property
     def fiq_pending(self):

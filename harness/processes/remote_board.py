@@ -67,11 +67,10 @@ class RemoteBoard(Microcontroller):
 
     def _send_edges(self, line: EdgeLine) -> cython.void:
         """Make messages of the edges that have come on one line."""
-        edge: cython.longlong
         while line.find_next() < 1 << 62:
-            edge = line.take()
+            line.buffer.read += 1
             # order 256: stage pins; kind 1: PIN_EDGE
-            self.inbox.put(edge >> 2, 256, 1, line.pin, edge >> 1 & 1, line.partner_pin, edge & 1, 0, 0)
+            self.inbox.put(line.next_time, 256, 1, line.pin, line.levels >> 1, line.partner_pin, line.levels & 1, 0, 0)
 
     def begin(self, until: cython.longlong) -> cython.void:
         """Ask the board to run everything before `until` (ns), if that can matter already."""
