@@ -19,13 +19,14 @@ cdef class Body:
     cdef public double anchor_outer, anchor_inner, height_outer, height_inner, gap_outer, gap_inner
     cdef public bint brush, brushing, exact_spring, standing, outer_armed, inner_armed, foothold_due, lock_hip
     cdef public object terms
-    cdef public double M, el, r, d, gx, gy, kh, ks, Jf, JH, JA, heel, toe, stop_low, stop_high, inverse_smoothing
-    cdef public double mc_outer, mc_inner, mw_outer, mw_inner, J_outer, J_inner, C_outer, C_inner
+    cdef public double M, el, r, d, gx, gy, kh, ks, Jf, JH, inverse_JA, inverse_Jf, heel, toe, stop_low, stop_high, inverse_smoothing
+    cdef public double mc_outer, mc_inner, mw_outer, mw_inner, C_outer, C_inner
+    cdef public double m22_outer, m22_inner, mt_outer, mt_inner, i33_outer, i33_inner
     cdef public double elapsed, time_s, released_s, stall_s, strike_ahead, passing_gap
     cdef public double friction_ratio_max, mu, normal_force_min, fall_height, fall_lean, fall_split
     cdef public double[16] saved
     # the rest serves double stance, the sole, events and additional terms
-    cdef public double closing_rate, sole_k, sole_c, sole_v, stop_k, stop_c, hip_ay
+    cdef public double J_outer, J_inner, JA, closing_rate, sole_k, sole_c, sole_v, stop_k, stop_c, hip_ay
     cdef public double scuff_time_s, slip_s, brush_s, pull_s
     cdef public double spring_ab, spring_aabb, spring_l0, spring_k
     cdef public double extra_hip, extra_outer, extra_inner, extra_outer_motor, extra_inner_motor

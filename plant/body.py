@@ -163,6 +163,15 @@ class Body:
         self.gx = 0.0
         self.gy = 0.0
         self.set_slope(self.floor.slope_rad)
+        # of these alone: of the mass matrix what is constant, with a leg as stance leg and (inverse) as the other one
+        self.m22_outer = self.M * self.el * self.el - 2.0 * self.el * self.mc_outer + self.J_outer + self.JH
+        self.m22_inner = self.M * self.el * self.el - 2.0 * self.el * self.mc_inner + self.J_inner + self.JH
+        self.mt_outer = self.M * self.el - self.mc_outer
+        self.mt_inner = self.M * self.el - self.mc_inner
+        self.i33_outer = 1.0 / (self.J_outer + self.JH)
+        self.i33_inner = 1.0 / (self.J_inner + self.JH)
+        self.inverse_JA = 1.0 / self.JA
+        self.inverse_Jf = 1.0 / self.Jf if self.Jf > 0.0 else 0.0
         self.C_outer = p.outer_rolling_friction_Nms
         self.C_inner = p.inner_rolling_friction_Nms
         self.heel = p.arc_heel_rad
@@ -544,8 +553,8 @@ class Body:
         ks: cython.double = self.ks
         Jf: cython.double = self.Jf
         JH: cython.double = self.JH
-        iJA: cython.double = 1.0 / self.JA
-        iJf: cython.double = 0.0 if massless else (1.0 / Jf if Jf > 0.0 else 0.0)
+        iJA: cython.double = self.inverse_JA
+        iJf: cython.double = self.inverse_Jf
         heel: cython.double = self.heel
         toe: cython.double = self.toe
         low: cython.double = self.stop_low
@@ -566,15 +575,8 @@ class Body:
             up0, un0 = self.motor_outer_rate, self.motor_inner_rate
             sF, cF, st, ct = self.sin_foot_outer, self.cos_foot_outer, self.sin_leg_outer, self.cos_leg_outer
             sw, cw, sG, cG = self.sin_leg_inner, self.cos_leg_inner, self.sin_foot_inner, self.cos_foot_inner
-            mcs, mws, Js, mcw, mww, Jw = (
-                self.mc_outer,
-                self.mw_outer,
-                self.J_outer,
-                self.mc_inner,
-                self.mw_inner,
-                self.J_inner,
-            )
-            Cs, Cw = self.C_outer, self.C_inner
+            mts, mws, mcw, mww = self.mt_outer, self.mw_outer, self.mc_inner, self.mw_inner
+            m22, i33, Cs, Cw = self.m22_outer, self.i33_inner, self.C_outer, self.C_inner
             hip_drive = self.hip_drive
             s_drive, s_coulomb, s_viscous = self.outer_drive, self.outer_coulomb, self.outer_viscous
             w_drive, w_coulomb, w_viscous = self.inner_drive, self.inner_coulomb, self.inner_viscous
@@ -591,22 +593,12 @@ class Body:
             up0, un0 = self.motor_inner_rate, self.motor_outer_rate
             sF, cF, st, ct = self.sin_foot_inner, self.cos_foot_inner, self.sin_leg_inner, self.cos_leg_inner
             sw, cw, sG, cG = self.sin_leg_outer, self.cos_leg_outer, self.sin_foot_outer, self.cos_foot_outer
-            mcs, mws, Js, mcw, mww, Jw = (
-                self.mc_inner,
-                self.mw_inner,
-                self.J_inner,
-                self.mc_outer,
-                self.mw_outer,
-                self.J_outer,
-            )
-            Cs, Cw = self.C_inner, self.C_outer
+            mts, mws, mcw, mww = self.mt_inner, self.mw_inner, self.mc_outer, self.mw_outer
+            m22, i33, Cs, Cw = self.m22_inner, self.i33_outer, self.C_inner, self.C_outer
             hip_drive = -self.hip_drive
             s_drive, s_coulomb, s_viscous = self.inner_drive, self.inner_coulomb, self.inner_viscous
             w_drive, w_coulomb, w_viscous = self.outer_drive, self.outer_coulomb, self.outer_viscous
             Xs, Xw, Ys, Yw = self.anchor_inner, self.anchor_outer, self.height_inner, self.height_outer
-        m22: cython.double = M * el * el - 2.0 * el * mcs + Js + JH
-        mts: cython.double = M * el - mcs
-        i33: cython.double = 1.0 / (Jw + JH)
         half: cython.double = 0.5 * h
         quarter: cython.double = 0.25 * h
         sixth: cython.double = h / 6.0
@@ -625,9 +617,6 @@ class Body:
         uG: cython.double = uG0
         up: cython.double = up0
         un: cython.double = un0
-        # first accelerations, and sums k1 + k2 + k3
-        kF = ks_ = kw = kG = kp = kn = 0.0
-        qF = qs = qw = qG = qp = qn = 0.0
         for stage in range(stages):
             # torques of the motors, first: they are calls, and before a call everything in registers is put aside
             hd = us - uw
@@ -838,6 +827,7 @@ class Body:
                     self.motor_outer_acc = an
                 if stages == 1:
                     return
+                # k: first accelerations; q: sums k1 + k2 + k3
                 qF = kF = aF
                 qs = ks_ = as_
                 qw = kw = aw
@@ -994,8 +984,8 @@ class Body:
         stage: cython.longlong
         M: cython.double = self.M
         JH: cython.double = self.JH
-        iJA: cython.double = 1.0 / self.JA
-        iJf: cython.double = 0.0 if massless else 1.0 / self.Jf
+        iJA: cython.double = self.inverse_JA
+        iJf: cython.double = self.inverse_Jf
         eps: cython.double = self.inverse_smoothing
         mco: cython.double = self.mc_outer
         mwo: cython.double = self.mw_outer
@@ -1752,23 +1742,26 @@ class Body:
 
     def _keep_forces(self, h: cython.double) -> cython.void:
         """Worst friction ratio and pull of the walk; time with more than the floor's friction."""
+        outer: cython.double = self.outer_Fy
+        inner: cython.double = self.inner_Fy
+        outer_along: cython.double = fabs(self.outer_Fx)
+        inner_along: cython.double = fabs(self.inner_Fx)
+        least: cython.double = outer if outer < inner else inner
         slips: cython.bint = False
-        if self.outer_Fy > 5.0:  # N; below that the ratio says nothing: chosen by us
-            if fabs(self.outer_Fx) > self.friction_ratio_max * self.outer_Fy:
-                self.friction_ratio_max = fabs(self.outer_Fx) / self.outer_Fy
-            slips = fabs(self.outer_Fx) > self.mu * self.outer_Fy
-        if self.inner_Fy > 5.0:
-            if fabs(self.inner_Fx) > self.friction_ratio_max * self.inner_Fy:
-                self.friction_ratio_max = fabs(self.inner_Fx) / self.inner_Fy
-            slips = slips or fabs(self.inner_Fx) > self.mu * self.inner_Fy
+        if outer > 5.0:  # N; below that the ratio says nothing: chosen by us
+            if outer_along > self.friction_ratio_max * outer:
+                self.friction_ratio_max = outer_along / outer
+            slips = outer_along > self.mu * outer
+        if inner > 5.0:
+            if inner_along > self.friction_ratio_max * inner:
+                self.friction_ratio_max = inner_along / inner
+            slips = slips or inner_along > self.mu * inner
         if slips:
             self.slip_s += h
-        if self.outer_Fy < -1.0 or self.inner_Fy < -1.0:
+        if least < self.normal_force_min:
+            self.normal_force_min = least
+        if least < -1.0:
             self.pull_s += h
-        if self.outer_Fy < self.normal_force_min:
-            self.normal_force_min = self.outer_Fy
-        if self.inner_Fy < self.normal_force_min:
-            self.normal_force_min = self.inner_Fy
 
     def _fall(self, cause) -> None:
         """The walk ends here: the body lies still, with the cause."""

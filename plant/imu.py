@@ -200,15 +200,18 @@ class Imu:
         line: ByteBuffer = self.bytes
         at: cython.longlong = line.count
         time: cython.longlong = self.line_free_ns
+        byte_ns: cython.longlong = self.byte_ns
+        total: cython.longlong = 0
         shift: cython.longlong
         byte: cython.longlong
         for shift in range(24, -8, -8):
             byte = word >> shift & 255
-            time += self.byte_ns
+            time += byte_ns
             line.times[at] = time
             line.values[at] = byte
-            self.checksum += byte
+            total += byte
             at += 1
+        self.checksum += total
         self.line_free_ns = time
         line.count = at
 

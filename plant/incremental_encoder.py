@@ -223,8 +223,11 @@ class IncrementalEncoder:
             m0 = x * rate0
             m1 = x * rate1
         du = u1 - u0
-        g0 = du / m0 if m0 != 0.0 else 0.0
-        g1 = du / m1 if m1 != 0.0 else 0.0
+        g0 = 0.0
+        g1 = 0.0
+        if m0 * m1 > 0.0:  # the same way at both ends
+            g0 = du / m0
+            g1 = du / m1
         if g0 < 0.5 or g0 > 2.0 or g1 < 0.5 or g1 > 2.0:
             if m0 != 0.0 or m1 != 0.0 or du != 0.0:
                 self._turning(t0, t1, u0, u1, m0, m1)

@@ -152,13 +152,17 @@ class MotorUnit:
         in pieces otherwise (EQUATIONS 10.2-10.7).
         """
         drive: Drive = self.drive
+        if t1 <= t0:
+            return
+        if drive.next_change_ns <= t0:  # before anything else: it is a call
+            drive.apply(t0)
         h: cython.double = (t1 - t0) * 1e-9
         R: cython.double = self.winding_ohm + self.series_ohm
         GK: cython.double = self.mounting * self.gear * self.K
         contact_V: cython.double = self.contact_drop_V
         back_emf_V: cython.double = GK * rate_rad_s
         amps: cython.double = self.bridge_current_A
-        d: cython.double
+        d: cython.double = drive.duty
         x: cython.double
         drop: cython.double
         sign: cython.double
@@ -167,11 +171,6 @@ class MotorUnit:
         part: cython.double = -1.0
         total_As: cython.double
         from_battery_As: cython.double = 0.0
-        if t1 <= t0:
-            return
-        if drive.next_change_ns <= t0:
-            drive.apply(t0)
-        d = drive.duty
         if amps == 0.0 and drive.switching_leads == 0 and drive.next_change_ns > t1:
             x = d * battery_V - back_emf_V
             if -contact_V <= x <= contact_V:
