@@ -299,11 +299,10 @@ class CanRouterBoard(Microcontroller):
 
         Where both buffers are taken, the end of a transmission will wake the main loop.
         """
-        router: Router = self.router
         controller: CanController
         channel: cython.longlong
         for channel in range(1, 5):
-            if router.tx_read[channel] != router.tx_write[channel]:
+            if self.router.tx_read[channel] != self.router.tx_write[channel]:
                 controller = self.controllers[channel - 1]
                 if not controller.free_at(1, at) and not controller.free_at(2, at):
                     controller.tell_first_end()
@@ -323,14 +322,17 @@ class CanRouterBoard(Microcontroller):
         passed: cython.longlong
         pairs: cython.longlong
         moved: cython.longlong
+        channel: cython.longlong
+        to_route: cython.bint
         router: Router = self.router
-        link: RouterSspLink = self.link
-        while (
-            router.rx_read != router.rx_write
-            or link.received_read != link.received_write
-            or router.own_read != router.own_write
-            or (router.waiting > 0 and self.can_flush(at))
-        ):
+        while True:
+            to_route = (
+                router.rx_read != router.rx_write
+                or self.link.received_read != self.link.received_write
+                or router.own_read != router.own_write
+            )
+            if not to_route and (router.waiting == 0 or not self.can_flush(at)):
+                break
             began = at
             if self.idle:
                 self.idle = False
@@ -341,14 +343,15 @@ class CanRouterBoard(Microcontroller):
                     pairs += 1
                     at += self.pair_ns - passed
                 self.flush_next = (self.flush_next + pairs) & 3
-            moved = router.route_step(at)
+            moved = router.route_step(at) if to_route else 0
             at += self.route_ns[moved]
             moved = 0
-            if router.waiting > 0:
+            channel = self.flush_next + 1
+            if router.tx_read[channel] != router.tx_write[channel]:
                 self.now = at
                 moved = self.flush(self.controllers[self.flush_next], began)
             at += self.flush_ns[moved]
-            self.flush_next = (self.flush_next + 1) & 3
+            self.flush_next = channel & 3
             if at >= self.horizon or at >= self.alarm_time or at >= self.tick_time or at >= self.inbox.head_time:
                 return at
         if self.idle:

@@ -54,7 +54,7 @@ class NetworkClock:
             # 40: eight bytes, single shot
             if controller.free_at(3, controller.chip.instant) and controller.transmit(3, 0, 40, ms, ms):
                 self.sent[controller.number] += 1
-                self.load.count(controller.number)
+                self.load.counts[controller.number] += 1
             else:
                 self.skipped[controller.number] += 1
         return ms

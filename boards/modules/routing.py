@@ -120,10 +120,7 @@ class Router:
         row: cython.longlong = 5 * self.rx_write
         self.load.counts[channel] += 1
         if following == self.rx_read:
-            self.receive_lost += 1
-            self.receive_lost_from[channel] += 1
-            self.report(self.receive_full_codes[channel])
-            return False
+            return self._lose(channel)
         if self.one_frame_lag:
             row = 5 * following
         self.rx_rows[row] = channel
@@ -133,6 +130,13 @@ class Router:
         self.rx_rows[row + 4] = word1
         self.rx_write = following
         return True
+
+    def _lose(self, channel: cython.longlong) -> cython.bint:
+        """A frame from `channel` finds the ring full: False."""
+        self.receive_lost += 1
+        self.receive_lost_from[channel] += 1
+        self.report(self.receive_full_codes[channel])
+        return False
 
     def send(self, identifier: cython.longlong, word0: cython.longlong, word1: cython.longlong) -> cython.bint:
         """A frame of the router itself into its own ring (7 fit); False when it is lost."""
@@ -148,23 +152,14 @@ class Router:
         self.own_write = following
         return True
 
-    def has_work(self) -> cython.bint:
-        """True while a frame waits at any of the three sources."""
-        return (
-            self.rx_read != self.rx_write
-            or self.own_read != self.own_write
-            or self.ssp.received_read != self.ssp.received_write
-        )
-
     def route_step(self, now: cython.longlong) -> cython.longlong:
         """Move up to three frames, one each from the link, the CAN ring and the own ring; return how many."""
         moved: cython.longlong = 0
         read: cython.longlong = self.rx_read
         row: cython.longlong = 5 * read
-        ssp: RouterSspLink = self.ssp
-        if ssp.received_read != ssp.received_write and ssp.take():
+        if self.ssp.received_read != self.ssp.received_write and self.ssp.take():
             self.load.counts[0] += 1
-            self.route(0, ssp.rx_id, ssp.rx_flags, ssp.rx_word0, ssp.rx_word1, now)
+            self.route(0, self.ssp.rx_id, self.ssp.rx_flags, self.ssp.rx_word0, self.ssp.rx_word1, now)
             moved += 1
         if read != self.rx_write:
             self.rx_read = (read + 1) & 63
@@ -201,39 +196,61 @@ class Router:
     ) -> cython.longlong:
         """Learn where the frame came from and copy it to its destinations; return the number of copies."""
         mask: cython.longlong
-        channel: cython.longlong
-        n: cython.longlong = 0
         if not 0 <= identifier <= 2031:
             self.unroutable += 1
             return 0
         self.routed += 1
-        if flags & 16 and 1 <= source <= 4:  # FLAG_REMOTE: somebody on that bus asks for the value
-            self.table.subscribe(identifier, source)
-            channel = self.table.rows[identifier] >> 8
-            if 1 <= channel <= 4 and channel != source:
-                self.queue(channel, identifier, flags, word0, word1)
-                n += 1
-            self.copies += n
-            return n
+        if flags & 16 and 1 <= source <= 4:  # FLAG_REMOTE
+            return self._ask(source, identifier, flags, word0, word1)
         mask = self.table.rows[identifier]
         if mask >> 8 != source:
             self.table.learn(identifier, source)
         mask = mask & 0xFF & ~(1 << source)
         if mask == 1:  # nearly all that satellites send
-            self.ssp.push(identifier, flags, word0, word1, now)
             self.copies += 1
+            self.ssp.push(identifier, flags, word0, word1, now)
             return 1
+        return self._spread(mask, identifier, flags, word0, word1, now)
+
+    def _ask(
+        self,
+        source: cython.longlong,
+        identifier: cython.longlong,
+        flags: cython.longlong,
+        word0: cython.longlong,
+        word1: cython.longlong,
+    ) -> cython.longlong:
+        """Somebody on bus `source` asks for a value: it goes there from now on, and the frame where it comes from."""
+        channel: cython.longlong = self.table.rows[identifier] >> 8
+        self.table.subscribe(identifier, source)
+        if not 1 <= channel <= 4 or channel == source:
+            return 0
+        self.queue(channel, identifier, flags, word0, word1)
+        self.copies += 1
+        return 1
+
+    def _spread(
+        self,
+        mask: cython.longlong,
+        identifier: cython.longlong,
+        flags: cython.longlong,
+        word0: cython.longlong,
+        word1: cython.longlong,
+        now: cython.longlong,
+    ) -> cython.longlong:
+        """Copy a frame to all destinations of `mask`; return their number."""
+        channel: cython.longlong = 0
+        n: cython.longlong = 0
         if mask & 1:
             self.ssp.push(identifier, flags, word0, word1, now)
             n += 1
         mask >>= 1
-        channel = 1
         while mask != 0:
+            channel += 1
             if mask & 1:
                 self.queue(channel, identifier, flags, word0, word1)
                 n += 1
             mask >>= 1
-            channel += 1
         self.copies += n
         return n
 
@@ -259,10 +276,6 @@ class Router:
         self.tx_rows[row + 3] = word1
         self.tx_write[channel] = following
         return True
-
-    def has_frame_for(self, channel: cython.longlong) -> cython.bint:
-        """True while the transmit ring of `channel` holds a frame."""
-        return self.tx_read[channel] != self.tx_write[channel]
 
     def frames_for(self, channel: cython.longlong) -> cython.longlong:
         """Frames in the transmit ring of `channel`."""

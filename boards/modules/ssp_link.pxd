@@ -6,6 +6,7 @@ cimport cython
 cdef class UnpackedFrames:
     cdef public long long[288] rows
     cpdef long long unpack(self, SspSegment segment, long long place) noexcept
+    cpdef void move(self, long long place, long long to) noexcept
 
 @cython.final
 cdef class MainBrainSspLink:
@@ -29,6 +30,9 @@ cdef class MainBrainSspLink:
     cpdef long long parse(self) except? <long long>-1
     cpdef bint send(self, long long identifier, long long word0, long long word1) except? -1
     cpdef long long flush(self) noexcept
+    cdef bint _begin_segment(self) except? -1
+    cdef bint _miss(self) except? -1
+    cdef int _note(self, long long code) except -1
 
 @cython.final
 cdef class RouterSspLink:
@@ -55,6 +59,10 @@ cdef class RouterSspLink:
     cpdef void receive(self, SspSegment segment) noexcept
     cpdef bint take(self) except? -1
     cpdef bint has_segments(self) noexcept
+    cdef bint _lose(self) except? -1
+    cdef bint _put_over_the_end(self, long long header, long long word0, long long word1) except? -1
+    cdef int _miss_segment(self) except -1
+    cdef int _drop_segment(self) except -1
     cdef void _begin_segment(self) noexcept
     cdef void _put(self, long long word) noexcept
     cdef void _cut(self, SspSegment segment, long long used) noexcept

@@ -1,6 +1,6 @@
-# cython: boundscheck=False, wraparound=False
-# (every index below is a half-word 0 ... 30 of a segment, a segment of a circle, wrapped where it is moved, or a frame
-# of those that the receiving end's segments can hold)
+# cython: boundscheck=False, wraparound=False, cdivision=True
+# (what is divided is never below 0; every index below is a half-word 0 ... 30 of a segment, a segment of a circle,
+# wrapped where it is moved, or a frame of those that the receiving end's segments can hold)
 """The serial link between the router and the main brain: both ends, as logic on segments.
 
 A segment is 31 half-words: up to six frames of five half-words, zeros, and a checksum. The router is the
@@ -60,10 +60,7 @@ def empty_segment() -> SspSegment:
 
 def restart(segment: SspSegment) -> cython.void:
     """Make it a valid segment without frames again."""
-    i: cython.longlong
-    for i in range(segment.used):
-        segment.words[i] = 0
-    segment.used = 0
+    segment.clear()
     segment.words[30] = 1
 
 
@@ -137,6 +134,12 @@ class UnpackedFrames:
             i += 1
         return frames if total & 0xFFFF == segment.words[30] else -1
 
+    def move(self, place: cython.longlong, to: cython.longlong) -> cython.void:
+        """Copy the frame of one place to another."""
+        i: cython.longlong
+        for i in range(3):
+            self.rows[3 * to + i] = self.rows[3 * place + i]
+
 
 class MainBrainSspLink:
     """The slave's end: 16 segments each way, parsed and filled once per slot of the main brain.
@@ -189,32 +192,36 @@ class MainBrainSspLink:
         frames: cython.longlong
         place: cython.longlong = self.received_frames
         i: cython.longlong
-        unpacked: UnpackedFrames
         if self.received_count == 16:
-            self.receive_full += 1
-            self.report(self.code_receive_full)
-            return False
+            return self._miss()
         if self.segments_received == 0 and self.first_is_junk:
             segment = self.shifted(segment)
         self.received_count += 1
         self.segments_received += 1
         if segment.used == 0 and segment.words[30] == 1:
             return True
-        unpacked = self.unpacked
-        frames = unpacked.unpack(segment, place)
+        frames = self.unpacked.unpack(segment, place)
         if frames < 0:
-            self.received_errors.append(self.code_checksum)
+            self._note(self.code_checksum)
         for i in range(place, place + frames):
-            if unpacked.rows[3 * i] > self.last_id:
-                self.received_errors.append(self.code_id_out_of_range)
+            if self.unpacked.rows[3 * i] > self.last_id:
+                self._note(self.code_id_out_of_range)
                 continue
             if place < i:
-                unpacked.rows[3 * place] = unpacked.rows[3 * i]
-                unpacked.rows[3 * place + 1] = unpacked.rows[3 * i + 1]
-                unpacked.rows[3 * place + 2] = unpacked.rows[3 * i + 2]
+                self.unpacked.move(i, place)
             place += 1
         self.received_frames = place
         return True
+
+    def _miss(self) -> cython.bint:
+        """A segment finds no place: False."""
+        self.receive_full += 1
+        self.report(self.code_receive_full)
+        return False
+
+    def _note(self, code: cython.longlong) -> None:
+        """Keep an error until `parse` reports it."""
+        self.received_errors.append(code)
 
     @property
     def ids(self):
@@ -280,18 +287,21 @@ class MainBrainSspLink:
 
         Call `flush` after the last frame of a slot.
         """
-        segment: SspSegment = self.packing
-        if segment is None:
-            if self.queue_count >= 16:
-                self.transmit_full += 1
-                self.report(self.code_transmit_full)
-                return False
-            segment = self.queue[(self.queue_read + self.queue_count) % 18]
-            restart(segment)
-            self.packing = segment
+        if self.packing is None and not self._begin_segment():
+            return False
         self.frames_sent += 1
-        if add_frame(segment, (identifier & 0x7FF) | 0x7800, word0, word1) == 30:
+        if add_frame(self.packing, (identifier & 0x7FF) | 0x7800, word0, word1) == 30:
             self.flush()
+        return True
+
+    def _begin_segment(self) -> cython.bint:
+        """Let an empty segment be the one that is packed; False when all are queued."""
+        if self.queue_count >= 16:
+            self.transmit_full += 1
+            self.report(self.code_transmit_full)
+            return False
+        self.packing = cython.cast(SspSegment, self.queue[(self.queue_read + self.queue_count) % 18])
+        restart(self.packing)
         return True
 
     def flush(self) -> cython.longlong:
@@ -369,22 +379,29 @@ class RouterSspLink:
         `flags` as in foundation.events; `now` is the instant in ns at which the pushing begins.
         """
         header: cython.longlong = (identifier & 0x7FF) | 0x7800
-        used: cython.longlong = self.packing.used
         if self.half_words > 494:
-            self.transmit_lost += 1
-            self.report(self.code_transmit_full)
-            return False
+            return self._lose()
         if flags & 16:  # FLAG_REMOTE
             header |= 0x8000
         self.half_words += 5
         self.push_time = now
-        if used > 25:
-            if used < 30:  # a frame was cut before: this one straddles two segments
-                for word in (header, word0 >> 16, word0, word1 >> 16, word1):
-                    self._put(word & 0xFFFF)
-                return True
+        if self.packing.used > 25:
+            if self.packing.used < 30:  # a frame was cut before: this one straddles two segments
+                return self._put_over_the_end(header, word0, word1)
             self._begin_segment()
         add_frame(self.packing, header, word0, word1)
+        return True
+
+    def _lose(self) -> cython.bint:
+        """A frame finds no room: False."""
+        self.transmit_lost += 1
+        self.report(self.code_transmit_full)
+        return False
+
+    def _put_over_the_end(self, header: cython.longlong, word0: cython.longlong, word1: cython.longlong) -> cython.bint:
+        """Append a frame of which only a part fits into the segment being packed: True."""
+        for word in (header, word0 >> 16, word0, word1 >> 16, word1):
+            self._put(word & 0xFFFF)
         return True
 
     def _begin_segment(self) -> cython.void:
@@ -434,15 +451,17 @@ class RouterSspLink:
         return segment
 
     def _cut(self, segment: SspSegment, used: cython.longlong) -> cython.void:
-        """Leave `used` half-words in the first segment; the others come before those of the second, the last one."""
+        """Leave `used` half-words in the first segment; the others, of the newest frame, go to the head of the last."""
+        moved: cython.longlong = segment.used - used
+        i: cython.longlong
         if self.first == self.last:
             self._begin_segment()
-        words = [segment.words[i] for i in range(used, segment.used)]
-        words += [self.packing.words[i] for i in range(self.packing.used)]
+        for i in range(self.packing.used - 1, -1, -1):
+            self.packing.words[i + moved] = self.packing.words[i]
+        for i in range(moved):
+            self.packing.words[i] = segment.words[used + i]
+        finish(self.packing, self.packing.used + moved)
         finish(segment, used)
-        restart(self.packing)
-        for word in words:
-            self._put(word)
 
     def tick(self, now: cython.longlong) -> SspSegment:
         """The 200 us interrupt: judge the exchange that should be over, return the next segment.
@@ -452,19 +471,23 @@ class RouterSspLink:
         """
         following: cython.longlong
         if self.exchange_running:
-            if not self.exchange_done:
-                self.low_rate += 1
-                self.report(self.code_low_rate)
+            following = (self.received_write + 1) & 7
+            if not self.exchange_done or following == self.received_read:
+                self._miss_segment()
             else:
-                following = (self.received_write + 1) & 7
-                if following == self.received_read:
-                    self.receive_overwritten += 1
-                    self.report(self.code_receive_overwritten)
-                else:
-                    self.received_write = following
+                self.received_write = following
         self.exchange_running = True
         self.exchange_done = False
         return self.next_segment(now)
+
+    def _miss_segment(self) -> None:
+        """The exchange brought no segment, or there is no place for it."""
+        if not self.exchange_done:
+            self.low_rate += 1
+            self.report(self.code_low_rate)
+        else:
+            self.receive_overwritten += 1
+            self.report(self.code_receive_overwritten)
 
     def receive(self, segment: SspSegment) -> cython.void:
         """The end of an exchange: the main brain's half-words lie in the current place."""
@@ -475,6 +498,11 @@ class RouterSspLink:
         self.received_frames[self.received_write] = frames
         self.exchange_done = True
         self.segments_received += 1
+
+    def _drop_segment(self) -> None:
+        """The checksum of the segment that is read next is wrong."""
+        self.checksum_errors += 1
+        self.report(self.code_checksum)
 
     def has_segments(self) -> cython.bint:
         """True while a received segment waits to be read, empty or not."""
@@ -487,21 +515,18 @@ class RouterSspLink:
         """
         frames: cython.longlong
         row: cython.longlong
-        unpacked: UnpackedFrames
         while self.received_read != self.received_write:
             frames = self.received_frames[self.received_read]
             if self.position < frames:
-                unpacked = self.unpacked
                 row = 3 * (self.received_read * 6 + self.position)
-                self.rx_id = unpacked.rows[row]
-                self.rx_word0 = unpacked.rows[row + 1]
-                self.rx_word1 = unpacked.rows[row + 2]
+                self.rx_id = self.unpacked.rows[row]
+                self.rx_word0 = self.unpacked.rows[row + 1]
+                self.rx_word1 = self.unpacked.rows[row + 2]
                 self.position += 1
                 self.frames_received += 1
                 return True
             if frames < 0:
-                self.checksum_errors += 1
-                self.report(self.code_checksum)
+                self._drop_segment()
             self.position = 0
             self.received_read = (self.received_read + 1) & 7
         return False

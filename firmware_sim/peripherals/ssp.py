@@ -34,9 +34,7 @@ class SspSegment:
 
     def clear(self) -> cython.void:
         """All zeros, nothing used."""
-        i: cython.longlong
-        for i in range(31):
-            self.words[i] = 0
+        self.words = [0] * 31
         self.used = 0
 
     def copy_from(self, other) -> cython.void:
