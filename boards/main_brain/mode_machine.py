@@ -16,6 +16,9 @@ from boards.main_brain.state_machine import State, StateMachine
 from boards.main_brain.steering_machine import SteeringMachine
 from datatable.store import DataStore
 
+if not cython.compiled:
+    from foundation.numbers import elapsed_u32
+
 READS = (
     "TIMESTAMP",
     "UI_BUTTONS",
@@ -104,7 +107,7 @@ class ModeMachine:
         )
         self.store.set_int(self.FSM_RESET, 1)
 
-    def update(self) -> cython.void:
+    def update(self) -> None:
         """One slot: keys, then the machines."""
         buttons: cython.longlong = self.store.get_int(self.UI_BUTTONS)
         self.pressed = buttons & ~self.buttons
@@ -166,7 +169,7 @@ class ModeMachine:
         """Every 4 s the next of battery, steps, metres; a song every 3000 steps; a light for late pushes."""
         store: DataStore = self.store
         now: cython.longlong = store.stamp(self.TIMESTAMP)
-        elapsed: float = (now - self.page_time) & 0xFFFFFFFF
+        elapsed: cython.longlong = elapsed_u32(now, self.page_time)
         song: float = store.get_float(self.P_UI_SONG_STEPS)
         steps: cython.longlong = store.get_int(self.E_STEP_COUNT)
         limit: float = store.get_float(self.P_UI_PP2HS_TTIME)

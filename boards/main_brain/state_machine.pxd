@@ -1,3 +1,5 @@
+from firmware_sim.scheduler cimport call
+
 cdef class State:
     cdef public long long number
     cdef public str name

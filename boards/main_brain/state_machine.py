@@ -13,6 +13,9 @@ Conditions and actions are callables without arguments; conditions must not chan
 
 import cython
 
+if not cython.compiled:
+    from firmware_sim.calls import call
+
 
 class State:
     """One state. `entry`, `main`, `exit`: callables or None; `machines`: the machines nested in it."""
@@ -31,7 +34,7 @@ class State:
         machine: StateMachine
         i: cython.longlong
         if self.main is not None:
-            self.main()
+            call(self.main)
         for i in range(len(self.machines)):
             machine = self.machines[i]
             machine.step()
@@ -106,13 +109,13 @@ class StateMachine:
         i: cython.longlong
         for i in range(len(state.transitions)):
             transition = state.transitions[i]
-            if transition.condition():
+            if call(transition.condition):
                 if not self.entered:
                     if state.entry is not None:
-                        state.entry()
+                        call(state.entry)
                     state.run_main()
                 if state.exit is not None:
-                    state.exit()
+                    call(state.exit)
                 self.changes += 1
                 state = transition.target
                 self.current = state
@@ -122,7 +125,7 @@ class StateMachine:
         if not self.entered:
             self.entered = True
             if state.entry is not None:
-                state.entry()
+                call(state.entry)
         state.run_main()
 
 
