@@ -7,6 +7,7 @@ cimport cython
 cdef class ExecutionTimer:
     cdef public Microcontroller chip
     cdef public NetworkTime time
-    cdef public long longest, longest_ever
+    cdef public long long longest_ns, longest_ever_ns
+    cpdef long long cycles(self, long long time_ns) noexcept
     cpdef double seconds(self) noexcept
     cpdef double longest_seconds(self) noexcept

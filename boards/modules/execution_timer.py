@@ -8,7 +8,8 @@ from firmware_sim.microcontroller import Microcontroller
 
 
 class ExecutionTimer:
-    """`longest` and `longest_ever`: cycles from the slot's start to the last entry of its row.
+    """`longest_ns` and `longest_ever_ns`: from the slot's start to the last entry of its row; `longest` and
+    `longest_ever`: the same in cycles of the core, as the slot timer counts them.
 
     `longest` starts anew while the low 8 bits of the network time are 0, about every 256 ms.
     """
@@ -16,21 +17,35 @@ class ExecutionTimer:
     def __init__(self, chip: Microcontroller, time: NetworkTime) -> None:
         self.chip = chip
         self.time = time
-        self.longest = 0
-        self.longest_ever = 0
+        self.longest_ns = 0
+        self.longest_ever_ns = 0
 
     def record(self) -> None:
         """Last entry of every row: read the slot timer's count."""
-        cycles: cython.longlong = self.chip.cycles_since_tick()
-        if self.time.ms & 255 == 0 or cycles > self.longest:
-            self.longest = cycles
-        if cycles > self.longest_ever:
-            self.longest_ever = cycles
+        since: cython.longlong = self.chip.now - self.chip.match_time
+        if since > self.longest_ns or self.time.ms & 255 == 0:
+            self.longest_ns = since
+            if since > self.longest_ever_ns:
+                self.longest_ever_ns = since
+
+    @property
+    def longest(self):
+        """Cycles."""
+        return self.cycles(self.longest_ns)
+
+    @property
+    def longest_ever(self):
+        """Cycles."""
+        return self.cycles(self.longest_ever_ns)
+
+    def cycles(self, time_ns: cython.longlong) -> cython.longlong:
+        """What the slot timer counts in `time_ns`."""
+        return int(time_ns * self.chip.cycles_per_ns)
 
     def seconds(self) -> cython.double:
         """EXECUTION_TIME, s."""
-        return self.longest * (1.0 / self.chip.hz)
+        return self.cycles(self.longest_ns) * (1.0 / self.chip.hz)
 
     def longest_seconds(self) -> cython.double:
         """MAX_EXECUTION_TIME, s."""
-        return self.longest_ever * (1.0 / self.chip.hz)
+        return self.cycles(self.longest_ever_ns) * (1.0 / self.chip.hz)
