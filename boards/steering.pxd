@@ -1,6 +1,7 @@
 from boards.motor_board cimport MotorBoard
 from firmware_sim.scheduler cimport Schedule
-from foundation.numbers cimport divide_toward_zero
+
+cpdef long long whole(long long value) noexcept
 
 cdef long long CENTRE_COUNTS, LIMIT_COUNTS, SENSOR
 

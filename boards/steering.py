@@ -14,9 +14,6 @@ from datatable.generated import errors as codes
 from datatable.generated import mcsi as table
 from firmware_sim.scheduler import Schedule, Task, Wait
 
-if not cython.compiled:
-    from foundation.numbers import divide_toward_zero
-
 __all__ = ["ANALOG", "PINS", "WORDS", "SteeringBoard"]
 
 # (place, multiplexer code, gain code): single-ended 0 times 2, 4-5 times 2, 2-3 times 20
@@ -40,6 +37,11 @@ LIMITS = dict(
 CENTRE_COUNTS = 4803  # of the limit check
 LIMIT_COUNTS = 200
 SENSOR = 0  # place in SEQUENCE
+
+
+def whole(value: cython.longlong) -> cython.longlong:
+    """The whole part of a 16.16 number, towards zero."""
+    return value >> 16 if value >= 0 else -(-value >> 16)
 
 
 class SteeringBoard(MotorBoard):
@@ -134,9 +136,8 @@ class SteeringBoard(MotorBoard):
             self.check()
         if not self.direct:
             return
-        duty = divide_toward_zero(self.compliance.command, 65536)
-        duty = self.limits.limit_duty(duty << 16, self.readings.motor_current_fixed())
-        duty = divide_toward_zero(duty, 65536)
+        duty = whole(self.compliance.command)
+        duty = whole(self.limits.limit_duty(duty << 16, self.readings.motor_current_fixed()))
         if (duty > 0 and self.current_control.block_positive) or (duty < 0 and self.current_control.block_negative):
             duty = 0
         self.output.write(duty)

@@ -61,15 +61,14 @@ class CurrentControl:
         False in the first two calls, which do nothing else than feed.
         """
         off: cython.bint
-        output: MotorOutput = self.output
-        output.feed_watchdog()
+        self.output.feed_watchdog()
         if self.calls < 2:  # START_CALLS
             self.calls += 1
             return False
         self.limits.monitor(current)
         off = self.limits.too_hot or self.limits.overloaded
-        if off != output.stopped:
-            output.stopped = off
+        if off != self.output.stopped:
+            self.output.stopped = off
             if off:
                 self.leds.on(0)  # GREEN
             else:

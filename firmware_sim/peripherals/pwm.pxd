@@ -10,7 +10,7 @@ cdef class Pwm(Peripheral):
     # the rest
     cdef public long long MR0, MR1, MR3, MR4, MR5, hz, phase_ns
     cdef public long long latched_MR1, latched_MR3, latched_MR4, latched_MR5
-    cpdef int write(self, long long MR2=*, long long MR6=*) except -1
+    cpdef int write(self, long long MR2, long long MR6) except -1
     cpdef int latch(self, long long mask) except -1
     cdef int _count_periods(self) except -1
     cdef void _find_period(self) noexcept

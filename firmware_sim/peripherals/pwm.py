@@ -46,17 +46,15 @@ class Pwm(Peripheral):
         self.rest = 0  # what `period_start` was rounded down by, in 1/rate ns
         self._count_periods()
 
-    def write(self, MR2: cython.longlong = -1, MR6: cython.longlong = -1) -> None:
-        """Write the two bridge leads (counts; -1 leaves one as it is) and enable their latches."""
-        if MR2 >= 0:
-            self.MR2 = MR2
-        if MR6 >= 0:
-            self.MR6 = MR6
+    def write(self, MR2: cython.longlong, MR6: cython.longlong) -> None:
+        """Write the two bridge leads (counts) and enable their latches."""
+        self.MR2 = MR2
+        self.MR6 = MR6
         self.LER = (1 << 2) | (1 << 6)
         self._find_period()
-        self.latched_MR2 = self.MR2
-        self.latched_MR6 = self.MR6
-        self.chip.outbox.push(self.period_start, 0, 35, self.MR2, self.MR6, self.latched_MR0)  # PWM_UPDATE
+        self.latched_MR2 = MR2
+        self.latched_MR6 = MR6
+        self.chip.outbox.push(self.period_start, 0, 35, MR2, MR6, self.latched_MR0)  # PWM_UPDATE
 
     def latch(self, mask: cython.longlong) -> None:
         """Write PWMLER: the match values whose bits are set take effect at the next period."""

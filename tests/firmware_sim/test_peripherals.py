@@ -202,7 +202,7 @@ def test_600_counts_at_60_megahertz_are_100_kilohertz_and_writes_wait_for_the_ne
     pwm.write(MR2=250, MR6=0)
     assert sent(chip) == [(130_000, PWM_UPDATE, 250, 0, 600)]
     chip.now = 130_000
-    pwm.write(MR6=600)
+    pwm.write(MR2=250, MR6=600)
     assert sent(chip) == [(130_000, PWM_UPDATE, 250, 600, 600)]
 
 
@@ -216,7 +216,7 @@ def test_periods_begin_at_ticks_of_the_crystal_whatever_the_pauses(ppb, period):
     chip.now = 123_456
     for pause in (0, 1, 500_000, 9_999, 10_000, 1_999_999_999, 2_000_000_001, 7, 3_600_000_000_000, 12_345):
         chip.now += pause
-        pwm.write(MR2=1)
+        pwm.write(MR2=1, MR6=0)
         number = -(-chip.crystal.local_ns(chip.now - 123_456) // period_ns)
         assert pwm.period_start == chip.crystal.tick_time_ns(number, period_ns, 123_456)
 
