@@ -19,7 +19,7 @@ cdef class DataLink:
     cdef public long long rate_sum, calls_without_step, points, segments_sent, steps
     cdef public long long ring_write, ring_read, packets, bad_packets, refused, ring_full
     cpdef int build_lists(self) except -1
-    cpdef long long allowed_steps(self)
+    cpdef long long allowed_steps(self) except? -1
     cpdef object send_data(self)
     cdef void _step(self)
     cdef int _put(self, long long number) except -1
@@ -27,6 +27,6 @@ cdef class DataLink:
     cdef int _word(self, long long at, long long word) except -1
     cdef int _start(self) except -1
     cpdef object swap_buffers(self)
-    cpdef long long waiting(self)
+    cpdef long long waiting(self) except? -1
     cpdef object parse(self)
     cdef void _write(self, long long number, long long word)

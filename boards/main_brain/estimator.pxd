@@ -10,14 +10,14 @@ cdef class EnergyMeter:
     cdef public bint started
     cdef public long long stamp
     cdef public double power_W, energy_J
-    cpdef bint update(self, double power_W, long long stamp_ms)
+    cpdef bint update(self, double power_W, long long stamp_ms) except? -1
 
 cdef class HeelSensor:
     cdef public double baseline
     cdef public long long count
     cpdef int restart(self, double raw) except -1
     cpdef int average(self, double raw) except -1
-    cpdef bint touches(self, double raw, double threshold, double ticks, double base_limit)
+    cpdef bint touches(self, double raw, double threshold, double ticks, double base_limit) except? -1
 
 cdef class Estimator:
     cdef public DataStore store
@@ -59,7 +59,7 @@ cdef class Estimator:
     cpdef void detect_strike(self, double hip, double outer_ankle, double inner_ankle)
     cpdef int set_stage(self, long long stage) except -1
     cpdef int update_contact_sums(self) except -1
-    cpdef double contact_sum(self, bint inner)
+    cpdef double contact_sum(self, bint inner) except? -1
     cpdef int strike(self, double hip, double outer_ankle, double inner_ankle) except -1
     cpdef int update_heights(self, double hip, double outer_ankle, double inner_ankle) except -1
     cpdef int update_energy(self) except -1

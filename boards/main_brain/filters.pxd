@@ -8,5 +8,5 @@ cdef class ButterworthFilter:
     cdef public bint started
     cdef public double x1, x2, y1, y2, output
     cpdef int rest_at(self, double value) except -1
-    cpdef double push(self, double value)
-    cpdef double push_stamped(self, double value, long long stamp_ms)
+    cpdef double push(self, double value) except? -1
+    cpdef double push_stamped(self, double value, long long stamp_ms) except? -1

@@ -27,16 +27,16 @@ cdef class FootMachine:
     cpdef int track_stance(self) except -1
     cpdef int enter_prepush(self) except -1
     cpdef int push(self) except -1
-    cpdef bint correction_applies(self)
-    cpdef double push_target(self)
+    cpdef bint correction_applies(self) except? -1
+    cpdef double push_target(self) except? -1
     cpdef int enter_afterpush(self) except -1
     cpdef int go_limp(self) except -1
     cpdef int flip_up(self) except -1
     cpdef int flip_down(self) except -1
-    cpdef bint reset_wanted(self)
-    cpdef bint own_foot_struck(self)
-    cpdef bint other_foot_struck(self)
-    cpdef bint push_is_due(self)
-    cpdef bint push_is_done(self)
-    cpdef bint cable_is_slack_enough(self)
-    cpdef bint own_leg_is_ahead(self)
+    cpdef bint reset_wanted(self) except? -1
+    cpdef bint own_foot_struck(self) except? -1
+    cpdef bint other_foot_struck(self) except? -1
+    cpdef bint push_is_due(self) except? -1
+    cpdef bint push_is_done(self) except? -1
+    cpdef bint cable_is_slack_enough(self) except? -1
+    cpdef bint own_leg_is_ahead(self) except? -1

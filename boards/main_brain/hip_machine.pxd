@@ -27,19 +27,19 @@ cdef class HipMachine:
     cpdef int hold_outer_ahead(self) except -1
     cpdef int enter_premid(self) except -1
     cpdef int enter_aftermid(self) except -1
-    cpdef double correction(self)
-    cpdef double base_current(self, double direction)
+    cpdef double correction(self) except? -1
+    cpdef double base_current(self, double direction) except? -1
     cpdef int swing_inner(self) except -1
     cpdef int swing_inner_corrected(self) except -1
     cpdef int swing_outer(self) except -1
     cpdef int swing_outer_corrected(self) except -1
-    cpdef bint reset_wanted(self)
-    cpdef bint inner_struck(self)
-    cpdef bint outer_struck(self)
-    cpdef bint inner_foot_flips_up(self)
-    cpdef bint outer_foot_flips_up(self)
-    cpdef bint outer_stance_past_mid(self)
-    cpdef bint inner_stance_past_mid(self)
-    cpdef bint hangs(self, double direction)
-    cpdef bint inner_leg_hangs(self)
-    cpdef bint outer_leg_hangs(self)
+    cpdef bint reset_wanted(self) except? -1
+    cpdef bint inner_struck(self) except? -1
+    cpdef bint outer_struck(self) except? -1
+    cpdef bint inner_foot_flips_up(self) except? -1
+    cpdef bint outer_foot_flips_up(self) except? -1
+    cpdef bint outer_stance_past_mid(self) except? -1
+    cpdef bint inner_stance_past_mid(self) except? -1
+    cpdef bint hangs(self, double direction) except? -1
+    cpdef bint inner_leg_hangs(self) except? -1
+    cpdef bint outer_leg_hangs(self) except? -1

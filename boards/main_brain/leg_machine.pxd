@@ -11,8 +11,8 @@ cdef class StanceLeg:
     cdef public double strike_angle, ss0_angle, ss0_rate, ss0_hip
     cdef public double mid_rate, mid_hip, mid_hip_rate, mid_time
     cpdef int forget(self) except -1
-    cpdef double angle_before_vertical(self)
-    cpdef double hip_ahead(self)
+    cpdef double angle_before_vertical(self) except? -1
+    cpdef double hip_ahead(self) except? -1
     cpdef int enter_preswing(self) except -1
     cpdef int count_preswing(self) except -1
     cpdef int leave_preswing(self) except -1
@@ -35,10 +35,10 @@ cdef class LegMachine:
     cpdef int publish_state(self, number) except -1
     cpdef int count_aftermid(self) except -1
     cpdef int leave_aftermid(self) except -1
-    cpdef bint reset_wanted(self)
-    cpdef bint inner_foot_flips_up(self)
-    cpdef bint outer_foot_flips_up(self)
-    cpdef bint outer_leg_past_vertical(self)
-    cpdef bint inner_leg_past_vertical(self)
-    cpdef bint inner_struck(self)
-    cpdef bint outer_struck(self)
+    cpdef bint reset_wanted(self) except? -1
+    cpdef bint inner_foot_flips_up(self) except? -1
+    cpdef bint outer_foot_flips_up(self) except? -1
+    cpdef bint outer_leg_past_vertical(self) except? -1
+    cpdef bint inner_leg_past_vertical(self) except? -1
+    cpdef bint inner_struck(self) except? -1
+    cpdef bint outer_struck(self) except? -1

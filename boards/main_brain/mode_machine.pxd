@@ -5,6 +5,7 @@ from boards.main_brain.leg_machine cimport LegMachine
 from boards.main_brain.state_machine cimport State, StateMachine
 from boards.main_brain.steering_machine cimport SteeringMachine
 from datatable.store cimport DataStore
+from foundation.numbers cimport elapsed_u32
 
 cdef class ModeMachine:
     cdef public DataStore store
@@ -22,7 +23,7 @@ cdef class ModeMachine:
     cdef public SteeringMachine steering
     cdef public long long buttons, pressed, last_song_steps, page, page_time, late_push_light
     cdef public StateMachine machine
-    cpdef void update(self)
+    cpdef int update(self) except -1
     cpdef int publish_state(self, number) except -1
     cpdef int motors_off(self) except -1
     cpdef int steering_off(self) except -1
@@ -35,7 +36,7 @@ cdef class ModeMachine:
     cpdef int show_page(self) except -1
     cpdef int show_mode(self, name, colour) except -1
     cpdef int show(self, upper, lower) except -1
-    cpdef bint key_0(self)
-    cpdef bint key_1(self)
-    cpdef bint key_2(self)
-    cpdef bint robot_fell(self)
+    cpdef bint key_0(self) except? -1
+    cpdef bint key_1(self) except? -1
+    cpdef bint key_2(self) except? -1
+    cpdef bint robot_fell(self) except? -1

@@ -15,14 +15,14 @@ cdef class SteeringMachine:
     cpdef int send(self, double counts) except -1
     cpdef int switch(self, long long shut_down) except -1
     cpdef int off(self) except -1
-    cpdef double radio_command(self)
+    cpdef double radio_command(self) except? -1
     cpdef int enter_back(self) except -1
     cpdef int send_twist(self) except -1
     cpdef int enter_front(self) except -1
     cpdef int enter_stance(self) except -1
     cpdef int ramp_to_other_side(self) except -1
-    cpdef bint reset_wanted(self)
-    cpdef bint inner_struck(self)
-    cpdef bint outer_struck(self)
-    cpdef bint inner_falls_behind(self)
-    cpdef bint inner_comes_forward(self)
+    cpdef bint reset_wanted(self) except? -1
+    cpdef bint inner_struck(self) except? -1
+    cpdef bint outer_struck(self) except? -1
+    cpdef bint inner_falls_behind(self) except? -1
+    cpdef bint inner_comes_forward(self) except? -1

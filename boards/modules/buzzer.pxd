@@ -6,11 +6,11 @@ cdef class Buzzer:
     cdef public long long frequency_hertz, note, note_left_ms, beep_hertz, beep_next
     cdef public long long[::1] tune_hertz, tune_ms, pitches, beep_queue
     cdef public long long tunes_started, beeps_made
-    cpdef void tone(self, long long hertz)
-    cpdef void start_tune(self)
+    cpdef void tone(self, long long hertz) noexcept
+    cpdef void start_tune(self) noexcept
     cpdef int stop_tune(self) except -1
-    cpdef void error_sound(self, long long code)
-    cpdef long long update(self)
+    cpdef void error_sound(self, long long code) noexcept
+    cpdef long long update(self) except? -1
 
 cdef class BuzzerFrequency(Receiver):
     cdef public Buzzer buzzer

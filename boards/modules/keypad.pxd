@@ -5,5 +5,5 @@ cdef class Keypad:
     cdef public long long[6] pins
     cdef public object report
     cdef public long long code_index
-    cpdef bint pressed(self, long long key)
-    cpdef long long buttons(self)
+    cpdef bint pressed(self, long long key) except? -1
+    cpdef long long buttons(self) except? -1

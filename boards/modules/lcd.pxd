@@ -15,9 +15,9 @@ cdef class Lcd:
     cdef public long long[::1] positions, characters, reads, counts
     cdef public long long code_full, code_position
     cdef public long long written, lost
-    cpdef bint put(self, long long position, long long character)
-    cpdef long long set_quarter(self, long long quarter, long long word)
-    cpdef long long tick(self)
+    cpdef bint put(self, long long position, long long character) except? -1
+    cpdef long long set_quarter(self, long long quarter, long long word) except? -1
+    cpdef long long tick(self) except? -1
 
 cdef class LcdQuarter(Receiver):
     cdef public Lcd lcd

@@ -8,6 +8,6 @@ cdef class SyncLight:
     cdef public ColourLeds leds
     cdef public bint running, lit
     cdef public long long held_slots, milliseconds, flashes, pin
-    cpdef long long watch_key(self)
-    cpdef long long update(self)
+    cpdef long long watch_key(self) except? -1
+    cpdef long long update(self) except? -1
     cpdef int _show(self, bint on) except -1

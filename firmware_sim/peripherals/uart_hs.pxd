@@ -10,8 +10,8 @@ cdef class HsUart(Peripheral):
     cdef public object held
     cdef public long long sent, buffer_bytes, active, filled, received, lost
     cdef public long long[::1] buffers
-    cpdef bint transmit(self, object data)
+    cpdef bint transmit(self, object data) except? -1
     cdef int _begin(self, object data, long long time) except -1
     cdef void _store(self, long long byte)
-    cpdef long long swap(self)
-    cpdef long long taken(self, long long place)
+    cpdef long long swap(self) except? -1
+    cpdef long long taken(self, long long place) except? -1
