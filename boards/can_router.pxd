@@ -51,6 +51,7 @@ cdef class CanRouterBoard(Microcontroller):
     cdef public long long code_dnf, code_near_limit, code_task_limit, code_queue_full
     cpdef int report(self, long long code) except -1
     cpdef long long flush(self, CanController controller, long long began) except? <long long>-1
+    cpdef bint nothing_waits(self) noexcept
     cpdef bint can_flush(self, long long at) except? -1
     cpdef int send_float(self, long long identifier, double value) except -1
     cpdef double current_A(self) except? -1

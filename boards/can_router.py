@@ -235,6 +235,8 @@ class CanRouterBoard(Microcontroller):
         if segment is None:
             return None
         self.link.receive(segment)
+        if self.idle and self.nothing_waits():  # the segment waits for the timer's next interrupt
+            self.background_wanted = False
         return 31
 
     def on_can_error(self, queue) -> None:
@@ -259,6 +261,15 @@ class CanRouterBoard(Microcontroller):
                 self.report(named[4] if cause >> 21 & 1 else named[5])
 
     # --- main loop --------------------------------------------------------------------------------------
+
+    def nothing_waits(self) -> cython.bint:
+        """True while the main loop has nothing to move, now or when a buffer gets free."""
+        return (
+            self.router.rx_read == self.router.rx_write
+            and self.link.received_read == self.link.received_write
+            and self.router.own_read == self.router.own_write
+            and self.router.waiting == 0
+        )
 
     def flush(self, controller: CanController, began: cython.longlong) -> cython.longlong:
         """Fill transmit buffers 1 and 2, those free when the turn `began` (ns), from the ring of the controller's bus.
