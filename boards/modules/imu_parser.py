@@ -78,12 +78,11 @@ class ImuParser:
     def receive(self, uart: Uart) -> cython.longlong:
         """Store every byte that waits in the FIFO of `uart`; returns how many there were."""
         count: cython.longlong = uart.fifo_count
-        first: cython.longlong = uart.fifo_head
         write: cython.longlong = self.ring_write
         i: cython.longlong
         if self.waiting() + count < 128:
             for i in range(count):
-                self.ring[(write + i) & 127] = uart.fifo[(first + i) & 15]
+                self.ring[(write + i) & 127] = uart.fifo[i]
             uart.were_read(count)
             self.ring_write = (write + count) & 127
         else:

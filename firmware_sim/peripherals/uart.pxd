@@ -8,7 +8,7 @@ cdef class Uart(Peripheral):
     # what a received byte touches
     cdef public InterruptSource source
     cdef public long long byte_ns, trigger
-    cdef public long long fifo_head, fifo_count, IIR, received
+    cdef public long long fifo_count, IIR, received
     cdef public long long[16] fifo
     # the rest
     cdef public long long overruns, errors

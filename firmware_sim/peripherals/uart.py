@@ -1,5 +1,5 @@
 # cython: boundscheck=False, wraparound=False
-# (every index below is a place of the FIFO or of a caller's ring, which is masked)
+# (every index below is a place of the FIFO that holds a byte or is free)
 """A UART with byte timing: UnRBR, UnTHR, UnLSR, UnIIR, UnDLL/DLM as one divisor, UnFDR; 8N1.
 
 Receive: UART_BYTE messages stamped with the end of the byte fill a FIFO of 16. One message may bring up to
@@ -37,8 +37,7 @@ class Uart(Peripheral):
         self.transmit_source = chip.vic.source(UART_TRANSMIT, number)
         self.timeout_alarm = chip.new_alarm(self, 0)
         self.transmit_alarm = chip.new_alarm(self, 1)
-        self.fifo = [0] * 16
-        self.fifo_head = 0
+        self.fifo = [0] * 16  # the oldest byte first
         self.fifo_count = 0
         self.IIR = 1
         self.errors = 0
@@ -74,7 +73,7 @@ class Uart(Peripheral):
         i: cython.longlong
         count: cython.longlong = 1
         bytes_left: cython.longlong = queue.b
-        place: cython.longlong = self.fifo_head + self.fifo_count
+        place: cython.longlong = self.fifo_count
         if queue.c > 1:
             count = queue.c
             bytes_left = queue.d
@@ -86,7 +85,7 @@ class Uart(Peripheral):
         for i in range(count):
             if i == 4:
                 bytes_left = queue.e
-            self.fifo[(place + i) & 15] = bytes_left & 255
+            self.fifo[place + i] = bytes_left & 255
             bytes_left >>= 8
         self.fifo_count += count
         if self.fifo_count == 0:
@@ -112,19 +111,17 @@ class Uart(Peripheral):
         byte: cython.longlong
         if self.fifo_count == 0:
             return 0
-        byte = self.fifo[self.fifo_head]
-        self.fifo_head = (self.fifo_head + 1) & 15
-        self.fifo_count -= 1
-        if self.fifo_count == 0:
-            self.IIR = 1
-            self.timeout_alarm.set(1 << 62)
+        byte = self.fifo[0]
+        self.were_read(1)
         return byte
 
     def were_read(self, count: cython.longlong) -> cython.void:
         """The oldest `count` bytes that wait were read from `fifo` itself, as by reads of RBR."""
+        i: cython.longlong
         if count > 0:
-            self.fifo_head = (self.fifo_head + count) & 15
             self.fifo_count -= count
+            for i in range(self.fifo_count):
+                self.fifo[i] = self.fifo[count + i]
             if self.fifo_count == 0:
                 self.IIR = 1
                 self.timeout_alarm.set(1 << 62)
