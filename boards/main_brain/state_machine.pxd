@@ -1,16 +1,21 @@
 from firmware_sim.scheduler cimport call
 
+cimport cython
+
+@cython.final
 cdef class State:
     cdef public long long number
     cdef public str name
     cdef public object entry, main, exit
     cdef public list machines, transitions
-    cpdef object run_main(self)
+    cpdef int run_main(self) except -1
 
+@cython.final
 cdef class Transition:
     cdef public State target
     cdef public object condition
 
+@cython.final
 cdef class StateMachine:
     cdef public str name
     cdef public list states
@@ -21,4 +26,4 @@ cdef class StateMachine:
     cpdef object state_names(self)
     cpdef object put(self, name)
     cpdef object _tell(self)
-    cpdef object step(self)
+    cpdef int step(self) except -1

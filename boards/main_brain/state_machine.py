@@ -29,14 +29,12 @@ class State:
         self.machines = list(machines)
         self.transitions = []
 
-    def run_main(self) -> object:
+    def run_main(self) -> None:
         """The main action, then one tick of every nested machine."""
         machine: StateMachine
-        i: cython.longlong
         if self.main is not None:
             call(self.main)
-        for i in range(len(self.machines)):
-            machine = self.machines[i]
+        for machine in self.machines:
             machine.step()
 
 
@@ -102,13 +100,11 @@ class StateMachine:
         if self.on_change is not None:
             self.on_change(self.current.number)
 
-    def step(self) -> object:
+    def step(self) -> None:
         """One tick."""
         state: State = self.current
         transition: Transition
-        i: cython.longlong
-        for i in range(len(state.transitions)):
-            transition = state.transitions[i]
+        for transition in state.transitions:
             if call(transition.condition):
                 if not self.entered:
                     if state.entry is not None:

@@ -60,8 +60,9 @@ def empty_segment() -> SspSegment:
 
 def restart(segment: SspSegment) -> cython.void:
     """Make it a valid segment without frames again."""
-    segment.clear()
+    segment.words = [0] * 31
     segment.words[30] = 1
+    segment.used = 0
 
 
 def add_frame(
