@@ -31,6 +31,10 @@ cdef class Alarm:
     cdef InterruptSource _ring(self, long long time)
 
 @cython.final
+cdef class SlotTimer(Peripheral):
+    cdef public Alarm alarm
+
+@cython.final
 cdef class EdgeLine:
     cdef public long long next_time, levels
     cdef public EdgeBuffer buffer
@@ -43,7 +47,7 @@ cdef class EdgeLine:
 # Fields that nearly every event touches come first, close together; then those of alarms, edges and messages.
 cdef class Microcontroller:
     cdef public long long now, instant, code_time, stop_time, extra_cycles
-    cdef public long long alarm_time, tick_time, edge_time, next_time, horizon
+    cdef public long long alarm_time, edge_time, next_time, horizon
     cdef public long long irq_free, fiq_free, stolen_cycles
     cdef public bint waiting, check_wait, background_wanted
     cdef public double ns_per_cycle
@@ -54,14 +58,15 @@ cdef class Microcontroller:
     cdef public object background
     cdef public list alarms
     cdef public long long alarms_set
-    cdef public long long[17] alarm_times
-    cdef public long long[17] alarm_places
+    cdef public long long[18] alarm_times
+    cdef public long long[18] alarm_places
     cdef public list message_table
     cdef public Peripheral others
     cdef public AnalogPins analog
     cdef public TickTrain ticks
     cdef public InterruptSource tick_source
-    cdef public long long match_time
+    cdef public SlotTimer slot_timer
+    cdef public long long tick_time, match_time
     cdef public object on_timer_tick
     cdef public double cycles_per_ns
     cdef public Wait wait_task
@@ -92,8 +97,6 @@ cdef class Microcontroller:
     cdef InterruptSource _input(self, EventQueue queue)
     @cython.final
     cdef InterruptSource _pin_edge(self, EventQueue queue)
-    @cython.final
-    cdef InterruptSource _timer_match(self)
     @cython.final
     cdef long long _background(self) except? <long long>-1
     @cython.final

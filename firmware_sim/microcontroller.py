@@ -9,7 +9,7 @@ How time passes inside:
 - A task or handler takes effect at its start, the instant `now`; then the CPU is busy for its cycles.
 - What arrives meanwhile is handled at its stamp: hardware (peripherals, capture registers) at once, handlers
   as soon as FIQ, then IRQ, is free. Their cycles lengthen whatever they interrupt.
-- At one instant: messages, peripheral events, the slot timer, handlers (FIQ before IRQ, then by slot), tasks.
+- At one instant: edges, messages, alarms (the slot timer's last), handlers (FIQ before IRQ, then by slot), tasks.
 - A handler's `now` is its start plus the latency of its source.
 Each busy time is rounded down to whole ns; cycle counts are exact integers.
 """
@@ -145,6 +145,21 @@ class Alarm:
         return self.owner.on_alarm(self.number, time)
 
 
+class SlotTimer(Peripheral):
+    """The timer whose match interrupt steps the scheduler; its alarm is the last of those at one instant."""
+
+    def __init__(self, chip) -> None:
+        Peripheral.__init__(self, chip)
+        self.alarm = Alarm(chip, self, 0, ALARMS)
+
+    def on_alarm(self, alarm: cython.longlong, time: cython.longlong) -> InterruptSource | None:
+        """The timer matches and restarts."""
+        self.chip.match_time = time
+        self.chip.tick_time = self.chip.ticks.next()
+        self.alarm.set(self.chip.tick_time)
+        return self.chip.tick_source
+
+
 class EdgeLine:
     """An encoder on two pins: its edges are read where its sensor writes them, each at its stamp.
 
@@ -228,10 +243,11 @@ class Microcontroller:
         self.wait_stolen = 0
         self.stolen_cycles = 0
         self.alarm_time = NEVER
-        self.alarms = []
+        self.slot_timer = SlotTimer(self)
+        self.alarms = [None] * ALARMS + [self.slot_timer.alarm]
         # those that are set: instants and places in `alarms`, the first to come last; at 0 stands one that never comes
-        self.alarm_times = [NEVER] * 17  # ALARMS + 1
-        self.alarm_places = [0] * 17
+        self.alarm_times = [NEVER] * 18  # ALARMS + 2
+        self.alarm_places = [0] * 18
         self.alarms_set = 1  # where the next one would stand
         self.others = Unclaimed(self)
         self.message_table = [self.others] * (MESSAGE_KINDS * INDICES_PER_KIND)
@@ -304,11 +320,11 @@ class Microcontroller:
     def new_alarm(self, peripheral, number) -> Alarm:
         """An alarm; when due, `peripheral.on_alarm(number, time)` runs."""
         self._check_peripheral(peripheral)
-        if len(self.alarms) >= ALARMS:
+        if None not in self.alarms:
             raise UserError(f"{self.name}: more than {ALARMS} peripheral alarms")
-        alarm = Alarm(self, peripheral, number, len(self.alarms))
-        self.alarms.append(alarm)
-        return alarm
+        place = self.alarms.index(None)
+        self.alarms[place] = Alarm(self, peripheral, number, place)
+        return self.alarms[place]
 
     def start(self, schedule: Schedule, phase_ns: cython.longlong) -> None:
         """Run `schedule`: the first slot begins at `phase_ns`, the later ones by this chip's crystal."""
@@ -316,7 +332,7 @@ class Microcontroller:
         self.scheduler = SlotScheduler(schedule, cycles, self.ns_per_cycle)
         self.ticks = TickTrain(self.crystal, schedule.slot_ns // schedule.divider, phase_ns)
         self.tick_time = phase_ns
-        self.next_time = min(self.next_time, phase_ns)
+        self.slot_timer.alarm.set(phase_ns)
         self.waiting = False
         self.tick_source = self.vic.attach(
             SLOT_TIMER,
@@ -376,13 +392,9 @@ class Microcontroller:
         first: cython.longlong
         own: cython.longlong
         self.horizon = until
-        if self.next_time >= until and inbox.head_time >= until and self.edge_time >= until:
-            return self.next_time  # idle: a frequent answer in short steps
         while True:
             # what comes in, or comes due by itself
             first = self.alarm_time
-            if self.tick_time < first:
-                first = self.tick_time
             if inbox.head_time < first:
                 first = inbox.head_time
             if self.edge_time < first:
@@ -410,7 +422,7 @@ class Microcontroller:
                 continue
             if first >= self.horizon:
                 break
-            # at one instant: edges, messages, alarms, the slot timer
+            # at one instant: edges, messages, alarms
             if self.edge_time == first:
                 self._edges()
                 continue
@@ -418,10 +430,8 @@ class Microcontroller:
             if inbox.head_time == first:
                 inbox.take()
                 asking = self._input(inbox)
-            elif self.alarm_time == first:
-                asking = cython.cast(Alarm, self.alarms[self.alarm_places[self.alarms_set - 1]])._ring(first)
             else:
-                asking = self._timer_match()
+                asking = cython.cast(Alarm, self.alarms[self.alarm_places[self.alarms_set - 1]])._ring(first)
             if asking is not None:
                 # mostly the processor is free for it, and nothing else comes at this instant
                 if (
@@ -429,7 +439,6 @@ class Microcontroller:
                     and self.irq_free <= first
                     and self.alarm_time > first
                     and inbox.head_time > first
-                    and self.tick_time > first
                     and asking.bit != 0
                 ):
                     self._serve(asking, inbox, first)
@@ -437,8 +446,6 @@ class Microcontroller:
                     vic.raise_source(asking)
         if self.alarm_time < own:
             own = self.alarm_time
-        if self.tick_time < own:
-            own = self.tick_time
         self.next_time = own
         return own
 
@@ -466,7 +473,7 @@ class Microcontroller:
         level: cython.longlong
         time: cython.longlong
         # what comes first; a handler may set an alarm before it
-        self.stop_time = min(self.horizon, self.alarm_time, self.tick_time, inbox.head_time)
+        self.stop_time = min(self.horizon, self.alarm_time, inbox.head_time)
         self.background_wanted = True
         while True:
             time = self.edge_time
@@ -521,13 +528,6 @@ class Microcontroller:
         if cython.cast(Peripheral, self.pin_owners[pin]).on_pin(channel, queue.b, queue.time):
             return cython.cast(InterruptSource, self.pin_sources[pin])
         return None
-
-    @cython.final
-    def _timer_match(self) -> InterruptSource:
-        """The slot timer matches and restarts. Returns its interrupt source."""
-        self.match_time = self.tick_time
-        self.tick_time = self.ticks.next()
-        return self.tick_source
 
     def on_slot_timer(self, queue: EventQueue) -> object:
         """Handler of the slot timer: publish the next row."""
@@ -586,7 +586,7 @@ class Microcontroller:
     def _code(self, first: cython.longlong) -> cython.longlong:
         """Run tasks from `code_time` on, until something else comes first or the row ends. Returns 0.
 
-        `first`: the first edge, message, alarm or tick.
+        `first`: the first edge, message or alarm.
         """
         scheduler: SlotScheduler = self.scheduler
         number: cython.longlong
@@ -637,7 +637,7 @@ class Microcontroller:
     @cython.final
     def _edges_between(self) -> cython.bint:
         """Two tasks: if nothing but edges comes between them, take those. True when the next task may run at once."""
-        first: cython.longlong = min(self.tick_time, self.alarm_time, self.inbox.head_time)
+        first: cython.longlong = min(self.alarm_time, self.inbox.head_time)
         if self.vic.pending != 0 or self.edge_time >= self.horizon or self.edge_time > min(first, self.code_time):
             return False
         self._edges()

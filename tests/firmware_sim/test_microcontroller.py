@@ -4,6 +4,7 @@ import pytest
 
 from firmware_sim.clock import Crystal
 from firmware_sim.microcontroller import Microcontroller, Peripheral
+from firmware_sim.scheduler import Schedule
 from firmware_sim.vic import FIQ, SOFTWARE
 from foundation.events import NEVER, PIN_OUTPUT, UART_BYTE
 from foundation.random_stream import RandomStream
@@ -65,6 +66,24 @@ def test_alarms_ring_in_the_order_of_their_instants_and_then_of_their_making():
                 expected[other] = then
         chip.advance(1_000)
         assert bells.heard == rung
+
+
+class Matches(Peripheral):
+    """An alarm that notes when the slot timer matched last."""
+
+    def on_alarm(self, alarm, time):
+        self.found = self.chip.match_time
+
+
+def test_at_one_instant_the_slot_timer_matches_after_the_alarms_however_late_they_were_made():
+    chip = Microcontroller("chip", 60_000_000, Crystal())
+    chip.start(Schedule(slot_us=500), 0)
+    matches = Matches(chip)
+    chip.new_alarm(matches, 0).set(500_000)
+    chip.advance(500_001)
+    assert (matches.found, chip.match_time, chip.tick_time) == (0, 500_000, 1_000_000)
+    with pytest.raises(UserError, match="more than 16"):
+        Bells(chip, 16)
 
 
 def test_a_message_that_nobody_claims_waits_in_its_interrupt_source_or_is_counted():
