@@ -4,15 +4,15 @@ Facts network-and-boards 4.12: called in one row (45.45 Hz); equal errors of one
 added, newest time kept) in a ring of 64 for the computer and one of 16 for the display. As intended by the
 appendix, the next error goes out when the last one was read; by the quirk of 2016 the computer's variable
 is marked new while its ring is empty, and the display's ring is never emptied.
-
-Runs 45 times a second and mostly finds nothing, so it is plain Python.
 """
 
 from typing import Any
 
+import cython
+
 from boards.modules.error_module import error_word
 from datatable.generated import mb as table
-from datatable.store import LABVIEW, MB_ERR_DIST, SSP
+from datatable.store import LABVIEW, MB_ERR_DIST, SSP, DataStore
 
 SOURCES = ("ERROR_MB", "ERROR_MCH", "ERROR_MCFO", "ERROR_MCFI", "ERROR_MCSO", "ERROR_MCSI", "ERROR_UI", "ERROR_CSR")
 COMPUTER_RING = 64
@@ -28,16 +28,18 @@ class ErrorRing:
         self.waiting: dict[tuple[int, int], Any] = {}
         self.dropped = 0
 
-    def add(self, board: int, code: int, count: int, stamp: int) -> None:
+    def add(
+        self, board: cython.longlong, code: cython.longlong, count: cython.longlong, stamp: cython.longlong
+    ) -> None:
         entry = self.waiting.get((board, code))
         if entry is not None:
             entry[0] += count
             entry[1] = stamp
-            return
-        if len(self.waiting) == self.size:
-            del self.waiting[next(iter(self.waiting))]
-            self.dropped += 1
-        self.waiting[board, code] = [count, stamp]
+        else:
+            if len(self.waiting) == self.size:
+                del self.waiting[next(iter(self.waiting))]
+                self.dropped += 1
+            self.waiting[board, code] = [count, stamp]
 
     def take(self) -> Any:
         """(word, stamp) of the oldest, or None."""
@@ -56,17 +58,24 @@ class ErrorDistribution:
         self.errors = errors  # this board's own error module
         self.inverted = inverted
         self.source_ids = [getattr(table, name) for name in SOURCES]
+        self.id_own = table.ERROR_MB
+        self.id_computer = table.ERROR_LABVIEW
+        self.id_display = table.ERROR_LCD
         self.computer = ErrorRing(COMPUTER_RING)
         self.display = ErrorRing(DISPLAY_RING)
-        self.computer_time_ms = None  # network time at which ERROR_LABVIEW was last renewed
+        self.computer_time_ms = -1  # network time at which ERROR_LABVIEW was last renewed
         self.totals: dict[Any, int] = {}
 
     def distribute(self) -> int:
         """Own error into ERROR_MB, new frames into the rings, one error to each reader; returns frames read."""
-        store = self.store
+        store: DataStore = self.store
+        number: cython.longlong
+        word: cython.longlong
+        stamp: cython.longlong
+        now: cython.longlong
+        read: cython.longlong = 0
         if self.errors.take():
-            store.set_word(table.ERROR_MB, self.errors.word, self.errors.stamp)
-        read = 0
+            store.set_word(self.id_own, self.errors.word, self.errors.stamp)
         for number in self.source_ids:
             if not store.is_unread(number, MB_ERR_DIST):
                 continue
@@ -82,16 +91,18 @@ class ErrorDistribution:
             read += 1
         if self.inverted:
             if not self.computer.waiting:
-                store.mark_unread(table.ERROR_LABVIEW)
+                store.mark_unread(self.id_computer)
             return read
         now = store.network_time_ms()
         if self.computer.waiting and (
-            not store.is_unread(table.ERROR_LABVIEW, LABVIEW)
-            or self.computer_time_ms is None
+            not store.is_unread(self.id_computer, LABVIEW)
+            or self.computer_time_ms < 0
             or now - self.computer_time_ms & 0xFFFFFFFF >= UNREAD_LIMIT_MS
         ):
-            store.set_word(table.ERROR_LABVIEW, *self.computer.take())
+            word, stamp = self.computer.take()
+            store.set_word(self.id_computer, word, stamp)
             self.computer_time_ms = now
-        if self.display.waiting and not store.is_unread(table.ERROR_LCD, SSP):
-            store.set_word(table.ERROR_LCD, *self.display.take())
+        if self.display.waiting and not store.is_unread(self.id_display, SSP):
+            word, stamp = self.display.take()
+            store.set_word(self.id_display, word, stamp)
         return read
