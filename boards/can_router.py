@@ -335,6 +335,7 @@ class CanRouterBoard(Microcontroller):
         moved: cython.longlong
         channel: cython.longlong
         to_route: cython.bint
+        to_flush: cython.bint = False
         router: Router = self.router
         while True:
             to_route = (
@@ -342,8 +343,10 @@ class CanRouterBoard(Microcontroller):
                 or self.link.received_read != self.link.received_write
                 or router.own_read != router.own_write
             )
-            if not to_route and (router.waiting == 0 or not self.can_flush(at)):
-                break
+            if not to_route and not to_flush:
+                to_flush = router.waiting > 0 and self.can_flush(at)
+                if not to_flush:
+                    break
             began = at
             if self.idle:
                 self.idle = False
@@ -361,6 +364,7 @@ class CanRouterBoard(Microcontroller):
             if router.tx_read[channel] != router.tx_write[channel]:
                 self.now = at
                 moved = self.flush(self.controllers[self.flush_next], began)
+                to_flush = False  # not known any more
             at += self.flush_ns[moved]
             self.flush_next = channel & 3
             if at >= self.horizon or at >= self.alarm_time or at >= self.tick_time or at >= self.inbox.head_time:

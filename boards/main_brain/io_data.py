@@ -76,7 +76,7 @@ class IoData:
         self.slots += 1
         for place in range(len(self.send_ids)):
             number = self.send_ids[place]
-            if store.unread[number] & flag and self.slots % self.dividers[place] == 0:
+            if store.unread[number] & flag and (self.dividers[place] == 1 or self.slots % self.dividers[place] == 0):
                 if not link.send(number, store.words[number], store.stamps[number]):
                     break
                 store.unread[number] &= ~flag
