@@ -367,7 +367,7 @@ class CanRouterBoard(Microcontroller):
                 to_flush = False  # not known any more
             at += self.flush_ns[moved]
             self.flush_next = channel & 3
-            if at >= self.horizon or at >= self.alarm_time or at >= self.tick_time or at >= self.inbox.head_time:
+            if at >= self.horizon or at >= self.alarm_time or at >= self.inbox.head_time:
                 return at
         if self.idle:
             return 0
