@@ -36,13 +36,12 @@ cdef class Bus:
     # what a frame touches
     cdef public long long next_strike, second_bit, second_ns
     cdef public long long bit_ns, bit_rest, intermission_ns, intermission_rest
-    cdef public Node first_node
+    cdef public list nodes
     cdef public FrameStream trace
     cdef public long long frames, bits, window_busy, window_end
     cdef long long* counts
     # what those three addresses lead into: kept here, exchanged only by methods that set them too
     cdef readonly long long[::1] rows, identifiers, wakes
-    cdef public list nodes
     cdef public str name
     cdef public object seed
     cdef public EventQueue commands

@@ -146,7 +146,6 @@ class Bus:
         self.bitrate = bitrate
         self.seed = seed
         self.nodes = []
-        self.first_node = None
         self.node_count = 0
         self.operating = 0
         self.joining = 0
@@ -274,10 +273,8 @@ class Bus:
         node: Node
         index = len(self.nodes)
         node = Node(name, index, inbox, controller, order)
-        if index == 0:
-            self.first_node = node
-        else:
-            node.following = self.first_node
+        if index > 0:
+            node.following = self.nodes[0]
             self.nodes[index - 1].following = node
         self.nodes.append(node)
         self.node_count += 1
@@ -760,14 +757,10 @@ class Bus:
         done = rest // rate
         rest -= done * rate
         done += self.second_ns
-        received = done - self.bit_ns
-        if rest < self.bit_rest:
-            received -= 1
+        received = done - self.bit_ns - (rest < self.bit_rest)
         bits += 3  # INTERMISSION_BITS
         self.free_bit = k + bits
-        self.free_time = done + self.intermission_ns
-        if rest + self.intermission_rest >= rate:
-            self.free_time += 1
+        self.free_time = done + self.intermission_ns + (rest + self.intermission_rest >= rate)
         self.frames += 1
         self.bits += bits
         self.window_busy += bits
@@ -782,9 +775,7 @@ class Bus:
         else:
             self._remove(row)
         self.slots[row] = done  # FREE_AT
-        sender = self.first_node
-        while sender.index != row >> 5:
-            sender = sender.following
+        sender = cython.cast(Node, self.nodes[row >> 5])
         if not sender.ends.write(row >> 3 & 3, done, 0):  # TX_SENT
             sender.inbox.put(done, sender.order, 3, sender.controller, row >> 3 & 3, 0, 0, 0, 0)  # CAN_TX_DONE
         sender.sent += 1

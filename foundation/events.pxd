@@ -8,6 +8,10 @@ cdef class Outbox:
         long long a=*, long long b=*, long long c=*, long long d=*, long long e=*, long long f=*,
         object ref=*,
     ) except -1
+    cpdef int request(
+        self, long long time, long long controller, long long buffer, long long identifier, long long flags,
+        long long lo, long long hi,
+    ) except -1
 
 @cython.final
 cdef class EventQueue(Outbox):

@@ -71,6 +71,19 @@ class Outbox:
     ) -> None:
         """Take a message: its stamp (ns), `order`, kind, six integers, and an object where the kind has one."""
 
+    def request(
+        self,
+        time: cython.longlong,
+        controller: cython.longlong,
+        buffer: cython.longlong,
+        identifier: cython.longlong,
+        flags: cython.longlong,
+        lo: cython.longlong,
+        hi: cython.longlong,
+    ) -> None:
+        """Take a CAN_REQUEST."""
+        self.push(time, 0, CAN_REQUEST, controller, buffer, identifier, flags, lo, hi)
+
 
 class EventQueue(Outbox):
     """Messages sorted by (time, order, arrival), as rows that follow each other in one array.

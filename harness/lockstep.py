@@ -33,7 +33,7 @@ from can_bus.bus import Bus
 from firmware_sim.microcontroller import MESSAGE_KINDS, Microcontroller
 from firmware_sim.peripherals.can_controller import CanController
 from foundation.edge_buffer import ByteBuffer
-from foundation.events import CAN_TX_DONE, Outbox
+from foundation.events import CAN_REQUEST, CAN_TX_DONE, Outbox
 from foundation.numbers import integers
 from foundation.row_stream import RowStream
 from foundation.user_error import UserError
@@ -148,16 +148,7 @@ class BoardWires(Outbox):
         ref: object = None,
     ) -> None:
         """Carry on what the board puts out at `time` (ns)."""
-        if kind == 32:  # CAN_REQUEST
-            if time < self.silent_until:
-                self._spoke_early(time)
-            if self.buses[a] is None:
-                self._to_bus_outside(kind, time, a, b, c, d, e, f)
-            else:
-                cython.cast(Bus, self.buses[a]).request(self.nodes[a], b, time, c, d, e, f)
-                if time + self.window_ns < self.board.horizon:
-                    self.board.stop_at(time + self.window_ns)
-        elif kind == 36:  # PIN_OUTPUT
+        if kind == 36:  # PIN_OUTPUT
             if a == self.watchdog_pin:
                 self.drive.watchdog_edge(time)
             elif a == self.low_side_2_pin:
@@ -169,6 +160,8 @@ class BoardWires(Outbox):
         elif kind == 35:  # PWM_UPDATE
             if self.drive is not None:
                 self.drive.write_pwm(time, a, b, c)
+        elif kind == 32:  # CAN_REQUEST
+            self.request(time, a, b, c, d, e, f)
         elif kind == 33 or kind == 34:  # CAN_ABORT, CAN_MODE
             if self.buses[a] is None:
                 self._to_bus_outside(kind, time, a, b, c, d, e, f)
@@ -183,6 +176,28 @@ class BoardWires(Outbox):
             self.link.load(ref)
         elif kind == 39:  # UART_OUTPUT
             self._to_serial_line(time, a, b, c, ref)
+
+    def request(
+        self,
+        time: cython.longlong,
+        controller: cython.longlong,
+        buffer: cython.longlong,
+        identifier: cython.longlong,
+        flags: cython.longlong,
+        lo: cython.longlong,
+        hi: cython.longlong,
+    ) -> None:
+        """Carry a frame to its bus."""
+        if time < self.silent_until:
+            self._spoke_early(time)
+        if self.buses[controller] is None:
+            self._to_bus_outside(CAN_REQUEST, time, controller, buffer, identifier, flags, lo, hi)
+        else:
+            cython.cast(Bus, self.buses[controller]).request(
+                self.nodes[controller], buffer, time, identifier, flags, lo, hi
+            )
+            if time + self.window_ns < self.board.horizon:
+                self.board.stop_at(time + self.window_ns)
 
     def _spoke_early(self, time) -> None:
         raise UserError(

@@ -155,23 +155,20 @@ class CanLink:
         ignored: cython.longlong = 0
         row: cython.longlong
         identifier: cython.longlong
-        receiver: Receiver
         if frames == 0:
             return 0
         while read != write:
             row = 4 * read
             identifier = self.rx_rows[row + 1]
-            receiver = None
             # DLC 8 and neither remote nor extended, as the bits stand in RFS
-            if self.rx_rows[row] == 524288 and identifier < 2048:
-                if identifier == self.time_identifier:
-                    receiver = self.time
-                else:
-                    receiver = cython.cast(Receiver, self.receivers[identifier])
-            if receiver is None:
+            if self.rx_rows[row] != 524288 or identifier > 2047:
+                ignored += 1
+            elif identifier == self.time_identifier:
+                self.time.deliver(self.rx_rows[row + 2], self.rx_rows[row + 3])
+            elif self.receivers[identifier] is None:
                 ignored += 1
             else:
-                receiver.deliver(self.rx_rows[row + 2], self.rx_rows[row + 3])
+                cython.cast(Receiver, self.receivers[identifier]).deliver(self.rx_rows[row + 2], self.rx_rows[row + 3])
             read = (read + 1) & 63
         self.rx_read = 0  # empty: the next frame goes to the front again, which is in the cache
         self.rx_write = 0
