@@ -17,6 +17,8 @@ from collections.abc import Sequence
 from types import ModuleType
 from typing import Any
 
+from foundation.declared_fields import DeclaredFieldsLoader
+
 OUR_PACKAGES = (
     "foundation",
     "datatable",
@@ -81,7 +83,7 @@ class OurFinder:
         if fullname in COMPILED_MODULES:
             loader = LibraryLoader(fullname, LIBRARY.__file__)
             return importlib.util.spec_from_file_location(fullname, LIBRARY.__file__, loader=loader)
-        sources = (importlib.machinery.SourceFileLoader, importlib.machinery.SOURCE_SUFFIXES)
+        sources = (DeclaredFieldsLoader, importlib.machinery.SOURCE_SUFFIXES)
         for folder in path:
             spec = importlib.machinery.FileFinder(folder, sources).find_spec(fullname)
             if spec is not None:
