@@ -18,9 +18,6 @@ from firmware_sim.peripherals.uart cimport Uart
 
 cimport cython
 
-cdef long long ID_ROLL, ID_PITCH, ID_YAW, ID_ANG_RATE_X, ID_ANG_RATE_Y, ID_ANG_RATE_Z, ID_BUTTONS, ID_RC_0
-cdef long long ID_RC_1, ID_RC_2, ID_RC_3, ID_STATUS, ID_EXECUTION_TIME, ID_MAX_EXECUTION_TIME
-
 @cython.final
 cdef class UserInterfaceBoard(Microcontroller):
     # what the tasks of every slot and the interrupts touch

@@ -45,22 +45,6 @@ PINS = {
 }
 IMU_UART = 1
 
-# Identifiers as C numbers of the compiled module
-ID_ROLL = table.UI_ROLL
-ID_PITCH = table.UI_PITCH
-ID_YAW = table.UI_YAW
-ID_ANG_RATE_X = table.UI_ANG_RATE_X
-ID_ANG_RATE_Y = table.UI_ANG_RATE_Y
-ID_ANG_RATE_Z = table.UI_ANG_RATE_Z
-ID_BUTTONS = table.UI_BUTTONS
-ID_RC_0 = table.UI_RC_0
-ID_RC_1 = table.UI_RC_1
-ID_RC_2 = table.UI_RC_2
-ID_RC_3 = table.UI_RC_3
-ID_STATUS = table.UI_STATUS
-ID_EXECUTION_TIME = table.UI_EXECUTION_TIME
-ID_MAX_EXECUTION_TIME = table.UI_MAX_EXECUTION_TIME
-
 # VIC slots (facts 4.16)
 CAN_RECEIVE_SLOT = 0
 TIMER_SLOT = 1
@@ -269,27 +253,27 @@ class UserInterfaceBoard(Microcontroller):
 
     def send_roll(self) -> None:
         """UI_ROLL, rad; 0 while the IMU sends rates alone. Old values are sent on if the IMU falls silent."""
-        self.can.send_float(ID_ROLL, self.imu.roll)
+        self.can.send_float(table.UI_ROLL, self.imu.roll)
 
     def send_pitch(self) -> None:
         """UI_PITCH, rad."""
-        self.can.send_float(ID_PITCH, self.imu.pitch)
+        self.can.send_float(table.UI_PITCH, self.imu.pitch)
 
     def send_yaw(self) -> None:
         """UI_YAW, rad."""
-        self.can.send_float(ID_YAW, self.imu.yaw)
+        self.can.send_float(table.UI_YAW, self.imu.yaw)
 
     def send_rate_x(self) -> None:
         """UI_ANG_RATE_X, rad/s."""
-        self.can.send_float(ID_ANG_RATE_X, self.imu.rate_x)
+        self.can.send_float(table.UI_ANG_RATE_X, self.imu.rate_x)
 
     def send_rate_y(self) -> None:
         """UI_ANG_RATE_Y, rad/s."""
-        self.can.send_float(ID_ANG_RATE_Y, self.imu.rate_y)
+        self.can.send_float(table.UI_ANG_RATE_Y, self.imu.rate_y)
 
     def send_rate_z(self) -> None:
         """UI_ANG_RATE_Z, rad/s."""
-        self.can.send_float(ID_ANG_RATE_Z, self.imu.rate_z)
+        self.can.send_float(table.UI_ANG_RATE_Z, self.imu.rate_z)
 
     def send_error(self) -> None:
         """ERROR_UI, the error that waits longest, if one does."""
@@ -297,32 +281,32 @@ class UserInterfaceBoard(Microcontroller):
 
     def send_buttons(self) -> None:
         """UI_BUTTONS, bit mask of the keys that are down."""
-        self.can.send_int(ID_BUTTONS, self.keypad.buttons())
+        self.can.send_int(table.UI_BUTTONS, self.keypad.buttons())
 
     def send_rc_0(self) -> None:
         """UI_RC_0, pulse width in 1/60 us."""
-        self.can.send_float(ID_RC_0, self.rc.width(0))
+        self.can.send_float(table.UI_RC_0, self.rc.width(0))
 
     def send_rc_1(self) -> None:
         """UI_RC_1."""
-        self.can.send_float(ID_RC_1, self.rc.width(1))
+        self.can.send_float(table.UI_RC_1, self.rc.width(1))
 
     def send_rc_2(self) -> None:
         """UI_RC_2; its pin drives the sync light, so 0."""
-        self.can.send_float(ID_RC_2, self.rc.width(2))
+        self.can.send_float(table.UI_RC_2, self.rc.width(2))
 
     def send_rc_3(self) -> None:
         """UI_RC_3."""
-        self.can.send_float(ID_RC_3, self.rc.width(3))
+        self.can.send_float(table.UI_RC_3, self.rc.width(3))
 
     def send_status(self) -> None:
         """UI_STATUS, always 1."""
-        self.can.send_float(ID_STATUS, 1.0)
+        self.can.send_float(table.UI_STATUS, 1.0)
 
     def send_execution_time(self) -> None:
         """UI_EXECUTION_TIME, s."""
-        self.can.send_float(ID_EXECUTION_TIME, self.execution.seconds())
+        self.can.send_float(table.UI_EXECUTION_TIME, self.execution.seconds())
 
     def send_max_execution_time(self) -> None:
         """UI_MAX_EXECUTION_TIME, s."""
-        self.can.send_float(ID_MAX_EXECUTION_TIME, self.execution.longest_seconds())
+        self.can.send_float(table.UI_MAX_EXECUTION_TIME, self.execution.longest_seconds())

@@ -207,7 +207,7 @@ class CanController(Peripheral):
         self.tx_complete[buffer] = 0
         self.requests += 1
         self.chip.outbox.request(self.chip.now, self.number, buffer, identifier, flags, lo, hi)
-        if self.IER & 1538 and self.IER & transmit_flag(buffer) and self.tx_source.bit != 0:
+        if self.IER & transmit_flag(buffer) and self.tx_source.bit != 0:
             self.tell_end(buffer)
         return True
 
