@@ -91,16 +91,7 @@ class OurFinder:
         return None
 
 
-def plain_cast(_: object, value: Any) -> Any:
-    """`cython.cast` for the interpreted run: what the compiler is told about a class needs no test at each use."""
-    return value
-
-
 # decided once: modules are not exchanged while a process runs
 LIBRARY, RUNS_INTERPRETED_BECAUSE = load_library()
 COMPILED_MODULES = frozenset(LIBRARY.names.split() if LIBRARY else ())
 sys.meta_path.insert(0, OurFinder)
-if LIBRARY is None:
-    import cython
-
-    cython.cast = plain_cast
