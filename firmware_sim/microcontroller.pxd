@@ -104,9 +104,9 @@ cdef class Microcontroller:
     @cython.final
     cdef long long _note_service(self, InterruptSource source, long long items) except? <long long>-1
     @cython.final
-    cdef long long _code(self, long long first) except? <long long>-1
+    cdef bint _resume(self) except? -1
     @cython.final
-    cdef bint _edges_between(self) except? -1
+    cdef long long _end_row(self) except? <long long>-1
     @cython.final
     cdef long long _spent(self, Task task, long long items) except? <long long>-1
     @cython.final

@@ -391,6 +391,9 @@ class Microcontroller:
         asking: InterruptSource
         first: cython.longlong
         own: cython.longlong
+        number: cython.longlong
+        usual_ns: cython.longlong
+        items: cython.longlong
         self.horizon = until
         while True:
             # what comes in, or comes due by itself
@@ -415,10 +418,33 @@ class Microcontroller:
                 self.instant = own
                 if vic.pending != 0:
                     self._serve(vic.take_first(), inbox, own)
-                elif not scheduler.done:
-                    self._code(first)
-                else:
+                    continue
+                if scheduler.done:
                     self._background()
+                    continue
+                # tasks, one after another; what one of them does can only bring an alarm or an interrupt nearer
+                self.stop_time = self.horizon if self.horizon < first else first
+                self.extra_cycles = 0
+                if (self.waiting or scheduler.late) and not self._resume():
+                    continue
+                while scheduler.position < scheduler.end:
+                    number = scheduler.numbers[scheduler.position]
+                    scheduler.position += 1
+                    usual_ns = scheduler.table[4 * number + 2]  # ENTRY
+                    self.now = self.code_time
+                    if usual_ns >= 0:
+                        items = run(scheduler, number) if cython.compiled else scheduler.functions[number]() or 0
+                        if items == 0 and self.extra_cycles == 0:
+                            self.code_time += usual_ns
+                            scheduler.table[4 * number + 3] += 1
+                        else:
+                            self._spent(cython.cast(Task, scheduler.tasks[number]), items)
+                    elif not self._special_task(cython.cast(Task, scheduler.tasks[number])):
+                        break
+                    if self.code_time >= self.stop_time or vic.pending != 0:
+                        break
+                else:
+                    self._end_row()
                 continue
             if first >= self.horizon:
                 break
@@ -583,67 +609,34 @@ class Microcontroller:
         return busy
 
     @cython.final
-    def _code(self, first: cython.longlong) -> cython.longlong:
-        """Run tasks from `code_time` on, until something else comes first or the row ends. Returns 0.
+    def _resume(self) -> cython.bint:
+        """Tasks go on after one that spins, or after one that was completed behind its slot's end.
 
-        `first`: the first edge, message or alarm.
+        False when something else comes first.
         """
         scheduler: SlotScheduler = self.scheduler
-        number: cython.longlong
-        items: cython.longlong
-        usual_ns: cython.longlong
-        # what comes first; a task can only bring an alarm or an interrupt nearer
-        self.stop_time = self.horizon if self.horizon < first else first
-        self.extra_cycles = 0
         if self.waiting:
             self.now = self.code_time
             self.check_wait = False
             if not call(self.wait_task.routine):
-                return 0
+                return False
             self._wait_over()
             if self.code_time >= self.stop_time or self.vic.pending != 0:
-                return 0
+                return False
         if scheduler.late:
             scheduler.late = False
             self._close_slot(scheduler.late_time)
             scheduler.late_record = None
-        while scheduler.position < scheduler.end:
-            number = scheduler.numbers[scheduler.position]
-            scheduler.position += 1
-            usual_ns = scheduler.table[4 * number + 2]  # ENTRY
-            self.now = self.code_time
-            if usual_ns >= 0:
-                if cython.compiled:
-                    items = run(scheduler, number)
-                else:
-                    items = scheduler.functions[number]() or 0
-                if items == 0 and self.extra_cycles == 0:
-                    self.code_time += usual_ns
-                    scheduler.table[4 * number + 3] += 1
-                else:
-                    self._spent(cython.cast(Task, scheduler.tasks[number]), items)
-            elif not self._special_task(cython.cast(Task, scheduler.tasks[number])):
-                return 0
-            if self.code_time >= self.stop_time or self.vic.pending != 0:
-                if self.edge_time > self.code_time or not self._edges_between():
-                    return 0
-        self.now = self.code_time
-        scheduler.done = True
-        self.background_wanted = True
-        scheduler.finished_time = self.code_time
-        self._close_slot(scheduler.slot_time)
-        return 0
+        return True
 
     @cython.final
-    def _edges_between(self) -> cython.bint:
-        """Two tasks: if nothing but edges comes between them, take those. True when the next task may run at once."""
-        first: cython.longlong = min(self.alarm_time, self.inbox.head_time)
-        if self.vic.pending != 0 or self.edge_time >= self.horizon or self.edge_time > min(first, self.code_time):
-            return False
-        self._edges()
-        self.extra_cycles = 0
-        self.stop_time = min(self.horizon, self.edge_time, first, self.alarm_time)
-        return self.vic.pending == 0 and self.code_time < self.stop_time
+    def _end_row(self) -> cython.longlong:
+        """The row's last task has run; returns the cycles of its slot."""
+        self.now = self.code_time
+        self.scheduler.done = True
+        self.background_wanted = True
+        self.scheduler.finished_time = self.code_time
+        return self._close_slot(self.scheduler.slot_time)
 
     @cython.final
     def _spent(self, task, items: cython.longlong) -> cython.longlong:
