@@ -501,14 +501,16 @@ class Lockstep:
         self.step_times[0] = start
         self.step_times[1] = end
         board: Microcontroller
+        place: cython.longlong
         first: cython.longlong
         for i in range(len(self.encoder_boards)):
-            board = cython.cast(Microcontroller, self.boards[self.encoder_boards[i]])
+            place = self.encoder_boards[i]
+            board = cython.cast(Microcontroller, self.boards[place])
             first = board.edges_came()
-            if first < self.came[self.encoder_boards[i]]:
-                self.came[self.encoder_boards[i]] = first
-                if self.prompt[self.encoder_boards[i]] and first < self.due[self.encoder_boards[i]]:
-                    self.due[self.encoder_boards[i]] = first
+            if first < self.came[place]:
+                self.came[place] = first
+                if self.prompt[place] and first < self.due[place]:
+                    self.due[place] = first
         if self.imu is not None and self.imu.bytes.count:
             if self.imu_tap is not None:
                 self.imu_tap.bytes_sent(self.imu.bytes.times, self.imu.bytes.values, self.imu.bytes.count)
@@ -517,38 +519,35 @@ class Lockstep:
     def _show_words(self) -> cython.void:
         """What the absolute encoders hold at the start of the step: their words stand until the next one."""
         plant: RangerPlant = self.plant
-        i: cython.longlong
-        word: WordWire
-        board: Microcontroller
-        wires: list = self.word_wires
-        for i in range(len(wires)):
-            word = cython.cast(WordWire, wires[i])
-            board = word.board
-            board.words[word.word] = plant.words[word.source]
+        wire: WordWire
+        for wire in self.word_wires:
+            wire.board.words[wire.word] = plant.words[wire.source]
 
     def _deliver_bytes(self) -> cython.void:
         """Bytes of the inertial unit: up to eight that follow each other closely travel as one message."""
         line: ByteBuffer = self.imu.bytes
         board: Microcontroller = self.imu_board
-        i: cython.longlong = 0
-        k: cython.longlong
-        n: cython.longlong
-        low: cython.longlong
-        high: cython.longlong
-        while i < line.count:
-            n = 1
-            while n < 8 and i + n < line.count and line.times[i + n] - line.times[i + n - 1] < 25_000:
-                n += 1
-            low = 0
-            high = 0
-            for k in range(n):
-                if k < 4:
-                    low |= line.values[i + k] << (8 * k)
-                else:
-                    high |= line.values[i + k] << (8 * (k - 4))
-            # order 256: stage pins; kind 5: UART_BYTE
-            board.inbox.put(line.times[i + n - 1], 256, 5, self.imu_uart, line.values[i], n, low, high, 0)
-            i += n
+        time: cython.longlong = line.times[0]
+        following: cython.longlong
+        byte: cython.longlong
+        n: cython.longlong = 0  # bytes in `low` and `high`, the first one in the lowest place
+        low: cython.longlong = 0
+        high: cython.longlong = 0
+        i: cython.longlong
+        for i in range(line.count):
+            following = line.times[i]
+            if n == 8 or following - time >= 25_000:
+                # order 256: stage pins; kind 5: UART_BYTE
+                board.inbox.put(time, 256, 5, self.imu_uart, low & 255, n, low, high, 0)
+                n = low = high = 0
+            byte = line.values[i]
+            if n < 4:
+                low |= byte << (8 * n)
+            else:
+                high |= byte << (8 * n - 32)
+            n += 1
+            time = following
+        board.inbox.put(time, 256, 5, self.imu_uart, low & 255, n, low, high, 0)
 
     def _sample(self, now: cython.longlong) -> None:
         """One row of the trace: the body, and when a log is kept the main brain's data table."""

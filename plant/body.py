@@ -986,6 +986,10 @@ class Body:
         JH: cython.double = self.JH
         iJA: cython.double = self.inverse_JA
         iJf: cython.double = self.inverse_Jf
+        gx: cython.double = self.gx
+        gy: cython.double = self.gy
+        r: cython.double = self.r
+        d: cython.double = self.d
         eps: cython.double = self.inverse_smoothing
         mco: cython.double = self.mc_outer
         mwo: cython.double = self.mw_outer
@@ -1015,16 +1019,21 @@ class Body:
         uF0, us0, uw0, uG0, up0, un0 = uF, us, uw, uG, up, un
         self._know_angles()
         st, ct, sw, cw = self.sin_leg_outer, self.cos_leg_outer, self.sin_leg_inner, self.cos_leg_inner
-        # sums of k1 + k2 + k3 (positions) and k1 + 2 k2 + 2 k3 + k4 (rates)
-        qF = qs = qw = qG = qp = qn = qx = qy = 0.0
-        vF = vs = vw = vG = vp = vn = vx = vy = 0.0
+        if outer_stands:
+            sS, cS, rolling = self.sin_foot_outer, self.cos_foot_outer, self.C_outer + 2.0
+        else:
+            sS, cS, rolling = self.sin_foot_inner, self.cos_foot_inner, self.C_inner + 2.0
         half: cython.double = 0.5 * h
         quarter: cython.double = 0.25 * h
-        c: cython.double = half
-        weight: cython.double = 1.0
+        # what rests while the operator holds it
+        as_ = aw = axh = ayh = 0.0
         for stage in range(stages):
             if stage != 2:
                 # what depends on angles alone; stages 1 and 2 look at the same ones
+                a_s = F - th
+                a_w = G - tw
+                pull_s = 0.0 if massless and not outer_stands else ks * (p - a_s)
+                pull_w = 0.0 if massless and not inner_stands else ks * (n - a_w)
                 if not locked:
                     if stage > 0:
                         st = sin(th)
@@ -1035,11 +1044,20 @@ class Body:
                     Bo = mco * st - mwo * ct
                     Ai = mci * cw + mwi * sw
                     Bi = mci * sw - mwi * cw
-                a_s = F - th
-                a_w = G - tw
-                pull_s = 0.0 if massless and not outer_stands else ks * (p - a_s)
-                pull_w = 0.0 if massless and not inner_stands else ks * (n - a_w)
-                spring = self._exact_spring(th - tw) if exact_spring else kh * (th - tw)
+                    spring = self._exact_spring(th - tw) if exact_spring else kh * (th - tw)
+                if standing:
+                    # the stance foot rolls under the weight, the legs keep their lean (EQUATIONS 7.2)
+                    foot = F if outer_stands else G
+                    if stage > 0:
+                        sS = sin(foot)
+                        cS = cos(foot)
+                    e = r - d * cS
+                    f = d * sS
+                    if foot < self.heel or foot > self.toe:
+                        e = r * cos(self._excess(foot)) - d * cS
+                        f -= r * sin(self._excess(foot))
+                    push = M * (e * gx + f * gy)
+                    weight_J = M * (e * e + f * f) + self.Jf
             Ts = pull_s
             Tw = pull_w
             mp = o_drive - o_coulomb * smoothed_sign(up * eps) - o_viscous * up - Ts
@@ -1070,49 +1088,33 @@ class Body:
                     mn += self.extra_inner
             ap = mp * iJA
             an = mn * iJA
-            Qo = Th - Ts
-            Qi = -Th - Tw
-            if held:
-                # the hip rests: gravity as if the hip were accelerated by its opposite
-                axh = 0.0
-                ayh = 0.0
-                as_ = 0.0
-                if locked:
-                    aw = 0.0
-                else:
-                    aw = (Qi - Ai * self.gx + Bi * self.gy) / (self.J_inner + JH)
-            else:
+            if not held:
                 # eliminate the hip's acceleration less gravity (EQUATIONS 7.1)
                 bx = -(Bo * us * us + Bi * uw * uw) / M
                 by = -(Ao * us * us + Ai * uw * uw) / M
                 n11 = self.J_outer + JH - (Ao * Ao + Bo * Bo) / M
                 n22 = self.J_inner + JH - (Ai * Ai + Bi * Bi) / M
                 n12 = -JH - (Ao * Ai + Bo * Bi) / M
-                b1 = Qo + Ao * bx - Bo * by
-                b2 = Qi + Ai * bx - Bi * by
+                b1 = Th - Ts + Ao * bx - Bo * by
+                b2 = -Th - Tw + Ai * bx - Bi * by
                 inv = 1.0 / (n11 * n22 - n12 * n12)
                 as_ = (n22 * b1 - n12 * b2) * inv
                 aw = (n11 * b2 - n12 * b1) * inv
-                axh = bx + (Ao * as_ + Ai * aw) / M + self.gx
-                ayh = by - (Bo * as_ + Bi * aw) / M + self.gy
+                axh = bx + (Ao * as_ + Ai * aw) / M + gx
+                ayh = by - (Bo * as_ + Bi * aw) / M + gy
+            elif not locked:
+                # the hip rests: gravity as if the hip were accelerated by its opposite
+                aw = (-Th - Tw - Ai * gx + Bi * gy) / (self.J_inner + JH)
             if massless:
                 aF = as_ + ap
                 aG = aw + an
             else:
                 aF = Ts * iJf
                 aG = Tw * iJf
-            if standing:
-                # the stance foot rolls under the weight, the legs keep their lean (EQUATIONS 7.2)
-                angle = F if outer_stands else G
-                stop = self._excess(angle)
-                e = self.r * cos(stop) - self.d * cos(angle)
-                f = self.d * sin(angle) - self.r * sin(stop)
-                push = M * (e * self.gx + f * self.gy)
-                weight_J = M * (e * e + f * f) + self.Jf
-                if outer_stands:
-                    aF = (Ts - (self.C_outer + 2.0) * uF + push) / weight_J
-                else:
-                    aG = (Tw - (self.C_inner + 2.0) * uG + push) / weight_J
+            if outer_stands:
+                aF = (Ts - rolling * uF + push) / weight_J
+            elif inner_stands:
+                aG = (Tw - rolling * uG + push) / weight_J
             if stage == 0:
                 self.foot_outer_acc = aF
                 self.leg_outer_acc = as_
@@ -1121,38 +1123,47 @@ class Body:
                 self.motor_outer_acc = ap
                 self.motor_inner_acc = an
                 self.hip_ay = ayh
-                self.outer_Fx = -M * self.gx if outer_stands else 0.0
-                self.outer_Fy = -M * self.gy if outer_stands else 0.0
-                self.inner_Fx = -M * self.gx if inner_stands else 0.0
-                self.inner_Fy = -M * self.gy if inner_stands else 0.0
+                self.outer_Fx = -M * gx if outer_stands else 0.0
+                self.outer_Fy = -M * gy if outer_stands else 0.0
+                self.inner_Fx = -M * gx if inner_stands else 0.0
+                self.inner_Fy = -M * gy if inner_stands else 0.0
                 if stages == 1:
                     return
-            vF += weight * aF
-            vs += weight * as_
-            vw += weight * aw
-            vG += weight * aG
-            vp += weight * ap
-            vn += weight * an
-            vx += weight * axh
-            vy += weight * ayh
-            if stage < 3:
+                # sums: q of k1 + k2 + k3 for the positions, v of k1 + 2 k2 + 2 k3 for the rates
+                qF = vF = aF
+                qs = vs = as_
+                qw = vw = aw
+                qG = vG = aG
+                qp = vp = ap
+                qn = vn = an
+                qx = vx = axh
+                qy = vy = ayh
+                F = F0 + half * (uF0 + quarter * aF)
+                th = th0 + half * (us0 + quarter * as_)
+                tw = tw0 + half * (uw0 + quarter * aw)
+                G = G0 + half * (uG0 + quarter * aG)
+                p = p0 + half * (up0 + quarter * ap)
+                n = n0 + half * (un0 + quarter * an)
+                c = half
+            elif stage < 3:
                 qF += aF
                 qs += as_
                 qw += aw
                 qG += aG
                 qp += ap
                 qn += an
-                qx += axh
-                qy += ayh
-                if stage == 0:
-                    F = F0 + half * (uF0 + quarter * aF)
-                    th = th0 + half * (us0 + quarter * as_)
-                    tw = tw0 + half * (uw0 + quarter * aw)
-                    G = G0 + half * (uG0 + quarter * aG)
-                    p = p0 + half * (up0 + quarter * ap)
-                    n = n0 + half * (un0 + quarter * an)
-                    weight = 2.0
-                elif stage == 2:
+                vF += 2.0 * aF
+                vs += 2.0 * as_
+                vw += 2.0 * aw
+                vG += 2.0 * aG
+                vp += 2.0 * ap
+                vn += 2.0 * an
+                if not held:
+                    qx += axh
+                    qy += ayh
+                    vx += 2.0 * axh
+                    vy += 2.0 * ayh
+                if stage == 2:
                     F = F0 + h * (uF0 + half * aF)
                     th = th0 + h * (us0 + half * as_)
                     tw = tw0 + h * (uw0 + half * aw)
@@ -1160,7 +1171,7 @@ class Body:
                     p = p0 + h * (up0 + half * ap)
                     n = n0 + h * (un0 + half * an)
                     c = h
-                    weight = 1.0
+            if stage < 3:
                 uF = uF0 + c * aF
                 us = us0 + c * as_
                 uw = uw0 + c * aw
@@ -1174,17 +1185,17 @@ class Body:
         self.foot_inner = G0 + h * (uG0 + sixth * qG)
         self.motor_outer = p0 + h * (up0 + sixth * qp)
         self.motor_inner = n0 + h * (un0 + sixth * qn)
-        self.foot_outer_rate = uF0 + sixth * vF
-        self.leg_outer_rate = us0 + sixth * vs
-        self.leg_inner_rate = uw0 + sixth * vw
-        self.foot_inner_rate = uG0 + sixth * vG
-        self.motor_outer_rate = up0 + sixth * vp
-        self.motor_inner_rate = un0 + sixth * vn
+        self.foot_outer_rate = uF0 + sixth * (vF + aF)
+        self.leg_outer_rate = us0 + sixth * (vs + as_)
+        self.leg_inner_rate = uw0 + sixth * (vw + aw)
+        self.foot_inner_rate = uG0 + sixth * (vG + aG)
+        self.motor_outer_rate = up0 + sixth * (vp + ap)
+        self.motor_inner_rate = un0 + sixth * (vn + an)
         if not held:
             self.hip_x += h * (self.hip_vx + sixth * qx)
             self.hip_y += h * (self.hip_vy + sixth * qy)
-            self.hip_vx += sixth * vx
-            self.hip_vy += sixth * vy
+            self.hip_vx += sixth * (vx + axh)
+            self.hip_vy += sixth * (vy + ayh)
 
     # ---- impacts ----------------------------------------------------------------------------------------------
 
@@ -1330,7 +1341,8 @@ class Body:
         self.elapsed = 0.0
         while remaining > 0.0 and self.mode != 4:
             tries += 1
-            self._save()
+            if self.mode != 0:  # nothing happens in the operator's hands that a step would be taken back for
+                self._save()
             if self.mode == 1 or self.mode == 2:
                 self.on_feet(remaining, 4)
                 if (self.outer_Fy < 0.0 or self.inner_Fy < 0.0) and tries < 20 and self._pulled_now(remaining):
