@@ -33,6 +33,7 @@ from firmware_sim.peripherals.ssp import SspPort, SspSegment
 from firmware_sim.peripherals.timer_capture import TimerCapture
 from firmware_sim.scheduler import Occasional, Schedule, Task
 from firmware_sim.vic import FIQ, TIMER_MATCH
+from foundation.division import quotient
 from foundation.events import CAN_RX, CAN_STATUS, SSP_SEGMENT
 
 if not cython.compiled:
@@ -351,7 +352,7 @@ class CanRouterBoard(Microcontroller):
             if self.idle:
                 self.idle = False
                 passed = at - self.idle_since
-                pairs = passed // self.pair_ns
+                pairs = quotient(passed, self.pair_ns)
                 passed -= pairs * self.pair_ns
                 if passed > 0:
                     pairs += 1

@@ -1,4 +1,5 @@
 from firmware_sim.microcontroller cimport Peripheral
+from foundation.division cimport quotient
 
 cimport cython
 

@@ -10,6 +10,7 @@ of the period that first has the new values: at most one period after `now`.
 import cython
 
 from firmware_sim.microcontroller import Peripheral
+from foundation.division import quotient
 from foundation.user_error import UserError
 
 LONGEST_PERIOD_S = 2  # so that products of times and rates stay within 64 bits
@@ -106,9 +107,10 @@ class Pwm(Peripheral):
             if far:
                 periods = 2000000000 // self.period_ns
             else:
-                periods = ((since * self.rate - self.rest) // 1000000000 + self.period_ns - 1) // self.period_ns
+                periods = (since * self.rate - self.rest) // 1000000000
+                periods = quotient(periods + self.period_ns - 1, self.period_ns)
             parts = self.rest + periods * self.period_ns * 1000000000
-            whole = parts // self.rate
+            whole = quotient(parts, self.rate)
             self.rest = parts - whole * self.rate
             self.period_start += whole
             since -= whole

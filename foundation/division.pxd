@@ -1,0 +1,1 @@
+cpdef long long quotient(long long a, long long b) noexcept
