@@ -8,8 +8,8 @@ import cython
 def quotient(a: cython.longlong, b: cython.longlong) -> cython.longlong:
     """floor(a / b) for a >= 0 and b > 0.
 
-    Compiled, by doubles as far as they are exact: where a + b < 2^53 the quotient is at least 1 / b below the next whole
-    number, which is more than it can be rounded. A processor divides 64-bit integers several times slower.
+    Compiled, by doubles as far as they are exact: where a + b < 2^53 the quotient is at least 1 / b below the next
+    whole number, which is more than it can be rounded. A processor divides 64-bit integers several times slower.
     """
     exact: cython.longlong = 9007199254740992  # 2^53
     if cython.compiled and a < exact - b:
