@@ -5,8 +5,8 @@
 Receive: UART_BYTE messages stamped with the end of the byte fill a FIFO of 16. One message may bring up to
 eight bytes: c their number, d the first four, e the rest, low byte first, stamped with the end of the last.
 The interrupt (UART_BYTE, number) comes when the trigger level (1, 4, 8 or 14) is reached, and when bytes have
-waited for the time of four characters (IIR 0xC, LPC2194 user manual: 3.5 to 4.5). Handlers are expected to
-empty the FIFO.
+waited below it for the time of four characters since the last one came or was read (IIR 0xC, LPC2194 user manual:
+3.5 to 4.5). Handlers are expected to empty the FIFO.
 Transmit: a byte written to THR leaves as UART_OUTPUT, stamped with the end of its stop bit; FIFO of 16. When
 the FIFO has become empty, (UART_TRANSMIT, number) is raised.
 """
@@ -70,30 +70,27 @@ class Uart(Peripheral):
         A group is taken at once: with the trigger at or above its size the interrupt comes at the same
         instant as byte by byte.
         """
-        i: cython.longlong
-        count: cython.longlong = 1
+        place: cython.longlong
+        first: cython.longlong = self.fifo_count
+        behind: cython.longlong = first + 1
         bytes_left: cython.longlong = queue.b
-        place: cython.longlong = self.fifo_count
         if queue.c > 1:
-            count = queue.c
-            bytes_left = queue.d
-        self.received += count
-        if self.fifo_count + count > 16:  # the last ones are lost
-            self.overruns += self.fifo_count + count - 16
+            behind = first + queue.c
+            bytes_left = queue.e << 32 | queue.d
+        self.received += behind - first
+        if behind > 16:  # the last ones are lost
+            self.overruns += behind - 16
             self.errors |= 2
-            count = 16 - self.fifo_count
-        for i in range(count):
-            if i == 4:
-                bytes_left = queue.e
-            self.fifo[place + i] = bytes_left & 255
+            behind = 16
+        for place in range(first, behind):
+            self.fifo[place] = bytes_left & 255
             bytes_left >>= 8
-        self.fifo_count += count
-        if self.fifo_count == 0:
-            return None
-        self.timeout_alarm.set(queue.time + 4 * self.byte_ns)
-        if self.fifo_count >= self.trigger:
+        self.fifo_count = behind
+        if behind >= self.trigger:
+            self.timeout_alarm.set(1 << 62)  # NEVER
             self.IIR = 4
             return self.source
+        self.timeout_alarm.set(queue.time + 4 * self.byte_ns)
         return None
 
     def on_alarm(self, alarm: cython.longlong, time: cython.longlong) -> InterruptSource | None:
@@ -125,6 +122,8 @@ class Uart(Peripheral):
             if self.fifo_count == 0:
                 self.IIR = 1
                 self.timeout_alarm.set(1 << 62)
+            else:
+                self.timeout_alarm.set(self.chip.now + 4 * self.byte_ns)
 
     def THR(self, byte: cython.longlong) -> cython.bint:
         """Send a byte; False (and `refused` counts) when the FIFO is full."""

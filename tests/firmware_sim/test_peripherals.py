@@ -417,6 +417,23 @@ def test_the_receive_interrupt_comes_at_the_trigger_level_and_after_four_quiet_c
     ]
 
 
+def test_bytes_that_a_handler_leaves_ask_again_after_four_characters():
+    chip = chip_at()
+    uart = Uart(chip, number=0, trigger=4)
+    times = []
+
+    def handler(queue):
+        times.append((chip.now, uart.IIR))
+        uart.RBR()
+
+    chip.vic.attach(UART_BYTE, 0, handler, cost=50, slot=3, latency=0)
+    chip.inbox.push(50_000, 0, UART_BYTE, 0, 0, 4, 0, 0)
+    chip.advance(10_000_000)
+    quiet = 4 * uart.byte_ns
+    assert times == [(50_000, 4), *((50_000 + n * quiet, 12) for n in (1, 2, 3))]
+    assert uart.waiting() == 0
+
+
 def test_a_full_receive_fifo_loses_the_new_byte_and_says_so_once():
     chip = chip_at()
     uart = Uart(chip, number=0)
