@@ -239,12 +239,13 @@ class InterruptController:
     def take_first(self):
         """Who is served now, only while `pending` is not 0: the first FIQ source attached, else the lowest slot."""
         first: InterruptSource = self.newest
-        place: cython.longlong = 16 if self.pending >= 65536 else 0  # FIRST_FIQ
+        place: cython.longlong
         if self.pending != first.bit:  # not alone, as it nearly always is
+            place = 16 if self.pending >= 65536 else 0  # FIRST_FIQ
             while self.pending >> place & 1 == 0:
                 place += 1
             first = self.fiq_list[place - 16] if place >= 16 else self.irq_list[place]
-        self.pending &= ~first.bit
+        self.pending ^= first.bit
         return first
 
     @property

@@ -10,13 +10,12 @@ cdef class Ads7871(Peripheral):
     cdef public bint busy, done
     cdef public long long step, length, register4
     cdef public Alarm alarm
-    cdef public long long started_time
     cdef public InterruptSource source
     cdef public long long conversion_ns, offset_counts
     cdef public long long[16] sequence, inputs
-    cdef public long long[8] gains
-    cdef public double scale, reference_V
-    cdef public long long result, conversions
+    cdef public double[8] gains
+    cdef public double count_V
+    cdef public long long result
     cdef public long long[16] results
     # the rest
     cdef public long long eint, not_finished

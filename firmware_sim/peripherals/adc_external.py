@@ -51,17 +51,14 @@ class Ads7871(Peripheral):
         self.eint = eint
         self.conversion_ns = conversion_ns
         self.alarm = chip.new_alarm(self, 0)
-        self.reference_V = reference_V
-        self.scale = scale
+        self.count_V = reference_V / 8192.0
+        self.gains = [scale * gain for gain in GAINS]
         self.offset_counts = offset_counts
         self.source = chip.vic.source(EXTERNAL_INTERRUPT, eint)
         self.register4 = 0
-        self.gains = list(GAINS)
         self.inputs = list(range(16))
         self.busy = False
         self.result = 0
-        self.conversions = 0
-        self.started_time = 0
         self.length = 0
         self.step = 0
         self.sequence = [0] * 16
@@ -80,46 +77,39 @@ class Ads7871(Peripheral):
 
     def convert(self, volts: cython.double, gain_code: cython.longlong) -> cython.longlong:
         """Counts for a voltage at the input."""
-        scaled: cython.double = self.scale * self.gains[gain_code] * volts / self.reference_V * 8192.0
+        scaled: cython.double = self.gains[gain_code] * volts / self.count_V
         counts: cython.longlong
-        if scaled != scaled:
-            return 0
-        if scaled > 16384.0:
-            scaled = 16384.0
-        if scaled < -16384.0:
-            scaled = -16384.0
+        if not -16384.0 <= scaled <= 16384.0:
+            if scaled != scaled:
+                return 0
+            scaled = copysign(16384.0, scaled)
         counts = int(scaled + copysign(0.5, scaled))
         counts += self.offset_counts
-        if counts > 8191:
-            return 8191
-        if counts < -8192:
-            return -8192
-        return counts
+        if -8192 <= counts <= 8191:
+            return counts
+        return 8191 if counts > 0 else -8192
 
     def start(self, register4: cython.longlong) -> cython.bint:
         """Write register 4; False when a conversion is under way (the write is lost)."""
         if self.busy:
             return False
-        self.register4 = register4 & 127
-        if register4 & 128 == 0:
-            return True
-        self.busy = True
-        self.started_time = self.chip.now
-        self.alarm.set(self.chip.now + self.conversion_ns)
+        self.register4 = register4
+        if register4 & 128:
+            self.busy = True
+            self.alarm.set(self.chip.now + self.conversion_ns)
         return True
 
     def on_alarm(self, alarm: cython.longlong, time: cython.longlong) -> InterruptSource | None:
         """The conversion is over: result registers 1 and 0 are loaded, BUSY falls."""
-        volts: cython.double = self.chip.analog.volts(self.inputs[self.register4 & 15], self.started_time)
+        volts: cython.double = self.chip.analog.volts(self.inputs[self.register4 & 15], time - self.conversion_ns)
         self.result = self.convert(volts, self.register4 >> 4 & 7)
         self.busy = False
-        self.conversions += 1
         return self.source
 
     @property
     def registers(self):
         """The 32 registers: result in 0 and 1, what was written in 4."""
-        return [self.result << 2 & 255, self.result >> 6 & 255, 0, 0, self.register4] + [0] * 27
+        return [self.result << 2 & 255, self.result >> 6 & 255, 0, 0, self.register4 & 127] + [0] * 27
 
     def read_result(self) -> cython.longlong:
         """Registers 1 and 0 as one signed number, -8192 ... 8191."""
@@ -139,10 +129,12 @@ class Ads7871(Peripheral):
 
     def on_busy(self, queue) -> object:
         """Interrupt handler: store the result, start the next entry."""
-        self.results[self.step] = self.result
-        self.step += 1
-        if self.step < self.length:
-            self.start(self.sequence[self.step])
+        step: cython.longlong = self.step
+        self.results[step] = self.result
+        step += 1
+        if step < self.length:
+            self.step = step
+            self.start(self.sequence[step])
         else:
             self.step = 0
             self.done = True

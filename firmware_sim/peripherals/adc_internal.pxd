@@ -10,16 +10,15 @@ cdef class AdcInternal(Peripheral):
     cdef public long long channel
     cdef public Alarm alarm
     cdef public InterruptSource source
-    cdef public long long started_time
-    cdef public long long conversion_ns, clkdiv
+    cdef public long long conversion_ns, single
     cdef public long long CR, GDR
-    cdef public double scale, reference_V
-    cdef public long long result, offset_counts, conversions
+    cdef public double scale, count_V
+    cdef public long long result, offset_counts
     cdef public long long[8] inputs
     # burst mode, and the rest
     cdef public long long[8] channels
     cdef public long long burst_count, burst_start
-    cdef public long long hz, not_finished
+    cdef public long long hz, clkdiv, not_finished
     cpdef long long convert(self, double volts) noexcept
     cpdef bint start(self, long long channel) except? -1
     cpdef long long DR(self, long long channel) except? <long long>-1

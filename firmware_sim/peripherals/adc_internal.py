@@ -26,20 +26,19 @@ class AdcInternal(Peripheral):
         self.clkdiv = clkdiv
         self.hz = hz if hz else chip.hz
         self.conversion_ns = 11 * clkdiv * 1_000_000_000 // self.hz
-        self.reference_V = reference_V
+        self.count_V = reference_V / 1024.0
         self.scale = scale
         self.offset_counts = offset_counts
         self.alarm = chip.new_alarm(self, 0)
         self.source = chip.vic.source(ADC_DONE, 0)
         self.inputs = list(range(8))
+        self.single = (clkdiv - 1) << 8 | 1 << 21 | 1 << 24  # ADCR without the channel: power on, start now
         self.CR = 0
         self.GDR = 0
         self.result = 0
         self.channel = 0
         self.busy = False
-        self.conversions = 0
         self.not_finished = 0
-        self.started_time = 0
         self.channels = [0] * 8
         self.burst_count = 0
         self.burst_start = 0
@@ -47,7 +46,7 @@ class AdcInternal(Peripheral):
     @cython.cdivision(True)  # the reference is above 0
     def convert(self, volts: cython.double) -> cython.longlong:
         """Counts for a voltage at the pin."""
-        scaled: cython.double = self.scale * volts / self.reference_V * 1024.0
+        scaled: cython.double = self.scale * volts / self.count_V
         counts: cython.longlong
         if not scaled > 0.0:
             scaled = 0.0
@@ -55,11 +54,9 @@ class AdcInternal(Peripheral):
             scaled = 2048.0
         counts = int(scaled)
         counts += self.offset_counts
-        if counts < 0:
-            return 0
-        if counts > 1023:
-            return 1023
-        return counts
+        if 0 <= counts <= 1023:
+            return counts
+        return 1023 if counts > 0 else 0
 
     def start(self, channel: cython.longlong) -> cython.bint:
         """Start one conversion; False (and `not_finished` counts) while one is under way."""
@@ -68,18 +65,16 @@ class AdcInternal(Peripheral):
             return False
         self.busy = True
         self.channel = channel
-        self.started_time = self.chip.now
-        self.CR = 1 << channel | (self.clkdiv - 1) << 8 | 1 << 21 | 1 << 24
+        self.CR = self.single | 1 << channel
         self.alarm.set(self.chip.now + self.conversion_ns)
         return True
 
     def on_alarm(self, alarm: cython.longlong, time: cython.longlong) -> InterruptSource | None:
         """The conversion is over: ADGDR holds result, channel and the DONE bit."""
         done: cython.longlong = 128  # bit 31 of ADGDR, above the channel
-        self.result = self.convert(self.chip.analog.volts(self.inputs[self.channel], self.started_time))
+        self.result = self.convert(self.chip.analog.volts(self.inputs[self.channel], time - self.conversion_ns))
         self.GDR = self.result << 6 | (done | self.channel) << 24
         self.busy = False
-        self.conversions += 1
         return self.source
 
     def start_burst(self, *channels) -> None:

@@ -4,7 +4,7 @@ cimport cython
 
 @cython.final
 cdef class Gpio(Peripheral):
-    cdef public long long[2] IODIR
+    cdef public long long[64] outputs
     cpdef long long level(self, long long pin) except? <long long>-1
     cpdef int write(self, long long pin, long long level) except -1
     cpdef int toggle(self, long long pin) except -1

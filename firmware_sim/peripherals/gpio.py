@@ -23,11 +23,11 @@ def p1(bit) -> int:
 
 
 class Gpio(Peripheral):
-    """The two ports of a chip, whose levels are `chip.pins`. `IODIR`, per port: bit n is 1 once pin n was written."""
+    """The two ports of a chip, whose levels are `chip.pins`. `outputs`, per pin: 1 once it was written."""
 
     def __init__(self, chip) -> None:
         Peripheral.__init__(self, chip)
-        self.IODIR = [0, 0]
+        self.outputs = [0] * 64
 
     def level(self, pin: cython.longlong) -> cython.longlong:
         """0 or 1, as the pin is now."""
@@ -35,15 +35,15 @@ class Gpio(Peripheral):
 
     def write(self, pin: cython.longlong, level: cython.longlong) -> None:
         """Drive an output; a change is told outside as PIN_OUTPUT at `now`."""
-        if self.chip.pins[pin] != level or not self.IODIR[pin >> 5] >> (pin & 31) & 1:
-            self.IODIR[pin >> 5] |= 1 << (pin & 31)
+        if self.chip.pins[pin] != level or self.outputs[pin] == 0:
+            self.outputs[pin] = 1
             self.chip.pins[pin] = level
             self.chip.outbox.push(self.chip.now, 0, 36, pin, level)  # PIN_OUTPUT
 
     def toggle(self, pin: cython.longlong) -> None:
         """Invert an output."""
         level: cython.longlong = 1 - self.chip.pins[pin]
-        self.IODIR[pin >> 5] |= 1 << (pin & 31)
+        self.outputs[pin] = 1
         self.chip.pins[pin] = level
         self.chip.outbox.push(self.chip.now, 0, 36, pin, level)  # PIN_OUTPUT
 

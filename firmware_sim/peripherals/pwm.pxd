@@ -15,3 +15,4 @@ cdef class Pwm(Peripheral):
     cpdef int latch(self, long long mask) except -1
     cdef int _count_periods(self) except -1
     cdef void _find_period(self) noexcept
+    cdef long long _go_on(self, long long periods) noexcept

@@ -98,19 +98,17 @@ class Pwm(Peripheral):
     def _find_period(self) -> cython.void:
         """Go on to the first period that begins at `now` or later: exactly to its `Crystal.tick_time_ns`."""
         since: cython.longlong = self.chip.now - self.period_start
-        far: cython.bint = True
         periods: cython.longlong
-        parts: cython.longlong
-        whole: cython.longlong
-        while far and since > 0:
-            far = since > 2000000000  # LONGEST_PERIOD_S
-            if far:
-                periods = 2000000000 // self.period_ns
-            else:
-                periods = (since * self.rate - self.rest) // 1000000000
-                periods = quotient(periods + self.period_ns - 1, self.period_ns)
-            parts = self.rest + periods * self.period_ns * 1000000000
-            whole = quotient(parts, self.rate)
-            self.rest = parts - whole * self.rate
-            self.period_start += whole
-            since -= whole
+        while since > 2000000000:  # LONGEST_PERIOD_S
+            since -= self._go_on(2000000000 // self.period_ns)
+        if since > 0:
+            periods = (since * self.rate - self.rest) // 1000000000
+            self._go_on(quotient(periods + self.period_ns - 1, self.period_ns))
+
+    def _go_on(self, periods: cython.longlong) -> cython.longlong:
+        """Go on by so many periods; returns how long they take (ns)."""
+        parts: cython.longlong = self.rest + periods * self.period_ns * 1000000000
+        whole: cython.longlong = quotient(parts, self.rate)
+        self.rest = parts - whole * self.rate
+        self.period_start += whole
+        return whole

@@ -11,7 +11,6 @@ cdef class SpiEncoder(Peripheral):
     cdef public long long word
     cdef public long long mask, latched, SPDR, SPSR, transfer_ns
     cdef public InterruptSource source
-    cdef public long long transfers
     # the rest
     cdef public long long number, bits, bit_rate, not_finished
     cpdef bint start(self) except? -1

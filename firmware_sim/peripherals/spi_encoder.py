@@ -35,7 +35,6 @@ class SpiEncoder(Peripheral):
         self.SPDR = 0
         self.SPSR = 0
         self.latched = 0
-        self.transfers = 0
         self.not_finished = 0
         self.busy = False
 
@@ -55,7 +54,6 @@ class SpiEncoder(Peripheral):
         self.SPDR = self.latched
         self.SPSR = 128
         self.busy = False
-        self.transfers += 1
         return self.source
 
     def read(self) -> cython.longlong:

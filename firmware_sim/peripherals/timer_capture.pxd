@@ -12,7 +12,6 @@ cdef class TimerCapture(Peripheral):
     cdef public double counts_per_ns
     cdef public long long MR0
     cdef public long long[4] captures
-    cdef public long long[4] captured
     # what a wrap touches besides
     cdef public Alarm alarm
     cdef public InterruptSource match_source
@@ -29,4 +28,5 @@ cdef class TimerCapture(Peripheral):
     cpdef int arm(self, long long channel, bint rising, bint falling) except -1
     cpdef long long count_at(self, long long time) except? <long long>-1
     cdef long long _wrap_to(self, long long time) except? <long long>-1
+    cdef long long _skip_to(self, long long time) except? <long long>-1
     cdef long long _late_pin(self, long long channel, long long level, long long time) except? <long long>-1

@@ -5,7 +5,8 @@
 The timer counts 0 ... MR0 and starts again. An edge that T0CCR asks for copies the count into the channel's
 capture register, sets the channel's bit in T0IR and raises the interrupt of the pin, source (PIN_EDGE, pin). A
 channel holds ONE capture: a second edge before the firmware clears the bit overwrites it. An edge of the
-direction that is not armed is not captured at all. Both are counted in `lost`, ground truth for tests.
+direction that is not armed is not captured at all. Both are counted in `lost`, ground truth for tests; those
+captured are counted by their interrupt's source.
 
 IR: bit 0 match 0, bits 4-7 capture 0-3. CCR: per channel three bits, rising, falling, interrupt.
 """
@@ -21,7 +22,7 @@ from foundation.user_error import UserError
 class TimerCapture(Peripheral):
     """Timer `number` that wraps every `period` counts of `hz` (core clock unless given), from `phase_ns` on.
 
-    `match_interrupt=True` raises (TIMER_MATCH, number) at every wrap. Edges `captured` and `lost` per channel.
+    `match_interrupt=True` raises (TIMER_MATCH, number) at every wrap. Edges `lost` per channel.
     """
 
     def __init__(self, chip, number=0, period=30000, hz=0, phase_ns=0, match_interrupt=False) -> None:
@@ -45,7 +46,6 @@ class TimerCapture(Peripheral):
         self.match_interrupt = match_interrupt
         self.match_source = chip.vic.source(TIMER_MATCH, number)
         self.pins = [-1] * 4
-        self.captured = [0] * 4
         self.lost = [0] * 4
         self.alarm = chip.new_alarm(self, 0)
         if match_interrupt:
@@ -81,11 +81,6 @@ class TimerCapture(Peripheral):
     def wraps(self):
         """How often the timer has started again, as far as it has been looked at."""
         return self.ticks.number - 1
-
-    @property
-    def edges(self):
-        """Edges per channel, captured and lost."""
-        return [captured + lost for captured, lost in zip(self.captured, self.lost, strict=True)]
 
     def CR(self, channel: cython.longlong) -> cython.longlong:
         """Capture register of a channel by number."""
@@ -127,11 +122,17 @@ class TimerCapture(Peripheral):
 
     def _wrap_to(self, time: cython.longlong) -> cython.longlong:
         """Bring the wrap that precedes `time` up to date, however far away; returns its instant."""
-        if time >= self.next_wrap_time + 2 * self.period_ns:
-            self.ticks.go_to(self.chip.crystal.local_ns(time - self.phase_ns) // self.period_ns)
-            self.next_wrap_time = self.ticks.time
-        while self.next_wrap_time <= time:
-            self.wrap_time = self.next_wrap_time
+        self.wrap_time = self.next_wrap_time
+        self.next_wrap_time = self.ticks.next()
+        if time >= self.next_wrap_time:
+            return self._skip_to(time)
+        return self.wrap_time
+
+    def _skip_to(self, time: cython.longlong) -> cython.longlong:
+        """The same over wraps that nobody has looked at."""
+        self.ticks.go_to(self.chip.crystal.local_ns(time - self.phase_ns) // self.period_ns)
+        while self.ticks.time <= time:
+            self.wrap_time = self.ticks.time
             self.next_wrap_time = self.ticks.next()
         return self.wrap_time
 
@@ -152,7 +153,6 @@ class TimerCapture(Peripheral):
             self.lost[channel] += 1
             return 0
         self.IR |= flag
-        self.captured[channel] += 1
         return asked >> 2 & 1
 
     def _late_pin(self, channel: cython.longlong, level: cython.longlong, time: cython.longlong) -> cython.longlong:
