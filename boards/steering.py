@@ -150,7 +150,7 @@ class SteeringBoard(MotorBoard):
         """
         if self.closed_loop:
             self.compliant_control()
-        elif self.current_control.supervise(self.readings.motor_current_fixed()) and not self.output.running():
+        elif self.current_control.supervise(self.readings.motor_current_fixed()) and self.output.off:
             self.errors.report(self.code_stopped)
 
     def check(self) -> None:

@@ -20,10 +20,12 @@ class CanLoad:
     def end_of_millisecond(self) -> cython.void:
         """Keep the largest count and start the next millisecond."""
         i: cython.longlong
+        count: cython.longlong
         for i in range(5):
-            if self.counts[i] > self.peaks[i]:
-                self.peaks[i] = self.counts[i]
-            self.last_counts[i] = self.counts[i]
+            count = self.counts[i]
+            if count > self.peaks[i]:
+                self.peaks[i] = count
+            self.last_counts[i] = count
             self.counts[i] = 0
 
     def report_peak(self, channel: cython.longlong) -> cython.double:

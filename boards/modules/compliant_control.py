@@ -51,10 +51,9 @@ class CompliantControl:
 
     def update(self, position: cython.longlong, velocity: cython.longlong) -> cython.longlong:
         """The current wanted now (A x 65536) at `position` (rad x 65536) and `velocity` (rad/s x 65536)."""
-        self.target = self.command + self.sign * (
+        return self.command + self.sign * (
             fixed_multiply(self.stiffness, position) + fixed_multiply(self.dampness, velocity)
         )
-        return self.target
 
 
 class GainReceiver(Receiver):

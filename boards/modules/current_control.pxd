@@ -2,7 +2,6 @@ from boards.modules.error_module cimport ErrorModule
 from boards.modules.mcu_led cimport McuLed
 from boards.modules.motor_limits cimport MotorLimits
 from boards.modules.motor_output cimport MotorOutput
-from foundation.numbers cimport fixed_multiply
 
 cimport cython
 
@@ -11,7 +10,7 @@ cdef class CurrentControl:
     cdef public MotorLimits limits
     cdef public MotorOutput output
     cdef public bint block_positive, block_negative
-    cdef public long long calls, integral, integral_limit, error, proportional_gain, integral_gain, duty
+    cdef public long long calls, integral, integral_limit, proportional_gain, integral_gain, duty
     cdef public McuLed leds
     cdef public ErrorModule errors
     cdef public long long code_saturated, code_sum, code_duty, code_stopped

@@ -8,9 +8,6 @@ from boards.modules.mcu_led import McuLed
 from boards.modules.motor_limits import MotorLimits
 from boards.modules.motor_output import MotorOutput
 
-if not cython.compiled:
-    from foundation.numbers import fixed_multiply
-
 # Counts per A and sample, all four boards (facts 4.2). The current settles within one sample, so the motor is a
 # gain of 1/31 A per count (1.34 ohm at 25.9 V): the integral alone has its pole at 1 - 20/31 = 0.35.
 INTEGRAL_GAIN = 20
@@ -49,7 +46,6 @@ class CurrentControl:
         self.integral_gain = integral_gain * 65536
         self.integral_limit = output.largest * 65536 // integral_gain
         self.integral = 0  # A samples x 65536
-        self.error = 0
         self.duty = 0
         self.calls = 0
         self.block_positive = False
@@ -60,19 +56,17 @@ class CurrentControl:
 
         False in the first two calls, which do nothing else than feed.
         """
-        off: cython.bint
         self.output.feed_watchdog()
         if self.calls < 2:  # START_CALLS
             self.calls += 1
             return False
-        self.limits.monitor(current)
-        off = self.limits.too_hot or self.limits.overloaded
-        if off != self.output.stopped:
-            self.output.stopped = off
-            if off:
+        if self.limits.monitor(current):
+            if self.output.off & 4 == 0:  # STOPPED
+                self.output.off |= 4
                 self.leds.on(0)  # GREEN
-            else:
-                self.leds.off(0)
+        elif self.output.off & 4:
+            self.output.off &= ~4
+            self.leds.off(0)
         return True
 
     def update(self, target: cython.longlong, current: cython.longlong) -> None:
@@ -83,7 +77,7 @@ class CurrentControl:
         counts: cython.longlong = 0
         largest: cython.longlong = self.output.largest
         if self.supervise(current):
-            if not self.output.running():
+            if self.output.off:
                 self.errors.report(self.code_stopped)
             else:
                 if (self.block_positive and target > 0) or (self.block_negative and target < 0):
@@ -96,9 +90,8 @@ class CurrentControl:
                 elif integral < -self.integral_limit:
                     integral = -self.integral_limit
                     self.errors.report(self.code_saturated)
-                self.error = error
                 self.integral = integral
-                total = (self.proportional_gain * error >> 16) + fixed_multiply(self.integral_gain, integral)
+                total = (self.proportional_gain * error >> 16) + (self.integral_gain * integral >> 16)
                 if total > 0x7FFFFFFF:
                     total = 0x7FFFFFFF
                     self.errors.report(self.code_sum)

@@ -8,7 +8,7 @@ from foundation.events cimport EventQueue
 @cython.final
 cdef class WrapCounter:
     cdef public TimerCapture timer
-    cdef public long long wraps
+    cdef public long long cycles
 
 @cython.final
 cdef class EncoderCapture:

@@ -24,11 +24,11 @@ LONGEST_TIME = 0x7F000000  # cycles, about 35 s: longer silences count as this
 
 
 class WrapCounter:
-    """Counts the wraps of the capture timer (every 0.5 ms) in the fast interrupt. `wraps` since power-up."""
+    """Counts the wraps of the capture timer (every 0.5 ms) in the fast interrupt: `cycles` of them since power-up."""
 
     def __init__(self, timer: TimerCapture) -> None:
         self.timer = timer
-        self.wraps = 0
+        self.cycles = 0
 
     def attach(self, chip: Microcontroller) -> None:
         """Take the timer's match interrupt. Attach after the encoders: captures of before a wrap come first."""
@@ -45,7 +45,7 @@ class WrapCounter:
     def on_wrap(self, queue: EventQueue):
         """Fast interrupt: the timer restarted at 0."""
         self.timer.IR &= -2
-        self.wraps += 1
+        self.cycles += 30000
 
 
 class EncoderCapture:
@@ -80,16 +80,15 @@ class EncoderCapture:
         """Fast interrupt: count the edge and keep the time since the one before. Rising with B low counts up."""
         timer: TimerCapture = self.timer
         level: cython.longlong = self.chip.pins[self.pin]
-        wraps: cython.longlong = self.wraps.wraps
         capture: cython.longlong = timer.captures[self.channel]
+        now: cython.longlong = capture + self.wraps.cycles
         elapsed: cython.longlong
         timer.IR &= ~self.flag
         # a wrap that is not counted yet came before this capture if the capture is a small number
         if timer.IR & 1 and capture < 15000:
-            wraps += 1
-        capture += 30000 * wraps
-        elapsed = capture - self.last
-        self.last = capture
+            now += 30000
+        elapsed = now - self.last
+        self.last = now
         if elapsed > 0x7F000000:  # LONGEST_TIME
             elapsed = 0x7F000000
         if level == self.armed_level:

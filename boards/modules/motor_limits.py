@@ -6,6 +6,8 @@ the direction of motion near the speed limit. The measured current acts on the d
 in the same slot, and the integral of the excess fades the duty and switches the motor off.
 """
 
+import math
+
 import cython
 
 from boards.modules.error_module import ErrorModule
@@ -69,9 +71,9 @@ class MotorLimits:
         self.excess_limit = excess_limit * 65536
         self.excess_fade = max(1, excess_limit // 10)  # the duty has faded to 0 at a tenth of the limit
         self.peak = peak
-        self.speed = speed and gear != 0
-        self.speed_max = fixed_of_float(RATED_SPEED_RAD_S / gear) if gear else 0
-        self.speed_soft = fixed_of_float(SOFT_SPEED * RATED_SPEED_RAD_S / gear) if gear else 0
+        # nothing turns so fast where speed is not limited
+        self.speed_max = fixed_of_float(RATED_SPEED_RAD_S / gear if speed and gear else math.inf)
+        self.speed_soft = fixed_of_float(SOFT_SPEED * RATED_SPEED_RAD_S / gear if speed and gear else math.inf)
         self.thermal = 0  # A^2 s
         self.thermal_multiplier = 65536
         self.too_hot = False
@@ -79,26 +81,27 @@ class MotorLimits:
         self.excess_multiplier = 65536
         self.overloaded = False
 
-    def monitor(self, current: cython.longlong) -> cython.void:
-        """Every slot, also while the motor is off: advance both monitors with the measured current."""
+    def monitor(self, current: cython.longlong) -> cython.bint:
+        """Every slot, also while the motor is off: advance both monitors with the measured current. True when the motor
+        must be off."""
         thermal: cython.longlong = self.thermal
         excess: cython.longlong = self.excess
         loss: cython.longlong = fixed_multiply(current, current) - fixed_multiply(thermal, self.thermal_rate)
         thermal += (loss * 32) >> 16  # SLOT_S_FIXED
         self.thermal = thermal
-        if thermal >= self.thermal_limit:
-            self.thermal_multiplier = 0
-            if not self.too_hot:
-                self.too_hot = True
-                self.errors.report(self.code_hot)
-        elif thermal >= self.thermal_soft:
-            self.thermal_multiplier = 65536 - fixed_multiply(thermal - self.thermal_soft, self.thermal_slope)
-            self.errors.report(self.code_warm)
-        else:
+        if thermal < self.thermal_soft:  # nearly always
             self.thermal_multiplier = 65536
             if self.too_hot:
                 self.too_hot = False
                 self.errors.report(self.code_cooled)
+        elif thermal < self.thermal_limit:
+            self.thermal_multiplier = 65536 - fixed_multiply(thermal - self.thermal_soft, self.thermal_slope)
+            self.errors.report(self.code_warm)
+        else:
+            self.thermal_multiplier = 0
+            if not self.too_hot:
+                self.too_hot = True
+                self.errors.report(self.code_hot)
         if current > 0:
             excess += current - self.current_max
         elif current < 0:
@@ -109,12 +112,13 @@ class MotorLimits:
             if self.overloaded:
                 self.overloaded = False
                 self.errors.report(self.code_excess_over)
-            return
+            return self.too_hot
         self.excess = excess
         self.excess_multiplier = max(0, 65536 - excess // self.excess_fade)
         if excess >= self.excess_limit and not self.overloaded:
             self.overloaded = True
             self.errors.report(self.code_excess)
+        return self.too_hot or self.overloaded
 
     def limit_target(self, target: cython.longlong, velocity: cython.longlong) -> cython.longlong:
         """The target current the motor may have now, at `velocity` (rad/s x 65536, joint side).
@@ -125,7 +129,7 @@ class MotorLimits:
         """
         low: cython.longlong = self.target_min
         high: cython.longlong = self.target_max
-        speed: cython.longlong
+        speed: cython.longlong = velocity if velocity >= 0 else -velocity
         share: cython.longlong
         if target > high:
             target = high
@@ -136,18 +140,16 @@ class MotorLimits:
         if self.derating and self.thermal_multiplier < 65536:
             high = fixed_multiply(high, self.thermal_multiplier)
             low = fixed_multiply(low, self.thermal_multiplier)
-        if self.speed:
-            speed = velocity if velocity >= 0 else -velocity
-            if speed > self.speed_soft:
-                share = 0
-                if speed < self.speed_max:
-                    share = ((self.speed_max - speed) << 16) // (self.speed_max - self.speed_soft)
-                if velocity > 0:
-                    high = fixed_multiply(high, share)
-                else:
-                    low = fixed_multiply(low, share)
-                if target > high or target < low:
-                    self.errors.report(self.code_speed)
+        if speed > self.speed_soft:
+            share = 0
+            if speed < self.speed_max:
+                share = ((self.speed_max - speed) << 16) // (self.speed_max - self.speed_soft)
+            if velocity > 0:
+                high = fixed_multiply(high, share)
+            else:
+                low = fixed_multiply(low, share)
+            if target > high or target < low:
+                self.errors.report(self.code_speed)
         if target > high:
             return high
         if target < low:

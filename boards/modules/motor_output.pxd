@@ -12,15 +12,12 @@ cdef class OffRequest(IntReceiver):
 
 @cython.final
 cdef class MotorOutput:
-    cdef public bint stopped, second_pattern
-    cdef public long long requests, watchdog_pin, low_side_2_pin, low_side_6_pin
+    cdef public bint second_pattern
+    cdef public long long off, watchdog_pin, low_side_2_pin, low_side_6_pin
     cdef public Gpio gpio
     cdef public Pwm pwm
     cdef public long long sign, largest, offset, low_side, duty
     cdef public OffRequest sleep, shutdown
-    cpdef bint asleep(self) noexcept
-    cpdef bint is_shut_down(self) noexcept
-    cpdef bint running(self) noexcept
     cpdef int feed_watchdog(self) except -1
     cpdef int enable_low_side(self, long long on) except -1
     cpdef int write(self, long long duty) except -1

@@ -22,13 +22,14 @@ PINS = {
 PERIOD_COUNTS = 600  # 100 kHz at 60 MHz
 
 
-SLEEP = 1  # bits of `requests`
+SLEEP = 1  # bits of `off`
 SHUTDOWN = 2
+STOPPED = 4
 
 
 class OffRequest(IntReceiver):
-    """SLEEP or SHUTDOWN as the main brain sent it last: `bit` of the output's `requests` is set unless its low 15 bits
-    are 0."""
+    """SLEEP or SHUTDOWN as the main brain sent it last: `bit` of the output's `off` is set unless its low 15 bits are
+    0."""
 
     def __init__(self, output, bit) -> None:
         IntReceiver.__init__(self)
@@ -38,9 +39,9 @@ class OffRequest(IntReceiver):
     def deliver(self, value_word: cython.longlong, time_word: cython.longlong) -> None:
         self.frames += 1
         self.value = wrap_i32(value_word)
-        self.output.requests &= ~self.bit
+        self.output.off &= ~self.bit
         if value_word & 0x7FFF != 0:
-            self.output.requests |= self.bit
+            self.output.off |= self.bit
 
 
 class MotorOutput:
@@ -48,19 +49,19 @@ class MotorOutput:
 
     `sign`: of the motor's mounting. `largest`: the duty is clipped to +/- this. `offset`: counts that the
     second of the two patterns drives more (14 in the firmware of 2016). `sleep`, `shutdown`: receivers of what the
-    main brain asks for. `stopped`: the limits switched the motor off.
+    main brain asks for. `off`: why the motor may not be driven, 0 when it may. SLEEP: the bridge is open, the watchdog
+    stays fed; SHUTDOWN: no duty, and the watchdog starves; STOPPED, by the limits: the same.
     """
 
     def __init__(self, gpio: Gpio, pwm: Pwm, sign, largest, offset) -> None:
         self.gpio = gpio
         self.pwm = pwm
-        self.requests = 0
+        self.off = 0
         self.sleep = OffRequest(self, SLEEP)
         self.shutdown = OffRequest(self, SHUTDOWN)
         self.sign = sign
         self.largest = largest
         self.offset = offset
-        self.stopped = False
         self.second_pattern = False
         self.duty = 0
         self.low_side = -1
@@ -68,21 +69,9 @@ class MotorOutput:
         self.low_side_2_pin = PINS["low_side_2"]
         self.low_side_6_pin = PINS["low_side_6"]
 
-    def asleep(self) -> cython.bint:
-        """SLEEP is set: the bridge is open, the watchdog stays fed."""
-        return self.requests & 1 != 0  # SLEEP
-
-    def is_shut_down(self) -> cython.bint:
-        """SHUTDOWN is set: no duty, and the watchdog starves."""
-        return self.requests & 2 != 0  # SHUTDOWN
-
-    def running(self) -> cython.bint:
-        """True when the motor may be driven."""
-        return not self.stopped and self.requests == 0
-
     def feed_watchdog(self) -> None:
-        """Toggle the watchdog pin, unless the motor is off or shut down."""
-        if not self.stopped and self.requests & 2 == 0:  # SHUTDOWN
+        """Toggle the watchdog pin, unless the motor is stopped or shut down."""
+        if self.off & 6 == 0:  # SHUTDOWN, STOPPED
             self.gpio.toggle(self.watchdog_pin)
 
     def enable_low_side(self, on: cython.longlong) -> None:
@@ -101,10 +90,9 @@ class MotorOutput:
         MR2: cython.longlong = 0
         MR6: cython.longlong = 0
         low_side: cython.longlong = 1
-        if self.stopped or self.requests != 0:
+        if self.off:
             duty = 0
-            if self.asleep():
-                low_side = 0
+            low_side = 1 - (self.off & 1)  # SLEEP
         else:
             if duty > self.largest:
                 duty = self.largest

@@ -8,15 +8,17 @@ cdef class QuadratureDecoder:
     # what an edge and a slot touch
     cdef public long long count, position
     cdef public long long position_gain
-    cdef public long long position_shift, filter_exponent, write, read, rate_shift, sign
+    cdef public long long position_shift, filter_exponent, write, read, rate_bits, sign
     cdef public long long rate_gain, mean
-    cdef public long long idle, speed, filtered, rate, edges
+    cdef public long long idle, speed, filtered, rate
     cdef public long long[64] ring
     # the rest
     cdef public long long glitches, dropped_times
     cdef public ErrorModule errors
-    cdef public long long glitch_code, full_code
+    cdef public long long glitch_code, full_code, rate_shift
     cdef public double rad_per_count
     cpdef int edge(self, long long step, long long elapsed) except -1
     cpdef int glitch(self) except -1
+    cdef void _be_silent(self) noexcept
+    cdef void _filter(self, long long speed, long long mean) noexcept
     cpdef int set_position(self, long long position) except -1

@@ -49,6 +49,8 @@ class QuadratureDecoder:
         per_count = PI / (pulses * gear)
         self.position_gain, self.position_shift = normalised_gain(per_count * 65536.0, 16384.0, 65535.0)
         self.rate_gain, self.rate_shift = normalised_gain(per_count * TIMER_HZ, 4096.0, 16383.0)
+        # counts/cycle x 2^31 times rad x 60e6/count x 2^shift: 31 - 16 = 15 more bits go for 16.16
+        self.rate_bits = self.rate_shift + 15
         self.rad_per_count = per_count
         self.filter_exponent = filter_exponent
         self.count = 0
@@ -58,7 +60,6 @@ class QuadratureDecoder:
         self.ring = [0] * 64
         self.write = 0
         self.read = 0
-        self.edges = 0
         self.glitches = 0
         self.dropped_times = 0
         # the slot's side
@@ -74,14 +75,14 @@ class QuadratureDecoder:
         The time is kept for the next slot with the sign of the step; when the ring is full it is lost, the count is
         not.
         """
-        after: cython.longlong = (self.write + 1) & 63  # RING_SIZE
-        self.edges += 1
+        write: cython.longlong = self.write
+        after: cython.longlong = (write + 1) & 63  # RING_SIZE
         self.count += step
         if after == self.read:
             self.dropped_times += 1
             self.errors.report(self.full_code)
         else:
-            self.ring[self.write] = step * elapsed
+            self.ring[write] = step * elapsed
             self.write = after
 
     def glitch(self) -> None:
@@ -91,7 +92,7 @@ class QuadratureDecoder:
 
     def update_angle(self) -> None:
         """Slot task: position from the count, floored."""
-        # shift is 8 ... 11 on the robot; never negative for real encoders
+        # shifts are 8 ... 11 on the robot, here and in the rate; never negative for real encoders
         self.position = (self.count * self.position_gain) >> self.position_shift
 
     def update_rate(self):
@@ -101,6 +102,9 @@ class QuadratureDecoder:
         first is left for the next slot. A zero or a single time of the other sign is a glitch, and the time
         that follows it is not used either.
         """
+        if self.read == self.write:
+            self._be_silent()
+            return None
         total: cython.longlong = 0
         valid: cython.longlong = 0
         seen: cython.longlong = 0
@@ -110,7 +114,6 @@ class QuadratureDecoder:
         after: cython.longlong
         elapsed: cython.longlong
         other: cython.longlong
-        speed: cython.longlong
         while here != write:
             elapsed = self.ring[here]
             after = (here + 1) & 63
@@ -136,28 +139,13 @@ class QuadratureDecoder:
                     after = (after + 1) & 63
             seen += 1
             here = after
-        total *= sign  # from here on without the sign
         if valid == 0:
-            # the longer the silence, the slower it must be: the rate falls with the inverse of the silence
-            valid = 1
-            self.idle += 30000  # cycles per slot
-            if self.idle > 0x7FFFFFFF:
-                self.idle = 0x7FFFFFFF
-            total = self.mean if self.mean >= 0 else -self.mean
-            if self.idle > total:
-                total = self.idle
+            self._be_silent()
         else:
             self.idle = 0
-        speed = valid * (0x7FFFFFFF // total)
-        if valid > 1:
-            total = total // valid
-        self.sign = sign
-        self.speed = sign * speed
-        self.mean = sign * total
-        self.filtered += (self.speed - self.filtered) >> self.filter_exponent
-        # counts/cycle x 2^31 times rad x 60e6/count x 2^shift: 31 - 16 = 15 more bits go for 16.16
-        if self.rate_shift + 15 >= 0:
-            self.rate = (self.rate_gain * self.filtered) >> (self.rate_shift + 15)
+            self.sign = sign
+            total *= sign  # without the sign
+            self._filter(valid * (0x7FFFFFFF // total), total // valid)
         if seen == 0:
             return None
         if here == write:  # empty: the next time goes to the front again, which is in the cache
@@ -165,6 +153,28 @@ class QuadratureDecoder:
             self.write = 0
         self.read = here
         return seen
+
+    def _be_silent(self) -> cython.void:
+        """A slot without a valid time: the longer the silence, the slower it must be, so the rate falls with the
+        inverse of the silence."""
+        mean: cython.longlong = self.mean if self.mean >= 0 else -self.mean
+        idle: cython.longlong = self.idle + 30000  # cycles per slot
+        if idle > 0x7FFFFFFF:
+            idle = 0x7FFFFFFF
+        self.idle = idle
+        if idle > mean:
+            mean = idle
+        self._filter(0x7FFFFFFF // mean, mean)
+
+    def _filter(self, speed: cython.longlong, mean: cython.longlong) -> cython.void:
+        """Follow a new speed (counts per cycle x 2^31) and mean (cycles), both without the sign."""
+        filtered: cython.longlong = self.filtered
+        speed *= self.sign
+        self.speed = speed
+        self.mean = mean * self.sign
+        filtered += (speed - filtered) >> self.filter_exponent
+        self.filtered = filtered
+        self.rate = (self.rate_gain * filtered) >> self.rate_bits
 
     def set_position(self, position: cython.longlong) -> None:
         """Set the count so that the position reads `position` (rad x 65536), truncated as in C."""

@@ -6,6 +6,7 @@ from boards.modules.compliant_control import CompliantControl
 from boards.modules.error_module import ErrorModule
 from boards.modules.motor_limits import MotorLimits
 from boards.modules.motor_output import PINS as MOTOR_PINS
+from boards.modules.motor_output import SHUTDOWN
 from boards.modules.network_time import NetworkTime
 from boards.quirks import Quirks
 from datatable.generated import errors as codes
@@ -299,7 +300,7 @@ def test_shutdown_starves_the_watchdog_and_drives_nothing():
     assert bench.errors()["MC_NOT_RUNNING"] >= 20
     bench.command("SHUTDOWN", 0)
     bench.run(ms=2)
-    assert bench.board.output.running()
+    assert bench.board.output.off == 0
 
 
 @pytest.mark.parametrize("output", ["duty", "duty_then_current", "current"])
@@ -336,7 +337,7 @@ def test_bits_15_and_above_of_shutdown_are_ignored(value, stopped):
     bench = Bench("MCH").run(ms=2)
     bench.command("SHUTDOWN", value)
     bench.run(ms=1)
-    assert bench.board.output.is_shut_down() is stopped
+    assert bench.board.output.off == (SHUTDOWN if stopped else 0)
 
 
 def test_a_motor_keeps_its_last_command_when_the_network_falls_silent():

@@ -171,7 +171,6 @@ def test_every_edge_of_a_turning_motor_is_counted_in_the_fast_interrupt():
     bench.turn(1000, 9_300, forward=True, pair="01")
     bench.run(ms=12)
     assert bench.board.motor.count == 1000
-    assert bench.board.motor.edges == 1000
     assert bench.board.scheduler.overruns == 0
 
 
