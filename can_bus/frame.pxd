@@ -1,12 +1,11 @@
-cdef short CRC_OF_PIECE[416]
-cdef unsigned long long STUFF[32]
+cdef short CRC_OF_BYTE[2048]
+cdef unsigned long long STUFF[256]
 cdef int BEGUN[2048]
 
 cdef long long _feed(long long chain, long long value, long long count) noexcept
 cdef long long _header(long long identifier, long long flags) noexcept
 cdef long long _measure_bitwise(long long identifier, long long flags, long long lo, long long hi) noexcept
-cdef unsigned int _in_wire_order(unsigned int word) noexcept
-cdef long long _measure_by_pieces(long long identifier, long long lo, long long hi) noexcept
+cdef long long _measure_by_bytes(long long identifier, long long lo, long long hi) noexcept
 cpdef long long measure(long long identifier, long long flags, long long lo, long long hi) noexcept
 cpdef long long crc15(long long identifier, long long flags, long long lo, long long hi) noexcept
 cpdef long long stuff_bits(long long identifier, long long flags, long long lo, long long hi)

@@ -101,21 +101,19 @@ def _measure_bitwise(
     return crc << 16 | (bits + 8 * length + (chain >> 18))
 
 
-# A standard frame of eight bytes, which nearly every frame is, goes through tables, piece by piece. The CRC is linear:
-# each piece of the data adds what stands in the table of its place. For the stuffing a piece is a map from the state
-# before it to the state behind it.
+# A standard frame of eight bytes, which nearly every frame is, goes through tables, byte by byte. The CRC is linear:
+# each byte adds what stands in the table of its place. For the stuffing a byte is a map from the state before it to the
+# state behind it.
 #
-# Compiled, a piece has five bits: the tables of bytes would be pushed out of the processor's cache from frame to frame,
-# those of five bits are 17 lines of it, which stay. From the last bit of the data length code to the end of the CRC
-# there are 80 bits, 16 pieces; only the first 13 hold data, and the first of them only four bits.
-# CRC_OF_PIECE: by place * 32 + piece. STUFF: by piece; by eight bits per state: next state << 3 | stuff bits << 6.
-# BEGUN: by identifier; CRC of the header << 16 | stuff bits << 8 | state << 3, these before the header's last bit.
+# Compiled: CRC_OF_BYTE by place * 256 + byte. STUFF by byte, a map that is read while the state is still being found,
+# by eight bits per state: next state << 3 | stuff bits << 6. BEGUN by identifier, of the header: CRC << 16 | stuff
+# bits << 8 | state << 3.
+#
+# Interpreted, the states are lists: by byte what comes behind it, the last item is the number of stuff bits so far.
+# CRC_LISTS: by place, by byte. WALK: by stuff bits, by state. WALKS: by identifier, as `_begin`.
 if not cython.compiled:
-    CRC_OF_PIECE, STUFF, BEGUN = [0] * 416, [0] * 32, [0] * 2048
-
-# Interpreted, a piece is a byte, and the states are lists: by byte what comes behind it, the last item is the number of
-# stuff bits so far. CRC_OF_BYTE: by place, by byte. WALK: by stuff bits, by state. WALKS: by identifier, as `_begin`.
-CRC_OF_BYTE: list = []
+    CRC_OF_BYTE, STUFF, BEGUN = [0] * 2048, [0] * 256, [0] * 2048
+CRC_LISTS: list = []
 WALK: list = []
 WALKS: dict = {}
 
@@ -123,34 +121,32 @@ WALKS: dict = {}
 def _fill_tables() -> None:
     """The tables of the compiled `measure`."""
     place: cython.longlong
-    piece: cython.longlong
+    byte: cython.longlong
     state: cython.longlong
     identifier: cython.longlong
     header: cython.longlong
     chain: cython.longlong
     steps: cython.ulonglong
     step: cython.ulonglong
-    for piece in range(32):
-        for place in range(13):
-            CRC_OF_PIECE[place * 32 + piece] = _feed(_feed(0, piece, 5), 0, 60 - 5 * place) & 0x7FFF
+    for byte in range(256):
+        for place in range(8):
+            CRC_OF_BYTE[place * 256 + byte] = _feed(_feed(0, byte, 8), 0, 56 - 8 * place) & 0x7FFF
         steps = 0
         for state in range(8):
-            chain = _feed(state << 15, piece, 5)
+            chain = _feed(state << 15, byte, 8)
             step = (chain >> 18) << 6 | (chain >> 15 & 7) << 3
             steps |= step << (8 * state)
-        STUFF[piece] = steps
+        STUFF[byte] = steps
     for identifier in range(2048):
         header = _header(identifier, 8)
-        chain = _feed(131072, header >> 1, 18)  # IDLE
-        BEGUN[identifier] = (
-            (_feed(_feed(0, header, 19), 0, 64) & 0x7FFF) << 16 | (chain >> 18) << 8 | (chain >> 15 & 7) << 3
-        )
+        chain = _feed(131072, header, 19)  # IDLE
+        BEGUN[identifier] = (_feed(chain, 0, 64) & 0x7FFF) << 16 | (chain >> 18) << 8 | (chain >> 15 & 7) << 3
 
 
 def _fill_lists() -> None:
     """The lists of the interpreted `measure`."""
     for place in range(8):
-        CRC_OF_BYTE.append([_feed(_feed(0, byte, 8), 0, 56 - 8 * place) & 0x7FFF for byte in range(256)])
+        CRC_LISTS.append([_feed(_feed(0, byte, 8), 0, 56 - 8 * place) & 0x7FFF for byte in range(256)])
     steps = [[_feed(state << 15, byte, 8) for byte in range(256)] for state in range(8)]
     most = worst_case_bits(8) - unstuffed_bits(8)
     WALK.extend([[] for _ in range(8)] for _ in range(most + 1))
@@ -168,35 +164,26 @@ def _begin(identifier):
     return WALKS[identifier]
 
 
-def _in_wire_order(word: cython.uint) -> cython.uint:
-    """The four bytes of a word, the lowest of which goes first, as bits in their order on the wire."""
-    return (word & 0xFF) << 24 | (word & 0xFF00) << 8 | (word >> 8 & 0xFF00) | word >> 24
-
-
-@cython.boundscheck(False)  # pieces are masked to 5 bits
+@cython.boundscheck(False)  # bytes are masked to 8 bits
 @cython.wraparound(False)
-def _measure_by_pieces(identifier: cython.longlong, lo: cython.longlong, hi: cython.longlong) -> cython.longlong:
+def _measure_by_bytes(identifier: cython.longlong, lo: cython.longlong, hi: cython.longlong) -> cython.longlong:
     """`measure` of a standard frame of eight bytes, compiled."""
     crc: cython.longlong = BEGUN[identifier] >> 16
     steps: cython.ulonglong = BEGUN[identifier] & 56  # its six low bits: where in the next map the next state stands
     stuffed: cython.ulonglong = (BEGUN[identifier] & 0xFF00) >> 2  # times 64, as in the maps
-    data: cython.ulonglong = _in_wire_order(lo)
-    piece: cython.ulonglong
+    data: cython.ulonglong = hi << 32 | lo
+    byte: cython.ulonglong
     place: cython.longlong
-    data = data << 32 | _in_wire_order(hi)
-    piece = data >> 60
-    data <<= 4
-    for place in range(0, 416, 32):
-        crc ^= CRC_OF_PIECE[place + piece]
-        steps = STUFF[piece] >> (steps & 63)
+    for place in range(0, 2048, 256):
+        byte = data & 0xFF
+        data >>= 8
+        crc ^= CRC_OF_BYTE[place + byte]
+        steps = STUFF[byte] >> (steps & 63)
         stuffed += steps & 192
-        piece = data >> 59
-        data <<= 5
-    steps = STUFF[crc >> 10] >> (steps & 63)
+    steps = STUFF[crc >> 7] >> (steps & 63)
     stuffed += steps & 192
-    steps = STUFF[crc >> 5 & 31] >> (steps & 63)
-    stuffed += steps & 192
-    steps = STUFF[crc & 31] >> (steps & 63)
+    # the last byte is filled up with the complement of the last bit, which never adds a stuff bit
+    steps = STUFF[(crc << 1 & 0xFE) | (crc & 1 ^ 1)] >> (steps & 63)
     stuffed += steps & 192
     return crc << 16 | (108 + (stuffed >> 6))
 
@@ -208,14 +195,14 @@ def measure(
 
     Bits: from start of frame to the end of EOF, stuff bits included, intermission not.
     """
-    if flags & ~32 != 8 or identifier < 0 or identifier > 0x7FF:  # FLAG_SINGLE_SHOT does not show on the wire
+    if identifier >> 11 or flags & ~32 != 8:  # FLAG_SINGLE_SHOT does not show on the wire
         return _measure_bitwise(identifier, flags, lo, hi)
     if cython.compiled:
-        return _measure_by_pieces(identifier, lo, hi)
+        return _measure_by_bytes(identifier, lo, hi)
     else:
         crc, walk = WALKS.get(identifier) or _begin(identifier)
         a, b, c, d, e, f, g, h = (hi << 32 | lo).to_bytes(8, "little")
-        t, u, v, w, x, y, z, s = CRC_OF_BYTE
+        t, u, v, w, x, y, z, s = CRC_LISTS
         crc ^= t[a] ^ u[b] ^ v[c] ^ w[d] ^ x[e] ^ y[f] ^ z[g] ^ s[h]
         # the last byte is filled up with the complement of the last bit, which never adds a stuff bit
         stuffed = walk[a][b][c][d][e][f][g][h][crc >> 7][(crc << 1 & 0xFE) | (crc & 1 ^ 1)][-1]
