@@ -1,6 +1,7 @@
 from boards.modules.network_time cimport NetworkTime
-from boards.modules.ssp_link cimport MainBrainSspLink, UnpackedFrames
+from boards.modules.ssp_link cimport MainBrainSspLink
 from datatable.store cimport DataStore
+from firmware_sim.peripherals.ssp cimport SspSegment
 
 cdef class IoData:
     cdef public DataStore store

@@ -12,8 +12,9 @@ import array
 import cython
 
 from boards.modules.network_time import NetworkTime
-from boards.modules.ssp_link import MainBrainSspLink, UnpackedFrames
+from boards.modules.ssp_link import MainBrainSspLink
 from datatable.store import DataStore
+from firmware_sim.peripherals.ssp import SspSegment
 from foundation.user_error import UserError
 
 
@@ -57,11 +58,14 @@ class IoData:
         link: MainBrainSspLink = self.link
         store: DataStore = self.store
         time: NetworkTime = self.time
-        frames: UnpackedFrames = link.unpacked
+        segment: SspSegment
         i: cython.longlong
+        row: cython.longlong
         link.parse()
-        for i in range(link.frames):
-            store.set_word(frames.rows[3 * i], frames.rows[3 * i + 1], frames.rows[3 * i + 2])
+        for i in range(link.segments):
+            segment = cython.cast(SspSegment, link.received[i])
+            for row in range(0, 3 * link.received_frames[i], 3):
+                store.set_word(segment.rows[row] & 0x7FF, segment.rows[row + 1], segment.rows[row + 2])
         time.ms = store.stamp(self.timestamp)
         return link.frames
 

@@ -3,22 +3,15 @@ from firmware_sim.peripherals.ssp cimport SspSegment
 cimport cython
 
 @cython.final
-cdef class UnpackedFrames:
-    cdef public long long[288] rows
-    cpdef long long unpack(self, SspSegment segment, long long place) noexcept
-    cpdef void move(self, long long place, long long to) noexcept
-
-@cython.final
 cdef class MainBrainSspLink:
     # what a segment touches
-    cdef public UnpackedFrames unpacked
     cdef public SspSegment empty, packing
-    cdef public list queue
+    cdef public list queue, received
     cdef public long long queue_read, queue_count
-    cdef public long long received_count, received_frames, last_id, frames
+    cdef public long long received_count, segments, frames, last_id
+    cdef public long long[16] received_frames
     cdef public long long segments_received, segments_sent, frames_received, frames_sent
     cdef public bint first_is_junk
-    cdef public list received_errors
     # the rest
     cdef public object report
     cdef public long long checksum_errors, receive_full, transmit_full, ids_out_of_range
@@ -32,7 +25,7 @@ cdef class MainBrainSspLink:
     cpdef long long flush(self) noexcept
     cdef bint _begin_segment(self) except? -1
     cdef bint _miss(self) except? -1
-    cdef int _note(self, long long code) except -1
+    cdef long long _drop_strangers(self, long long place, long long frames) except? <long long>-1
 
 @cython.final
 cdef class RouterSspLink:
@@ -40,8 +33,7 @@ cdef class RouterSspLink:
     cdef public long long received_write, received_read, position
     cdef public SspSegment packing
     cdef public long long half_words, push_time, first, last
-    cdef public list segments
-    cdef public UnpackedFrames unpacked
+    cdef public list segments, received
     cdef public long long[8] received_frames
     cdef public long long rx_id, rx_flags, rx_word0, rx_word1
     cdef public bint exchange_running, exchange_done, frames_may_straddle
@@ -60,16 +52,16 @@ cdef class RouterSspLink:
     cpdef bint take(self) except? -1
     cpdef bint has_segments(self) noexcept
     cdef bint _lose(self) except? -1
-    cdef bint _put_over_the_end(self, long long header, long long word0, long long word1) except? -1
+    cdef bint _put_half_words(self, long long header, long long word0, long long word1) except? -1
     cdef int _miss_segment(self) except -1
     cdef int _drop_segment(self) except -1
     cdef void _begin_segment(self) noexcept
-    cdef void _put(self, long long word) noexcept
-    cdef void _cut(self, SspSegment segment, long long used) noexcept
+    cdef int _put(self, long long word) except -1
+    cdef int _cut(self, SspSegment segment, long long used) except -1
 
-cpdef long long checksum(SspSegment segment) noexcept
-cpdef void finish(SspSegment segment, long long used) noexcept
-cpdef void restart(SspSegment segment) noexcept
+cpdef long long checksum(SspSegment segment) except? -1
+cpdef int finish(SspSegment segment, long long used) except -1
 cpdef long long add_frame(SspSegment segment, long long header, long long word0, long long word1) noexcept
+cpdef long long frames_in(SspSegment segment) noexcept
 cpdef SspSegment empty_segment()
 cpdef SspSegment corrupted_copy(SspSegment segment, long long index, long long flipped_bits)

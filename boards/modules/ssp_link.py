@@ -1,6 +1,6 @@
 # cython: boundscheck=False, wraparound=False, cdivision=True
-# (what is divided is never below 0; every index below is a half-word 0 ... 30 of a segment, a segment of a circle,
-# wrapped where it is moved, or a frame of those that the receiving end's segments can hold)
+# (what is divided is never below 0; every index below is a row of a segment or a segment of a circle, wrapped where it
+# is moved)
 """The serial link between the router and the main brain: both ends, as logic on segments.
 
 A segment is 31 half-words: up to six frames of five half-words, zeros, and a checksum. The router is the
@@ -9,11 +9,11 @@ master and starts an exchange every 200 us; 496 bits at 3.0 Mbit/s take 165.3 us
 bits 11-14, and the remote bit in 15. The checksum is (1 + sum of the other 30) modulo 65536. Source: facts
 network-and-boards 1.6.
 
-Frames are packed straight into the segment that will carry them, whose checksum grows with them, and are unpacked
-straight out of the one that comes in; what is judged later (a checksum, an identifier) is judged on that.
+Frames are put straight into the segment that will carry them, and are taken straight out of the one that came in.
 
 Empty segments are one shared object per end and the others come round in a circle, so nobody may write to a
-segment that was handed over: a fault makes its own with `corrupted_copy`.
+segment that was handed over: a fault makes its own with `corrupted_copy`. A circle is long enough for all that its end
+can queue and for all that the other end can let wait.
 """
 
 import cython
@@ -28,125 +28,73 @@ HEADER_ONES = 0x7800  # bits 11-14 of every header
 SEGMENT_PERIOD_NS = 200_000  # Timer1 of the router, match 11 999 at 60 MHz
 EXCHANGE_NS = 165_333  # 496 bits at 3.0 Mbit/s
 ROUTER_RING_HALF_WORDS = 500  # one stays free: 99 frames
-ROUTER_SEGMENTS = 24  # 17 hold the ring; one in an exchange, one being delivered, and some for consumers a little late
 ROUTER_RECEIVE_SEGMENTS = 8
 MAIN_BRAIN_SEGMENTS = 16  # each way
+# 17 hold the ring; one in an exchange, one being delivered; and those that wait at the main brain
+ROUTER_CIRCLE = 17 + 2 + MAIN_BRAIN_SEGMENTS
+# 16 queued, one being packed; one in an exchange, one being delivered; and those that wait at the router
+MAIN_BRAIN_CIRCLE = MAIN_BRAIN_SEGMENTS + 3 + ROUTER_RECEIVE_SEGMENTS
 
 
 def checksum(segment: SspSegment) -> cython.longlong:
     """(1 + sum of the first 30 half-words) modulo 65536; half-words from `used` on are zeros."""
-    total: cython.longlong = 1
-    i: cython.longlong
-    for i in range(segment.used):
-        total += segment.words[i]
-    return total & 0xFFFF
+    return (1 + sum(segment.words[: segment.used])) & 0xFFFF
 
 
-def finish(segment: SspSegment, used: cython.longlong) -> cython.void:
-    """Zero what an earlier use left behind `used` half-words, and write the checksum."""
-    i: cython.longlong
-    for i in range(used, segment.used):
-        segment.words[i] = 0
+def finish(segment: SspSegment, used: cython.longlong) -> None:
+    """Zero everything behind `used` half-words; the checksum is right."""
+    segment.words = [*segment.words[:used], *[0] * (31 - used)]
     segment.used = used
-    segment.words[30] = checksum(segment)
+    segment.checksum_error = 0
 
 
 def empty_segment() -> SspSegment:
     """A valid segment without frames: 30 zeros and the checksum 1."""
-    segment: SspSegment = SspSegment()
-    restart(segment)
-    return segment
-
-
-def restart(segment: SspSegment) -> cython.void:
-    """Make it a valid segment without frames again."""
-    segment.words = [0] * 31
-    segment.words[30] = 1
-    segment.used = 0
+    return SspSegment()
 
 
 def add_frame(
     segment: SspSegment, header: cython.longlong, word0: cython.longlong, word1: cython.longlong
 ) -> cython.longlong:
-    """Append a frame to a segment with room for five half-words, checksum included; returns how many are used."""
-    used: cython.longlong = segment.used
-    value_high: cython.longlong = (word0 >> 16) & 0xFFFF
-    value_low: cython.longlong = word0 & 0xFFFF
-    time_high: cython.longlong = (word1 >> 16) & 0xFFFF
-    time_low: cython.longlong = word1 & 0xFFFF
-    segment.words[used] = header
-    segment.words[used + 1] = value_high
-    segment.words[used + 2] = value_low
-    segment.words[used + 3] = time_high
-    segment.words[used + 4] = time_low
-    segment.words[30] = (segment.words[30] + header + value_high + value_low + time_high + time_low) & 0xFFFF
-    segment.used = used + 5
-    return used + 5
+    """Append a frame to a segment that holds less than six, and nothing else; returns how many half-words are used."""
+    used: cython.longlong = segment.used + 5
+    row: cython.longlong = 3 * used // 5
+    segment.rows[row - 3] = header
+    segment.rows[row - 2] = word0
+    segment.rows[row - 1] = word1
+    segment.used = used
+    return used
+
+
+def frames_in(segment: SspSegment) -> cython.longlong:
+    """How many rows of a segment are frames; -1 with a wrong checksum.
+
+    A half-word whose top five bits are not 01111 where a header should be ends the frames.
+    """
+    row: cython.longlong = 0
+    if segment.checksum_error != 0:
+        return -1
+    while row < 18 and segment.rows[row] >> 11 == 0x0F:
+        row += 3
+    return row // 3
 
 
 def corrupted_copy(segment: SspSegment, index: cython.longlong, flipped_bits: cython.longlong) -> SspSegment:
     """A copy of `segment` with bits of half-word `index` (0-30) flipped: a disturbance on the wires."""
     copy: SspSegment = SspSegment()
-    copy.copy_from(segment)
-    copy.words[index] ^= flipped_bits & 0xFFFF
-    if index < 30 and index >= copy.used:
-        copy.used = index + 1
+    half_words = segment.words
+    half_words[index] ^= flipped_bits & 0xFFFF
+    copy.words = half_words
+    copy.used = index + 1 if segment.used <= index < 30 else segment.used
     return copy
-
-
-class UnpackedFrames:
-    """Frames as they come out of segments, 96 places: `rows` of identifier, first and second word."""
-
-    def __init__(self) -> None:
-        self.rows = [0] * 288
-
-    def unpack(self, segment: SspSegment, place: cython.longlong) -> cython.longlong:
-        """Put the frames of `segment` from `place` on; returns how many, -1 with a wrong checksum.
-
-        A half-word whose top five bits are not 01111 where a header should be ends the frames.
-        """
-        used: cython.longlong = min(segment.used, 30)
-        total: cython.longlong = 1
-        frames: cython.longlong = 0
-        row: cython.longlong = 3 * place
-        i: cython.longlong = 0
-        header: cython.longlong
-        value_high: cython.longlong
-        value_low: cython.longlong
-        time_high: cython.longlong
-        time_low: cython.longlong
-        while i < used and i <= 25:
-            header = segment.words[i]
-            if header >> 11 != 0x0F:
-                break
-            value_high = segment.words[i + 1]
-            value_low = segment.words[i + 2]
-            time_high = segment.words[i + 3]
-            time_low = segment.words[i + 4]
-            total += header + value_high + value_low + time_high + time_low
-            self.rows[row] = header & 0x7FF
-            self.rows[row + 1] = value_high << 16 | value_low
-            self.rows[row + 2] = time_high << 16 | time_low
-            row += 3
-            frames += 1
-            i += 5
-        while i < used:
-            total += segment.words[i]
-            i += 1
-        return frames if total & 0xFFFF == segment.words[30] else -1
-
-    def move(self, place: cython.longlong, to: cython.longlong) -> cython.void:
-        """Copy the frame of one place to another."""
-        i: cython.longlong
-        for i in range(3):
-            self.rows[3 * to + i] = self.rows[3 * place + i]
 
 
 class MainBrainSspLink:
     """The slave's end: 16 segments each way, parsed and filled once per slot of the main brain.
 
     `report(code)` is called for every error; `last_id` is the highest identifier the data table has.
-    After `parse()` the first `frames` rows of `unpacked` are what came in, until the next segment does.
+    `parse()` leaves in `received` the first `segments` that came in, with `received_frames` frames each and `frames` in
+    all; so it stays until the next segment comes in.
     """
 
     def __init__(self, report, last_id, first_is_junk=True) -> None:
@@ -154,13 +102,12 @@ class MainBrainSspLink:
         self.last_id = last_id
         # the receive DMA is armed in the middle of nowhere, so the first segment comes shifted (facts 1.6)
         self.first_is_junk = first_is_junk
-        self.unpacked = UnpackedFrames()
+        self.received = [None] * MAIN_BRAIN_SEGMENTS
+        self.received_count = 0  # those that wait for `parse`
+        self.received_frames = [0] * 16  # MAIN_BRAIN_SEGMENTS
+        self.segments = 0
         self.frames = 0
-        self.received_count = 0  # segments and frames that wait for `parse`, and what it will report
-        self.received_frames = 0
-        self.received_errors = []
-        # 16 queued, one being exchanged, one being packed
-        self.queue = [empty_segment() for _ in range(18)]
+        self.queue = [empty_segment() for _ in range(MAIN_BRAIN_CIRCLE)]
         self.empty = empty_segment()
         self.packing = None
         self.queue_read = 0
@@ -187,31 +134,15 @@ class MainBrainSspLink:
         """Keep what a received segment brings, as the receive DMA does in one of 16 places; False when it is lost.
 
         With all places full the segment is dropped and MB_SSP_RX_FULL reported (dropping the newest is
-        chosen by us, because the facts name only the error). A wrong checksum drops the segment, an identifier
-        above `last_id` its frame; `parse` reports them.
+        chosen by us, because the facts name only the error).
         """
-        frames: cython.longlong
-        place: cython.longlong = self.received_frames
-        i: cython.longlong
         if self.received_count == 16:
             return self._miss()
         if self.segments_received == 0 and self.first_is_junk:
             segment = self.shifted(segment)
+        self.received[self.received_count] = segment
         self.received_count += 1
         self.segments_received += 1
-        if segment.used == 0 and segment.words[30] == 1:
-            return True
-        frames = self.unpacked.unpack(segment, place)
-        if frames < 0:
-            self._note(self.code_checksum)
-        for i in range(place, place + frames):
-            if self.unpacked.rows[3 * i] > self.last_id:
-                self._note(self.code_id_out_of_range)
-                continue
-            if place < i:
-                self.unpacked.move(i, place)
-            place += 1
-        self.received_frames = place
         return True
 
     def _miss(self) -> cython.bint:
@@ -220,31 +151,18 @@ class MainBrainSspLink:
         self.report(self.code_receive_full)
         return False
 
-    def _note(self, code: cython.longlong) -> None:
-        """Keep an error until `parse` reports it."""
-        self.received_errors.append(code)
-
-    @property
-    def ids(self):
-        """Identifiers of the unpacked frames, by place."""
-        return list(self.unpacked.rows)[0::3]
-
-    @property
-    def words0(self):
-        """Their first words."""
-        return list(self.unpacked.rows)[1::3]
-
-    @property
-    def words1(self):
-        """Their second words."""
-        return list(self.unpacked.rows)[2::3]
+    def parsed(self) -> list:
+        """The frames that the last `parse` handed over: (identifier, first word, second word)."""
+        found = []
+        for segment, frames in zip(self.received[: self.segments], self.received_frames, strict=False):
+            rows = list(segment.rows)
+            found += [(rows[row] & 0x7FF, rows[row + 1], rows[row + 2]) for row in range(0, 3 * frames, 3)]
+        return found
 
     def shifted(self, segment: SspSegment) -> SspSegment:
         """A copy of `segment` as it looks from its second half-word on."""
         copy: SspSegment = SspSegment()
-        i: cython.longlong
-        for i in range(30):
-            copy.words[i] = segment.words[i + 1]
+        copy.words = [*segment.words[1:], 0]
         copy.used = 30
         return copy
 
@@ -256,7 +174,7 @@ class MainBrainSspLink:
             return self.empty
         segment = cython.cast(SspSegment, self.queue[self.queue_read])
         self.queue_read += 1
-        if self.queue_read == 18:
+        if self.queue_read == 27:  # MAIN_BRAIN_CIRCLE
             self.queue_read = 0
         self.queue_count -= 1
         return segment
@@ -268,20 +186,41 @@ class MainBrainSspLink:
         where a header should be ends the segment. An identifier above `last_id` drops its frame
         (MB_SSP_ID_OOR).
         """
-        segments: cython.longlong = self.received_count
-        if self.received_errors:
-            for code in self.received_errors:
-                if code == self.code_checksum:
-                    self.checksum_errors += 1
-                else:
-                    self.ids_out_of_range += 1
-                self.report(code)
-            self.received_errors = []
-        self.frames = self.received_frames
-        self.frames_received += self.received_frames
+        segment: SspSegment
+        i: cython.longlong
+        row: cython.longlong
+        frames: cython.longlong
+        self.segments = self.received_count
         self.received_count = 0
-        self.received_frames = 0
-        return segments
+        self.frames = 0
+        for i in range(self.segments):
+            segment = cython.cast(SspSegment, self.received[i])
+            frames = frames_in(segment)
+            if frames < 0:
+                frames = 0
+                self.checksum_errors += 1
+                self.report(self.code_checksum)
+            for row in range(0, 3 * frames, 3):
+                if segment.rows[row] & 0x7FF > self.last_id:
+                    frames = self._drop_strangers(i, frames)
+                    break
+            self.received_frames[i] = frames
+            self.frames += frames
+        self.frames_received += self.frames
+        return self.segments
+
+    def _drop_strangers(self, place: cython.longlong, frames: cython.longlong) -> cython.longlong:
+        """Keep the received segment at `place` without the frames that no variable has; returns how many are left."""
+        segment: SspSegment = self.received[place]
+        known: SspSegment = SspSegment()
+        for row in range(0, 3 * frames, 3):
+            if segment.rows[row] & 0x7FF > self.last_id:
+                self.ids_out_of_range += 1
+                self.report(self.code_id_out_of_range)
+            else:
+                add_frame(known, segment.rows[row], segment.rows[row + 1], segment.rows[row + 2])
+        self.received[place] = known
+        return known.used // 5
 
     def send(self, identifier: cython.longlong, word0: cython.longlong, word1: cython.longlong) -> cython.bint:
         """Pack one frame; False (and MB_SSP_TX_FULL) when all 16 segments are queued.
@@ -301,8 +240,9 @@ class MainBrainSspLink:
             self.transmit_full += 1
             self.report(self.code_transmit_full)
             return False
-        self.packing = cython.cast(SspSegment, self.queue[(self.queue_read + self.queue_count) % 18])
-        restart(self.packing)
+        # MAIN_BRAIN_CIRCLE
+        self.packing = cython.cast(SspSegment, self.queue[(self.queue_read + self.queue_count) % 27])
+        self.packing.clear()
         return True
 
     def flush(self) -> cython.longlong:
@@ -329,7 +269,7 @@ class RouterSspLink:
     def __init__(self, report, frames_may_straddle=False) -> None:
         self.report = report
         self.frames_may_straddle = frames_may_straddle
-        self.segments = [empty_segment() for _ in range(ROUTER_SEGMENTS)]
+        self.segments = [empty_segment() for _ in range(ROUTER_CIRCLE)]
         self.first = 0  # the segment that goes next
         self.last = 0  # the segment being packed, which is also
         self.packing = self.segments[0]
@@ -338,9 +278,9 @@ class RouterSspLink:
         # six instructions per half-word pushed, about 12 cycles: chosen by us, because no listing says
         self.push_step_ns = 200
         self.empty = empty_segment()
-        # what came in, by place: six frames, and how many there are (-1: the checksum is wrong)
-        self.unpacked = UnpackedFrames()
-        self.received_frames = [0] * 8
+        # what came in, by place: the segment, and how many frames it has (-1: the checksum is wrong)
+        self.received = [None] * ROUTER_RECEIVE_SEGMENTS
+        self.received_frames = [0] * 8  # ROUTER_RECEIVE_SEGMENTS
         self.received_write = 0
         self.received_read = 0
         self.position = 0
@@ -386,10 +326,10 @@ class RouterSspLink:
             header |= 0x8000
         self.half_words += 5
         self.push_time = now
-        if self.packing.used > 25:
-            if self.packing.used < 30:  # a frame was cut before: this one straddles two segments
-                return self._put_over_the_end(header, word0, word1)
+        if self.packing.used == 30:
             self._begin_segment()
+        elif self.frames_may_straddle and self.packing.used % 5 != 0:  # a frame was cut before
+            return self._put_half_words(header, word0, word1)
         add_frame(self.packing, header, word0, word1)
         return True
 
@@ -399,8 +339,8 @@ class RouterSspLink:
         self.report(self.code_transmit_full)
         return False
 
-    def _put_over_the_end(self, header: cython.longlong, word0: cython.longlong, word1: cython.longlong) -> cython.bint:
-        """Append a frame of which only a part fits into the segment being packed: True."""
+    def _put_half_words(self, header: cython.longlong, word0: cython.longlong, word1: cython.longlong) -> cython.bint:
+        """Append a frame that does not lie as the others do, and may go on in the next segment: True."""
         for word in (header, word0 >> 16, word0, word1 >> 16, word1):
             self._put(word & 0xFFFF)
         return True
@@ -408,18 +348,19 @@ class RouterSspLink:
     def _begin_segment(self) -> cython.void:
         """Let the segment after the last be the one that is packed."""
         self.last += 1
-        if self.last == 24:
+        if self.last == 35:  # ROUTER_CIRCLE
             self.last = 0
         self.packing = cython.cast(SspSegment, self.segments[self.last])
-        restart(self.packing)
+        self.packing.clear()
 
-    def _put(self, word: cython.longlong) -> cython.void:
-        """Append one half-word, without the checksum of frames."""
+    def _put(self, word: cython.longlong) -> None:
+        """Append one half-word."""
         if self.packing.used == 30:
             self._begin_segment()
-        self.packing.words[self.packing.used] = word
-        self.packing.used += 1
-        self.packing.words[30] = (self.packing.words[30] + word) & 0xFFFF
+        half_words = self.packing.words
+        half_words[self.packing.used] = word
+        self.packing.words = half_words
+        finish(self.packing, self.packing.used + 1)
 
     def next_segment(self, now: cython.longlong) -> SspSegment:
         """The segment that is exchanged from instant `now` (ns) on.
@@ -445,23 +386,19 @@ class RouterSspLink:
         if self.first == self.last:
             self._begin_segment()
         self.first += 1
-        if self.first == 24:
+        if self.first == 35:  # ROUTER_CIRCLE
             self.first = 0
         self.half_words -= segment.used
         self.frames_sent += segment.used // 5
         return segment
 
-    def _cut(self, segment: SspSegment, used: cython.longlong) -> cython.void:
+    def _cut(self, segment: SspSegment, used: cython.longlong) -> None:
         """Leave `used` half-words in the first segment; the others, of the newest frame, go to the head of the last."""
-        moved: cython.longlong = segment.used - used
-        i: cython.longlong
+        moved = segment.words[used : segment.used]
         if self.first == self.last:
             self._begin_segment()
-        for i in range(self.packing.used - 1, -1, -1):
-            self.packing.words[i + moved] = self.packing.words[i]
-        for i in range(moved):
-            self.packing.words[i] = segment.words[used + i]
-        finish(self.packing, self.packing.used + moved)
+        self.packing.words = [*moved, *self.packing.words[: 31 - len(moved)]]
+        finish(self.packing, self.packing.used + len(moved))
         finish(segment, used)
 
     def tick(self, now: cython.longlong) -> SspSegment:
@@ -492,11 +429,9 @@ class RouterSspLink:
 
     def receive(self, segment: SspSegment) -> cython.void:
         """The end of an exchange: the main brain's half-words lie in the current place."""
-        frames: cython.longlong = 0
         # a segment that starts with zero is passed over without a look at its checksum, as the robot does
-        if segment.used > 0 and segment.words[0] != 0:
-            frames = self.unpacked.unpack(segment, self.received_write * 6)
-        self.received_frames[self.received_write] = frames
+        self.received_frames[self.received_write] = frames_in(segment) if segment.rows[0] != 0 else 0
+        self.received[self.received_write] = segment
         self.exchange_done = True
         self.segments_received += 1
 
@@ -516,13 +451,15 @@ class RouterSspLink:
         """
         frames: cython.longlong
         row: cython.longlong
+        segment: SspSegment
         while self.received_read != self.received_write:
             frames = self.received_frames[self.received_read]
             if self.position < frames:
-                row = 3 * (self.received_read * 6 + self.position)
-                self.rx_id = self.unpacked.rows[row]
-                self.rx_word0 = self.unpacked.rows[row + 1]
-                self.rx_word1 = self.unpacked.rows[row + 2]
+                segment = cython.cast(SspSegment, self.received[self.received_read])
+                row = 3 * self.position
+                self.rx_id = segment.rows[row] & 0x7FF
+                self.rx_word0 = segment.rows[row + 1]
+                self.rx_word1 = segment.rows[row + 2]
                 self.position += 1
                 self.frames_received += 1
                 return True

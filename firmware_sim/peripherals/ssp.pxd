@@ -7,7 +7,8 @@ cimport cython
 @cython.final
 cdef class SspSegment:
     cdef public long long used
-    cdef public long long[31] words
+    cdef public long long checksum_error
+    cdef public long long[18] rows
     cpdef void clear(self) noexcept
     cpdef void copy_from(self, SspSegment other) noexcept
 

@@ -26,22 +26,47 @@ def segment_time_ns(words: cython.longlong, word_bits: cython.longlong, bit_rate
 
 
 class SspSegment:
-    """31 half-words in `words`, each 0 ... 65535; `used`: how many are filled in."""
+    """31 half-words, the last of which is the checksum of the others; `used`: how many are filled in.
+
+    They are kept as those who fill them in have them: `rows` of a half-word and two words of 32 bits, six times. Of the
+    checksum only `checksum_error` is kept: how much it is above what the others sum up to, 0 unless somebody spoilt it.
+    """
 
     def __init__(self) -> None:
-        self.words = [0] * 31
+        self.rows = [0] * 18
+        self.checksum_error = 0
         self.used = 0
 
+    @property
+    def words(self) -> list:
+        """The half-words on the wire, each 0 ... 65535: a copy."""
+        half_words = []
+        for row in range(0, 18, 3):
+            word0, word1 = self.rows[row + 1], self.rows[row + 2]
+            half_words += [self.rows[row], word0 >> 16, word0 & 0xFFFF, word1 >> 16, word1 & 0xFFFF]
+        return [*half_words, (1 + sum(half_words) + self.checksum_error) & 0xFFFF]
+
+    @words.setter
+    def words(self, half_words) -> None:
+        for row in range(6):
+            at = 5 * row
+            self.rows[3 * row] = half_words[at]
+            self.rows[3 * row + 1] = half_words[at + 1] << 16 | half_words[at + 2]
+            self.rows[3 * row + 2] = half_words[at + 3] << 16 | half_words[at + 4]
+        self.checksum_error = (half_words[30] - 1 - sum(half_words[:30])) & 0xFFFF
+
     def clear(self) -> cython.void:
-        """All zeros, nothing used."""
-        self.words = [0] * 31
+        """Thirty zeros and their checksum, nothing used."""
+        self.rows = [0] * 18
+        self.checksum_error = 0
         self.used = 0
 
     def copy_from(self, other) -> cython.void:
         """Take over the contents of another segment."""
         i: cython.longlong
-        for i in range(31):
-            self.words[i] = other.words[i]
+        for i in range(18):
+            self.rows[i] = other.rows[i]
+        self.checksum_error = other.checksum_error
         self.used = other.used
 
 

@@ -140,8 +140,8 @@ class Mailbox:
         segment: SspSegment
         if isinstance(ref, SspSegment):
             segment = ref
-            for i in range(31):
-                self.words[at + i] = segment.words[i]
+            for i, half_word in enumerate(segment.words):
+                self.words[at + i] = half_word
             self.words[at + 31] = segment.used
             return 32
         data = bytes(ref)
@@ -211,12 +211,10 @@ class Mailbox:
 
     def _read_payload(self, at: cython.longlong, count: cython.longlong, kind: cython.longlong) -> object:
         """The object whose words begin at `at`."""
-        i: cython.longlong
         segment: SspSegment
         if self.limits[kind * 15 + 2] == 32:  # SSP_WORDS
             segment = SspSegment()
-            for i in range(31):
-                segment.words[i] = self.words[at + i]
+            segment.words = [self.words[at + i] for i in range(31)]
             segment.used = self.words[at + 31]
             return segment
         data = array.array("q", [self.words[at + i] for i in range(1, count)]).tobytes()

@@ -32,7 +32,7 @@ def to_main_brain(router):
     while router.ssp.half_words_waiting():
         brain.receive(router.ssp.next_segment(10**9))
         brain.parse()
-        got += [brain.ids[i] for i in range(brain.frames)]
+        got += [identifier for identifier, _, _ in brain.parsed()]
     return got
 
 

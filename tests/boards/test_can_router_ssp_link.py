@@ -36,7 +36,8 @@ def brain(said):
 
 
 def frames_of(brain):
-    return [(brain.ids[i], brain.words0[i], brain.words1[i]) for i in range(brain.frames)]
+    assert len(brain.parsed()) == brain.frames
+    return brain.parsed()
 
 
 def exchange(router, brain, now):

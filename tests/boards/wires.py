@@ -61,8 +61,7 @@ class Wires:
                     out.time + EXCHANGE_NS, STAGE_INTERRUPTS * 256, SSP_SEGMENT, 0, 0, 0, 0, 0, 0, down
                 )
                 self.brain.parse()
-                for i in range(self.brain.frames):
-                    self.heard.append((self.brain.ids[i], self.brain.words0[i], self.brain.words1[i]))
+                self.heard += self.brain.parsed()
             elif out.kind == UART_OUTPUT:
                 self.uart.append((out.time, out.b))
             elif out.kind == CAN_ABORT:
