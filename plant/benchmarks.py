@@ -13,7 +13,9 @@ from scipy.integrate import solve_ivp
 
 from plant import paper_model as pm
 from plant.body import FALLEN, Body
+from plant.motion import advance
 from plant.parameters import BodyParameters
+from plant.stance import on_feet
 
 RTOL = 2.3e-14  # about 100 roundings, the least scipy accepts
 ATOL = 1e-15
@@ -174,7 +176,7 @@ def swing_end(step_s, smoothing, seconds=0.1):
     body = Body(dataclasses.replace(BodyParameters(), friction_smoothing_rad_s=smoothing))
     swing_state(body)
     for _ in range(round(seconds / step_s)):
-        body.on_feet(step_s, 4)
+        on_feet(body, step_s, 4)
     return np.array([body.foot_outer, body.leg_outer, body.leg_inner, body.foot_inner])
 
 
@@ -218,7 +220,7 @@ def steps_of_falling_body(body: Body, seconds: float) -> int:
     for _ in range(round(seconds / 250e-6)):
         if body.mode == FALLEN:
             break
-        body.advance(250e-6)
+        advance(body, 250e-6)
     return body.record.steps
 
 

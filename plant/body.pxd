@@ -1,7 +1,6 @@
 cimport cython
 
-from libc.math cimport cos, fabs, sin, sqrt
-from plant.friction cimport smoothed_sign
+from libc.math cimport cos, sin, sqrt
 
 @cython.final
 cdef class Body:
@@ -36,54 +35,31 @@ cdef class Body:
     cdef public double[10] solution
     cdef public object parameters, floor, record
     cdef public str cause
-    cpdef int advance(self, double h) except -1
-    cpdef bint stands(self, long long leg) noexcept
     cpdef void set_slope(self, double slope_rad) noexcept
+    cpdef double excess(self, double foot) noexcept
     cpdef double chain_x(self, double foot, double leg) noexcept
     cpdef double chain_y(self, double foot, double leg) noexcept
-    cdef double _excess(self, double foot) noexcept
-    cdef void _know_angles(self) noexcept
-    cdef double _behind(self, long long leg) noexcept
+    cpdef double behind(self, long long leg) noexcept
+    cpdef double ahead(self) noexcept
+    cpdef void anchor(self, long long leg) noexcept
     cpdef double contact_x(self, long long leg) noexcept
     cpdef double ankle_x(self, long long leg) noexcept
-    cpdef void update_pose(self) noexcept
-    cpdef void update_hip_rates(self) noexcept
     cpdef double hip_angle(self) noexcept
     cpdef double hip_rate(self) noexcept
-    cpdef dict snapshot(self)
-    cpdef double energy_J(self)
-    cpdef void place(self, double outer_leg_rad, double hip_rad)
-    cpdef void hold(self, double outer_leg_rad)
-    cpdef void hold_both(self, double outer_leg_rad, double hip_rad)
-    cpdef void hold_standing(self, double outer_leg_rad, double hip_rad, long long stance=*)
-    cpdef void release(self, double outer_leg_rate, long long stance=*, double stance_foot_rate=*, double hip_rate=*)
-    cpdef void begin_walk(self)
+    cpdef bint stands(self, long long leg) noexcept
+    cdef void know_angles(self) noexcept
+    cpdef void update_pose(self) noexcept
+    cpdef void update_hip_rates(self) noexcept
+    cpdef void lift(self) noexcept
     cpdef void limp_foot(self, long long leg) noexcept
-    cpdef void on_feet(self, double h, long long stages)
-    cdef double _stop(self, double angle, double rate) noexcept
-    cdef double _exact_spring(self, double angle) noexcept
-    cdef void _ask_terms(
+    cpdef dict snapshot(self)
+    cdef double stop_torque(self, double angle, double rate) noexcept
+    cdef double spring_torque(self, double angle) noexcept
+    cdef int ask_terms(
         self, bint outer_stance, double hip, double a_s, double a_w, double p, double n, double hip_rate,
         double ra_s, double ra_w, double up, double un,
-    )
-    cpdef void in_air(self, double h, long long stages)
-    cpdef int impact(self, bint outer, bint inner) except -1
-    cpdef void _eliminate(self, long long n) noexcept
-    cdef void _save(self) noexcept
-    cdef void _restore(self) noexcept
-    cdef double _rise(self, long long leg) noexcept
-    cpdef bint lets_go(self, long long leg)
-    cdef bint _pulled_now(self, double h)
-    cdef bint _sole_ready(self, long long leg) noexcept
-    cdef bint _may_leave(self, long long leg) noexcept
-    cdef double _crossed(self)
-    cdef double _ahead(self) noexcept
-    cdef double _try(self, double h)
-    cdef double _locate(self, double h)
-    cdef int _act(self) except -1
+    ) except -1
+    cpdef double energy_J(self)
     cpdef long long event_time_ns(self) noexcept
-    cdef int _touch(self, long long foot) except -1
-    cdef int _leave(self, long long foot) except -1
-    cdef int _watch(self, double h) except -1
-    cpdef void _keep_forces(self, double h) noexcept
-    cpdef int _fall(self, cause) except -1
+    cdef void save(self) noexcept
+    cdef void restore(self) noexcept

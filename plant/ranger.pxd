@@ -5,6 +5,7 @@ from plant.body cimport Body
 from plant.electrics cimport Electrics
 from plant.imu cimport Imu
 from plant.incremental_encoder cimport IncrementalEncoder
+from plant.motion cimport advance
 from plant.motor_unit cimport MotorUnit
 from plant.steering cimport Steering
 

@@ -11,6 +11,7 @@ Seen from the boards: `motors` with their drives, `encoders` with their edges, `
 import cython
 import numpy as np
 
+from plant import handling
 from plant.absolute_encoder import AbsoluteEncoder
 from plant.body import Body
 from plant.electrics import Electrics
@@ -21,6 +22,9 @@ from plant.motor_unit import MotorUnit
 from plant.parameters import BodyParameters
 from plant.steering import Steering
 from plant.walk_record import RING
+
+if not cython.compiled:
+    from plant.motion import advance
 
 STEP_NS = 250_000  # the plant's step; its error is measured in EQUATIONS 15
 
@@ -159,15 +163,15 @@ class RangerPlant:
         """
         b: Body = self.body
         outer: cython.double = lean_rad if stance == "outer" else lean_rad + hip_angle_rad
-        b.place(outer, hip_angle_rad)
+        handling.place(b, outer, hip_angle_rad)
         b.motor_outer = outer_ankle_rad - self.zero
         b.motor_inner = inner_ankle_rad - self.zero
         b.foot_outer = outer + b.motor_outer
         b.foot_inner = outer - hip_angle_rad + b.motor_inner
         if lifted:
-            b.hold_both(outer, hip_angle_rad)
+            handling.hold_both(b, outer, hip_angle_rad)
         else:
-            b.hold_standing(outer, hip_angle_rad, 0 if stance == "outer" else 1)
+            handling.hold_standing(b, outer, hip_angle_rad, 0 if stance == "outer" else 1)
         self._settle()
 
     def release(self, rate_rad_s: cython.double, hip_rate_rad_s: cython.double = 0.0) -> cython.void:
@@ -175,7 +179,7 @@ class RangerPlant:
         b: Body = self.body
         b.step_start_ns = self.time_ns
         b.elapsed = 0.0
-        b.release(rate_rad_s, b.stance, rate_rad_s, hip_rate_rad_s)
+        handling.release(b, rate_rad_s, b.stance, rate_rad_s, hip_rate_rad_s)
         self.begin()
 
     def begin(self) -> cython.void:
@@ -253,7 +257,7 @@ class RangerPlant:
         b.inner_viscous = motor.viscous_Nms
 
         b.step_start_ns = t0
-        b.advance(h)
+        advance(b, h)
 
         outer_stands = b.stands(0)
         inner_stands = b.stands(1)

@@ -14,7 +14,9 @@ from boards.quirks import Quirks
 from datatable.generated import mb as table
 from datatable.generated.all_variables import TABLE_SIZE
 from datatable.store import DataStore
+from plant import handling
 from plant.body import Body
+from plant.motion import advance
 
 STEP_S = 0.0005
 BATTERY_V = 25.9
@@ -79,13 +81,13 @@ class BareRobot:
         self.motor_energy_J = 0.0
         operator = self.controller.operator
         body = self.body
-        body.place(operator.lean_rad, operator.hip_angle_rad)
+        handling.place(body, operator.lean_rad, operator.hip_angle_rad)
         body.motor_outer = operator.outer_ankle_rad - 1.68
         body.motor_inner = operator.inner_ankle_rad - 1.68
         body.foot_outer = body.leg_outer + body.motor_outer
         body.foot_inner = body.leg_inner + body.motor_inner
         body.update_pose()
-        body.hold_standing(operator.lean_rad, operator.hip_angle_rad)
+        handling.hold_standing(body, operator.lean_rad, operator.hip_angle_rad)
 
     def set_ids(self, **values) -> None:
         for name, value in values.items():
@@ -145,7 +147,7 @@ class BareRobot:
             body.outer_drive, body.outer_coulomb = self.outer.torque(1.68 + body.motor_outer, body.motor_outer_rate)
             body.inner_drive, body.inner_coulomb = self.inner.torque(1.68 + body.motor_inner, body.motor_inner_rate)
             body.hip_viscous = body.outer_viscous = body.inner_viscous = 0.01
-            body.advance(STEP_S)
+            advance(body, STEP_S)
             self.hip.filter_rate(body.hip_rate())
             self.outer.filter_rate(body.foot_outer_rate - body.leg_outer_rate)
             self.inner.filter_rate(body.foot_inner_rate - body.leg_inner_rate)
@@ -163,7 +165,7 @@ class BareRobot:
                 sum(1 << k.key for k in operator.keys if k.time_s <= self.time_s < k.time_s + k.hold_s),
             )
             self.step()
-        self.body.release(operator.release_rate_rad_per_s)
+        handling.release(self.body, operator.release_rate_rad_per_s)
 
     def walk(self, steps, limit_s) -> bool:
         """Walk until so many steps; False when the robot fell or the time was up."""

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from plant import benchmarks as bm
+from plant import handling
 from plant.body import Body
+from plant.motion import advance
 from plant.ranger import STEP_NS, RangerPlant
 from tests.plant.walking import (
     SLOT,
@@ -56,7 +58,7 @@ def first_strike(parts):
             walker.controller.tick(walker)
         for part in range(parts):
             body.step_start_ns = walker.count * STEP_NS + part * STEP_NS // parts
-            body.advance(STEP_S / parts)
+            advance(body, STEP_S / parts)
         walker.count += 1
     return body.record.strike_time_ns
 
@@ -70,7 +72,7 @@ def test_a_strike_is_timed_within_a_microsecond():
 def test_touch_is_located_inside_a_step():
     """A robot dropped from 2 mm in flight lands when free fall says so: t = sqrt(2 gap / g)."""
     body = Body()
-    body.place(0.0, 0.0)
+    handling.place(body, 0.0, 0.0)
     body.leg_outer, body.leg_inner = 0.1, -0.2
     body.foot_outer, body.foot_inner = 0.1, -0.2
     body.motor_outer = body.motor_inner = 0.0
@@ -83,7 +85,7 @@ def test_touch_is_located_inside_a_step():
     count = 0
     while body.mode == 3:
         body.step_start_ns = count * STEP_NS
-        body.advance(STEP_S)
+        advance(body, STEP_S)
         count += 1
     landed = body.record.touch_time_ns
     # the inertia of a falling body without rotation does not matter; 1 ns is the stamp's own unit

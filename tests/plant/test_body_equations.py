@@ -13,11 +13,16 @@ import numpy as np
 import pytest
 
 from foundation.random_stream import RandomStream
+from plant import handling
 from plant import paper_model as pm
+from plant.air import in_air
 from plant.body import DOUBLE, FLIGHT, HELD, INNER, OUTER, SINGLE, Body
 from plant.floor import Floor
+from plant.impact import impact
+from plant.motion import advance
 from plant.parameters import BodyParameters, hip_spring_torque_Nm
 from plant.ranger import STEP_NS
+from plant.stance import on_feet
 
 STEP_S = STEP_NS * 1e-9
 
@@ -109,7 +114,7 @@ def test_single_stance_agrees_with_the_appendix_formulation(stance):
         set_state(body, x, v)
         laws = set_motors(body, stream)
         body.mode, body.stance = SINGLE, stance
-        body.on_feet(0.0, 1)
+        on_feet(body, 0.0, 1)
         q, u = pm.paper_angles(x, stance), pm.paper_angles(v, stance)
         acc = pm.single_stance(p, q, u, paper_torques(laws, v, stance))
         force = pm.stance_force(p, q, u, acc)
@@ -142,7 +147,7 @@ def closed_posture(body, stream, stance):
     for name in STATE[:4]:
         setattr(body, name + "_rate", stream.normal())
     body.hip_vx, body.hip_vy = stream.normal(), stream.normal()
-    body.impact(True, True)
+    impact(body, True, True)
     body.update_pose()
 
 
@@ -155,7 +160,7 @@ def test_double_stance_agrees_with_the_appendix_formulation(stance):
         laws = set_motors(body, stream)
         closed_posture(body, stream, stance)
         x, v = state(body)
-        body.on_feet(0.0, 1)
+        on_feet(body, 0.0, 1)
         q, u = pm.paper_angles(x, stance), pm.paper_angles(v, stance)
         acc, P = pm.double_stance(p, q, u, paper_torques(laws, v, stance))
         front = pm.stance_force(p, q, u, acc, P)
@@ -183,7 +188,7 @@ def test_the_strike_agrees_with_the_appendix_formulation(stance):
         x, v = state(body)
         r, rr = pm.paper_angles(x, stance), pm.paper_angles(v, stance)
         q, u, P = pm.strike_to_double(p, r, rr)
-        body.impact(True, True)
+        impact(body, True, True)
         _, after = state(body)
         assert pm.fixed_legs(q, 1 - stance) == pytest.approx(x, abs=1e-14)
         scale = np.abs(u).max()
@@ -378,7 +383,7 @@ def test_single_stance_agrees_with_numerical_lagrange(stance, foot):
         body.mode, body.stance = SINGLE, stance
         body.update_pose()
         body.update_hip_rates()
-        body.on_feet(0.0, 1)
+        on_feet(body, 0.0, 1)
         acc, force = reference.solve(*to_z(body), laws, (stance,))
         # the reference's curvature is a central difference of step 1e-5: 1e-10 of terms up to 1e4
         assert accelerations(body) == pytest.approx(to_body(acc), rel=1e-7, abs=2e-6)
@@ -394,7 +399,7 @@ def test_double_stance_agrees_with_numerical_lagrange(stance):
         laws = set_motors(body, stream)
         closed_posture(body, stream, stance)
         body.update_hip_rates()
-        body.on_feet(0.0, 1)
+        on_feet(body, 0.0, 1)
         acc, force = reference.solve(*to_z(body), laws, (OUTER, INNER))
         assert accelerations(body) == pytest.approx(to_body(acc), rel=1e-6, abs=1e-5)
         assert [*forces(body)[OUTER], *forces(body)[INNER]] == pytest.approx(force, rel=1e-6, abs=1e-5)
@@ -412,10 +417,10 @@ def test_flight_agrees_with_numerical_lagrange():
         body.hip_y = 1.1
         z, zd = to_z(body)
         acc, _ = reference.solve(z, zd, laws, ())
-        body.in_air(0.0, 1)
+        in_air(body, 0.0, 1)
         assert accelerations(body) == pytest.approx(to_body(acc), rel=1e-7, abs=2e-6)
         # the hip's acceleration shows in a short step: v(h) - v(0) = a h + O(h^2) jerk, 1e4 m/s^3 x 1e-6 s
-        body.in_air(1e-6, 4)
+        in_air(body, 1e-6, 4)
         assert ((body.hip_vx - zd[0]) * 1e6, (body.hip_vy - zd[1]) * 1e6) == pytest.approx(acc[:2], abs=1e-2)
 
 
@@ -423,14 +428,14 @@ def test_a_held_robot_swings_its_inner_leg_as_a_pendulum():
     """Small oscillation about the hip against eq. 29 of the appendix, with spring and rotor: known answer."""
     p = BodyParameters()
     body = Body(p)
-    body.place(0.0, 0.01)
+    handling.place(body, 0.0, 0.01)
     stiffness = p.hip_spring_Nm_per_rad + p.inner_mass_moment_kg_m * p.gravity_m_per_s2
     period = 2 * math.pi * math.sqrt((p.inner_hip_inertia_kg_m2 + p.hip_rotor_inertia_kg_m2) / stiffness)
     assert body.mode == HELD
     crossings = []
     before = body.hip_angle()
     for k in range(round(3.75 / STEP_S)):
-        body.advance(STEP_S)
+        advance(body, STEP_S)
         now = body.hip_angle()
         if before > 0 >= now:
             crossings.append((k + before / (before - now)) * STEP_S)
@@ -468,9 +473,9 @@ def test_energy_is_kept_without_friction(mode, foot_inertia, exact_spring):
     seconds = 0.03 if mode == DOUBLE else 0.2
     for _ in range(round(seconds / STEP_S)):
         if mode == FLIGHT:
-            body.in_air(STEP_S, 4)
+            in_air(body, STEP_S, 4)
         else:
-            body.on_feet(STEP_S, 4)
+            on_feet(body, STEP_S, 4)
     # fourth order: facts on the plant 2 give 4.5e-10 per second at 500 us, so 3e-11 at 250 us. The arc is long
     # enough not to roll over its end, where the acceleration jumps (that costs 1e-7).
     assert body.energy_J() == pytest.approx(before, rel=1e-10)
@@ -481,7 +486,7 @@ def opening(seed, steps):
     closed_posture(body, RandomStream(seed, "closed"), OUTER)
     worst = []
     for _ in range(steps):
-        body.on_feet(STEP_S, 4)
+        on_feet(body, STEP_S, 4)
         body.update_pose()
         worst.append(abs(body.gap_inner))
     return worst

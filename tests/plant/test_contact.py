@@ -6,10 +6,15 @@ import pytest
 
 from foundation.random_stream import RandomStream
 from foundation.user_error import UserError
+from plant import handling, motion
+from plant.air import in_air
 from plant.body import DOUBLE, FALLEN, FLIGHT, HELD, INNER, OUTER, SINGLE, Body
 from plant.floor import Floor
+from plant.impact import impact
 from plant.parameters import BodyParameters
 from plant.ranger import STEP_NS
+from plant.stance import on_feet
+from plant.watch import keep_forces
 from tests.plant.test_body_equations import closed_posture
 from tests.plant.walking import STEP_S, PaperGait, Walker, mid_stance_start
 
@@ -17,13 +22,13 @@ from tests.plant.walking import STEP_S, PaperGait, Walker, mid_stance_start
 def advance(body, seconds):
     for _ in range(round(seconds / STEP_S)):
         body.step_start_ns += STEP_NS
-        body.advance(STEP_S)
+        motion.advance(body, STEP_S)
 
 
 def test_a_held_robot_keeps_its_legs_while_its_feet_follow_their_motors():
     body = Body()
-    body.place(0.09, 0.35)
-    body.hold_both(0.09, 0.35)
+    handling.place(body, 0.09, 0.35)
+    handling.hold_both(body, 0.09, 0.35)
     body.inner_drive, body.inner_coulomb = -0.5, 0.1
     # A rotor pulled with the net torque T drags the foot by the cable k: the stretch swings between 0 and twice
     # T/J_A / (k (1/J_A + 1/J_f)), which is 14.8 mrad; 1 mrad for the friction's smoothing while it starts.
@@ -43,13 +48,13 @@ def test_a_held_robot_keeps_its_legs_while_its_feet_follow_their_motors():
 @pytest.mark.parametrize("stance", [OUTER, INNER])
 def test_a_standing_hold_settles_where_ankle_and_weight_balance(stance):
     body = Body()
-    body.place(0.0, 0.0)
-    body.hold_standing(0.05, 0.0, stance)
+    handling.place(body, 0.0, 0.0)
+    handling.hold_standing(body, 0.05, 0.0, stance)
     for _ in range(16000):
         # a position loop on each ankle motor, as the boards' start states are
         body.outer_drive = -18.0 * body.motor_outer - 0.2 * body.motor_outer_rate
         body.inner_drive = -18.0 * body.motor_inner - 0.2 * body.motor_inner_rate
-        body.advance(STEP_S)
+        motion.advance(body, STEP_S)
     foot = body.foot_outer if stance == OUTER else body.foot_inner
     motor = body.motor_outer if stance == OUTER else body.motor_inner
     p = body.parameters
@@ -63,9 +68,9 @@ def test_a_standing_hold_settles_where_ankle_and_weight_balance(stance):
 
 def test_letting_go_starts_a_walk_with_the_rates_given():
     body = Body()
-    body.place(0.09, 0.35)
-    body.hold_standing(0.09, 0.35)
-    body.release(0.7, OUTER, 0.7, 0.1)
+    handling.place(body, 0.09, 0.35)
+    handling.hold_standing(body, 0.09, 0.35)
+    handling.release(body, 0.7, OUTER, 0.7, 0.1)
     assert body.mode == SINGLE and body.stance == OUTER
     assert (body.leg_outer_rate, body.foot_outer_rate) == (0.7, 0.7)
     assert body.hip_rate() == pytest.approx(0.1)
@@ -76,8 +81,8 @@ def test_letting_go_starts_a_walk_with_the_rates_given():
 
 def test_letting_go_with_the_other_foot_in_the_floor_ends_the_walk_with_that_cause():
     body = Body()
-    body.place(0.3, 0.3)  # the inner leg is upright and reaches deeper than the leaning outer one
-    body.release(0.5)
+    handling.place(body, 0.3, 0.3)  # the inner leg is upright and reaches deeper than the leaning outer one
+    handling.release(body, 0.5)
     assert body.mode == FALLEN
     assert body.cause == "put down with the swing foot in the floor"
     assert body.record.fell
@@ -91,7 +96,7 @@ def test_a_strike_ahead_counts_as_a_step_and_a_bounce_does_not():
     body.motor_inner = 0.4
     body.foot_inner_rate = 0.0
     body.leg_inner_rate = 0.6
-    body.begin_walk()
+    handling.begin_walk(body)
     assert body.record.steps == 0
     Walker(body, _Nothing()).run(1, 1.0)
     record = body.record
@@ -129,7 +134,7 @@ def test_impulses_of_a_strike_balance_the_momentum():
             )
 
         before = momentum(body)
-        body.impact(True, True)
+        impact(body, True, True)
         after = momentum(body)
         # solution of a 10 x 10 system: rounding 1e-16 times condition 1e6 times 10 N s
         assert after[0] - before[0] == pytest.approx(body.P_stance_x + body.P_swing_x, abs=1e-9)
@@ -170,11 +175,11 @@ def test_a_brushing_foot_is_pushed_up_and_slowed_down():
     body.update_pose()
     assert body.gap_inner == pytest.approx(-5e-4)
     body.brush = True
-    body.on_feet(0.0, 1)
+    on_feet(body, 0.0, 1)
     assert body.inner_Fy > 5.0
     # sliding friction opposes the foot's forward motion with mu times the normal force at most
     assert -0.9 * body.inner_Fy * 1.0000001 <= body.inner_Fx < 0.0
-    advance(body, STEP_S)
+    motion.advance(body, STEP_S)
     assert body.record.scuffs == 1
     assert body.brush_s > 0.0
 
@@ -192,7 +197,7 @@ def test_energy_only_falls_while_a_foot_brushes():
         # the sole's own spring holds k gap^2 / 2
         sole = 0.5 * body.sole_k * min(0.0, body.gap_inner) ** 2
         energies.append(body.energy_J() + sole)
-        body.on_feet(STEP_S, 4)
+        on_feet(body, STEP_S, 4)
     # the damper's force jumps as the sole comes off: one step of it, 130 N s/m x 0.1 m/s over 1e-5 m
     assert all(b <= a + 1e-4 for a, b in zip(energies, energies[1:], strict=False))
     assert energies[-1] < energies[0] - 1e-4
@@ -206,7 +211,7 @@ def test_a_jump_is_a_flight_that_ends_with_a_touch():
     body.update_pose()
     highest = 0.0
     for _ in range(4000):
-        body.advance(STEP_S)
+        motion.advance(body, STEP_S)
         if body.mode != FLIGHT:
             break
         highest = max(highest, body.gap_outer)
@@ -219,7 +224,7 @@ def test_oddities_are_counted_not_ignored():
     body = Body()
     body.outer_Fx, body.outer_Fy, body.inner_Fy = 60.0, 50.0, -3.0
     body.mode = SINGLE
-    body._keep_forces(STEP_S)
+    keep_forces(body, STEP_S)
     assert body.friction_ratio_max == pytest.approx(1.2)
     assert body.slip_s == STEP_S
     assert body.pull_s == STEP_S
@@ -240,7 +245,7 @@ def test_each_fall_has_its_cause(changes, cause):
     for name, value in changes.items():
         setattr(body, name, value)
     body.height_inner = -1.0  # a hole for the swing foot: only the fall ends this
-    body.advance(STEP_S)
+    motion.advance(body, STEP_S)
     assert body.mode == FALLEN and body.cause == cause
 
 
@@ -304,12 +309,12 @@ def test_a_slope_pulls_the_held_leg_by_its_angle():
     """On a slope of gamma a hanging leg is in balance at th = -gamma of the floor's normal: m c g sin."""
     slope = 0.05
     body = Body(BodyParameters(slope_rad=slope, hip_spring_Nm_per_rad=0.0), Floor(slope))
-    body.place(0.0, 0.0)
+    handling.place(body, 0.0, 0.0)
     body.leg_inner = -slope
     body.foot_inner = body.leg_inner
-    body.in_air(0.0, 1)
+    in_air(body, 0.0, 1)
     assert abs(body.leg_inner_acc) < 1e-12
     body.leg_inner = 0.0
     body.foot_inner = 0.0
-    body.in_air(0.0, 1)
+    in_air(body, 0.0, 1)
     assert body.leg_inner_acc < -0.1

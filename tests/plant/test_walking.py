@@ -10,6 +10,7 @@ import pytest
 
 from plant.body import Body
 from plant.floor import Floor
+from plant.motion import advance
 from plant.parameters import BodyParameters
 from plant.ranger import RangerPlant
 from tests.plant.walking import (
@@ -111,5 +112,5 @@ def test_a_robot_without_current_falls_forward_and_the_walk_ends_with_that():
     assert body.cause in ("fell forward", "fell backward", "legs split", "tripped")
     assert body.record.fall_cause == body.cause
     fallen = body.leg_outer
-    body.advance(STEP_S)
+    advance(body, STEP_S)
     assert body.leg_outer == fallen and body.record.fall_time_ns > 0

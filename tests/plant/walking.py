@@ -6,7 +6,9 @@ appendix (eq. 35, smoothed by eq. 43) and the electric power of eq. 32, per moto
 
 import math
 
+from plant import handling
 from plant.body import DOUBLE, FALLEN, SINGLE, Body
+from plant.motion import advance
 from plant.ranger import STEP_NS
 
 K = 0.018  # N m/A, torque constant [appendix table 3]
@@ -99,7 +101,7 @@ class Walker:
             self.ankles[0].spend(b.motor_outer_rate, STEP_S)
             self.ankles[1].spend(b.motor_inner_rate, STEP_S)
             b.step_start_ns = self.count * STEP_NS
-            b.advance(STEP_S)
+            advance(b, STEP_S)
             self.count += 1
         return b.mode != FALLEN
 
@@ -377,11 +379,11 @@ class RecordGait:
 
 def held_start(walker, lean=0.09, rate=0.7, seconds=1.5):
     """The operator's start [facts on the record walk]: standing, legs held 0.35 rad apart, then let go."""
-    walker.body.place(lean, 0.35)
-    walker.body.hold_standing(lean, 0.35)
+    handling.place(walker.body, lean, 0.35)
+    handling.hold_standing(walker.body, lean, 0.35)
     walker.run(1, seconds)
     walker.body.step_start_ns = walker.count * STEP_NS
-    walker.body.release(rate)
+    handling.release(walker.body, rate)
 
 
 class ElectricWalker(Walker):
@@ -444,7 +446,7 @@ def mid_stance_start(body, leg_rate=0.62, hip_rate=2.1, stance_foot=0.0, swing_a
     b.motor_outer_rate = 0.0
     b.motor_inner_rate = 0.0
     b.foot_inner_rate = leg_rate - hip_rate
-    b.release(leg_rate, 0, leg_rate, hip_rate)
+    handling.release(b, leg_rate, 0, leg_rate, hip_rate)
     b.foothold_due = False
 
 

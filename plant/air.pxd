@@ -1,0 +1,5 @@
+from libc.math cimport cos, sin
+from plant.body cimport Body
+from plant.friction cimport smoothed_sign
+
+cpdef void in_air(Body body, double h, long long stages)

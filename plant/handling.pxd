@@ -1,0 +1,11 @@
+from plant.body cimport Body
+from plant.watch cimport fall
+
+cpdef int place(Body body, double outer_leg_rad, double hip_rad) except -1
+cpdef int hold(Body body, double outer_leg_rad) except -1
+cpdef int hold_both(Body body, double outer_leg_rad, double hip_rad) except -1
+cpdef int hold_standing(Body body, double outer_leg_rad, double hip_rad, long long stance=*) except -1
+cpdef int release(
+    Body body, double outer_leg_rate, long long stance=*, double stance_foot_rate=*, double hip_rate=*,
+) except -1
+cpdef int begin_walk(Body body) except -1
