@@ -2,8 +2,8 @@
 
 Two expressions in our sources are meant for the compiler, and plain Python would evaluate them at every use, 300,000
 times per simulated second: `cython.cast(T, x)`, which says what x is and becomes `x`, and `cython.compiled`, which is
-False, so that CPython leaves out the branch that never runs. Nothing else is touched, and every expression keeps its
-lines and columns: tracebacks, debuggers and coverage show the source as it stands.
+False; of an `if` on that, what runs is left. Nothing else is touched, and every expression keeps its lines and
+columns: tracebacks, debuggers and coverage show the source as it stands.
 """
 
 import ast
@@ -21,7 +21,7 @@ TAG = f"settled{zlib.crc32(pathlib.Path(__file__).read_bytes()):08x}{sys.flags.o
 
 
 class Settle(ast.NodeTransformer):
-    """Puts the value for the two expressions."""
+    """Puts the value for the two expressions, and what runs for an `if` that depends on nothing else."""
 
     def visit_Call(self, node: ast.Call) -> ast.AST:
         """`cython.cast(T, x)`: x."""
@@ -36,6 +36,16 @@ class Settle(ast.NodeTransformer):
             case ast.Attribute(ast.Name("cython"), "compiled", ast.Load()):
                 return ast.copy_location(ast.Constant(False), node)
         return self.generic_visit(node)
+
+    def visit_If(self, node: ast.If) -> ast.AST | list[ast.stmt]:
+        """`if cython.compiled`, `if not cython.compiled`: the statements that run."""
+        self.generic_visit(node)
+        match node.test:
+            case ast.Constant(False):
+                return node.orelse or ast.copy_location(ast.Pass(), node)
+            case ast.UnaryOp(ast.Not(), ast.Constant(False)):
+                return node.body
+        return node
 
 
 class CompileTimeLoader(importlib.machinery.SourceFileLoader):

@@ -43,7 +43,11 @@ def settled(text):
         ("cython.cast(T, x)", "x"),
         ("cython.cast(T, rows[cython.cast(cython.longlong, i)]).take(cython.cast(U, b))", "rows[i].take(b)"),
         ("a = f() if cython.compiled else g()", "a = f() if False else g()"),
-        ("if not cython.compiled:\n    import x", "if not False:\n    import x"),
+        ("if not cython.compiled:\n    import x\n    f()", "import x\nf()"),
+        ("if cython.compiled:\n    f()\nelse:\n    g()\n    h()", "g()\nh()"),
+        ("if a:\n    f()\nelif cython.compiled:\n    g()\nelse:\n    h()", "if a:\n    f()\nelse:\n    h()"),
+        ("while a:\n    if cython.compiled:\n        f()", "while a:\n    pass"),
+        ("if cython.compiled and a:\n    f()", "if False and a:\n    f()"),
         # what only looks like it
         ("cython.cast(T, x, typecheck=True)", "cython.cast(T, x, typecheck=True)"),
         ("cython.cast(*both)", "cython.cast(*both)"),
@@ -62,7 +66,7 @@ def test_nothing_is_left_to_settle_and_everything_keeps_its_place(path):
         return {
             (type(node), node.lineno, node.col_offset, node.end_lineno, node.end_col_offset)
             for node in ast.walk(tree)
-            if hasattr(node, "lineno") and not isinstance(node, ast.Constant)
+            if hasattr(node, "lineno") and not isinstance(node, ast.Constant | ast.Pass)
         }
 
     text = path.read_text(encoding="utf-8")
