@@ -1,6 +1,6 @@
 # cython: cdivision=True
 # (only by masses and inertias, which are above zero)
-"""Motion in the air or in the operator's hands."""
+"""Motion in the air or in the operator's hands (EQUATIONS 7); written as `on_feet` is."""
 
 import cython
 

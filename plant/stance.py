@@ -1,6 +1,12 @@
 # cython: cdivision=True
 # (only by determinants of inertia, which are above zero)
-"""Motion on one or two feet."""
+"""Motion on one or two feet (EQUATIONS 5, 6).
+
+One function from the state to the state after a step: its stages share some sixty numbers, and to hand these from one
+function to the next would cost more than to work them out. It reads in paragraphs: the state by the roles of the legs;
+in every stage the motors, what depends on angles alone, torques and forces, accelerations, the next stage's state; then
+the step's end, back in fixed legs.
+"""
 
 import cython
 
@@ -43,6 +49,7 @@ def on_feet(body, h: cython.double, stages: cython.longlong) -> cython.void:
     eps: cython.double = body.inverse_smoothing
     hip_coulomb: cython.double = body.hip_coulomb
     hip_viscous: cython.double = body.hip_viscous
+    # the state, by role
     body.know_angles()
     if outer_stance:
         F0, th0, tw0, G0 = body.foot_outer, body.leg_outer, body.leg_inner, body.foot_inner
@@ -116,6 +123,7 @@ def on_feet(body, h: cython.double, stages: cython.longlong) -> cython.void:
                 if stage == 3 or double_stance or brush:
                     sG = sin(G)
                     cG = cos(G)
+            # the standing chain and the mass matrix, its inverse n from two rows (EQUATIONS 4, 5.1, 5.3)
             ls = el * st
             lc = el * ct
             Us = mts * ct - mws * st
@@ -145,10 +153,12 @@ def on_feet(body, h: cython.double, stages: cython.longlong) -> cython.void:
             n11 *= inv
             n12 *= inv
             n22 *= inv
+            # cables and hip spring (EQUATIONS 2.3, 2.4)
             pull_s = ks * (p - a_s)
             pull_w = 0.0 if massless else ks * (n - a_w)
             spring = body.spring_torque(hip) if exact_spring else kh * hip
             if brush or double_stance or stage == 3:
+                # the other foot's chain, and its height above the floor
                 dfw = d * cG
                 fw = d * sG
                 gg = 0.0
@@ -212,25 +222,21 @@ def on_feet(body, h: cython.double, stages: cython.longlong) -> cython.void:
             body.ask_terms(outer_stance, hip, a_s, a_w, p, n, hd, uF - us, uG - uw, up, un)
             if outer_stance:
                 Th += body.extra_hip
-                Ts += body.extra_outer
-                TF += body.extra_outer
                 mp += body.extra_outer_motor
-                Tw += body.extra_inner
-                TG += body.extra_inner
                 mn += body.extra_inner_motor
-                if massless:
-                    mn += body.extra_inner
+                extra_s, extra_w = body.extra_outer, body.extra_inner
             else:
                 Th -= body.extra_hip
-                Ts += body.extra_inner
-                TF += body.extra_inner
                 mp += body.extra_inner_motor
-                Tw += body.extra_outer
-                TG += body.extra_outer
                 mn += body.extra_outer_motor
-                if massless:
-                    mn += body.extra_outer
-        # generalised forces (EQUATIONS 5.3), unknowns: foot s, leg s, leg w
+                extra_s, extra_w = body.extra_inner, body.extra_outer
+            Ts += extra_s
+            TF += extra_s
+            Tw += extra_w
+            TG += extra_w
+            if massless:
+                mn += extra_w
+        # generalised forces on foot s, leg s, leg w (EQUATIONS 5.3)
         Q1 = TF - e * Px - f * Py
         Q2 = Th - Ts - Us * ax + Vs * ay + swing * uw2
         Q3 = Aw * ax - Bw * ay - swing * us2 - Th - Tw
@@ -251,6 +257,7 @@ def on_feet(body, h: cython.double, stages: cython.longlong) -> cython.void:
                     mn += push
             else:
                 Ry = 0.0
+        # accelerations
         b1 = Q1 - t13 * Q3
         b2 = Q2 - t23 * Q3
         aF = n22 * b1 - n12 * b2
@@ -308,7 +315,7 @@ def on_feet(body, h: cython.double, stages: cython.longlong) -> cython.void:
                 body.motor_outer_acc = an
             if stages == 1:
                 return
-            # k: first accelerations; q: sums k1 + k2 + k3
+            # the next stage (EQUATIONS 15); k: first accelerations, q: sums k1 + k2 + k3
             qF = kF = aF
             qs = ks_ = as_
             qw = kw = aw
@@ -356,6 +363,7 @@ def on_feet(body, h: cython.double, stages: cython.longlong) -> cython.void:
             uG = uG0 + c * aG
             up = up0 + c * ap
             un = un0 + c * an
+    # the step's end, in fixed legs
     if outer_stance:
         body.known_foot_outer, body.known_leg_outer, body.known_leg_inner, body.known_foot_inner = F, th, tw, G
         body.sin_foot_outer, body.cos_foot_outer, body.sin_leg_outer, body.cos_leg_outer = sF, cF, st, ct
