@@ -269,4 +269,6 @@ def declared_modules():
 
 
 if __name__ == "__main__":
-    setup(ext_modules=[Extension(LIBRARY, [])], cmdclass={"build_ext": OptionalBuild})
+    # named, libm gives its present functions; found through Python it gives those for programs linked long ago
+    mathematics = ["m"] if os.name == "posix" else []
+    setup(ext_modules=[Extension(LIBRARY, [], libraries=mathematics)], cmdclass={"build_ext": OptionalBuild})

@@ -1,5 +1,7 @@
 cimport cython
 
+from foundation.division cimport quotient
+
 cdef long long _NEVER
 
 cdef extern from "Python.h":
