@@ -365,8 +365,9 @@ class Lockstep:
         second: cython.longlong
         time: cython.longlong
         later: cython.longlong
-        due: cython.longlong[::1] = self.due
-        came: cython.longlong[::1] = self.came
+        # compiled, addresses: to take a memoryview into a variable is counted by an atomic instruction
+        due: cython.p_longlong = cython.address(self.due[0]) if cython.compiled else self.due
+        came: cython.p_longlong = cython.address(self.came[0]) if cython.compiled else self.came
         board_count: cython.longlong = len(self.boards)
         while True:
             if cython.compiled:  # without a branch: no processor could foresee which board is next
