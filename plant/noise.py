@@ -28,7 +28,10 @@ def quantile_table() -> list[float]:
 
 
 class NoiseSource:
-    """Normal numbers of one named stream. `seed`: any integer; `name`: unique per source."""
+    """Normal numbers of one named stream. `seed`: any integer; `name`: unique per source.
+
+    A source gives either single values (`normal`) or places (`block`): the former are drawn ahead.
+    """
 
     def __init__(self, seed, name) -> None:
         self.stream = RandomStream(seed, name)
@@ -40,23 +43,35 @@ class NoiseSource:
         self.table = reals(table)
         self.word = 0
         self.left = 0
+        self.ahead = [0.0] * 60  # drawn and not given yet; the first to come last
+        self.drawn = 0
 
     def normal(self) -> cython.double:
         """The next value, mean 0, variance 1: at the place that `block` would give."""
-        place: cython.longlong
-        if self.left == 0:
-            self.word = self.stream.bits() >> 4
-            self.left = 5
-        place = self.word & 4095
-        self.word >>= 12
-        self.left -= 1
-        return self.table[place]
+        if self.drawn == 0:
+            self._draw_ahead()
+        self.drawn -= 1
+        return self.ahead[self.drawn]
+
+    @cython.final
+    def _draw_ahead(self) -> cython.void:
+        """The next 60 values at once: the processor fetches them side by side, not each from memory in its turn."""
+        k: cython.longlong
+        word: cython.longlong
+        self.drawn = 60
+        while self.drawn > 0:
+            word = self.stream.bits() >> 4  # the lowest bits are as good; 60 of 64 are used
+            for k in range(5):
+                self.drawn -= 1
+                self.ahead[self.drawn] = self.table[word & 4095]
+                word >>= 12
+        self.drawn = 60
 
     def block(self) -> cython.longlong:
         """A random place of `table` (0 ... 4095): 64 values from there on are noise of so many channels."""
         place: cython.longlong
         if self.left == 0:
-            self.word = self.stream.bits() >> 4  # the lowest bits are as good; 60 of 64 are used
+            self.word = self.stream.bits() >> 4
             self.left = 5
         place = self.word & 4095
         self.word >>= 12
