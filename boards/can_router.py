@@ -291,7 +291,7 @@ class CanRouterBoard(Microcontroller):
             else:
                 break
             row = 4 * (channel * 8 + read)
-            if not controller.transmit(
+            if not controller.transmit_if_free(
                 buffer, router.tx_rows[row], router.tx_rows[row + 1], router.tx_rows[row + 2], router.tx_rows[row + 3]
             ):
                 break

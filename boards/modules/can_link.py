@@ -74,7 +74,7 @@ class CanLink:
         self.receivers = [None] * IDENTIFIERS
         self.time_identifier = -1  # whose frames bring `time`: every third frame
         # rings of rows: RFS, identifier, value and time; and identifier, value and time
-        self.rx_rows = [0] * 256  # 4 RECEIVE_RING
+        self.rx_rows = [0] * 256  # 4 RECEIVE_RING; written and read from where a row begins
         self.rx_write = 0
         self.rx_read = 0
         self.tx_rows = [0] * 24  # 3 SEND_RING
@@ -110,9 +110,8 @@ class CanLink:
 
     def on_receive(self, queue: EventQueue) -> None:
         """Interrupt: copy the frame into the ring and release the hardware buffer."""
-        write: cython.longlong = self.rx_write
-        after: cython.longlong = (write + 1) & 63
-        row: cython.longlong = 4 * write
+        row: cython.longlong = self.rx_write
+        after: cython.longlong = (row + 4) & 255
         controller: CanController = self.controller
         if after == self.rx_read:
             self.receive_lost += 1
@@ -151,25 +150,25 @@ class CanLink:
         """Slot task: deliver every frame that waits; returns how many there were."""
         read: cython.longlong = self.rx_read
         write: cython.longlong = self.rx_write
-        frames: cython.longlong = (write - read) & 63
+        frames: cython.longlong = ((write - read) & 255) >> 2
         ignored: cython.longlong = 0
-        row: cython.longlong
         identifier: cython.longlong
         if frames == 0:
             return 0
         while read != write:
-            row = 4 * read
-            identifier = self.rx_rows[row + 1]
+            identifier = self.rx_rows[read + 1]
             # DLC 8 and neither remote nor extended, as the bits stand in RFS
-            if self.rx_rows[row] != 524288 or identifier > 2047:
+            if self.rx_rows[read] != 524288 or identifier > 2047:
                 ignored += 1
             elif identifier == self.time_identifier:
-                self.time.deliver(self.rx_rows[row + 2], self.rx_rows[row + 3])
+                self.time.deliver(self.rx_rows[read + 2], self.rx_rows[read + 3])
             elif self.receivers[identifier] is None:
                 ignored += 1
             else:
-                cython.cast(Receiver, self.receivers[identifier]).deliver(self.rx_rows[row + 2], self.rx_rows[row + 3])
-            read = (read + 1) & 63
+                cython.cast(Receiver, self.receivers[identifier]).deliver(
+                    self.rx_rows[read + 2], self.rx_rows[read + 3]
+                )
+            read = (read + 4) & 255
         self.rx_read = 0  # empty: the next frame goes to the front again, which is in the cache
         self.rx_write = 0
         self.ignored += ignored
@@ -187,9 +186,8 @@ class CanLink:
         after: cython.longlong = (write + 1) & 7
         row: cython.longlong
         waiting: cython.longlong
-        if write == self.tx_read and controller.buffer_free(1) and not controller.MOD & 1:
-            # nothing waits: straight through the ring
-            controller.transmit(1, identifier, 8, value_word, time_word)
+        if write == self.tx_read and controller.transmit_if_free(1, identifier, 8, value_word, time_word):
+            # nothing waited: straight through the ring
             self.queued += 1
             if self.most_waiting == 0:
                 self.most_waiting = 1
@@ -230,21 +228,22 @@ class CanLink:
         Returns how many frames went there.
         """
         frames: cython.longlong = 0
-        buffer: cython.longlong
         row: cython.longlong
+        identifier: cython.longlong
+        value: cython.longlong
+        time: cython.longlong
         controller: CanController
         if self.tx_read == self.tx_write:
             return 0
         controller = self.controller
         while self.tx_read != self.tx_write:
-            if controller.buffer_free(1):
-                buffer = 1
-            elif controller.buffer_free(2):
-                buffer = 2
-            else:
-                break
             row = 3 * self.tx_read
-            if not controller.transmit(buffer, self.tx_rows[row], 8, self.tx_rows[row + 1], self.tx_rows[row + 2]):
+            identifier = self.tx_rows[row]
+            value = self.tx_rows[row + 1]
+            time = self.tx_rows[row + 2]
+            if not controller.transmit_if_free(1, identifier, 8, value, time) and not controller.transmit_if_free(
+                2, identifier, 8, value, time
+            ):
                 break
             self.tx_read = (self.tx_read + 1) & 7
             frames += 1

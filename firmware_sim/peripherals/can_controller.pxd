@@ -11,9 +11,9 @@ cdef class CanController(Peripheral):
     cdef public long long MOD
     cdef public TransmitEnds ends
     cdef readonly long long IER
-    cdef public long long ICR
+    cdef public long long end_interrupts, ended, noted
     cdef public long long number, rx_count
-    cdef public long long[4] tx_free, tx_complete
+    cdef public long long[4] tx_status
     cdef public long long RFS, RID, RDA, RDB
     cdef public long long second_RFS, second_RID, second_RDA, second_RDB
     cdef public long long received, sent, requests
@@ -24,6 +24,7 @@ cdef class CanController(Peripheral):
     cdef public long long tx_errors, rx_errors, BTR
     cdef public InterruptSource error_source
     cpdef bint transmit(self, long long buffer, long long identifier, long long flags, long long lo, long long hi) except? -1
+    cpdef bint transmit_if_free(self, long long buffer, long long identifier, long long flags, long long lo, long long hi) except? -1
     cpdef bint free_at(self, long long buffer, long long time) noexcept
     cpdef bint buffer_free(self, long long buffer) noexcept
     cpdef int tell_end(self, long long buffer) except -1
@@ -41,4 +42,4 @@ cdef class CanController(Peripheral):
     cdef void _bus_off(self) noexcept
 
 cdef long long frame_word(long long flags) noexcept
-cdef long long transmit_flag(long long buffer) noexcept
+cdef long long buffers_of(long long word) noexcept

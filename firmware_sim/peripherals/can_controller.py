@@ -58,9 +58,9 @@ def frame_word(flags: cython.longlong) -> cython.longlong:
     return (flags & 15) << 16 | (flags >> 4 & 1) << 30 | (flags >> 6 & 1) << 31
 
 
-def transmit_flag(buffer: cython.longlong) -> cython.longlong:
-    """TI1 ... TI3 of CxICR and CxIER."""
-    return 2 if buffer == 1 else 256 << (buffer - 1)
+def buffers_of(word: cython.longlong) -> cython.longlong:
+    """TI1 ... TI3 of a CxICR or CxIER value, as bits 1 ... 3."""
+    return word & 2 | word >> 7 & 12
 
 
 class CanController(Peripheral):
@@ -78,7 +78,9 @@ class CanController(Peripheral):
         self.ends = TransmitEnds()
         self.MOD = 0
         self.IER = IER
-        self.ICR = 0
+        self.end_interrupts = buffers_of(IER)  # by buffer, bits 1 ... 3
+        self.ended = 0  # the same way: ends that CxICR shows until it is read
+        self.noted = 0  # what else it shows until then
         self.BTR = btr
         self.RFS = 0
         self.RID = 0
@@ -93,8 +95,7 @@ class CanController(Peripheral):
         self.TID = [0] * 4
         self.TDA = [0] * 4
         self.TDB = [0] * 4
-        self.tx_free = [1] * 4
-        self.tx_complete = [1] * 4
+        self.tx_status = [12] * 4  # TBS 4 and TCS 8 of a buffer; 0 while it transmits
         self.overrun = False
         self.bus_off = False
         self.error_warning = False
@@ -122,9 +123,10 @@ class CanController(Peripheral):
 
     def free_at(self, buffer: cython.longlong, time: cython.longlong) -> cython.bint:
         """TBS of a transmit buffer 1 ... 3 by what has happened up to `time` (ns)."""
-        if self.ends.times[buffer & 3] <= time:
-            self._end(buffer & 3, self.ends.statuses[buffer & 3])
-        return self.tx_free[buffer & 3] != 0
+        buffer &= 3
+        if self.ends.times[buffer] <= time:
+            self._end(buffer, self.ends.statuses[buffer])
+        return self.tx_status[buffer] != 0
 
     def buffer_free(self, buffer: cython.longlong) -> cython.bint:
         """TBS of a transmit buffer 1 ... 3."""
@@ -157,8 +159,9 @@ class CanController(Peripheral):
         buffer: cython.longlong
         self._look()
         self.IER = value
+        self.end_interrupts = buffers_of(value)
         for buffer in range(1, 4):
-            if value & transmit_flag(buffer) and self.tx_source.bit != 0:
+            if self.end_interrupts >> buffer & 1 and self.tx_source.bit != 0:
                 self.tell_end(buffer)
 
     def _look(self) -> cython.void:
@@ -170,15 +173,16 @@ class CanController(Peripheral):
     def _end(self, buffer: cython.longlong, status: cython.longlong) -> cython.void:
         """The transmission from a buffer has ended."""
         self.ends.times[buffer] = 1 << 62
-        self.tx_free[buffer] = 1
+        self.ended |= 1 << buffer
         if status == 0:
             self.sent += 1
-            self.tx_complete[buffer] = 1
-        elif status == 1:
+            self.tx_status[buffer] = 12
+            return
+        self.tx_status[buffer] |= 4
+        if status == 1:
             self.aborted += 1
         else:
             self.lost += 1
-        self.ICR |= transmit_flag(buffer)
 
     def transmit(
         self,
@@ -188,26 +192,38 @@ class CanController(Peripheral):
         lo: cython.longlong,
         hi: cython.longlong,
     ) -> cython.bint:
-        """Fill a buffer and request it; flags as in foundation/events.py. False when the buffer is not free.
+        """Fill a buffer and request it; flags as in foundation/events.py. False, and refused, when it is not free.
 
         IndexError for a buffer that is not 1 ... 3.
         """
+        if self.transmit_if_free(buffer, identifier, flags, lo, hi):
+            return True
+        self.refused += 1
+        return False
+
+    def transmit_if_free(
+        self,
+        buffer: cython.longlong,
+        identifier: cython.longlong,
+        flags: cython.longlong,
+        lo: cython.longlong,
+        hi: cython.longlong,
+    ) -> cython.bint:
+        """`transmit` by a program that looks at the buffer's status first: False when that says no, or in reset."""
         if not 1 <= buffer <= 3:
             raise IndexError(f"{self.chip.name}: CAN controller {self.number}: transmit buffer {buffer} is not 1 ... 3")
         if self.ends.times[buffer] <= self.chip.now:
             self._end(buffer, self.ends.statuses[buffer])
-        if self.tx_free[buffer] == 0 or self.MOD & 1:
-            self.refused += 1
+        if self.tx_status[buffer] == 0 or self.MOD & 1:
             return False
         self.TFI[buffer] = 524288 if flags == 8 else frame_word(flags)
         self.TID[buffer] = identifier
         self.TDA[buffer] = lo
         self.TDB[buffer] = hi
-        self.tx_free[buffer] = 0
-        self.tx_complete[buffer] = 0
+        self.tx_status[buffer] = 0
         self.requests += 1
         self.chip.outbox.request(self.chip.now, self.number, buffer, identifier, flags, lo, hi)
-        if self.IER & transmit_flag(buffer) and self.tx_source.bit != 0:
+        if self.end_interrupts >> buffer & 1 and self.tx_source.bit != 0:
             self.tell_end(buffer)
         return True
 
@@ -244,11 +260,13 @@ class CanController(Peripheral):
             if self.MOD & 1:
                 return None
             if self.rx_count == 0:
+                self.rx_count = 1
                 self.RFS = 524288 if queue.c == 8 else frame_word(queue.c)
                 self.RID = queue.b
                 self.RDA = queue.d
                 self.RDB = queue.e
             elif self.rx_count == 1:
+                self.rx_count = 2
                 self.second_RFS = 524288 if queue.c == 8 else frame_word(queue.c)
                 self.second_RID = queue.b
                 self.second_RDA = queue.d
@@ -256,25 +274,23 @@ class CanController(Peripheral):
             else:
                 self.data_overruns += 1
                 self.overrun = True
-                self.ICR |= 8
+                self.noted |= 8
                 if self.IER & 8:
                     return self.error_source
                 return None
             self.received += 1
-            self.rx_count += 1
-            self.ICR |= 1
             if self.IER & 1:
                 return self.rx_source
         elif queue.kind == 3:  # CAN_TX_DONE
             buffer = queue.b & 3
             self._end(buffer, queue.c)
-            if self.IER & transmit_flag(buffer):
+            if self.end_interrupts >> buffer & 1:
                 return self.tx_source
         else:  # CAN_STATUS
             self.tx_errors = queue.c
             self.rx_errors = queue.d
             self.error_warning = queue.c >= 96 or queue.d >= 96
-            self.ICR |= queue.b
+            self.noted |= queue.b
             if queue.e and not self.bus_off:
                 self._bus_off()
             elif not queue.e:
@@ -289,16 +305,14 @@ class CanController(Peripheral):
         self.bus_off = True
         self.MOD |= 1
         for buffer in range(1, 4):
-            self.tx_free[buffer] = 1
+            self.tx_status[buffer] |= 4
 
     def release(self) -> cython.void:
         """CMR.RRB: free the older receive buffer; the newer moves up and asks for the interrupt again."""
-        if self.rx_count == 0:
+        if self.rx_count < 2:
+            self.rx_count = 0
             return
-        self.rx_count -= 1
-        if self.rx_count == 0:
-            self.ICR &= -2
-            return
+        self.rx_count = 1
         self.RFS = self.second_RFS
         self.RID = self.second_RID
         self.RDA = self.second_RDA
@@ -314,9 +328,8 @@ class CanController(Peripheral):
         self.MOD = mode
         if mode & 1:
             self.rx_count = 0
-            self.ICR &= -2
             for buffer in range(1, 4):
-                self.tx_free[buffer] = 1
+                self.tx_status[buffer] |= 4
         self.chip.outbox.push(self.chip.now, 0, 34, self.number, mode & 1)  # CAN_MODE
 
     def read_ICR(self) -> cython.longlong:
@@ -324,8 +337,14 @@ class CanController(Peripheral):
         value: cython.longlong
         self._look()
         value = self.ICR
-        self.ICR &= 1
+        self.ended = 0
+        self.noted = 0
         return value
+
+    @property
+    def ICR(self) -> cython.longlong:
+        """The same by the ends taken in so far, without clearing anything."""
+        return self.noted | self.ended & 2 | (self.ended & 12) << 7 | (self.rx_count > 0)
 
     def SR(self) -> cython.longlong:
         """Status of the three buffers, 8 bits each."""
@@ -342,7 +361,7 @@ class CanController(Peripheral):
         if self.bus_off:
             common |= 128
         for buffer in range(1, 4):
-            word |= (common | self.tx_free[buffer] << 2 | self.tx_complete[buffer] << 3) << 8 * (buffer - 1)
+            word |= (common | self.tx_status[buffer]) << 8 * (buffer - 1)
         return word
 
     def GSR(self) -> cython.longlong:

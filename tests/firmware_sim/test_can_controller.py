@@ -91,6 +91,8 @@ def test_a_buffer_is_not_free_until_the_bus_answers():
     assert node.can.GSR() & 0xC == 0
     assert not node.can.transmit(2, 22, 8, 3, 4)
     assert node.can.refused == 1
+    assert not node.can.transmit_if_free(2, 22, 8, 3, 4)
+    assert node.can.refused == 1, "who looks first commands nothing"
     assert node.can.TID[2] == 21
     node.tell(CAN_TX_DONE, 2, TX_SENT)
     assert node.can.SR() == 0x0C0C0C
