@@ -29,10 +29,10 @@ cdef class Node:
 @cython.final
 cdef class Bus:
     # times in ns and in bits since power-up, transmit buffers: what a request and a frame touch
-    cdef public long long next_time, next_bit, advanced, free_time, free_bit, suspended_until, next_change
+    cdef public long long next_time, next_bit, advanced, free_time, free_bit, hindered_until, next_change
     cdef long long* slots
     cdef public long long bitrate, first
-    cdef public long long pending_count, node_count, operating, wake_place
+    cdef public long long pending_count, node_count, acknowledging, wake_place
     cdef long long* due
     # what a frame touches
     cdef public long long next_strike, second_bit, second_ns
@@ -46,7 +46,7 @@ cdef class Bus:
     cdef public str name
     cdef public object seed
     cdef public EventQueue commands
-    cdef public long long joining
+    cdef public long long joining, suspended_until
     # disturbances
     cdef public RandomStream noise
     cdef public double bit_error_rate
@@ -78,6 +78,16 @@ cdef class Bus:
     cdef void _look_ahead(self) noexcept
     cdef void _remove(self, long long row) noexcept
     cdef long long _attempt(self, long long k) except? <long long>-1
+    cdef int _no_such_buffer(self, long long node, long long buffer) except -1
+    cdef int _check_frame(self, long long identifier, long long flags) except -1
+    cdef int _refuse(self, long long node, long long flags) except -1
+    cdef long long _hindered(
+        self, long long node, long long buffer, long long time, long long flags, long long first
+    ) except? <long long>-1
+    cdef bint _disturbed(self, long long k, long long best, long long bits, bint merged) except? -1
+    cdef int _after_success(self, Node node, long long end, long long done) except -1
+    cdef int _calm_receiver(self, Node node, long long time) except -1
+    cdef int _count_extended(self, long long identifier) except -1
     cdef long long _key(self, long long row) noexcept
     cdef long long _arbitrate(self, long long k) except? <long long>-1
     cdef bint _contend(self, long long k, long long best, long long best_key) except? -1

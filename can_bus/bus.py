@@ -148,9 +148,10 @@ class Bus:
         self.seed = seed
         self.nodes = []
         self.node_count = 0
-        self.operating = 0
+        self.acknowledging = 0
         self.joining = 0
         self.suspended_until = 0  # the last bit up to which a node has been suspended
+        self.hindered_until = 0  # the same; NEVER while not every node takes part
         self.commands = EventQueue(16)
         self.next_change = NEVER  # the instant of the first command; -1 while a node is joining
         self.advanced = -1
@@ -165,7 +166,7 @@ class Bus:
         self.bit_error_rate = 0.0
         self.next_noise_bit = NEVER
         self.next_planned_bit = NEVER
-        self.next_strike = NEVER
+        self.next_strike = -1  # the next bit that is hit; -1 when the next frame fails wherever that lies
         self.strikes_left = 0
         self.strike_position = -1
         self.planned_bits = []
@@ -226,6 +227,16 @@ class Bus:
             self.due = self.wakes
 
     @property
+    def operating(self) -> int:
+        """Nodes that take part and acknowledge; an observer that only listens takes itself off."""
+        return self.acknowledging
+
+    @operating.setter
+    def operating(self, count: int) -> None:
+        self.acknowledging = count
+        self._note_changes()
+
+    @property
     def accepted(self) -> int:
         """Requests taken; what waited when the statistics were set to zero counts."""
         over = self.frames + self.merged + self.aborted + self.flushed + self.single_shot_dropped
@@ -279,12 +290,13 @@ class Bus:
             self.nodes[index - 1].following = node
         self.nodes.append(node)
         self.node_count += 1
-        self.operating += 1
+        self.acknowledging += 1
         before = self.rows
         self.rows = integers(4 * ROW * self.node_count)
         for place in range(len(before)):
             self.rows[place] = before[place]
         self._find_numbers()
+        self._aim()
         return index
 
     @cython.cdivision(True)  # instants are not negative
@@ -314,11 +326,10 @@ class Bus:
         row: cython.longlong = (node << 5) + (buffer << 3)
         if node < 0 or node >= self.node_count or buffer < 1 or buffer > 3:
             self._no_such_buffer(node, buffer)
-        if flags & ~32 != 8 or identifier < 0 or identifier > 0x7FF:  # no standard frame of eight bytes
-            self._check_frame(identifier, flags)
         lo &= mask
         hi &= mask
-        if flags & ~32 != 8:
+        if identifier >> 11 or flags & ~32 != 8:  # no standard frame of eight bytes
+            self._check_frame(identifier, flags)
             if flags & 16:  # a remote frame carries no data
                 lo = 0
                 hi = 0
@@ -329,8 +340,6 @@ class Bus:
                 hi &= (1 << 8 * ((flags & 15) - 4)) - 1
         if time < self.slots[row]:  # FREE_AT
             self._refuse(node, flags)
-            return False
-        if self.operating < self.node_count and self._is_off(node, buffer, time, flags):
             return False
         if time < self.advanced:
             # stamped before what has been decided: it takes part from here on
@@ -345,9 +354,11 @@ class Bus:
             first = (time - second * billion) * self.bitrate // billion + 1
             start = second * billion + quotient(first * billion + self.bitrate - 1, self.bitrate)
             first += second * self.bitrate
-        if first < self.suspended_until:
-            first = self._after_suspension(node, first)
-            start = self.edge_ns(first)
+        if first < self.hindered_until:
+            first = self._hindered(node, buffer, time, flags, first)
+            if first < 0:
+                return False
+            start = self.edge_ns(first) if first < never else never
         if cython.compiled:
             self.slots[row] = never
             self.slots[row + 1] = first
@@ -361,9 +372,6 @@ class Bus:
             self.slots[row : row + 8] = (never, first, time, self.first, identifier, flags, lo, hi)
         self.first = row
         self.pending_count += 1
-        if self.operating < self.node_count and self.nodes[node].mode == JOINING:  # held until the node takes part
-            self.slots[row + 1] += never  # READY
-            return True
         if first < self.next_bit:
             self.next_bit = first
         if start < self.next_time:
@@ -372,12 +380,12 @@ class Bus:
                 self.due[self.wake_place] = start
         return True
 
-    def _no_such_buffer(self, node, buffer) -> None:
+    def _no_such_buffer(self, node: cython.longlong, buffer: cython.longlong) -> None:
         if node < 0 or node >= self.node_count:
             raise ValueError(f"bus {self.name}: node {node} does not exist")
         raise ValueError(f"bus {self.name}: transmit buffer {buffer} is not one of 1, 2, 3")
 
-    def _check_frame(self, identifier, flags) -> None:
+    def _check_frame(self, identifier: cython.longlong, flags: cython.longlong) -> None:
         """ValueError for a frame that cannot be sent."""
         if flags & 64:  # FLAG_EXTENDED
             if identifier < 0 or identifier > 0x1FFFFFFF:
@@ -387,7 +395,7 @@ class Bus:
         if flags & ~0x7F:  # length code, remote, single shot, extended
             raise ValueError(f"bus {self.name}: flags {flags:#x} of identifier {identifier:#x} cannot be sent")
 
-    def _refuse(self, node, flags) -> None:
+    def _refuse(self, node: cython.longlong, flags: cython.longlong) -> None:
         owner: Node = self.nodes[node]
         self.refused += 1
         owner.refused += 1
@@ -395,20 +403,25 @@ class Bus:
             self.single_shot_skipped += 1
             owner.single_shot_skipped += 1
 
-    def _is_off(self, node, buffer, time, flags) -> bool:
-        """True, and its request is refused and answered, when a node is off the bus."""
+    def _hindered(
+        self,
+        node: cython.longlong,
+        buffer: cython.longlong,
+        time: cython.longlong,
+        flags: cython.longlong,
+        first: cython.longlong,
+    ) -> cython.longlong:
+        """READY of a request that could start at bit `first`: later if its node is suspended, NEVER + that bit while it
+        is joining; -1, refused and answered, when it is off the bus."""
         owner: Node = self.nodes[node]
-        if owner.mode != RESET and owner.mode != BUS_OFF:
-            return False
-        self._refuse(node, flags)
-        if not owner.ends.write(buffer, time, TX_ABORTED):
-            owner.inbox.push(time, owner.order, CAN_TX_DONE, owner.controller, buffer, TX_ABORTED)
-        return True
-
-    def _after_suspension(self, node, first) -> int:
-        """The bit `first`, or a later one up to which the node is suspended."""
-        owner: Node = self.nodes[node]
-        return max(first, owner.suspend_bit)
+        if owner.mode == RESET or owner.mode == BUS_OFF:
+            self._refuse(node, flags)
+            if not owner.ends.write(buffer, time, TX_ABORTED):
+                owner.inbox.push(time, owner.order, CAN_TX_DONE, owner.controller, buffer, TX_ABORTED)
+            return -1
+        if first < owner.suspend_bit:
+            first = owner.suspend_bit
+        return NEVER + first if owner.mode == JOINING else first
 
     def abort(self, node: cython.longlong, buffer: cython.longlong, time: cython.longlong) -> cython.void:
         """Take back, at `time` (ns), the frame waiting in a transmit buffer.
@@ -474,8 +487,9 @@ class Bus:
         self._aim()
 
     def _aim(self) -> None:
-        """Set `next_strike` to the next bit that is hit, -1 when the next frame is, wherever it lies."""
-        self.next_strike = -1 if self.strikes_left > 0 else min(self.next_planned_bit, self.next_noise_bit)
+        """Set `next_strike` after anything that decides on it; a lone node fails because nobody acknowledges."""
+        fails = self.strikes_left > 0 or self.acknowledging < 2
+        self.next_strike = -1 if fails else min(self.next_planned_bit, self.next_noise_bit)
 
     def _draw_noise(self) -> None:
         """The next disturbed bit: distances between them are exponential with mean 1 / rate."""
@@ -539,8 +553,10 @@ class Bus:
         return self.next_time
 
     def _note_changes(self) -> None:
-        """Set `next_change` after a command came or went, or a node began or ended to join."""
+        """Set what depends on it after a command came or went, or a node began or ended to join or to take part."""
         self.next_change = -1 if self.joining > 0 else self.commands.head_time
+        self.hindered_until = self.suspended_until if self.acknowledging == self.node_count else NEVER
+        self._aim()
 
     def _change(self, until: cython.longlong) -> cython.bint:
         """Carry out the abort or mode change, or let the nodes join, that come before the next frame, if any do."""
@@ -610,7 +626,7 @@ class Bus:
                 self._drop(node, row, time, TX_ABORTED)
         elif commands.b == RESET:
             if node.mode == OPERATING:
-                self.operating -= 1
+                self.acknowledging -= 1
                 node.mode = RESET
             elif node.mode == JOINING:
                 self.joining -= 1
@@ -638,7 +654,7 @@ class Bus:
             node.mode = OPERATING
             node.sequences_left = 0
             self.joining -= 1
-            self.operating += 1
+            self.acknowledging += 1
             if node.transmit_errors >= BUS_OFF_LIMIT:
                 node.transmit_errors = 0
                 node.receive_errors = 0
@@ -665,7 +681,7 @@ class Bus:
 
     def alone_and_passive(self) -> bool:
         """True while what waits cannot be acknowledged, by nobody, and only repeats."""
-        if self.pending_count == 0 or self.operating >= 2 or self.joining or self.commands.count:
+        if self.pending_count == 0 or self.acknowledging >= 2 or self.joining or self.commands.count:
             return False
         return all(self.nodes[row // (4 * ROW)].passive for row in self.rows_waiting())
 
@@ -728,6 +744,7 @@ class Bus:
         rest: cython.longlong
         asked: cython.longlong
         bits: cython.longlong
+        place: cython.longlong
         rate: cython.longlong = self.bitrate
         billion: cython.longlong = 1000000000
         sender: Node
@@ -747,9 +764,8 @@ class Bus:
             _, _, asked, _, identifier, flags, lo, hi = self.slots[row : row + 8]
         bits = measure(identifier, flags, lo, hi) & 0xFFFF
         end = k + bits
-        if merged or self.operating < 2 or self.next_strike < end - 1:
-            if self._disturbed(k, row, bits, merged):
-                return self.free_bit
+        if (merged or self.next_strike < end - 1) and self._disturbed(k, row, bits, merged):
+            return self.free_bit
         # edge_ns of `end`; from it those of end - 1 (the end of the sixth bit of EOF) and of the intermission's end
         if k - self.second_bit >= rate:
             self.second_ns = k // rate * billion
@@ -798,9 +814,10 @@ class Bus:
         if flags & 64:  # FLAG_EXTENDED
             self._count_extended(identifier)
         else:
-            self.counts[2 * identifier] += 1
-            if done - asked > self.counts[2 * identifier + 1]:
-                self.counts[2 * identifier + 1] = done - asked
+            place = 2 * identifier
+            self.counts[place] += 1
+            if done - asked > self.counts[place + 1]:
+                self.counts[place + 1] = done - asked
         if self.trace is not None:
             self.trace.add(received, identifier, flags, lo, hi)
         else:
@@ -865,13 +882,15 @@ class Bus:
                 self._skip(lost, self.edge_ns(k + self._bits_until_loss(lost, best)))
         return merged
 
-    def _disturbed(self, k, best, bits, merged) -> bool:
+    def _disturbed(
+        self, k: cython.longlong, best: cython.longlong, bits: cython.longlong, merged: cython.bint
+    ) -> cython.bint:
         """Settle the frame on bits k ... k + bits - 1 where something may be wrong; True when it failed."""
         senders = self._senders(k, best) if merged else [best]
         position = -1
         if merged:
             position = self._collision(senders)
-        acknowledged = self.operating > len(senders)
+        acknowledged = self.acknowledging > len(senders)
         if position < 0:
             vulnerable = 41 if self.rows[best + FLAGS] & 64 else 17  # see inject_errors
             position = self._strike_of(k, k + bits - 1, vulnerable)
@@ -897,7 +916,7 @@ class Bus:
             node.inbox.put(done, node.order, CAN_TX_DONE, node.controller, row // ROW % 4, TX_SENT, 0, 0, 0)
         self._after_success(node, end, done)
 
-    def _after_success(self, node, end, done) -> None:
+    def _after_success(self, node: Node, end: cython.longlong, done: cython.longlong) -> None:
         """What a frame sent whole, to bit `end`, at `done` in ns, means for a sender that has had errors."""
         if node.passive:
             self._suspend(node, end + INTERMISSION_BITS)
@@ -945,10 +964,11 @@ class Bus:
         """An error-passive sender waits eight bits more after the intermission (ISO 11898-1)."""
         node.suspend_bit = free + 8
         self.suspended_until = node.suspend_bit
+        self.hindered_until = max(self.hindered_until, node.suspend_bit)
         for row in self._waiting(node):
             self.rows[row + READY] = max(self.rows[row + READY], node.suspend_bit)
 
-    def _calm_receiver(self, node, time) -> None:
+    def _calm_receiver(self, node: Node, time: cython.longlong) -> None:
         """Receive counter after a good frame (ISO 11898-1: above 127 back to 119 ... 127, we take 119)."""
         node.receive_errors = node.receive_errors - 1 if node.receive_errors < PASSIVE_LIMIT else 119
         self._confine(node, time, 0)
@@ -1035,7 +1055,8 @@ class Bus:
             interrupts |= ICR_ERROR_PASSIVE
         if node.transmit_errors >= BUS_OFF_LIMIT:
             node.mode = BUS_OFF
-            self.operating -= 1
+            self.acknowledging -= 1
+            self._note_changes()
             interrupts |= ICR_ERROR_WARNING
         self._tell(node, time, interrupts)
 
@@ -1057,7 +1078,7 @@ class Bus:
 
     # ---- load and log
 
-    def _count_extended(self, identifier) -> None:
+    def _count_extended(self, identifier: cython.longlong) -> None:
         counts = self.frames_by_extended_identifier
         counts[identifier] = counts.get(identifier, 0) + 1
 
