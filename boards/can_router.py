@@ -266,10 +266,9 @@ class CanRouterBoard(Microcontroller):
     def nothing_waits(self) -> cython.bint:
         """True while the main loop has nothing to move, now or when a buffer gets free."""
         return (
-            self.router.rx_read == self.router.rx_write
-            and self.link.received_read == self.link.received_write
-            and self.router.own_read == self.router.own_write
+            self.router.to_route == 0
             and self.router.waiting == 0
+            and self.link.received_read == self.link.received_write
         )
 
     def flush(self, controller: CanController, began: cython.longlong) -> cython.longlong:
@@ -339,11 +338,7 @@ class CanRouterBoard(Microcontroller):
         to_flush: cython.bint = False
         router: Router = self.router
         while True:
-            to_route = (
-                router.rx_read != router.rx_write
-                or self.link.received_read != self.link.received_write
-                or router.own_read != router.own_write
-            )
+            to_route = router.to_route > 0 or self.link.received_read != self.link.received_write
             if not to_route and not to_flush:
                 to_flush = router.waiting > 0 and self.can_flush(at)
                 if not to_flush:
@@ -362,7 +357,7 @@ class CanRouterBoard(Microcontroller):
             at += self.route_ns[moved]
             moved = 0
             channel = self.flush_next + 1
-            if router.tx_read[channel] != router.tx_write[channel]:
+            if router.waiting > 0 and router.tx_read[channel] != router.tx_write[channel]:
                 self.now = at
                 moved = self.flush(self.controllers[self.flush_next], began)
                 to_flush = False  # not known any more

@@ -14,7 +14,7 @@ cdef class RoutingTable:
 @cython.final
 cdef class Router:
     # what the main loop and a frame touch
-    cdef public long long rx_write, rx_read, own_write, own_read, waiting
+    cdef public long long rx_write, rx_read, own_write, own_read, to_route, waiting
     cdef public RoutingTable table
     cdef public RouterSspLink ssp
     cdef public CanLoad load

@@ -82,6 +82,7 @@ class Router:
         self.rx_rows = [0] * 320  # 5 RECEIVE_RING
         self.rx_write = 0
         self.rx_read = 0
+        self.to_route = 0  # frames in this ring and in the router's own
         self.tx_rows = [0] * 160  # 4 TRANSMIT_RING for each of five channels
         self.waiting = 0  # frames in the four transmit rings
         self.tx_write = [0] * 5
@@ -129,6 +130,7 @@ class Router:
         self.rx_rows[row + 3] = word0
         self.rx_rows[row + 4] = word1
         self.rx_write = following
+        self.to_route += 1
         return True
 
     def _lose(self, channel: cython.longlong) -> cython.bint:
@@ -150,6 +152,7 @@ class Router:
         self.own_rows[row + 2] = word0
         self.own_rows[row + 3] = word1
         self.own_write = following
+        self.to_route += 1
         return True
 
     def route_step(self, now: cython.longlong) -> cython.longlong:
@@ -162,6 +165,7 @@ class Router:
             self.route(0, self.ssp.rx_id, self.ssp.rx_flags, self.ssp.rx_word0, self.ssp.rx_word1, now)
             moved += 1
         if read != self.rx_write:
+            self.to_route -= 1
             self.rx_read = (read + 1) & 63
             if self.rx_read == self.rx_write and not self.one_frame_lag:
                 self.rx_read = 0  # empty: the next frame goes to the front again, which is in the cache
@@ -178,6 +182,7 @@ class Router:
         read = self.own_read
         if read != self.own_write:
             row = 4 * read
+            self.to_route -= 1
             self.own_read = (read + 1) & 7
             self.route(
                 5, self.own_rows[row], self.own_rows[row + 1], self.own_rows[row + 2], self.own_rows[row + 3], now
