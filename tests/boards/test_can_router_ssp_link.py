@@ -154,6 +154,39 @@ def test_the_seventeenth_segment_unread_is_dropped_with_an_error(router, brain, 
     assert [f[1] for f in frames_of(brain)] == list(range(16))
 
 
+def test_nobody_writes_to_segments_that_wait_at_the_main_brain(router, brain):
+    for i in range(96):
+        router.push(30, 8, i, i, 0)
+        if i % 6 == 5:
+            brain.receive(router.next_segment(TICK))
+    for _ in range(2):  # one segment more in an exchange, then the ring full again
+        while router.push(31, 8, 77, 77, 0):
+            pass
+        router.next_segment(TICK)
+    while router.push(31, 8, 77, 77, 0):
+        pass
+    assert brain.parse() == 16
+    assert frames_of(brain) == [(30, i, i) for i in range(96)]
+
+
+def test_nobody_writes_to_segments_that_wait_at_the_router(brain, router):
+    for i in range(7):
+        brain.send(5, i, 0)
+        brain.flush()
+        exchange(router, brain, i * TICK)
+    router.tick(7 * TICK)
+    for _ in range(2):  # one segment more in an exchange, then the queue full again
+        while brain.send(6, 77, 0):
+            pass
+        brain.next_segment()
+    while brain.send(6, 77, 0):
+        pass
+    got = []
+    while router.take():
+        got.append((router.rx_id, router.rx_word0))
+    assert got == [(5, i) for i in range(7)]
+
+
 def test_the_first_segment_after_the_start_is_junk(router, said):
     brain = MainBrainSspLink(said.append, 2031)
     for i in range(2):

@@ -509,6 +509,17 @@ def test_master_and_slave_put_their_segments_on_the_wire():
     assert (list(segment.words), segment.used) == ([0] * 30 + [1], 0)
 
 
+def test_a_segment_shows_the_half_words_that_were_put_into_it_and_how_wrong_their_checksum_is():
+    segment = SspSegment()
+    segment.words = list(range(100, 131))
+    assert list(segment.rows[:4]) == [100, 101 << 16 | 102, 103 << 16 | 104, 105]
+    right = 1 + sum(range(100, 130))
+    assert segment.checksum_error == (130 - right) % 65536
+    assert segment.words == list(range(100, 131))
+    segment.checksum_error = 0
+    assert segment.words[30] == right
+
+
 def test_a_segment_that_is_loaded_already_goes_out_again_without_a_word():
     chip = chip_at()
     port = SspPort(chip)
