@@ -7,9 +7,12 @@ import hashlib
 
 import cython
 
+# BLAKE2b (RFC 7693): as strong as SHA-256, in half the time on processors without instructions for that
+DIGEST_BYTES = 32
+
 
 class RowStream:
-    """Rows of 64-bit values collected into blocks. `hashed`: feed the blocks to SHA-256 as well.
+    """Rows of 64-bit values collected into blocks. `hashed`: feed the blocks to BLAKE2b as well.
 
     code: "q" for whole numbers, "d" for doubles. A row is written into `integers` or `reals` from `used` on, then
     told by `finish_row`. `number` tells streams of one kind apart.
@@ -26,7 +29,7 @@ class RowStream:
         self.used = 0
         self.last_time_ns = 0
         self.is_real = code == "d"
-        self.digest = hashlib.sha256() if hashed else None
+        self.digest = hashlib.blake2b(digest_size=DIGEST_BYTES) if hashed else None
         self.sink = None
 
     def finish_row(self, time_ns: cython.longlong) -> None:

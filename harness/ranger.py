@@ -253,7 +253,7 @@ class Ranger:
         self.boards[board].scheduler.replace(task, function, cost=cost, limit=limit)
 
     def trace_digest(self) -> str:
-        """SHA-256 of the canonical trace so far."""
+        """BLAKE2b-256 of the canonical trace so far."""
         return self.recorder.trace_digest()
 
     def recorded(self) -> Any:

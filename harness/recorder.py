@@ -6,7 +6,7 @@ Words of the main brain's data table (not hashed, they follow from the others): 
 
 import hashlib
 
-from foundation.row_stream import FrameStream, RowStream
+from foundation.row_stream import DIGEST_BYTES, FrameStream, RowStream
 
 
 class Recorder:
@@ -23,8 +23,8 @@ class Recorder:
         return {**frames, "samples": self.samples, "words": self.words}
 
     def trace_digest(self):
-        """SHA-256 (hex) over the frames of every bus and the samples so far; what is pending is flushed first."""
-        total = hashlib.sha256(b"ranger-sim trace 2\n")
+        """BLAKE2b-256 (hex) over the frames of every bus and the samples so far; what is pending is flushed first."""
+        total = hashlib.blake2b(b"ranger-sim trace 3\n", digest_size=DIGEST_BYTES)
         for stream in (*self.frames, self.samples):
             stream.flush()
             total.update(stream.digest.digest())

@@ -7,7 +7,7 @@ from harness.scenario import Scenario
 
 
 def digest(seconds: float, uptime_ms: int = 0) -> str:
-    """SHA-256 of the first `seconds` after power-up at `uptime_ms`."""
+    """BLAKE2b-256 of the first `seconds` after power-up at `uptime_ms`."""
     robot = Ranger(Scenario(start_uptime_ms=uptime_ms))
     robot.run_for(seconds)
     assert not robot.ended
