@@ -56,12 +56,12 @@ class NoiseSource:
     @cython.final
     def _draw_ahead(self) -> cython.void:
         """The next 60 values at once: the processor fetches them side by side, not each from memory in its turn."""
-        k: cython.longlong
+        _place: cython.longlong
         word: cython.longlong
         self.drawn = 60
         while self.drawn > 0:
             word = self.stream.bits() >> 4  # the lowest bits are as good; 60 of 64 are used
-            for k in range(5):
+            for _place in range(5):
                 self.drawn -= 1
                 self.ahead[self.drawn] = self.table[word & 4095]
                 word >>= 12
