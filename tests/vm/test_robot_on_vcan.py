@@ -57,7 +57,7 @@ def walked(tmp_path_factory):
 
             await_condition(robot_talks, 200)
             subprocess.run(["cansend", "vcan0", "6F0#01020304"], check=True)
-            told, _ = robot.communicate(timeout=850)  # 350 s where the machine is slow
+            told, _ = robot.communicate(timeout=600)
         finally:
             robot.kill()
             robot.communicate()
