@@ -11,7 +11,6 @@ from firmware_sim.peripherals.can_controller cimport CanController
 from firmware_sim.peripherals.gpio cimport Gpio
 from firmware_sim.peripherals.ssp cimport SspPort, SspSegment
 from firmware_sim.peripherals.timer_capture cimport TimerCapture
-from foundation.division cimport quotient
 from foundation.numbers cimport float32, word_of_float
 
 cimport cython

@@ -33,7 +33,6 @@ from firmware_sim.peripherals.ssp import SspPort, SspSegment
 from firmware_sim.peripherals.timer_capture import TimerCapture
 from firmware_sim.scheduler import Occasional, Schedule, Task
 from firmware_sim.vic import FIQ, TIMER_MATCH
-from foundation.division import quotient
 from foundation.events import CAN_RX, CAN_STATUS, SSP_SEGMENT
 
 if not cython.compiled:
@@ -321,7 +320,6 @@ class CanRouterBoard(Microcontroller):
                     return True
         return False
 
-    @cython.cdivision(True)  # instants are not negative
     def main_loop(self) -> cython.longlong:
         """Move what waits, until nothing does or something else is due; returns the instant reached, 0 when it idles.
 
@@ -347,7 +345,7 @@ class CanRouterBoard(Microcontroller):
             if self.idle:
                 self.idle = False
                 passed = at - self.idle_since
-                pairs = quotient(passed, self.pair_ns)
+                pairs = passed // self.pair_ns  # floored: the first work may come before `phase_ns`
                 passed -= pairs * self.pair_ns
                 if passed > 0:
                     pairs += 1

@@ -1,4 +1,3 @@
-from foundation.division cimport quotient
 from foundation.events cimport EventQueue
 from foundation.random_stream cimport RandomStream
 from foundation.row_stream cimport FrameStream

@@ -25,7 +25,6 @@ import cython
 
 from can_bus.frame import INTERMISSION_BITS, arbitration_key, measure, wire
 from can_bus.transmit_ends import TransmitEnds
-from foundation.division import quotient
 from foundation.events import (
     CAN_STATUS,
     CAN_TX_DONE,
@@ -352,7 +351,7 @@ class Bus:
         else:  # the bit after bit_of(time), and its edge_ns
             second = time // billion
             first = (time - second * billion) * self.bitrate // billion + 1
-            start = second * billion + quotient(first * billion + self.bitrate - 1, self.bitrate)
+            start = second * billion + (first * billion + self.bitrate - 1) // self.bitrate
             first += second * self.bitrate
         if first < self.hindered_until:
             first = self._hindered(node, buffer, time, flags, first)
@@ -771,7 +770,7 @@ class Bus:
             self.second_ns = k // rate * billion
             self.second_bit = k // rate * rate
         rest = (end - self.second_bit) * billion + rate - 1
-        done = quotient(rest, rate)
+        done = rest // rate
         rest -= done * rate
         done += self.second_ns
         received = done - self.bit_ns - (rest < self.bit_rest)

@@ -1,6 +1,5 @@
 cimport cython
 
-from foundation.division cimport quotient
 
 cdef long long _NEVER
 

@@ -13,7 +13,6 @@ against `limit`. The event loop that spends the time is in microcontroller.py; h
 
 import cython
 
-from foundation.division import quotient
 from foundation.events import NEVER
 from foundation.numbers import integers
 from foundation.user_error import UserError
@@ -442,7 +441,7 @@ class SlotScheduler:
 
     def close(self, cycles: cython.longlong) -> cython.bint:
         """A row (or the last task of an overrun one) ended `cycles` after its tick. True: near the limit."""
-        index: cython.longlong = quotient(cycles, self.histogram_step)
+        index: cython.longlong = cycles // self.histogram_step
         near: cython.bint = False
         if cycles > self.slot_cycles or index > 20:
             index = 20

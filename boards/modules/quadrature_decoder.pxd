@@ -1,7 +1,6 @@
 cimport cython
 
 from boards.modules.error_module cimport ErrorModule
-from foundation.division cimport quotient
 from foundation.numbers cimport divide_toward_zero
 
 @cython.final

@@ -12,7 +12,6 @@ import cython
 from boards.modules.error_module import ErrorModule
 
 if not cython.compiled:
-    from foundation.division import quotient
     from foundation.numbers import divide_toward_zero
 
 PI = 3.141592653589793
@@ -146,7 +145,7 @@ class QuadratureDecoder:
             self.idle = 0
             self.sign = sign
             total *= sign  # without the sign
-            self._filter(valid * quotient(0x7FFFFFFF, total), quotient(total, valid))
+            self._filter(valid * (0x7FFFFFFF // total), total // valid)
         if seen == 0:
             return None
         if here == write:  # empty: the next time goes to the front again, which is in the cache
@@ -165,7 +164,7 @@ class QuadratureDecoder:
         self.idle = idle
         if idle > mean:
             mean = idle
-        self._filter(quotient(0x7FFFFFFF, mean), mean)
+        self._filter(0x7FFFFFFF // mean, mean)
 
     def _filter(self, speed: cython.longlong, mean: cython.longlong) -> cython.void:
         """Follow a new speed (counts per cycle x 2^31) and mean (cycles), both without the sign."""

@@ -1,5 +1,4 @@
 from firmware_sim.microcontroller cimport Peripheral
-from foundation.division cimport quotient
 
 cimport cython
 

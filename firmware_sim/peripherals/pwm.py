@@ -10,7 +10,6 @@ of the period that first has the new values: at most one period after `now`.
 import cython
 
 from firmware_sim.microcontroller import Peripheral
-from foundation.division import quotient
 from foundation.user_error import UserError
 
 LONGEST_PERIOD_S = 2  # so that products of times and rates stay within 64 bits
@@ -103,12 +102,12 @@ class Pwm(Peripheral):
             since -= self._go_on(2000000000 // self.period_ns)
         if since > 0:
             periods = (since * self.rate - self.rest) // 1000000000
-            self._go_on(quotient(periods + self.period_ns - 1, self.period_ns))
+            self._go_on((periods + self.period_ns - 1) // self.period_ns)
 
     def _go_on(self, periods: cython.longlong) -> cython.longlong:
         """Go on by so many periods; returns how long they take (ns)."""
         parts: cython.longlong = self.rest + periods * self.period_ns * 1000000000
-        whole: cython.longlong = quotient(parts, self.rate)
+        whole: cython.longlong = parts // self.rate
         self.rest = parts - whole * self.rate
         self.period_start += whole
         return whole

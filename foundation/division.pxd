@@ -1,1 +1,0 @@
-cpdef long long quotient(long long a, long long b) noexcept
