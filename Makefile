@@ -4,12 +4,12 @@ PYTHON ?= python3
 VENV   ?= .venv
 STEPS  ?= 100
 RUN    := $(VENV)/bin/python
-SOURCES := $(shell find foundation datatable can_bus plant firmware_sim boards harness tools \( -name '*.py' -o -name '*.pxd' \) -not -name '_*' 2>/dev/null)
+SOURCES := $(shell find ranger_sim foundation datatable can_bus plant firmware_sim boards harness tools \( -name '*.py' -o -name '*.pxd' \) -not -name '_*' 2>/dev/null)
 
 .PHONY: walk test test-vm lint setup bench lock clean
 
 walk: $(VENV)/.built
-	$(RUN) -m tools.cli walk --steps $(STEPS) --out runs/walk
+	$(RUN) -m ranger_sim walk --steps $(STEPS) --out runs/walk
 
 test: $(VENV)/.built
 	$(RUN) -m pytest -q -rs
@@ -23,7 +23,7 @@ lint: $(VENV)/.built
 	$(RUN) -m mypy
 
 bench: $(VENV)/.built
-	$(RUN) -m tools.cli bench
+	$(RUN) -m ranger_sim bench
 
 setup: $(VENV)/.built
 
@@ -51,4 +51,4 @@ clean:
 	rm -rf $(VENV) build *.egg-info
 	find . -name '*.so' -not -path './$(VENV)/*' -delete
 	find . -name '*.c' -not -path './$(VENV)/*' -not -path './datatable/generated/*' -delete
-	rm -f foundation/build_record.json
+	rm -f ranger_sim/build_record.json

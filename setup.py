@@ -1,12 +1,12 @@
 """Builds every module that has a .pxd beside it; without a C compiler the plain sources are used.
 
-All of them go into one shared library, foundation._compiled: Python's constants, entry points and numbers are then in
+All of them go into one shared library, ranger_sim._compiled: Python's constants, entry points and numbers are then in
 one place instead of one per module, and what runs lies together, apart from what does not (LAYOUT below). The whole
 robot runs some 4 % faster than with a library of each module.
 
 All or nothing: a compiled module reads the fields of another's classes at fixed places, so compiled and interpreted
-modules must not be mixed. When anything fails, this is told, the reason is written to foundation/build_record.json,
-and the whole robot runs interpreted (foundation/__init__.py reads the record).
+modules must not be mixed. When anything fails, this is told, the reason is written to ranger_sim/build_record.json,
+and the whole robot runs interpreted (ranger_sim/loading.py reads the record).
 
 RANGER_SIM_BUILD_JOBS: how many modules are translated and compiled at once (default: one per processor).
 RANGER_SIM_BUILT=1: an editable install does not build again what `make` has just built in place.
@@ -19,12 +19,12 @@ import sys
 import tempfile
 from concurrent.futures import ThreadPoolExecutor
 
-from setuptools import Extension, setup
+from setuptools import Extension, find_namespace_packages, setup
 from setuptools.command.build_ext import build_ext
 from setuptools.modified import newer_group
 
 HERE = pathlib.Path(__file__).resolve().parent
-PACKAGES = (
+ROOMS = (
     "foundation",
     "datatable",
     "can_bus",
@@ -34,8 +34,9 @@ PACKAGES = (
     "harness",
     "tools",
 )
-LIBRARY = "foundation._compiled"
-RECORD = "build_record.json"  # in the package foundation
+DATA_FOLDERS = ("profiles",)  # shipped like a room, no Python in them
+LIBRARY = "ranger_sim._compiled"
+RECORD = "build_record.json"  # in the package ranger_sim
 # no fused multiply-add, no fast-math: both change the last bit of a trajectory
 COMPILE_ARGUMENTS = ["-O2", "-g0", "-ffp-contract=off", "-fno-fast-math", "-w"]
 DIRECTIVES = {
@@ -122,7 +123,6 @@ class OptionalBuild(build_ext):
             self.check_wish_and_compiler()
             self.modules, self.jobs = self.translate(jobs), jobs
             super().run()
-            self.remove_libraries_of_one_module()
         except NotCompiledError as why:
             reason = str(why)
         except Exception as error:  # noqa: BLE001  (whatever the tool chain throws, we fall back)
@@ -162,18 +162,20 @@ class OptionalBuild(build_ext):
             from Cython.Build import cythonize
         except ImportError as error:
             raise NotCompiledError(f"no Cython ({one_line(error)})") from error
-        os.chdir(HERE)
         try:
+            os.chdir(tree_of_links())
             translated = cythonize(
                 [Extension(name, [name.replace(".", "/") + ".py"]) for name in declared_modules()],
-                build_dir="build/cython",
+                build_dir="../cython",
                 language_level=3,
                 nthreads=jobs if jobs > 1 else 0,
                 compiler_directives=DIRECTIVES,
             )
         except Exception as error:  # noqa: BLE001  (Cython has printed the place)
             raise NotCompiledError(f"Cython could not translate the sources ({one_line(error)})") from error
-        return {extension.name: extension.sources[0] for extension in translated}
+        finally:
+            os.chdir(HERE)
+        return {each.name: os.path.normpath(f"build/tree/{each.sources[0]}") for each in translated}
 
     def build_extension(self, library):
         """The library: an object file of each module, and the directory of them."""
@@ -224,17 +226,9 @@ class OptionalBuild(build_ext):
             path.write_text(text, encoding="ascii")
         return path.as_posix()
 
-    def remove_libraries_of_one_module(self):
-        """What earlier versions built: nobody loads them any more, and no wheel shall hold them."""
-        for package in PACKAGES:
-            for folder in (HERE, HERE / self.build_lib):
-                for path in (folder / package).rglob("*.so"):
-                    if not path.name.startswith("_compiled."):
-                        path.unlink()
-
     def write_record(self, reason):
         """Beside the modules it speaks of: in the source tree or in the folder that becomes the wheel."""
-        folder = HERE / "foundation" if self.inplace else pathlib.Path(self.build_lib) / "foundation"
+        folder = HERE / "ranger_sim" if self.inplace else pathlib.Path(self.build_lib) / "ranger_sim"
         folder.mkdir(parents=True, exist_ok=True)
         record = {"compiled": not reason, "reason": reason}
         (folder / RECORD).write_text(json.dumps(record) + "\n", encoding="utf-8")
@@ -263,12 +257,40 @@ def try_out(compiler, compiling=(), linking=None):
 
 def declared_modules():
     """Names of the modules to compile."""
-    for package in PACKAGES:
-        for declaration in sorted((HERE / package).rglob("*.pxd")):
-            yield ".".join(declaration.relative_to(HERE).with_suffix("").parts)
+    for room in ROOMS:
+        for declaration in sorted((HERE / room).rglob("*.pxd")):
+            yield ".".join(("ranger_sim", *declaration.relative_to(HERE).with_suffix("").parts))
+
+
+def tree_of_links():
+    """The folder in which `ranger_sim` lies as it will be installed: by links to this package and to the rooms."""
+    package = HERE / "build" / "tree" / "ranger_sim"
+    package.mkdir(parents=True, exist_ok=True)
+    for target in (*(HERE / "ranger_sim").glob("*.py"), *(HERE / room for room in ROOMS)):
+        link = package / target.name
+        if not link.is_symlink():
+            link.symlink_to(os.path.relpath(target, package), target_is_directory=target.is_dir())
+    return package.parent
+
+
+def packages():
+    """{package: its folder} of the wheel, whose only top level is `ranger_sim`; folders of data files are packages."""
+    found = {"ranger_sim": "ranger_sim"}
+    for room in (*ROOMS, *DATA_FOLDERS):
+        for name in [
+            room,
+            *(f"{room}.{inside}" for inside in find_namespace_packages(room, exclude=["*__pycache__*"])),
+        ]:
+            found[f"ranger_sim.{name}"] = name.replace(".", "/")
+    return found
 
 
 if __name__ == "__main__":
     # named, libm gives its present functions; found through Python it gives those for programs linked long ago
     mathematics = ["m"] if os.name == "posix" else []
-    setup(ext_modules=[Extension(LIBRARY, [], libraries=mathematics)], cmdclass={"build_ext": OptionalBuild})
+    setup(
+        packages=list(packages()),
+        package_dir=packages(),
+        ext_modules=[Extension(LIBRARY, [], libraries=mathematics)],
+        cmdclass={"build_ext": OptionalBuild},
+    )

@@ -1,1 +1,2 @@
-import foundation  # noqa: F401  (first: it chooses compiled or interpreted modules)
+if __name__ != "ranger_sim.boards":
+    raise ImportError("boards is a room of ranger_sim: import ranger_sim.boards")

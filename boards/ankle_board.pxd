@@ -1,9 +1,9 @@
-from boards.modules.foot_contact cimport FootContact
-from boards.modules.joint_safety cimport AnkleSafety
-from boards.modules.limit_switch cimport LimitSwitch
-from boards.modules.quadrature_decoder cimport QuadratureDecoder
-from boards.motor_board cimport MotorBoard
-from foundation.numbers cimport fixed_of_float, float32, float_of_fixed
+from ranger_sim.boards.modules.foot_contact cimport FootContact
+from ranger_sim.boards.modules.joint_safety cimport AnkleSafety
+from ranger_sim.boards.modules.limit_switch cimport LimitSwitch
+from ranger_sim.boards.modules.quadrature_decoder cimport QuadratureDecoder
+from ranger_sim.boards.motor_board cimport MotorBoard
+from ranger_sim.foundation.numbers cimport fixed_of_float, float32, float_of_fixed
 
 cdef class AnkleBoard(MotorBoard):
     cdef public QuadratureDecoder joint

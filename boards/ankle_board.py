@@ -7,14 +7,14 @@ Facts: network-and-boards 4.2, 4.7-4.9, 5. The two rooms hold their constants an
 
 import cython
 
-from boards.modules.foot_contact import FootContact
-from boards.modules.joint_safety import AnkleSafety
-from boards.modules.limit_switch import LimitSwitch
-from boards.motor_board import PINS, MotorBoard
-from datatable.generated import errors as codes
+from ranger_sim.boards.modules.foot_contact import FootContact
+from ranger_sim.boards.modules.joint_safety import AnkleSafety
+from ranger_sim.boards.modules.limit_switch import LimitSwitch
+from ranger_sim.boards.motor_board import PINS, MotorBoard
+from ranger_sim.datatable.generated import errors as codes
 
 if not cython.compiled:
-    from foundation.numbers import fixed_of_float, float32, float_of_fixed
+    from ranger_sim.foundation.numbers import fixed_of_float, float32, float_of_fixed
 
 # (place, multiplexer code, gain code): differential 4-5 and 2-3 times 2, single-ended 0 and 1 times 1
 SEQUENCE = (

@@ -1,17 +1,17 @@
-from boards.modules.can_load cimport CanLoad
-from boards.modules.error_module cimport ErrorModule
-from boards.modules.mcu_led cimport Heartbeat, McuLed
-from boards.modules.network_clock cimport NetworkClock
-from boards.modules.network_time cimport NetworkTime
-from boards.modules.routing cimport Router, RoutingTable
-from boards.modules.ssp_link cimport RouterSspLink
-from firmware_sim.microcontroller cimport Microcontroller
-from firmware_sim.peripherals.adc_internal cimport AdcInternal
-from firmware_sim.peripherals.can_controller cimport CanController
-from firmware_sim.peripherals.gpio cimport Gpio
-from firmware_sim.peripherals.ssp cimport SspPort, SspSegment
-from firmware_sim.peripherals.timer_capture cimport TimerCapture
-from foundation.numbers cimport float32, word_of_float
+from ranger_sim.boards.modules.can_load cimport CanLoad
+from ranger_sim.boards.modules.error_module cimport ErrorModule
+from ranger_sim.boards.modules.mcu_led cimport Heartbeat, McuLed
+from ranger_sim.boards.modules.network_clock cimport NetworkClock
+from ranger_sim.boards.modules.network_time cimport NetworkTime
+from ranger_sim.boards.modules.routing cimport Router, RoutingTable
+from ranger_sim.boards.modules.ssp_link cimport RouterSspLink
+from ranger_sim.firmware_sim.microcontroller cimport Microcontroller
+from ranger_sim.firmware_sim.peripherals.adc_internal cimport AdcInternal
+from ranger_sim.firmware_sim.peripherals.can_controller cimport CanController
+from ranger_sim.firmware_sim.peripherals.gpio cimport Gpio
+from ranger_sim.firmware_sim.peripherals.ssp cimport SspPort, SspSegment
+from ranger_sim.firmware_sim.peripherals.timer_capture cimport TimerCapture
+from ranger_sim.foundation.numbers cimport float32, word_of_float
 
 cimport cython
 

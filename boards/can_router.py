@@ -8,19 +8,19 @@ main loop moves frames whenever no slot runs: run the scheduler, then four times
 
 import cython
 
-from boards.modules.can_load import CanLoad
-from boards.modules.error_module import ErrorModule
-from boards.modules.mcu_led import Heartbeat
-from boards.modules.network_clock import CYCLES_PER_SYNC, NetworkClock
-from boards.modules.network_time import NetworkTime
-from boards.modules.routing import Router, RoutingTable
-from boards.modules.ssp_link import RouterSspLink
-from datatable.generated import csr as table
-from datatable.generated import errors as codes
-from datatable.generated import routes
-from firmware_sim.microcontroller import Microcontroller
-from firmware_sim.peripherals.adc_internal import AdcInternal
-from firmware_sim.peripherals.can_controller import (
+from ranger_sim.boards.modules.can_load import CanLoad
+from ranger_sim.boards.modules.error_module import ErrorModule
+from ranger_sim.boards.modules.mcu_led import Heartbeat
+from ranger_sim.boards.modules.network_clock import CYCLES_PER_SYNC, NetworkClock
+from ranger_sim.boards.modules.network_time import NetworkTime
+from ranger_sim.boards.modules.routing import Router, RoutingTable
+from ranger_sim.boards.modules.ssp_link import RouterSspLink
+from ranger_sim.datatable.generated import csr as table
+from ranger_sim.datatable.generated import errors as codes
+from ranger_sim.datatable.generated import routes
+from ranger_sim.firmware_sim.microcontroller import Microcontroller
+from ranger_sim.firmware_sim.peripherals.adc_internal import AdcInternal
+from ranger_sim.firmware_sim.peripherals.can_controller import (
     ICR_BEI,
     ICR_DOI,
     ICR_EI,
@@ -28,15 +28,15 @@ from firmware_sim.peripherals.can_controller import (
     ICR_RI,
     CanController,
 )
-from firmware_sim.peripherals.gpio import Gpio
-from firmware_sim.peripherals.ssp import SspPort, SspSegment
-from firmware_sim.peripherals.timer_capture import TimerCapture
-from firmware_sim.scheduler import Occasional, Schedule, Task
-from firmware_sim.vic import FIQ, TIMER_MATCH
-from foundation.events import CAN_RX, CAN_STATUS, SSP_SEGMENT
+from ranger_sim.firmware_sim.peripherals.gpio import Gpio
+from ranger_sim.firmware_sim.peripherals.ssp import SspPort, SspSegment
+from ranger_sim.firmware_sim.peripherals.timer_capture import TimerCapture
+from ranger_sim.firmware_sim.scheduler import Occasional, Schedule, Task
+from ranger_sim.firmware_sim.vic import FIQ, TIMER_MATCH
+from ranger_sim.foundation.events import CAN_RX, CAN_STATUS, SSP_SEGMENT
 
 if not cython.compiled:
-    from foundation.numbers import float32, word_of_float
+    from ranger_sim.foundation.numbers import float32, word_of_float
 
 # Cycles of the interrupts and of the main loop, chosen by us, because no cycle count of this firmware is
 # known; each is an estimate of instructions and of accesses over the slow peripheral bus.

@@ -1,8 +1,8 @@
-from boards.modules.joint_safety cimport HipSafety
-from boards.modules.quadrature_decoder cimport QuadratureDecoder
-from boards.motor_board cimport MotorBoard
-from firmware_sim.scheduler cimport Schedule
-from foundation.numbers cimport float32, float_of_fixed
+from ranger_sim.boards.modules.joint_safety cimport HipSafety
+from ranger_sim.boards.modules.quadrature_decoder cimport QuadratureDecoder
+from ranger_sim.boards.motor_board cimport MotorBoard
+from ranger_sim.firmware_sim.scheduler cimport Schedule
+from ranger_sim.foundation.numbers cimport float32, float_of_fixed
 
 cdef long long REZERO_SHARE
 

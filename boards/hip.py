@@ -6,14 +6,14 @@ Positive hip angle: inner legs swung forward.
 
 import cython
 
-from boards.modules.can_link import HIP_INTERRUPTS
-from boards.modules.joint_safety import HipSafety
-from boards.motor_board import ANALOG, PINS, WORDS, MotorBoard
-from datatable.generated import mch as table
-from firmware_sim.scheduler import Schedule, Task, Wait
+from ranger_sim.boards.modules.can_link import HIP_INTERRUPTS
+from ranger_sim.boards.modules.joint_safety import HipSafety
+from ranger_sim.boards.motor_board import ANALOG, PINS, WORDS, MotorBoard
+from ranger_sim.datatable.generated import mch as table
+from ranger_sim.firmware_sim.scheduler import Schedule, Task, Wait
 
 if not cython.compiled:
-    from foundation.numbers import float32, float_of_fixed
+    from ranger_sim.foundation.numbers import float32, float_of_fixed
 
 __all__ = ["ANALOG", "PINS", "WORDS", "HipBoard"]
 

@@ -1,26 +1,26 @@
-from boards.modules.absolute_encoder cimport AbsoluteEncoder
-from boards.modules.adc_readings cimport AdcReadings
-from boards.modules.can_link cimport CanLink
-from boards.modules.compliant_control cimport CompliantControl
-from boards.modules.current_control cimport CurrentControl
-from boards.modules.encoder_capture cimport EncoderCapture, WrapCounter
-from boards.modules.error_module cimport ErrorModule
-from boards.modules.execution_timer cimport ExecutionTimer
-from boards.modules.mcu_led cimport Heartbeat, McuLed
-from boards.modules.motor_limits cimport MotorLimits
-from boards.modules.motor_output cimport MotorOutput
-from boards.modules.network_time cimport NetworkTime
-from boards.modules.quadrature_decoder cimport QuadratureDecoder
-from firmware_sim.microcontroller cimport Alarm, Microcontroller, Peripheral
-from firmware_sim.peripherals.adc_external cimport Ads7871
-from firmware_sim.peripherals.adc_internal cimport AdcInternal
-from firmware_sim.peripherals.can_controller cimport CanController
-from firmware_sim.peripherals.gpio cimport Gpio
-from firmware_sim.peripherals.pwm cimport Pwm
-from firmware_sim.peripherals.spi_encoder cimport SpiEncoder
-from firmware_sim.peripherals.timer_capture cimport TimerCapture
-from firmware_sim.scheduler cimport Schedule, Task
-from foundation.numbers cimport float_of_fixed
+from ranger_sim.boards.modules.absolute_encoder cimport AbsoluteEncoder
+from ranger_sim.boards.modules.adc_readings cimport AdcReadings
+from ranger_sim.boards.modules.can_link cimport CanLink
+from ranger_sim.boards.modules.compliant_control cimport CompliantControl
+from ranger_sim.boards.modules.current_control cimport CurrentControl
+from ranger_sim.boards.modules.encoder_capture cimport EncoderCapture, WrapCounter
+from ranger_sim.boards.modules.error_module cimport ErrorModule
+from ranger_sim.boards.modules.execution_timer cimport ExecutionTimer
+from ranger_sim.boards.modules.mcu_led cimport Heartbeat, McuLed
+from ranger_sim.boards.modules.motor_limits cimport MotorLimits
+from ranger_sim.boards.modules.motor_output cimport MotorOutput
+from ranger_sim.boards.modules.network_time cimport NetworkTime
+from ranger_sim.boards.modules.quadrature_decoder cimport QuadratureDecoder
+from ranger_sim.firmware_sim.microcontroller cimport Alarm, Microcontroller, Peripheral
+from ranger_sim.firmware_sim.peripherals.adc_external cimport Ads7871
+from ranger_sim.firmware_sim.peripherals.adc_internal cimport AdcInternal
+from ranger_sim.firmware_sim.peripherals.can_controller cimport CanController
+from ranger_sim.firmware_sim.peripherals.gpio cimport Gpio
+from ranger_sim.firmware_sim.peripherals.pwm cimport Pwm
+from ranger_sim.firmware_sim.peripherals.spi_encoder cimport SpiEncoder
+from ranger_sim.firmware_sim.peripherals.timer_capture cimport TimerCapture
+from ranger_sim.firmware_sim.scheduler cimport Schedule, Task
+from ranger_sim.foundation.numbers cimport float_of_fixed
 
 cdef long long CODE_ADCI_DNF, CODE_ADCX_DNF, CODE_OVERRUN, CODE_TASK_LIMIT, CODE_NEAR_LIMIT
 cdef long long BATTERY_VOLTAGE_CHANNEL

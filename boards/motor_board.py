@@ -13,10 +13,10 @@ A task's limit is what it may take at the busiest (ring full, fastest motor), pl
 
 import cython
 
-from boards.modules.absolute_encoder import AbsoluteEncoder
-from boards.modules.adc_readings import AdcReadings
-from boards.modules.can_link import ALL_INTERRUPTS, CanLink
-from boards.modules.compliant_control import (
+from ranger_sim.boards.modules.absolute_encoder import AbsoluteEncoder
+from ranger_sim.boards.modules.adc_readings import AdcReadings
+from ranger_sim.boards.modules.can_link import ALL_INTERRUPTS, CanLink
+from ranger_sim.boards.modules.compliant_control import (
     COMMAND,
     DAMPNESS,
     STIFFNESS,
@@ -24,34 +24,34 @@ from boards.modules.compliant_control import (
     CompliantControl,
     GainReceiver,
 )
-from boards.modules.current_control import INTEGRAL_GAIN, PROPORTIONAL_GAIN, CurrentControl
-from boards.modules.encoder_capture import EncoderCapture, WrapCounter
-from boards.modules.error_module import ErrorModule
-from boards.modules.execution_timer import ExecutionTimer
-from boards.modules.mcu_led import PINS as LED_PINS
-from boards.modules.mcu_led import Heartbeat
-from boards.modules.motor_limits import MotorLimits
-from boards.modules.motor_output import PERIOD_COUNTS, MotorOutput
-from boards.modules.motor_output import PINS as MOTOR_PINS
-from boards.modules.network_time import NetworkTime
-from boards.modules.quadrature_decoder import QuadratureDecoder
-from boards.quirks import Quirks
-from datatable.generated import errors as codes
-from firmware_sim.microcontroller import Microcontroller, Peripheral
-from firmware_sim.peripherals.adc_external import Ads7871
-from firmware_sim.peripherals.adc_internal import AdcInternal
-from firmware_sim.peripherals.can_controller import CanController
-from firmware_sim.peripherals.gpio import Gpio, p0
-from firmware_sim.peripherals.pwm import Pwm
-from firmware_sim.peripherals.spi_encoder import SpiEncoder
-from firmware_sim.peripherals.timer_capture import TimerCapture
-from firmware_sim.scheduler import Schedule, Task
-from firmware_sim.vic import ADC_DONE, EXTERNAL_INTERRUPT, SPI_DONE, InterruptSource
-from foundation.events import EventQueue
-from foundation.user_error import UserError
+from ranger_sim.boards.modules.current_control import INTEGRAL_GAIN, PROPORTIONAL_GAIN, CurrentControl
+from ranger_sim.boards.modules.encoder_capture import EncoderCapture, WrapCounter
+from ranger_sim.boards.modules.error_module import ErrorModule
+from ranger_sim.boards.modules.execution_timer import ExecutionTimer
+from ranger_sim.boards.modules.mcu_led import PINS as LED_PINS
+from ranger_sim.boards.modules.mcu_led import Heartbeat
+from ranger_sim.boards.modules.motor_limits import MotorLimits
+from ranger_sim.boards.modules.motor_output import PERIOD_COUNTS, MotorOutput
+from ranger_sim.boards.modules.motor_output import PINS as MOTOR_PINS
+from ranger_sim.boards.modules.network_time import NetworkTime
+from ranger_sim.boards.modules.quadrature_decoder import QuadratureDecoder
+from ranger_sim.boards.quirks import Quirks
+from ranger_sim.datatable.generated import errors as codes
+from ranger_sim.firmware_sim.microcontroller import Microcontroller, Peripheral
+from ranger_sim.firmware_sim.peripherals.adc_external import Ads7871
+from ranger_sim.firmware_sim.peripherals.adc_internal import AdcInternal
+from ranger_sim.firmware_sim.peripherals.can_controller import CanController
+from ranger_sim.firmware_sim.peripherals.gpio import Gpio, p0
+from ranger_sim.firmware_sim.peripherals.pwm import Pwm
+from ranger_sim.firmware_sim.peripherals.spi_encoder import SpiEncoder
+from ranger_sim.firmware_sim.peripherals.timer_capture import TimerCapture
+from ranger_sim.firmware_sim.scheduler import Schedule, Task
+from ranger_sim.firmware_sim.vic import ADC_DONE, EXTERNAL_INTERRUPT, SPI_DONE, InterruptSource
+from ranger_sim.foundation.events import EventQueue
+from ranger_sim.foundation.user_error import UserError
 
 if not cython.compiled:
-    from foundation.numbers import float_of_fixed
+    from ranger_sim.foundation.numbers import float_of_fixed
 
 # Processor pins by what hangs on them (facts 4.1, 4.4, 4.7, 4.9, 4.11); for the wiring table.
 PINS = {

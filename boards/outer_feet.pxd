@@ -1,5 +1,5 @@
-from boards.ankle_board cimport AnkleBoard
-from firmware_sim.scheduler cimport Schedule
+from ranger_sim.boards.ankle_board cimport AnkleBoard
+from ranger_sim.firmware_sim.scheduler cimport Schedule
 
 cdef class OuterFeetBoard(AnkleBoard):
     cpdef Schedule schedule(self)

@@ -4,10 +4,10 @@ Facts: network-and-boards 3.3 (schedule, laid out below line by line), 4.1, 4.2,
 Ankle angle: 0 with the foot flipped up, growing as the foot is pushed down.
 """
 
-from boards.ankle_board import FOOT_OFF_LEVEL, AnkleBoard
-from boards.motor_board import ANALOG, PINS, WORDS
-from datatable.generated import mcfo as table
-from firmware_sim.scheduler import Schedule, Task, Wait
+from ranger_sim.boards.ankle_board import FOOT_OFF_LEVEL, AnkleBoard
+from ranger_sim.boards.motor_board import ANALOG, PINS, WORDS
+from ranger_sim.datatable.generated import mcfo as table
+from ranger_sim.firmware_sim.scheduler import Schedule, Task, Wait
 
 __all__ = ["ANALOG", "PINS", "WORDS", "OuterFeetBoard"]
 

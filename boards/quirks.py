@@ -8,7 +8,7 @@ appendix, then what is known of the firmware. `Quirks()` is the robot as the app
 
 from dataclasses import dataclass, field, fields
 
-from foundation.user_error import UserError
+from ranger_sim.foundation.user_error import UserError
 
 
 def switch(default, firmware, allowed):

@@ -1,5 +1,5 @@
-from boards.motor_board cimport MotorBoard
-from firmware_sim.scheduler cimport Schedule
+from ranger_sim.boards.motor_board cimport MotorBoard
+from ranger_sim.firmware_sim.scheduler cimport Schedule
 
 cpdef long long whole(long long value) noexcept
 

@@ -9,10 +9,10 @@ quirks.py for what the firmware of 2016 made of it.
 
 import cython
 
-from boards.motor_board import ANALOG, PINS, WORDS, MotorBoard
-from datatable.generated import errors as codes
-from datatable.generated import mcsi as table
-from firmware_sim.scheduler import Schedule, Task, Wait
+from ranger_sim.boards.motor_board import ANALOG, PINS, WORDS, MotorBoard
+from ranger_sim.datatable.generated import errors as codes
+from ranger_sim.datatable.generated import mcsi as table
+from ranger_sim.firmware_sim.scheduler import Schedule, Task, Wait
 
 __all__ = ["ANALOG", "PINS", "WORDS", "SteeringBoard"]
 

@@ -1,20 +1,20 @@
-from boards.modules.buzzer cimport Buzzer
-from boards.modules.can_link cimport CanLink
-from boards.modules.colour_leds cimport ColourLeds
-from boards.modules.error_module cimport ErrorModule
-from boards.modules.execution_timer cimport ExecutionTimer
-from boards.modules.imu_parser cimport ImuParser
-from boards.modules.keypad cimport Keypad
-from boards.modules.lcd cimport Lcd
-from boards.modules.mcu_led cimport Heartbeat, McuLed
-from boards.modules.network_time cimport NetworkTime
-from boards.modules.rc_receiver cimport RcReceiver
-from boards.modules.sync_light cimport SyncLight
-from firmware_sim.microcontroller cimport Microcontroller
-from firmware_sim.peripherals.can_controller cimport CanController
-from firmware_sim.peripherals.gpio cimport Gpio
-from firmware_sim.peripherals.timer_capture cimport TimerCapture
-from firmware_sim.peripherals.uart cimport Uart
+from ranger_sim.boards.modules.buzzer cimport Buzzer
+from ranger_sim.boards.modules.can_link cimport CanLink
+from ranger_sim.boards.modules.colour_leds cimport ColourLeds
+from ranger_sim.boards.modules.error_module cimport ErrorModule
+from ranger_sim.boards.modules.execution_timer cimport ExecutionTimer
+from ranger_sim.boards.modules.imu_parser cimport ImuParser
+from ranger_sim.boards.modules.keypad cimport Keypad
+from ranger_sim.boards.modules.lcd cimport Lcd
+from ranger_sim.boards.modules.mcu_led cimport Heartbeat, McuLed
+from ranger_sim.boards.modules.network_time cimport NetworkTime
+from ranger_sim.boards.modules.rc_receiver cimport RcReceiver
+from ranger_sim.boards.modules.sync_light cimport SyncLight
+from ranger_sim.firmware_sim.microcontroller cimport Microcontroller
+from ranger_sim.firmware_sim.peripherals.can_controller cimport CanController
+from ranger_sim.firmware_sim.peripherals.gpio cimport Gpio
+from ranger_sim.firmware_sim.peripherals.timer_capture cimport TimerCapture
+from ranger_sim.firmware_sim.peripherals.uart cimport Uart
 
 cimport cython
 

@@ -6,34 +6,34 @@ Facts network-and-boards 3.6, 4.10-4.12, 4.16; appendix 3.7, 3.8. What a person 
 
 import cython
 
-from boards.modules.buzzer import Buzzer, BuzzerFrequency, ErrorSound, TuneStart
-from boards.modules.can_link import CanLink
-from boards.modules.colour_leds import CYCLES_PER_WRITE, ColourLeds, LedReceiver
-from boards.modules.error_module import ErrorModule
-from boards.modules.execution_timer import ExecutionTimer
-from boards.modules.imu_parser import (
+from ranger_sim.boards.modules.buzzer import Buzzer, BuzzerFrequency, ErrorSound, TuneStart
+from ranger_sim.boards.modules.can_link import CanLink
+from ranger_sim.boards.modules.colour_leds import CYCLES_PER_WRITE, ColourLeds, LedReceiver
+from ranger_sim.boards.modules.error_module import ErrorModule
+from ranger_sim.boards.modules.execution_timer import ExecutionTimer
+from ranger_sim.boards.modules.imu_parser import (
     HEADER_ANGLES_AND_RATES,
     HEADER_RATES_ONLY,
     ImuParser,
     start_command,
 )
-from boards.modules.keypad import KEY_PINS, Keypad
-from boards.modules.lcd import Lcd, LcdQuarter
-from boards.modules.mcu_led import PINS as LED_PINS
-from boards.modules.mcu_led import Heartbeat
-from boards.modules.network_time import NetworkTime
-from boards.modules.rc_receiver import RcReceiver
-from boards.modules.sync_light import SYNC_PIN, SyncLight
-from datatable.generated import errors as codes
-from datatable.generated import ui as table
-from firmware_sim.microcontroller import Microcontroller
-from firmware_sim.peripherals.can_controller import ICR_BEI, ICR_DOI, ICR_EI, ICR_EPI, ICR_RI, CanController
-from firmware_sim.peripherals.gpio import Gpio, p0
-from firmware_sim.peripherals.timer_capture import TimerCapture
-from firmware_sim.peripherals.uart import Uart
-from firmware_sim.scheduler import Schedule, Task
-from firmware_sim.vic import TIMER_MATCH
-from foundation.events import UART_BYTE
+from ranger_sim.boards.modules.keypad import KEY_PINS, Keypad
+from ranger_sim.boards.modules.lcd import Lcd, LcdQuarter
+from ranger_sim.boards.modules.mcu_led import PINS as LED_PINS
+from ranger_sim.boards.modules.mcu_led import Heartbeat
+from ranger_sim.boards.modules.network_time import NetworkTime
+from ranger_sim.boards.modules.rc_receiver import RcReceiver
+from ranger_sim.boards.modules.sync_light import SYNC_PIN, SyncLight
+from ranger_sim.datatable.generated import errors as codes
+from ranger_sim.datatable.generated import ui as table
+from ranger_sim.firmware_sim.microcontroller import Microcontroller
+from ranger_sim.firmware_sim.peripherals.can_controller import ICR_BEI, ICR_DOI, ICR_EI, ICR_EPI, ICR_RI, CanController
+from ranger_sim.firmware_sim.peripherals.gpio import Gpio, p0
+from ranger_sim.firmware_sim.peripherals.timer_capture import TimerCapture
+from ranger_sim.firmware_sim.peripherals.uart import Uart
+from ranger_sim.firmware_sim.scheduler import Schedule, Task
+from ranger_sim.firmware_sim.vic import TIMER_MATCH
+from ranger_sim.foundation.events import UART_BYTE
 
 # Processor pins by what hangs on them (facts 4.11); for the wiring table.
 RC_PINS = (p0(22), p0(27), p0(16), p0(29))  # the third is driven by the sync light and hears no radio

@@ -1,6 +1,6 @@
-from foundation.events cimport EventQueue
-from can_bus.bus cimport Bus
-from can_bus.frame cimport frame_bits
+from ranger_sim.foundation.events cimport EventQueue
+from ranger_sim.can_bus.bus cimport Bus
+from ranger_sim.can_bus.frame cimport frame_bits
 
 cdef class Load:
     cdef public list buses, inboxes

@@ -7,10 +7,10 @@ import array
 
 import cython
 
-from can_bus.bus import Bus
-from can_bus.frame import frame_bits
-from foundation import wallclock
-from foundation.events import STAGE_BUS, EventQueue
+from ranger_sim.can_bus.bus import Bus
+from ranger_sim.can_bus.frame import frame_bits
+from ranger_sim.foundation import wallclock
+from ranger_sim.foundation.events import STAGE_BUS, EventQueue
 
 ROBOT_BIT_RATE = 3_000_000  # bit/s, facts network-and-boards 1.2
 ROBOT_BUSES = 4

@@ -13,11 +13,11 @@ import functools
 import heapq
 from collections.abc import Callable, Sequence
 
-from can_bus.bounds import Bound, Message, level_of, message, response_times, utilisation
-from can_bus.bus import BUFFERS, Bus
-from can_bus.frame import INTERMISSION_BITS, frame_bits, worst_case_bits
-from foundation.events import CAN_TX_DONE, FLAG_EXTENDED, NEVER, STAGE_BUS, EventQueue
-from foundation.random_stream import RandomStream
+from ranger_sim.can_bus.bounds import Bound, Message, level_of, message, response_times, utilisation
+from ranger_sim.can_bus.bus import BUFFERS, Bus
+from ranger_sim.can_bus.frame import INTERMISSION_BITS, frame_bits, worst_case_bits
+from ranger_sim.foundation.events import CAN_TX_DONE, FLAG_EXTENDED, NEVER, STAGE_BUS, EventQueue
+from ranger_sim.foundation.random_stream import RandomStream
 
 BIT_RATES = (125_000, 250_000, 500_000, 1_000_000, 3_000_000)
 LEAD_NS = 1  # the blocking frame is asked for so long before the start that the others miss

@@ -38,7 +38,7 @@ import math
 from collections.abc import Iterable, Sequence
 from fractions import Fraction
 
-from can_bus.frame import INTERMISSION_BITS, arbitration_key, worst_case_bits
+from ranger_sim.can_bus.frame import INTERMISSION_BITS, arbitration_key, worst_case_bits
 
 TICKS_PER_BIT = 10**9
 # A busy period of more instances than this is given up as unbounded, so that an answer comes within seconds. Chosen by

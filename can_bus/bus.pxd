@@ -1,8 +1,8 @@
-from foundation.events cimport EventQueue
-from foundation.random_stream cimport RandomStream
-from foundation.row_stream cimport FrameStream
-from can_bus.frame cimport arbitration_key, measure
-from can_bus.transmit_ends cimport TransmitEnds
+from ranger_sim.foundation.events cimport EventQueue
+from ranger_sim.foundation.random_stream cimport RandomStream
+from ranger_sim.foundation.row_stream cimport FrameStream
+from ranger_sim.can_bus.frame cimport arbitration_key, measure
+from ranger_sim.can_bus.transmit_ends cimport TransmitEnds
 
 from libc.math cimport log
 

@@ -23,9 +23,9 @@ import array
 
 import cython
 
-from can_bus.frame import INTERMISSION_BITS, arbitration_key, measure, wire
-from can_bus.transmit_ends import TransmitEnds
-from foundation.events import (
+from ranger_sim.can_bus.frame import INTERMISSION_BITS, arbitration_key, measure, wire
+from ranger_sim.can_bus.transmit_ends import TransmitEnds
+from ranger_sim.foundation.events import (
     CAN_STATUS,
     CAN_TX_DONE,
     FLAG_ERROR,
@@ -35,8 +35,8 @@ from foundation.events import (
     TX_SENT,
     EventQueue,
 )
-from foundation.numbers import integers
-from foundation.random_stream import RandomStream
+from ranger_sim.foundation.numbers import integers
+from ranger_sim.foundation.random_stream import RandomStream
 
 if not cython.compiled:
     from math import log

@@ -9,7 +9,7 @@ processes.
 
 import cython
 
-from foundation.events import NEVER
+from ranger_sim.foundation.events import NEVER
 
 BY_MESSAGE = NEVER + 1
 

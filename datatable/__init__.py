@@ -4,14 +4,15 @@ Master files: `datatable/master/`. Generated and checked in: `datatable/generate
 imports only generated modules (``from datatable.generated import mch as table``), which read no file.
 """
 
-import foundation  # noqa: F401, I001  (first: it honours RANGER_SIM_INTERPRETED)
-
 from typing import TYPE_CHECKING
 
+if __name__ != "ranger_sim.datatable":
+    raise ImportError("datatable is a room of ranger_sim: import ranger_sim.datatable")
+
 if TYPE_CHECKING:
-    from datatable.model import Table
-    from datatable.schedule import PublishedSchedule
-    from datatable.store import DataStore
+    from ranger_sim.datatable.model import Table
+    from ranger_sim.datatable.schedule import PublishedSchedule
+    from ranger_sim.datatable.store import DataStore
 
 
 def load(folder: str | None = None) -> "Table":
@@ -19,21 +20,21 @@ def load(folder: str | None = None) -> "Table":
 
     Raises datatable.model.TableError, a UserError, that names every fault at once.
     """
-    from datatable.loader import load_table
+    from ranger_sim.datatable.loader import load_table
 
     return load_table(folder)
 
 
 def table_hash(folder: str | None = None) -> str:
     """SHA-256 over the master files, 64 hexadecimal digits; the same with either line ending."""
-    from datatable.loader import hash_of_master_files
+    from ranger_sim.datatable.loader import hash_of_master_files
 
     return hash_of_master_files(folder)
 
 
 def published_schedule(board: str) -> "PublishedSchedule":
     """What the schedule of `board` sends, row by row, as boards.toml says it."""
-    from datatable.schedule import published_schedule as lookup
+    from ranger_sim.datatable.schedule import published_schedule as lookup
 
     return lookup(board)
 
@@ -43,9 +44,9 @@ def main_brain_store() -> "DataStore":
 
     ROBOT PARITY: the robot's store ends at id 313; ours goes on with the ids of the 2011 controller.
     """
-    from datatable.generated import all_variables
-    from datatable.packing import word_of_value
-    from datatable.store import DataStore
+    from ranger_sim.datatable.generated import all_variables
+    from ranger_sim.datatable.packing import word_of_value
+    from ranger_sim.datatable.store import DataStore
 
     store = DataStore(all_variables.TABLE_SIZE)
     for number, kind in all_variables.TYPES.items():

@@ -7,7 +7,7 @@ import json
 import pathlib
 import sys
 
-from datatable.model import Table, Variable
+from ranger_sim.datatable.model import Table, Variable
 
 EXIT_DONE, EXIT_STALE = 0, 1
 
@@ -36,14 +36,14 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 
 
 def load(arguments: argparse.Namespace) -> Table:
-    from datatable.loader import load_table
+    from ranger_sim.datatable.loader import load_table
 
     return load_table(arguments.master)
 
 
 def run_generate(arguments: argparse.Namespace) -> int:
     """Write, or with --check only compare. Exit code 0, or 1 when --check found stale files."""
-    from datatable.generate import GENERATED_FOLDER, stale, write
+    from ranger_sim.datatable.generate import GENERATED_FOLDER, stale, write
 
     table = load(arguments)
     folder = pathlib.Path(arguments.out) if arguments.out else GENERATED_FOLDER

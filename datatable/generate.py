@@ -7,12 +7,12 @@ from __future__ import annotations
 
 import pathlib
 
-from datatable.generate_c import c_files
-from datatable.generate_catalogue import catalogue_text
-from datatable.generate_dbc import dbc_text
-from datatable.generate_python import python_files
-from datatable.model import Table
-from foundation.user_error import UserError
+from ranger_sim.datatable.generate_c import c_files
+from ranger_sim.datatable.generate_catalogue import catalogue_text
+from ranger_sim.datatable.generate_dbc import dbc_text
+from ranger_sim.datatable.generate_python import python_files
+from ranger_sim.datatable.model import Table
+from ranger_sim.foundation.user_error import UserError
 
 GENERATED_FOLDER = pathlib.Path(__file__).parent / "generated"
 GENERATED_SUFFIXES = (".py", ".c", ".h", ".dbc", ".json")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 
-from datatable.model import Table
+from ranger_sim.datatable.model import Table
 
 
 def number(value: object) -> object:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from datatable.model import LIMITS, Table, Variable
+from ranger_sim.datatable.model import LIMITS, Table, Variable
 
 HEADER = 'VERSION ""\n\nNS_ :\n\nBS_:\n'
 TIME_SIGNAL = ' SG_ time_ms : 32|32@1+ (1,0) [0|4294967295] "ms" {receivers}'

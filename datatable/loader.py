@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterable
 from fractions import Fraction
 from typing import Any
 
-from datatable.model import (
+from ranger_sim.datatable.model import (
     LARGEST_CAN_ID,
     LARGEST_ID,
     LIMITS,
@@ -30,7 +30,7 @@ from datatable.model import (
     TableError,
     Variable,
 )
-from datatable.routing import unreachable
+from ranger_sim.datatable.routing import unreachable
 
 MASTER_FOLDER = pathlib.Path(__file__).parent / "master"
 BOARDS_FILE, VARIABLES_FILE, ERRORS_FILE = "boards.toml", "variables.csv", "errors.csv"

@@ -5,8 +5,8 @@ from __future__ import annotations
 import dataclasses
 from fractions import Fraction
 
-from foundation.numbers import float32
-from foundation.user_error import UserError
+from ranger_sim.foundation.numbers import float32
+from ranger_sim.foundation.user_error import UserError
 
 LARGEST_CAN_ID = 2031  # identifiers 2032-2047 are illegal: their first 7 bits are recessive (facts network 1.5)
 LARGEST_ID = 0xFFFF  # ids have 16 bits (appendix 4.1)

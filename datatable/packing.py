@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import struct
 
-from foundation.numbers import float_of_word, word_of_float, wrap_i32, wrap_u32
+from ranger_sim.foundation.numbers import float_of_word, word_of_float, wrap_i32, wrap_u32
 
 ERROR_CODE_BITS, ERROR_BOARD_BITS, ERROR_COUNT_BITS = 16, 6, 10
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from datatable.model import LARGEST_CAN_ID, Board, Table
+from ranger_sim.datatable.model import LARGEST_CAN_ID, Board, Table
 
 ENTRIES = LARGEST_CAN_ID + 1
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 
-from datatable.model import Board, Table
+from ranger_sim.datatable.model import Board, Table
 
 
 @dataclasses.dataclass(frozen=True)
@@ -30,7 +30,7 @@ def schedule_of(board: Board) -> PublishedSchedule:
 
 def published_schedule(name: str, table: Table | None = None) -> PublishedSchedule:
     """The published schedule of the board called `name`; UserError when there is no such board."""
-    from datatable.loader import load_table
+    from ranger_sim.datatable.loader import load_table
 
     return schedule_of((table or load_table()).board(name))
 

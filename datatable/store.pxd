@@ -1,4 +1,4 @@
-from foundation.numbers cimport float_of_word, word_of_float, wrap_i32
+from ranger_sim.foundation.numbers cimport float_of_word, word_of_float, wrap_i32
 
 cimport cython
 

@@ -12,7 +12,7 @@ import array
 
 import cython
 
-from foundation.numbers import float_of_word, word_of_float, wrap_i32
+from ranger_sim.foundation.numbers import float_of_word, word_of_float, wrap_i32
 
 # Bits of the read flags (facts network 4.13).
 BLUETOOTH = 0

@@ -5,7 +5,7 @@
 
 import cython
 
-from foundation.user_error import UserError
+from ranger_sim.foundation.user_error import UserError
 
 PINS = 32
 

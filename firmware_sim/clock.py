@@ -7,7 +7,7 @@ nine seconds. Results are rounded down, always from absolute counts, so no error
 
 import cython
 
-from foundation.user_error import UserError
+from ranger_sim.foundation.user_error import UserError
 
 # chosen by us: a crystal outside this is broken, and the remainders below still fit into 63 bits
 LARGEST_PPB = 100_000_000

@@ -1,11 +1,11 @@
 cimport cython
 
-from foundation.edge_buffer cimport EdgeBuffer
-from foundation.events cimport EventQueue, Outbox
-from firmware_sim.analog cimport AnalogPins
-from firmware_sim.clock cimport Crystal, TickTrain
-from firmware_sim.scheduler cimport Occasional, Schedule, SlotScheduler, Task, Wait, call, run
-from firmware_sim.vic cimport InterruptController, InterruptSource, handle
+from ranger_sim.foundation.edge_buffer cimport EdgeBuffer
+from ranger_sim.foundation.events cimport EventQueue, Outbox
+from ranger_sim.firmware_sim.analog cimport AnalogPins
+from ranger_sim.firmware_sim.clock cimport Crystal, TickTrain
+from ranger_sim.firmware_sim.scheduler cimport Occasional, Schedule, SlotScheduler, Task, Wait, call, run
+from ranger_sim.firmware_sim.vic cimport InterruptController, InterruptSource, handle
 
 cdef class Peripheral:
     cdef public Microcontroller chip

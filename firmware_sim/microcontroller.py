@@ -18,17 +18,17 @@ import array
 
 import cython
 
-from firmware_sim.analog import AnalogPins
-from firmware_sim.clock import Crystal, TickTrain
-from firmware_sim.scheduler import Occasional, Schedule, SlotScheduler, Task, Wait
-from firmware_sim.vic import SLOT_TIMER, InterruptController, InterruptSource
-from foundation.edge_buffer import EdgeBuffer
-from foundation.events import NEVER, PIN_EDGE, EventQueue
-from foundation.numbers import integers
-from foundation.user_error import UserError
+from ranger_sim.firmware_sim.analog import AnalogPins
+from ranger_sim.firmware_sim.clock import Crystal, TickTrain
+from ranger_sim.firmware_sim.scheduler import Occasional, Schedule, SlotScheduler, Task, Wait
+from ranger_sim.firmware_sim.vic import SLOT_TIMER, InterruptController, InterruptSource
+from ranger_sim.foundation.edge_buffer import EdgeBuffer
+from ranger_sim.foundation.events import NEVER, PIN_EDGE, EventQueue
+from ranger_sim.foundation.numbers import integers
+from ranger_sim.foundation.user_error import UserError
 
 if not cython.compiled:
-    from firmware_sim.calls import call, handle, own_code, run
+    from ranger_sim.firmware_sim.calls import call, handle, own_code, run
 
 PINS = 64  # P0.0 ... P0.31 are 0 ... 31, P1.0 ... P1.31 are 32 ... 63
 WORDS = 16

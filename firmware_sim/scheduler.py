@@ -13,12 +13,12 @@ against `limit`. The event loop that spends the time is in microcontroller.py; h
 
 import cython
 
-from foundation.events import NEVER
-from foundation.numbers import integers
-from foundation.user_error import UserError
+from ranger_sim.foundation.events import NEVER
+from ranger_sim.foundation.numbers import integers
+from ranger_sim.foundation.user_error import UserError
 
 if not cython.compiled:
-    from firmware_sim.calls import code_of, owner_of
+    from ranger_sim.firmware_sim.calls import code_of, owner_of
 
 NORMAL_TASK = 0
 OCCASIONAL_TASK = 1

@@ -1,7 +1,7 @@
 cimport cython
 
-from foundation.events cimport EventQueue
-from firmware_sim.scheduler cimport call_with, code_of, owner_of
+from ranger_sim.foundation.events cimport EventQueue
+from ranger_sim.firmware_sim.scheduler cimport call_with, code_of, owner_of
 
 # What the handler returns for the message in the fields of `queue`.
 cdef inline object handle(InterruptSource source, EventQueue queue):

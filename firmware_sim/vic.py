@@ -8,11 +8,11 @@ loop in microcontroller.py serves; this file only keeps who waits.
 
 import cython
 
-from foundation.events import EventQueue
-from foundation.user_error import UserError
+from ranger_sim.foundation.events import EventQueue
+from ranger_sim.foundation.user_error import UserError
 
 if not cython.compiled:
-    from firmware_sim.calls import code_of, owner_of
+    from ranger_sim.firmware_sim.calls import code_of, owner_of
 
 FIQ = -1
 FIRST_FIQ = 1 << 16  # in the word of pending sources the FIQ sources stand above the 16 slots

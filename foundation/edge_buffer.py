@@ -8,7 +8,7 @@ hold the same buffer: an edge is the most frequent thing on the robot, and never
 
 import cython
 
-from foundation.numbers import integers
+from ranger_sim.foundation.numbers import integers
 
 
 class EdgeBuffer:

@@ -10,7 +10,7 @@ The same messages travel in one process or between several.
 
 import cython
 
-from foundation.numbers import integers
+from ranger_sim.foundation.numbers import integers
 
 NEVER = 1 << 62  # ns; later than any instant of a run (146 years)
 

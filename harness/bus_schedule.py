@@ -24,15 +24,15 @@ from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
-import datatable
-from can_bus.bounds import Bound, Message, message, most_waiting, response_times
-from can_bus.frame import arbitration_key
-from datatable.model import Board, Table, Variable
-from firmware_sim.scheduler import Occasional
-from foundation.user_error import UserError
+from ranger_sim import datatable
+from ranger_sim.can_bus.bounds import Bound, Message, message, most_waiting, response_times
+from ranger_sim.can_bus.frame import arbitration_key
+from ranger_sim.datatable.model import Board, Table, Variable
+from ranger_sim.firmware_sim.scheduler import Occasional
+from ranger_sim.foundation.user_error import UserError
 
 if TYPE_CHECKING:
-    from harness.profile import Profile
+    from ranger_sim.harness.profile import Profile
 
 MOST_TURNS = 1000  # turns to the next sending; with more a variable is as good as not sent (chosen by us)
 MOST_ROWS = 10_000  # rows of a table laid out over its passes (chosen by us)

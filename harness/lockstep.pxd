@@ -1,15 +1,15 @@
 cimport cython
 
-from boards.main_brain.estimator cimport Estimator
-from can_bus.bus cimport Bus
-from firmware_sim.microcontroller cimport Microcontroller
-from foundation.events cimport Outbox
-from foundation.row_stream cimport RowStream
-from harness.processes.remote_board cimport RemoteBoard
-from foundation.edge_buffer cimport ByteBuffer
-from plant.drive cimport Drive
-from plant.imu cimport Imu
-from plant.ranger cimport RangerPlant
+from ranger_sim.boards.main_brain.estimator cimport Estimator
+from ranger_sim.can_bus.bus cimport Bus
+from ranger_sim.firmware_sim.microcontroller cimport Microcontroller
+from ranger_sim.foundation.events cimport Outbox
+from ranger_sim.foundation.row_stream cimport RowStream
+from ranger_sim.harness.processes.remote_board cimport RemoteBoard
+from ranger_sim.foundation.edge_buffer cimport ByteBuffer
+from ranger_sim.plant.drive cimport Drive
+from ranger_sim.plant.imu cimport Imu
+from ranger_sim.plant.ranger cimport RangerPlant
 
 @cython.final
 cdef class WordWire:

@@ -29,16 +29,16 @@ import array
 
 import cython
 
-from can_bus.bus import Bus
-from firmware_sim.microcontroller import MESSAGE_KINDS, Microcontroller
-from firmware_sim.peripherals.can_controller import CanController
-from foundation.edge_buffer import ByteBuffer
-from foundation.events import CAN_REQUEST, CAN_TX_DONE, Outbox
-from foundation.numbers import integers
-from foundation.row_stream import RowStream
-from foundation.user_error import UserError
-from harness.processes.remote_board import RemoteBoard
-from plant.ranger import RangerPlant
+from ranger_sim.can_bus.bus import Bus
+from ranger_sim.firmware_sim.microcontroller import MESSAGE_KINDS, Microcontroller
+from ranger_sim.firmware_sim.peripherals.can_controller import CanController
+from ranger_sim.foundation.edge_buffer import ByteBuffer
+from ranger_sim.foundation.events import CAN_REQUEST, CAN_TX_DONE, Outbox
+from ranger_sim.foundation.numbers import integers
+from ranger_sim.foundation.row_stream import RowStream
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.harness.processes.remote_board import RemoteBoard
+from ranger_sim.plant.ranger import RangerPlant
 
 WINDOW_NS = 31_000
 SAMPLE_NS = 2_000_000  # the canonical trace samples body and data table at the main brain's rate

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from foundation.user_error import UserError
-from harness.recorder import Recorder
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.harness.recorder import Recorder
 
 WINDOW_S = 10.0  # default window of the logs: some 16 steps
 

@@ -5,8 +5,8 @@ What the person does comes from the parameter set's [operator] table; times coun
 
 from typing import Any
 
-from foundation.events import PIN_EDGE, STAGE_PINS
-from harness import wiring
+from ranger_sim.foundation.events import PIN_EDGE, STAGE_PINS
+from ranger_sim.harness import wiring
 
 PIN_ORDER = STAGE_PINS * 256 + 128
 

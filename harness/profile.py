@@ -22,10 +22,17 @@ import tomllib
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from datatable.model import Table
-from foundation.user_error import UserError
-from harness import wiring
-from harness.bus_schedule import MOST_ROWS, MOST_TURNS, BusSchedule, command_variables, passes_of, robots_table
+from ranger_sim.datatable.model import Table
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.harness import wiring
+from ranger_sim.harness.bus_schedule import (
+    MOST_ROWS,
+    MOST_TURNS,
+    BusSchedule,
+    command_variables,
+    passes_of,
+    robots_table,
+)
 
 FOLDER = pathlib.Path(__file__).resolve().parent.parent / "profiles"
 SCHEDULES = "schedules"
@@ -306,7 +313,7 @@ def load(name: str | pathlib.Path, interfaces: Callable[[], tuple[str, ...]] | N
 
 
 def _interfaces() -> tuple[str, ...]:
-    from can_bus.edge.interfaces import known_interfaces  # python-can takes a second to load
+    from ranger_sim.can_bus.edge.interfaces import known_interfaces  # python-can takes a second to load
 
     return known_interfaces()
 

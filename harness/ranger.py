@@ -7,29 +7,29 @@ tables of harness/wiring.py; `harness/lockstep.py` then passes time and carries 
 from collections.abc import Callable
 from typing import Any
 
-from boards.can_router import CanRouterBoard
-from boards.hip import HipBoard
-from boards.inner_feet import InnerFeetBoard
-from boards.main_brain import controllers
-from boards.main_brain.board import MainBrainBoard
-from boards.modules.ssp_link import EXCHANGE_NS, empty_segment
-from boards.outer_feet import OuterFeetBoard
-from boards.quirks import Quirks
-from boards.steering import SteeringBoard
-from boards.user_interface import UserInterfaceBoard
-from can_bus.bus import Bus
-from datatable.generated import all_variables
-from firmware_sim.clock import seeded_crystal
-from foundation import wallclock
-from foundation.events import STAGE_BUS
-from foundation.random_stream import RandomStream
-from harness import bus_schedule, lockstep, wiring
-from harness.logbook import Logbook
-from harness.operator import Operator
-from harness.profile import Profile
-from harness.recorder import Recorder
-from harness.scenario import Scenario, StopRule
-from plant.ranger import RangerPlant
+from ranger_sim.boards.can_router import CanRouterBoard
+from ranger_sim.boards.hip import HipBoard
+from ranger_sim.boards.inner_feet import InnerFeetBoard
+from ranger_sim.boards.main_brain import controllers
+from ranger_sim.boards.main_brain.board import MainBrainBoard
+from ranger_sim.boards.modules.ssp_link import EXCHANGE_NS, empty_segment
+from ranger_sim.boards.outer_feet import OuterFeetBoard
+from ranger_sim.boards.quirks import Quirks
+from ranger_sim.boards.steering import SteeringBoard
+from ranger_sim.boards.user_interface import UserInterfaceBoard
+from ranger_sim.can_bus.bus import Bus
+from ranger_sim.datatable.generated import all_variables
+from ranger_sim.firmware_sim.clock import seeded_crystal
+from ranger_sim.foundation import wallclock
+from ranger_sim.foundation.events import STAGE_BUS
+from ranger_sim.foundation.random_stream import RandomStream
+from ranger_sim.harness import bus_schedule, lockstep, wiring
+from ranger_sim.harness.logbook import Logbook
+from ranger_sim.harness.operator import Operator
+from ranger_sim.harness.profile import Profile
+from ranger_sim.harness.recorder import Recorder
+from ranger_sim.harness.scenario import Scenario, StopRule
+from ranger_sim.plant.ranger import RangerPlant
 
 BUS_BIT_RATE = 3_000_000  # bit/s, appendix 3.11
 # Boards get their power together but their resets and start-up code differ: first slots spread over 2 ms.
@@ -241,7 +241,7 @@ class Ranger:
 
     def variable(self, name: str) -> float:
         """Value of a variable as the main brain's data table has it."""
-        from datatable.packing import value_of_word
+        from ranger_sim.datatable.packing import value_of_word
 
         number = all_variables.ID_OF[name]
         return value_of_word(all_variables.TYPES[number], self.boards["MB"].store.get_word(number))
@@ -258,13 +258,13 @@ class Ranger:
 
     def recorded(self) -> Any:
         """What the log kept, as arrays: a `harness.recorded.Recorded`."""
-        from harness.recorded import Recorded
+        from ranger_sim.harness.recorded import Recorded
 
         return Recorded(self)
 
     def error_meaning(self, name: str) -> str:
         """What an error code means, in the words of the master table."""
-        import datatable
+        from ranger_sim import datatable
 
         return next((row.description for row in datatable.load().errors if row.name == name), "")
 
@@ -276,6 +276,6 @@ class Ranger:
 
     def summary(self) -> dict:
         """The walk in numbers: what `--json` prints."""
-        from harness import summary
+        from ranger_sim.harness import summary
 
         return summary.of(self)

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-import datatable
-from datatable.generated import all_variables
+from ranger_sim import datatable
+from ranger_sim.datatable.generated import all_variables
 
 # machine: variable of its state in the main brain's table
 STATE_VARIABLES = {

@@ -1,4 +1,4 @@
-from foundation.row_stream cimport RowStream
+from ranger_sim.foundation.row_stream cimport RowStream
 
 cimport cython
 

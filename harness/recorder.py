@@ -6,7 +6,7 @@ Words of the main brain's data table (not hashed, they follow from the others): 
 
 import hashlib
 
-from foundation.row_stream import DIGEST_BYTES, FrameStream, RowStream
+from ranger_sim.foundation.row_stream import DIGEST_BYTES, FrameStream, RowStream
 
 
 class Recorder:

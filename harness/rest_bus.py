@@ -11,13 +11,13 @@ import heapq
 import math
 from fractions import Fraction
 
-from datatable.model import Table, Variable
-from datatable.packing import word_of_value
-from foundation.events import NEVER
-from foundation.user_error import UserError
-from harness.bus_schedule import command_variables, robots_table, schedule_of_board
-from harness.profile import Profile
-from harness.supervision import SYNC, expected_periods
+from ranger_sim.datatable.model import Table, Variable
+from ranger_sim.datatable.packing import word_of_value
+from ranger_sim.foundation.events import NEVER
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.harness.bus_schedule import command_variables, robots_table, schedule_of_board
+from ranger_sim.harness.profile import Profile
+from ranger_sim.harness.supervision import SYNC, expected_periods
 
 DATA_8 = 8  # flags of a data frame of eight bytes
 SPREAD_NS = 137_000  # between first sendings, so that not everything comes at once; chosen by us: longer than a frame

@@ -3,7 +3,7 @@
 import dataclasses
 import math
 
-from foundation.user_error import UserError
+from ranger_sim.foundation.user_error import UserError
 
 DAY_MS = 24 * 3600 * 1000
 

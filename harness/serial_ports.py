@@ -17,13 +17,13 @@ import tty
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Protocol
 
-from foundation.events import NEVER, PIN_EDGE, STAGE_PINS, UART_BYTE
-from foundation.random_stream import RandomStream
-from foundation.user_error import UserError
-from harness import wiring
+from ranger_sim.foundation.events import NEVER, PIN_EDGE, STAGE_PINS, UART_BYTE
+from ranger_sim.foundation.random_stream import RandomStream
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.harness import wiring
 
 if TYPE_CHECKING:
-    from harness.ranger import Ranger
+    from ranger_sim.harness.ranger import Ranger
 
 POLL_NS = 1_000_000  # between two looks at a port: half a slot of the main brain
 AHEAD_NS = 20_000_000  # bytes read at once last at most so long on the robot's side; the rest waits in the port
@@ -366,7 +366,7 @@ class ImuOffer:
 
 def daq_line(push: Push, board: Any, port: Port, dropouts: Dropouts | None = None) -> SerialLine:
     """The line between the main brain `board` and a port; `push` reaches the board's inbox."""
-    from boards.main_brain.board import COMPUTER_PORTS
+    from ranger_sim.boards.main_brain.board import COMPUTER_PORTS
 
     uart = board.computer_uart
     cts_pin = COMPUTER_PORTS[board.quirks.computer_link].cts_pin

@@ -3,8 +3,9 @@
 import math
 from typing import Any
 
-from datatable.generated import errors as error_table
-from harness import build, wiring
+from ranger_sim import loading
+from ranger_sim.datatable.generated import errors as error_table
+from ranger_sim.harness import wiring
 
 MASS_KG, GRAVITY = 9.91, 9.81  # total cost of transport: appendix 1, table of the walk
 SKIPPED_STEPS = 5  # the start is left out of means
@@ -46,7 +47,7 @@ def of(robot: Any) -> dict:
         "errors": {name: errors(board) for name, board in robot.boards.items()},
         "realtime_factor": robot.realtime_factor(),
         "cpu_factor": robot.time_s / robot.cpu_s if robot.cpu_s > 0.0 else None,
-        "compiled": build.is_compiled(),
+        "compiled": loading.RUNS_COMPILED,
         "controller": robot.scenario.controller,
         "profile": robot.profile.name if robot.profile is not None else None,
         "model_file": robot.scenario.model_file,

@@ -6,8 +6,8 @@ Read a line from left to right in the direction in which the signal goes.
 
 from typing import NamedTuple
 
-from boards import can_router, motor_board, user_interface
-from plant import wiring_points as point
+from ranger_sim.boards import can_router, motor_board, user_interface
+from ranger_sim.plant import wiring_points as point
 
 # The order in which boards are advanced and their messages sorted within an instant.
 BOARDS = ("MCH", "MCFO", "MCFI", "MCSI", "UI", "CSR", "MB")

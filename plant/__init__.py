@@ -1,1 +1,2 @@
-import foundation  # noqa: F401  (first: it chooses compiled or interpreted modules)
+if __name__ != "ranger_sim.plant":
+    raise ImportError("plant is a room of ranger_sim: import ranger_sim.plant")

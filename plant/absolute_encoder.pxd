@@ -1,8 +1,8 @@
 cimport cython
 
 from libc.math cimport exp, sin
-from foundation.random_stream cimport RandomStream
-from plant.noise cimport NoiseSource
+from ranger_sim.foundation.random_stream cimport RandomStream
+from ranger_sim.plant.noise cimport NoiseSource
 
 @cython.final
 cdef class AbsoluteEncoder:

@@ -7,9 +7,9 @@ joint angle 0, `sign` the mounting. Zeros of the robot: hip 4590 (+), outer ankl
 
 import cython
 
-from foundation.random_stream import RandomStream
-from foundation.user_error import UserError
-from plant.noise import NoiseSource
+from ranger_sim.foundation.random_stream import RandomStream
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.plant.noise import NoiseSource
 
 if not cython.compiled:
     from math import exp, sin

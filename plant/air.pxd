@@ -1,5 +1,5 @@
 from libc.math cimport cos, sin
-from plant.body cimport Body
-from plant.friction cimport smoothed_sign
+from ranger_sim.plant.body cimport Body
+from ranger_sim.plant.friction cimport smoothed_sign
 
 cpdef void in_air(Body body, double h, long long stages)

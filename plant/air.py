@@ -7,7 +7,7 @@ import cython
 if not cython.compiled:
     from math import cos, sin
 
-    from plant.friction import smoothed_sign
+    from ranger_sim.plant.friction import smoothed_sign
 
 
 def in_air(body, h: cython.double, stages: cython.longlong) -> cython.void:

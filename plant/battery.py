@@ -16,8 +16,8 @@ import math
 
 import cython
 
-from foundation.numbers import reals
-from foundation.user_error import UserError
+from ranger_sim.foundation.numbers import reals
+from ranger_sim.foundation.user_error import UserError
 
 if not cython.compiled:
     from math import sqrt

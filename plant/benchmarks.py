@@ -11,11 +11,11 @@ import math
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from plant import paper_model as pm
-from plant.body import FALLEN, Body
-from plant.motion import advance
-from plant.parameters import BodyParameters
-from plant.stance import on_feet
+from ranger_sim.plant import paper_model as pm
+from ranger_sim.plant.body import FALLEN, Body
+from ranger_sim.plant.motion import advance
+from ranger_sim.plant.parameters import BodyParameters
+from ranger_sim.plant.stance import on_feet
 
 RTOL = 2.3e-14  # about 100 roundings, the least scipy accepts
 ATOL = 1e-15

@@ -24,9 +24,9 @@ The body's fields and geometry stand here. What happens to it, in the order in w
 
 import cython
 
-from plant.floor import Floor
-from plant.parameters import BodyParameters
-from plant.walk_record import WalkRecord
+from ranger_sim.plant.floor import Floor
+from ranger_sim.plant.parameters import BodyParameters
+from ranger_sim.plant.walk_record import WalkRecord
 
 if not cython.compiled:
     from math import cos, sin, sqrt

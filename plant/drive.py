@@ -10,7 +10,7 @@ bridge has power until `watchdog_ns` after the last edge on the watchdog line, a
 
 import cython
 
-from foundation.numbers import integers
+from ranger_sim.foundation.numbers import integers
 
 # Kinds of changes.
 PWM_WRITE = 0

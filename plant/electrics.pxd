@@ -1,10 +1,10 @@
 cimport cython
 
 from libc.math cimport exp
-from plant.battery cimport Battery
-from plant.foot_sensor cimport FootSensors
-from plant.motor_unit cimport MotorUnit
-from plant.noise cimport NoiseSource
+from ranger_sim.plant.battery cimport Battery
+from ranger_sim.plant.foot_sensor cimport FootSensors
+from ranger_sim.plant.motor_unit cimport MotorUnit
+from ranger_sim.plant.noise cimport NoiseSource
 
 @cython.final
 cdef class Electrics:

@@ -22,15 +22,15 @@ import math
 
 import cython
 
-from foundation.numbers import reals
-from foundation.user_error import UserError
-from plant.battery import Battery, BatteryParameters
-from plant.electronics import power_W
-from plant.foot_sensor import FootSensors
-from plant.motor_parameters import ANKLE_MOTOR, HIP_MOTOR, STEERING_MOTOR, MotorParameters
-from plant.motor_unit import MotorUnit
-from plant.noise import NoiseSource
-from plant.wiring_points import ANALOG_COUNT, MOTOR_NAMES
+from ranger_sim.foundation.numbers import reals
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.plant.battery import Battery, BatteryParameters
+from ranger_sim.plant.electronics import power_W
+from ranger_sim.plant.foot_sensor import FootSensors
+from ranger_sim.plant.motor_parameters import ANKLE_MOTOR, HIP_MOTOR, STEERING_MOTOR, MotorParameters
+from ranger_sim.plant.motor_unit import MotorUnit
+from ranger_sim.plant.noise import NoiseSource
+from ranger_sim.plant.wiring_points import ANALOG_COUNT, MOTOR_NAMES
 
 if not cython.compiled:
     from math import exp

@@ -2,8 +2,8 @@
 
 import math
 
-from foundation.random_stream import RandomStream
-from foundation.user_error import UserError
+from ranger_sim.foundation.random_stream import RandomStream
+from ranger_sim.foundation.user_error import UserError
 
 
 class Floor:

@@ -16,7 +16,7 @@ gap is closed and the stop takes over (appendix 2.4): chosen by us, half of the 
 
 import cython
 
-from foundation.user_error import UserError
+from ranger_sim.foundation.user_error import UserError
 
 if not cython.compiled:
     from math import exp

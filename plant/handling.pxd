@@ -1,5 +1,5 @@
-from plant.body cimport Body
-from plant.watch cimport fall
+from ranger_sim.plant.body cimport Body
+from ranger_sim.plant.watch cimport fall
 
 cpdef int place(Body body, double outer_leg_rad, double hip_rad) except -1
 cpdef int hold(Body body, double outer_leg_rad) except -1

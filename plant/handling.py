@@ -3,7 +3,7 @@
 import cython
 
 if not cython.compiled:
-    from plant.watch import fall
+    from ranger_sim.plant.watch import fall
 
 
 def place(body, outer_leg_rad: cython.double, hip_rad: cython.double) -> None:

@@ -1,5 +1,5 @@
 from libc.math cimport cos, fabs, sin
-from plant.body cimport Body
+from ranger_sim.plant.body cimport Body
 
 cdef int touch(Body body, long long foot) except -1
 cdef void set_down(Body body, long long foot) noexcept

@@ -1,9 +1,9 @@
 cimport cython
 
 from libc.math cimport cos, exp, sin
-from foundation.numbers cimport word_of_float
-from foundation.random_stream cimport RandomStream
-from foundation.edge_buffer cimport ByteBuffer
+from ranger_sim.foundation.numbers cimport word_of_float
+from ranger_sim.foundation.random_stream cimport RandomStream
+from ranger_sim.foundation.edge_buffer cimport ByteBuffer
 
 cdef long long _MASK, _TEN_BITS
 

@@ -21,14 +21,14 @@ ROBOT PARITY: fused angles are the true ones with noise and bias; the device's s
 
 import cython
 
-from foundation.edge_buffer import ByteBuffer
-from foundation.random_stream import RandomStream
-from foundation.user_error import UserError
+from ranger_sim.foundation.edge_buffer import ByteBuffer
+from ranger_sim.foundation.random_stream import RandomStream
+from ranger_sim.foundation.user_error import UserError
 
 if not cython.compiled:
     from math import cos, exp, sin
 
-    from foundation.numbers import word_of_float
+    from ranger_sim.foundation.numbers import word_of_float
 
 HEADER_ANGLES_AND_RATES = 0xCF
 HEADER_RATES = 0xC2

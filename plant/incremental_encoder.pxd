@@ -1,8 +1,8 @@
 cimport cython
 
 from libc.math cimport cos, sin, sqrt
-from foundation.random_stream cimport RandomStream
-from foundation.edge_buffer cimport EdgeBuffer
+from ranger_sim.foundation.random_stream cimport RandomStream
+from ranger_sim.foundation.edge_buffer cimport EdgeBuffer
 
 @cython.final
 cdef class IncrementalEncoder:

@@ -19,10 +19,10 @@ disc (rad of encoder shaft, once and twice per turn).
 
 import cython
 
-from foundation.edge_buffer import EdgeBuffer
-from foundation.numbers import reals
-from foundation.random_stream import RandomStream
-from foundation.user_error import UserError
+from ranger_sim.foundation.edge_buffer import EdgeBuffer
+from ranger_sim.foundation.numbers import reals
+from ranger_sim.foundation.random_stream import RandomStream
+from ranger_sim.foundation.user_error import UserError
 
 if not cython.compiled:
     from math import cos, sin, sqrt

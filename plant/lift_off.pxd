@@ -1,7 +1,7 @@
 from libc.math cimport cos, sin
-from plant.air cimport in_air
-from plant.body cimport Body
-from plant.stance cimport on_feet
+from ranger_sim.plant.air cimport in_air
+from ranger_sim.plant.body cimport Body
+from ranger_sim.plant.stance cimport on_feet
 
 cdef bint may_leave(Body body, long long leg) noexcept
 cdef bint sole_ready(Body body, long long leg) noexcept

@@ -5,8 +5,8 @@ import cython
 if not cython.compiled:
     from math import cos, sin
 
-    from plant.air import in_air
-    from plant.stance import on_feet
+    from ranger_sim.plant.air import in_air
+    from ranger_sim.plant.stance import on_feet
 
 
 def may_leave(body, leg: cython.longlong) -> cython.bint:

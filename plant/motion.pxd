@@ -1,9 +1,9 @@
-from plant.air cimport in_air
-from plant.body cimport Body
-from plant.impact cimport touch
-from plant.lift_off cimport leave, lets_go, may_leave, sole_ready
-from plant.stance cimport on_feet
-from plant.watch cimport watch
+from ranger_sim.plant.air cimport in_air
+from ranger_sim.plant.body cimport Body
+from ranger_sim.plant.impact cimport touch
+from ranger_sim.plant.lift_off cimport leave, lets_go, may_leave, sole_ready
+from ranger_sim.plant.stance cimport on_feet
+from ranger_sim.plant.watch cimport watch
 
 cpdef int advance(Body body, double h) except -1
 cdef bint let_pulled_foot_go(Body body, double h) except? -1

@@ -5,11 +5,11 @@
 import cython
 
 if not cython.compiled:
-    from plant.air import in_air
-    from plant.impact import touch
-    from plant.lift_off import leave, lets_go, may_leave, sole_ready
-    from plant.stance import on_feet
-    from plant.watch import watch
+    from ranger_sim.plant.air import in_air
+    from ranger_sim.plant.impact import touch
+    from ranger_sim.plant.lift_off import leave, lets_go, may_leave, sole_ready
+    from ranger_sim.plant.stance import on_feet
+    from ranger_sim.plant.watch import watch
 
 
 def advance(body, h: cython.double) -> None:

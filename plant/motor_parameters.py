@@ -7,7 +7,7 @@ and boards section n, "chosen by us, because ...". Angles and rates of a motor a
 import dataclasses
 import math
 
-from foundation.user_error import UserError
+from ranger_sim.foundation.user_error import UserError
 
 # Measured winding inductance against frequency [A 3.9]: 94 uH at 1 kHz ... 16 uH at 200 kHz.
 FAULHABER_INDUCTANCE = ((1e3, 94e-6), (20e3, 35e-6), (100e3, 20e-6), (200e3, 16e-6))

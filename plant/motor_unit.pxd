@@ -1,8 +1,8 @@
 cimport cython
 
 from libc.math cimport exp, log
-from plant.friction cimport smoothed_sign
-from plant.drive cimport Drive
+from ranger_sim.plant.friction cimport smoothed_sign
+from ranger_sim.plant.drive cimport Drive
 
 @cython.final
 cdef class MotorUnit:

@@ -28,13 +28,13 @@ are drawn from the battery here.
 
 import cython
 
-from plant.drive import Drive
-from plant.motor_parameters import MotorParameters
+from ranger_sim.plant.drive import Drive
+from ranger_sim.plant.motor_parameters import MotorParameters
 
 if not cython.compiled:
     from math import exp, log
 
-    from plant.friction import smoothed_sign
+    from ranger_sim.plant.friction import smoothed_sign
 
 
 class MotorUnit:

@@ -1,6 +1,6 @@
 cimport cython
 
-from foundation.random_stream cimport RandomStream
+from ranger_sim.foundation.random_stream cimport RandomStream
 
 @cython.final
 cdef class NoiseSource:

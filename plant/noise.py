@@ -11,8 +11,8 @@ import statistics
 
 import cython
 
-from foundation.numbers import reals
-from foundation.random_stream import RandomStream
+from ranger_sim.foundation.numbers import reals
+from ranger_sim.foundation.random_stream import RandomStream
 
 TABLE_SIZE = 4096
 BLOCK = 64  # values that may be read from a place on

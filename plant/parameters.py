@@ -7,7 +7,7 @@ Sources are named in brackets at each field: [A n] appendix section n, [P n] fac
 import dataclasses
 import math
 
-from foundation.user_error import UserError
+from ranger_sim.foundation.user_error import UserError
 
 
 @dataclasses.dataclass(frozen=True)

@@ -1,13 +1,13 @@
 cimport cython
 
-from plant.absolute_encoder cimport AbsoluteEncoder
-from plant.body cimport Body
-from plant.electrics cimport Electrics
-from plant.imu cimport Imu
-from plant.incremental_encoder cimport IncrementalEncoder
-from plant.motion cimport advance
-from plant.motor_unit cimport MotorUnit
-from plant.steering cimport Steering
+from ranger_sim.plant.absolute_encoder cimport AbsoluteEncoder
+from ranger_sim.plant.body cimport Body
+from ranger_sim.plant.electrics cimport Electrics
+from ranger_sim.plant.imu cimport Imu
+from ranger_sim.plant.incremental_encoder cimport IncrementalEncoder
+from ranger_sim.plant.motion cimport advance
+from ranger_sim.plant.motor_unit cimport MotorUnit
+from ranger_sim.plant.steering cimport Steering
 
 @cython.final
 cdef class RangerPlant:

@@ -11,20 +11,20 @@ Seen from the boards: `motors` with their drives, `encoders` with their edges, `
 import cython
 import numpy as np
 
-from plant import handling
-from plant.absolute_encoder import AbsoluteEncoder
-from plant.body import Body
-from plant.electrics import Electrics
-from plant.floor import Floor
-from plant.imu import Imu
-from plant.incremental_encoder import IncrementalEncoder
-from plant.motor_unit import MotorUnit
-from plant.parameters import BodyParameters
-from plant.steering import Steering
-from plant.walk_record import RING
+from ranger_sim.plant import handling
+from ranger_sim.plant.absolute_encoder import AbsoluteEncoder
+from ranger_sim.plant.body import Body
+from ranger_sim.plant.electrics import Electrics
+from ranger_sim.plant.floor import Floor
+from ranger_sim.plant.imu import Imu
+from ranger_sim.plant.incremental_encoder import IncrementalEncoder
+from ranger_sim.plant.motor_unit import MotorUnit
+from ranger_sim.plant.parameters import BodyParameters
+from ranger_sim.plant.steering import Steering
+from ranger_sim.plant.walk_record import RING
 
 if not cython.compiled:
-    from plant.motion import advance
+    from ranger_sim.plant.motion import advance
 
 STEP_NS = 250_000  # the plant's step; its error is measured in EQUATIONS 15
 
@@ -140,7 +140,7 @@ class RangerPlant:
         self.sample_names = SAMPLES
         self.model_file = model_file
         if model_file is not None:
-            from plant import terms
+            from ranger_sim.plant import terms
 
             terms.load(model_file).apply(self)
         self._settle()

@@ -16,7 +16,7 @@ import cython
 if not cython.compiled:
     from math import cos, sin
 
-    from plant.friction import smoothed_sign
+    from ranger_sim.plant.friction import smoothed_sign
 
 
 class Steering:

@@ -1,7 +1,7 @@
 cimport cython
 
 from libc.math cimport exp, sin
-from plant.friction cimport smoothed_sign
+from ranger_sim.plant.friction cimport smoothed_sign
 
 @cython.final
 cdef class TermTorques:

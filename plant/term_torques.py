@@ -28,7 +28,7 @@ import cython
 if not cython.compiled:
     from math import exp, sin
 
-    from plant.friction import smoothed_sign
+    from ranger_sim.plant.friction import smoothed_sign
 
 STRIBECK = 0
 COULOMB = 1

@@ -19,10 +19,10 @@ import pathlib
 import tomllib
 from typing import Any
 
-from foundation.numbers import reals
-from foundation.user_error import UserError
-from plant import term_torques as torques
-from plant.wiring_points import ANALOG_NAMES, ENCODER_NAMES, WORD_NAMES
+from ranger_sim.foundation.numbers import reals
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.plant import term_torques as torques
+from ranger_sim.plant.wiring_points import ANALOG_NAMES, ENCODER_NAMES, WORD_NAMES
 
 MOTORS = ("hip_motor", "outer_motor", "inner_motor", "steering_motor")
 TORQUE_PLACES = ("hip_joint", "hip_motor", "outer_ankle", "outer_motor", "inner_ankle", "inner_motor")

@@ -1,5 +1,5 @@
 from libc.math cimport fabs
-from plant.body cimport Body
+from ranger_sim.plant.body cimport Body
 
 cpdef int watch(Body body, double h) except -1
 cdef int watch_swing_foot(Body body, double h) except -1

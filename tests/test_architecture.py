@@ -4,10 +4,12 @@ import ast
 import contextlib
 import pathlib
 import re
+import subprocess
+import sys
 
 import pytest
 
-import foundation
+from ranger_sim import loading
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 
@@ -42,20 +44,31 @@ def sources():
 
 
 def imported_packages(path):
-    """Top-level names a file imports, in .py by its syntax tree, in .pxd by its cimport lines."""
+    """What a file imports, in .py by its syntax tree, in .pxd by its cimport lines: libraries, and rooms by name."""
+    for names, line in imported_modules(path):
+        package, _, rest = names.partition(".")
+        yield (rest.partition(".")[0] or package) if package == "ranger_sim" else package, line
+
+
+def imported_modules(path):
+    """(dotted name, line) of what a file imports."""
     if path.suffix == ".pxd":
         text = path.read_text(encoding="utf-8")
         for match in re.finditer(r"^\s*(?:from\s+([\w.]+)\s+cimport|cimport\s+([\w.]+))", text, re.MULTILINE):
-            name = (match.group(1) or match.group(2)).partition(".")[0]
-            if name:
+            name = match.group(1) or match.group(2)
+            if not name.startswith("."):
                 yield name, text[: match.start()].count("\n") + 1
         return
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
             for alias in node.names:
-                yield alias.name.partition(".")[0], node.lineno
+                yield alias.name, node.lineno
         elif isinstance(node, ast.ImportFrom) and node.level == 0 and node.module:
-            yield node.module.partition(".")[0], node.lineno
+            if node.module == "ranger_sim":
+                for alias in node.names:
+                    yield f"ranger_sim.{alias.name}", node.lineno
+            else:
+                yield node.module, node.lineno
 
 
 @pytest.mark.parametrize("package", MAY_IMPORT)
@@ -85,15 +98,16 @@ def test_nobody_draws_from_a_global_random_generator():
     assert not faults
 
 
-@pytest.mark.parametrize("package", [p for p in MAY_IMPORT if p != "foundation"])
-def test_a_package_chooses_compiled_or_interpreted_before_anything_else(package):
-    body = ast.parse((ROOT / package / "__init__.py").read_text(encoding="utf-8")).body
-    imports = [node for node in body if isinstance(node, ast.Import | ast.ImportFrom)]
-    assert isinstance(imports[0], ast.Import) and imports[0].names[0].name == "foundation"
+@pytest.mark.parametrize("room", MAY_IMPORT)
+def test_a_room_imported_by_its_bare_name_is_refused_with_the_right_one(room):
+    program = f"import {room}"
+    done = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert done.stderr.splitlines()[-1] == f"ImportError: {room} is a room of ranger_sim: import ranger_sim.{room}"
 
 
-def test_the_finder_knows_every_package():
-    assert set(foundation.OUR_PACKAGES) == set(MAY_IMPORT)
+def test_the_finder_knows_every_room():
+    assert set(loading.ROOMS) == set(MAY_IMPORT)
 
 
 def declarations():

@@ -13,8 +13,7 @@ import tomllib
 
 import pytest
 
-import foundation
-from harness import build
+from ranger_sim import loading
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
@@ -29,10 +28,10 @@ WHERE_FROM = (
 
 
 def declared_modules():
-    """Names of the modules that have a .pxd, of every package."""
-    for package in foundation.OUR_PACKAGES:
-        for path in sorted((ROOT / package).rglob("*.pxd")):
-            yield ".".join(path.relative_to(ROOT).with_suffix("").parts)
+    """Names of the modules that have a .pxd, of every room."""
+    for room in loading.ROOMS:
+        for path in sorted((ROOT / room).rglob("*.pxd")):
+            yield ".".join(("ranger_sim", *path.relative_to(ROOT).with_suffix("").parts))
 
 
 def run(arguments, cwd, **environment):
@@ -60,18 +59,19 @@ def files_of(names, folder, **environment):
 
 
 def test_every_declared_module_is_compiled_where_a_compiler_is():
-    compiled, interpreted = build.compiled_modules()
-    assert sorted(compiled + interpreted) == sorted(declared_modules())
-    if foundation.interpreted_is_forced():
-        assert not compiled
+    declared = sorted(declared_modules())
+    assert sorted(loading.declared_modules()) == declared
+    if loading.interpreted_is_forced():
+        assert not loading.COMPILED_MODULES
     elif shutil.which(COMPILER):
-        assert not interpreted, f"run `make setup`; {build.why_interpreted()}"
+        assert sorted(loading.COMPILED_MODULES) == declared, f"run `make setup`; {loading.RUNS_INTERPRETED_BECAUSE}"
     else:
-        assert "C compiler" in build.why_interpreted()
+        assert "C compiler" in loading.RUNS_INTERPRETED_BECAUSE
 
 
 def test_modules_with_the_same_last_name_are_not_confused():
-    for name in ("boards.steering", "plant.steering", "boards.modules.absolute_encoder", "plant.absolute_encoder"):
+    for inside in ("boards.steering", "plant.steering", "boards.modules.absolute_encoder", "plant.absolute_encoder"):
+        name = f"ranger_sim.{inside}"
         module = importlib.import_module(name)
         assert module.__name__ == module.__spec__.name == name
         assert name in {each.__module__ for each in vars(module).values() if isinstance(each, type)}
@@ -115,8 +115,8 @@ def shipped(tmp_path_factory):
     done = run(["setup.py", "-q", "build_py", "--build-lib", folder], ROOT)
     assert done.returncode == 0, done.stderr
     for pattern in ("_compiled.*", "build_record.json"):
-        for built in (ROOT / "foundation").glob(pattern):
-            shutil.copy(built, folder / "foundation")
+        for built in (ROOT / "ranger_sim").glob(pattern):
+            shutil.copy(built, folder / "ranger_sim")
     return folder
 
 
@@ -124,16 +124,16 @@ def test_every_file_of_the_packages_is_shipped_and_nothing_else(shipped):
     def kept(root):
         return {
             path.relative_to(root).as_posix()
-            for package in (*foundation.OUR_PACKAGES, *DATA_FOLDERS)
-            for path in (root / package).rglob("*")
+            for room in (*loading.ROOMS, *DATA_FOLDERS)
+            for path in (root / room).rglob("*")
             if path.is_file() and "__pycache__" not in path.parts and path.suffix not in BUILT
         }
 
     in_tree = {
         name for name in kept(ROOT) if not name.endswith(".c") or name.startswith("datatable/generated/")
     }  # earlier builds left C files beside the sources
-    assert kept(shipped) == in_tree
-    assert {path.name for path in shipped.iterdir()} == {*foundation.OUR_PACKAGES, *DATA_FOLDERS}
+    assert kept(shipped / "ranger_sim") == in_tree
+    assert [path.name for path in shipped.iterdir()] == ["ranger_sim"]
 
 
 def test_the_shipped_robot_walks_from_another_folder_both_ways(shipped, tmp_path):
@@ -145,13 +145,13 @@ def test_the_shipped_robot_walks_from_another_folder_both_ways(shipped, tmp_path
         if interpreted:
             assert all(file.endswith(".py") for file in files.values())
         out = tmp_path / f"out{interpreted}"
-        done = run(["-m", "tools.cli", "walk", "--time", "200ms", "--out", out, "--json", "-"], tmp_path, **setting)
+        done = run(["-m", "ranger_sim", "walk", "--time", "200ms", "--out", out, "--json", "-"], tmp_path, **setting)
         assert done.returncode == 0, done.stderr
         digests.add(json.loads(done.stdout)["trace_digest"])
         assert (out / "report.html").stat().st_size > 100_000
-        done = run(["-m", "tools.cli", "table", "generate", "--check"], tmp_path, **setting)
+        done = run(["-m", "ranger_sim", "table", "generate", "--check"], tmp_path, **setting)
         assert done.returncode == 0, done.stderr
-        done = run(["-m", "tools.cli", "can-bounds", "--profile", "hil-1mbit", "--json", "-"], tmp_path, **setting)
+        done = run(["-m", "ranger_sim", "can-bounds", "--profile", "hil-1mbit", "--json", "-"], tmp_path, **setting)
         assert done.returncode == 0 and json.loads(done.stdout)["met"], done.stderr
     assert len(digests) == 1
 
@@ -161,14 +161,15 @@ def test_the_shipped_robot_walks_from_another_folder_both_ways(shipped, tmp_path
 
 @pytest.fixture
 def small_house(tmp_path):
-    """setup.py and the package `foundation` alone, not built."""
+    """setup.py, the package and the room `foundation` alone, not built."""
     for name in ("setup.py", "pyproject.toml", "README.md", "LICENSE"):
         shutil.copy(ROOT / name, tmp_path)
-    shutil.copytree(
-        ROOT / "foundation",
-        tmp_path / "foundation",
-        ignore=shutil.ignore_patterns("*.so", "*.pyd", "*.c", "__pycache__", "build_record.json"),
-    )
+    for folder in ("ranger_sim", "foundation"):
+        shutil.copytree(
+            ROOT / folder,
+            tmp_path / folder,
+            ignore=shutil.ignore_patterns("*.so", "*.pyd", "*.c", "__pycache__", "build_record.json"),
+        )
     return tmp_path
 
 
@@ -180,8 +181,8 @@ def build_in(folder, **environment):
 
 def how_it_runs(folder):
     """(files of the compiled modules, the reason for running interpreted)."""
-    names = ["foundation.events", "foundation.numbers", "foundation.random_stream"]
-    done = run(["-c", "import foundation; print(foundation.RUNS_INTERPRETED_BECAUSE)"], folder)
+    names = [f"ranger_sim.foundation.{name}" for name in ("events", "numbers", "random_stream")]
+    done = run(["-c", "from ranger_sim import loading; print(loading.RUNS_INTERPRETED_BECAUSE)"], folder)
     assert done.returncode == 0, done.stderr
     return list(files_of(names, folder).values()), done.stdout.strip()
 
@@ -205,7 +206,7 @@ def test_a_build_compiles_rebuilds_only_what_changed_and_survives_a_broken_decla
     ahead = library.stat().st_mtime_ns + 1_000_000_000
     os.utime(source, ns=(ahead, ahead))
     told = build_in(small_house).stdout
-    assert re.findall(r"Cythonizing (\S+)", told) == ["foundation/numbers.py"]
+    assert re.findall(r"Cythonizing (\S+)", told) == ["ranger_sim/foundation/numbers.py"]
     changed = {name for name, time in times_of_objects(small_house).items() if time != built[name]}
     assert changed == {"numbers.o", "directory.o"}
     assert set(how_it_runs(small_house)[0]) == {str(library)}
@@ -226,8 +227,9 @@ def test_a_build_compiles_rebuilds_only_what_changed_and_survives_a_broken_decla
 
 @needs_compiler
 def test_a_tool_chain_that_knows_no_layout_builds_as_well_and_what_older_builds_left_is_not_used(small_house):
-    left = small_house / "foundation" / ("numbers" + sysconfig.get_config_var("EXT_SUFFIX"))
-    left.write_bytes(b"the library of one module, as they were built once")
+    for name in ("numbers", "_compiled"):
+        left = small_house / "foundation" / (name + sysconfig.get_config_var("EXT_SUFFIX"))
+        left.write_bytes(b"a library as they were built once")
     files, reason = how_it_runs(small_house)
     assert all(file.endswith(".py") for file in files) and reason == "nothing was built here"
 
@@ -235,7 +237,6 @@ def test_a_tool_chain_that_knows_no_layout_builds_as_well_and_what_older_builds_
     compiler.write_text(f'#!/bin/sh\ncase "$*" in *-fno-plt*) exit 1;; esac\nexec {COMPILER} "$@"\n', encoding="ascii")
     compiler.chmod(0o755)
     build_in(small_house, CC=str(compiler))
-    assert not left.exists()
     files, reason = how_it_runs(small_house)
     assert all(file.endswith(BUILT) for file in files) and reason == ""
 
@@ -294,13 +295,11 @@ def test_every_dependency_has_its_reason_beside_it():
     assert all(re.fullmatch(r"\s+# \w.{10,}", rest) for rest in listed)
 
 
-def test_packages_are_listed_alike_everywhere():
+def test_rooms_are_listed_alike_everywhere():
     source = (ROOT / "setup.py").read_text(encoding="utf-8")
-    in_setup = re.search(r"PACKAGES = \((.*?)\)", source, re.DOTALL).group(1)
-    assert tuple(re.findall(r'"(\w+)"', in_setup)) == foundation.OUR_PACKAGES
-    found = PROJECT["tool"]["setuptools"]["packages"]["find"]["include"]
-    assert tuple(name.removesuffix("*") for name in found) == (*foundation.OUR_PACKAGES, *DATA_FOLDERS)
-    assert tuple(PROJECT["tool"]["mypy"]["packages"]) == foundation.OUR_PACKAGES
+    for listed, names in (("ROOMS", loading.ROOMS), ("DATA_FOLDERS", DATA_FOLDERS)):
+        in_setup = re.search(rf"{listed} = \((.*?)\)", source, re.DOTALL).group(1)
+        assert tuple(re.findall(r'"(\w+)"', in_setup)) == names
 
 
 def test_only_compiled_modules_are_left_out_of_type_checking():

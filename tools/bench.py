@@ -18,10 +18,10 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from foundation import wallclock
-from foundation.user_error import UserError
-from tools.files import json_target, replace_file
-from tools.units import whole_number
+from ranger_sim.foundation import wallclock
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.tools.files import json_target, replace_file
+from ranger_sim.tools.units import whole_number
 
 
 def register(commands: Any) -> None:
@@ -53,8 +53,8 @@ def register(commands: Any) -> None:
 
 def robot_case(seconds: float, log: str = "none", swap: bool = False) -> dict:
     """Run the whole robot for so long; CPU seconds of the stepping loop only."""
-    from harness.ranger import Ranger
-    from harness.scenario import Scenario, StopRule
+    from ranger_sim.harness.ranger import Ranger
+    from ranger_sim.harness.scenario import Scenario, StopRule
 
     robot = Ranger(Scenario(), log=log)
     if swap:
@@ -84,7 +84,7 @@ def users_law(board: Any) -> Callable[[], None]:
 
 def plant_case(seconds: float) -> dict:
     """The plant alone, held, motors off."""
-    from plant.ranger import RangerPlant
+    from ranger_sim.plant.ranger import RangerPlant
 
     plant = RangerPlant()
     steps = round(seconds * 1e9 / plant.step_ns)
@@ -96,7 +96,7 @@ def plant_case(seconds: float) -> dict:
 
 def bus_case(frames: int, load: float = 1.0, nodes: int = 3) -> dict:
     """Our bus: send, arbitrate and deliver on four buses of `nodes` boards at `load`."""
-    from can_bus import benchmark
+    from ranger_sim.can_bus import benchmark
 
     done = benchmark.million_frames(frames, load, nodes)
     return {
@@ -110,35 +110,35 @@ def bus_case(frames: int, load: float = 1.0, nodes: int = 3) -> dict:
 
 def virtual_case(frames: int) -> dict:
     """The same work on python-can's `virtual` interface."""
-    from can_bus.edge import benchmark
+    from ranger_sim.can_bus.edge import benchmark
 
     return {"figure": benchmark.virtual_frames(frames)["frames_per_s"], "unit": "frames per CPU s"}
 
 
 def fuzz_case(cases: int) -> dict:
     """Wrong bytes on the data link, both ways; everything accounted for, or an error."""
-    from tools import fuzz_serial
+    from ranger_sim.tools import fuzz_serial
 
     return fuzz_serial.benchmark(cases)
 
 
 def can_fuzz_case(cases: int) -> dict:
     """Frames of every kind and bytes that are none, from outside onto a whole robot's buses."""
-    from tools import fuzz_can
+    from ranger_sim.tools import fuzz_can
 
     return fuzz_can.benchmark(cases)
 
 
 def channel_fuzz_case(cases: int) -> dict:
     """Damaged messages in the channel of a board process."""
-    from tools import fuzz_channel
+    from ranger_sim.tools import fuzz_channel
 
     return fuzz_channel.benchmark(cases)
 
 
 def profile_fuzz_case(cases: int) -> dict:
     """Damaged profiles and schedules."""
-    from tools import fuzz_profiles
+    from ranger_sim.tools import fuzz_profiles
 
     return fuzz_profiles.benchmark(cases)
 
@@ -169,7 +169,7 @@ def measured(case: str, seconds: float, interpreted: bool) -> dict:
     environment.pop("RANGER_SIM_INTERPRETED", None)
     if interpreted:
         environment["RANGER_SIM_INTERPRETED"] = "1"
-    call = [sys.executable, "-m", "tools.cli", "bench", "--case", case, "--seconds", str(max(1, int(seconds)))]
+    call = [sys.executable, "-m", "ranger_sim", "bench", "--case", case, "--seconds", str(max(1, int(seconds)))]
     done = subprocess.run(call, env=environment, capture_output=True, text=True, check=False)
     if done.returncode != 0:
         raise UserError(f"bench: case {case} failed: {done.stderr.strip().splitlines()[-1:]}")
@@ -201,8 +201,8 @@ KEPT = (
 
 def walks(options: argparse.Namespace) -> int:
     """Walk every case of WALKS; a line each, and everything as JSON."""
-    from harness.ranger import Ranger
-    from harness.scenario import Scenario, StopRule
+    from ranger_sim.harness.ranger import Ranger
+    from ranger_sim.harness.scenario import Scenario, StopRule
 
     console = Console(stderr=True, quiet=options.json == "-")
     rows = []
@@ -235,7 +235,7 @@ def walks(options: argparse.Namespace) -> int:
 
 def bounds(options: argparse.Namespace) -> int:
     """Random message sets against their bounds; exit code 1 when an answer came later than its bound."""
-    from can_bus import bound_check
+    from ranger_sim.can_bus import bound_check
 
     json_file = json_target(options.json)
     figures = bound_check.random_sets(options.bounds)
@@ -252,7 +252,7 @@ def bounds(options: argparse.Namespace) -> int:
 
 def interfaces(options: argparse.Namespace) -> int:
     """Frames through python-can interfaces, ours first; a table, and everything as JSON."""
-    from tools.interface_bench import compare, table_of
+    from ranger_sim.tools.interface_bench import compare, table_of
 
     json_file = json_target(options.json)
     rows = compare(options.frames, Console(stderr=True, quiet=options.json == "-"))

@@ -5,14 +5,14 @@ import math
 from contextlib import ExitStack, closing
 from typing import Any
 
-from can_bus.edge.attach import DEFAULT_NAME, AttachServer
-from can_bus.edge.host import BusHost
-from can_bus.edge.paced import DEFAULT_BITRATE, PacedBus, speed_of
-from can_bus.edge.slcan import SlcanServer
-from can_bus.edge.socketcand import SocketcandServer
-from foundation import wallclock
-from foundation.user_error import UserError
-from tools.units import whole_number
+from ranger_sim.can_bus.edge.attach import DEFAULT_NAME, AttachServer
+from ranger_sim.can_bus.edge.host import BusHost
+from ranger_sim.can_bus.edge.paced import DEFAULT_BITRATE, PacedBus, speed_of
+from ranger_sim.can_bus.edge.slcan import SlcanServer
+from ranger_sim.can_bus.edge.socketcand import SocketcandServer
+from ranger_sim.foundation import wallclock
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.tools.units import whole_number
 
 
 def register(commands: Any) -> None:

@@ -11,11 +11,11 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from can_bus.bounds import Bound, response_times, utilisation
-from foundation.user_error import UserError
-from harness import bus_schedule, profile
-from tools.files import json_target, replace_file
-from tools.units import whole_number
+from ranger_sim.can_bus.bounds import Bound, response_times, utilisation
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.harness import bus_schedule, profile
+from ranger_sim.tools.files import json_target, replace_file
+from ranger_sim.tools.units import whole_number
 
 EXIT_DONE, EXIT_MISSED = 0, 1
 
@@ -80,7 +80,7 @@ def of_profile(options: argparse.Namespace) -> list[dict]:
 
 def of_dbc(options: argparse.Namespace) -> list[dict]:
     """The one bus of a DBC file."""
-    from can_bus.edge.dbc import read_messages
+    from ranger_sim.can_bus.edge.dbc import read_messages
 
     path = pathlib.Path(options.dbc)
     messages, bit_rate, silent = read_messages(path, options.bit_rate)

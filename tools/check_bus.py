@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 
-from harness import bus_schedule, profile
-from tools.files import json_target, replace_file
-from tools.units import TIMES, quantity
+from ranger_sim.harness import bus_schedule, profile
+from ranger_sim.tools.files import json_target, replace_file
+from ranger_sim.tools.units import TIMES, quantity
 
 if TYPE_CHECKING:
-    from datatable.model import Table
+    from ranger_sim.datatable.model import Table
 
 EXIT_DONE, EXIT_FAULT = 0, 1
 
@@ -58,7 +58,7 @@ def run(options: argparse.Namespace) -> int:
 
 def check(chosen: profile.Profile, name: str, table: Table, seconds: float) -> dict:
     """Everything about one bus, as plain values."""
-    from can_bus.edge import check_bus as edge  # python-can takes a second to load
+    from ranger_sim.can_bus.edge import check_bus as edge  # python-can takes a second to load
 
     bus = chosen.buses[name]
     arguments = bus.python_can()

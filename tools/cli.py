@@ -5,7 +5,7 @@ import os
 import sys
 from typing import Any, NoReturn
 
-from foundation.user_error import UserError
+from ranger_sim.foundation.user_error import UserError
 
 EXIT_DONE = 0
 EXIT_FELL = 1  # the robot fell or a board failed
@@ -23,9 +23,9 @@ class OneLineParser(argparse.ArgumentParser):
 
 def parser() -> argparse.ArgumentParser:
     """The whole command line."""
-    from datatable import cli as table_command
-    from tools import bench, bus, can_bounds, check_bus, daq, info, tune, up, walk
-    from tools.vm import command as vm
+    from ranger_sim.datatable import cli as table_command
+    from ranger_sim.tools import bench, bus, can_bounds, check_bus, daq, info, tune, up, walk
+    from ranger_sim.tools.vm import command as vm
 
     top = OneLineParser(
         prog="ranger-sim",

@@ -18,21 +18,21 @@ from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
-from boards.main_brain import controllers
-from datatable.generated import all_variables
-from foundation import wallclock
-from foundation.user_error import UserError
-from harness.serial_ports import BLUETOOTH_BAUD, DAQ_BAUD, RealPort, reason_of
-from tools.files import json_target, replace_file
-from tools.robodaq import catalogue, logs, parameter_files
-from tools.robodaq.session import Session
-from tools.units import TIMES, quantity, whole_number
-from tools.walk import ctrl_c_noted
+from ranger_sim.boards.main_brain import controllers
+from ranger_sim.datatable.generated import all_variables
+from ranger_sim.foundation import wallclock
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.harness.serial_ports import BLUETOOTH_BAUD, DAQ_BAUD, RealPort, reason_of
+from ranger_sim.tools.files import json_target, replace_file
+from ranger_sim.tools.robodaq import catalogue, logs, parameter_files
+from ranger_sim.tools.robodaq.session import Session
+from ranger_sim.tools.units import TIMES, quantity, whole_number
+from ranger_sim.tools.walk import ctrl_c_noted
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from tools.robodaq.codec import Point
+    from ranger_sim.tools.robodaq.codec import Point
 
 LOOK_S = 0.02  # between two looks at the port when nothing comes
 SHOW_S = 0.25  # between two pictures on a terminal

@@ -3,7 +3,7 @@
 import pathlib
 import tempfile
 
-from foundation.user_error import UserError
+from ranger_sim.foundation.user_error import UserError
 
 
 def writable_folder(name: str | pathlib.Path) -> pathlib.Path:

@@ -12,17 +12,17 @@ import socket
 from contextlib import suppress
 from typing import Any
 
-from can_bus.bus import OPERATING
-from can_bus.edge import attach_records as wire
-from can_bus.edge.attach import AttachServer
-from can_bus.edge.slcan import SlcanServer
-from can_bus.edge.socketcand import SocketcandServer
-from foundation import wallclock
-from foundation.events import FLAG_EXTENDED, FLAG_REMOTE
-from foundation.random_stream import RandomStream
-from foundation.user_error import UserError
-from harness.ranger import Ranger
-from harness.scenario import Scenario
+from ranger_sim.can_bus.bus import OPERATING
+from ranger_sim.can_bus.edge import attach_records as wire
+from ranger_sim.can_bus.edge.attach import AttachServer
+from ranger_sim.can_bus.edge.slcan import SlcanServer
+from ranger_sim.can_bus.edge.socketcand import SocketcandServer
+from ranger_sim.foundation import wallclock
+from ranger_sim.foundation.events import FLAG_EXTENDED, FLAG_REMOTE
+from ranger_sim.foundation.random_stream import RandomStream
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.harness.ranger import Ranger
+from ranger_sim.harness.scenario import Scenario
 
 SLICE_NS = 1_000_000
 CASES_PER_SLICE = 8

@@ -5,10 +5,10 @@ from __future__ import annotations
 import pathlib
 import tempfile
 
-from foundation import wallclock
-from foundation.random_stream import RandomStream
-from foundation.user_error import UserError
-from harness import profile
+from ranger_sim.foundation import wallclock
+from ranger_sim.foundation.random_stream import RandomStream
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.harness import profile
 
 INTERFACES = ("ranger_sim", "slcan", "socketcan", "virtual")
 WORDS = (

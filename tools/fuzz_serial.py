@@ -9,17 +9,17 @@ from __future__ import annotations
 
 from typing import Any
 
-from boards.main_brain.board import MainBrainBoard
-from boards.quirks import Quirks
-from datatable.generated import all_variables
-from datatable.generated import mb as table
-from firmware_sim.clock import Crystal
-from foundation import wallclock
-from foundation.events import UART_BYTE, UART_OUTPUT
-from foundation.random_stream import RandomStream
-from foundation.user_error import UserError
-from tools.robodaq.codec import SEGMENT_BYTES, write_packet
-from tools.robodaq.session import Session
+from ranger_sim.boards.main_brain.board import MainBrainBoard
+from ranger_sim.boards.quirks import Quirks
+from ranger_sim.datatable.generated import all_variables
+from ranger_sim.datatable.generated import mb as table
+from ranger_sim.firmware_sim.clock import Crystal
+from ranger_sim.foundation import wallclock
+from ranger_sim.foundation.events import UART_BYTE, UART_OUTPUT
+from ranger_sim.foundation.random_stream import RandomStream
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.tools.robodaq.codec import SEGMENT_BYTES, write_packet
+from ranger_sim.tools.robodaq.session import Session
 
 PASS_NS = 22_000_000
 SLOTS_PER_PASS = 11

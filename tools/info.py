@@ -4,15 +4,13 @@ import argparse
 import json
 import platform
 import sys
-from importlib import metadata
 from typing import Any
 
 from rich.console import Console
 from rich.table import Table
 
-import datatable
-from can_bus.edge import interfaces
-from harness.build import compiled_modules, is_compiled, why_interpreted
+from ranger_sim import __version__, datatable, loading
+from ranger_sim.can_bus.edge import interfaces
 
 
 def register(commands: Any) -> None:
@@ -22,23 +20,15 @@ def register(commands: Any) -> None:
     command.set_defaults(run=run)
 
 
-def version() -> str:
-    """Version of the installed package; a bare source tree says so."""
-    try:
-        return metadata.version("ranger-sim")
-    except metadata.PackageNotFoundError:
-        return "source tree, not installed"
-
-
 def facts() -> dict[str, Any]:
     """Everything the command tells, as plain data."""
-    compiled, interpreted = compiled_modules()
+    declared = set(loading.declared_modules())
     return {
-        "version": version(),
-        "compiled": is_compiled(),
-        "interpreted_because": why_interpreted(),
-        "compiled_modules": len(compiled),
-        "interpreted_modules": sorted(interpreted),
+        "version": __version__,
+        "compiled": loading.RUNS_COMPILED,
+        "interpreted_because": loading.RUNS_INTERPRETED_BECAUSE,
+        "compiled_modules": len(declared & loading.COMPILED_MODULES),
+        "interpreted_modules": sorted(declared - loading.COMPILED_MODULES),
         "python": sys.version.split()[0],
         "implementation": platform.python_implementation(),
         "platform": platform.platform(),

@@ -12,7 +12,7 @@ SHARE = {"ranger_sim": 1.0, "virtual": 1.0, "udp_multicast": 0.1}
 
 def compare(frames: int, console: Console) -> list[dict[str, Any]]:
     """`frames` through each interface, in one thread and (where it can) from one process to another."""
-    from can_bus.edge import benchmark
+    from ranger_sim.can_bus.edge import benchmark
 
     rows = []
     for way, measure, interfaces in (

@@ -6,12 +6,12 @@ import argparse
 import sys
 from typing import TYPE_CHECKING, Any
 
-from boards.quirks import Quirks
-from foundation.user_error import UserError
-from harness import serial_ports
+from ranger_sim.boards.quirks import Quirks
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.harness import serial_ports
 
 if TYPE_CHECKING:
-    from harness.ranger import Ranger
+    from ranger_sim.harness.ranger import Ranger
 
 
 def add_options(command: Any) -> None:

@@ -20,10 +20,10 @@ import tempfile
 
 from rich.console import Console
 
-from boards.main_brain import controllers
-from foundation.user_error import UserError
-from harness.scenario import Scenario, StopRule
-from tools.units import LENGTHS, quantity, whole_number
+from ranger_sim.boards.main_brain import controllers
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.harness.scenario import Scenario, StopRule
+from ranger_sim.tools.units import LENGTHS, quantity, whole_number
 
 # What a walk should be, and the deviation that costs 1. Values: the robot's in May 2011 (0.35 m, 0.60 s, 11.3 W,
 # 0.28, 14 ms); tolerances: a quarter of the length, 15 % of the time, and what keeps 6 ... 15 W, 0.19 ... 0.35 and
@@ -169,7 +169,7 @@ class Judge:
 
 def walk(controller: str, seed: int, roughness_m: float, steps: int) -> dict:
     """The summary of one walk of the whole robot."""
-    from harness.ranger import Ranger  # the whole robot: only when it is to walk
+    from ranger_sim.harness.ranger import Ranger  # the whole robot: only when it is to walk
 
     with contextlib.closing(Ranger(Scenario(controller=controller, seed=seed, floor_roughness_m=roughness_m))) as robot:
         # three times the time of such a walk, so that one that stands still ends too (chosen by us)

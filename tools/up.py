@@ -12,26 +12,27 @@ from rich.console import Console
 from rich.live import Live
 from rich.table import Table
 
-from foundation import wallclock
-from foundation.user_error import UserError
-from harness import build, wiring
-from harness.processes import block as places
-from harness.processes import control
-from harness.processes.hardware import HardwareInTheLoop
-from harness.processes.lateness import figures
-from harness.processes.outside import move_bus
-from harness.processes.settings import NEVER, ON_FAILURE, Settings, one_processor
-from harness.processes.supervisor import ELSEWHERE, RUNNING, Supervisor, View, check_platform
-from harness.profile import Profile
-from harness.profile import load as load_profile
-from harness.scenario import StopRule
-from tools import serial_options, walk
-from tools.files import json_target, writable_folder
+from ranger_sim import loading
+from ranger_sim.foundation import wallclock
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.harness import wiring
+from ranger_sim.harness.processes import block as places
+from ranger_sim.harness.processes import control
+from ranger_sim.harness.processes.hardware import HardwareInTheLoop
+from ranger_sim.harness.processes.lateness import figures
+from ranger_sim.harness.processes.outside import move_bus
+from ranger_sim.harness.processes.settings import NEVER, ON_FAILURE, Settings, one_processor
+from ranger_sim.harness.processes.supervisor import ELSEWHERE, RUNNING, Supervisor, View, check_platform
+from ranger_sim.harness.profile import Profile
+from ranger_sim.harness.profile import load as load_profile
+from ranger_sim.harness.scenario import StopRule
+from ranger_sim.tools import serial_options, walk
+from ranger_sim.tools.files import json_target, writable_folder
 
 if TYPE_CHECKING:
-    from can_bus.edge.external_bus import ExternalBus
-    from harness.processes.plant_process import PlantRun
-    from harness.ranger import Ranger
+    from ranger_sim.can_bus.edge.external_bus import ExternalBus
+    from ranger_sim.harness.processes.plant_process import PlantRun
+    from ranger_sim.harness.ranger import Ranger
 
 PLAIN_S = 2.0  # between two lines where there is no terminal
 FOREVER = StopRule(steps=1 << 40)
@@ -50,7 +51,7 @@ def speed(text: str) -> float | None:
 def processor(text: str) -> int | None:
     """The processor that --processor means; None for all of them."""
     if text == "one":
-        return one_processor() if build.is_compiled() else None
+        return one_processor() if loading.RUNS_COMPILED else None
     if text == "all":
         return None
     if not text.isdecimal():
@@ -119,7 +120,7 @@ def external_buses(
 
     UserError for what is not there or contradicts itself.
     """
-    from can_bus.edge.external_bus import ExternalBus, opener, place_of
+    from ranger_sim.can_bus.edge.external_bus import ExternalBus, opener, place_of
 
     found: dict[str, ExternalBus] = {}
     openers: dict[str, Any] = {}
@@ -149,8 +150,8 @@ def external_buses(
 
 def run(options: argparse.Namespace) -> int:
     """Start the processes and look after them; exit codes as for `walk`."""
-    from harness.ranger import Ranger  # the whole robot, and python-can: only when it is to walk
-    from tools import bus
+    from ranger_sim.harness.ranger import Ranger  # the whole robot, and python-can: only when it is to walk
+    from ranger_sim.tools import bus
 
     check_platform()
     settings = Settings(
@@ -184,8 +185,10 @@ def run(options: argparse.Namespace) -> int:
         outside, openers = external_buses(options, robot, profile)
         for each in outside:
             console.print(f"{each.name} is outside: this run is asynchronous and cannot be repeated", highlight=False)
-        if not build.is_compiled():
-            console.print(f"running interpreted, slowly: {build.why_interpreted()}", highlight=False, soft_wrap=True)
+        if not loading.RUNS_COMPILED:
+            console.print(
+                f"running interpreted, slowly: {loading.RUNS_INTERPRETED_BECAUSE}", highlight=False, soft_wrap=True
+            )
 
         elsewhere: list[HardwareInTheLoop] = []
 

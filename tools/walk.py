@@ -13,21 +13,21 @@ from typing import TYPE_CHECKING, Any
 from rich.console import Console
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeRemainingColumn
 
-from foundation import wallclock
-from foundation.user_error import UserError
-from harness import build
-from harness.profile import Profile
-from harness.profile import load as load_profile
-from harness.scenario import Scenario, StopRule
-from tools import serial_options
-from tools.files import json_target, replace_file, writable_folder
-from tools.units import LENGTHS, TIMES, quantity, whole_number
+from ranger_sim import loading
+from ranger_sim.foundation import wallclock
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.harness.profile import Profile
+from ranger_sim.harness.profile import load as load_profile
+from ranger_sim.harness.scenario import Scenario, StopRule
+from ranger_sim.tools import serial_options
+from ranger_sim.tools.files import json_target, replace_file, writable_folder
+from ranger_sim.tools.units import LENGTHS, TIMES, quantity, whole_number
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from types import FrameType
 
-    from harness.ranger import Ranger
+    from ranger_sim.harness.ranger import Ranger
 
 DEFAULT_STEPS = 100
 SLICE_S = 0.05  # virtual seconds between two looks at the screen and at Ctrl-C
@@ -125,7 +125,7 @@ def profile_of(options: argparse.Namespace, console: Console) -> Profile | None:
 
 def run_scenario(scenario: Scenario, stop: StopRule, options: argparse.Namespace, interrupted: list[bool]) -> int:
     """`run` with everything checked; `interrupted` is filled by Ctrl-C."""
-    from harness.ranger import Ranger  # the whole robot: only when it is to walk
+    from ranger_sim.harness.ranger import Ranger  # the whole robot: only when it is to walk
 
     folder = writable_folder(options.out) if options.out else None
     json_file = json_target(options.json)
@@ -138,8 +138,10 @@ def run_scenario(scenario: Scenario, stop: StopRule, options: argparse.Namespace
         ends, places = serial_options.connect(robot, options)
         for place in places:
             console.print(place, highlight=False, soft_wrap=True)
-        if not build.is_compiled():
-            console.print(f"running interpreted, slowly: {build.why_interpreted()}", highlight=False, soft_wrap=True)
+        if not loading.RUNS_COMPILED:
+            console.print(
+                f"running interpreted, slowly: {loading.RUNS_INTERPRETED_BECAUSE}", highlight=False, soft_wrap=True
+            )
         walk(robot, stop, console, interrupted, paced=bool(ends))
         for line in serial_options.report(ends):
             console.print(line, highlight=False, soft_wrap=True)
@@ -231,8 +233,8 @@ def walk(robot: Ranger, stop: StopRule, console: Console, interrupted: list[bool
 
 def write_files(robot: Ranger, summary: dict, folder: pathlib.Path, console: Console) -> None:
     """Summary first, then candump logs, variables and report, as far as the log kept something to show."""
-    from tools import variables_file
-    from tools.report import page
+    from ranger_sim.tools import variables_file
+    from ranger_sim.tools.report import page
 
     replace_file(folder / "summary.json", (json.dumps(summary, indent=2) + "\n").encode())
     if robot.logbook.mode == "none":
@@ -245,7 +247,7 @@ def write_files(robot: Ranger, summary: dict, folder: pathlib.Path, console: Con
 
 def write_frames(robot: Ranger, folder: pathlib.Path) -> None:
     """One log per bus in candump's format."""
-    from can_bus.edge.candump import CandumpWriter
+    from ranger_sim.can_bus.edge.candump import CandumpWriter
 
     frames = robot.logbook.frames()
     columns = [frames[name] for name in ("time_ns", "identifier", "flags", "word0", "word1")]

@@ -1,3 +1,1 @@
 """The main brain: estimator, concurrent state machines, modes, and the controller parameter sets."""
-
-import foundation  # noqa: F401

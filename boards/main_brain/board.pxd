@@ -1,15 +1,15 @@
-from boards.main_brain.data_link cimport DataLink
-from boards.main_brain.estimator cimport Estimator
-from boards.main_brain.io_data cimport IoData
-from boards.main_brain.mode_machine cimport ModeMachine
-from boards.modules.error_module cimport ErrorModule
-from boards.modules.network_time cimport NetworkTime
-from boards.modules.ssp_link cimport MainBrainSspLink
-from datatable.store cimport DataStore
-from firmware_sim.microcontroller cimport Microcontroller
-from firmware_sim.peripherals.ssp cimport SspPort, SspSegment
-from firmware_sim.peripherals.uart_hs cimport HsUart
-from firmware_sim.scheduler cimport Schedule
+from ranger_sim.boards.main_brain.data_link cimport DataLink
+from ranger_sim.boards.main_brain.estimator cimport Estimator
+from ranger_sim.boards.main_brain.io_data cimport IoData
+from ranger_sim.boards.main_brain.mode_machine cimport ModeMachine
+from ranger_sim.boards.modules.error_module cimport ErrorModule
+from ranger_sim.boards.modules.network_time cimport NetworkTime
+from ranger_sim.boards.modules.ssp_link cimport MainBrainSspLink
+from ranger_sim.datatable.store cimport DataStore
+from ranger_sim.firmware_sim.microcontroller cimport Microcontroller
+from ranger_sim.firmware_sim.peripherals.ssp cimport SspPort, SspSegment
+from ranger_sim.firmware_sim.peripherals.uart_hs cimport HsUart
+from ranger_sim.firmware_sim.scheduler cimport Schedule
 
 cdef class MainBrainBoard(Microcontroller):
     cdef public object quirks, distribution, controller

@@ -12,25 +12,25 @@ from typing import NamedTuple
 
 import cython
 
-from boards.main_brain import controllers
-from boards.main_brain.data_link import DataLink
-from boards.main_brain.error_distribution import ErrorDistribution
-from boards.main_brain.estimator import Estimator
-from boards.main_brain.io_data import IoData
-from boards.main_brain.mode_machine import ModeMachine
-from boards.modules.error_module import ErrorModule
-from boards.modules.network_time import NetworkTime
-from boards.modules.ssp_link import MainBrainSspLink
-from datatable.generated import errors as codes
-from datatable.generated import mb as table
-from datatable.generated.all_variables import ID_OF_LAST, TABLE_SIZE
-from datatable.store import DataStore
-from firmware_sim.microcontroller import Microcontroller
-from firmware_sim.peripherals.ssp import SspPort, SspSegment
-from firmware_sim.peripherals.uart_hs import HsUart
-from firmware_sim.scheduler import Schedule, Task
-from firmware_sim.vic import DMA_DONE, FIQ, SOFTWARE
-from foundation.events import SSP_SEGMENT, EventQueue
+from ranger_sim.boards.main_brain import controllers
+from ranger_sim.boards.main_brain.data_link import DataLink
+from ranger_sim.boards.main_brain.error_distribution import ErrorDistribution
+from ranger_sim.boards.main_brain.estimator import Estimator
+from ranger_sim.boards.main_brain.io_data import IoData
+from ranger_sim.boards.main_brain.mode_machine import ModeMachine
+from ranger_sim.boards.modules.error_module import ErrorModule
+from ranger_sim.boards.modules.network_time import NetworkTime
+from ranger_sim.boards.modules.ssp_link import MainBrainSspLink
+from ranger_sim.datatable.generated import errors as codes
+from ranger_sim.datatable.generated import mb as table
+from ranger_sim.datatable.generated.all_variables import ID_OF_LAST, TABLE_SIZE
+from ranger_sim.datatable.store import DataStore
+from ranger_sim.firmware_sim.microcontroller import Microcontroller
+from ranger_sim.firmware_sim.peripherals.ssp import SspPort, SspSegment
+from ranger_sim.firmware_sim.peripherals.uart_hs import HsUart
+from ranger_sim.firmware_sim.scheduler import Schedule, Task
+from ranger_sim.firmware_sim.vic import DMA_DONE, FIQ, SOFTWARE
+from ranger_sim.foundation.events import SSP_SEGMENT, EventQueue
 
 # Both edges of slave select: stop and restart two DMA channels; about 300 instructions of C (chosen by us).
 SEGMENT_CYCLES = 450

@@ -1,4 +1,4 @@
-from datatable.store cimport DataStore
+from ranger_sim.datatable.store cimport DataStore
 
 cdef class MotorCommand:
     cdef public DataStore store

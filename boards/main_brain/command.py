@@ -1,6 +1,6 @@
 """What a machine tells a motor board, and how machines come by the numbers of the data table."""
 
-from datatable.generated import mb as table
+from ranger_sim.datatable.generated import mb as table
 
 
 def table_id(name):

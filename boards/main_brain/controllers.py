@@ -13,9 +13,9 @@ import tomllib
 from dataclasses import dataclass, fields
 from typing import Any
 
-from datatable.generated import mb as table_ids
-from datatable.loader import load_table
-from foundation.user_error import UserError
+from ranger_sim.datatable.generated import mb as table_ids
+from ranger_sim.datatable.loader import load_table
+from ranger_sim.foundation.user_error import UserError
 
 FOLDER = pathlib.Path(__file__).parent / "parameters"
 FIRST_OWN_ID = 314  # ids below are the robot's of 2016; its CTRL_ parameters belong to another controller

@@ -1,7 +1,7 @@
-from datatable.store cimport DataStore
-from firmware_sim.microcontroller cimport Microcontroller
-from firmware_sim.peripherals.uart_hs cimport HsUart
-from firmware_sim.vic cimport InterruptSource
+from ranger_sim.datatable.store cimport DataStore
+from ranger_sim.firmware_sim.microcontroller cimport Microcontroller
+from ranger_sim.firmware_sim.peripherals.uart_hs cimport HsUart
+from ranger_sim.firmware_sim.vic cimport InterruptSource
 
 cdef class DataLink:
     cdef public Microcontroller chip

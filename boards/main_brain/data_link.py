@@ -16,11 +16,11 @@ import array
 
 import cython
 
-from datatable.generated import all_variables, errors
-from datatable.generated import mb as table
-from firmware_sim.peripherals.uart_hs import HsUart
-from firmware_sim.vic import SOFTWARE
-from foundation.events import EventQueue
+from ranger_sim.datatable.generated import all_variables, errors
+from ranger_sim.datatable.generated import mb as table
+from ranger_sim.firmware_sim.peripherals.uart_hs import HsUart
+from ranger_sim.firmware_sim.vic import SOFTWARE
+from ranger_sim.foundation.events import EventQueue
 
 POINTS_PER_SEGMENT = 9
 POINT_BYTES = 10

@@ -1,5 +1,5 @@
-from boards.modules.error_module cimport ErrorModule
-from datatable.store cimport DataStore
+from ranger_sim.boards.modules.error_module cimport ErrorModule
+from ranger_sim.datatable.store cimport DataStore
 
 cimport cython
 

@@ -10,9 +10,9 @@ from typing import Any
 
 import cython
 
-from boards.modules.error_module import error_word
-from datatable.generated import mb as table
-from datatable.store import LABVIEW, MB_ERR_DIST, SSP, DataStore
+from ranger_sim.boards.modules.error_module import error_word
+from ranger_sim.datatable.generated import mb as table
+from ranger_sim.datatable.store import LABVIEW, MB_ERR_DIST, SSP, DataStore
 
 SOURCES = ("ERROR_MB", "ERROR_MCH", "ERROR_MCFO", "ERROR_MCFI", "ERROR_MCSO", "ERROR_MCSI", "ERROR_UI", "ERROR_CSR")
 COMPUTER_RING = 64

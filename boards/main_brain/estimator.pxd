@@ -1,8 +1,8 @@
 from libc.math cimport cos
 
-from boards.main_brain.filters cimport ButterworthFilter
-from boards.main_brain.geometry cimport FloorGeometry
-from datatable.store cimport DataStore
+from ranger_sim.boards.main_brain.filters cimport ButterworthFilter
+from ranger_sim.boards.main_brain.geometry cimport FloorGeometry
+from ranger_sim.datatable.store cimport DataStore
 
 cdef long long _MASK
 

@@ -10,11 +10,11 @@ ROBOT PARITY: the LPC3250 computed in single precision in part; its angle integr
 
 import cython
 
-from boards.main_brain.command import table_id
-from boards.main_brain.filters import ButterworthFilter
-from boards.main_brain.geometry import FloorGeometry
-from datatable.generated import errors
-from datatable.store import DataStore
+from ranger_sim.boards.main_brain.command import table_id
+from ranger_sim.boards.main_brain.filters import ButterworthFilter
+from ranger_sim.boards.main_brain.geometry import FloorGeometry
+from ranger_sim.datatable.generated import errors
+from ranger_sim.datatable.store import DataStore
 
 if not cython.compiled:
     from math import cos

@@ -7,9 +7,9 @@ the inner feet start flipped down in the air, the outer ones start standing, and
 
 import cython
 
-from boards.main_brain.command import MotorCommand, table_id
-from boards.main_brain.state_machine import ANY, State, StateMachine
-from datatable.store import DataStore
+from ranger_sim.boards.main_brain.command import MotorCommand, table_id
+from ranger_sim.boards.main_brain.state_machine import ANY, State, StateMachine
+from ranger_sim.datatable.store import DataStore
 
 COMMON = (
     "MCH_ANGLE",

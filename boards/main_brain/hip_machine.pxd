@@ -1,6 +1,6 @@
-from boards.main_brain.command cimport MotorCommand
-from boards.main_brain.state_machine cimport State, StateMachine
-from datatable.store cimport DataStore
+from ranger_sim.boards.main_brain.command cimport MotorCommand
+from ranger_sim.boards.main_brain.state_machine cimport State, StateMachine
+from ranger_sim.datatable.store cimport DataStore
 
 cdef class HipMachine:
     cdef public DataStore store

@@ -9,9 +9,9 @@ it was off and all its gains were 0.
 
 import cython
 
-from boards.main_brain.command import MotorCommand, table_id
-from boards.main_brain.state_machine import State, StateMachine
-from datatable.store import DataStore
+from ranger_sim.boards.main_brain.command import MotorCommand, table_id
+from ranger_sim.boards.main_brain.state_machine import State, StateMachine
+from ranger_sim.datatable.store import DataStore
 
 READS = (
     "MCH_ANGLE",

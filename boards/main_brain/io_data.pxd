@@ -1,7 +1,7 @@
-from boards.modules.network_time cimport NetworkTime
-from boards.modules.ssp_link cimport MainBrainSspLink
-from datatable.store cimport DataStore
-from firmware_sim.peripherals.ssp cimport SspSegment
+from ranger_sim.boards.modules.network_time cimport NetworkTime
+from ranger_sim.boards.modules.ssp_link cimport MainBrainSspLink
+from ranger_sim.datatable.store cimport DataStore
+from ranger_sim.firmware_sim.peripherals.ssp cimport SspSegment
 
 cdef class IoData:
     cdef public DataStore store

@@ -11,11 +11,11 @@ import array
 
 import cython
 
-from boards.modules.network_time import NetworkTime
-from boards.modules.ssp_link import MainBrainSspLink
-from datatable.store import DataStore
-from firmware_sim.peripherals.ssp import SspSegment
-from foundation.user_error import UserError
+from ranger_sim.boards.modules.network_time import NetworkTime
+from ranger_sim.boards.modules.ssp_link import MainBrainSspLink
+from ranger_sim.datatable.store import DataStore
+from ranger_sim.firmware_sim.peripherals.ssp import SspSegment
+from ranger_sim.foundation.user_error import UserError
 
 
 class IoData:

@@ -1,5 +1,5 @@
-from boards.main_brain.state_machine cimport State, StateMachine
-from datatable.store cimport DataStore
+from ranger_sim.boards.main_brain.state_machine cimport State, StateMachine
+from ranger_sim.datatable.store cimport DataStore
 
 cdef class StanceLeg:
     cdef public LegMachine owner

@@ -11,9 +11,9 @@ machine in premid until the stance leg is next upright.
 
 import cython
 
-from boards.main_brain.command import table_id
-from boards.main_brain.state_machine import ANY, State, StateMachine
-from datatable.store import DataStore
+from ranger_sim.boards.main_brain.command import table_id
+from ranger_sim.boards.main_brain.state_machine import ANY, State, StateMachine
+from ranger_sim.datatable.store import DataStore
 
 READS = (
     "E_LO_ANGLE",

@@ -1,11 +1,11 @@
-from boards.main_brain.estimator cimport Estimator
-from boards.main_brain.foot_machines cimport FootMachine
-from boards.main_brain.hip_machine cimport HipMachine
-from boards.main_brain.leg_machine cimport LegMachine
-from boards.main_brain.state_machine cimport State, StateMachine
-from boards.main_brain.steering_machine cimport SteeringMachine
-from datatable.store cimport DataStore
-from foundation.numbers cimport elapsed_u32
+from ranger_sim.boards.main_brain.estimator cimport Estimator
+from ranger_sim.boards.main_brain.foot_machines cimport FootMachine
+from ranger_sim.boards.main_brain.hip_machine cimport HipMachine
+from ranger_sim.boards.main_brain.leg_machine cimport LegMachine
+from ranger_sim.boards.main_brain.state_machine cimport State, StateMachine
+from ranger_sim.boards.main_brain.steering_machine cimport SteeringMachine
+from ranger_sim.datatable.store cimport DataStore
+from ranger_sim.foundation.numbers cimport elapsed_u32
 
 cdef class ModeMachine:
     cdef public DataStore store

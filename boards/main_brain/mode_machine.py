@@ -8,16 +8,16 @@ light 1 as in 2016 (facts network-and-boards 6.4) where the mode exists there.
 
 import cython
 
-from boards.main_brain.command import table_id
-from boards.main_brain.foot_machines import FootMachine
-from boards.main_brain.hip_machine import HipMachine
-from boards.main_brain.leg_machine import LegMachine
-from boards.main_brain.state_machine import State, StateMachine
-from boards.main_brain.steering_machine import SteeringMachine
-from datatable.store import DataStore
+from ranger_sim.boards.main_brain.command import table_id
+from ranger_sim.boards.main_brain.foot_machines import FootMachine
+from ranger_sim.boards.main_brain.hip_machine import HipMachine
+from ranger_sim.boards.main_brain.leg_machine import LegMachine
+from ranger_sim.boards.main_brain.state_machine import State, StateMachine
+from ranger_sim.boards.main_brain.steering_machine import SteeringMachine
+from ranger_sim.datatable.store import DataStore
 
 if not cython.compiled:
-    from foundation.numbers import elapsed_u32
+    from ranger_sim.foundation.numbers import elapsed_u32
 
 READS = (
     "TIMESTAMP",

@@ -1,4 +1,4 @@
-from firmware_sim.scheduler cimport call
+from ranger_sim.firmware_sim.scheduler cimport call
 
 cimport cython
 

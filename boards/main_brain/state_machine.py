@@ -14,7 +14,7 @@ Conditions and actions are callables without arguments; conditions must not chan
 import cython
 
 if not cython.compiled:
-    from firmware_sim.calls import call
+    from ranger_sim.firmware_sim.calls import call
 
 
 class State:

@@ -7,8 +7,8 @@ the motor is shut down.
 
 import cython
 
-from boards.main_brain.command import table_id
-from boards.main_brain.state_machine import ANY, State, StateMachine
+from ranger_sim.boards.main_brain.command import table_id
+from ranger_sim.boards.main_brain.state_machine import ANY, State, StateMachine
 
 READS = (
     "MCH_ANGLE",

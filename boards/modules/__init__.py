@@ -1,3 +1,1 @@
 """Firmware modules that several boards share, one job each. A module knows its chip's pins, never a board's name."""
-
-import foundation  # noqa: F401  (first: it chooses compiled or interpreted modules)

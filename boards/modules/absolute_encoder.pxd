@@ -1,4 +1,4 @@
-from boards.modules.error_module cimport ErrorModule
+from ranger_sim.boards.modules.error_module cimport ErrorModule
 
 cimport cython
 

@@ -3,7 +3,7 @@
 
 import cython
 
-from boards.modules.error_module import ErrorModule
+from ranger_sim.boards.modules.error_module import ErrorModule
 
 RAD_PER_COUNT = 0.0007669922  # as in the firmware; 2 pi / 8192 would be 0.00076699039
 # The same in 0.32 fixed point: 0.0007669922 x 2^32, so that the truncation stays below one 16.16 step.

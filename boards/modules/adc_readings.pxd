@@ -1,6 +1,6 @@
-from firmware_sim.peripherals.adc_external cimport Ads7871
-from firmware_sim.peripherals.adc_internal cimport AdcInternal
-from foundation.numbers cimport fixed_multiply, fixed_of_float, float32, float_of_fixed
+from ranger_sim.firmware_sim.peripherals.adc_external cimport Ads7871
+from ranger_sim.firmware_sim.peripherals.adc_internal cimport AdcInternal
+from ranger_sim.foundation.numbers cimport fixed_multiply, fixed_of_float, float32, float_of_fixed
 
 cimport cython
 

@@ -9,11 +9,11 @@ truncated to 16.16 (100 instead of 100.9 for the hip), as in the firmware.
 
 import cython
 
-from firmware_sim.peripherals.adc_external import Ads7871
-from firmware_sim.peripherals.adc_internal import AdcInternal
+from ranger_sim.firmware_sim.peripherals.adc_external import Ads7871
+from ranger_sim.firmware_sim.peripherals.adc_internal import AdcInternal
 
 if not cython.compiled:
-    from foundation.numbers import fixed_multiply, fixed_of_float, float32, float_of_fixed
+    from ranger_sim.foundation.numbers import fixed_multiply, fixed_of_float, float32, float_of_fixed
 
 
 class AdcReadings:

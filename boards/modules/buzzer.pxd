@@ -1,4 +1,4 @@
-from boards.modules.receiver cimport Receiver
+from ranger_sim.boards.modules.receiver cimport Receiver
 
 cdef class Buzzer:
     cdef public bint beeps, repeats, playing

@@ -10,7 +10,7 @@ import array
 
 import cython
 
-from boards.modules.receiver import Receiver
+from ranger_sim.boards.modules.receiver import Receiver
 
 # Our own tune, a rising and falling fifth: the robot played a song that belongs to others. (Hz, ms)
 TUNE = ((523, 200), (784, 200), (659, 200), (988, 200), (784, 400), (587, 200), (523, 400), (0, 200))

@@ -1,9 +1,9 @@
-from boards.modules.error_module cimport ErrorModule
-from boards.modules.network_time cimport NetworkTime
-from boards.modules.receiver cimport Receiver
-from firmware_sim.microcontroller cimport Microcontroller
-from firmware_sim.peripherals.can_controller cimport CanController
-from foundation.numbers cimport word_of_float, word_of_i32
+from ranger_sim.boards.modules.error_module cimport ErrorModule
+from ranger_sim.boards.modules.network_time cimport NetworkTime
+from ranger_sim.boards.modules.receiver cimport Receiver
+from ranger_sim.firmware_sim.microcontroller cimport Microcontroller
+from ranger_sim.firmware_sim.peripherals.can_controller cimport CanController
+from ranger_sim.foundation.numbers cimport word_of_float, word_of_i32
 
 cimport cython
 

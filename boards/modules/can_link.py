@@ -10,11 +10,11 @@ buffers 1 and 2 as these fall free: looked after whenever a frame is queued, and
 
 import cython
 
-from boards.modules.error_module import ErrorModule
-from boards.modules.network_time import NetworkTime
-from boards.modules.receiver import Receiver
-from firmware_sim.microcontroller import Microcontroller
-from firmware_sim.peripherals.can_controller import (
+from ranger_sim.boards.modules.error_module import ErrorModule
+from ranger_sim.boards.modules.network_time import NetworkTime
+from ranger_sim.boards.modules.receiver import Receiver
+from ranger_sim.firmware_sim.microcontroller import Microcontroller
+from ranger_sim.firmware_sim.peripherals.can_controller import (
     ICR_BEI,
     ICR_DOI,
     ICR_EI,
@@ -23,11 +23,11 @@ from firmware_sim.peripherals.can_controller import (
     ICR_TI1,
     CanController,
 )
-from foundation.events import CAN_RX, CAN_STATUS, EventQueue
-from foundation.user_error import UserError
+from ranger_sim.foundation.events import CAN_RX, CAN_STATUS, EventQueue
+from ranger_sim.foundation.user_error import UserError
 
 if not cython.compiled:
-    from foundation.numbers import word_of_float, word_of_i32
+    from ranger_sim.foundation.numbers import word_of_float, word_of_i32
 
 RECEIVE_RING = 64  # 63 usable
 SEND_RING = 8  # 7 usable

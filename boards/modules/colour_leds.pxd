@@ -1,5 +1,5 @@
-from boards.modules.receiver cimport Receiver
-from firmware_sim.microcontroller cimport Microcontroller
+from ranger_sim.boards.modules.receiver cimport Receiver
+from ranger_sim.firmware_sim.microcontroller cimport Microcontroller
 
 cdef class ColourLeds:
     cdef public long long[::1] ports

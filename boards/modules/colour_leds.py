@@ -9,7 +9,7 @@ import array
 
 import cython
 
-from boards.modules.receiver import Receiver
+from ranger_sim.boards.modules.receiver import Receiver
 
 BLUE = 0
 GREEN = 1

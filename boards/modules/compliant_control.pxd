@@ -1,5 +1,5 @@
-from boards.modules.receiver cimport Receiver
-from foundation.numbers cimport fixed_multiply, fixed_of_float, float_of_word
+from ranger_sim.boards.modules.receiver cimport Receiver
+from ranger_sim.foundation.numbers cimport fixed_multiply, fixed_of_float, float_of_word
 
 cimport cython
 

@@ -3,10 +3,10 @@
 
 import cython
 
-from boards.modules.receiver import Receiver
+from ranger_sim.boards.modules.receiver import Receiver
 
 if not cython.compiled:
-    from foundation.numbers import fixed_multiply, fixed_of_float, float_of_word
+    from ranger_sim.foundation.numbers import fixed_multiply, fixed_of_float, float_of_word
 
 COMMAND = 0
 STIFFNESS = 1

@@ -1,7 +1,7 @@
-from boards.modules.error_module cimport ErrorModule
-from boards.modules.mcu_led cimport McuLed
-from boards.modules.motor_limits cimport MotorLimits
-from boards.modules.motor_output cimport MotorOutput
+from ranger_sim.boards.modules.error_module cimport ErrorModule
+from ranger_sim.boards.modules.mcu_led cimport McuLed
+from ranger_sim.boards.modules.motor_limits cimport MotorLimits
+from ranger_sim.boards.modules.motor_output cimport MotorOutput
 
 cimport cython
 

@@ -3,10 +3,10 @@
 
 import cython
 
-from boards.modules.error_module import ErrorModule
-from boards.modules.mcu_led import McuLed
-from boards.modules.motor_limits import MotorLimits
-from boards.modules.motor_output import MotorOutput
+from ranger_sim.boards.modules.error_module import ErrorModule
+from ranger_sim.boards.modules.mcu_led import McuLed
+from ranger_sim.boards.modules.motor_limits import MotorLimits
+from ranger_sim.boards.modules.motor_output import MotorOutput
 
 # Counts per A and sample, all four boards (facts 4.2). The current settles within one sample, so the motor is a
 # gain of 1/31 A per count (1.34 ohm at 25.9 V): the integral alone has its pole at 1 - 20/31 = 0.35.

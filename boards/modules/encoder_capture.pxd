@@ -1,9 +1,9 @@
 cimport cython
 
-from boards.modules.quadrature_decoder cimport QuadratureDecoder
-from firmware_sim.microcontroller cimport Microcontroller
-from firmware_sim.peripherals.timer_capture cimport TimerCapture
-from foundation.events cimport EventQueue
+from ranger_sim.boards.modules.quadrature_decoder cimport QuadratureDecoder
+from ranger_sim.firmware_sim.microcontroller cimport Microcontroller
+from ranger_sim.firmware_sim.peripherals.timer_capture cimport TimerCapture
+from ranger_sim.foundation.events cimport EventQueue
 
 @cython.final
 cdef class WrapCounter:

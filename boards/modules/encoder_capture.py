@@ -9,11 +9,11 @@ that edge leaves, looks at channel B for the direction, and arms the other edge.
 
 import cython
 
-from boards.modules.quadrature_decoder import QuadratureDecoder
-from firmware_sim.microcontroller import Microcontroller
-from firmware_sim.peripherals.timer_capture import TimerCapture
-from firmware_sim.vic import FIQ, TIMER_MATCH
-from foundation.events import EventQueue
+from ranger_sim.boards.modules.quadrature_decoder import QuadratureDecoder
+from ranger_sim.firmware_sim.microcontroller import Microcontroller
+from ranger_sim.firmware_sim.peripherals.timer_capture import TimerCapture
+from ranger_sim.firmware_sim.vic import FIQ, TIMER_MATCH
+from ranger_sim.foundation.events import EventQueue
 
 # Appendix 4.6: the hand-written handler takes about 150 cycles, entry included.
 EDGE_CYCLES = 150

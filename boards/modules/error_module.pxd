@@ -1,4 +1,4 @@
-from boards.modules.network_time cimport NetworkTime
+from ranger_sim.boards.modules.network_time cimport NetworkTime
 
 cimport cython
 

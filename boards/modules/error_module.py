@@ -8,8 +8,8 @@ since it was last sent (22-31); its time word is when it first came (facts netwo
 
 import cython
 
-from boards.modules.network_time import NetworkTime
-from foundation.numbers import integers
+from ranger_sim.boards.modules.network_time import NetworkTime
+from ranger_sim.foundation.numbers import integers
 
 CODES = 1024  # codes 0 ... CODES-1 can be noted (the table has about 120)
 RING_SIZE = 32  # errors waiting to be sent; one place stays empty, as in all rings of the firmware

@@ -1,5 +1,5 @@
-from boards.modules.network_time cimport NetworkTime
-from firmware_sim.microcontroller cimport Microcontroller
+from ranger_sim.boards.modules.network_time cimport NetworkTime
+from ranger_sim.firmware_sim.microcontroller cimport Microcontroller
 
 cimport cython
 

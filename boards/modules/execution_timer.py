@@ -3,8 +3,8 @@
 
 import cython
 
-from boards.modules.network_time import NetworkTime
-from firmware_sim.microcontroller import Microcontroller
+from ranger_sim.boards.modules.network_time import NetworkTime
+from ranger_sim.firmware_sim.microcontroller import Microcontroller
 
 
 class ExecutionTimer:

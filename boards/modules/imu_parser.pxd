@@ -1,5 +1,5 @@
-from firmware_sim.peripherals.uart cimport Uart
-from foundation.numbers cimport float_of_word
+from ranger_sim.firmware_sim.peripherals.uart cimport Uart
+from ranger_sim.foundation.numbers cimport float_of_word
 
 cimport cython
 

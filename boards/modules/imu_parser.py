@@ -15,11 +15,11 @@ the sum of the 29 bytes before it.
 
 import cython
 
-from datatable.generated import errors
-from firmware_sim.peripherals.uart import Uart
+from ranger_sim.datatable.generated import errors
+from ranger_sim.firmware_sim.peripherals.uart import Uart
 
 if not cython.compiled:
-    from foundation.numbers import float_of_word
+    from ranger_sim.foundation.numbers import float_of_word
 
 HEADER_ANGLES_AND_RATES = 0xCF
 HEADER_RATES_ONLY = 0xC2

@@ -1,10 +1,10 @@
-from boards.modules.absolute_encoder cimport AbsoluteEncoder
-from boards.modules.current_control cimport CurrentControl
-from boards.modules.error_module cimport ErrorModule
-from boards.modules.limit_switch cimport LimitSwitch
-from boards.modules.mcu_led cimport McuLed
-from boards.modules.quadrature_decoder cimport QuadratureDecoder
-from foundation.numbers cimport fixed_of_float
+from ranger_sim.boards.modules.absolute_encoder cimport AbsoluteEncoder
+from ranger_sim.boards.modules.current_control cimport CurrentControl
+from ranger_sim.boards.modules.error_module cimport ErrorModule
+from ranger_sim.boards.modules.limit_switch cimport LimitSwitch
+from ranger_sim.boards.modules.mcu_led cimport McuLed
+from ranger_sim.boards.modules.quadrature_decoder cimport QuadratureDecoder
+from ranger_sim.foundation.numbers cimport fixed_of_float
 
 cimport cython
 

@@ -2,15 +2,15 @@
 
 import cython
 
-from boards.modules.absolute_encoder import AbsoluteEncoder
-from boards.modules.current_control import CurrentControl
-from boards.modules.error_module import ErrorModule
-from boards.modules.limit_switch import LimitSwitch
-from boards.modules.mcu_led import McuLed
-from boards.modules.quadrature_decoder import QuadratureDecoder
+from ranger_sim.boards.modules.absolute_encoder import AbsoluteEncoder
+from ranger_sim.boards.modules.current_control import CurrentControl
+from ranger_sim.boards.modules.error_module import ErrorModule
+from ranger_sim.boards.modules.limit_switch import LimitSwitch
+from ranger_sim.boards.modules.mcu_led import McuLed
+from ranger_sim.boards.modules.quadrature_decoder import QuadratureDecoder
 
 if not cython.compiled:
-    from foundation.numbers import fixed_of_float
+    from ranger_sim.foundation.numbers import fixed_of_float
 
 HIP_LIMIT_COUNTS = 800  # 0.614 rad
 ANKLE_LOW_RAD = 0.2

@@ -1,4 +1,4 @@
-from firmware_sim.peripherals.gpio cimport Gpio
+from ranger_sim.firmware_sim.peripherals.gpio cimport Gpio
 
 cdef class Keypad:
     cdef public Gpio gpio

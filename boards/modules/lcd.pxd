@@ -1,4 +1,4 @@
-from boards.modules.receiver cimport Receiver
+from ranger_sim.boards.modules.receiver cimport Receiver
 
 cdef class CharacterDisplay:
     cdef public long long[::1] memory

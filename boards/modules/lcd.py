@@ -10,8 +10,8 @@ import array
 
 import cython
 
-from boards.modules.receiver import Receiver
-from datatable.generated import errors
+from ranger_sim.boards.modules.receiver import Receiver
+from ranger_sim.datatable.generated import errors
 
 START_COMMANDS = (0x38, 0x0C, 0x06, 0x01, 0x02)  # 8 bits and 2 lines, on, move right, clear, home
 QUEUES = 4

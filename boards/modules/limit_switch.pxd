@@ -1,5 +1,5 @@
-from boards.modules.foot_contact cimport Debounce
-from firmware_sim.microcontroller cimport Microcontroller
+from ranger_sim.boards.modules.foot_contact cimport Debounce
+from ranger_sim.firmware_sim.microcontroller cimport Microcontroller
 
 cimport cython
 

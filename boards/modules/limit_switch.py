@@ -4,8 +4,8 @@
 
 import cython
 
-from boards.modules.foot_contact import Debounce
-from firmware_sim.microcontroller import Microcontroller
+from ranger_sim.boards.modules.foot_contact import Debounce
+from ranger_sim.firmware_sim.microcontroller import Microcontroller
 
 EQUAL_SAMPLES = 3  # the firmware's limit of 2 repetitions: 1.5 ms
 

@@ -1,5 +1,5 @@
-from boards.modules.network_time cimport NetworkTime
-from firmware_sim.peripherals.gpio cimport Gpio
+from ranger_sim.boards.modules.network_time cimport NetworkTime
+from ranger_sim.firmware_sim.peripherals.gpio cimport Gpio
 
 cimport cython
 

@@ -2,8 +2,8 @@
 
 import cython
 
-from boards.modules.network_time import NetworkTime
-from firmware_sim.peripherals.gpio import Gpio, p1
+from ranger_sim.boards.modules.network_time import NetworkTime
+from ranger_sim.firmware_sim.peripherals.gpio import Gpio, p1
 
 GREEN = 0
 RED = 1

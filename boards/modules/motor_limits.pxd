@@ -1,5 +1,5 @@
-from boards.modules.error_module cimport ErrorModule
-from foundation.numbers cimport fixed_multiply, fixed_of_float
+from ranger_sim.boards.modules.error_module cimport ErrorModule
+from ranger_sim.foundation.numbers cimport fixed_multiply, fixed_of_float
 
 cimport cython
 

@@ -10,10 +10,10 @@ import math
 
 import cython
 
-from boards.modules.error_module import ErrorModule
+from ranger_sim.boards.modules.error_module import ErrorModule
 
 if not cython.compiled:
-    from foundation.numbers import fixed_multiply, fixed_of_float
+    from ranger_sim.foundation.numbers import fixed_multiply, fixed_of_float
 
 SLOT_S_FIXED = 32  # 0.5 ms x 65536, truncated (0.488 ms), as in the firmware
 RATED_SPEED_RAD_S = 659.734  # 6300 rpm at the motor shaft (appendix 4.7)

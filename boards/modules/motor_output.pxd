@@ -1,7 +1,7 @@
-from boards.modules.receiver cimport IntReceiver
-from firmware_sim.peripherals.gpio cimport Gpio
-from firmware_sim.peripherals.pwm cimport Pwm
-from foundation.numbers cimport wrap_i32
+from ranger_sim.boards.modules.receiver cimport IntReceiver
+from ranger_sim.firmware_sim.peripherals.gpio cimport Gpio
+from ranger_sim.firmware_sim.peripherals.pwm cimport Pwm
+from ranger_sim.foundation.numbers cimport wrap_i32
 
 cimport cython
 

@@ -5,12 +5,12 @@
 
 import cython
 
-from boards.modules.receiver import IntReceiver
-from firmware_sim.peripherals.gpio import Gpio, p0, p1
-from firmware_sim.peripherals.pwm import Pwm
+from ranger_sim.boards.modules.receiver import IntReceiver
+from ranger_sim.firmware_sim.peripherals.gpio import Gpio, p0, p1
+from ranger_sim.firmware_sim.peripherals.pwm import Pwm
 
 if not cython.compiled:
-    from foundation.numbers import wrap_i32
+    from ranger_sim.foundation.numbers import wrap_i32
 
 PINS = {
     "pwm_lead_2": p0(7),

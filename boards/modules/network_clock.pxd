@@ -1,6 +1,6 @@
-from boards.modules.can_load cimport CanLoad
-from boards.modules.network_time cimport NetworkTime
-from firmware_sim.peripherals.can_controller cimport CanController
+from ranger_sim.boards.modules.can_load cimport CanLoad
+from ranger_sim.boards.modules.network_time cimport NetworkTime
+from ranger_sim.firmware_sim.peripherals.can_controller cimport CanController
 
 cimport cython
 

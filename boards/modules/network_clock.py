@@ -9,9 +9,9 @@ buffer is still busy the millisecond is skipped without an error. Source: facts 
 
 import cython
 
-from boards.modules.can_load import CanLoad
-from boards.modules.network_time import NetworkTime
-from firmware_sim.peripherals.can_controller import CanController
+from ranger_sim.boards.modules.can_load import CanLoad
+from ranger_sim.boards.modules.network_time import NetworkTime
+from ranger_sim.firmware_sim.peripherals.can_controller import CanController
 
 TICKS_PER_MS = 5
 SYNC_BUFFER = 3

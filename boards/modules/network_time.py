@@ -6,7 +6,7 @@ A board has no other clock and neither corrects its crystal nor shifts its slots
 
 import cython
 
-from boards.modules.receiver import Receiver
+from ranger_sim.boards.modules.receiver import Receiver
 
 
 class NetworkTime(Receiver):

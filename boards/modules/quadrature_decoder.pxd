@@ -1,7 +1,7 @@
 cimport cython
 
-from boards.modules.error_module cimport ErrorModule
-from foundation.numbers cimport divide_toward_zero
+from ranger_sim.boards.modules.error_module cimport ErrorModule
+from ranger_sim.foundation.numbers cimport divide_toward_zero
 
 @cython.final
 cdef class QuadratureDecoder:

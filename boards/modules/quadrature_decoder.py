@@ -9,10 +9,10 @@ network-and-boards 4.1; appendix 4.6).
 
 import cython
 
-from boards.modules.error_module import ErrorModule
+from ranger_sim.boards.modules.error_module import ErrorModule
 
 if not cython.compiled:
-    from foundation.numbers import divide_toward_zero
+    from ranger_sim.foundation.numbers import divide_toward_zero
 
 PI = 3.141592653589793
 TIMER_HZ = 60000000  # the capture timer counts processor cycles

@@ -9,7 +9,7 @@ import array
 
 import cython
 
-from datatable.generated import errors
+from ranger_sim.datatable.generated import errors
 
 TIMER_TICKS = 600_000
 TICKS_PER_US = 60

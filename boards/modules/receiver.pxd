@@ -1,4 +1,4 @@
-from foundation.numbers cimport fixed_of_float, float_of_word, wrap_i32
+from ranger_sim.foundation.numbers cimport fixed_of_float, float_of_word, wrap_i32
 
 cimport cython
 

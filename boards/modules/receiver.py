@@ -3,7 +3,7 @@
 import cython
 
 if not cython.compiled:
-    from foundation.numbers import fixed_of_float, float_of_word, wrap_i32
+    from ranger_sim.foundation.numbers import fixed_of_float, float_of_word, wrap_i32
 
 
 class Receiver:

@@ -1,5 +1,5 @@
-from boards.modules.can_load cimport CanLoad
-from boards.modules.ssp_link cimport RouterSspLink
+from ranger_sim.boards.modules.can_load cimport CanLoad
+from ranger_sim.boards.modules.ssp_link cimport RouterSspLink
 
 cimport cython
 

@@ -9,9 +9,9 @@ Source: facts network-and-boards 1.5.
 
 import cython
 
-from boards.modules.can_load import CanLoad
-from boards.modules.ssp_link import RouterSspLink
-from datatable.generated import errors
+from ranger_sim.boards.modules.can_load import CanLoad
+from ranger_sim.boards.modules.ssp_link import RouterSspLink
+from ranger_sim.datatable.generated import errors
 
 IDENTIFIERS = 2032  # 2032-2047 would begin with seven recessive bits, which CAN forbids
 CHANNEL_SSP = 0

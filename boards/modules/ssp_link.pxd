@@ -1,4 +1,4 @@
-from firmware_sim.peripherals.ssp cimport SspSegment
+from ranger_sim.firmware_sim.peripherals.ssp cimport SspSegment
 
 cimport cython
 

@@ -18,8 +18,8 @@ can queue and for all that the other end can let wait.
 
 import cython
 
-from datatable.generated import errors
-from firmware_sim.peripherals.ssp import SspSegment
+from ranger_sim.datatable.generated import errors
+from ranger_sim.firmware_sim.peripherals.ssp import SspSegment
 
 SEGMENT_HALF_WORDS = 31
 FRAME_HALF_WORDS = 5

@@ -1,6 +1,6 @@
-from boards.modules.colour_leds cimport ColourLeds
-from boards.modules.keypad cimport Keypad
-from firmware_sim.peripherals.gpio cimport Gpio
+from ranger_sim.boards.modules.colour_leds cimport ColourLeds
+from ranger_sim.boards.modules.keypad cimport Keypad
+from ranger_sim.firmware_sim.peripherals.gpio cimport Gpio
 
 cdef class SyncLight:
     cdef public Gpio gpio

@@ -8,9 +8,9 @@ flashes in the first n + 1, so the run of flashes tells where in the cycle a vid
 
 import cython
 
-from boards.modules.colour_leds import ColourLeds
-from boards.modules.keypad import Keypad
-from firmware_sim.peripherals.gpio import Gpio
+from ranger_sim.boards.modules.colour_leds import ColourLeds
+from ranger_sim.boards.modules.keypad import Keypad
+from ranger_sim.firmware_sim.peripherals.gpio import Gpio
 
 SYNC_KEY = 4
 SYNC_PIN = 16  # P0.16

@@ -10,11 +10,11 @@ import socket
 import struct
 from collections.abc import Mapping
 
-from can_bus.bus import Bus
-from can_bus.edge import attach_records as wire
-from can_bus.edge.attach_records import DEFAULT_NAME, MalformedError
-from can_bus.edge.stream_server import BACKLOG_LIMIT, CLIENT_LIMIT, Connection, StreamServer
-from can_bus.edge.taps import (
+from ranger_sim.can_bus.bus import Bus
+from ranger_sim.can_bus.edge import attach_records as wire
+from ranger_sim.can_bus.edge.attach_records import DEFAULT_NAME, MalformedError
+from ranger_sim.can_bus.edge.stream_server import BACKLOG_LIMIT, CLIENT_LIMIT, Connection, StreamServer
+from ranger_sim.can_bus.edge.taps import (
     DROPPED,
     NOT_ON_BUS,
     QUEUED,
@@ -24,7 +24,7 @@ from can_bus.edge.taps import (
     Taps,
     fault_of_frame,
 )
-from foundation.user_error import UserError
+from ranger_sim.foundation.user_error import UserError
 
 __all__ = ["DEFAULT_NAME", "AttachServer"]
 

@@ -8,7 +8,7 @@ import sys
 from collections.abc import Iterator
 from typing import Any
 
-from foundation.user_error import UserError
+from ranger_sim.foundation.user_error import UserError
 
 VERSION = 1
 MAGIC = b"RNGR"

@@ -1,6 +1,7 @@
 """The same work on our bus, on our python-can interface and on python-can's own interfaces that need no adapter.
 
-`python -m can_bus.edge.benchmark` is not for people: it is the sender and the host in the two-process measurement.
+`python -m ranger_sim.can_bus.edge.benchmark` is not for people: it is the sender and the host in the two-process
+measurement.
 """
 
 import contextlib
@@ -11,11 +12,11 @@ from typing import Any
 
 import can
 
-from can_bus.benchmark import million_frames
-from can_bus.edge.attach import AttachServer
-from can_bus.edge.host import BusHost
-from can_bus.edge.paced import PacedBus
-from foundation import wallclock
+from ranger_sim.can_bus.benchmark import million_frames
+from ranger_sim.can_bus.edge.attach import AttachServer
+from ranger_sim.can_bus.edge.host import BusHost
+from ranger_sim.can_bus.edge.paced import PacedBus
+from ranger_sim.foundation import wallclock
 
 IDENTIFIERS = 16  # per sender
 SPACING = 64  # between the first identifiers of two senders
@@ -152,7 +153,7 @@ class _helper:  # noqa: N801  (used like a function)
 
     def __init__(self, *arguments: str) -> None:
         self.process = subprocess.Popen(
-            [sys.executable, "-m", "can_bus.edge.benchmark", *arguments], stdout=subprocess.PIPE, text=True
+            [sys.executable, "-m", "ranger_sim.can_bus.edge.benchmark", *arguments], stdout=subprocess.PIPE, text=True
         )
 
     def __enter__(self) -> "_helper":

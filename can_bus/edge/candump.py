@@ -11,10 +11,10 @@ import pathlib
 from collections.abc import Iterable, Iterator
 from typing import Any, TextIO
 
-from can_bus.bus import LOG_FIELDS
-from can_bus.edge.messages import data_of_words, words_of_data
-from foundation.events import FLAG_ERROR, FLAG_EXTENDED, FLAG_REMOTE
-from foundation.user_error import UserError
+from ranger_sim.can_bus.bus import LOG_FIELDS
+from ranger_sim.can_bus.edge.messages import data_of_words, words_of_data
+from ranger_sim.foundation.events import FLAG_ERROR, FLAG_EXTENDED, FLAG_REMOTE
+from ranger_sim.foundation.user_error import UserError
 
 ERROR_FLAG = 0x20000000  # CAN_ERR_FLAG, linux/can.h
 ERROR_BUS = 0x00000080  # CAN_ERR_BUSERROR, linux/can/error.h

@@ -15,7 +15,7 @@ from typing import Any
 
 import can
 
-from foundation import wallclock
+from ranger_sim.foundation import wallclock
 
 WARNING_LEVEL = 96  # of the error counters: ISO 11898-1
 FEW_TO_WAIT = 100  # frames; the kernel's default of 10 overflows when a slot's commands go out together (chosen by us)

@@ -7,9 +7,9 @@ import pathlib
 import cantools
 from cantools.database.can import Database
 
-from can_bus.bounds import Message, message
-from foundation.events import FLAG_EXTENDED
-from foundation.user_error import UserError
+from ranger_sim.can_bus.bounds import Message, message
+from ranger_sim.foundation.events import FLAG_EXTENDED
+from ranger_sim.foundation.user_error import UserError
 
 LARGEST_PERIOD_MS = 10**9
 

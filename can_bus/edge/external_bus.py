@@ -26,9 +26,9 @@ from typing import Any, NoReturn
 import can
 from can import cli as can_options
 
-from can_bus.edge.messages import frame_of_message, message_of_frame
-from can_bus.frame import INTERMISSION_BITS, frame_bits
-from foundation.events import (
+from ranger_sim.can_bus.edge.messages import frame_of_message, message_of_frame
+from ranger_sim.can_bus.frame import INTERMISSION_BITS, frame_bits
+from ranger_sim.foundation.events import (
     CAN_ABORT,
     CAN_MODE,
     CAN_REQUEST,
@@ -40,7 +40,7 @@ from foundation.events import (
     TX_LOST,
     TX_SENT,
 )
-from foundation.user_error import UserError
+from ranger_sim.foundation.user_error import UserError
 
 # Virtual time between two looks at the interfaces: half a step of the plant. Chosen by us: less brings nothing, as the
 # boards' outputs act at the plant's next step, and much more would be seen in the control loops (500 Hz).

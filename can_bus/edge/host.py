@@ -3,9 +3,9 @@
 import select
 from typing import Any
 
-from can_bus.edge.paced import PacedBus
-from foundation import wallclock
-from foundation.events import NEVER
+from ranger_sim.can_bus.edge.paced import PacedBus
+from ranger_sim.foundation import wallclock
+from ranger_sim.foundation.events import NEVER
 
 LONGEST_NAP_S = 1.0  # so that an interrupt by the user is never late; chosen by us
 

@@ -13,9 +13,9 @@ from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
 
-from can_bus.edge import attach_records as wire
-from can_bus.edge.paced import PacedBus
-from can_bus.edge.taps import (
+from ranger_sim.can_bus.edge import attach_records as wire
+from ranger_sim.can_bus.edge.paced import PacedBus
+from ranger_sim.can_bus.edge.taps import (
     DROPPED,
     ERROR_ACTIVE,
     ERROR_PASSIVE,
@@ -29,9 +29,9 @@ from can_bus.edge.taps import (
     Event,
     overflow_frame,
 )
-from foundation import wallclock
-from foundation.events import NEVER
-from foundation.user_error import UserError
+from ranger_sim.foundation import wallclock
+from ranger_sim.foundation.events import NEVER
+from ranger_sim.foundation.user_error import UserError
 
 log = logging.getLogger("can.ranger_sim")
 

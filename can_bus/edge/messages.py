@@ -2,9 +2,9 @@
 
 import can
 
-from can_bus.frame import data_length
-from foundation.events import FLAG_ERROR, FLAG_EXTENDED, FLAG_REMOTE
-from foundation.user_error import UserError
+from ranger_sim.can_bus.frame import data_length
+from ranger_sim.foundation.events import FLAG_ERROR, FLAG_EXTENDED, FLAG_REMOTE
+from ranger_sim.foundation.user_error import UserError
 
 
 def message_of_frame(

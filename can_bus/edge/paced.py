@@ -1,10 +1,10 @@
 """A bus of its own clock: private buses are released by the wall clock, or run as fast as frames are offered."""
 
-from can_bus.bus import Bus
-from can_bus.edge.taps import TRANSMIT_QUEUE, Tap, Taps
-from foundation import wallclock
-from foundation.events import NEVER
-from foundation.user_error import UserError
+from ranger_sim.can_bus.bus import Bus
+from ranger_sim.can_bus.edge.taps import TRANSMIT_QUEUE, Tap, Taps
+from ranger_sim.foundation import wallclock
+from ranger_sim.foundation.events import NEVER
+from ranger_sim.foundation.user_error import UserError
 
 # bit/s; chosen by us, because it is the fastest that classic CAN adapters do (ISO 11898-2)
 DEFAULT_BITRATE = 1_000_000

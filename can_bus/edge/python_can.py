@@ -13,8 +13,8 @@ from typing import Any
 import can
 from can.broadcastmanager import CyclicSendTaskABC, ThreadBasedCyclicSendTask
 
-from can_bus.edge.attach_records import DEFAULT_NAME, names_running
-from can_bus.edge.links import (
+from ranger_sim.can_bus.edge.attach_records import DEFAULT_NAME, names_running
+from ranger_sim.can_bus.edge.links import (
     RECEIVE_QUEUE,
     AttachedLink,
     LinkError,
@@ -22,9 +22,9 @@ from can_bus.edge.links import (
     PrivateLink,
     channels_of,
 )
-from can_bus.edge.messages import frame_of_message
-from can_bus.edge.paced import DEFAULT_BITRATE, PacedBus, speed_of
-from can_bus.edge.taps import (
+from ranger_sim.can_bus.edge.messages import frame_of_message
+from ranger_sim.can_bus.edge.paced import DEFAULT_BITRATE, PacedBus, speed_of
+from ranger_sim.can_bus.edge.taps import (
     ERROR_ACTIVE,
     ERROR_PASSIVE,
     LISTENING,
@@ -33,10 +33,10 @@ from can_bus.edge.taps import (
     Event,
     fault_of_frame,
 )
-from can_bus.frame import data_length
-from foundation import wallclock
-from foundation.events import FLAG_ERROR, FLAG_EXTENDED, FLAG_REMOTE
-from foundation.user_error import UserError
+from ranger_sim.can_bus.frame import data_length
+from ranger_sim.foundation import wallclock
+from ranger_sim.foundation.events import FLAG_ERROR, FLAG_EXTENDED, FLAG_REMOTE
+from ranger_sim.foundation.user_error import UserError
 
 log = logging.getLogger("can.ranger_sim")
 

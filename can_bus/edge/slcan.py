@@ -10,12 +10,12 @@ import os
 import sys
 from contextlib import suppress
 
-from can_bus.bus import Bus
-from can_bus.edge.messages import data_of_words, words_of_data
-from can_bus.edge.stream_server import COUNTERS, NEXT_POLL_NS, QUICK_POLL_NS
-from can_bus.edge.taps import ERROR_PASSIVE, OFF, QUEUED, RECEIVED, Event, Tap, Taps, taps_of
-from foundation.events import FLAG_ERROR, FLAG_EXTENDED, FLAG_REMOTE
-from foundation.user_error import UserError
+from ranger_sim.can_bus.bus import Bus
+from ranger_sim.can_bus.edge.messages import data_of_words, words_of_data
+from ranger_sim.can_bus.edge.stream_server import COUNTERS, NEXT_POLL_NS, QUICK_POLL_NS
+from ranger_sim.can_bus.edge.taps import ERROR_PASSIVE, OFF, QUEUED, RECEIVED, Event, Tap, Taps, taps_of
+from ranger_sim.foundation.events import FLAG_ERROR, FLAG_EXTENDED, FLAG_REMOTE
+from ranger_sim.foundation.user_error import UserError
 
 LINE_LIMIT = 32  # characters; the longest command, an extended frame of eight bytes, has 26
 BACKLOG_LIMIT = 1 << 16  # bytes that wait for a slow reader before frames are dropped; chosen by us

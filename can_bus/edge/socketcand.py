@@ -10,13 +10,13 @@ import socket
 from collections.abc import Mapping
 from contextlib import suppress
 
-from can_bus.bus import Bus
-from can_bus.edge.messages import data_of_words, words_of_data
-from can_bus.edge.stream_server import BACKLOG_LIMIT, CLIENT_LIMIT, Connection, StreamServer
-from can_bus.edge.taps import QUEUED, RECEIVED, Event, Tap, Taps
-from foundation import wallclock
-from foundation.events import FLAG_ERROR, FLAG_EXTENDED, FLAG_REMOTE
-from foundation.user_error import UserError
+from ranger_sim.can_bus.bus import Bus
+from ranger_sim.can_bus.edge.messages import data_of_words, words_of_data
+from ranger_sim.can_bus.edge.stream_server import BACKLOG_LIMIT, CLIENT_LIMIT, Connection, StreamServer
+from ranger_sim.can_bus.edge.taps import QUEUED, RECEIVED, Event, Tap, Taps
+from ranger_sim.foundation import wallclock
+from ranger_sim.foundation.events import FLAG_ERROR, FLAG_EXTENDED, FLAG_REMOTE
+from ranger_sim.foundation.user_error import UserError
 
 TEXT_LIMIT = 256  # characters of one message; the longest, a send with eight bytes, has 45
 # Clients take everything that has come in for the answer to `rawmode`; a frame directly behind it confuses them. So

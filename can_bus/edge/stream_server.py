@@ -10,8 +10,8 @@ from collections.abc import Mapping
 from contextlib import suppress
 from typing import Generic, TypeVar
 
-from can_bus.bus import Bus
-from can_bus.edge.taps import Tap, Taps, taps_of
+from ranger_sim.can_bus.bus import Bus
+from ranger_sim.can_bus.edge.taps import Tap, Taps, taps_of
 
 CLIENT_LIMIT = 64  # chosen by us: a slip in a loop must not eat the plant process's file descriptors
 BACKLOG_LIMIT = 1 << 20  # bytes that wait for a slow client before its frames are dropped: 38,000 frames

@@ -7,7 +7,7 @@ import functools
 from collections import deque
 from typing import Any
 
-from can_bus.bus import (
+from ranger_sim.can_bus.bus import (
     BUS_OFF,
     ICR_BUS_ERROR,
     ICR_ERROR_PASSIVE,
@@ -25,8 +25,8 @@ from can_bus.bus import (
     WARNING_LIMIT,
     Bus,
 )
-from can_bus.frame import FIELD_ACK_SLOT, arbitration_key
-from foundation.events import (
+from ranger_sim.can_bus.frame import FIELD_ACK_SLOT, arbitration_key
+from ranger_sim.foundation.events import (
     CAN_RX,
     CAN_STATUS,
     CAN_TX_DONE,

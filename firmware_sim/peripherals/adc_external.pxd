@@ -1,8 +1,8 @@
 cimport cython
 from libc.math cimport copysign
 
-from firmware_sim.microcontroller cimport Alarm, Peripheral
-from firmware_sim.vic cimport InterruptSource
+from ranger_sim.firmware_sim.microcontroller cimport Alarm, Peripheral
+from ranger_sim.firmware_sim.vic cimport InterruptSource
 
 @cython.final
 cdef class Ads7871(Peripheral):

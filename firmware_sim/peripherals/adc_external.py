@@ -13,10 +13,10 @@ The SSP transfers (16 bits at 10 MHz) are part of the cost of the code that does
 
 import cython
 
-from firmware_sim.microcontroller import Peripheral
-from firmware_sim.vic import EXTERNAL_INTERRUPT, InterruptSource
-from foundation.events import NEVER
-from foundation.user_error import UserError
+from ranger_sim.firmware_sim.microcontroller import Peripheral
+from ranger_sim.firmware_sim.vic import EXTERNAL_INTERRUPT, InterruptSource
+from ranger_sim.foundation.events import NEVER
+from ranger_sim.foundation.user_error import UserError
 
 if not cython.compiled:
     from math import copysign

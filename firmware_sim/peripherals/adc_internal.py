@@ -11,9 +11,9 @@ V / VDDA * 1024; scale and offset are those of a board's own divider and convert
 
 import cython
 
-from firmware_sim.microcontroller import Peripheral
-from firmware_sim.vic import ADC_DONE, InterruptSource
-from foundation.user_error import UserError
+from ranger_sim.firmware_sim.microcontroller import Peripheral
+from ranger_sim.firmware_sim.vic import ADC_DONE, InterruptSource
+from ranger_sim.foundation.user_error import UserError
 
 
 class AdcInternal(Peripheral):

@@ -1,6 +1,6 @@
-from can_bus.transmit_ends cimport TransmitEnds
-from firmware_sim.microcontroller cimport Microcontroller, Peripheral
-from firmware_sim.vic cimport InterruptSource
+from ranger_sim.can_bus.transmit_ends cimport TransmitEnds
+from ranger_sim.firmware_sim.microcontroller cimport Microcontroller, Peripheral
+from ranger_sim.firmware_sim.vic cimport InterruptSource
 
 cimport cython
 

@@ -18,11 +18,11 @@ RFS, TFI: DLC in bits 16-19, RTR bit 30, extended identifier bit 31.
 
 import cython
 
-from can_bus.transmit_ends import TransmitEnds
-from firmware_sim.microcontroller import Peripheral
-from firmware_sim.vic import InterruptSource
-from foundation.events import CAN_RX, CAN_STATUS, CAN_TX_DONE
-from foundation.user_error import UserError
+from ranger_sim.can_bus.transmit_ends import TransmitEnds
+from ranger_sim.firmware_sim.microcontroller import Peripheral
+from ranger_sim.firmware_sim.vic import InterruptSource
+from ranger_sim.foundation.events import CAN_RX, CAN_STATUS, CAN_TX_DONE
+from ranger_sim.foundation.user_error import UserError
 
 CMR_TR, CMR_AT, CMR_RRB, CMR_CDO, CMR_SRR, CMR_STB1, CMR_STB2, CMR_STB3 = 1, 2, 4, 8, 16, 32, 64, 128
 ICR_RI, ICR_TI1, ICR_EI, ICR_DOI, ICR_EPI, ICR_ALI, ICR_BEI, ICR_TI2, ICR_TI3 = 1, 2, 4, 8, 32, 64, 128, 512, 1024

@@ -1,4 +1,4 @@
-from firmware_sim.microcontroller cimport Peripheral
+from ranger_sim.firmware_sim.microcontroller cimport Peripheral
 
 cimport cython
 

@@ -1,6 +1,6 @@
-from firmware_sim.microcontroller cimport Peripheral
-from firmware_sim.vic cimport InterruptSource
-from foundation.events cimport EventQueue
+from ranger_sim.firmware_sim.microcontroller cimport Peripheral
+from ranger_sim.firmware_sim.vic cimport InterruptSource
+from ranger_sim.foundation.events cimport EventQueue
 
 cimport cython
 

@@ -11,9 +11,9 @@ handler, which returns the number of half-words.
 
 import cython
 
-from firmware_sim.microcontroller import Peripheral
-from firmware_sim.vic import InterruptSource
-from foundation.events import SSP_SEGMENT
+from ranger_sim.firmware_sim.microcontroller import Peripheral
+from ranger_sim.firmware_sim.vic import InterruptSource
+from ranger_sim.foundation.events import SSP_SEGMENT
 
 SEGMENT_WORDS = 31
 BIT_RATE = 3_000_000  # 60 MHz / 20

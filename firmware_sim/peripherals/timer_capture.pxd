@@ -1,8 +1,8 @@
 cimport cython
 
-from firmware_sim.clock cimport TickTrain
-from firmware_sim.microcontroller cimport Alarm, Peripheral
-from firmware_sim.vic cimport InterruptSource
+from ranger_sim.firmware_sim.clock cimport TickTrain
+from ranger_sim.firmware_sim.microcontroller cimport Alarm, Peripheral
+from ranger_sim.firmware_sim.vic cimport InterruptSource
 
 @cython.final
 cdef class TimerCapture(Peripheral):

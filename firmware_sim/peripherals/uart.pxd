@@ -1,5 +1,5 @@
-from firmware_sim.microcontroller cimport Alarm, Peripheral
-from firmware_sim.vic cimport InterruptSource
+from ranger_sim.firmware_sim.microcontroller cimport Alarm, Peripheral
+from ranger_sim.firmware_sim.vic cimport InterruptSource
 
 cimport cython
 

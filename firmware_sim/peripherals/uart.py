@@ -13,10 +13,10 @@ the FIFO has become empty, (UART_TRANSMIT, number) is raised.
 
 import cython
 
-from firmware_sim.microcontroller import Peripheral
-from firmware_sim.vic import UART_TRANSMIT, InterruptSource
-from foundation.events import NEVER, UART_BYTE
-from foundation.user_error import UserError
+from ranger_sim.firmware_sim.microcontroller import Peripheral
+from ranger_sim.firmware_sim.vic import UART_TRANSMIT, InterruptSource
+from ranger_sim.foundation.events import NEVER, UART_BYTE
+from ranger_sim.foundation.user_error import UserError
 
 FIFO_BYTES = 16
 BITS_PER_BYTE = 10  # start, 8 data, stop

@@ -15,10 +15,10 @@ import array
 
 import cython
 
-from firmware_sim.microcontroller import Peripheral
-from firmware_sim.vic import DMA_DONE, InterruptSource
-from foundation.events import UART_BYTE
-from foundation.user_error import UserError
+from ranger_sim.firmware_sim.microcontroller import Peripheral
+from ranger_sim.firmware_sim.vic import DMA_DONE, InterruptSource
+from ranger_sim.foundation.events import UART_BYTE
+from ranger_sim.foundation.user_error import UserError
 
 BITS_PER_BYTE = 10  # start, 8 data, stop
 SAMPLES_PER_BIT = 14

@@ -9,8 +9,8 @@ import mmap
 import os
 from typing import Any
 
-from foundation.user_error import UserError
-from harness.processes.channel import SLOT_WORDS, VERSION
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.harness.processes.channel import SLOT_WORDS, VERSION
 
 MAGIC = 0x52414E4745523031  # "RANGER01"
 SLOTS = 1024  # of each mailbox: forty times what a turn of the default scenario needs at most

@@ -4,15 +4,15 @@ import os
 import traceback
 from typing import Any
 
-from harness import wiring
-from harness.processes import block as places
-from harness.processes import kernel
-from harness.processes.block import Block
-from harness.processes.channel import Bell
-from harness.processes.endpoint import Endpoint
-from harness.processes.fresh_board import wire_fresh_board
-from harness.processes.settings import Settings
-from harness.processes.stage import Audience
+from ranger_sim.harness import wiring
+from ranger_sim.harness.processes import block as places
+from ranger_sim.harness.processes import kernel
+from ranger_sim.harness.processes.block import Block
+from ranger_sim.harness.processes.channel import Bell
+from ranger_sim.harness.processes.endpoint import Endpoint
+from ranger_sim.harness.processes.fresh_board import wire_fresh_board
+from ranger_sim.harness.processes.settings import Settings
+from ranger_sim.harness.processes.stage import Audience
 
 FAILED = 4  # exit code: the board's program raised
 

@@ -1,5 +1,5 @@
-from foundation.events cimport EventQueue, Outbox
-from firmware_sim.peripherals.ssp cimport SspSegment
+from ranger_sim.foundation.events cimport EventQueue, Outbox
+from ranger_sim.firmware_sim.peripherals.ssp cimport SspSegment
 
 # What a shared word needs that a plain array does not: order between processes, and a bell (an eventfd).
 cdef extern from *:

@@ -22,12 +22,12 @@ import array
 
 import cython
 
-from firmware_sim.peripherals.ssp import SspSegment
-from foundation.events import EventQueue, Outbox
-from harness.processes.kinds import FIELDS, KINDS, NOTE_WORDS, PAYLOADS, limits
+from ranger_sim.firmware_sim.peripherals.ssp import SspSegment
+from ranger_sim.foundation.events import EventQueue, Outbox
+from ranger_sim.harness.processes.kinds import FIELDS, KINDS, NOTE_WORDS, PAYLOADS, limits
 
 if not cython.compiled:
-    from harness.processes.plain import load, mix, pause, post, store
+    from ranger_sim.harness.processes.plain import load, mix, pause, post, store
 
 VERSION = 1
 SLOT_WORDS = 12

@@ -8,7 +8,7 @@ import struct
 from collections.abc import Callable
 from typing import Any
 
-from foundation.user_error import UserError
+from ranger_sim.foundation.user_error import UserError
 
 LONGEST_LINE = 65536
 ANSWER_S = 10.0  # a client waits so long

@@ -1,7 +1,7 @@
-from firmware_sim.microcontroller cimport Microcontroller
-from foundation.events cimport EventQueue
-from harness.processes.channel cimport Bell, Mailbox
-from harness.processes.stage cimport Audience
+from ranger_sim.firmware_sim.microcontroller cimport Microcontroller
+from ranger_sim.foundation.events cimport EventQueue
+from ranger_sim.harness.processes.channel cimport Bell, Mailbox
+from ranger_sim.harness.processes.stage cimport Audience
 
 cdef class Endpoint:
     cdef public Microcontroller board

@@ -7,15 +7,15 @@ import json
 
 import cython
 
-from firmware_sim.microcontroller import Microcontroller
-from foundation import wallclock
-from foundation.events import CAN_RX, CAN_TX_DONE, PIN_EDGE, UART_BYTE, EventQueue
-from harness.processes import block as places
-from harness.processes import snapshot
-from harness.processes.channel import Bell, Mailbox
-from harness.processes.kinds import FROM_BOARD, KINDS, NOTE, NOTE_SNAPSHOT, NOTE_WORDS, SET_WORD, TO_BOARD
-from harness.processes.lateness import bin_of
-from harness.wiring import HEAR_IN_SLOTS
+from ranger_sim.firmware_sim.microcontroller import Microcontroller
+from ranger_sim.foundation import wallclock
+from ranger_sim.foundation.events import CAN_RX, CAN_TX_DONE, PIN_EDGE, UART_BYTE, EventQueue
+from ranger_sim.harness.processes import block as places
+from ranger_sim.harness.processes import snapshot
+from ranger_sim.harness.processes.channel import Bell, Mailbox
+from ranger_sim.harness.processes.kinds import FROM_BOARD, KINDS, NOTE, NOTE_SNAPSHOT, NOTE_WORDS, SET_WORD, TO_BOARD
+from ranger_sim.harness.processes.lateness import bin_of
+from ranger_sim.harness.wiring import HEAR_IN_SLOTS
 
 EVERYTHING = 0xFFFF  # bits of all message kinds to a board
 NOTE_BYTES = 8 * (NOTE_WORDS - 1)

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from harness import bus_schedule, wiring
+from ranger_sim.harness import bus_schedule, wiring
 
 
 def wire_fresh_board(robot: Any, name: str, power_up_ns: int) -> Any:

@@ -6,11 +6,11 @@ import collections
 from collections.abc import Callable
 from typing import Any
 
-from foundation.events import CAN_REQUEST, CAN_TX_DONE, STAGE_BUS, EventQueue
-from harness import wiring
-from harness.profile import Profile
-from harness.rest_bus import RestBus
-from harness.supervision import Watch
+from ranger_sim.foundation.events import CAN_REQUEST, CAN_TX_DONE, STAGE_BUS, EventQueue
+from ranger_sim.harness import wiring
+from ranger_sim.harness.profile import Profile
+from ranger_sim.harness.rest_bus import RestBus
+from ranger_sim.harness.supervision import Watch
 
 CHECK_NS = 10_000_000  # between two looks for what has not come
 CONTROLLER = 1

@@ -4,7 +4,7 @@ import ctypes
 import os
 import signal
 
-from harness.processes.settings import Settings
+from ranger_sim.harness.processes.settings import Settings
 
 PR_SET_PDEATHSIG, PR_SET_NAME, PR_SET_TIMERSLACK = 1, 15, 29  # linux/prctl.h
 MCL_CURRENT, MCL_FUTURE = 1, 2  # sys/mman.h

@@ -6,7 +6,7 @@ whose codec is in `Mailbox` (channel.py). Meanings of the fields: foundation/eve
 
 from typing import NamedTuple
 
-from foundation import events
+from ranger_sim.foundation import events
 
 TO_BOARD, FROM_BOARD = 0, 1
 WORD = (0, 0xFFFFFFFF)

@@ -9,13 +9,13 @@ import select
 import signal
 from typing import Any
 
-from foundation.user_error import UserError
-from harness import wiring
-from harness.processes import block as places
-from harness.processes import board_process, kernel
-from harness.processes.block import Block, new_stage
-from harness.processes.channel import Bell
-from harness.processes.settings import Settings
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.harness import wiring
+from ranger_sim.harness.processes import block as places
+from ranger_sim.harness.processes import board_process, kernel
+from ranger_sim.harness.processes.block import Block, new_stage
+from ranger_sim.harness.processes.channel import Bell
+from ranger_sim.harness.processes.settings import Settings
 
 PATIENCE_S = 60.0  # a turn takes some microseconds; the rest is for a busy machine
 

@@ -2,8 +2,8 @@
 
 from typing import Any
 
-from foundation.events import STAGE_BUS
-from harness import wiring
+from ranger_sim.foundation.events import STAGE_BUS
+from ranger_sim.harness import wiring
 
 
 def move_bus(robot: Any, external: Any, openers: dict, boards: tuple) -> None:

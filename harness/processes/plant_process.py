@@ -7,19 +7,19 @@ import struct
 from collections.abc import Callable
 from typing import Any
 
-from datatable.generated import all_variables
-from datatable.packing import word_of_value
-from foundation import wallclock
-from foundation.user_error import UserError
-from harness import wiring
-from harness.processes import block as places
-from harness.processes import kernel, snapshot
-from harness.processes.kinds import NOTE, NOTE_SNAPSHOT, SET_WORD
-from harness.processes.pace import Pace
-from harness.processes.remote_board import RemoteBoard
-from harness.processes.settings import Settings
-from harness.processes.stage import Stage
-from harness.scenario import StopRule
+from ranger_sim.datatable.generated import all_variables
+from ranger_sim.datatable.packing import word_of_value
+from ranger_sim.foundation import wallclock
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.harness import wiring
+from ranger_sim.harness.processes import block as places
+from ranger_sim.harness.processes import kernel, snapshot
+from ranger_sim.harness.processes.kinds import NOTE, NOTE_SNAPSHOT, SET_WORD
+from ranger_sim.harness.processes.pace import Pace
+from ranger_sim.harness.processes.remote_board import RemoteBoard
+from ranger_sim.harness.processes.settings import Settings
+from ranger_sim.harness.processes.stage import Stage
+from ranger_sim.harness.scenario import StopRule
 
 SLICE_S = 0.0005  # virtual time between two looks at the wall clock: one slot of a motor board
 FAST_SLICE_S = 0.005  # the same when there is no pace to keep

@@ -1,7 +1,7 @@
-from firmware_sim.microcontroller cimport EdgeLine, Microcontroller
-from foundation.events cimport EventQueue
-from harness.processes.channel cimport Bell, Mailbox, load
-from harness.processes.stage cimport Stage
+from ranger_sim.firmware_sim.microcontroller cimport EdgeLine, Microcontroller
+from ranger_sim.foundation.events cimport EventQueue
+from ranger_sim.harness.processes.channel cimport Bell, Mailbox, load
+from ranger_sim.harness.processes.stage cimport Stage
 
 cdef class RemoteBoard(Microcontroller):
     cdef public Microcontroller shadow

@@ -12,15 +12,15 @@ the missed time later, and reads its sensors from the stage's rows of that time.
 
 import cython
 
-from firmware_sim.microcontroller import EdgeLine, Microcontroller
-from foundation.events import EventQueue
-from foundation.user_error import UserError
-from harness.processes import block as places
-from harness.processes.channel import Bell, Mailbox
-from harness.processes.kinds import FROM_BOARD, TO_BOARD
+from ranger_sim.firmware_sim.microcontroller import EdgeLine, Microcontroller
+from ranger_sim.foundation.events import EventQueue
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.harness.processes import block as places
+from ranger_sim.harness.processes.channel import Bell, Mailbox
+from ranger_sim.harness.processes.kinds import FROM_BOARD, TO_BOARD
 
 if not cython.compiled:
-    from harness.processes.plain import load
+    from ranger_sim.harness.processes.plain import load
 
 
 class RemoteBoard(Microcontroller):

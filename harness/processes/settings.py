@@ -4,8 +4,8 @@ import dataclasses
 import math
 import os
 
-from foundation.user_error import UserError
-from harness import wiring
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.harness import wiring
 
 NEVER, ON_FAILURE = "never", "on-failure"
 

@@ -1,5 +1,5 @@
-from firmware_sim.microcontroller cimport Microcontroller
-from plant.ranger cimport RangerPlant
+from ranger_sim.firmware_sim.microcontroller cimport Microcontroller
+from ranger_sim.plant.ranger cimport RangerPlant
 
 cdef class Stage:
     cdef public long long[::1] words, step_times, registers

@@ -7,10 +7,10 @@ import array
 
 import cython
 
-from firmware_sim.microcontroller import Microcontroller
-from foundation.user_error import UserError
-from harness.processes.block import MOST_VOLTAGES, MOST_WORDS
-from plant.ranger import RangerPlant
+from ranger_sim.firmware_sim.microcontroller import Microcontroller
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.harness.processes.block import MOST_VOLTAGES, MOST_WORDS
+from ranger_sim.plant.ranger import RangerPlant
 
 # Places of block.py as C numbers
 FIRST, RING, SIZE = 64, 64, 80

@@ -18,16 +18,16 @@ import warnings
 from collections.abc import Callable, Iterator
 from typing import Any
 
-from foundation import wallclock
-from foundation.user_error import UserError
-from harness import wiring
-from harness.processes import block as places
-from harness.processes import board_process, kernel, plant_process
-from harness.processes.block import Block, new_stage
-from harness.processes.control import ControlServer
-from harness.processes.lateness import figures
-from harness.processes.settings import ON_FAILURE, Settings
-from harness.scenario import StopRule
+from ranger_sim.foundation import wallclock
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.harness import wiring
+from ranger_sim.harness.processes import block as places
+from ranger_sim.harness.processes import board_process, kernel, plant_process
+from ranger_sim.harness.processes.block import Block, new_stage
+from ranger_sim.harness.processes.control import ControlServer
+from ranger_sim.harness.processes.lateness import figures
+from ranger_sim.harness.processes.settings import ON_FAILURE, Settings
+from ranger_sim.harness.scenario import StopRule
 
 PLANT = "plant"
 LOOK_S = 0.2  # between two looks at boards and screen

@@ -7,16 +7,16 @@ contact voltage rises 11 ms after touchdown, so that the second sample in a row 
 
 import math
 
-from boards.main_brain import controllers
-from boards.main_brain.estimator import Estimator
-from boards.main_brain.mode_machine import ModeMachine
-from boards.quirks import Quirks
-from datatable.generated import mb as table
-from datatable.generated.all_variables import TABLE_SIZE
-from datatable.store import DataStore
-from plant import handling
-from plant.body import Body
-from plant.motion import advance
+from ranger_sim.boards.main_brain import controllers
+from ranger_sim.boards.main_brain.estimator import Estimator
+from ranger_sim.boards.main_brain.mode_machine import ModeMachine
+from ranger_sim.boards.quirks import Quirks
+from ranger_sim.datatable.generated import mb as table
+from ranger_sim.datatable.generated.all_variables import TABLE_SIZE
+from ranger_sim.datatable.store import DataStore
+from ranger_sim.plant import handling
+from ranger_sim.plant.body import Body
+from ranger_sim.plant.motion import advance
 
 STEP_S = 0.0005
 BATTERY_V = 25.9

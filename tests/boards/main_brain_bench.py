@@ -1,12 +1,12 @@
 """A main brain's program without its board: data table, estimator and machines, fed by hand."""
 
-from boards.main_brain import controllers
-from boards.main_brain.estimator import Estimator
-from boards.main_brain.mode_machine import ModeMachine
-from boards.quirks import Quirks
-from datatable.generated import mb as table
-from datatable.generated.all_variables import TABLE_SIZE
-from datatable.store import DataStore
+from ranger_sim.boards.main_brain import controllers
+from ranger_sim.boards.main_brain.estimator import Estimator
+from ranger_sim.boards.main_brain.mode_machine import ModeMachine
+from ranger_sim.boards.quirks import Quirks
+from ranger_sim.datatable.generated import mb as table
+from ranger_sim.datatable.generated.all_variables import TABLE_SIZE
+from ranger_sim.datatable.store import DataStore
 
 
 class Bench:

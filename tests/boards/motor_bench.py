@@ -2,16 +2,16 @@
 
 from collections import Counter
 
-from boards.hip import HipBoard
-from boards.inner_feet import InnerFeetBoard
-from boards.motor_board import ANALOG, PINS
-from boards.outer_feet import OuterFeetBoard
-from boards.quirks import Quirks
-from boards.steering import SteeringBoard
-from datatable.generated import errors as codes
-from firmware_sim.clock import Crystal
-from foundation.events import CAN_REQUEST, CAN_RX, CAN_TX_DONE, PIN_EDGE, PIN_OUTPUT, PWM_UPDATE
-from foundation.numbers import float_of_word, word_of_float
+from ranger_sim.boards.hip import HipBoard
+from ranger_sim.boards.inner_feet import InnerFeetBoard
+from ranger_sim.boards.motor_board import ANALOG, PINS
+from ranger_sim.boards.outer_feet import OuterFeetBoard
+from ranger_sim.boards.quirks import Quirks
+from ranger_sim.boards.steering import SteeringBoard
+from ranger_sim.datatable.generated import errors as codes
+from ranger_sim.firmware_sim.clock import Crystal
+from ranger_sim.foundation.events import CAN_REQUEST, CAN_RX, CAN_TX_DONE, PIN_EDGE, PIN_OUTPUT, PWM_UPDATE
+from ranger_sim.foundation.numbers import float_of_word, word_of_float
 
 BOARDS = {"MCH": HipBoard, "MCFO": OuterFeetBoard, "MCFI": InnerFeetBoard, "MCSI": SteeringBoard}
 FRAME_NS = 37_000  # 111 bits at 3 Mbit/s

@@ -2,16 +2,16 @@
 
 import pytest
 
-from boards.can_router import CanRouterBoard
-from boards.main_brain.board import MainBrainBoard
-from boards.modules.ssp_link import EXCHANGE_NS, empty_segment
-from boards.quirks import Quirks
-from boards.user_interface import PINS, UserInterfaceBoard
-from can_bus.bus import Bus
-from datatable.generated import errors
-from datatable.generated import mb as table
-from firmware_sim.clock import Crystal
-from foundation.events import CAN_MODE, CAN_REQUEST, PIN_EDGE, SSP_LOAD, SSP_SEGMENT, SSP_START
+from ranger_sim.boards.can_router import CanRouterBoard
+from ranger_sim.boards.main_brain.board import MainBrainBoard
+from ranger_sim.boards.modules.ssp_link import EXCHANGE_NS, empty_segment
+from ranger_sim.boards.quirks import Quirks
+from ranger_sim.boards.user_interface import PINS, UserInterfaceBoard
+from ranger_sim.can_bus.bus import Bus
+from ranger_sim.datatable.generated import errors
+from ranger_sim.datatable.generated import mb as table
+from ranger_sim.firmware_sim.clock import Crystal
+from ranger_sim.foundation.events import CAN_MODE, CAN_REQUEST, PIN_EDGE, SSP_LOAD, SSP_SEGMENT, SSP_START
 
 MS = 1_000_000
 QUANTUM = 25_000

@@ -6,14 +6,14 @@ import sys
 
 import pytest
 
-from boards.can_router import ANALOG, CanRouterBoard, supply_pins_V
-from boards.modules.ssp_link import corrupted_copy
-from boards.quirks import Quirks
-from datatable.generated import csr as table
-from datatable.generated import errors
-from firmware_sim.clock import Crystal
-from foundation.events import CAN_STATUS, FLAG_SINGLE_SHOT, SSP_SEGMENT
-from foundation.numbers import float_of_word
+from ranger_sim.boards.can_router import ANALOG, CanRouterBoard, supply_pins_V
+from ranger_sim.boards.modules.ssp_link import corrupted_copy
+from ranger_sim.boards.quirks import Quirks
+from ranger_sim.datatable.generated import csr as table
+from ranger_sim.datatable.generated import errors
+from ranger_sim.firmware_sim.clock import Crystal
+from ranger_sim.foundation.events import CAN_STATUS, FLAG_SINGLE_SHOT, SSP_SEGMENT
+from ranger_sim.foundation.numbers import float_of_word
 from tests.boards.wires import Wires, quiet_brain
 
 MS = 1_000_000

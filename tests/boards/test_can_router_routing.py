@@ -4,11 +4,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from boards.modules.can_load import CanLoad
-from boards.modules.routing import Router, RoutingTable
-from boards.modules.ssp_link import MainBrainSspLink, RouterSspLink
-from datatable.generated import errors, routes
-from foundation.events import FLAG_REMOTE
+from ranger_sim.boards.modules.can_load import CanLoad
+from ranger_sim.boards.modules.routing import Router, RoutingTable
+from ranger_sim.boards.modules.ssp_link import MainBrainSspLink, RouterSspLink
+from ranger_sim.datatable.generated import errors, routes
+from ranger_sim.foundation.events import FLAG_REMOTE
 
 
 def build(lag=False, table=None):

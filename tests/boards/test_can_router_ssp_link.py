@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from boards.modules.ssp_link import (
+from ranger_sim.boards.modules.ssp_link import (
     MainBrainSspLink,
     RouterSspLink,
     checksum,
@@ -12,10 +12,10 @@ from boards.modules.ssp_link import (
     empty_segment,
     finish,
 )
-from datatable.generated import errors
-from firmware_sim.peripherals.ssp import SspSegment
-from foundation.events import FLAG_REMOTE
-from foundation.numbers import word_of_float
+from ranger_sim.datatable.generated import errors
+from ranger_sim.firmware_sim.peripherals.ssp import SspSegment
+from ranger_sim.foundation.events import FLAG_REMOTE
+from ranger_sim.foundation.numbers import word_of_float
 
 TICK = 200_000
 

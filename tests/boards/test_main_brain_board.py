@@ -5,22 +5,22 @@ import re
 
 import pytest
 
-from boards.main_brain import controllers
-from boards.main_brain.board import MainBrainBoard
-from boards.main_brain.error_distribution import ErrorDistribution, ErrorRing
-from boards.modules.error_module import ErrorModule, error_word
-from boards.modules.network_time import NetworkTime
-from boards.modules.ssp_link import corrupted_copy, empty_segment
-from boards.quirks import Quirks
-from datatable.generated import errors as codes
-from datatable.generated import mb as table
-from datatable.generated.all_variables import TABLE_SIZE
-from datatable.packing import parts_of_error_word
-from datatable.store import LABVIEW, SSP, DataStore
-from firmware_sim.clock import Crystal
-from foundation.events import SSP_LOAD, SSP_SEGMENT
-from foundation.numbers import float_of_word, word_of_float
-from foundation.user_error import UserError
+from ranger_sim.boards.main_brain import controllers
+from ranger_sim.boards.main_brain.board import MainBrainBoard
+from ranger_sim.boards.main_brain.error_distribution import ErrorDistribution, ErrorRing
+from ranger_sim.boards.modules.error_module import ErrorModule, error_word
+from ranger_sim.boards.modules.network_time import NetworkTime
+from ranger_sim.boards.modules.ssp_link import corrupted_copy, empty_segment
+from ranger_sim.boards.quirks import Quirks
+from ranger_sim.datatable.generated import errors as codes
+from ranger_sim.datatable.generated import mb as table
+from ranger_sim.datatable.generated.all_variables import TABLE_SIZE
+from ranger_sim.datatable.packing import parts_of_error_word
+from ranger_sim.datatable.store import LABVIEW, SSP, DataStore
+from ranger_sim.firmware_sim.clock import Crystal
+from ranger_sim.foundation.events import SSP_LOAD, SSP_SEGMENT
+from ranger_sim.foundation.numbers import float_of_word, word_of_float
+from ranger_sim.foundation.user_error import UserError
 
 PERIOD_NS = 200_000
 

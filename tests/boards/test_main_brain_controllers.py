@@ -4,11 +4,11 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from boards.main_brain import controllers
-from datatable.generated import mb as table
-from datatable.generated.all_variables import TABLE_SIZE
-from datatable.store import DataStore
-from foundation.user_error import UserError
+from ranger_sim.boards.main_brain import controllers
+from ranger_sim.datatable.generated import mb as table
+from ranger_sim.datatable.generated.all_variables import TABLE_SIZE
+from ranger_sim.datatable.store import DataStore
+from ranger_sim.foundation.user_error import UserError
 
 
 def test_both_sets_load_and_give_every_parameter():

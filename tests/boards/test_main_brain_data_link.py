@@ -6,14 +6,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from boards.main_brain.board import MainBrainBoard
-from boards.quirks import Quirks
-from datatable.generated import errors as codes
-from datatable.generated import mb as table
-from datatable.generated.all_variables import ID_OF_LAST
-from firmware_sim.clock import Crystal
-from foundation.events import PIN_EDGE, UART_BYTE, UART_OUTPUT
-from foundation.numbers import word_of_float
+from ranger_sim.boards.main_brain.board import MainBrainBoard
+from ranger_sim.boards.quirks import Quirks
+from ranger_sim.datatable.generated import errors as codes
+from ranger_sim.datatable.generated import mb as table
+from ranger_sim.datatable.generated.all_variables import ID_OF_LAST
+from ranger_sim.firmware_sim.clock import Crystal
+from ranger_sim.foundation.events import PIN_EDGE, UART_BYTE, UART_OUTPUT
+from ranger_sim.foundation.numbers import word_of_float
 
 MEDIUM, FAST = 65536, 131072
 SLOT_NS = 2_000_000

@@ -4,8 +4,8 @@ import math
 
 import pytest
 
-from boards.quirks import Quirks
-from datatable.generated import errors
+from ranger_sim.boards.quirks import Quirks
+from ranger_sim.datatable.generated import errors
 from tests.boards.main_brain_bench import Bench
 
 FLAT_FEET = {"MCFO_RIGHT_ANKLE_ANGLE": 1.68 + 0.2, "MCFI_MID_ANKLE_ANGLE": 1.68 + 0.2}

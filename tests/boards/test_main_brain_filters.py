@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from boards.main_brain.filters import ButterworthFilter
+from ranger_sim.boards.main_brain.filters import ButterworthFilter
 
 
 def test_the_record_walks_filter_has_the_robots_coefficients():

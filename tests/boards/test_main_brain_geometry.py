@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from boards.main_brain.geometry import FloorGeometry
+from ranger_sim.boards.main_brain.geometry import FloorGeometry
 
 ROBOT = (0.23, 0.176, 0.168, 0.114)  # inner radius, ankle to centre; outer
 APPENDIX = (0.2, 0.11, 0.2, 0.11)

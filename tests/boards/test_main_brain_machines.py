@@ -2,7 +2,7 @@
 
 import pytest
 
-from boards.quirks import Quirks
+from ranger_sim.boards.quirks import Quirks
 from tests.boards.main_brain_bench import Bench
 
 OFF = (0.0, 0.0, 0.0)

@@ -2,7 +2,7 @@
 
 import pytest
 
-from boards.main_brain.mode_machine import lcd_words
+from ranger_sim.boards.main_brain.mode_machine import lcd_words
 from tests.boards.main_brain_bench import Bench
 
 OFF = (0.0, 0.0, 0.0)

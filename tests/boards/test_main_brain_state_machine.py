@@ -2,7 +2,7 @@
 
 import pytest
 
-from boards.main_brain.state_machine import ANY, State, StateMachine
+from ranger_sim.boards.main_brain.state_machine import ANY, State, StateMachine
 
 
 class Script:

@@ -8,9 +8,9 @@ windows here are wide: they are those that the whole robot has to meet.
 
 import pytest
 
-from datatable.generated import mb as table
-from plant.floor import Floor
-from plant.parameters import BodyParameters
+from ranger_sim.datatable.generated import mb as table
+from ranger_sim.plant.floor import Floor
+from ranger_sim.plant.parameters import BodyParameters
 from tests.boards.bare_body import BareRobot
 
 

@@ -2,14 +2,14 @@
 
 import pytest
 
-from boards.modules.compliant_control import CompliantControl
-from boards.modules.error_module import ErrorModule
-from boards.modules.motor_limits import MotorLimits
-from boards.modules.motor_output import PINS as MOTOR_PINS
-from boards.modules.motor_output import SHUTDOWN
-from boards.modules.network_time import NetworkTime
-from boards.quirks import Quirks
-from datatable.generated import errors as codes
+from ranger_sim.boards.modules.compliant_control import CompliantControl
+from ranger_sim.boards.modules.error_module import ErrorModule
+from ranger_sim.boards.modules.motor_limits import MotorLimits
+from ranger_sim.boards.modules.motor_output import PINS as MOTOR_PINS
+from ranger_sim.boards.modules.motor_output import SHUTDOWN
+from ranger_sim.boards.modules.network_time import NetworkTime
+from ranger_sim.boards.quirks import Quirks
+from ranger_sim.datatable.generated import errors as codes
 from tests.boards.motor_bench import BOARDS, SLOT_NS, Bench, Winding
 
 ONE = 65536
@@ -434,7 +434,7 @@ def test_an_ankle_is_blocked_at_its_ends_and_when_the_cable_is_off(name, angle, 
 
 
 def test_a_closed_limit_switch_blocks_pulling():
-    from boards.outer_feet import PINS
+    from ranger_sim.boards.outer_feet import PINS
 
     bench = Bench("MCFO")
     encoder = bench.board.encoder

@@ -2,15 +2,15 @@
 
 import pytest
 
-from boards.hip import JOINT_ENCODER as HIP_JOINT
-from boards.hip import MOTOR_ENCODER as HIP_MOTOR
-from boards.inner_feet import JOINT_ENCODER as INNER_JOINT
-from boards.inner_feet import MOTOR_ENCODER as INNER_MOTOR
-from boards.modules.error_module import ErrorModule
-from boards.modules.network_time import NetworkTime
-from boards.modules.quadrature_decoder import QuadratureDecoder
-from boards.outer_feet import JOINT_ENCODER as OUTER_JOINT
-from boards.outer_feet import MOTOR_ENCODER as OUTER_MOTOR
+from ranger_sim.boards.hip import JOINT_ENCODER as HIP_JOINT
+from ranger_sim.boards.hip import MOTOR_ENCODER as HIP_MOTOR
+from ranger_sim.boards.inner_feet import JOINT_ENCODER as INNER_JOINT
+from ranger_sim.boards.inner_feet import MOTOR_ENCODER as INNER_MOTOR
+from ranger_sim.boards.modules.error_module import ErrorModule
+from ranger_sim.boards.modules.network_time import NetworkTime
+from ranger_sim.boards.modules.quadrature_decoder import QuadratureDecoder
+from ranger_sim.boards.outer_feet import JOINT_ENCODER as OUTER_JOINT
+from ranger_sim.boards.outer_feet import MOTOR_ENCODER as OUTER_MOTOR
 from tests.boards.motor_bench import Bench
 
 GLITCH, FULL = 41, 101

@@ -2,13 +2,13 @@
 
 import pytest
 
-from boards.modules.absolute_encoder import AbsoluteEncoder
-from boards.modules.error_module import ErrorModule, error_word
-from boards.modules.foot_contact import Debounce, FootContact
-from boards.modules.network_time import NetworkTime
-from boards.quirks import Quirks
-from datatable.generated import errors as codes
-from foundation.numbers import float_of_word
+from ranger_sim.boards.modules.absolute_encoder import AbsoluteEncoder
+from ranger_sim.boards.modules.error_module import ErrorModule, error_word
+from ranger_sim.boards.modules.foot_contact import Debounce, FootContact
+from ranger_sim.boards.modules.network_time import NetworkTime
+from ranger_sim.boards.quirks import Quirks
+from ranger_sim.datatable.generated import errors as codes
+from ranger_sim.foundation.numbers import float_of_word
 from tests.boards.motor_bench import BOARDS, SLOT_NS, Bench
 
 SPIKE = codes.AE_SPIKE

@@ -4,19 +4,19 @@ import hashlib
 
 import pytest
 
-from boards.modules.can_link import CanLink
-from boards.modules.error_module import ErrorModule
-from boards.modules.network_time import NetworkTime
-from boards.modules.receiver import FloatReceiver, Ignored, IntReceiver
-from boards.quirks import Quirks
-from datatable.generated import errors as codes
-from datatable.schedule import published_schedule
-from firmware_sim.clock import Crystal
-from firmware_sim.microcontroller import Microcontroller
-from firmware_sim.peripherals.can_controller import CanController
-from firmware_sim.vic import FIQ
-from foundation.events import CAN_REQUEST, CAN_RX, CAN_TX_DONE
-from foundation.user_error import UserError
+from ranger_sim.boards.modules.can_link import CanLink
+from ranger_sim.boards.modules.error_module import ErrorModule
+from ranger_sim.boards.modules.network_time import NetworkTime
+from ranger_sim.boards.modules.receiver import FloatReceiver, Ignored, IntReceiver
+from ranger_sim.boards.quirks import Quirks
+from ranger_sim.datatable.generated import errors as codes
+from ranger_sim.datatable.schedule import published_schedule
+from ranger_sim.firmware_sim.clock import Crystal
+from ranger_sim.firmware_sim.microcontroller import Microcontroller
+from ranger_sim.firmware_sim.peripherals.can_controller import CanController
+from ranger_sim.firmware_sim.vic import FIQ
+from ranger_sim.foundation.events import CAN_REQUEST, CAN_RX, CAN_TX_DONE
+from ranger_sim.foundation.user_error import UserError
 from tests.boards.motor_bench import BOARDS, Bench
 
 DECODERS = ["qdc_cap01_angle", "qdc_cap01_rate", "qdc_cap23_angle", "qdc_cap23_rate"]
@@ -440,7 +440,7 @@ def test_a_free_buffer_takes_the_oldest_frame_with_its_own_stamp():
 
 
 def test_after_bus_off_the_controller_is_started_again_at_once():
-    from foundation.events import CAN_STATUS
+    from ranger_sim.foundation.events import CAN_STATUS
 
     link = Link()
     link.push(CAN_STATUS, 1, 4, 256, 0, 1)
@@ -459,7 +459,7 @@ def test_after_bus_off_the_controller_is_started_again_at_once():
     ],
 )
 def test_controller_errors_get_the_codes_of_their_controller(bits, code):
-    from foundation.events import CAN_STATUS
+    from ranger_sim.foundation.events import CAN_STATUS
 
     link = Link(number=2)
     link.push(CAN_STATUS, 2, bits, 100, 0, 0)

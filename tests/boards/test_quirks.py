@@ -5,9 +5,9 @@ from dataclasses import fields
 
 import pytest
 
-import boards
-from boards.quirks import Quirks
-from foundation.user_error import UserError
+from ranger_sim import boards
+from ranger_sim.boards.quirks import Quirks
+from ranger_sim.foundation.user_error import UserError
 
 TABLE = pathlib.Path(boards.__file__).parent / "QUIRKS.md"
 

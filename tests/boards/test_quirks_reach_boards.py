@@ -2,14 +2,14 @@
 
 import pytest
 
-from boards.can_router import CanRouterBoard
-from boards.main_brain.board import MainBrainBoard
-from boards.modules.buzzer import TUNE
-from boards.quirks import Quirks
-from boards.user_interface import UserInterfaceBoard
-from datatable.generated import mb
-from datatable.store import LABVIEW
-from firmware_sim.clock import Crystal
+from ranger_sim.boards.can_router import CanRouterBoard
+from ranger_sim.boards.main_brain.board import MainBrainBoard
+from ranger_sim.boards.modules.buzzer import TUNE
+from ranger_sim.boards.quirks import Quirks
+from ranger_sim.boards.user_interface import UserInterfaceBoard
+from ranger_sim.datatable.generated import mb
+from ranger_sim.datatable.store import LABVIEW
+from ranger_sim.firmware_sim.clock import Crystal
 from tests.boards.motor_bench import BOARDS as MOTOR_BOARDS
 from tests.boards.motor_bench import Bench
 

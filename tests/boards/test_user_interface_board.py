@@ -7,15 +7,15 @@ import sys
 
 import pytest
 
-from boards.modules.buzzer import TUNE
-from boards.modules.keypad import KEY_PINS
-from boards.quirks import Quirks
-from boards.user_interface import IMU_UART, PINS, UserInterfaceBoard
-from datatable.generated import errors
-from datatable.generated import ui as table
-from firmware_sim.clock import Crystal
-from foundation.events import UART_BYTE
-from foundation.numbers import float32, float_of_word
+from ranger_sim.boards.modules.buzzer import TUNE
+from ranger_sim.boards.modules.keypad import KEY_PINS
+from ranger_sim.boards.quirks import Quirks
+from ranger_sim.boards.user_interface import IMU_UART, PINS, UserInterfaceBoard
+from ranger_sim.datatable.generated import errors
+from ranger_sim.datatable.generated import ui as table
+from ranger_sim.firmware_sim.clock import Crystal
+from ranger_sim.foundation.events import UART_BYTE
+from ranger_sim.foundation.numbers import float32, float_of_word
 from tests.boards.wires import Wires
 
 MS = 1_000_000

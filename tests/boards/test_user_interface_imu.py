@@ -6,9 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from boards.modules.imu_parser import ImuParser, start_command
-from datatable.generated import errors
-from foundation.numbers import float32
+from ranger_sim.boards.modules.imu_parser import ImuParser, start_command
+from ranger_sim.datatable.generated import errors
+from ranger_sim.foundation.numbers import float32
 
 
 def packet(header, values, timer=0):

@@ -4,15 +4,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from boards.modules.buzzer import TUNE, Buzzer, BuzzerFrequency, ErrorSound, TuneStart
-from boards.modules.colour_leds import ColourLeds, LedReceiver
-from boards.modules.keypad import KEY_PINS, Keypad
-from boards.modules.lcd import Lcd, LcdQuarter
-from boards.modules.rc_receiver import RcReceiver
-from boards.modules.sync_light import SyncLight
-from datatable.generated import errors
-from firmware_sim.microcontroller import Microcontroller
-from firmware_sim.peripherals.gpio import Gpio
+from ranger_sim.boards.modules.buzzer import TUNE, Buzzer, BuzzerFrequency, ErrorSound, TuneStart
+from ranger_sim.boards.modules.colour_leds import ColourLeds, LedReceiver
+from ranger_sim.boards.modules.keypad import KEY_PINS, Keypad
+from ranger_sim.boards.modules.lcd import Lcd, LcdQuarter
+from ranger_sim.boards.modules.rc_receiver import RcReceiver
+from ranger_sim.boards.modules.sync_light import SyncLight
+from ranger_sim.datatable.generated import errors
+from ranger_sim.firmware_sim.microcontroller import Microcontroller
+from ranger_sim.firmware_sim.peripherals.gpio import Gpio
 
 
 def word(text):

@@ -1,7 +1,7 @@
 """A few wires for a board alone on the table: buses that carry one frame after the other, a link partner."""
 
-from boards.modules.ssp_link import EXCHANGE_NS, MainBrainSspLink
-from foundation.events import (
+from ranger_sim.boards.modules.ssp_link import EXCHANGE_NS, MainBrainSspLink
+from ranger_sim.foundation.events import (
     CAN_ABORT,
     CAN_REQUEST,
     CAN_RX,

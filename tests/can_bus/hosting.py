@@ -11,9 +11,9 @@ import subprocess
 import sys
 import threading
 
-from can_bus.edge.attach import AttachServer
-from can_bus.edge.host import BusHost
-from can_bus.edge.paced import PacedBus
+from ranger_sim.can_bus.edge.attach import AttachServer
+from ranger_sim.can_bus.edge.host import BusHost
+from ranger_sim.can_bus.edge.paced import PacedBus
 
 NUMBERS = itertools.count()
 PATIENCE_S = 60.0  # a guard against waiting for ever; nothing asserts on it

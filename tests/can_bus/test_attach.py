@@ -9,17 +9,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from can_bus.bus import RESET, Bus
-from can_bus.edge import attach_records as wire
-from can_bus.edge import host as host_module
-from can_bus.edge import links
-from can_bus.edge.attach import BACKLOG_LIMIT, CLIENT_LIMIT, AttachServer
-from can_bus.edge.host import BusHost
-from can_bus.edge.paced import PacedBus
-from can_bus.edge.taps import RECEIVED, TRANSMIT_QUEUE
-from foundation.events import FLAG_ERROR, FLAG_EXTENDED, FLAG_REMOTE, FLAG_SINGLE_SHOT, STAGE_BUS, EventQueue
-from foundation.random_stream import RandomStream
-from foundation.user_error import UserError
+from ranger_sim.can_bus.bus import RESET, Bus
+from ranger_sim.can_bus.edge import attach_records as wire
+from ranger_sim.can_bus.edge import host as host_module
+from ranger_sim.can_bus.edge import links
+from ranger_sim.can_bus.edge.attach import BACKLOG_LIMIT, CLIENT_LIMIT, AttachServer
+from ranger_sim.can_bus.edge.host import BusHost
+from ranger_sim.can_bus.edge.paced import PacedBus
+from ranger_sim.can_bus.edge.taps import RECEIVED, TRANSMIT_QUEUE
+from ranger_sim.foundation.events import FLAG_ERROR, FLAG_EXTENDED, FLAG_REMOTE, FLAG_SINGLE_SHOT, STAGE_BUS, EventQueue
+from ranger_sim.foundation.random_stream import RandomStream
+from ranger_sim.foundation.user_error import UserError
 
 from .hosting import PATIENCE_S, fresh_name, hosted
 

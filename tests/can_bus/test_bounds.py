@@ -6,12 +6,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from can_bus import bound_check
-from can_bus.bound_check import Sender, critical_releases, longest_content, play
-from can_bus.bounds import Message, level_of, message, most_waiting, response_times, utilisation
-from can_bus.frame import frame_bits, worst_case_bits
-from foundation.events import FLAG_EXTENDED
-from foundation.random_stream import RandomStream
+from ranger_sim.can_bus import bound_check
+from ranger_sim.can_bus.bound_check import Sender, critical_releases, longest_content, play
+from ranger_sim.can_bus.bounds import Message, level_of, message, most_waiting, response_times, utilisation
+from ranger_sim.can_bus.frame import frame_bits, worst_case_bits
+from ranger_sim.foundation.events import FLAG_EXTENDED
+from ranger_sim.foundation.random_stream import RandomStream
 
 MS = 1_000_000
 

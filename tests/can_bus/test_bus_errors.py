@@ -2,10 +2,10 @@
 
 import pytest
 
-from can_bus import bus as can_bus_module
-from can_bus.bus import BUS_OFF, JOINING, OPERATING, RESET
-from can_bus.frame import FIELD_ACK_SLOT, FIELD_CRC_DELIMITER, frame_bits
-from foundation.events import FLAG_ERROR, FLAG_SINGLE_SHOT, TX_ABORTED, TX_LOST, TX_SENT
+from ranger_sim.can_bus import bus as can_bus_module
+from ranger_sim.can_bus.bus import BUS_OFF, JOINING, OPERATING, RESET
+from ranger_sim.can_bus.frame import FIELD_ACK_SLOT, FIELD_CRC_DELIMITER, frame_bits
+from ranger_sim.foundation.events import FLAG_ERROR, FLAG_SINGLE_SHOT, TX_ABORTED, TX_LOST, TX_SENT
 
 from .wiring import Wired, edge
 

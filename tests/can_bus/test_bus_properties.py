@@ -12,10 +12,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
 
-from can_bus import benchmark
-from can_bus.bus import BUS_OFF
-from can_bus.frame import arbitration_key, frame_bits
-from foundation.events import FLAG_ERROR, FLAG_EXTENDED, FLAG_SINGLE_SHOT, TX_ABORTED, TX_LOST, TX_SENT
+from ranger_sim.can_bus import benchmark
+from ranger_sim.can_bus.bus import BUS_OFF
+from ranger_sim.can_bus.frame import arbitration_key, frame_bits
+from ranger_sim.foundation.events import FLAG_ERROR, FLAG_EXTENDED, FLAG_SINGLE_SHOT, TX_ABORTED, TX_LOST, TX_SENT
 
 from .wiring import RATE, Wired
 

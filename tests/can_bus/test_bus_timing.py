@@ -4,9 +4,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from can_bus.bus import Bus
-from can_bus.frame import frame_bits
-from foundation.events import FLAG_EXTENDED, FLAG_REMOTE, FLAG_SINGLE_SHOT, NEVER, TX_ABORTED, TX_LOST, TX_SENT
+from ranger_sim.can_bus.bus import Bus
+from ranger_sim.can_bus.frame import frame_bits
+from ranger_sim.foundation.events import (
+    FLAG_EXTENDED,
+    FLAG_REMOTE,
+    FLAG_SINGLE_SHOT,
+    NEVER,
+    TX_ABORTED,
+    TX_LOST,
+    TX_SENT,
+)
 
 from .wiring import RATE, Wired, edge
 

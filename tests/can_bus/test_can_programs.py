@@ -5,9 +5,9 @@ import pathlib
 import can
 import pytest
 
-import datatable
-from can_bus.edge.candump import CandumpWriter
-from foundation.events import FLAG_EXTENDED
+from ranger_sim import datatable
+from ranger_sim.can_bus.edge.candump import CandumpWriter
+from ranger_sim.foundation.events import FLAG_EXTENDED
 
 from .hosting import Program, hosted
 

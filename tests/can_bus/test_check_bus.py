@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from can_bus.edge import check_bus
-from can_bus.edge.check_bus import Finding, NotReadError, Traffic, check_link, check_traffic
+from ranger_sim.can_bus.edge import check_bus
+from ranger_sim.can_bus.edge.check_bus import Finding, NotReadError, Traffic, check_link, check_traffic
 
 RATE = 1_000_000
 

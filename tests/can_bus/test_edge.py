@@ -11,12 +11,12 @@ from can.io.canutils import CanutilsLogReader, CanutilsLogWriter
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from can_bus.edge import benchmark
-from can_bus.edge.candump import CandumpWriter, frames_of_log, line_of_frame, read_candump
-from can_bus.edge.messages import frame_of_message, message_of_frame
-from can_bus.frame import FIELD_CRC, data_length
-from foundation.events import FLAG_ERROR, FLAG_EXTENDED, FLAG_REMOTE
-from foundation.user_error import UserError
+from ranger_sim.can_bus.edge import benchmark
+from ranger_sim.can_bus.edge.candump import CandumpWriter, frames_of_log, line_of_frame, read_candump
+from ranger_sim.can_bus.edge.messages import frame_of_message, message_of_frame
+from ranger_sim.can_bus.frame import FIELD_CRC, data_length
+from ranger_sim.foundation.events import FLAG_ERROR, FLAG_EXTENDED, FLAG_REMOTE
+from ranger_sim.foundation.user_error import UserError
 
 from .wiring import Wired
 

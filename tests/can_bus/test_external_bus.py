@@ -3,9 +3,9 @@
 import can
 import pytest
 
-from can_bus.edge.external_bus import AHEAD_NS, ExternalBus, opener, place_of
-from can_bus.frame import frame_bits
-from foundation.events import (
+from ranger_sim.can_bus.edge.external_bus import AHEAD_NS, ExternalBus, opener, place_of
+from ranger_sim.can_bus.frame import frame_bits
+from ranger_sim.foundation.events import (
     CAN_ABORT,
     CAN_MODE,
     CAN_REQUEST,
@@ -17,7 +17,7 @@ from foundation.events import (
     TX_SENT,
     EventQueue,
 )
-from foundation.user_error import UserError
+from ranger_sim.foundation.user_error import UserError
 
 FRAME_NS = (frame_bits(0x123, 8, 1, 2) + 3) * 1000  # at 1 Mbit/s
 

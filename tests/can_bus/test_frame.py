@@ -4,8 +4,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from can_bus import frame
-from foundation.events import FLAG_EXTENDED, FLAG_REMOTE
+from ranger_sim.can_bus import frame
+from ranger_sim.foundation.events import FLAG_EXTENDED, FLAG_REMOTE
 
 WORD = st.integers(0, 2**32 - 1)
 

@@ -9,10 +9,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from can_bus.edge import python_can
-from can_bus.edge.links import PrivateLink
-from can_bus.frame import frame_bits
-from foundation import wallclock
+from ranger_sim.can_bus.edge import python_can
+from ranger_sim.can_bus.edge.links import PrivateLink
+from ranger_sim.can_bus.frame import frame_bits
+from ranger_sim.foundation import wallclock
 
 from .hosting import fresh_name, hosted
 
@@ -75,7 +75,7 @@ def drained(a_bus):
 
 
 def test_the_interface_is_registered_with_python_can():
-    assert can.interfaces.BACKENDS["ranger_sim"] == ("can_bus.edge.python_can", "RangerSimBus")
+    assert can.interfaces.BACKENDS["ranger_sim"] == ("ranger_sim.can_bus.edge.python_can", "RangerSimBus")
 
 
 def test_a_frame_takes_its_bits_and_arrives_then(bus, clock):

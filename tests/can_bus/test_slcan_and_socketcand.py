@@ -8,12 +8,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from can_bus.bus import Bus
-from can_bus.edge.slcan import SlcanServer
-from can_bus.edge.socketcand import SocketcandServer
-from foundation import wallclock
-from foundation.events import FLAG_EXTENDED, FLAG_REMOTE, STAGE_BUS, EventQueue
-from foundation.user_error import UserError
+from ranger_sim.can_bus.bus import Bus
+from ranger_sim.can_bus.edge.slcan import SlcanServer
+from ranger_sim.can_bus.edge.socketcand import SocketcandServer
+from ranger_sim.foundation import wallclock
+from ranger_sim.foundation.events import FLAG_EXTENDED, FLAG_REMOTE, STAGE_BUS, EventQueue
+from ranger_sim.foundation.user_error import UserError
 
 from .hosting import hosted
 

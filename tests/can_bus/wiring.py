@@ -1,7 +1,7 @@
 """A bus with some nodes, and what their inboxes held, for the tests of this folder."""
 
-from can_bus.bus import Bus
-from foundation.events import CAN_RX, CAN_STATUS, CAN_TX_DONE, STAGE_BUS, EventQueue
+from ranger_sim.can_bus.bus import Bus
+from ranger_sim.foundation.events import CAN_RX, CAN_STATUS, CAN_TX_DONE, STAGE_BUS, EventQueue
 
 RATE = 3_000_000  # bit/s
 

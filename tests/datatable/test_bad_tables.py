@@ -4,9 +4,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from datatable.loader import hash_of_master_files, load_table
-from datatable.model import TableError
-from foundation.user_error import UserError
+from ranger_sim.datatable.loader import hash_of_master_files, load_table
+from ranger_sim.datatable.model import TableError
+from ranger_sim.foundation.user_error import UserError
 
 from .small_table import BOARDS, ERRORS, VARIABLES, write
 

@@ -8,13 +8,13 @@ import importlib
 
 import pytest
 
-import datatable
-from boards.quirks import Quirks
-from datatable.generated import all_variables
-from datatable.store import BLUETOOTH
-from firmware_sim.clock import Crystal
-from firmware_sim.scheduler import Occasional
-from foundation.events import CAN_REQUEST, CAN_TX_DONE, SSP_START, STAGE_BUS, TX_SENT
+from ranger_sim import datatable
+from ranger_sim.boards.quirks import Quirks
+from ranger_sim.datatable.generated import all_variables
+from ranger_sim.datatable.store import BLUETOOTH
+from ranger_sim.firmware_sim.clock import Crystal
+from ranger_sim.firmware_sim.scheduler import Occasional
+from ranger_sim.foundation.events import CAN_REQUEST, CAN_TX_DONE, SSP_START, STAGE_BUS, TX_SENT
 
 QUANTUM_NS = 25_000  # below the 36 us of the shortest frame, as in the assembled robot
 FRAME_NS = 37_000  # a frame of 8 bytes with intermission at 3 Mbit/s: 111 bits

@@ -6,11 +6,11 @@ import subprocess
 
 import pytest
 
-from datatable.generate import GENERATED_FOLDER
-from datatable.generate_c import C_TYPES
-from datatable.generate_python import heard_by, known_to, sent_by
-from datatable.loader import load_table
-from datatable.routing import destination_masks
+from ranger_sim.datatable.generate import GENERATED_FOLDER
+from ranger_sim.datatable.generate_c import C_TYPES
+from ranger_sim.datatable.generate_python import heard_by, known_to, sent_by
+from ranger_sim.datatable.loader import load_table
+from ranger_sim.datatable.routing import destination_masks
 
 COMPILER = shutil.which("cc")
 pytestmark = pytest.mark.skipif(COMPILER is None, reason="no C compiler `cc` found: the generated C was NOT compiled")

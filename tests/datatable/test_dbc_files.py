@@ -5,10 +5,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from datatable.generate import GENERATED_FOLDER
-from datatable.loader import load_table
-from datatable.model import LIMITS
-from datatable.packing import error_word, pack_frame, unpack_frame
+from ranger_sim.datatable.generate import GENERATED_FOLDER
+from ranger_sim.datatable.loader import load_table
+from ranger_sim.datatable.model import LIMITS
+from ranger_sim.datatable.packing import error_word, pack_frame, unpack_frame
 
 TABLE = load_table()
 BUSES = [bus for bus in TABLE.channels if bus != "SSP"]

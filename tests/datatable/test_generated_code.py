@@ -6,10 +6,10 @@ import re
 
 import pytest
 
-from datatable.generate import GENERATED_FOLDER, generated_files, stale, write
-from datatable.loader import load_table
-from datatable.packing import error_word, parts_of_error_word
-from foundation.user_error import UserError
+from ranger_sim.datatable.generate import GENERATED_FOLDER, generated_files, stale, write
+from ranger_sim.datatable.loader import load_table
+from ranger_sim.datatable.packing import error_word, parts_of_error_word
+from ranger_sim.foundation.user_error import UserError
 
 from . import small_table
 

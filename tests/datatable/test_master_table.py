@@ -6,12 +6,12 @@ import pathlib
 
 import pytest
 
-import datatable
-from datatable.loader import load_table
-from datatable.model import Table
-from datatable.routing import destination_masks
-from datatable.schedule import published_schedule, scheduled_frames_per_s
-from foundation.user_error import UserError
+from ranger_sim import datatable
+from ranger_sim.datatable.loader import load_table
+from ranger_sim.datatable.model import Table
+from ranger_sim.datatable.routing import destination_masks
+from ranger_sim.datatable.schedule import published_schedule, scheduled_frames_per_s
+from ranger_sim.foundation.user_error import UserError
 
 HERE = pathlib.Path(__file__).parent
 
@@ -163,14 +163,14 @@ def test_the_router_sends_fifty_identifiers_away_from_the_main_brain(table):
 
 
 def test_routed_identifiers_are_exactly_the_main_brains_send_list(table):
-    from datatable.generated import mb, routes
+    from ranger_sim.datatable.generated import mb, routes
 
     assert routes.DESTINATIONS == tuple(destination_masks(table))
     assert tuple(number for number, mask in enumerate(routes.DESTINATIONS) if mask != 1) == mb.SEND
 
 
 def test_the_hash_does_not_depend_on_line_endings_but_on_every_character(tmp_path):
-    from datatable.loader import MASTER_FOLDER
+    from ranger_sim.datatable.loader import MASTER_FOLDER
 
     for path in MASTER_FOLDER.iterdir():
         (tmp_path / path.name).write_bytes(path.read_bytes().replace(b"\n", b"\r\n"))
@@ -186,9 +186,9 @@ def test_importing_the_generated_modules_opens_no_master_file():
 
     program = (
         "import sys\n"
-        "import datatable.generated\n"
-        "from datatable.generated import mch, mcfo, mcfi, mcsi, ui, csr, mb, all_variables, errors, routes\n"
-        "assert 'csv' not in sys.modules and 'tomllib' not in sys.modules and 'datatable.loader' not in sys.modules\n"
+        "import ranger_sim.datatable.generated\n"
+        "from ranger_sim.datatable.generated import mch, mcfo, mcfi, mcsi, ui, csr, mb, all_variables, errors, routes\n"
+        "assert not {'csv', 'tomllib', 'ranger_sim.datatable.loader'} & set(sys.modules)\n"
         "print(mch.MCH_ANGLE)\n"
     )
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, cwd=HERE.parent.parent)

@@ -9,10 +9,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-import datatable
-from datatable import store as store_module
-from datatable.generated import all_variables, mb
-from datatable.store import DataStore
+from ranger_sim import datatable
+from ranger_sim.datatable import store as store_module
+from ranger_sim.datatable.generated import all_variables, mb
+from ranger_sim.datatable.store import DataStore
 
 words = st.integers(0, 2**32 - 1)
 
@@ -162,8 +162,8 @@ def test_without_a_callback_an_id_beyond_the_table_is_only_counted():
 
 PROGRAM = """
 import hashlib
-import datatable
-from datatable.store import DataStore
+from ranger_sim import datatable
+from ranger_sim.datatable.store import DataStore
 store = datatable.main_brain_store()
 state = 12345
 for step in range(20000):

@@ -5,8 +5,8 @@ import json
 
 import pytest
 
-from datatable import cli
-from foundation.user_error import UserError
+from ranger_sim.datatable import cli
+from ranger_sim.foundation.user_error import UserError
 
 from . import small_table
 

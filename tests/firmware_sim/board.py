@@ -1,7 +1,7 @@
 """What the tests of this package share: a chip whose tasks write down when they ran."""
 
-from firmware_sim.microcontroller import Microcontroller, Peripheral
-from firmware_sim.scheduler import Schedule, Task
+from ranger_sim.firmware_sim.microcontroller import Microcontroller, Peripheral
+from ranger_sim.firmware_sim.scheduler import Schedule, Task
 
 FULL_SPEED_HZ = 60_000_000
 TICK_CYCLES = 85  # latency 25 and cost 60 of the slot timer's interrupt

@@ -1,6 +1,6 @@
 """What a chip's main loop does beside the scheduler."""
 
-from foundation.events import CAN_RX
+from ranger_sim.foundation.events import CAN_RX
 from tests.firmware_sim.board import TICK_NS, Log
 
 

@@ -2,8 +2,8 @@
 
 import pytest
 
-from firmware_sim.microcontroller import Microcontroller
-from firmware_sim.peripherals.can_controller import (
+from ranger_sim.firmware_sim.microcontroller import Microcontroller
+from ranger_sim.firmware_sim.peripherals.can_controller import (
     CMR_AT,
     CMR_CDO,
     CMR_STB2,
@@ -21,8 +21,8 @@ from firmware_sim.peripherals.can_controller import (
     btr_value,
     sample_point_of,
 )
-from firmware_sim.vic import FIQ
-from foundation.events import (
+from ranger_sim.firmware_sim.vic import FIQ
+from ranger_sim.foundation.events import (
     CAN_ABORT,
     CAN_MODE,
     CAN_REQUEST,
@@ -36,7 +36,7 @@ from foundation.events import (
     TX_LOST,
     TX_SENT,
 )
-from foundation.user_error import UserError
+from ranger_sim.foundation.user_error import UserError
 
 
 class Node:

@@ -6,9 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from firmware_sim.clock import Crystal, TickTrain, seeded_crystal
-from foundation.random_stream import RandomStream
-from foundation.user_error import UserError
+from ranger_sim.firmware_sim.clock import Crystal, TickTrain, seeded_crystal
+from ranger_sim.foundation.random_stream import RandomStream
+from ranger_sim.foundation.user_error import UserError
 
 HOUR_NS = 3_600_000_000_000
 

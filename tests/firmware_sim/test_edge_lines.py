@@ -4,13 +4,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from firmware_sim.microcontroller import Microcontroller, Peripheral
-from firmware_sim.peripherals.timer_capture import TimerCapture
-from firmware_sim.scheduler import Schedule, Task
-from firmware_sim.vic import FIQ
-from foundation.edge_buffer import EdgeBuffer
-from foundation.events import CAN_RX, NEVER, PIN_EDGE
-from foundation.user_error import UserError
+from ranger_sim.firmware_sim.microcontroller import Microcontroller, Peripheral
+from ranger_sim.firmware_sim.peripherals.timer_capture import TimerCapture
+from ranger_sim.firmware_sim.scheduler import Schedule, Task
+from ranger_sim.firmware_sim.vic import FIQ
+from ranger_sim.foundation.edge_buffer import EdgeBuffer
+from ranger_sim.foundation.events import CAN_RX, NEVER, PIN_EDGE
+from ranger_sim.foundation.user_error import UserError
 
 PINS = ((22, 27), (16, 29))  # channels A and B of two encoders
 PINS_ORDER = 256  # stage pins

@@ -2,10 +2,10 @@
 
 import pytest
 
-from firmware_sim.peripherals.timer_capture import TimerCapture
-from firmware_sim.vic import ADC_DONE, EXTERNAL_INTERRUPT, FIQ, SOFTWARE, SPI_DONE, InterruptController
-from foundation.events import CAN_RX, PIN_EDGE, STAGE_BUS, STAGE_PINS, UART_BYTE
-from foundation.user_error import UserError
+from ranger_sim.firmware_sim.peripherals.timer_capture import TimerCapture
+from ranger_sim.firmware_sim.vic import ADC_DONE, EXTERNAL_INTERRUPT, FIQ, SOFTWARE, SPI_DONE, InterruptController
+from ranger_sim.foundation.events import CAN_RX, PIN_EDGE, STAGE_BUS, STAGE_PINS, UART_BYTE
+from ranger_sim.foundation.user_error import UserError
 from tests.firmware_sim.board import TICK_NS, Log, raise_at
 
 # Sources of these tests steal 60 cycles = 1000 ns unless told otherwise; latency 0 keeps instants round.

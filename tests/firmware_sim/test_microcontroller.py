@@ -2,13 +2,13 @@
 
 import pytest
 
-from firmware_sim.clock import Crystal
-from firmware_sim.microcontroller import Microcontroller, Peripheral
-from firmware_sim.scheduler import Schedule
-from firmware_sim.vic import FIQ, SOFTWARE
-from foundation.events import NEVER, PIN_OUTPUT, UART_BYTE
-from foundation.random_stream import RandomStream
-from foundation.user_error import UserError
+from ranger_sim.firmware_sim.clock import Crystal
+from ranger_sim.firmware_sim.microcontroller import Microcontroller, Peripheral
+from ranger_sim.firmware_sim.scheduler import Schedule
+from ranger_sim.firmware_sim.vic import FIQ, SOFTWARE
+from ranger_sim.foundation.events import NEVER, PIN_OUTPUT, UART_BYTE
+from ranger_sim.foundation.random_stream import RandomStream
+from ranger_sim.foundation.user_error import UserError
 from tests.firmware_sim.board import raise_at
 
 

@@ -4,19 +4,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from firmware_sim.analog import AnalogPins
-from firmware_sim.clock import Crystal
-from firmware_sim.microcontroller import Microcontroller
-from firmware_sim.peripherals.adc_external import GAINS, Ads7871, register4
-from firmware_sim.peripherals.adc_internal import AdcInternal
-from firmware_sim.peripherals.gpio import Gpio, p0, p1
-from firmware_sim.peripherals.pwm import Pwm
-from firmware_sim.peripherals.spi_encoder import SpiEncoder
-from firmware_sim.peripherals.ssp import BIT_RATE, SEGMENT_WORDS, SspPort, SspSegment, segment_time_ns
-from firmware_sim.peripherals.timer_capture import TimerCapture
-from firmware_sim.peripherals.uart import Uart
-from firmware_sim.vic import ADC_DONE, EXTERNAL_INTERRUPT, FIQ, SPI_DONE, TIMER_MATCH, UART_TRANSMIT
-from foundation.events import (
+from ranger_sim.firmware_sim.analog import AnalogPins
+from ranger_sim.firmware_sim.clock import Crystal
+from ranger_sim.firmware_sim.microcontroller import Microcontroller
+from ranger_sim.firmware_sim.peripherals.adc_external import GAINS, Ads7871, register4
+from ranger_sim.firmware_sim.peripherals.adc_internal import AdcInternal
+from ranger_sim.firmware_sim.peripherals.gpio import Gpio, p0, p1
+from ranger_sim.firmware_sim.peripherals.pwm import Pwm
+from ranger_sim.firmware_sim.peripherals.spi_encoder import SpiEncoder
+from ranger_sim.firmware_sim.peripherals.ssp import BIT_RATE, SEGMENT_WORDS, SspPort, SspSegment, segment_time_ns
+from ranger_sim.firmware_sim.peripherals.timer_capture import TimerCapture
+from ranger_sim.firmware_sim.peripherals.uart import Uart
+from ranger_sim.firmware_sim.vic import ADC_DONE, EXTERNAL_INTERRUPT, FIQ, SPI_DONE, TIMER_MATCH, UART_TRANSMIT
+from ranger_sim.foundation.events import (
     PIN_EDGE,
     PIN_OUTPUT,
     PWM_UPDATE,
@@ -26,7 +26,7 @@ from foundation.events import (
     UART_BYTE,
     UART_OUTPUT,
 )
-from foundation.user_error import UserError
+from ranger_sim.foundation.user_error import UserError
 
 
 def chip_at(now=0, **more):

@@ -2,11 +2,11 @@
 
 import pytest
 
-from firmware_sim.clock import Crystal
-from firmware_sim.scheduler import Occasional, Schedule, Task, Wait
-from firmware_sim.vic import EXTERNAL_INTERRUPT
-from foundation.events import NEVER
-from foundation.user_error import UserError
+from ranger_sim.firmware_sim.clock import Crystal
+from ranger_sim.firmware_sim.scheduler import Occasional, Schedule, Task, Wait
+from ranger_sim.firmware_sim.vic import EXTERNAL_INTERRUPT
+from ranger_sim.foundation.events import NEVER
+from ranger_sim.foundation.user_error import UserError
 from tests.firmware_sim.board import TICK_CYCLES, TICK_NS, Log, raise_at
 
 

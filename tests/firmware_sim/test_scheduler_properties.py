@@ -3,10 +3,10 @@
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from firmware_sim.clock import Crystal
-from firmware_sim.scheduler import Schedule, Task
-from firmware_sim.vic import FIQ
-from foundation.events import PIN_EDGE
+from ranger_sim.firmware_sim.clock import Crystal
+from ranger_sim.firmware_sim.scheduler import Schedule, Task
+from ranger_sim.firmware_sim.vic import FIQ
+from ranger_sim.foundation.events import PIN_EDGE
 from tests.firmware_sim.board import Log
 
 COSTS = st.integers(0, 40_000)

@@ -2,10 +2,10 @@
 
 import pytest
 
-from can_bus.bus import Bus
-from firmware_sim.clock import Crystal
-from firmware_sim.microcontroller import Microcontroller
-from firmware_sim.peripherals.can_controller import (
+from ranger_sim.can_bus.bus import Bus
+from ranger_sim.firmware_sim.clock import Crystal
+from ranger_sim.firmware_sim.microcontroller import Microcontroller
+from ranger_sim.firmware_sim.peripherals.can_controller import (
     CMR_AT,
     CMR_STB1,
     CMR_TR,
@@ -15,9 +15,9 @@ from firmware_sim.peripherals.can_controller import (
     ICR_TI3,
     CanController,
 )
-from firmware_sim.scheduler import Schedule, Task
-from foundation.events import CAN_ABORT, CAN_REQUEST, CAN_TX_DONE, STAGE_BUS, EventQueue
-from foundation.random_stream import RandomStream
+from ranger_sim.firmware_sim.scheduler import Schedule, Task
+from ranger_sim.foundation.events import CAN_ABORT, CAN_REQUEST, CAN_TX_DONE, STAGE_BUS, EventQueue
+from ranger_sim.foundation.random_stream import RandomStream
 
 WINDOW_NS = 25_000  # shorter than the shortest frame
 SLOT_US = 20

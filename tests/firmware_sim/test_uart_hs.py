@@ -2,13 +2,13 @@
 
 import pytest
 
-from firmware_sim.clock import Crystal
-from firmware_sim.microcontroller import Microcontroller
-from firmware_sim.peripherals.uart_hs import HsUart
-from firmware_sim.scheduler import Schedule
-from firmware_sim.vic import DMA_DONE
-from foundation.events import PIN_EDGE, UART_BYTE, UART_OUTPUT
-from foundation.user_error import UserError
+from ranger_sim.firmware_sim.clock import Crystal
+from ranger_sim.firmware_sim.microcontroller import Microcontroller
+from ranger_sim.firmware_sim.peripherals.uart_hs import HsUart
+from ranger_sim.firmware_sim.scheduler import Schedule
+from ranger_sim.firmware_sim.vic import DMA_DONE
+from ranger_sim.foundation.events import PIN_EDGE, UART_BYTE, UART_OUTPUT
+from ranger_sim.foundation.user_error import UserError
 
 BYTE_NS = 10_769  # 10 bits of 14 cycles at 13 MHz: 10 769.23 ns
 CTS = 5

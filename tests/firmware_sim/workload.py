@@ -5,21 +5,21 @@ The digest covers every instant of every task and handler, every message sent, a
 
 import hashlib
 
-from firmware_sim import microcontroller
-from firmware_sim.clock import seeded_crystal
-from firmware_sim.microcontroller import Microcontroller
-from firmware_sim.peripherals.adc_external import Ads7871
-from firmware_sim.peripherals.adc_internal import AdcInternal
-from firmware_sim.peripherals.can_controller import CanController
-from firmware_sim.peripherals.gpio import Gpio
-from firmware_sim.peripherals.pwm import Pwm
-from firmware_sim.peripherals.spi_encoder import SpiEncoder
-from firmware_sim.peripherals.timer_capture import TimerCapture
-from firmware_sim.peripherals.uart import Uart
-from firmware_sim.scheduler import Schedule, Task, Wait
-from firmware_sim.vic import ADC_DONE, EXTERNAL_INTERRUPT, FIQ, SPI_DONE, TIMER_MATCH
-from foundation.events import CAN_REQUEST, CAN_RX, CAN_TX_DONE, PIN_EDGE, UART_BYTE
-from foundation.random_stream import RandomStream
+from ranger_sim.firmware_sim import microcontroller
+from ranger_sim.firmware_sim.clock import seeded_crystal
+from ranger_sim.firmware_sim.microcontroller import Microcontroller
+from ranger_sim.firmware_sim.peripherals.adc_external import Ads7871
+from ranger_sim.firmware_sim.peripherals.adc_internal import AdcInternal
+from ranger_sim.firmware_sim.peripherals.can_controller import CanController
+from ranger_sim.firmware_sim.peripherals.gpio import Gpio
+from ranger_sim.firmware_sim.peripherals.pwm import Pwm
+from ranger_sim.firmware_sim.peripherals.spi_encoder import SpiEncoder
+from ranger_sim.firmware_sim.peripherals.timer_capture import TimerCapture
+from ranger_sim.firmware_sim.peripherals.uart import Uart
+from ranger_sim.firmware_sim.scheduler import Schedule, Task, Wait
+from ranger_sim.firmware_sim.vic import ADC_DONE, EXTERNAL_INTERRUPT, FIQ, SPI_DONE, TIMER_MATCH
+from ranger_sim.foundation.events import CAN_REQUEST, CAN_RX, CAN_TX_DONE, PIN_EDGE, UART_BYTE
+from ranger_sim.foundation.random_stream import RandomStream
 
 QUANTUM_NS = 25_000
 

@@ -3,8 +3,8 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from foundation.events import NEVER, EventQueue
-from foundation.numbers import integers
+from ranger_sim.foundation.events import NEVER, EventQueue
+from ranger_sim.foundation.numbers import integers
 
 
 def drain(queue):

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from foundation import numbers
+from ranger_sim.foundation import numbers
 
 WORDS = st.integers(min_value=0, max_value=2**32 - 1)
 SINGLES = st.floats(width=32, allow_nan=False)

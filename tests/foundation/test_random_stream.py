@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from foundation.random_stream import RandomStream
+from ranger_sim.foundation.random_stream import RandomStream
 
 
 def test_splitmix64_gives_the_published_sequence_from_state_zero():

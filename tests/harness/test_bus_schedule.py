@@ -5,20 +5,20 @@ import dataclasses
 
 import pytest
 
-import datatable
-from boards.hip import HipBoard
-from boards.main_brain.board import MainBrainBoard
-from boards.quirks import Quirks
-from can_bus.bounds import utilisation
-from datatable.generated import all_variables, mb
-from firmware_sim.clock import Crystal
-from firmware_sim.scheduler import Occasional, Task
-from foundation.events import CAN_REQUEST, CAN_TX_DONE, STAGE_BUS, TX_SENT
-from foundation.user_error import UserError
-from harness import bus_schedule, profile
-from harness.bus_schedule import BusSchedule
-from harness.ranger import Ranger
-from harness.scenario import Scenario
+from ranger_sim import datatable
+from ranger_sim.boards.hip import HipBoard
+from ranger_sim.boards.main_brain.board import MainBrainBoard
+from ranger_sim.boards.quirks import Quirks
+from ranger_sim.can_bus.bounds import utilisation
+from ranger_sim.datatable.generated import all_variables, mb
+from ranger_sim.firmware_sim.clock import Crystal
+from ranger_sim.firmware_sim.scheduler import Occasional, Task
+from ranger_sim.foundation.events import CAN_REQUEST, CAN_TX_DONE, STAGE_BUS, TX_SENT
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.harness import bus_schedule, profile
+from ranger_sim.harness.bus_schedule import BusSchedule
+from ranger_sim.harness.ranger import Ranger
+from ranger_sim.harness.scenario import Scenario
 
 TABLE = datatable.load()
 BUSES = profile.BUSES

@@ -4,10 +4,10 @@ import pathlib
 
 import pytest
 
-from foundation.user_error import UserError
-from harness import lockstep, profile, wiring
-from harness.ranger import Ranger
-from harness.scenario import Scenario, StopRule
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.harness import lockstep, profile, wiring
+from ranger_sim.harness.ranger import Ranger
+from ranger_sim.harness.scenario import Scenario, StopRule
 
 RUN_S = 0.06
 

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-import datatable
-from foundation.user_error import UserError
-from harness import profile, wiring
+from ranger_sim import datatable
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.harness import profile, wiring
 
 INTERFACES = ("ranger_sim", "slcan", "socketcan", "virtual")
 ON_CAN0 = '[buses.can1]\ninterface = "socketcan"\nchannel = "can0"\nbit_rate = 1000000\n'

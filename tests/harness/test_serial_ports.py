@@ -9,17 +9,17 @@ import serial
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from boards.modules.imu_parser import ImuParser, start_command
-from boards.quirks import Quirks
-from boards.user_interface import UserInterfaceBoard
-from firmware_sim.clock import Crystal
-from foundation.events import NEVER, PIN_EDGE, UART_BYTE
-from foundation.user_error import UserError
-from harness import serial_ports
-from harness.ranger import Ranger
-from harness.scenario import Scenario
-from harness.serial_ports import Dropouts, PtyPort, RealPort, SerialLine
-from plant.imu import Imu
+from ranger_sim.boards.modules.imu_parser import ImuParser, start_command
+from ranger_sim.boards.quirks import Quirks
+from ranger_sim.boards.user_interface import UserInterfaceBoard
+from ranger_sim.firmware_sim.clock import Crystal
+from ranger_sim.foundation.events import NEVER, PIN_EDGE, UART_BYTE
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.harness import serial_ports
+from ranger_sim.harness.ranger import Ranger
+from ranger_sim.harness.scenario import Scenario
+from ranger_sim.harness.serial_ports import Dropouts, PtyPort, RealPort, SerialLine
+from ranger_sim.plant.imu import Imu
 
 BYTE_NS = 10_000
 MS = 1_000_000

@@ -8,13 +8,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-import datatable
-from datatable.packing import word_of_value
-from foundation.events import FLAG_ERROR, FLAG_EXTENDED, FLAG_REMOTE, NEVER
-from foundation.user_error import UserError
-from harness import profile, rest_bus, supervision
-from harness.ranger import Ranger
-from harness.scenario import Scenario
+from ranger_sim import datatable
+from ranger_sim.datatable.packing import word_of_value
+from ranger_sim.foundation.events import FLAG_ERROR, FLAG_EXTENDED, FLAG_REMOTE, NEVER
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.harness import profile, rest_bus, supervision
+from ranger_sim.harness.ranger import Ranger
+from ranger_sim.harness.scenario import Scenario
 
 TABLE = datatable.load()
 MS = 1_000_000

@@ -2,9 +2,9 @@
 
 import pytest
 
-from foundation.user_error import UserError
-from plant import electronics
-from plant.battery import Battery, BatteryParameters
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.plant import electronics
+from ranger_sim.plant.battery import Battery, BatteryParameters
 
 H = 125e-6
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from plant import benchmarks as bm
+from ranger_sim.plant import benchmarks as bm
 
 
 @pytest.fixture(scope="module")

@@ -12,17 +12,17 @@ import math
 import numpy as np
 import pytest
 
-from foundation.random_stream import RandomStream
-from plant import handling
-from plant import paper_model as pm
-from plant.air import in_air
-from plant.body import DOUBLE, FLIGHT, HELD, INNER, OUTER, SINGLE, Body
-from plant.floor import Floor
-from plant.impact import impact
-from plant.motion import advance
-from plant.parameters import BodyParameters, hip_spring_torque_Nm
-from plant.ranger import STEP_NS
-from plant.stance import on_feet
+from ranger_sim.foundation.random_stream import RandomStream
+from ranger_sim.plant import handling
+from ranger_sim.plant import paper_model as pm
+from ranger_sim.plant.air import in_air
+from ranger_sim.plant.body import DOUBLE, FLIGHT, HELD, INNER, OUTER, SINGLE, Body
+from ranger_sim.plant.floor import Floor
+from ranger_sim.plant.impact import impact
+from ranger_sim.plant.motion import advance
+from ranger_sim.plant.parameters import BodyParameters, hip_spring_torque_Nm
+from ranger_sim.plant.ranger import STEP_NS
+from ranger_sim.plant.stance import on_feet
 
 STEP_S = STEP_NS * 1e-9
 

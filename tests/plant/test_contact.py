@@ -4,17 +4,17 @@ import math
 
 import pytest
 
-from foundation.random_stream import RandomStream
-from foundation.user_error import UserError
-from plant import handling, motion
-from plant.air import in_air
-from plant.body import DOUBLE, FALLEN, FLIGHT, HELD, INNER, OUTER, SINGLE, Body
-from plant.floor import Floor
-from plant.impact import impact
-from plant.parameters import BodyParameters
-from plant.ranger import STEP_NS
-from plant.stance import on_feet
-from plant.watch import keep_forces
+from ranger_sim.foundation.random_stream import RandomStream
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.plant import handling, motion
+from ranger_sim.plant.air import in_air
+from ranger_sim.plant.body import DOUBLE, FALLEN, FLIGHT, HELD, INNER, OUTER, SINGLE, Body
+from ranger_sim.plant.floor import Floor
+from ranger_sim.plant.impact import impact
+from ranger_sim.plant.parameters import BodyParameters
+from ranger_sim.plant.ranger import STEP_NS
+from ranger_sim.plant.stance import on_feet
+from ranger_sim.plant.watch import keep_forces
 from tests.plant.test_body_equations import closed_posture
 from tests.plant.walking import STEP_S, PaperGait, Walker, mid_stance_start
 

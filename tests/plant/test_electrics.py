@@ -8,9 +8,9 @@ import sys
 
 import pytest
 
-from foundation.user_error import UserError
-from plant import wiring_points as points
-from plant.electrics import Electrics, ElectricsParameters
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.plant import wiring_points as points
+from ranger_sim.plant.electrics import Electrics, ElectricsParameters
 
 STEP = 125_000
 QUIET = ElectricsParameters(
@@ -199,12 +199,12 @@ def test_impossible_numbers_of_the_sensors_are_refused_by_name():
 
 TRACE = """
 import struct
-from plant.electrics import Electrics
-from plant.imu import Imu
-from plant.incremental_encoder import IncrementalEncoder
-from plant.absolute_encoder import AbsoluteEncoder
+from ranger_sim.plant.electrics import Electrics
+from ranger_sim.plant.imu import Imu
+from ranger_sim.plant.incremental_encoder import IncrementalEncoder
+from ranger_sim.plant.absolute_encoder import AbsoluteEncoder
 from math import sin, cos
-import plant.electrics
+from ranger_sim.plant import electrics
 e = Electrics(seed=7)
 imu = Imu(seed=7)
 encoder = IncrementalEncoder("m", 512, 34.0, -1, line_error=0.02, duty_error=0.03, jitter=0.02, seed=7)
@@ -232,7 +232,7 @@ for k in range(4000):
 for unit in (e.hip, e.outer_ankle, e.inner_ankle, e.steering):
     out.append(struct.pack("<4d", unit.drawn_J, unit.returned_J, unit.winding_J, unit.rotor_temperature_C))
 import hashlib
-print(plant.electrics.__file__.endswith(".py"), hashlib.sha256(b"".join(out)).hexdigest())
+print(electrics.__file__.endswith(".py"), hashlib.sha256(b"".join(out)).hexdigest())
 """
 
 

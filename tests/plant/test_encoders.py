@@ -6,9 +6,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from foundation.user_error import UserError
-from plant.absolute_encoder import AbsoluteEncoder
-from plant.incremental_encoder import IncrementalEncoder
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.plant.absolute_encoder import AbsoluteEncoder
+from ranger_sim.plant.incremental_encoder import IncrementalEncoder
 
 STEP = 125_000
 

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from plant.friction import smoothed_sign
+from ranger_sim.plant.friction import smoothed_sign
 
 RATES = [k / 128 for k in range(-3000, 3001)] + [s * 10.0**k for s in (-1, 1) for k in range(-300, 301, 7)]
 

@@ -5,9 +5,9 @@ import struct
 
 import pytest
 
-from foundation.user_error import UserError
-from plant.foot_sensor import FootSensors
-from plant.imu import Imu
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.plant.foot_sensor import FootSensors
+from ranger_sim.plant.imu import Imu
 
 STEP = 125_000
 BYTE_NS = 10_000_000_000 // 460_800

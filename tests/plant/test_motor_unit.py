@@ -5,10 +5,10 @@ import math
 
 import pytest
 
-from foundation.random_stream import RandomStream
-from foundation.user_error import UserError
-from plant.motor_parameters import ANKLE_MOTOR, HIP_MOTOR, STEERING_MOTOR, MotorParameters
-from plant.motor_unit import MotorUnit
+from ranger_sim.foundation.random_stream import RandomStream
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.plant.motor_parameters import ANKLE_MOTOR, HIP_MOTOR, STEERING_MOTOR, MotorParameters
+from ranger_sim.plant.motor_unit import MotorUnit
 
 STEP = 125_000  # ns; the formulas are exact for any step
 COUNTS = 600

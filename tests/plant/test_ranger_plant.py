@@ -9,11 +9,11 @@ import sys
 
 import pytest
 
-from plant import wiring_points as point
-from plant.parameters import BodyParameters
-from plant.ranger import SAMPLES, STEP_NS, RangerPlant
-from plant.steering import Steering
-from plant.walk_record import RING, WalkRecord
+from ranger_sim.plant import wiring_points as point
+from ranger_sim.plant.parameters import BodyParameters
+from ranger_sim.plant.ranger import SAMPLES, STEP_NS, RangerPlant
+from ranger_sim.plant.steering import Steering
+from ranger_sim.plant.walk_record import RING, WalkRecord
 from tests.plant.walking import ElectricWalker, RecordGait, electric_start
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent

@@ -4,10 +4,10 @@ import math
 
 import pytest
 
-from foundation.user_error import UserError
-from plant import terms
-from plant.ranger import RangerPlant
-from plant.term_torques import TermTorques
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.plant import terms
+from ranger_sim.plant.ranger import RangerPlant
+from ranger_sim.plant.term_torques import TermTorques
 
 STEP = 125_000
 

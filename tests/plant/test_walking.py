@@ -8,11 +8,11 @@ import dataclasses
 
 import pytest
 
-from plant.body import Body
-from plant.floor import Floor
-from plant.motion import advance
-from plant.parameters import BodyParameters
-from plant.ranger import RangerPlant
+from ranger_sim.plant.body import Body
+from ranger_sim.plant.floor import Floor
+from ranger_sim.plant.motion import advance
+from ranger_sim.plant.parameters import BodyParameters
+from ranger_sim.plant.ranger import RangerPlant
 from tests.plant.walking import (
     STEP_S,
     ElectricWalker,

@@ -6,10 +6,10 @@ appendix (eq. 35, smoothed by eq. 43) and the electric power of eq. 32, per moto
 
 import math
 
-from plant import handling
-from plant.body import DOUBLE, FALLEN, SINGLE, Body
-from plant.motion import advance
-from plant.ranger import STEP_NS
+from ranger_sim.plant import handling
+from ranger_sim.plant.body import DOUBLE, FALLEN, SINGLE, Body
+from ranger_sim.plant.motion import advance
+from ranger_sim.plant.ranger import STEP_NS
 
 K = 0.018  # N m/A, torque constant [appendix table 3]
 R = 1.34  # ohm, with the series inductor [facts on the plant 3]

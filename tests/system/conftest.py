@@ -8,8 +8,8 @@ import sys
 
 import pytest
 
-from harness.ranger import Ranger
-from harness.scenario import Scenario
+from ranger_sim.harness.ranger import Ranger
+from ranger_sim.harness.scenario import Scenario
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 
@@ -32,7 +32,7 @@ def command():
         if interpreted is not None:
             env["RANGER_SIM_INTERPRETED"] = "1" if interpreted else ""
         return subprocess.run(
-            [sys.executable, "-m", "tools.cli", *map(str, arguments)],
+            [sys.executable, "-m", "ranger_sim", *map(str, arguments)],
             cwd=ROOT,
             env=env,
             capture_output=True,

@@ -2,8 +2,8 @@
 
 import sys
 
-from harness.ranger import Ranger
-from harness.scenario import Scenario
+from ranger_sim.harness.ranger import Ranger
+from ranger_sim.harness.scenario import Scenario
 
 
 def digest(seconds: float, uptime_ms: int = 0) -> str:

@@ -7,15 +7,15 @@ import socket
 import can
 import pytest
 
-from can_bus.bus import OPERATING
-from can_bus.edge import attach_records as wire
-from can_bus.edge.attach import AttachServer
-from can_bus.edge.candump import read_candump
-from can_bus.edge.messages import frame_of_message
-from can_bus.edge.taps import OFF
-from foundation.random_stream import RandomStream
-from harness.ranger import Ranger
-from harness.scenario import Scenario
+from ranger_sim.can_bus.bus import OPERATING
+from ranger_sim.can_bus.edge import attach_records as wire
+from ranger_sim.can_bus.edge.attach import AttachServer
+from ranger_sim.can_bus.edge.candump import read_candump
+from ranger_sim.can_bus.edge.messages import frame_of_message
+from ranger_sim.can_bus.edge.taps import OFF
+from ranger_sim.foundation.random_stream import RandomStream
+from ranger_sim.harness.ranger import Ranger
+from ranger_sim.harness.scenario import Scenario
 from tests.can_bus.hosting import Program, fresh_name
 
 MS = 1_000_000
@@ -99,7 +99,7 @@ def test_listeners_hear_what_the_robot_logs_and_change_nothing():
 
 def test_beside_a_running_robot_python_can_sees_what_the_robot_logs(tmp_path):
     name = fresh_name()
-    call = ("-m", "tools.cli", "up", "--time", "2s", "--name", name, "--log", "full", "--out", str(tmp_path))
+    call = ("-m", "ranger_sim", "up", "--time", "2s", "--name", name, "--log", "full", "--out", str(tmp_path))
     with Program(*call, together=True) as robot:
         robot.until(r"python-can: .*\n")
         heard = []

@@ -121,7 +121,7 @@ def test_a_master_folder_that_is_not_there_leaves_with_2(command):
 def test_a_reader_that_leaves_is_no_error():
     """`ranger-sim table list --json | head -c 1`"""
     with subprocess.Popen(
-        [sys.executable, "-m", "tools.cli", "table", "list", "--json"],
+        [sys.executable, "-m", "ranger_sim", "table", "list", "--json"],
         cwd=ROOT,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
@@ -136,7 +136,7 @@ def test_a_reader_that_leaves_is_no_error():
 def test_ctrl_c_finishes_the_files_and_leaves_with_130(tmp_path):
     folder = tmp_path / "run"
     with subprocess.Popen(
-        [sys.executable, "-m", "tools.cli", "walk", "--steps", "1000000", "--out", folder, "--json", "-"],
+        [sys.executable, "-m", "ranger_sim", "walk", "--steps", "1000000", "--out", folder, "--json", "-"],
         cwd=ROOT,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,

@@ -16,14 +16,14 @@ import sys
 
 import pytest
 
-from boards.quirks import Quirks
-from datatable.generated import all_variables
-from foundation.numbers import float_of_word
-from harness import serial_ports
-from harness.ranger import Ranger
-from harness.scenario import Scenario
-from tools import cli, daq
-from tools.robodaq.codec import write_packet
+from ranger_sim.boards.quirks import Quirks
+from ranger_sim.datatable.generated import all_variables
+from ranger_sim.foundation.numbers import float_of_word
+from ranger_sim.harness import serial_ports
+from ranger_sim.harness.ranger import Ranger
+from ranger_sim.harness.scenario import Scenario
+from ranger_sim.tools import cli, daq
+from ranger_sim.tools.robodaq.codec import write_packet
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 ID = all_variables.ID_OF
@@ -236,7 +236,7 @@ def test_a_port_that_is_not_there_gets_one_line(capsys):
 def test_daq_in_a_process_of_its_own_writes_to_a_robot_in_processes():
     """`up` as fast as it goes, `daq` beside it; both are real, and only what was written is looked at."""
     up = subprocess.Popen(
-        [sys.executable, "-m", "tools.cli", "up", "--speed", "max", "--daq-port", "pty", "--json", "-"]
+        [sys.executable, "-m", "ranger_sim", "up", "--speed", "max", "--daq-port", "pty", "--json", "-"]
         + ["--name", f"daq-test-{os.getpid()}"],
         cwd=ROOT,
         stdout=subprocess.PIPE,
@@ -247,7 +247,7 @@ def test_daq_in_a_process_of_its_own_writes_to_a_robot_in_processes():
         place = re.search(r"--port (\S+)", up.stderr.readline()).group(1)
         asked = ["--write", "C_F_ST_F_ANG=4.25", "--read", "C_F_ST_F_ANG", "--timeout", "60s", "--json", "-"]
         told = subprocess.run(
-            [sys.executable, "-m", "tools.cli", "daq", "--port", place, *asked],
+            [sys.executable, "-m", "ranger_sim", "daq", "--port", place, *asked],
             cwd=ROOT,
             capture_output=True,
             text=True,

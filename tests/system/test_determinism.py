@@ -7,8 +7,8 @@ import sys
 
 import pytest
 
-from harness.ranger import Ranger
-from harness.scenario import Scenario
+from ranger_sim.harness.ranger import Ranger
+from ranger_sim.harness.scenario import Scenario
 from tests.system.digest_of import digest
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]

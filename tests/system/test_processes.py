@@ -12,10 +12,10 @@ import uuid
 
 import pytest
 
-from foundation import wallclock
-from foundation.user_error import UserError
-from harness import wiring
-from harness.processes import control
+from ranger_sim.foundation import wallclock
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.harness import wiring
+from ranger_sim.harness.processes import control
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 TWO_SECONDS = 2.0  # the promise for naming what died or hangs
@@ -29,7 +29,7 @@ class Up:
     def __init__(self, *arguments, script=None, speed="0.05"):
         self.name = f"test-{uuid.uuid4().hex[:12]}"
         self.mark = f"RANGER_SIM_TEST={self.name}"
-        command = [sys.executable, "-m", "tools.cli", "up"] if script is None else [sys.executable, "-c", script]
+        command = [sys.executable, "-m", "ranger_sim", "up"] if script is None else [sys.executable, "-c", script]
         self.started = subprocess.Popen(
             [*command, "--name", self.name, "--no-real-time", "--speed", speed, *arguments],
             cwd=ROOT,
@@ -149,7 +149,7 @@ def comparable(summary):
 def walked():
     """The summary of two steps in lockstep."""
     done = subprocess.run(
-        [sys.executable, "-m", "tools.cli", "walk", "--steps", "2", "--json", "-"],
+        [sys.executable, "-m", "ranger_sim", "walk", "--steps", "2", "--json", "-"],
         cwd=ROOT,
         capture_output=True,
         text=True,
@@ -222,10 +222,10 @@ def test_a_stopped_board_is_named(up):
 
 SCRIPT = """
 import argparse, contextlib, sys
-from harness.processes.settings import Settings
-from harness.processes.supervisor import Supervisor, View
-from harness.ranger import Ranger
-from harness.scenario import StopRule
+from ranger_sim.harness.processes.settings import Settings
+from ranger_sim.harness.processes.supervisor import Supervisor, View
+from ranger_sim.harness.ranger import Ranger
+from ranger_sim.harness.scenario import StopRule
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--name")
@@ -271,7 +271,7 @@ def test_a_hanging_board_is_named_and_its_motor_loses_its_power(up):
 
 BLOCKED = """
 import signal, sys
-from tools.cli import main
+from ranger_sim.tools.cli import main
 
 signal.pthread_sigmask(signal.SIG_BLOCK, signal.valid_signals())
 sys.exit(main(["up", *sys.argv[1:]]))

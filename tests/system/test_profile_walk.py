@@ -2,9 +2,9 @@
 
 import contextlib
 
-from harness import profile
-from harness.ranger import Ranger
-from harness.scenario import Scenario, StopRule
+from ranger_sim.harness import profile
+from ranger_sim.harness.ranger import Ranger
+from ranger_sim.harness.scenario import Scenario, StopRule
 
 
 def walked(chosen, steps):

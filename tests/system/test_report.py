@@ -12,8 +12,8 @@ import cantools
 import numpy as np
 import pytest
 
-from can_bus.edge.candump import read_candump
-from datatable.generated import all_variables
+from ranger_sim.can_bus.edge.candump import read_candump
+from ranger_sim.datatable.generated import all_variables
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome", "chrome"))), None)
@@ -24,7 +24,7 @@ def folder(tmp_path_factory):
     """What one short walk left behind."""
     out = tmp_path_factory.mktemp("walk")
     subprocess.run(
-        [sys.executable, "-m", "tools.cli", "walk", "--steps", "6", "--out", str(out), "--json", str(out / "x.json")],
+        [sys.executable, "-m", "ranger_sim", "walk", "--steps", "6", "--out", str(out), "--json", str(out / "x.json")],
         cwd=ROOT,
         check=True,
         capture_output=True,

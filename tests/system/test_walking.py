@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-import datatable
-from datatable.generated import all_variables
-from datatable.schedule import scheduled_frames_per_s
-from harness.ranger import Ranger
-from harness.scenario import Scenario, StopRule
+from ranger_sim import datatable
+from ranger_sim.datatable.generated import all_variables
+from ranger_sim.datatable.schedule import scheduled_frames_per_s
+from ranger_sim.harness.ranger import Ranger
+from ranger_sim.harness.scenario import Scenario, StopRule
 
 BUSES = ("can1", "can2", "can3", "can4")
 # Frames/s: sync and what the boards send, table 1.10 of the facts.
@@ -69,7 +69,7 @@ def test_total_load_is_that_of_our_schedules_and_controller(hundred_steps):
 
 def test_the_detection_chain_alone_takes_about_5_ms(walking):
     """From the foot's voltage crossing baseline + 2000 counts to the main brain's slot that flips the swing leg."""
-    from plant import wiring_points as point
+    from ranger_sim.plant import wiring_points as point
 
     counts_per_volt = 8192 / 2.5
     robot, delays = walking, []

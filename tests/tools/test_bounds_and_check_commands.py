@@ -4,10 +4,10 @@ import json
 
 import pytest
 
-from can_bus.bounds import response_times
-from can_bus.edge.dbc import read_messages
-from tools import cli
-from tools.cli import main
+from ranger_sim.can_bus.bounds import response_times
+from ranger_sim.can_bus.edge.dbc import read_messages
+from ranger_sim.tools import cli
+from ranger_sim.tools.cli import main
 
 DBC = """VERSION ""
 NS_ :
@@ -140,7 +140,7 @@ def test_a_walk_needs_every_board(capsys, tmp_path):
 
 
 def test_check_bus_tells_what_mends_a_missing_interface(capsys, tmp_path, monkeypatch):
-    from can_bus.edge import check_bus
+    from ranger_sim.can_bus.edge import check_bus
 
     def nothing(_):
         raise check_bus.NotReadError(check_bus.NO_DEVICE)

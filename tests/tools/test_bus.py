@@ -7,13 +7,13 @@ import socket
 import can
 import pytest
 
+from ranger_sim.tools import cli
 from tests.can_bus.hosting import Program, fresh_name
-from tools import cli
 
 
 def test_programs_of_any_kind_meet_on_a_hosted_bus():
     name = fresh_name()
-    call = ("-m", "tools.cli", "bus", "can1", "can2", "--name", name, "--slcan", "can2", "--socketcand", "0")
+    call = ("-m", "ranger_sim", "bus", "can1", "can2", "--name", name, "--slcan", "can2", "--socketcand", "0")
     with Program(*call) as host:
         host.until("can1, can2: 1000000 bit/s, 1 x real time; Ctrl-C ends")
         host.until(re.escape(f'python-can: can.Bus(interface="ranger_sim", channel="{name}/can1")'))

@@ -2,10 +2,10 @@
 
 import pytest
 
-from can_bus.bus import RESET
-from firmware_sim.microcontroller import Microcontroller
-from foundation.user_error import UserError
-from tools import fuzz_can
+from ranger_sim.can_bus.bus import RESET
+from ranger_sim.firmware_sim.microcontroller import Microcontroller
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.tools import fuzz_can
 
 
 def test_three_thousand_cases_from_outside_move_the_counters_and_stop_nothing():

@@ -6,9 +6,9 @@ import signal
 
 import pytest
 
-from foundation.user_error import UserError
-from harness.ranger import Ranger
-from tools import fuzz_channel
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.harness.ranger import Ranger
+from ranger_sim.tools import fuzz_channel
 
 
 def test_three_hundred_damaged_turns_are_answered():

@@ -2,8 +2,8 @@
 
 import pytest
 
-from harness import profile
-from tools import fuzz_profiles
+from ranger_sim.harness import profile
+from ranger_sim.tools import fuzz_profiles
 
 
 def test_broken_profiles_pass_or_are_refused_with_a_line_per_fault():

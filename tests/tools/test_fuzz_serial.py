@@ -2,8 +2,8 @@
 
 import pytest
 
-from foundation.user_error import UserError
-from tools import fuzz_serial
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.tools import fuzz_serial
 
 
 def test_three_hundred_cases_of_wrong_bytes_move_the_counters_and_stop_nothing():

@@ -7,14 +7,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from boards.main_brain import controllers
-from datatable.generated import all_variables, errors
-from datatable.packing import error_word
-from foundation.numbers import word_of_float
-from foundation.user_error import UserError
-from tools.robodaq import catalogue, logs, parameter_files
-from tools.robodaq.codec import Point, SegmentDecoder, segment, write_packet
-from tools.robodaq.session import Session
+from ranger_sim.boards.main_brain import controllers
+from ranger_sim.datatable.generated import all_variables, errors
+from ranger_sim.datatable.packing import error_word
+from ranger_sim.foundation.numbers import word_of_float
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.tools.robodaq import catalogue, logs, parameter_files
+from ranger_sim.tools.robodaq.codec import Point, SegmentDecoder, segment, write_packet
+from ranger_sim.tools.robodaq.session import Session
 
 LAST = all_variables.ID_OF_LAST
 ID = all_variables.ID_OF

@@ -5,7 +5,7 @@ import re
 
 import pytest
 
-from tools import cli, walk
+from ranger_sim.tools import cli, walk
 
 
 @pytest.fixture(autouse=True)

@@ -2,8 +2,8 @@
 
 import pytest
 
-from boards.main_brain import controllers
-from tools import cli, tune
+from ranger_sim.boards.main_brain import controllers
+from ranger_sim.tools import cli, tune
 
 BASE = controllers.load("record-2011").values
 

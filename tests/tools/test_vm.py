@@ -13,9 +13,9 @@ import sys
 
 import pytest
 
-from foundation.user_error import UserError
-from tools import cli
-from tools.vm import kernel, machine, ramdisk
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.tools import cli
+from ranger_sim.tools.vm import kernel, machine, ramdisk
 
 END = b"0123456789abcdef"
 
@@ -219,7 +219,7 @@ def test_the_child_asks_to_die_with_its_parent():
         [
             *("python3", "-c"),
             "import subprocess, sys\n"
-            "from tools.vm.machine import die_with_parent\n"
+            "from ranger_sim.tools.vm.machine import die_with_parent\n"
             "child = subprocess.Popen(['sleep', '100'], preexec_fn=die_with_parent)\n"
             "print(child.pid, flush=True)\n"
             "child.wait()\n",

@@ -8,9 +8,9 @@ import sys
 
 import pytest
 
-from can_bus.edge.candump import read_candump
-from foundation import wallclock
-from foundation.events import FLAG_EXTENDED
+from ranger_sim.can_bus.edge.candump import read_candump
+from ranger_sim.foundation import wallclock
+from ranger_sim.foundation.events import FLAG_EXTENDED
 
 from . import places
 
@@ -140,7 +140,7 @@ def command():
 
     def run(*arguments, timeout=600):
         return subprocess.run(
-            [sys.executable, "-m", "tools.cli", *map(str, arguments)],
+            [sys.executable, "-m", "ranger_sim", *map(str, arguments)],
             cwd=ROOT,
             capture_output=True,
             text=True,

@@ -10,7 +10,7 @@ import shutil
 import subprocess
 import sys
 
-from foundation import wallclock
+from ranger_sim.foundation import wallclock
 from tests.vm import places
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
@@ -53,7 +53,7 @@ def main() -> int:
         subprocess.run(pytest_call("-m", here), env={**os.environ, places.PLACE: "host"}).returncode,
         subprocess.run(
             [
-                *(sys.executable, "-m", "tools.cli", "vm"),
+                *(sys.executable, "-m", "ranger_sim", "vm"),
                 *("--time-limit", f"{TIME_LIMIT_S - (wallclock.monotonic_s() - started):.0f}s", "--"),
                 *pytest_call("-m", inside),
             ],

@@ -8,11 +8,11 @@ import subprocess
 import cantools
 import pytest
 
-from can_bus.edge.candump import read_candump
-from datatable.generate import GENERATED_FOLDER
-from harness.ranger import Ranger
-from harness.scenario import Scenario
-from tools import walk
+from ranger_sim.can_bus.edge.candump import read_candump
+from ranger_sim.datatable.generate import GENERATED_FOLDER
+from ranger_sim.harness.ranger import Ranger
+from ranger_sim.harness.scenario import Scenario
+from ranger_sim.tools import walk
 
 from . import places
 

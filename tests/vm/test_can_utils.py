@@ -6,13 +6,13 @@ import subprocess
 import can
 import cantools
 
-from can_bus.edge import interfaces
-from can_bus.edge.messages import frame_of_message, message_of_frame
-from datatable.generate import GENERATED_FOLDER
-from foundation.events import FLAG_EXTENDED, FLAG_REMOTE
-from harness.ranger import Ranger
-from harness.scenario import Scenario
-from tools import walk
+from ranger_sim.can_bus.edge import interfaces
+from ranger_sim.can_bus.edge.messages import frame_of_message, message_of_frame
+from ranger_sim.datatable.generate import GENERATED_FOLDER
+from ranger_sim.foundation.events import FLAG_EXTENDED, FLAG_REMOTE
+from ranger_sim.harness.ranger import Ranger
+from ranger_sim.harness.scenario import Scenario
+from ranger_sim.tools import walk
 
 
 def test_python_can_finds_the_interfaces():

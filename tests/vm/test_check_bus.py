@@ -5,7 +5,7 @@ import subprocess
 
 import pytest
 
-from tools import cli
+from ranger_sim.tools import cli
 
 from .test_adapters import BIT_RATE, ip_link, set_up
 

@@ -9,8 +9,8 @@ import sys
 import cantools
 import pytest
 
-from can_bus.edge.candump import read_candump
-from datatable.generate import GENERATED_FOLDER
+from ranger_sim.can_bus.edge.candump import read_candump
+from ranger_sim.datatable.generate import GENERATED_FOLDER
 
 from .conftest import ROOT, await_condition, recording
 
@@ -40,7 +40,7 @@ def walked(tmp_path_factory):
     with recording(folder / "candump.log", *BUSES.values()) as watcher:
         robot = subprocess.Popen(
             [
-                *(sys.executable, "-m", "tools.cli", "up", "--no-real-time"),
+                *(sys.executable, "-m", "ranger_sim", "up", "--no-real-time"),
                 *("--speed", str(SPEED), "--steps", str(STEPS)),
                 *(word for bus, interface in BUSES.items() for word in ("--bus", f"{bus}=socketcan:{interface}")),
                 *("--log", "full", "--out", str(folder / "out"), "--json", str(folder / "summary.json")),

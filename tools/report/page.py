@@ -10,8 +10,8 @@ import numpy as np
 from markupsafe import Markup
 from plotly.offline import get_plotlyjs
 
-import datatable
-from tools.report import figures
+from ranger_sim import datatable
+from ranger_sim.tools.report import figures
 
 HERE = pathlib.Path(__file__).parent
 ANIMATION_HZ = 125  # frames kept per second: smooth at one eighth of real time on a 60 Hz screen

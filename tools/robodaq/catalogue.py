@@ -7,11 +7,11 @@ import fnmatch
 import functools
 import math
 
-import datatable
-from datatable.generated import all_variables
-from datatable.model import LIMITS, Variable
-from datatable.packing import value_of_word, word_of_value
-from foundation.user_error import UserError
+from ranger_sim import datatable
+from ranger_sim.datatable.generated import all_variables
+from ranger_sim.datatable.model import LIMITS, Variable
+from ranger_sim.datatable.packing import value_of_word, word_of_value
+from ranger_sim.foundation.user_error import UserError
 
 CHANNEL_PREFIX = "LV_"  # the link's own variables: channels are chosen, not written
 

@@ -7,11 +7,11 @@ import pathlib
 from collections.abc import Iterator
 from typing import IO, Any, Protocol
 
-from datatable.generated import all_variables
-from foundation.user_error import UserError
-from tools.files import writable_folder
-from tools.robodaq import catalogue
-from tools.robodaq.codec import Point
+from ranger_sim.datatable.generated import all_variables
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.tools.files import writable_folder
+from ranger_sim.tools.robodaq import catalogue
+from ranger_sim.tools.robodaq.codec import Point
 
 
 class Log(Protocol):
@@ -80,7 +80,7 @@ class MeasurementLog:
                 )
 
     def close(self) -> None:
-        from tools import variables_file
+        from ranger_sim.tools import variables_file
 
         variables_file.write_groups(self.groups(), self.path)
 

@@ -8,11 +8,11 @@ from __future__ import annotations
 import math
 import pathlib
 
-from boards.main_brain import controllers
-from datatable.packing import word_of_value
-from foundation.user_error import UserError
-from tools.files import replace_file
-from tools.robodaq import catalogue
+from ranger_sim.boards.main_brain import controllers
+from ranger_sim.datatable.packing import word_of_value
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.tools.files import replace_file
+from ranger_sim.tools.robodaq import catalogue
 
 
 def load(name: str) -> dict[str, float]:

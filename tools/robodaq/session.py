@@ -10,13 +10,13 @@ import collections
 import dataclasses
 from collections.abc import Callable, Iterable
 
-from boards.main_brain.data_link import CHANNELS, FAST, MEDIUM
-from datatable.generated import all_variables
-from datatable.model import Variable
-from datatable.packing import parts_of_error_word, word_of_value
-from foundation.user_error import UserError
-from tools.robodaq import catalogue
-from tools.robodaq.codec import Point, SegmentDecoder, write_packet
+from ranger_sim.boards.main_brain.data_link import CHANNELS, FAST, MEDIUM
+from ranger_sim.datatable.generated import all_variables
+from ranger_sim.datatable.model import Variable
+from ranger_sim.datatable.packing import parts_of_error_word, word_of_value
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.tools.robodaq import catalogue
+from ranger_sim.tools.robodaq.codec import Point, SegmentDecoder, write_packet
 
 TIMESTAMP = all_variables.ID_OF["TIMESTAMP"]
 ERRORS = all_variables.ID_OF["ERROR_LABVIEW"]

@@ -8,9 +8,9 @@ import pathlib
 import sys
 from typing import Any
 
-from foundation.user_error import UserError
-from tools.units import TIMES, quantity, whole_number
-from tools.vm import machine
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.tools.units import TIMES, quantity, whole_number
+from ranger_sim.tools.vm import machine
 
 
 def register(commands: Any) -> None:

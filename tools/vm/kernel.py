@@ -10,7 +10,7 @@ import pathlib
 import re
 import subprocess
 
-from foundation.user_error import UserError
+from ranger_sim.foundation.user_error import UserError
 
 INSTALL_SCRIPT = pathlib.Path(__file__).with_name("install-packages.sh")
 FOLDER_VARIABLE = "RANGER_SIM_VM_KERNEL"

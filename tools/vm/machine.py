@@ -16,9 +16,9 @@ import socket
 import subprocess
 from collections.abc import Callable, Mapping, Sequence
 
-from foundation import wallclock
-from foundation.user_error import UserError
-from tools.vm import kernel, ramdisk
+from ranger_sim.foundation import wallclock
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.tools.vm import kernel, ramdisk
 
 QEMU = "qemu-system-x86_64"
 BUSYBOX_PLACES = ("/bin/busybox", "/usr/bin/busybox", "/usr/lib/busybox/bin/busybox-static")

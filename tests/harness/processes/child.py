@@ -4,8 +4,8 @@ import os
 import select
 import signal
 
-from harness.processes import block as places
-from harness.processes import kernel
+from ranger_sim.harness.processes import block as places
+from ranger_sim.harness.processes import kernel
 
 PATIENCE_S = 60.0  # a guard against waiting for ever; nothing asserts on it
 

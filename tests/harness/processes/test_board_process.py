@@ -8,13 +8,13 @@ import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
-from foundation.events import PIN_EDGE, EventQueue
-from foundation.user_error import UserError
-from harness.processes import block as places
-from harness.processes.channel import SLOT_WORDS, Mailbox
-from harness.processes.kinds import FROM_BOARD, TO_BOARD
-from harness.processes.lone_board import LoneBoard
-from harness.ranger import Ranger
+from ranger_sim.foundation.events import PIN_EDGE, EventQueue
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.harness.processes import block as places
+from ranger_sim.harness.processes.channel import SLOT_WORDS, Mailbox
+from ranger_sim.harness.processes.kinds import FROM_BOARD, TO_BOARD
+from ranger_sim.harness.processes.lone_board import LoneBoard
+from ranger_sim.harness.ranger import Ranger
 
 STEP_NS = 100_000
 LONG_TURN_NS = 900_000_000  # MCSI puts out six times what its mailbox holds

@@ -7,19 +7,19 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from firmware_sim.peripherals.ssp import SspSegment
-from foundation import events
-from foundation.events import EventQueue
-from foundation.user_error import UserError
-from harness import wiring
-from harness.processes import block as places
-from harness.processes import kinds, plain
-from harness.processes.block import SLOTS, Block, new_stage
-from harness.processes.channel import SLOT_WORDS, Bell, Mailbox
-from harness.processes.kinds import FROM_BOARD, KINDS, TO_BOARD
-from harness.processes.remote_board import RemoteBoard
-from harness.processes.stage import Stage
-from harness.ranger import Ranger
+from ranger_sim.firmware_sim.peripherals.ssp import SspSegment
+from ranger_sim.foundation import events
+from ranger_sim.foundation.events import EventQueue
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.harness import wiring
+from ranger_sim.harness.processes import block as places
+from ranger_sim.harness.processes import kinds, plain
+from ranger_sim.harness.processes.block import SLOTS, Block, new_stage
+from ranger_sim.harness.processes.channel import SLOT_WORDS, Bell, Mailbox
+from ranger_sim.harness.processes.kinds import FROM_BOARD, KINDS, TO_BOARD
+from ranger_sim.harness.processes.remote_board import RemoteBoard
+from ranger_sim.harness.processes.stage import Stage
+from ranger_sim.harness.ranger import Ranger
 from tests.harness.processes.child import Child
 
 NEAR = 1_000_000  # ns; stamps of the tests

@@ -6,11 +6,11 @@ import os
 
 import pytest
 
-from harness.processes import supervisor
-from harness.processes.settings import Settings
-from harness.processes.supervisor import Supervisor, View
-from harness.ranger import Ranger
-from harness.scenario import StopRule
+from ranger_sim.harness.processes import supervisor
+from ranger_sim.harness.processes.settings import Settings
+from ranger_sim.harness.processes.supervisor import Supervisor, View
+from ranger_sim.harness.ranger import Ranger
+from ranger_sim.harness.scenario import StopRule
 from tests.harness.processes.child import Child, fork
 
 

@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from foundation.declared_fields import FIELDS, declared_fields
+from ranger_sim.declared_fields import FIELDS, declared_fields
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
 DECLARATIONS = """\
@@ -26,7 +26,7 @@ cdef class Second(First):
     cdef public bint on
 """
 LOOK = """\
-from plant.drive import Drive
+from ranger_sim.plant.drive import Drive
 
 class OfAUser:
     pass

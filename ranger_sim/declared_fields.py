@@ -10,7 +10,7 @@ import re
 from types import ModuleType
 from typing import Any
 
-from foundation.compile_time import CompileTimeLoader
+from ranger_sim.compile_time import CompileTimeLoader
 
 CLASS = re.compile(r"cdef class (\w+)")
 FIELDS = re.compile(r"\s+cdef (?:public |readonly )?(?:unsigned )?(?:long long|[\w.]+)(?:\[[^\]]*\]|\*)? ([\w ,]+)$")
