@@ -1,7 +1,7 @@
 cimport cython
+from ranger_sim.foundation.events cimport NEVER
 
 
-cdef long long _NEVER
 
 cdef extern from "Python.h":
     ctypedef struct PyObject

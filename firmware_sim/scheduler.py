@@ -13,12 +13,12 @@ against `limit`. The event loop that spends the time is in microcontroller.py; h
 
 import cython
 
-from ranger_sim.foundation.events import NEVER
 from ranger_sim.foundation.numbers import integers
 from ranger_sim.foundation.user_error import UserError
 
 if not cython.compiled:
     from ranger_sim.firmware_sim.calls import code_of, owner_of
+    from ranger_sim.foundation.events import NEVER
 
 NORMAL_TASK = 0
 OCCASIONAL_TASK = 1
@@ -26,7 +26,6 @@ WAIT_TASK = 2
 
 HISTOGRAM_BINS = 21  # twenty of 5 % of a slot, the last for overruns
 ENTRY = 4  # numbers per task in the table laid out: code, owner, usual_ns, usual calls
-_NEVER = NEVER  # a C variable when compiled (.pxd)
 
 
 class Task:
@@ -349,7 +348,7 @@ class SlotScheduler:
             places += [self.tasks.index(task) for task in schedule.row_tasks(row)] + [0]
             self.row_starts[row + 1] = len(places)
         self.numbers = bytearray(places)
-        self.leads_kept = integers(len(places), _NEVER)
+        self.leads_kept = integers(len(places), NEVER)
         self.table_kept = integers(ENTRY * max(len(self.tasks), 1))
         if cython.compiled:
             self.leads = cython.address(self.leads_kept[0])
@@ -377,12 +376,12 @@ class SlotScheduler:
     def lay_leads(self) -> None:
         """From the end of each row back to its start: how long a place is ahead of the row's next speaker."""
         for row in range(self.row_count):
-            lead = _NEVER
+            lead = NEVER
             for place in range(self.row_starts[row + 1] - 2, self.row_starts[row] - 1, -1):
                 task = self.tasks[self.numbers[place]]
                 if task.speaks:
                     lead = 0
-                elif lead < _NEVER:
+                elif lead < NEVER:
                     lead += int(task.base_cycles * self.ns_per_cycle)
                 self.leads_kept[place] = lead
 

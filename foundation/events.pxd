@@ -1,6 +1,42 @@
 cimport cython
 
-cdef long long _NEVER
+cdef extern from *:
+    """
+    #define RANGER_SIM_NEVER 0x4000000000000000LL
+    """
+    const long long NEVER "RANGER_SIM_NEVER"
+
+cpdef enum:
+    STAGE_PLANT = 0
+    STAGE_PINS = 1
+    STAGE_BUS = 2
+    STAGE_INTERRUPTS = 3
+    STAGE_SLOTS = 4
+    ORDER_PINS = 256
+    ORDER_BUS = 512
+    ORDER_INTERRUPTS = 768
+    PIN_EDGE = 1
+    CAN_RX = 2
+    CAN_TX_DONE = 3
+    CAN_STATUS = 4
+    UART_BYTE = 5
+    SSP_SEGMENT = 6
+    CAN_REQUEST = 32
+    CAN_ABORT = 33
+    CAN_MODE = 34
+    PWM_UPDATE = 35
+    PIN_OUTPUT = 36
+    SSP_START = 37
+    SSP_LOAD = 38
+    UART_OUTPUT = 39
+    FLAG_REMOTE = 16
+    FLAG_SINGLE_SHOT = 32
+    FLAG_EXTENDED = 64
+    FLAG_ERROR = 128
+    TX_SENT = 0
+    TX_ABORTED = 1
+    TX_LOST = 2
+    ROW = 10
 
 cdef class Outbox:
     cpdef int push(

@@ -12,45 +12,52 @@ import cython
 
 from ranger_sim.foundation.numbers import integers
 
-NEVER = 1 << 62  # ns; later than any instant of a run (146 years)
+# C constants when compiled: the same numbers stand in the .pxd, and a test holds them together.
+if not cython.compiled:
+    NEVER = 1 << 62  # ns; later than any instant of a run (146 years)
 
-STAGE_PLANT = 0
-STAGE_PINS = 1
-STAGE_BUS = 2
-STAGE_INTERRUPTS = 3
-STAGE_SLOTS = 4
+    STAGE_PLANT = 0
+    STAGE_PINS = 1
+    STAGE_BUS = 2
+    STAGE_INTERRUPTS = 3
+    STAGE_SLOTS = 4
+    # the `order` of the first source of a stage
+    ORDER_PINS = 256
+    ORDER_BUS = 512
+    ORDER_INTERRUPTS = 768
 
-# Messages to a board (inputs).
-PIN_EDGE = 1  # a pin, b level 0/1, c partner pin (or -1), d level of the partner
-CAN_RX = 2  # a controller 1..4, b identifier, c flags, d word 0 (bytes 0-3), e word 1 (bytes 4-7)
-CAN_TX_DONE = 3  # a controller, b buffer 1..3, c TX_* status
-CAN_STATUS = 4  # a controller, b interrupt bits, c transmit errors, d receive errors, e bus-off 0/1
-UART_BYTE = 5  # a UART number, b byte; or c 2-8 bytes at once, d the first four, e the rest, low byte first
-SSP_SEGMENT = 6  # a 0, ref SspSegment received
+    # Messages to a board (inputs).
+    PIN_EDGE = 1  # a pin, b level 0/1, c partner pin (or -1), d level of the partner
+    CAN_RX = 2  # a controller 1..4, b identifier, c flags, d word 0 (bytes 0-3), e word 1 (bytes 4-7)
+    CAN_TX_DONE = 3  # a controller, b buffer 1..3, c TX_* status
+    CAN_STATUS = 4  # a controller, b interrupt bits, c transmit errors, d receive errors, e bus-off 0/1
+    UART_BYTE = 5  # a UART number, b byte; or c 2-8 bytes at once, d the first four, e the rest, low byte first
+    SSP_SEGMENT = 6  # a 0, ref SspSegment received
 
-# Messages from a board (outputs).
-CAN_REQUEST = 32  # a controller, b buffer 1..3, c identifier, d flags, e word 0, f word 1
-CAN_ABORT = 33  # a controller, b buffer
-CAN_MODE = 34  # a controller, b 0 operating / 1 reset
-PWM_UPDATE = 35  # a MR2, b MR6, c MR0 (counts)
-PIN_OUTPUT = 36  # a pin, b level
-SSP_START = 37  # a 0, ref SspSegment sent by the master; the exchange starts at the stamp
-SSP_LOAD = 38  # a 0, ref SspSegment that the slave will send in the next exchange
-UART_OUTPUT = 39  # a UART number, b byte; the stamp is the end of its last bit
+    # Messages from a board (outputs).
+    CAN_REQUEST = 32  # a controller, b buffer 1..3, c identifier, d flags, e word 0, f word 1
+    CAN_ABORT = 33  # a controller, b buffer
+    CAN_MODE = 34  # a controller, b 0 operating / 1 reset
+    PWM_UPDATE = 35  # a MR2, b MR6, c MR0 (counts)
+    PIN_OUTPUT = 36  # a pin, b level
+    SSP_START = 37  # a 0, ref SspSegment sent by the master; the exchange starts at the stamp
+    SSP_LOAD = 38  # a 0, ref SspSegment that the slave will send in the next exchange
+    UART_OUTPUT = 39  # a UART number, b byte; the stamp is the end of its last bit
 
-# Flags of a frame: bits 0-3 data length code, then:
-FLAG_REMOTE = 1 << 4
-FLAG_SINGLE_SHOT = 1 << 5
-FLAG_EXTENDED = 1 << 6
-FLAG_ERROR = 1 << 7
+    # Flags of a frame: bits 0-3 data length code, then:
+    FLAG_REMOTE = 16
+    FLAG_SINGLE_SHOT = 32
+    FLAG_EXTENDED = 64
+    FLAG_ERROR = 128
 
-# Status of CAN_TX_DONE.
-TX_SENT = 0
-TX_ABORTED = 1  # aborted on request before it started
-TX_LOST = 2  # single shot that lost arbitration or met an error
+    # Status of CAN_TX_DONE.
+    TX_SENT = 0
+    TX_ABORTED = 1  # aborted on request before it started
+    TX_LOST = 2  # single shot that lost arbitration or met an error
 
-ROW = 10  # numbers in a row of a queue
-_NEVER = NEVER  # a C variable when compiled (.pxd)
+    ROW = 10  # numbers in a row of a queue
+else:
+    globals()["NEVER"] = 1 << 62  # too long for an enum: a macro in C, so Python gets it here
 
 
 class Outbox:
@@ -268,7 +275,7 @@ class EventQueue(Outbox):
         if at == self.tail:
             self.head = 0
             self.tail = 0
-            self.head_time = _NEVER
+            self.head_time = NEVER
         else:
             self.head = at
             self.head_time = self.rows[at]

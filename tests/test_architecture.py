@@ -2,6 +2,8 @@
 
 import ast
 import contextlib
+import json
+import os
 import pathlib
 import re
 import subprocess
@@ -231,3 +233,41 @@ def test_numbers_in_compiled_fields_have_64_bits(declaration):
     narrow = r"(?:(?:un)?signed )?(?:short|int|char|long(?! long)|float|Py_UCS4)\b"
     found = [field for field in fields if re.match(narrow, field) and not field.startswith("unsigned char[::1] ")]
     assert not found, f"{declaration}: {found}"
+
+
+def declared_constants(text):
+    """{name: number} of the enums of a .pxd that Python sees."""
+    numbers, inside = {}, False
+    for line in re.sub(r"#.*", "", text).splitlines():
+        if line.strip() and not line.startswith(" "):
+            inside = line.strip() == "cpdef enum:"
+        elif inside and line.strip():
+            name, _, value = line.partition("=")
+            numbers[name.strip()] = int(value, 0)
+    return numbers
+
+
+def test_constants_are_the_same_numbers_interpreted_and_compiled():
+    """An enum of a .pxd is what the compiler uses; what stands under the same name in the source, the interpreter."""
+    wanted = {}
+    for declaration in declarations():
+        numbers = declared_constants((ROOT / declaration).read_text(encoding="utf-8"))
+        if numbers:
+            wanted[".".join(("ranger_sim", *declaration.with_suffix("").parts))] = numbers
+    assert wanted["ranger_sim.foundation.events"]["PIN_OUTPUT"] == 36
+    program = (
+        "import importlib, json, sys\n"
+        "wanted = json.load(sys.stdin)\n"
+        "print(json.dumps({m: {n: getattr(importlib.import_module(m), n) for n in wanted[m]} for m in wanted}))"
+    )
+    for interpreted in ("", "1"):
+        done = subprocess.run(
+            [sys.executable, "-c", program],
+            input=json.dumps(wanted),
+            cwd=ROOT,
+            env=os.environ | {"RANGER_SIM_INTERPRETED": interpreted},
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        assert json.loads(done.stdout) == wanted

@@ -19,14 +19,14 @@ from ranger_sim.foundation.events import CAN_REQUEST, CAN_TX_DONE, SSP_START, ST
 QUANTUM_NS = 25_000  # below the 36 us of the shortest frame, as in the assembled robot
 FRAME_NS = 37_000  # a frame of 8 bytes with intermission at 3 Mbit/s: 111 bits
 SATELLITES = {
-    "MCH": "boards.hip.HipBoard",
-    "MCFO": "boards.outer_feet.OuterFeetBoard",
-    "MCFI": "boards.inner_feet.InnerFeetBoard",
-    "MCSI": "boards.steering.SteeringBoard",
-    "UI": "boards.user_interface.UserInterfaceBoard",
+    "MCH": "ranger_sim.boards.hip.HipBoard",
+    "MCFO": "ranger_sim.boards.outer_feet.OuterFeetBoard",
+    "MCFI": "ranger_sim.boards.inner_feet.InnerFeetBoard",
+    "MCSI": "ranger_sim.boards.steering.SteeringBoard",
+    "UI": "ranger_sim.boards.user_interface.UserInterfaceBoard",
 }
-ROUTER = "boards.can_router.CanRouterBoard"
-MAIN_BRAIN = "boards.main_brain.board.MainBrainBoard"
+ROUTER = "ranger_sim.boards.can_router.CanRouterBoard"
+MAIN_BRAIN = "ranger_sim.boards.main_brain.board.MainBrainBoard"
 EVERY_BOARD = {**SATELLITES, "CSR": ROUTER, "MB": MAIN_BRAIN}
 
 
@@ -176,7 +176,7 @@ def test_the_main_brain_writes_row_by_row_what_boards_toml_says():
 
 @pytest.mark.parametrize("name", SATELLITES)
 def test_a_satellite_listens_only_to_what_the_table_gives_it(name):
-    generated = importlib.import_module(f"datatable.generated.{name.lower()}")
+    generated = importlib.import_module(f"ranger_sim.datatable.generated.{name.lower()}")
     board = power_up(SATELLITES[name])
     heard = {number for number, receiver in enumerate(board.can.receivers) if receiver is not None}
     assert heard and heard <= set(generated.RECEIVE)

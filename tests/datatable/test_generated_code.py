@@ -20,7 +20,7 @@ def table():
 
 
 def module(name):
-    return importlib.import_module(f"datatable.generated.{name}")
+    return importlib.import_module(f"ranger_sim.datatable.generated.{name}")
 
 
 def test_the_files_checked_in_are_what_the_table_gives(table):

@@ -282,7 +282,5 @@ def test_a_file_nested_too_deeply_is_refused(folder):
     loads_or_complains(folder, b"a = " + b"[" * 100_000)
 
 
-def test_profiles_are_shipped_with_the_package():
-    project = pathlib.Path(profile.__file__).resolve().parents[1] / "pyproject.toml"
-    assert '"profiles*"' in project.read_text(encoding="utf-8")
+def test_the_default_profile_has_the_tables_bit_rate():
     assert datatable.load().bit_rates["CAN1"] == profile.default().buses["can1"].bit_rate

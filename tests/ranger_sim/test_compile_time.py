@@ -111,8 +111,8 @@ def test_what_is_kept_is_used_again_but_by_no_other_loader(source, monkeypatch):
     for _ in range(2):  # the second time from the bytecode
         assert "compiled" in load(source, plain).second.__code__.co_names
         assert "compiled" not in load(source, CompileTimeLoader).second.__code__.co_names
-    monkeypatch.setattr("compile_time.TAG", "other")
+    monkeypatch.setattr("ranger_sim.compile_time.TAG", "other")
     load(source, CompileTimeLoader)
     assert len(list(source.parent.rglob("*.pyc"))) == 3
-    monkeypatch.setattr("compile_time.Settle", None)  # nothing is settled any more
+    monkeypatch.setattr("ranger_sim.compile_time.Settle", None)  # nothing is settled any more
     assert load(source, CompileTimeLoader).second() == "interpreted"
