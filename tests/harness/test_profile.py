@@ -1,6 +1,5 @@
 """Profiles: every fault named at once, with file, key, value and rule; what passes is complete."""
 
-import pathlib
 import re
 
 import pytest
