@@ -22,7 +22,7 @@ import functools
 import math
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ranger_sim import datatable
 from ranger_sim.can_bus.bounds import Bound, Message, message, most_waiting, response_times
@@ -30,9 +30,6 @@ from ranger_sim.can_bus.frame import arbitration_key
 from ranger_sim.datatable.model import Board, Table, Variable
 from ranger_sim.firmware_sim.scheduler import Occasional
 from ranger_sim.foundation.user_error import UserError
-
-if TYPE_CHECKING:
-    from ranger_sim.harness.profile import Profile
 
 MOST_TURNS = 1000  # turns to the next sending; with more a variable is as good as not sent (chosen by us)
 MOST_ROWS = 10_000  # rows of a table laid out over its passes (chosen by us)
@@ -153,10 +150,9 @@ def thinned_rows(board: Board, rows: list, schedule: BusSchedule) -> list:
     return laid_out
 
 
-def apply(board: Any, profile: Profile, table: Table | None = None) -> None:
-    """Give an emulated board the schedules of a profile: after it is built, before time passes."""
+def apply(board: Any, schedules: Mapping[str, BusSchedule], table: Table | None = None) -> None:
+    """Give an emulated board the schedules of its buses, by name: after it is built, before time passes."""
     table = table if table is not None else robots_table()
-    schedules = {name: bus.schedule for name, bus in profile.buses.items()}
     description = table.board(board.name)
     if description.role == "main brain":
         _apply_to_main_brain(board, schedules, table)

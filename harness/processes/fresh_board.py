@@ -12,7 +12,7 @@ def wire_fresh_board(robot: Any, name: str, power_up_ns: int) -> Any:
     """
     board = robot.new_board(name, power_up_ns)
     if robot.profile is not None:
-        bus_schedule.apply(board, robot.profile)
+        bus_schedule.apply(board, robot.profile.schedules())
     loop, plant = robot.loop, robot.plant
     for analog in wiring.ANALOG:
         if analog.board == name:

@@ -68,7 +68,7 @@ def test_rows_are_laid_out_over_passes_with_what_is_not_due_left_out():
 def test_a_schedule_that_thins_nothing_leaves_the_board_alone():
     board = HipBoard(Crystal(), Quirks(), 0)
     rows = board.scheduler.schedule.rows
-    bus_schedule.apply(board, profile.default())
+    bus_schedule.apply(board, profile.default().schedules())
     assert board.scheduler.schedule.rows is rows
 
 
@@ -76,13 +76,13 @@ def test_a_board_that_runs_already_is_refused():
     board = HipBoard(Crystal(), Quirks(), 0)
     board.advance(2_000_000)
     with pytest.raises(UserError, match="MCH: a bus schedule is given before the first slot"):
-        bus_schedule.apply(board, profile.load(HIL))
+        bus_schedule.apply(board, profile.load(HIL).schedules())
 
 
 def sent_by_the_hip(chosen, until_ns):
     """(time, name) of every frame that the hip board alone puts out."""
     board = HipBoard(Crystal(), Quirks(), 0)
-    bus_schedule.apply(board, chosen)
+    bus_schedule.apply(board, chosen.schedules())
     found = []
     for time in range(25_000, until_ns, 25_000):
         board.advance(time)
@@ -113,7 +113,8 @@ def test_a_thinned_board_sends_every_nth_frame_and_the_others_as_before():
 
 def test_commands_leave_in_their_slots_and_the_others_one_at_a_time_in_turn():
     board = MainBrainBoard(Crystal(), Quirks(), 0)
-    bus_schedule.apply(board, with_schedule(every={"MCH_COMMAND_CURRENT": 2, "MCFI_STIFFNESS": 3}, commands_in_turn=2))
+    chosen = with_schedule(every={"MCH_COMMAND_CURRENT": 2, "MCFI_STIFFNESS": 3}, commands_in_turn=2)
+    bus_schedule.apply(board, chosen.schedules())
     io, store = board.io, board.store
     command, stiffness = mb.MCH_COMMAND_CURRENT, mb.MCFI_STIFFNESS
     assert set(io.send_ids) == {command, stiffness}
