@@ -2,7 +2,7 @@
 # (results are those of SEQUENCE)
 """What the boards of the outer and the inner feet share: two feet, two limit switches, one ankle motor.
 
-Facts: network-and-boards 4.2, 4.7-4.9, 5. The two rooms hold their constants and their tables.
+Source: robot.md N4.2, N4.7-N4.9, N5. The two rooms hold their constants and their tables.
 """
 
 import cython

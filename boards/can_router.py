@@ -2,7 +2,7 @@
 # (every index below is a bus, a place of its rings, or a number of frames that one turn can move)
 """The CAN router (CSR, board B10A): four buses, the link to the main brain, the robot's time.
 
-Facts network-and-boards 1.4-1.6, 3.7, 4.16; appendix 3.7, 3.11. Interrupts fill rings and keep the time; the
+Source: robot.md N1.4-N1.6, N3.7, N4.16; appendix 3.7, 3.11. Interrupts fill rings and keep the time; the
 main loop moves frames whenever no slot runs: run the scheduler, then four times "route, flush one bus".
 """
 
@@ -50,18 +50,18 @@ ROUTE_FRAME_CYCLES = 220  # table, learning, one push
 FLUSH_IDLE_CYCLES = 25
 FLUSH_FRAME_CYCLES = 110  # status, four registers, command
 LOOP_CYCLES = 20  # the scheduler's look at its flag, once per turn of four
-# Supply of the electronics (facts 5): ten-bit readings, gain and offset
+# Supply of the electronics (robot.md N5): ten-bit readings, gain and offset
 CURRENT_GAIN_A, CURRENT_OFFSET = 0.000501, 6
 VOLTAGE_GAIN_V, VOLTAGE_OFFSET = 0.03046, 5
 # Places on `chip.analog`, in volts at the converter's input: AIN0 and AIN1.
 ANALOG = {"supply_current": 0, "supply_voltage": 1}
-WARNING_FRAMES_PER_MS = 20  # facts 1.10
+WARNING_FRAMES_PER_MS = 20  # robot.md N1.10
 FULL_FRAMES_PER_MS = 30
 LED_OFF, LED_TRAFFIC, LED_WARNING, LED_FULL = 0, 1, 2, 3
 
 
 def supply_pins_V(current_A, voltage_V):
-    """Voltages at AIN0 and AIN1 for a supply of `current_A` and `voltage_V`: inverse of facts 5, 3.3 V full scale."""
+    """Voltages at AIN0, AIN1 for a supply of `current_A` and `voltage_V`: inverse of robot.md N5, 3.3 V full scale."""
     lsb = 3.3 / 1024.0
     return (
         (current_A / CURRENT_GAIN_A - CURRENT_OFFSET) * lsb,
@@ -167,7 +167,7 @@ class CanRouterBoard(Microcontroller):
         self.start(self.schedule(), phase_ns)
 
     def schedule(self) -> Schedule:
-        """Facts 3.7. Costs and limits are chosen by us: no execution times of this board are known."""
+        """Source: robot.md N3.7. Costs and limits are chosen by us: no execution times of this board are known."""
         # untyped names: the compiler cannot hand out a bound method of another module's compiled class
         leds: object = self.leds
         heartbeat: object = self.heartbeat

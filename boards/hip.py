@@ -1,6 +1,6 @@
 """Hip motor board (MCH): B2A, 0.5 ms slots, 4 rows.
 
-Facts: network-and-boards 3.2 (schedule, laid out below line by line), 4.1, 4.2, 4.5, 4.7, 4.8, 5.
+Source: robot.md N3.2 (schedule, laid out below line by line), N4.1, N4.2, N4.5, N4.7, N4.8, N5.
 Positive hip angle: inner legs swung forward.
 """
 

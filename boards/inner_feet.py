@@ -1,6 +1,6 @@
 """Inner feet motor board (MCFI): B2A, 0.5 ms slots, 8 rows.
 
-Facts: network-and-boards 3.4 (schedule, laid out below line by line), 4.1, 4.2, 4.5, 4.7-4.9, 5.
+Source: robot.md N3.4 (schedule, laid out below line by line), N4.1, N4.2, N4.5, N4.7-N4.9, N5.
 Ankle angle: 0 with the foot flipped up, growing as the foot is pushed down.
 """
 

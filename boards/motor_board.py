@@ -1,7 +1,7 @@
 """What the four motor boards (B2A) share: chip, peripherals, modules, publishing, start-up.
 
 Each board's own room (hip.py, outer_feet.py, inner_feet.py, steering.py) holds its constants and its one
-schedule table. Facts: network-and-boards 1.2, 4, 5, 6.1.
+schedule table. Source: robot.md N1.2, N4, N5, N6.1.
 
 Where the numbers of cycles come from: measured on the robot is only the encoder interrupt (about 150
 cycles, appendix 4.6). All others are chosen by us: instructions of the described work counted at 1.5 cycles
@@ -53,7 +53,7 @@ from ranger_sim.foundation.user_error import UserError
 if not cython.compiled:
     from ranger_sim.foundation.numbers import float_of_fixed
 
-# Processor pins by what hangs on them (facts 4.1, 4.4, 4.7, 4.9, 4.11); for the wiring table.
+# Processor pins by what hangs on them (robot.md N4.1, N4.4, N4.7, N4.9, N4.11); for the wiring table.
 PINS = {
     **{f"led_{colour}": pin for colour, pin in LED_PINS.items()},
     **MOTOR_PINS,
@@ -78,7 +78,7 @@ ANALOG = {
 WORDS = {"absolute_encoder": 0}
 
 BATTERY_VOLTAGE_CHANNEL = 1  # AIN1, P0.28
-# About 23,000 instructions pass from reset to the first slot (facts 7.3): at 1.3 cycles each 0.5 ms.
+# About 23,000 instructions pass from reset to the first slot (robot.md N7.3): at 1.3 cycles each 0.5 ms.
 START_VALUES_NS = 400_000
 SLOTS_BEGIN_NS = 500_000
 
@@ -89,7 +89,7 @@ CODE_OVERRUN = codes.ASCHED_DNF
 CODE_TASK_LIMIT = codes.SCHED_TASK_LIMIT
 CODE_NEAR_LIMIT = codes.SCHED_SLOT_NEAR_LIMIT
 
-# VIC slots (facts 4.16)
+# VIC slots (robot.md N4.16)
 CAN_RECEIVE_SLOT = 0
 EXTERNAL_ADC_SLOT = 1
 INTERNAL_ADC_SLOT = 3
@@ -241,7 +241,7 @@ class MotorBoard(Microcontroller):
         self.power_up.begin(phase_ns)
 
     def listen(self) -> None:
-        """Receive list, in the order of the firmware's (facts 2.4)."""
+        """Receive list, in the order of the firmware's (robot.md N2.4)."""
         name = self.table.BOARD + "_"
         for suffix, receiver in (
             ("MOTOR_TARGET_CURRENT", GainReceiver(self.compliance, TARGET)),
@@ -373,7 +373,7 @@ class MotorBoard(Microcontroller):
         self.can.send_float(self.id_batt_voltage, self.readings.battery_voltage())
 
     def send_bridge_temperature(self) -> None:
-        """AIN3 is never converted, so 0 is sent (facts 4.6)."""
+        """AIN3 is never converted, so 0 is sent (robot.md N4.6)."""
         self.can.send_float(self.id_hbridge_temp, 0.0)
 
     def send_status(self) -> None:

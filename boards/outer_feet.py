@@ -1,6 +1,6 @@
 """Outer feet motor board (MCFO): B2A, 0.5 ms slots, 9 rows.
 
-Facts: network-and-boards 3.3 (schedule, laid out below line by line), 4.1, 4.2, 4.5, 4.7-4.9, 5.
+Source: robot.md N3.3 (schedule, laid out below line by line), N4.1, N4.2, N4.5, N4.7-N4.9, N5.
 Ankle angle: 0 with the foot flipped up, growing as the foot is pushed down.
 """
 

@@ -28,7 +28,7 @@ class Quirks:
 
     # --- motor boards -------------------------------------------------------------------------------
     compliant_gain_sign: int = switch(-1, -1, (-1, 1))
-    """Sign of both gain terms. Appendix eq. 3: plus (erratum 11). Firmware and default: minus."""
+    """Sign of both gain terms. Appendix eq. 3: plus (robot.md P1.11). Firmware and default: minus."""
 
     proportional_current_control: bool = switch(True, False, YES_OR_NO)
     """Appendix 4.7: PI with the emphasis on the integral. Firmware: Kp = 0, integral only."""

@@ -2,7 +2,7 @@
 # (results are those of SEQUENCE)
 """Steering motor board (MCSI): B2A, 0.5 ms slots, 4 rows, no incremental encoders.
 
-Facts: network-and-boards 3.5 (schedule, laid out below line by line), 4.2, 4.5, 5, 6.1; control-and-data 1.6.
+Source: robot.md N3.5 (schedule, laid out below line by line), N4.2, N4.5, N5, N6.1, C1.6.
 The controller of May 2011 commands the duty itself, in counts of 600 (at most 75); see `steering_output` in
 quirks.py for what the firmware of 2016 made of it.
 """
@@ -145,7 +145,7 @@ class SteeringBoard(MotorBoard):
     def steering_control(self) -> None:
         """mc_compliant_control: the loops if they are wanted, otherwise only watchdog and monitors.
 
-        Either way a motor that may not run is an error in every slot (facts 4.3), so a board that the main
+        Either way a motor that may not run is an error in every slot (robot.md N4.3), so a board that the main
         brain has shut down reports MC_NOT_RUNNING 2000 times a second, as on the robot.
         """
         if self.closed_loop:

@@ -1,6 +1,6 @@
 """The user interface board (UI, B8A): IMU, keys, radio control, display, colour lights, buzzer.
 
-Facts network-and-boards 3.6, 4.10-4.12, 4.16; appendix 3.7, 3.8. What a person sees and hears is public state:
+Source: robot.md N3.6, N4.10-N4.12, N4.16; appendix 3.7, 3.8. What a person sees and hears is public state:
 `board.lcd.text()`, `board.leds.colour(i)`, `board.buzzer.hertz`, `board.sync_light.lit`.
 """
 
@@ -35,7 +35,7 @@ from ranger_sim.firmware_sim.scheduler import Schedule, Task
 from ranger_sim.firmware_sim.vic import TIMER_MATCH
 from ranger_sim.foundation.events import UART_BYTE
 
-# Processor pins by what hangs on them (facts 4.11); for the wiring table.
+# Processor pins by what hangs on them (robot.md N4.11); for the wiring table.
 RC_PINS = (p0(22), p0(27), p0(16), p0(29))  # the third is driven by the sync light and hears no radio
 PINS = {
     **{f"led_{colour}": pin for colour, pin in LED_PINS.items()},
@@ -45,7 +45,7 @@ PINS = {
 }
 IMU_UART = 1
 
-# VIC slots (facts 4.16)
+# VIC slots (robot.md N4.16)
 CAN_RECEIVE_SLOT = 0
 TIMER_SLOT = 1
 RC_SLOT = 2
@@ -84,7 +84,7 @@ class UserInterfaceBoard(Microcontroller):
         self.can2 = CanController(self, table.CONTROLLER, IER=interrupts)
         self.can = CanLink(self, self.can2, self.time, self.errors, codes, quirks.full_queues_reported)
         self.can.attach(receive_slot=CAN_RECEIVE_SLOT, error_slot=CAN_ERROR_SLOT)
-        # inertial sensor: 460 526 baud (facts 4.10)
+        # inertial sensor: 460 526 baud (robot.md N4.10)
         rates_only = quirks.imu_packets == "rates"
         header = HEADER_RATES_ONLY if rates_only else HEADER_ANGLES_AND_RATES
         self.uart1 = Uart(self, IMU_UART, divisor=6, divaddval=5, mulval=14, trigger=8)
@@ -115,7 +115,7 @@ class UserInterfaceBoard(Microcontroller):
         self.start(self.schedule(), phase_ns)
 
     def listen(self) -> None:
-        """Receive list (facts 2.4)."""
+        """Receive list (robot.md N2.4)."""
         listen = self.can.listen
         listen(table.TIMESTAMP, self.time)
         for quarter in range(4):
@@ -129,7 +129,7 @@ class UserInterfaceBoard(Microcontroller):
             listen(table.ERROR_LCD, ErrorSound(self.buzzer))
 
     def schedule(self) -> Schedule:
-        """Facts 3.6. Costs and limits are chosen by us: no execution times of this board are known."""
+        """Source: robot.md N3.6. Costs and limits are chosen by us: no execution times of this board are known."""
         # untyped names: the compiler cannot hand out a bound method of another module's compiled class
         can: object = self.can
         heartbeat: object = self.heartbeat

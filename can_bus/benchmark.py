@@ -12,7 +12,7 @@ from ranger_sim.can_bus.frame import frame_bits
 from ranger_sim.foundation import wallclock
 from ranger_sim.foundation.events import STAGE_BUS, EventQueue
 
-ROBOT_BIT_RATE = 3_000_000  # bit/s, facts network-and-boards 1.2
+ROBOT_BIT_RATE = 3_000_000  # bit/s, robot.md N1.2
 ROBOT_BUSES = 4
 
 

@@ -2,7 +2,7 @@
 
 A frame is four integers everywhere: identifier, flags (bits 0-3 data length code, then the FLAG_* of
 foundation.events), and two words: `lo` holds data bytes 0-3, `hi` bytes 4-7, both little-endian as the
-transmit registers CxTDA/TDB of the LPC2194 hold them (facts network-and-boards 1.3).
+transmit registers CxTDA/TDB of the LPC2194 hold them (robot.md N1.3).
 
 Layout (ISO 11898-1): start of frame, arbitration and control field, data, CRC-15: all of these are
 stuffed; then CRC delimiter, acknowledge slot and delimiter, seven bits end of frame: 10 bits unstuffed.
@@ -228,7 +228,7 @@ def frame_bits(
 ) -> cython.longlong:
     """Bits on the wire from start of frame to the end of EOF, stuff bits included, intermission not.
 
-    44 + 8 per byte (extended 64) without stuffing, so 108 for the robot's frames (facts 1.2).
+    44 + 8 per byte (extended 64) without stuffing, so 108 for the robot's frames (robot.md N1.2).
     """
     return measure(identifier, flags, lo, hi) & 0xFFFF
 

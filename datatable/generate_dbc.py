@@ -22,7 +22,7 @@ def range_of(variable: Variable) -> str:
 
 
 def value_signals(variable: Variable, receivers: str) -> list[str]:
-    """Bytes 0-3: the value, or the three parts of an error word (facts network 1.7)."""
+    """Bytes 0-3: the value, or the three parts of an error word (robot.md N1.7)."""
     if variable.is_error_word:
         return [
             f' SG_ code : 0|16@1+ (1,0) [0|65535] "" {receivers}',

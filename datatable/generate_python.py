@@ -43,7 +43,7 @@ def sent_by(table: Table, board: Board) -> list[Variable]:
     """What a board puts on a bus or link: its variables that some bus carries.
 
     The main brain also sends what the computer sets for a satellite; what stays between main brain and
-    computer, and what it has for the router itself, is not on its list (facts network 2.2).
+    computer, and what it has for the router itself, is not on its list (robot.md N2.2).
     """
     if board.role != "main brain":
         return [variable for variable in table.published_by(board.name) if variable.buses]

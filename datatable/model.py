@@ -8,7 +8,7 @@ from fractions import Fraction
 from ranger_sim.foundation.numbers import float32
 from ranger_sim.foundation.user_error import UserError
 
-LARGEST_CAN_ID = 2031  # identifiers 2032-2047 are illegal: their first 7 bits are recessive (facts network 1.5)
+LARGEST_CAN_ID = 2031  # identifiers 2032-2047 are illegal: their first 7 bits are recessive (robot.md N1.5)
 LARGEST_ID = 0xFFFF  # ids have 16 bits (appendix 4.1)
 LONGEST_NAME = 32  # characters; the limit of a name in a DBC file and of a portable C identifier
 TYPES = ("f32", "i32", "u32")
@@ -68,7 +68,7 @@ class Board:
     def sends_per_s(self) -> dict[str, Fraction]:
         """How often per second the schedule sends each variable, exact.
 
-        The occasional list has one idle call after its last entry (facts network 3.1), so n entries need
+        The occasional list has one idle call after its last entry (robot.md N3.1), so n entries need
         n + 1 calls, one per pass through the rows.
         """
         rates: dict[str, Fraction] = {}
@@ -117,7 +117,7 @@ class Variable:
 
     @property
     def is_error_word(self) -> bool:
-        """True for words packed as error frames: code, board, count (facts network 1.7)."""
+        """True for words packed as error frames: code, board, count (robot.md N1.7)."""
         return self.type == "u32" and self.name.startswith("ERROR_")
 
     @property

@@ -1,4 +1,4 @@
-"""The eight bytes of a frame: a value word and a time word, both little-endian (facts network 1.3, 1.7)."""
+"""The eight bytes of a frame: a value word and a time word, both little-endian (robot.md N1.3, N1.7)."""
 
 from __future__ import annotations
 

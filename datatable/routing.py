@@ -1,4 +1,4 @@
-"""Who can hear whom, and the router's table: one destination mask per identifier (facts network 1.5)."""
+"""Who can hear whom, and the router's table: one destination mask per identifier (robot.md N1.5)."""
 
 from __future__ import annotations
 

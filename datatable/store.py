@@ -2,7 +2,7 @@
 # (every index below is an id held against the table's size, or a place in the caller's list of ids)
 """The main brain's data at run time: one 32-bit word and one ms stamp per id, with a read flag per subscriber.
 
-What the robot's io data module keeps (facts network 4.13). A write makes a value new for every subscriber.
+What the robot's io data module keeps (robot.md N4.13). A write makes a value new for every subscriber.
 An id beyond the table is no exception here, as in the firmware it is not: it reads 0, changes nothing, and is
 told through `out_of_range_count`, `out_of_range_id` and the attribute `on_out_of_range`, which the board sets
 to raise MB_IO_ID_OOR.
@@ -14,7 +14,7 @@ import cython
 
 from ranger_sim.foundation.numbers import float_of_word, word_of_float, wrap_i32
 
-# Bits of the read flags (facts network 4.13).
+# Bits of the read flags (robot.md N4.13).
 BLUETOOTH = 0
 SSP = 1
 LABVIEW = 2

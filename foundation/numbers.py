@@ -91,7 +91,7 @@ def elapsed_u32(now: cython.longlong, then: cython.longlong) -> cython.longlong:
 def fixed_of_float(value: cython.double) -> cython.longlong:
     """16.16 fixed point of `value`, truncated toward zero, saturated at the 32-bit limits.
 
-    The firmware truncates (facts network-and-boards 4); NaN becomes 0.
+    The firmware truncates (robot.md N4); NaN becomes 0.
     """
     scaled: cython.double = value * 65536.0
     if -2147483648.0 < scaled < 2147483647.0:

@@ -39,7 +39,7 @@ CRYSTAL_PPM = 30
 # TIMESTAMP comes from an interrupt that waits at most for the others of its level: four frames of 90 cycles and the
 # service of one segment, 240 + 31 x 14 cycles (boards/can_router.py): 18 us.
 SYNC_JITTER_NS = 20_000
-# The exchange between main brain and router runs every 200 us, free of the main brain's slots (facts network 1.6).
+# The exchange between main brain and router runs every 200 us, free of the main brain's slots (robot.md N1.6).
 EXCHANGE_NS = 200_000
 FRAMES_PER_EXCHANGE = 6
 # How much a main-brain slot varies before it sends, and the router before it has routed: chosen by us, above what the
@@ -51,7 +51,7 @@ COMMAND_VARIATION_NS = 200_000
 # ERROR_LCD, once per pass of the main brain's rows, 22 ms. The first slot of all, which sends every command once, is
 # not covered.
 ON_DEMAND_MS = Fraction(20)
-HARDWARE_BUFFERS = 2  # transmit buffers that a board's queue is emptied into (facts network 1.6, 4.14)
+HARDWARE_BUFFERS = 2  # transmit buffers that a board's queue is emptied into (robot.md N1.6, N4.14)
 SYNC = "TIMESTAMP"
 OTHER = "(other commands)"
 

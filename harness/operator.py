@@ -11,7 +11,7 @@ from ranger_sim.harness import wiring
 PIN_ORDER = STAGE_PINS * 256 + 128
 
 # Radio pulse of the steering stick: width in s = CENTRE + stick * REACH, every FRAME. The record walk's
-# steering machine takes 4e-5 * (width in 1/60 us) - 3.4 for the stick (facts control-and-data 1.6), so the
+# steering machine takes 4e-5 * (width in 1/60 us) - 3.4 for the stick (robot.md C1.6), so the
 # centre is 85,000 ticks = 1.4167 ms and one unit is 25,000 ticks = 0.4167 ms; 20 ms is the hobby standard.
 CENTRE_NS, REACH_NS, FRAME_NS = 1_416_667, 416_667, 20_000_000
 

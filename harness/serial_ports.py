@@ -30,9 +30,9 @@ AHEAD_NS = 20_000_000  # bytes read at once last at most so long on the robot's 
 ORDER = STAGE_PINS * 256 + 192
 GROUP = 8  # bytes that travel as one message
 
-DAQ_BAUD = 921_600  # of the computer's side: facts control-and-data 7
+DAQ_BAUD = 921_600  # of the computer's side: robot.md C7
 BLUETOOTH_BAUD = 460_800
-IMU_BAUD = 460_800  # facts network-and-boards 4.10
+IMU_BAUD = 460_800  # robot.md N4.10
 
 
 class Port(Protocol):
@@ -158,7 +158,7 @@ def open_port(name: str, baud: int = DAQ_BAUD, flow_control: bool = False) -> Po
 class Dropouts:
     """When the radio is silent: seeded, in virtual time.
 
-    The robot's Bluetooth logs (facts control-and-data 6.1, 6.2) have gaps of 50 to 180 ms; one of 93 s has about 25
+    The robot's Bluetooth logs (robot.md C6.1, C6.2) have gaps of 50 to 180 ms; one of 93 s has about 25
     of them, one every 3.7 s. Uniform lengths and exponential distances are chosen by us.
     """
 

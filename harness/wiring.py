@@ -1,6 +1,6 @@
 """Every wire of the robot, as tables: which sensor hangs on which pin of which board, which board on which bus.
 
-Facts network-and-boards 1.1 (buses), 4.1 (encoders), 4.5-4.9 (converters, switches), 4.10, 4.11 (user interface).
+Source: robot.md N1.1 (buses), N4.1 (encoders), N4.5-N4.9 (converters, switches), N4.10, N4.11 (user interface).
 Read a line from left to right in the direction in which the signal goes.
 """
 

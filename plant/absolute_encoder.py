@@ -1,5 +1,5 @@
-"""The absolute joint encoder AM8192B as a device: a 13-bit word for an angle (appendix 3.8; facts
-network-and-boards 4.7).
+"""The absolute joint encoder AM8192B as a device: a 13-bit word for an angle (appendix 3.8;
+robot.md N4.7).
 
 word = zero + sign x 8192 / (2 pi) x (angle + errors), to the nearest count, modulo 8192. `zero` is the word at
 joint angle 0, `sign` the mounting. Zeros of the robot: hip 4590 (+), outer ankle 6562 (-), inner ankle 1572 (+).

@@ -36,7 +36,7 @@ class BatteryParameters:
     cells_in_series: int = 7  # 25.9 V nominal at 3.7 V a cell [A 3.10]
     pack_energy_Wh: float = 67.0  # [A 3.10]
     # Chosen by us: seven cells at 55 mohm and a protection circuit of about 0.1 ohm. One pack then sags 3 V at
-    # 140 W, as the battery logged at 24.0-27.5 V sags to 21.5 V (facts control-and-data 6.2).
+    # 140 W, as the battery logged at 24.0-27.5 V sags to 21.5 V (robot.md C6.2).
     pack_resistance_ohm: float = 0.5
     # Charge at power-up, 1 is full. Chosen by us: 26.7 V without load, in the logged range.
     charge: float = 0.7

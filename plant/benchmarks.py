@@ -20,7 +20,7 @@ from ranger_sim.plant.stance import on_feet
 RTOL = 2.3e-14  # about 100 roundings, the least scipy accepts
 ATOL = 1e-15
 
-# Table 1 of the appendix; its J_l is one leg's, hence 0.5 for the wheel (facts on the plant, section 2).
+# Table 1 of the appendix; its J_l is one leg's, hence 0.5 for the wheel (robot.md P2).
 WHEEL = pm.PaperParameters(
     el=1.0, r=0.0, d=0.0, c=0.0, kh=0.0, ks=0.0, Jl=0.25, m=0.0, M=1.0, g=1.0, gamma=0.2, C1=0.0, C2=0.0, JH=0.0
 )
@@ -28,7 +28,7 @@ WHEEL_SPOKES = 6
 SIMPLEST = pm.PaperParameters(
     el=1.0, r=0.0, d=0.0, c=1.0, kh=0.0, ks=0.0, Jl=0.0, m=1.0, M=1e6, g=1.0, gamma=0.009, C1=0.0, C2=0.0, JH=0.0
 )
-# Published values [appendix 6.2, 6.3; facts on the plant 2].
+# Published values [appendix 6.2, 6.3; robot.md P2].
 WHEEL_FIXED_POINT = (0.523598775598299, -0.460341126609458)
 WHEEL_EIGENVALUE = 4.0 / 9.0
 SIMPLEST_FIXED_POINT = (0.200310750572952, -0.199832546623605, 0.400621501145903, -0.015822982402147)

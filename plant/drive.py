@@ -5,7 +5,7 @@
 What a board does arrives stamped (ns) and takes effect at its stamp, also inside a step of the plant; a stamp
 that has passed takes effect at the start of the next step. The watchdog is judged here, in plant time: the
 bridge has power until `watchdog_ns` after the last edge on the watchdog line, and again from the next edge on
-(appendix 3.9; facts network-and-boards 4.3).
+(appendix 3.9; robot.md N4.3).
 """
 
 import cython
@@ -31,7 +31,7 @@ class Drive:
         self.watchdog_ns = watchdog_ns
         self.mr2 = 0
         self.mr6 = 0
-        self.mr0 = 600  # 100 kHz at 60 MHz, facts network-and-boards 4.4
+        self.mr0 = 600  # 100 kHz at 60 MHz, robot.md N4.4
         self.enable2 = True
         self.enable6 = True
         self.powered = False  # nothing has fed the watchdog yet

@@ -6,7 +6,7 @@ A step of the plant in order: `step_motors` with the joint rates at its start (c
 then the body moves, then `sense` with what the feet and the steering show at its end. The voltages stand in
 `analog_start` and `analog_end` (V, by plant/wiring_points.py), to be read as straight lines over the step.
 
-Sensor constants are those with which each board's firmware turns counts back (facts network-and-boards 5), so a
+Sensor constants are those with which each board's firmware turns counts back (robot.md N5), so a
 nominal sensor is inverted exactly: -g (raw - off) is the motor's current in A, g (raw - off) the battery's, both by
 the 14-bit converter with 2.5 V reference and the board's gain; battery voltage V = g x raw of the 10-bit one
 with 3.3 V.
@@ -36,10 +36,10 @@ if not cython.compiled:
     from math import exp
     from operator import add, mul
 
-ADS7871_REFERENCE_V = 2.5  # facts network-and-boards 4.5 (external reference; 2.5 V as the internal one)
+ADS7871_REFERENCE_V = 2.5  # robot.md N4.5 (external reference; 2.5 V as the internal one)
 INTERNAL_REFERENCE_V = 3.3
 
-# Facts network-and-boards 4.5 and 5, by motor: g, off, converter gain of the motor current; the same of the
+# robot.md N4.5 and N5, by motor: g, off, converter gain of the motor current; the same of the
 # battery current; g of the battery voltage.
 BOARD_CONSTANTS = (
     (0.00154, -9.0, 2.0, 0.000506, -4.0, 2.0, 0.0323),
@@ -47,14 +47,14 @@ BOARD_CONSTANTS = (
     (0.001525, -1.0, 2.0, 0.000502, -3.0, 2.0, 0.0324),
     (0.0001535, 25.0, 2.0, 0.0000505, -75.0, 20.0, 0.0327),
 )
-ROUTER_CURRENT_A_PER_COUNT = 0.000501  # A = 0.000501 (raw + 6), facts network-and-boards 5
+ROUTER_CURRENT_A_PER_COUNT = 0.000501  # A = 0.000501 (raw + 6), robot.md N5
 ROUTER_CURRENT_OFFSET = 6.0
 ROUTER_VOLT_PER_COUNT = 0.03046  # V = 0.03046 (raw + 5)
 ROUTER_VOLT_OFFSET = 5.0
 
 # Steering angle: EM-3242, 1024 steps over one turn as a voltage from 10 to 90 % of its supply. Chosen by us: 3.3 V
 # supply; its magnet sits so that straight feet read 4803 counts at gain 2, the middle of the firmware's check
-# (facts network-and-boards 4.8); +/- 200 counts are then +/- 4.2 degrees.
+# (robot.md N4.8); +/- 200 counts are then +/- 4.2 degrees.
 STEERING_CENTRE_V = 4803.0 * 2.5 / (8192.0 * 2.0)
 STEERING_V_PER_RAD = 0.8 * 3.3 / (2.0 * math.pi)
 STEERING_STEP_V = 0.8 * 3.3 / 1024.0
@@ -103,7 +103,7 @@ class Electrics:
         self.parameters = p
         self.battery = Battery(p.battery)
         self.electronics_W = power_W(p.left_outer_ankle_electronics)
-        # The outer ankle's motor sits mirrored: facts network-and-boards 4.1 and 4.2, the signs of MCFO.
+        # The outer ankle's motor sits mirrored: robot.md N4.1 and N4.2, the signs of MCFO.
         self.hip = MotorUnit("hip", p.hip, 1)
         self.outer_ankle = MotorUnit("outer_ankle", p.outer_ankle, -1)
         self.inner_ankle = MotorUnit("inner_ankle", p.inner_ankle, 1)

@@ -1,7 +1,7 @@
 """The contact sensors in a pair of feet: the gap of the C-shaped foot, seen by an optical interrupter.
 
 A load on the foot closes the gap (appendix 2.4, 3.8). Counts of the board's converter are 700 in swing and 7000
-in stance (facts control-and-data 3.2). Between them (EQUATIONS 11.4):
+in stance (robot.md C3.2). Between them (EQUATIONS 11.4):
 
     target = swing + span (share + (1 - share) min(1, load / full_load))   in contact, swing otherwise
     rise_time_constant x d(counts)/dt = target - counts
@@ -23,7 +23,7 @@ if not cython.compiled:
 
 SWING_COUNTS = 700.0
 STANCE_COUNTS = 7000.0
-VOLTS_PER_COUNT = 2.5 / 8192.0  # ADS7871 at gain 1 with its 2.5 V reference, facts network-and-boards 4.5
+VOLTS_PER_COUNT = 2.5 / 8192.0  # ADS7871 at gain 1 with its 2.5 V reference, robot.md N4.5
 
 
 class FootSensors:

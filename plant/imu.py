@@ -12,7 +12,7 @@ it). Both packets known here have 31 bytes: header, six big-endian singles, a fo
   know only "rates alone at 1000 Hz"; C2 is the device's packet with scaled rates and no angles, as its protocol
   describes it. The accelerations are those of gravity alone, because nothing on the robot reads them.
 
-Signs (facts control-and-data 1.1, 3.2): with the outer legs' lean LO positive forward, rate x = bias - dLO/dt and
+Signs (robot.md C1.1, C3.2): with the outer legs' lean LO positive forward, rate x = bias - dLO/dt and
 roll = roll_bias - LO. So the firmware's -(rate x - bias) is the legs' rate. The physical bias is the one that the
 2011 firmware takes off, -0.004 rad/s; the roll bias the one of 2016, -0.021 rad.
 
@@ -49,10 +49,10 @@ class Imu:
     def __init__(
         self,
         seed=0,
-        bias_rad_s=-0.004,  # facts control-and-data 3.1
-        # Chosen by us: the log of the resting gyro (facts control-and-data 6.2) spans 0.03 rad/s in 18 000 samples.
+        bias_rad_s=-0.004,  # robot.md C3.1
+        # Chosen by us: the log of the resting gyro (robot.md C6.2) spans 0.03 rad/s in 18 000 samples.
         noise_rad_s=0.004,
-        roll_bias_rad=-0.021,  # facts network-and-boards 4.17
+        roll_bias_rad=-0.021,  # robot.md N4.17
         roll_noise_rad=0.001,  # chosen by us: a few hundredths of a degree, far below the 0.5 degrees of accuracy
         filter_samples=1,
         latency_ns=500_000,  # chosen by us: half a sample to compute and frame a packet

@@ -4,8 +4,8 @@
 
 Position is counted in edges of A, u = sign x gear x lines / pi x angle: two edges per line, as the 2X decoder
 of the firmware counts them. Edge n lies at u = n; A is high from even to odd n, B from n + 1/2 of even n to
-n + 1/2 of odd n. So forward, A rises while B is low, which the firmware counts up (facts
-network-and-boards 4.1).
+n + 1/2 of odd n. So forward, A rises while B is low, which the firmware counts up
+(robot.md N4.1).
 
 Between the ends of a step the position is the cubic with the given angles and rates. Where it runs one way
 with moderate change of rate, the time of an edge comes from the cubic of the inverse function; otherwise the

@@ -1,7 +1,7 @@
 """Every number of the motors and their drives, with its source.
 
-Sources in brackets: [A n] appendix section n, [P n] facts about the plant section n, [N n] facts about network
-and boards section n, "chosen by us, because ...". Angles and rates of a motor are those of the joint it drives.
+Sources in brackets: [A n] appendix section n, [P n] and [N n] paragraph n of those parts
+of docs/robot.md, "chosen by us, because ...". Angles and rates of a motor are those of the joint it drives.
 """
 
 import dataclasses

@@ -4,7 +4,7 @@
 
 Everything seen from outside is in the joint's sense: a positive current turns the joint positively. `mounting`
 (+1 or -1) says how the motor sits: with -1 a positive bridge voltage turns the joint negatively (the outer
-ankle is mirrored, facts network-and-boards 4.1, 4.2).
+ankle is mirrored, robot.md N4.1, N4.2).
 
 Electrical (appendix eq. 32 with the inductance added; EQUATIONS 10.1-10.7):
 

@@ -18,7 +18,7 @@ STANCE_FOOT, STANCE_ANKLE, STANCE_MOTOR, HIP, SWING_ANKLE, SWING_MOTOR = range(6
 
 @dataclasses.dataclass(frozen=True)
 class PaperParameters:
-    """Symbols of the appendix 1.1.1; defaults as facts on the plant, section 3, settle them."""
+    """Symbols of the appendix 1.1.1; defaults as robot.md P3 settles them."""
 
     el: float = 0.96
     r: float = 0.2

@@ -1,7 +1,7 @@
 """Every number of the body, with its source. SI units; angles in rad.
 
-Sources are named in brackets at each field: [A n] appendix section n, [P n] facts about the plant section n,
-[C n] facts about control and data section n, [R] facts about the record walk, "chosen by us, because ...".
+Sources are named in brackets at each field: [A n] appendix section n, [P n], [C n] and [W n] paragraph n of
+those parts of docs/robot.md, "chosen by us, because ...".
 """
 
 import dataclasses
@@ -26,7 +26,7 @@ class BodyParameters:
     leg_length_m: float = 0.96  # l, hip to ankle [A table 2; P 3]
     foot_radius_m: float = 0.2  # r [A table 2]
     ankle_offset_m: float = 0.11  # d, ankle to the centre of the arc [A table 2]
-    foot_inertia_kg_m2: float = 0.002  # about the ankle [C 5.2 RangerSimulation; R: it helps most]; 0: massless [A 5]
+    foot_inertia_kg_m2: float = 0.002  # about the ankle [C 5.2 RangerSimulation; W 1: it helps most]; 0: massless [A 5]
     gravity_m_per_s2: float = 9.81  # [A 1.1.1]
     slope_rad: float = 0.0  # gamma, positive downhill [A 1.1.1]
 
@@ -43,12 +43,12 @@ class BodyParameters:
     motor_inertia_kg_m2: float = 1.6e-6  # J_m at the rotor [P 3: 0.002 of the appendix is the reflected value]
     hip_gear: float = 66.0  # G_H [A 1.1.2]
     ankle_gear: float = 34.0  # G_A [P 3: 43:1 gearhead times the pulleys]
-    hip_rotor: bool = True  # G_H^2 J_m in the hip's row [P 1, erratum 9]
+    hip_rotor: bool = True  # G_H^2 J_m in the hip's row [P 1.9]
 
     outer_rolling_friction_Nms: float = 0.05  # C_FW [A 1.1.1; P 3 for the unit]
     inner_rolling_friction_Nms: float = 0.05
 
-    # Ends of the arc seen from the sweet spot. [P 1: -0.2 ... +0.9 works; R: a heel end of -0.1 adds 14 mm clearance.]
+    # Ends of the arc seen from the sweet spot [P 1: -0.2 ... +0.9 works; W 1: a heel end of -0.1 adds 14 mm clearance]
     # Heel -0.1, 20 mm behind the sweet spot, because the sweet spot "is near the heel" [A 2.4]; with -0.2 the heel of
     # the flipping foot brushes the floor and half of the record machines' starts end within five steps.
     arc_heel_rad: float = -0.1

@@ -103,7 +103,7 @@ class RangerPlant:
         self.step_s = STEP_NS * 1e-9
         self.zero = self.parameters.ankle_zero_rad
 
-        # Lines, gears and senses of the encoders: facts network-and-boards 4.1; the outer feet's are mirrored.
+        # Lines, gears and senses of the encoders: robot.md N4.1; the outer feet's are mirrored.
         self.hip_joint = IncrementalEncoder("hip_joint", 2048, seed=seed)
         self.hip_motor = IncrementalEncoder("hip_motor", 192, 66.0, seed=seed)
         self.outer_motor = IncrementalEncoder("outer_motor", 512, 34.0, -1, seed=seed)
@@ -118,7 +118,7 @@ class RangerPlant:
             self.inner_motor,
             self.inner_joint,
         ]
-        # Zeros: facts network-and-boards 4.7.
+        # Zeros: robot.md N4.7.
         self.hip_word = AbsoluteEncoder("hip", 4590, 1, seed=seed)
         self.outer_word = AbsoluteEncoder("outer_ankle", 6562, -1, seed=seed)
         self.inner_word = AbsoluteEncoder("inner_ankle", 1572, 1, seed=seed)

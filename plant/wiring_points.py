@@ -61,7 +61,7 @@ INNER_ANKLE_WORD = 2
 WORD_COUNT = 3
 WORD_NAMES = ("hip_absolute", "outer_ankle_absolute", "inner_ankle_absolute")
 
-# Incremental encoders: edges of channel A (facts network-and-boards 4.1: which capture input each one has).
+# Incremental encoders: edges of channel A (robot.md N4.1: which capture input each one has).
 HIP_JOINT_EDGES = 0  # MCH capture 0
 HIP_MOTOR_EDGES = 1  # MCH capture 2
 OUTER_MOTOR_EDGES = 2  # MCFO capture 0

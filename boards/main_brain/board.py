@@ -1,10 +1,10 @@
 """The main brain (MB, LPC3250 at 208 MHz): all data, estimator, state machines. Slots of 2 ms, 11 rows.
 
-Facts network-and-boards 1.6, 3.1, 3.8, 4.12, 4.13; appendix 4.3, 4.4. Its tick comes from its own crystal,
+Source: robot.md N1.6, N3.1, N3.8, N4.12, N4.13; appendix 4.3, 4.4. Its tick comes from its own crystal,
 not from the router: phase and drift against the rest of the robot are arbitrary; its time is that of the
 last frame of identifier 0.
 
-The line to the computer is one of two ports (facts 4.15): HS-UART1 with a wire, 928.6 kbaud, or HS-UART2 with the
+The line to the computer is one of two ports (robot.md N4.15): HS-UART1 with a wire, 928.6 kbaud, or HS-UART2 with the
 Bluetooth module, 464.3 kbaud and hardware flow control; `quirks.computer_link` says which.
 """
 
@@ -34,7 +34,7 @@ from ranger_sim.foundation.events import SSP_SEGMENT, EventQueue
 
 # Both edges of slave select: stop and restart two DMA channels; about 300 instructions of C (chosen by us).
 SEGMENT_CYCLES = 450
-EXECUTION_TIMER_HZ = 13_000_000  # Timer0 counts the peripheral clock (facts 3.8)
+EXECUTION_TIMER_HZ = 13_000_000  # Timer0 counts the peripheral clock (robot.md N3.8)
 
 
 class ComputerPort(NamedTuple):
@@ -46,8 +46,8 @@ class ComputerPort(NamedTuple):
 
 
 COMPUTER_PORTS = {"wired": ComputerPort(1, 0, -1), "bluetooth": ComputerPort(2, 1, 0)}
-TRANSMIT_CHANNEL = 3  # GPDMA (facts 4.15)
-RESTART_SLOT, DMA_SLOT = 1, 2  # after the timer; tested in this order (facts 4.16)
+TRANSMIT_CHANNEL = 3  # GPDMA (robot.md N4.15)
+RESTART_SLOT, DMA_SLOT = 1, 2  # after the timer; tested in this order (robot.md N4.16)
 # Acknowledge, find the next segment, write four registers of the channel: about as many instructions as an exchange
 # of the link to the router takes (chosen by us).
 DMA_CYCLES = 450
@@ -127,7 +127,7 @@ class MainBrainBoard(Microcontroller):
         controller.apply(self.store)
 
     def schedule(self) -> Schedule:
-        """Facts 3.8.
+        """Source: robot.md N3.8.
 
         Costs are chosen by us, because no execution times of this board are known: the ARM926 has no
         floating point unit, so about 60 cycles per operation, 1500 per sine or root, 30 per table access.
@@ -178,7 +178,7 @@ class MainBrainBoard(Microcontroller):
     # --- tasks of our own -------------------------------------------------------------------------------
 
     def beat(self) -> None:
-        """The heartbeat light: on for 50 ms when bit 8 of the network time rises (facts 1.8)."""
+        """The heartbeat light: on for 50 ms when bit 8 of the network time rises (robot.md N1.8)."""
         bit: cython.longlong = self.time.ms >> 8 & 1
         if bit == 1 and self.heartbeat_bit == 0:
             self.heartbeat_on = True

@@ -12,7 +12,7 @@ class MotorCommand:
     """The three words of the compliant law I = I0 - K p - D dp/dt of one motor board.
 
     board: prefix of its variables ("MCH"). All three are rewritten on every call, so the link sends them
-    in every slot, as the machines of 2011 did (facts control-and-data 1.2).
+    in every slot, as the machines of 2011 did (robot.md C1.2).
     """
 
     def __init__(self, store, board) -> None:

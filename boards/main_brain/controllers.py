@@ -52,7 +52,7 @@ class Operator:
 
 
 # Allowed values of the operator's numbers: beyond these no person could hold or push the robot so, or the
-# joints do not reach (hip stop 0.614 rad, ankle 0 ... 3.2 rad; facts control-and-data 4, 1.1).
+# joints do not reach (hip stop 0.614 rad, ankle 0 ... 3.2 rad; robot.md C4, C1.1).
 OPERATOR_LIMITS = {
     "lean_rad": (-0.5, 0.5),
     "hip_angle_rad": (-0.6, 0.6),

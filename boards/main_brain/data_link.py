@@ -1,4 +1,4 @@
-"""The line to the computer: data points out by rate and priority, parameters in (facts network-and-boards 4.15).
+"""The line to the computer: data points out by rate and priority, parameters in (robot.md N4.15).
 
 To the computer go segments of 92 bytes: nine points of identifier (16 bits), value and time stamp (32 bits each),
 and a checksum, the sum of the 90 bytes before it plus 1; everything big-endian, no start byte. Twenty segments form

@@ -1,6 +1,6 @@
 """The main brain gathers every board's error frames and passes them on, one at a time.
 
-Facts network-and-boards 4.12: called in one row (45.45 Hz); equal errors of one board are merged (counts
+Source: robot.md N4.12: called in one row (45.45 Hz); equal errors of one board are merged (counts
 added, newest time kept) in a ring of 64 for the computer and one of 16 for the display. As intended by the
 appendix, the next error goes out when the last one was read; by the quirk of 2016 the computer's variable
 is marked new while its ring is empty, and the display's ring is never emptied.

@@ -1,7 +1,7 @@
 """The estimator: filtered rates, leg angles, heel strike, step length, distance, energy.
 
-Facts control-and-data 3.1 (the form of the record walks); runs once per 2 ms slot before the machines.
-All angles in rad with the signs of facts 1.1: leg angles positive leaning forward, hip angle positive
+Source: robot.md C3.1 (the form of the record walks); runs once per 2 ms slot before the machines.
+All angles in rad with the signs of robot.md C1.1: leg angles positive leaning forward, hip angle positive
 with the inner legs ahead, foot angle positive rolled towards the toe.
 
 The table holds single-precision words; inside, the estimator computes in double precision.
@@ -167,9 +167,9 @@ class Estimator:
             self.floor.inner_ankle_m = self.floor.outer_ankle_m = 0.11
             self.sweet_spot_m = 0.09  # radius less ankle-to-centre distance
         else:
-            self.sweet_spot_m = 0.054  # facts 3.1, both feet
-        self.ankle_zero = 1.68  # ankle angle with the sweet spot under a vertical leg, rad (facts 1.1)
-        self.foot_offset = 1.75  # published foot angle less geometric one, rad (facts 1.1)
+            self.sweet_spot_m = 0.054  # robot.md C3.1, both feet
+        self.ankle_zero = 1.68  # ankle angle with the sweet spot under a vertical leg, rad (robot.md C1.1)
+        self.foot_offset = 1.75  # published foot angle less geometric one, rad (robot.md C1.1)
         self.left = HeelSensor()
         self.right = HeelSensor()
         self.stage = 0  # of the strike detector: 0 swing leg behind, 1 averaging, 2 armed
@@ -264,7 +264,7 @@ class Estimator:
         rate: float
         gap: cython.longlong
         if self.use_imu_roll:
-            # roll is positive with the foot ahead of the hip, so the lean is its opposite (facts 1.1, 3.2)
+            # roll is positive with the foot ahead of the hip, so the lean is its opposite (robot.md C1.1, C3.2)
             self.outer_angle = -(self.roll.push(store.get_float(self.UI_ROLL)) - store.get_float(self.P_E_ROLL_BIAS))
             return
         gap = (stamp - self.gyro_stamp) & _MASK
@@ -313,7 +313,7 @@ class Estimator:
             store.set_float(self.E_HEEL_BASE_RIGHT, self.right.baseline)
             self.set_stage(2)
         if self.use_filtered_sum:
-            if self.contact_sum(self.swing_leg == 1) > 850.0:  # counts, facts 3.2
+            if self.contact_sum(self.swing_leg == 1) > 850.0:  # counts, robot.md C3.2
                 self.strike(hip, outer_ankle, inner_ankle)
             return
         left_touches = self.left.touches(
@@ -336,7 +336,7 @@ class Estimator:
         self.store.set_int(self.E_HEEL_STAGE, stage)
 
     def update_contact_sums(self) -> None:
-        """The four heel sensors through 10 Hz filters, once per slot (facts network-and-boards 4.17)."""
+        """The four heel sensors through 10 Hz filters, once per slot (robot.md N4.17)."""
         store: DataStore = self.store
         self.outer_left_sense.push(store.get_float(self.MCFO_LEFT_HEEL_SENSE))
         self.outer_right_sense.push(store.get_float(self.MCFO_RIGHT_HEEL_SENSE))
@@ -433,7 +433,7 @@ class Estimator:
             )
 
     def judge_fall(self, hip: float) -> cython.void:
-        """A leg beyond 45 degrees is a fall (facts network-and-boards 4.17); told once per walk."""
+        """A leg beyond 45 degrees is a fall (robot.md N4.17); told once per walk."""
         limit: float = self.store.get_float(self.P_E_FALL_ANG)
         lo: float = self.outer_angle
         li: float = lo - hip

@@ -2,7 +2,7 @@
 
 Bilinear design: with r = 2 f_c/f_s and c = tan(pi/2 (1 - r)),
 b0 = 1/(1 + sqrt(2) c + c^2), b1 = 2 b0, b2 = b0, a1 = -2 (c^2 - 1) b0, a2 = (1 - sqrt(2) c + c^2) b0
-(facts control-and-data 3.2; at 10 Hz and 1 kHz it gives the record walk's coefficients of 3.1).
+(robot.md C3.2; at 10 Hz and 1 kHz it gives the record walk's coefficients of robot.md C3.1).
 """
 
 import cython

@@ -1,6 +1,6 @@
 """The machines of the two ankle motors, from one description.
 
-Facts control-and-data 1.5. Written for the foot pair that the machine drives ("own") and the other one;
+Source: robot.md C1.5. Written for the foot pair that the machine drives ("own") and the other one;
 the hip angle is taken with the sign that makes it positive while the own legs are ahead. Differences:
 the inner feet start flipped down in the air, the outer ones start standing, and skip their first push.
 """

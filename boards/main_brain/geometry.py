@@ -1,6 +1,6 @@
 """The robot's pose from its joint angles alone, when front and rear feet both stand on a level floor.
 
-Notation of facts control-and-data 3.1: the front leg's foot is "t", the rear one "w"; R the radius of a
+Notation of robot.md C3.1: the front leg's foot is "t", the rear one "w"; R the radius of a
 foot's arc, d the distance from the ankle to the arc's centre; ankle angles counted from the sweet spot.
 ROBOT PARITY: the firmware took sines from tables and arcsines from a quartic fit; here they are exact.
 """

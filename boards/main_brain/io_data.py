@@ -4,7 +4,7 @@
 
 Received frames overwrite value and time stamp together. Every variable of the send list that was written
 since the link took it last is sent, in the order of the table, with its own stamp: so a command is sent
-only when it is rewritten, and at most once per slot (facts network-and-boards 1.6, 4.13).
+only when it is rewritten, and at most once per slot (robot.md N1.6, N4.13).
 """
 
 import array

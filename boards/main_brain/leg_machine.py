@@ -1,6 +1,6 @@
 """The leg machine: which leg stands, how far the step is, and the figures of mid-stance.
 
-Facts control-and-data 1.3. It commands nothing. Its figures (stance leg rate v, hip angle alpha and hip
+Source: robot.md C1.3. It commands nothing. Its figures (stance leg rate v, hip angle alpha and hip
 rate omega at mid-stance, each averaged over the last two steps) serve the discrete corrections of the
 hip and foot machines, which run after it in the same tick.
 
@@ -102,7 +102,7 @@ class StanceLeg:
     def enter_aftermid(self) -> cython.void:
         """Mid-stance: rates by finite differences since SS0, averaged with the other leg's last ones.
 
-        Without an SS0 before (the start state) the presets stay; facts give no rule, chosen by us.
+        Without an SS0 before (the start state) the presets stay; no source gives a rule, chosen by us.
         """
         store: DataStore = self.store
         span_ms: float

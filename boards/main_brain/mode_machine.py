@@ -1,9 +1,9 @@
 """The mode machine: what the keys choose, what the display shows, and the walk's machines inside it.
 
-Facts control-and-data 1.7. Key 0 leads from standby to calibrate, key 1 from either of them to walk, key 2
+Source: robot.md C1.7. Key 0 leads from standby to calibrate, key 1 from either of them to walk, key 2
 from walk back to standby. A key counts when it goes down. Chosen by us, because no fact gives it: a fall
 leads from walk to stop (the 2016 firmware goes to its safe mode), keys 0 and 2 lead out of stop; colours of
-light 1 as in 2016 (facts network-and-boards 6.4) where the mode exists there.
+light 1 as in 2016 (robot.md N6.4) where the mode exists there.
 """
 
 import cython
@@ -46,7 +46,7 @@ WRITES = (
 )
 LCD_QUADS = ("UI_SET_LCD_QUAD_1", "UI_SET_LCD_QUAD_2", "UI_SET_LCD_QUAD_3", "UI_SET_LCD_QUAD_4")
 
-# Colour words: red in the lowest byte, then green, then blue (facts network-and-boards 4.11, 6.4).
+# Colour words: red in the lowest byte, then green, then blue (robot.md N4.11, N6.4).
 RED = 0x000080
 GREEN = 0x008000
 BLUE = 0x800000

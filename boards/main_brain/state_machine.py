@@ -1,6 +1,6 @@
 """Concurrent, nestable finite state machines with entry, main and exit actions.
 
-One tick of a machine (facts control-and-data 1.0): of the transitions declared for the present state,
+One tick of a machine (robot.md C1.0): of the transitions declared for the present state,
 the first one whose condition holds is taken; with none, the state's main action runs (after its entry
 action, the first time). A transition is complete within its tick: the old state's exit action, then both entry
 and main action of the new state; an old state that was entered but never ran gets its entry and main

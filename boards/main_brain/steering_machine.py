@@ -1,6 +1,6 @@
 """The steering machine: twists the inner feet one way in the air and the other way on the ground.
 
-Facts control-and-data 1.6, the form of the record walk: the command is a count of PWM duty that the
+Source: robot.md C1.6, the form of the record walk: the command is a count of PWM duty that the
 steering board writes straight to its drive. The radio's channel 0 says how much; within the dead band
 the motor is shut down.
 """
@@ -78,7 +78,7 @@ class SteeringMachine:
     def radio_command(self) -> float:
         """-1 ... 1 from the pulse width of channel 0 in 1/60 us (85 000 is the centre).
 
-        A radio that never sent a pulse (width 0) means straight on: facts give no rule, chosen by us,
+        A radio that never sent a pulse (width 0) means straight on: no source gives a rule, chosen by us,
         because the formula alone would then steer fully to one side.
         """
         width: float = self.store.get_float(self.UI_RC_0)

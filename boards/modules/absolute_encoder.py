@@ -1,5 +1,5 @@
 """Absolute joint encoder AM8192B: 13 bits per turn, its spike limiter, zero and sign
-(facts network-and-boards 4.7)."""
+(robot.md N4.7)."""
 
 import cython
 

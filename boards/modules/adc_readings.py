@@ -1,7 +1,7 @@
 # cython: boundscheck=False, wraparound=False
 # (entries are places of the converter's sequence)
 """From converter counts to amperes, volts and watts, with the constants of one board
-(facts network-and-boards 4 and 5).
+(robot.md N4 and N5).
 
 Values that are published are single floats of the full constants; inside the control loop the gain is
 truncated to 16.16 (100 instead of 100.9 for the hip), as in the firmware.

@@ -2,7 +2,7 @@
 
 Period 60e6 / Hz counts in MR0, half of it in MR5. UI_EMPTY_TX2 or UI_SET_BUZZER_AMPL, when not 0, starts
 the tune. The firmware of 2016 then never stops it, and silences the buzzer in every millisecond without a tune,
-so that a frequency alone is not heard (facts network-and-boards 4.11). Appendix 3.8 has beeps on errors and
+so that a frequency alone is not heard (robot.md N4.11). Appendix 3.8 has beeps on errors and
 own sounds for the common ones; `beeps` and `repeats` are the switches buzzer_beeps, song_repeats_for_ever.
 """
 

@@ -1,7 +1,7 @@
 # cython: boundscheck=False, wraparound=False
 # (every index below is a place of a ring, which is masked, or an identifier held against the list's length)
 """A satellite's end of its CAN bus: frames to setters by identifier, values to frames
-(facts network-and-boards 1.3, 4.14).
+(robot.md N1.3, N4.14).
 
 Receiving: the interrupt copies the controller's registers into a ring, a slot task delivers what waits.
 Sending: frames are built with the last network time, wait in a ring of 8 and go into the hardware transmit

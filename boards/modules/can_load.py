@@ -29,7 +29,7 @@ class CanLoad:
             self.counts[i] = 0
 
     def report_peak(self, channel: cython.longlong) -> cython.double:
-        """Largest frame count of one millisecond since the last report, as a float (facts 3.7)."""
+        """Largest frame count of one millisecond since the last report, as a float (robot.md N3.7)."""
         peak: cython.double = self.peaks[channel]
         self.peaks[channel] = 0
         return peak

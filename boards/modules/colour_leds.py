@@ -2,7 +2,7 @@
 
 Light l has port (3 l + c) mod 9 of device l / 3, c = 0 blue, 1 green, 2 red. A command word has red in byte
 0, green in byte 1, blue in byte 2. Port value 1 is off, 0 is fully on, 3-254 are duty steps; levels below 3
-become off and above 254 fully on. Source: facts network-and-boards 4.11; MAX6966 data sheet.
+become off and above 254 fully on. Source: robot.md N4.11; MAX6966 data sheet.
 """
 
 import array

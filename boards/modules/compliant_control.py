@@ -1,5 +1,5 @@
 """The outer loop: a motor current that makes the joint behave like a spring and a damper
-(appendix eq. 3 with erratum 11; facts network-and-boards 4.2)."""
+(appendix eq. 3; robot.md P1.11, N4.2)."""
 
 import cython
 

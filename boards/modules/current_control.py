@@ -1,5 +1,5 @@
 """The inner loop: proportional-integral control of the motor current, 2 kHz, duty in counts of 600
-(appendix 4.7; facts network-and-boards 4.3)."""
+(appendix 4.7; robot.md N4.3)."""
 
 import cython
 
@@ -8,7 +8,7 @@ from ranger_sim.boards.modules.mcu_led import McuLed
 from ranger_sim.boards.modules.motor_limits import MotorLimits
 from ranger_sim.boards.modules.motor_output import MotorOutput
 
-# Counts per A and sample, all four boards (facts 4.2). The current settles within one sample, so the motor is a
+# Counts per A and sample, all four boards (robot.md N4.2). The current settles within one sample, so the motor is a
 # gain of 1/31 A per count (1.34 ohm at 25.9 V): the integral alone has its pole at 1 - 20/31 = 0.35.
 INTEGRAL_GAIN = 20
 # Chosen by us: a fifth of the integral gain, "with the emphasis on the integral" (appendix 4.7). Poles of

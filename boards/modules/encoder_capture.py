@@ -1,7 +1,7 @@
 # cython: boundscheck=False, wraparound=False
 # (pins are those of the table in motor_board.py)
 """The fast interrupt of an incremental encoder: from a timer capture to a count and a time
-(appendix 4.6; facts network-and-boards 4.1).
+(appendix 4.6; robot.md N4.1).
 
 The capture channel is armed for one edge of channel A at a time; its handler compares the pin's level with what
 that edge leaves, looks at channel B for the direction, and arms the other edge.

@@ -3,7 +3,7 @@
 """Errors of one board: noted anywhere, collected once per slot, sent one at a time (appendix 4.9).
 
 An error frame's value word holds the code (bits 0-15), the board's number (16-21) and how often it came
-since it was last sent (22-31); its time word is when it first came (facts network-and-boards 1.7, 4.12).
+since it was last sent (22-31); its time word is when it first came (robot.md N1.7, N4.12).
 """
 
 import cython

@@ -1,5 +1,5 @@
 """How long the slots take: the variables EXECUTION_TIME and MAX_EXECUTION_TIME
-(facts network-and-boards 3.1)."""
+(robot.md N3.1)."""
 
 import cython
 

@@ -1,5 +1,5 @@
 """Foot contact and limit switches: hysteresis on a raw reading, then a number of equal samples in a row
-(appendix 4.10; facts network-and-boards 4.9)."""
+(appendix 4.10; robot.md N4.9)."""
 
 import cython
 

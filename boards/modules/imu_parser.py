@@ -6,8 +6,8 @@ Both packets the board can ask for have 31 bytes: a header byte, six big-endian 
 (1/62 500 s per tick in the data sheet of the 3DM-GX3-25; not used here) and a 16-bit big-endian checksum,
 the sum of the 29 bytes before it.
 
-- 0xCF: roll, pitch, yaw (rad), then rates about x, y, z (rad/s). What the 2016 firmware asks for (facts
-  network-and-boards 4.10).
+- 0xCF: roll, pitch, yaw (rad), then rates about x, y, z (rad/s). What the 2016 firmware asks for
+  (robot.md N4.10).
 - 0xC2: accelerations x, y, z (g), then rates. The device sends this one at 1 kHz, because nothing has to
   be fused for it. ROBOT PARITY: appendix 3.8 says only that the record walk used rates alone at 1 kHz;
   0xC2 is chosen by us, because it is the device's documented packet with scaled rates and no angles.
@@ -28,7 +28,7 @@ RING_BYTES = 128
 
 
 def start_command(header) -> bytes:
-    """The four bytes that put the device into continuous mode with packet `header` (facts 4.10)."""
+    """The four bytes that put the device into continuous mode with packet `header` (robot.md N4.10)."""
     return bytes((0xC4, 0xC1, 0x29, header))
 
 

@@ -1,4 +1,4 @@
-"""Joint limits that close one direction of the motor (facts network-and-boards 4.8)."""
+"""Joint limits that close one direction of the motor (robot.md N4.8)."""
 
 import cython
 

@@ -1,4 +1,4 @@
-"""Six keys, active high, not debounced. Source: facts network-and-boards 4.11."""
+"""Six keys, active high, not debounced. Source: robot.md N4.11."""
 
 import cython
 

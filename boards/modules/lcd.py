@@ -2,7 +2,7 @@
 
 The firmware keeps four queues of 100 characters, one per quarter of four places, and serves the lowest
 quarter first. Each character takes a cursor command, 50 ms, the data, 1 ms: about 20 characters a second.
-Place p has the device address 0x40 (p / 8) + p mod 8. Source: facts network-and-boards 4.11; the device is
+Place p has the device address 0x40 (p / 8) + p mod 8. Source: robot.md N4.11; the device is
 of the HD44780 type, commands as in its data sheet.
 """
 

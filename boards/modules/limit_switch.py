@@ -1,6 +1,6 @@
 # cython: boundscheck=False, wraparound=False
 # (pins are those of the table in motor_board.py)
-"""Limit switches on pins, active low, with the same debouncing as the feet (facts network-and-boards 4.9)."""
+"""Limit switches on pins, active low, with the same debouncing as the feet (robot.md N4.9)."""
 
 import cython
 

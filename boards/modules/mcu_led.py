@@ -1,4 +1,4 @@
-"""The three LEDs beside the processor, and the heartbeat (facts network-and-boards 1.8, 4.11)."""
+"""The three LEDs beside the processor, and the heartbeat (robot.md N1.8, N4.11)."""
 
 import cython
 

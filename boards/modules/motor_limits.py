@@ -1,5 +1,5 @@
 """What keeps a motor and its gearhead alive: clips, thermal model, peak current, speed, coupled
-(appendix 4.7; facts network-and-boards 4.2, 4.3). All quantities are 16.16 fixed point.
+(appendix 4.7; robot.md N4.2, N4.3). All quantities are 16.16 fixed point.
 
 The allowed range of the target current is the motor's clip, narrowed by the thermal state, narrowed again in
 the direction of motion near the speed limit. The measured current acts on the duty: beyond the peak it is cut
@@ -18,7 +18,7 @@ if not cython.compiled:
 SLOT_S_FIXED = 32  # 0.5 ms x 65536, truncated (0.488 ms), as in the firmware
 RATED_SPEED_RAD_S = 659.734  # 6300 rpm at the motor shaft (appendix 4.7)
 SOFT_SPEED = 0.9  # the current fades from here to the rated speed (chosen by us: one tenth of the range)
-SOFT_THERMAL = 0.75  # of the thermal limit (facts 4.3)
+SOFT_THERMAL = 0.75  # of the thermal limit (robot.md N4.3)
 
 
 class MotorLimits:
@@ -124,7 +124,7 @@ class MotorLimits:
         """The target current the motor may have now, at `velocity` (rad/s x 65536, joint side).
 
         MC_TCURR_OOB is part of every step: flip-up asks for 1.5 A/rad x (0.2 - 1.85) rad = -2.5 A where an
-        ankle is clipped at -1 A (facts network-and-boards 4.2, control-and-data 1.8), for the 0.1 s that the foot
+        ankle is clipped at -1 A (robot.md N4.2, C1.8), for the 0.1 s that the foot
         takes to come up. At one note per slot that is 190 per stride and board, on the robot too.
         """
         low: cython.longlong = self.target_min

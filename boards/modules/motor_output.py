@@ -1,7 +1,7 @@
 # cython: boundscheck=False, wraparound=False
 # (pins are those of the table below)
 """The H-bridge seen from the processor: two PWM leads, two low-side enables, the watchdog pin
-(facts network-and-boards 4.4; appendix 3.8 on the alternating leads)."""
+(robot.md N4.4; appendix 3.8 on the alternating leads)."""
 
 import cython
 

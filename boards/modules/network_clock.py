@@ -4,7 +4,7 @@
 
 Identifier 0, both words the count, on all four buses every fifth 200 us interrupt. It uses transmit buffer 3
 with transmit and abort together: a frame that does not get through at once is not repeated, and when the
-buffer is still busy the millisecond is skipped without an error. Source: facts network-and-boards 1.4.
+buffer is still busy the millisecond is skipped without an error. Source: robot.md N1.4.
 """
 
 import cython

@@ -1,7 +1,7 @@
 """The robot's time as this board last heard it: the router's millisecond count, from identifier 0.
 
 A board has no other clock and neither corrects its crystal nor shifts its slots: without sync frames it stops
-(facts network-and-boards 1.4).
+(robot.md N1.4).
 """
 
 import cython

@@ -3,8 +3,8 @@
 """Incremental encoder: position from both edges of channel A (2X), rate from the time between edges.
 
 The edge part runs in the fast interrupt of every edge, the update part once per slot. All arithmetic is
-the firmware's: 32-bit integers and 16.16 fixed point, truncated where C truncates (facts
-network-and-boards 4.1; appendix 4.6).
+the firmware's: 32-bit integers and 16.16 fixed point, truncated where C truncates
+(robot.md N4.1; appendix 4.6).
 """
 
 import cython

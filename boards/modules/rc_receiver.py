@@ -2,7 +2,7 @@
 
 A timer that wraps every 10 ms (600 000 ticks of 60 MHz) is captured at both edges; a pulse of 1.5 ms is
 90 000 ticks. A channel that shows the same level at two captures raises RCX_BAD_LVLS and forgets the pulse. Source:
-facts network-and-boards 4.11.
+robot.md N4.11.
 """
 
 import array
@@ -34,7 +34,7 @@ class RcReceiver:
         """An edge of `channel` 0-3 at timer count `ticks`; `level` is the pin after it. Returns 1.
 
         The first pulse of a channel sets the filter (a start at 0 would take some 60 pulses to arrive;
-        chosen by us, because the facts give only the filter).
+        chosen by us, because the firmware gives only the filter).
         """
         width: cython.longlong
         if channel < 0 or channel > 3:

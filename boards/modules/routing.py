@@ -4,7 +4,7 @@
 
 A table entry is a mask of destinations (bit 0 SSP, bits 1-4 CAN1-CAN4) and the source last seen (7: none
 yet). Frames go to every destination but the channel they came from, in the order SSP, CAN1 ... CAN4.
-Source: facts network-and-boards 1.5.
+Source: robot.md N1.5.
 """
 
 import cython

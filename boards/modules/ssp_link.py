@@ -6,8 +6,8 @@
 A segment is 31 half-words: up to six frames of five half-words, zeros, and a checksum. The router is the
 master and starts an exchange every 200 us; 496 bits at 3.0 Mbit/s take 165.3 us, full duplex. A frame is
 (header, value high, value low, time high, time low); a header has the identifier in bits 0-10, ones in
-bits 11-14, and the remote bit in 15. The checksum is (1 + sum of the other 30) modulo 65536. Source: facts
-network-and-boards 1.6.
+bits 11-14, and the remote bit in 15. The checksum is (1 + sum of the other 30) modulo 65536. Source:
+robot.md N1.6.
 
 Frames are put straight into the segment that will carry them, and are taken straight out of the one that came in.
 
@@ -100,7 +100,7 @@ class MainBrainSspLink:
     def __init__(self, report, last_id, first_is_junk=True) -> None:
         self.report = report
         self.last_id = last_id
-        # the receive DMA is armed in the middle of nowhere, so the first segment comes shifted (facts 1.6)
+        # the receive DMA is armed in the middle of nowhere, so the first segment comes shifted (robot.md N1.6)
         self.first_is_junk = first_is_junk
         self.received = [None] * MAIN_BRAIN_SEGMENTS
         self.received_count = 0  # those that wait for `parse`
@@ -134,7 +134,7 @@ class MainBrainSspLink:
         """Keep what a received segment brings, as the receive DMA does in one of 16 places; False when it is lost.
 
         With all places full the segment is dropped and MB_SSP_RX_FULL reported (dropping the newest is
-        chosen by us, because the facts name only the error).
+        chosen by us, because only the error is known).
         """
         if self.received_count == 16:
             return self._miss()
@@ -260,7 +260,7 @@ class RouterSspLink:
 
     `frames_may_straddle`: the firmware moves half-words, so a frame that is only partly in the ring when a
     segment is filled is cut, and with a ring that never runs empty nothing re-aligns the frames that
-    follow (a quirk of the facts, 1.6); without it only whole frames enter a segment.
+    follow (a quirk of robot.md N1.6); without it only whole frames enter a segment.
 
     ROBOT PARITY: a segment is filled at its start; the robot fills its FIFO of eight half-words during
     the exchange, so a frame queued in the first microseconds after the tick goes out 200 us later here.

@@ -2,7 +2,7 @@
 
 What the motor boards do is condensed to the compliant law at 2 kHz with the robot's clips; a foot's
 contact voltage rises 11 ms after touchdown, so that the second sample in a row above the threshold comes
-14 ms after it (facts record-walk-in-our-plant: seen in the sample at 12 or at 14 ms).
+14 ms after it (robot.md W4: seen in the sample at 12 or at 14 ms).
 """
 
 import math

@@ -70,10 +70,10 @@ def test_the_main_brain_gets_its_copy_of_the_time_every_millisecond():
     assert stamps == list(range(0, 49)) or stamps == list(range(0, 50))
 
 
-# --- tables of the facts --------------------------------------------------------------------------------
+# --- tables of the firmware -----------------------------------------------------------------------------
 
 
-def test_the_schedule_is_that_of_the_facts():
+def test_the_schedule_is_that_of_the_firmware():
     schedule = build().board.scheduler.schedule
     assert [task.name for task in schedule.every] == [
         "send_time", "update_errors", "count_load", "update", "show_load", "beat",
@@ -85,7 +85,7 @@ def test_the_schedule_is_that_of_the_facts():
     ]  # fmt: skip
 
 
-def test_timer_link_and_buses_are_fast_interrupts_in_the_order_of_the_facts():
+def test_timer_link_and_buses_are_fast_interrupts_in_the_order_of_the_firmware():
     vic = build().board.vic
     assert [source.name for source in vic.fiq_list] == [
         "timer1", "ssp", "can1 receive", "can2 receive", "can3 receive", "can4 receive",
@@ -162,7 +162,7 @@ def test_the_lag_quirk_holds_every_frame_until_the_next_one_comes():
 
 
 def nominal_load(wires, seconds):
-    """Facts 1.10: frames per second up on the four buses, 7500 down in 500 bundles; returns what was sent."""
+    """Frames per second up on the four buses (robot.md N1.10), 7500 down in 500 bundles; returns what was sent."""
     plan = []
     rates = {1: 1864, 2: 956, 3: 1956, 4: 3750}
     first = {1: 14, 2: 142, 3: 37, 4: 65}

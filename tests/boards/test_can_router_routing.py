@@ -121,7 +121,7 @@ def test_without_the_lag_every_frame_is_forwarded_at_once():
 
 
 def test_with_the_lag_the_robots_own_injection_sequence_comes_out():
-    # facts 1.5: of 14, 21, 15, 37 each appears when its successor is received, and the first reception yields nothing
+    # robot.md N1.5: of 14, 21, 15, 37 each appears when its successor is received; the first reception yields nothing
     router, _ = build(lag=True)
     got = []
     for identifier in (14, 21, 15, 37):

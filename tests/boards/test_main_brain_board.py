@@ -1,4 +1,4 @@
-"""The main brain as a board: its table of facts 3.8, its traffic on the link, its errors and its limits."""
+"""The main brain as a board: its table of robot.md N3.8, its traffic on the link, its errors and its limits."""
 
 import pathlib
 import re
@@ -99,7 +99,7 @@ def press(router, key) -> None:
     router.run_ms(10)
 
 
-def test_the_schedule_is_that_of_facts_38(board):
+def test_the_schedule_is_that_of_the_firmware(board):
     schedule = board.scheduler.schedule
     assert schedule.slot_ns == 2_000_000
     assert schedule.divider == 2

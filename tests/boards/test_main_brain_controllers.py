@@ -26,7 +26,7 @@ def test_the_record_set_is_what_the_table_starts_with():
 
 @pytest.mark.parametrize(
     "name, value",
-    [  # facts control-and-data 1.8, values that a slip of the pen would spoil unnoticed
+    [  # robot.md C1.8, values that a slip of the pen would spoil unnoticed
         ("C_H_OUTER_STIFFNESS", 2),
         ("C_H_PM_H_RATE", 3),
         ("P_H_PM_H_TRATE", 2),

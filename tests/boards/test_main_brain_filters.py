@@ -9,7 +9,7 @@ from ranger_sim.boards.main_brain.filters import ButterworthFilter
 
 def test_the_record_walks_filter_has_the_robots_coefficients():
     low_pass = ButterworthFilter(10.0, 1000.0)
-    # facts control-and-data 3.1, printed to 14 decimals
+    # robot.md C3.1, printed to 14 decimals
     assert low_pass.b0 == pytest.approx(0.00094469184384, abs=5e-15)
     assert low_pass.b1 == 2.0 * low_pass.b0
     assert low_pass.b2 == low_pass.b0
@@ -19,7 +19,7 @@ def test_the_record_walks_filter_has_the_robots_coefficients():
 
 @pytest.mark.parametrize(
     "cutoff, b0, a1, a2",
-    [  # facts control-and-data 3.2, printed to 9 decimals
+    [  # robot.md C3.2, printed to 9 decimals
         (20.0, 0.013359200, -1.647459981, 0.700896781),
         (10.0, 0.003621682, -1.822694925, 0.837181651),
     ],

@@ -1,7 +1,7 @@
 """The main brain's program walks the body alone: ideal sensors and current sources, no boards, no buses.
 
 Signs, order of states and figures are checked before electronics and network can hide anything. A
-prototype (facts record-walk-in-our-plant) found 0.428 m and 0.627 s for the changes of the robust set, and
+prototype (robot.md W2) found 0.428 m and 0.627 s for the changes of the robust set, and
 0.369 m, 0.636 s for the record parameters with massless feet; its plant differs in unknown details, so the
 windows here are wide: they are those that the whole robot has to meet.
 """
@@ -64,7 +64,7 @@ def test_the_estimated_leg_angle_stays_within_a_hundredth_of_a_radian(robust_wal
 def test_steps_and_distance_are_counted_right(robust_walk):
     store, record = robust_walk.store, robust_walk.body.record
     assert record.steps - store.get_int(table.E_STEP_COUNT) in (0, 1)  # the last strike may not be seen yet
-    # the first step is counted from different places (facts 3.1: ankle distance only)
+    # the first step is counted from different places (robot.md C3.1: ankle distance only)
     assert store.get_float(table.E_DISTANCE) == pytest.approx(record.distance_m, rel=0.02)
 
 

@@ -20,7 +20,7 @@ def decoder(pulses=2048, gear=1.0, exponent=4):
     return QuadratureDecoder(pulses, gear, ErrorModule(3, NetworkTime()), GLITCH, FULL, exponent)
 
 
-# Constants that the six compiled images of the robot hold after their start (facts network-and-boards 4.1).
+# Constants that the six compiled images of the robot hold after their start (robot.md N4.1).
 @pytest.mark.parametrize(
     ("encoder", "position_gain", "position_shift", "rate_gain", "rate_shift", "rad"),
     [

@@ -21,7 +21,7 @@ from tests.boards.motor_bench import BOARDS, Bench
 
 DECODERS = ["qdc_cap01_angle", "qdc_cap01_rate", "qdc_cap23_angle", "qdc_cap23_rate"]
 
-# Written out from the facts about the robot's firmware (network-and-boards 3.2-3.5), one list per board.
+# Written out from the robot's firmware (robot.md N3.2-N3.5), one list per board.
 EVERY = {
     "MCH": [
         "adcx_convert_all", "adci_convert_all", *DECODERS, "ae_update", "can_rx_dispatch_all", "hb_beat",
@@ -72,7 +72,7 @@ OCCASIONAL = {
 }  # fmt: skip
 SPECIAL = {"ERROR": "ERROR_{}", "rezero": "motor_encoder_rezero"}
 
-# Frames per second of each board and of some variables (facts 3.2-3.5 and 1.10, no errors flowing).
+# Frames per second of each board and of some variables (robot.md N3.2-N3.5 and N1.10, no errors flowing).
 UP = {"MCH": 1863.6, "MCFO": 1955.6, "MCFI": 1950.0, "MCSI": 1800.0}
 RATES = {
     "MCH": {"ANGLE": 500, "ANG_RATE": 500, "BATT_POWER": 500, "STATUS": 45.45, "MOTOR_VELOCITY": 45.45},

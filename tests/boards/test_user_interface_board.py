@@ -44,13 +44,13 @@ def letters(text):
 # --- what it sends ------------------------------------------------------------------------------------
 
 
-def test_the_frames_of_a_second_are_those_of_the_facts():
+def test_the_frames_of_a_second_are_those_of_the_firmware():
     wires = build().run(45 * 45 * MS)
     count = {}
     for _, bus, identifier, flags, _, _ in wires.sent:
         assert (bus, flags) == (2, 8)
         count[identifier] = count.get(identifier, 0) + 1
-    # in 2025 slots: 675 passes of three rows, 45 rounds of fifteen occasional calls (facts 3.6)
+    # in 2025 slots: 675 passes of three rows, 45 rounds of fifteen occasional calls (robot.md N3.6)
     twice = {table.UI_ROLL: 675 + 45, table.UI_ANG_RATE_X: 675}
     once = [
         table.UI_BUTTONS, table.UI_RC_0, table.UI_RC_1, table.UI_STATUS, table.UI_EXECUTION_TIME,
@@ -58,11 +58,11 @@ def test_the_frames_of_a_second_are_those_of_the_facts():
         table.UI_RC_2, table.UI_RC_3,
     ]  # fmt: skip
     assert count == twice | dict.fromkeys(once, 45)
-    # 955.6 frames a second (facts 1.10)
+    # 955.6 frames a second (robot.md N1.10)
     assert sum(count.values()) / 2.025 == pytest.approx(955.6, abs=0.1)
 
 
-def test_the_occasional_list_runs_in_the_order_of_the_facts():
+def test_the_occasional_list_runs_in_the_order_of_the_firmware():
     wires = build().run(46 * MS)
     order = [s[2] for s in wires.sent if s[2] not in (table.UI_ANG_RATE_X,)]
     names = [table.NAMES[i] for i in order if i != table.UI_ROLL]
@@ -72,7 +72,7 @@ def test_the_occasional_list_runs_in_the_order_of_the_facts():
     ]  # fmt: skip
 
 
-def test_the_every_slot_list_is_that_of_the_facts():
+def test_the_every_slot_list_is_that_of_the_firmware():
     schedule = build().board.scheduler.schedule
     assert [task.name for task in schedule.every] == [
         "receive_all", "beat", "update", "update_imu", "update_errors", "feed",
@@ -83,7 +83,7 @@ def test_the_every_slot_list_is_that_of_the_facts():
     ]  # fmt: skip
 
 
-def test_interrupts_have_the_slots_of_the_facts():
+def test_interrupts_have_the_slots_of_the_firmware():
     vic = build().board.vic
     assert vic.fiq_list == []
     assert {n: s.name for n, s in enumerate(vic.irq_list) if s} == {

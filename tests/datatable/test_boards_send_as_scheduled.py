@@ -118,7 +118,7 @@ def test_a_satellite_sends_row_by_row_what_boards_toml_says(name):
 
 
 def frames_in(segment):
-    """Identifiers of the frames in a segment of the link (facts network 1.6), in order."""
+    """Identifiers of the frames in a segment of the link (robot.md N1.6), in order."""
     found = []
     for start in range(0, 30, 5):
         header = segment.words[start]
@@ -181,6 +181,6 @@ def test_a_satellite_listens_only_to_what_the_table_gives_it(name):
     heard = {number for number, receiver in enumerate(board.can.receivers) if receiver is not None}
     assert heard and heard <= set(generated.RECEIVE)
     unheard = {generated.NAMES[number] for number in set(generated.RECEIVE) - heard}
-    # facts network 2.4: nobody takes the main brain's status, the spares and what is reserved
+    # robot.md N2.4: nobody takes the main brain's status, the spares and what is reserved
     reserved = {"MB_STATUS", "MCFO_HS_STATE", "MCFI_HS_STATE", "UI_AUDIO", "ERROR_LCD", "MCSO_LEFT_ANKLE_ANGLE"}
     assert {variable for variable in unheard if "_EMPTY_" not in variable} <= reserved

@@ -105,7 +105,7 @@ def test_the_hip_boards_module_has_its_ids_lists_and_start_values():
 
 def test_the_main_brain_sends_the_robots_fifty_identifiers_in_table_order():
     mb = module("mb")
-    # facts network 2.3: status; each motor board's eight (two for the old steering board); the display; the errors
+    # robot.md N2.3: status; each motor board's eight (two for the old steering board); the display; the errors
     motor = [
         [first, *shutdown_to_dampness, *spares]
         for first, shutdown_to_dampness, spares in (

@@ -56,7 +56,7 @@ def test_what_the_robot_does_not_have_begins_at_id_314_and_error_114(table):
 
 def test_each_board_publishes_as_many_of_the_robots_variables_as_on_the_robot(table):
     count = collections.Counter(variable.publisher for variable in table.variables if variable.id < 263)
-    # rows per source in the robot's table (facts network 2.1)
+    # rows per source in the robot's table (robot.md N2.1)
     assert count == {
         "MB": 115,
         "MCFO": 21,
@@ -72,7 +72,7 @@ def test_each_board_publishes_as_many_of_the_robots_variables_as_on_the_robot(ta
 
 
 def test_the_main_brain_hears_98_variables_of_the_satellites(table):
-    # ids to board 1 from boards 3-8 (facts network 2.2)
+    # ids to board 1 from boards 3-8 (robot.md N2.2)
     numbers = {board.name: board.number for board in table.boards}
     heard = [v for v in table.subscribed_by("MB") if v.id < 263 and 3 <= numbers[v.publisher] <= 8]
     assert len(heard) == 98
@@ -87,7 +87,7 @@ def test_every_variable_is_described_and_ids_are_dense_to_the_last_of_the_robot(
     ("bus", "frames_per_s"), [("CAN1", 1863.6), ("CAN2", 955.6), ("CAN3", 1955.6), ("CAN4", 1950.0 + 1800.0)]
 )
 def test_scheduled_traffic_upwards_is_that_of_the_robot(table, bus, frames_per_s):
-    # facts network 1.10, which rounds to 0.1 frame/s
+    # robot.md N1.10, which rounds to 0.1 frame/s
     assert scheduled_frames_per_s(table, bus) == pytest.approx(frames_per_s, abs=0.05)
 
 
@@ -139,7 +139,7 @@ def test_the_published_schedule_of_the_hip_board_is_the_robots():
     ],
 )
 def test_slots_rows_and_occasional_entries_are_the_robots(board, slot_us, rows, occasional):
-    schedule = datatable.published_schedule(board)  # facts network 3.2-3.8
+    schedule = datatable.published_schedule(board)  # robot.md N3.2-N3.8
     assert (schedule.slot_us, len(schedule.rows), len(schedule.occasional)) == (slot_us, rows, occasional)
 
 
@@ -152,7 +152,7 @@ def test_the_router_sends_fifty_identifiers_away_from_the_main_brain(table):
     masks = destination_masks(table)
     assert len(masks) == 2032
     away = [number for number, mask in enumerate(masks) if mask != 1]
-    assert len(away) == 50  # facts network 1.5
+    assert len(away) == 50  # robot.md N1.5
     assert masks[table.variable("MB_STATUS").id] == 0b11110
     assert masks[table.variable("ERROR_LCD").id] == 0b00100
     assert masks[table.variable("MCH_STIFFNESS").id] == 0b00010

@@ -1,4 +1,4 @@
-"""Converters, timers, pins, serial ports: each against figures worked out by hand or given by the facts."""
+"""Converters, timers, pins, serial ports: each against figures worked out by hand or given by the firmware."""
 
 import pytest
 from hypothesis import given

@@ -41,7 +41,7 @@ def test_the_simplest_walker_has_the_published_eigenvalues(walker):
 
 def test_the_true_eigenvalue_is_the_one_without_truncation(walker):
     found = bm.largest_eigenvalue(bm.richardson(bm.simplest_step, walker, 2e-4))
-    # h^4 truncation left by one extrapolation at 2e-4, measured against Richardson of the facts: 3e-8
+    # h^4 truncation left by one extrapolation at 2e-4, measured against Richardson of robot.md P2: 3e-8
     assert found == pytest.approx(bm.SIMPLEST_EIGENVALUE_TRUE, abs=6e-8)
     assert abs(found - bm.SIMPLEST_EIGENVALUE) > 1e-7
 

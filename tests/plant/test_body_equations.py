@@ -476,7 +476,7 @@ def test_energy_is_kept_without_friction(mode, foot_inertia, exact_spring):
             in_air(body, STEP_S, 4)
         else:
             on_feet(body, STEP_S, 4)
-    # fourth order: facts on the plant 2 give 4.5e-10 per second at 500 us, so 3e-11 at 250 us. The arc is long
+    # fourth order: robot.md P2 gives 4.5e-10 per second at 500 us, so 3e-11 at 250 us. The arc is long
     # enough not to roll over its end, where the acceleration jumps (that costs 1e-7).
     assert body.energy_J() == pytest.approx(before, rel=1e-10)
 

@@ -23,7 +23,7 @@ QUIET = ElectricsParameters(
     steering_noise_V=0.0,
     battery_current_lag_s=0.0,
 )
-# Facts network-and-boards 5, as the firmware writes them: the motor's current is -g (raw - off), the battery's
+# robot.md N5, as the firmware writes them: the motor's current is -g (raw - off), the battery's
 # g (raw - off), its voltage g raw; gains of the converter from 4.5.
 FIRMWARE = {
     "hip": (0.00154, -9, 2, 0.000506, -4, 2, 0.0323),
@@ -82,7 +82,7 @@ def test_no_current_reads_as_the_boards_offsets():
 
 
 def test_the_router_measures_voltage_and_current_of_the_electronics():
-    # facts network-and-boards 5: A = 0.000501 (raw + 6), V = 0.03046 (raw + 5)
+    # robot.md N5: A = 0.000501 (raw + 6), V = 0.03046 (raw + 5)
     electrics = Electrics(QUIET)
     run(electrics, 8)
     current = 0.000501 * (internal(electrics.analog_end[points.ROUTER_CURRENT]) + 6)
@@ -177,7 +177,7 @@ def test_all_currents_meet_in_the_battery():
 
 
 def test_the_motor_current_reaches_full_scale_near_12_6_amperes():
-    # facts network-and-boards 5: full scale of the hip's converter
+    # robot.md N5: full scale of the hip's converter
     electrics = Electrics(QUIET)
     volts = electrics.zero_V[0] + electrics.slope_V[0] * 12.6
     assert abs(ads7871(volts, 2)) == pytest.approx(8191, abs=10)

@@ -37,7 +37,7 @@ def test_one_turn_of_the_shaft_gives_two_edges_per_line():
 
 
 def test_counts_times_the_firmwares_gain_are_the_angle():
-    # facts network-and-boards 4.1: rad per count of the six encoders, signs included
+    # robot.md N4.1: rad per count of the six encoders, signs included
     for lines, gear, sign, rad in (
         (2048, 1.0, 1, 1.53398e-3),
         (192, 66.0, 1, 2.47918e-4),
@@ -270,7 +270,7 @@ def test_an_impossible_encoder_is_refused(arguments):
 
 
 def test_an_absolute_word_is_turned_back_into_the_angle_by_the_firmwares_zero_and_sign():
-    # facts network-and-boards 4.7: zero, sign; position = sign (word - zero) 0.0007669922
+    # robot.md N4.7: zero, sign; position = sign (word - zero) 0.0007669922
     for zero, sign, angles in (
         (4590, 1, (-0.6, -0.001, 0.0, 0.35, 0.6)),
         (6562, -1, (0.0, 1.68, 3.2)),

@@ -83,7 +83,7 @@ def test_angles_come_at_250_hz_with_roll_opposite_to_the_lean():
     found = packets(listen(imu, 8 * 100, lean=0.15, yaw=0.3, yaw_rate=0.1), 0xCF)
     assert 24 <= len(found) <= 25
     _, values, _ = found[-1]
-    # th0 = roll + 0.021 and th0 = -lean: facts control-and-data 1.1, 3.2
+    # th0 = roll + 0.021 and th0 = -lean: robot.md C1.1, C3.2
     assert -(values[0] - -0.021) == pytest.approx(0.15, abs=1e-6)
     assert values[2] == pytest.approx(0.3, abs=1e-6)
     assert values[5] == pytest.approx(0.1 - 0.004, abs=1e-6)

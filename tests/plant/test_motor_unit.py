@@ -236,7 +236,7 @@ def test_the_gate_drive_takes_300_mW_at_30_volts_while_one_lead_switches():
 
 
 def test_alternating_leads_give_the_same_duty_and_move_the_switching_lead():
-    # facts network-and-boards 4.4 without its offset of 14 counts: u = 120 in pattern 0 and in pattern 1
+    # robot.md N4.4 without its offset of 14 counts: u = 120 in pattern 0 and in pattern 1
     first = driven(MotorUnit("m"), 120, 0)
     second = driven(MotorUnit("m"), 600, 480)
     run(first, 40)
@@ -308,7 +308,7 @@ def test_a_mirrored_motor_does_the_same_at_the_joint_for_the_opposite_bridge_vol
 
 
 def test_hip_torque_of_6_Nm_needs_about_5_6_A_with_friction():
-    # facts about the plant, section 5
+    # robot.md P5
     unit = MotorUnit("hip")
     amps = 5.6
     assert unit.torque_Nm(amps, 1.0) == pytest.approx(66 * 0.018 * amps * 0.9 - 0.1 - 0.01, rel=1e-9)

@@ -1,6 +1,6 @@
 """Known answers for the corrected equations: the figures of another implementation of the same robot.
 
-Those figures (facts on control and data, section 5.1) carry 9 to 10 digits; agreement is asked to a few units of
+Those figures (robot.md C5.1) carry 9 to 10 digits; agreement is asked to a few units of
 their last digit, which is 1e-9 of the largest term. The other implementation's parameters differ from ours (hip
 inertia 0.53, ground friction 0.1, hip viscosity 0.1, no hip rotor), so they are set here.
 """

@@ -1,6 +1,6 @@
 """The body walks by itself: small controllers with ideal currents, and the whole plant with its bridges.
 
-What is asked of step length, time and power are bands around what facts about the plant and the record walk report
+What is asked of step length, time and power are bands around what robot.md P4, W1 and W2 report
 for the same machines in other simulations, 15 % in length and time, because contact rules and feet differ.
 """
 
@@ -38,7 +38,7 @@ def test_the_robust_gait_walks_a_hundred_steps(foot_inertia):
     upright, record, power = walked(Walker(body, PaperGait()), 100)
     assert upright, body.cause
     assert record.steps == 100 and record.counted == 95
-    # facts on the plant 4: 0.598 s, 12.1 W without the boards' current clips and with massless feet
+    # robot.md P4: 0.598 s, 12.1 W without the boards' current clips and with massless feet
     assert record.mean_step_time_s() == pytest.approx(0.598, rel=0.05)
     assert record.mean_step_length_m() == pytest.approx(0.39, rel=0.05)
     assert 10.0 < power < 17.0
@@ -62,7 +62,7 @@ def test_the_robust_gait_repeats_itself_bit_for_bit():
     ids=["robust changes", "record"],
 )
 def test_the_machines_of_2011_walk_massless_feet(machines, length, seconds):
-    """Facts on the record walk: 0.369 m, 0.636 s unchanged; 0.425 m, 0.645 s with the changes for massless feet."""
+    """robot.md W1, W2: 0.369 m, 0.636 s unchanged; 0.425 m, 0.645 s with the changes for massless feet."""
     body = Body(BodyParameters(foot_inertia_kg_m2=0.0, arc_heel_rad=-0.1))
     walker = Walker(body, RecordGait(machines))
     held_start(walker)

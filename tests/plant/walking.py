@@ -12,10 +12,10 @@ from ranger_sim.plant.motion import advance
 from ranger_sim.plant.ranger import STEP_NS
 
 K = 0.018  # N m/A, torque constant [appendix table 3]
-R = 1.34  # ohm, with the series inductor [facts on the plant 3]
+R = 1.34  # ohm, with the series inductor [robot.md P3]
 V_C = 0.7  # V, brush contacts
 MU = 0.1
-C0 = 0.1  # N m on the robot [facts on the plant 3]
+C0 = 0.1  # N m on the robot [robot.md P3]
 C1 = 0.01  # N m s/rad
 STEP_S = STEP_NS * 1e-9
 ZERO = 1.68  # rad, ankle reading with the sweet spot under an upright leg
@@ -60,7 +60,7 @@ class Walker:
 
     def set_currents(self, hip, outer, inner):
         if self.limits:
-            hip = clip(hip, -4.0, 4.0)  # the boards' clips [facts on control 4]
+            hip = clip(hip, -4.0, 4.0)  # the boards' clips [robot.md C4]
             outer = clip(outer, -1.0, 6.0)
             inner = clip(inner, -1.0, 6.0)
         self.hip.current_A = hip
@@ -107,7 +107,7 @@ class Walker:
 
 
 class PaperGait:
-    """The gait of facts on the plant, section 4, in the angles of the appendix, for either leg as stance.
+    """The gait of robot.md P4, in the angles of the appendix, for either leg as stance.
 
     Entries (I0, Kp, Kv): I = I0 + Kp q + Kv qdot. hip on q3, ankles on their motor angle.
     """
@@ -192,7 +192,7 @@ class PaperGait:
 
 
 class Butterworth:
-    """10 Hz at 1 kHz, second order, iterated twice per tick of 2 ms [facts on control 3.1]."""
+    """10 Hz at 1 kHz, second order, iterated twice per tick of 2 ms [robot.md C3.1]."""
 
     def __init__(self):
         self.x = [0.0, 0.0]
@@ -211,13 +211,13 @@ class Butterworth:
 
 
 class RecordGait:
-    """The May 2011 machines [facts on control 1.3-1.5] with ideal angles: leg, hip, two feet, no boards.
+    """The May 2011 machines [robot.md C1.3-C1.5] with ideal angles: leg, hip, two feet, no boards.
 
     Side 0 outer, 1 inner. `flag` is the swing leg flag: 0 outer legs swing, 1 inner legs swing.
     """
 
     RECORD = dict(outer_stiffness=2.0, trigger=0.012, flip_down=0.10)
-    ROBUST = dict(outer_stiffness=0.0, trigger=0.022, flip_down=0.13)  # "F" of facts on the record walk
+    ROBUST = dict(outer_stiffness=0.0, trigger=0.022, flip_down=0.13)  # robot.md W2
 
     def __init__(self, parameters=None):
         self.p = dict(self.RECORD if parameters is None else parameters)
@@ -378,7 +378,7 @@ class RecordGait:
 
 
 def held_start(walker, lean=0.09, rate=0.7, seconds=1.5):
-    """The operator's start [facts on the record walk]: standing, legs held 0.35 rad apart, then let go."""
+    """The operator's start [robot.md W3]: standing, legs held 0.35 rad apart, then let go."""
     handling.place(walker.body, lean, 0.35)
     handling.hold_standing(walker.body, lean, 0.35)
     walker.run(1, seconds)
@@ -390,7 +390,7 @@ class ElectricWalker(Walker):
     """The same controllers on the whole plant: bridges, windings, battery; current loops as on the motor boards.
 
     Integral-only loop at 2 kHz with 20 counts of 600 per A and sample, duty clips 250 and 300 counts
-    [facts on control 4], on the true current.
+    [robot.md C4], on the true current.
     """
 
     def __init__(self, plant, controller, delay_s=0.014):

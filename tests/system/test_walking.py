@@ -10,7 +10,7 @@ from ranger_sim.harness.ranger import Ranger
 from ranger_sim.harness.scenario import Scenario, StopRule
 
 BUSES = ("can1", "can2", "can3", "can4")
-# Frames/s: sync and what the boards send, table 1.10 of the facts.
+# Frames/s: sync and what the boards send, robot.md N1.10.
 UP_FRAMES_PER_S = {"can1": 1863.6, "can2": 955.6, "can3": 1955.6, "can4": 3750.0}
 SYNC_FRAMES_PER_S = 1000.0
 

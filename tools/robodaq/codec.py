@@ -1,4 +1,4 @@
-"""Bytes of the data link as the computer sees them (facts network-and-boards 4.15).
+"""Bytes of the data link as the computer sees them (robot.md N4.15).
 
 From the robot: segments of 92 bytes, nine points of identifier, value word and stamp in ms, and the sum of these 90
 bytes plus 1. To the robot: packets of 8 bytes, identifier, value word, and the sum of the six plus 1. Big-endian.

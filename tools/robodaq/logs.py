@@ -27,7 +27,7 @@ class Log(Protocol):
 
 
 class TextLog:
-    """`NAME<tab>id` per variable, then `id<tab>value<tab>robot time in ms` per point (facts control-and-data 6.1)."""
+    """`NAME<tab>id` per variable, then `id<tab>value<tab>robot time in ms` per point (robot.md C6.1)."""
 
     def __init__(self, path: pathlib.Path) -> None:
         self.path = path

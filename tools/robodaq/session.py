@@ -23,7 +23,7 @@ ERRORS = all_variables.ID_OF["ERROR_LABVIEW"]
 FIRST_CHANNEL = all_variables.ID_OF["LV_CH_0"]
 # Two channels are the session's own: the robot's time shows gaps, and errors come as soon as there are some.
 OWN = (TIMESTAMP + MEDIUM, ERRORS + FAST)
-GAP_MS = 50  # the logs of the real robot have radio gaps of 50 ms and more (facts control-and-data 6.1)
+GAP_MS = 50  # the logs of the real robot have radio gaps of 50 ms and more (robot.md C6.1)
 # The robot takes 499 bytes in 22 ms and answers by its slow list, in about a third of a second at full speed.
 UNANSWERED_MAX = 40  # packets of 8 bytes under way at a time: 320 bytes
 REPEAT_S = 2.0  # a packet not confirmed by then may have been lost: it is sent again (chosen by us)
