@@ -5,11 +5,11 @@ import math
 import numpy as np
 import pytest
 
-from ranger_sim.plant import benchmarks as bm
 from ranger_sim.plant import handling
 from ranger_sim.plant.body import Body
 from ranger_sim.plant.motion import advance
 from ranger_sim.plant.ranger import STEP_NS, RangerPlant
+from tests.plant import benchmarks as bm
 from tests.plant.walking import (
     SLOT,
     STEP_S,

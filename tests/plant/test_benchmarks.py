@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from ranger_sim.plant import benchmarks as bm
+from tests.plant import benchmarks as bm
 
 
 @pytest.fixture(scope="module")

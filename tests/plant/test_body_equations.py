@@ -1,6 +1,6 @@
 """The body's equations of motion against two other derivations, on random states, and its energy.
 
-1. Massless feet: `plant/paper_model.py`, the appendix's angular momentum balances in q1 ... q4.
+1. Massless feet: `tests/plant/paper_model.py`, the appendix's angular momentum balances in q1 ... q4.
 2. Feet with inertia, arc ends, stops, flight: Lagrange's equations with multipliers in floating coordinates, all
    derivatives taken numerically by complex steps (exact to rounding), written here without a formula of the body.
 """
@@ -14,7 +14,6 @@ import pytest
 
 from ranger_sim.foundation.random_stream import RandomStream
 from ranger_sim.plant import handling
-from ranger_sim.plant import paper_model as pm
 from ranger_sim.plant.air import in_air
 from ranger_sim.plant.body import DOUBLE, FLIGHT, HELD, INNER, OUTER, SINGLE, Body
 from ranger_sim.plant.floor import Floor
@@ -23,6 +22,7 @@ from ranger_sim.plant.motion import advance
 from ranger_sim.plant.parameters import BodyParameters, hip_spring_torque_Nm
 from ranger_sim.plant.ranger import STEP_NS
 from ranger_sim.plant.stance import on_feet
+from tests.plant import paper_model as pm
 
 STEP_S = STEP_NS * 1e-9
 

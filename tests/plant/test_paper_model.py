@@ -13,7 +13,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from ranger_sim.foundation.random_stream import RandomStream
-from ranger_sim.plant import paper_model as pm
+from tests.plant import paper_model as pm
 
 C = 0.72 / 4.955
 SIM = pm.PaperParameters(c=C, Jl=0.53 - 0.72 * C, C1=0.1, C2=0.1, JH=0.0)

@@ -1,7 +1,7 @@
 """The appendix's section 6: Ranger's equations reduced to walkers about which everything is known.
 
-Both reductions use the balances and momenta of `plant/paper_model.py` with the parameters of the appendix's table 1,
-integrated by scipy's DOP853 near rounding, the strike polished by Newton steps on its time. Run as a module it
+Both reductions use the balances and momenta of `tests/plant/paper_model.py` with the parameters of the appendix's
+table 1, integrated by scipy's DOP853 near rounding, the strike polished by Newton steps on its time. Run as a module it
 prints the figures. `step_errors` measures the running plant's step length and friction smoothing (EQUATIONS 15).
 """
 
@@ -11,11 +11,10 @@ import math
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from ranger_sim.plant import paper_model as pm
-from ranger_sim.plant.body import FALLEN, Body
-from ranger_sim.plant.motion import advance
+from ranger_sim.plant.body import Body
 from ranger_sim.plant.parameters import BodyParameters
 from ranger_sim.plant.stance import on_feet
+from tests.plant import paper_model as pm
 
 RTOL = 2.3e-14  # about 100 roundings, the least scipy accepts
 ATOL = 1e-15
@@ -213,15 +212,6 @@ def report() -> str:
         *(f"  {smoothing:6.3f} rad/s {error:.1e} rad" for smoothing, error in smoothing_errors()),
     ]
     return "\n".join(lines)
-
-
-def steps_of_falling_body(body: Body, seconds: float) -> int:
-    """Strikes of a body let alone for so long (it falls); used to time the plant without a controller."""
-    for _ in range(round(seconds / 250e-6)):
-        if body.mode == FALLEN:
-            break
-        advance(body, 250e-6)
-    return body.record.steps
 
 
 if __name__ == "__main__":

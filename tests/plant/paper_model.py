@@ -209,12 +209,6 @@ def hip_acceleration(p, q, u, acc):
     return chain_acceleration(p, psi1, phi1, dpsi1, dphi1, ddpsi1, ddphi1)
 
 
-def heel_height(p: PaperParameters, q):
-    """Height of the swing foot's lowest point: the strike is where it falls through 0."""
-    psi1, phi1, phi2, psi2 = rates_of(q)
-    return chain(p, psi1, phi1)[1] - chain(p, psi2, phi2)[1]
-
-
 def swapped(q):
     """Names after the strike, eq. 16."""
     return np.array([q[0] + q[1] - q[3] - q[4], q[4], q[5], -q[3], q[1], q[2]])
