@@ -389,7 +389,10 @@ class Supervisor:
             used_s = kernel.processor_time_s(child.process) - child.turn_cpu_s
             if kernel.state_of(child.process) == "R" and used_s < HANG_S / 2:
                 continue  # it would like to, but the machine is busy with others
-            self.view.say(f"{name} (process {child.process}) hangs: no answer for {held_s:.1f} s; it is killed")
+            self.view.say(
+                f"{name} (process {child.process}) hangs: no answer for {held_s:.1f} s, "
+                f"{used_s:.1f} s of them computing; it is killed"
+            )
             os.kill(child.process, signal.SIGKILL)
             child.turn_since_s = now
         plant = self.children.get(PLANT)

@@ -55,6 +55,8 @@ class Robot:
                 if self.written_bytes > robot.line.bytes_in:
                     select.select(robot.line.filenos(), [], [], 10.0)
                 robot.ranger.run_for(LOOK_S)
+                # its time is the clock: once it stands still, nothing that waits for a time would ever end
+                assert not robot.ranger.ended, f"the robot {robot.ranger.ended} at {robot.ranger.time_s:.3f} s"
                 data = b""
                 while self.read_bytes + len(data) < robot.line.bytes_out:
                     select.select([self.number], [], [], 10.0)

@@ -264,7 +264,12 @@ with contextlib.closing(Ranger()) as robot:
 def test_a_hanging_board_is_named_and_its_motor_loses_its_power(up):
     """The board's program never returns after 0.2 s; the bridge has power for 10 ms after the last watchdog edge."""
     robot = up("--hang", script=SCRIPT, speed="1000")
-    robot.wait_for(r"MCH \(process \d+\) hangs: no answer for 1\.\d s; it is killed")
+    named = robot.wait_for(
+        r"MCH \(process \d+\) hangs: no answer for ([\d.]+) s, ([\d.]+) s of them computing; it is killed"
+    )
+    held_s, computing_s = map(float, named.groups())
+    # the promise of 2 s holds where the board has a processor; where others compute as well, naming waits for its share
+    assert held_s >= 1.0 and 0.5 <= computing_s < TWO_SECONDS
     robot.wait_for(r"hip powered False losses 1 at 0.25")
     assert robot.end() == 0
 
@@ -380,7 +385,9 @@ def test_two_robots_cannot_have_one_name(up, command):
     robot = up()
     robot.processes()
     done = command("up", "--name", robot.name, "--steps", "1")
-    assert done.returncode == 2 and "is already" in done.stderr or "taken" in done.stderr
+    assert done.returncode == 2
+    assert f"the name '{robot.name}' is taken by another running robot or bus host" in done.stderr
+    assert len(done.stderr.splitlines()) == 1
     assert robot.interrupt() == 130
 
 
