@@ -3,8 +3,8 @@
 Each board's own room (hip.py, outer_feet.py, inner_feet.py, steering.py) holds its constants and its one
 schedule table. Source: robot.md N1.2, N4, N5, N6.1.
 
-Where the numbers of cycles come from: measured on the robot is only the encoder interrupt (about 150
-cycles, appendix 4.6). All others are chosen by us: instructions of the described work counted at 1.5 cycles
+Where the numbers of cycles come from: the encoder interrupt's is the appendix's (about 150 cycles, appendix
+4.6). All others are chosen by us, not yet those of robot.md T1 and T2: instructions of the described work at 1.5 cycles
 each (ARM7 with its flash accelerator on), a software division 350, a single-float operation 100, an exchange
 of 16 bits with the converter at 10 MHz 100 cycles. They give slots of a third standing still and of nearly
 two thirds with the motor at full speed; the robot is known never to have missed a slot.

@@ -129,7 +129,7 @@ class UserInterfaceBoard(Microcontroller):
             listen(table.ERROR_LCD, ErrorSound(self.buzzer))
 
     def schedule(self) -> Schedule:
-        """Source: robot.md N3.6. Costs and limits are chosen by us: no execution times of this board are known."""
+        """Source: robot.md N3.6. Costs and limits are chosen by us; robot.md T1 has the board's measured slots."""
         # untyped names: the compiler cannot hand out a bound method of another module's compiled class
         can: object = self.can
         heartbeat: object = self.heartbeat

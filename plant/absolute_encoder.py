@@ -20,7 +20,7 @@ PI = 3.141592653589793
 
 class AbsoluteEncoder:
     """One device. `noise_counts`: standard deviation before rounding; `bit_flip`: probability per word that one
-    of its bits is read wrong (the long unshielded cable of appendix 3.8; 0 by default, because no fact gives a rate).
+    of its bits is read wrong (the long unshielded cable of appendix 3.8; 0 by default, because no source gives a rate).
     """
 
     def __init__(self, name, zero, sign=1, noise_counts=0.3, bit_flip=0.0, seed=0) -> None:

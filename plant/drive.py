@@ -23,7 +23,7 @@ class Drive:
 
     `is_open`: no transistor conducts (no power, or a low side off), so the winding can only freewheel through the
     diodes. `switching_leads`: leads that toggle with the PWM. `sensed_lead_switches`: lead 2, where the current
-    sensor sits (chosen by us, because no fact says which), is one of them. `ripple`: (|D| (1 - |D|))^2 of the duty D,
+    sensor sits (chosen by us, because no source says which), is one of them. `ripple`: (|D| (1 - |D|))^2 of the duty D,
     to which the loss of the current's ripple is proportional.
     """
 

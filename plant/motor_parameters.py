@@ -22,8 +22,8 @@ class MotorParameters:
     series_resistance_ohm: float = 0.04  # of the added inductor [A 3.9]
     # Two TPCA8014-H of the bridge in the current's path at about 9 mohm each (data sheet, typical).
     bridge_resistance_ohm: float = 0.018
-    contact_drop_V: float = 0.7  # V_c [P 3; A 8.3.1]
-    torque_constant_Nm_per_A: float = 0.018  # K [P 3; A 8.3.2]
+    contact_drop_V: float = 0.7  # V_c [A 8.3.1]
+    torque_constant_Nm_per_A: float = 0.018  # K [A 8.3.2]
     load_friction: float = 0.1  # mu [A table 3]
     constant_friction_Nm: float = 0.1  # C_0 at the joint [P 3: robot]
     viscous_friction_Nms: float = 0.01  # C_1 at the joint [P 3]
@@ -39,7 +39,7 @@ class MotorParameters:
     diode_drop_V: float = 0.7  # of a bridge diode [A 3.9]
     watchdog_ns: int = 10_000_000  # [A 3.9; N 4.3]
     # Heat: winding to housing, housing to air. Chosen by us in the size of the catalogue values of a 26 mm motor
-    # (a few K/W inside, ten outside; 20 s and 11 min), because no fact gives them.
+    # (a few K/W inside, ten outside; 20 s and 11 min), because no source gives them.
     winding_to_housing_K_per_W: float = 2.0
     housing_to_air_K_per_W: float = 10.0
     winding_capacity_J_per_K: float = 10.0
@@ -115,7 +115,7 @@ class MotorParameters:
 HIP_MOTOR = MotorParameters()
 ANKLE_MOTOR = MotorParameters(gear=34.0)  # 43:1 gearhead times the pulleys [P 3]
 
-# Steering: "a small 1-watt-nominal Maxon gearmotor" [A 2.7] with 0.3 A as its limit [N 4.2]; no fact names the
+# Steering: "a small 1-watt-nominal Maxon gearmotor" [A 2.7] with 0.3 A as its limit [N 4.2]; no source names the
 # type. Chosen by us in the range of 16 mm, 12 V windings of that class: 12 V gives 10 000 rpm free and 0.3 A
 # stalled. 84:1 turns the feet 5 degrees within a swing. No inductor is mentioned for it; precious-metal brushes
 # have next to no drop; three-stage planetary gearheads of that size have about 75 % efficiency.

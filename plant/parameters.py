@@ -58,7 +58,7 @@ class BodyParameters:
     ankle_zero_rad: float = 1.68
     ankle_stop_low_rad: float = 0.0
     ankle_stop_high_rad: float = 3.2
-    # The stop holds a spring-loaded contact [A fig. 4]. Chosen by us, because no fact gives it: 400 Nm/rad bends
+    # The stop holds a spring-loaded contact [A fig. 4]. Chosen by us, because no source gives it: 400 Nm/rad bends
     # 10 mrad under the gearhead's 4 N m, and 0.9 N m s/rad is half of critical damping for foot and motor together.
     ankle_stop_Nm_per_rad: float = 400.0
     ankle_stop_Nms_per_rad: float = 0.9

@@ -1,7 +1,7 @@
 """The mode machine: what the keys choose, what the display shows, and the walk's machines inside it.
 
 Source: robot.md C1.7. Key 0 leads from standby to calibrate, key 1 from either of them to walk, key 2
-from walk back to standby. A key counts when it goes down. Chosen by us, because no fact gives it: a fall
+from walk back to standby. A key counts when it goes down. Chosen by us, because no source gives it: a fall
 leads from walk to stop (the 2016 firmware goes to its safe mode), keys 0 and 2 lead out of stop; colours of
 light 1 as in 2016 (robot.md N6.4) where the mode exists there.
 """

@@ -33,7 +33,7 @@ def test_a_ramp_comes_out_22_and_a_half_ms_late():
     low_pass = ButterworthFilter(10.0, 1000.0)
     for ms in range(2000):
         low_pass.push_stamped(0.001 * ms, ms)
-    # delay of a settled ramp = group delay at DC; the fact gives 22.5 ms
+    # delay of a settled ramp = group delay at DC; robot.md C3.1 gives 22.5 ms
     assert 1999 - 1000.0 * low_pass.output == pytest.approx(22.5, abs=0.05)
 
 

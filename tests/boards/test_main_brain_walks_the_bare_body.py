@@ -1,7 +1,7 @@
 """The main brain's program walks the body alone: ideal sensors and current sources, no boards, no buses.
 
 Signs, order of states and figures are checked before electronics and network can hide anything. A
-prototype (robot.md W2) found 0.428 m and 0.627 s for the changes of the robust set, and
+prototype (robot.md W1, W2) found 0.428 m and 0.627 s for the changes of the robust set, and
 0.369 m, 0.636 s for the record parameters with massless feet; its plant differs in unknown details, so the
 windows here are wide: they are those that the whole robot has to meet.
 """

@@ -24,7 +24,7 @@ QUIET = ElectricsParameters(
     battery_current_lag_s=0.0,
 )
 # robot.md N5, as the firmware writes them: the motor's current is -g (raw - off), the battery's
-# g (raw - off), its voltage g raw; gains of the converter from 4.5.
+# g (raw - off), its voltage g raw; gains of the converter from robot.md N4.5.
 FIRMWARE = {
     "hip": (0.00154, -9, 2, 0.000506, -4, 2, 0.0323),
     "outer_ankle": (-0.00152, 0, 2, 0.000502, -9, 2, 0.0327),
