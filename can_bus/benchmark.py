@@ -44,7 +44,7 @@ class Load:
             queues = [EventQueue(64) for _ in range(nodes_per_bus)]
             for n, queue in enumerate(queues):
                 bus.add_node(f"node{n}", queue, 1, STAGE_BUS * 256 + n)
-            bus.log_capacity = 0  # logs off
+            bus.log.capacity = 0
             self.buses.append(bus)
             self.inboxes.append(queues)
         count = buses * nodes_per_bus
@@ -72,7 +72,7 @@ class Load:
                 bus = self.buses[b]
                 if bus.next_time <= self.time:
                     bus.advance(self.time)
-                if bus.pending_count > 0:
+                if bus.buffers.waiting_count > 0:
                     busy = True
                 for n in range(self.nodes_per_bus):
                     inbox = self.inboxes[b][n]
@@ -137,9 +137,11 @@ def million_frames(frames: int = 1_000_000, load: float = 1.0, nodes_per_bus: in
     simulated_s = traffic.time * 1e-9
     return {
         "frames": traffic.requested,
-        "sent": sum(bus.frames for bus in traffic.buses),
+        "sent": sum(bus.counters.frames for bus in traffic.buses),
         "delivered": traffic.delivered,
-        "lost": traffic.requested * (nodes_per_bus - 1) - traffic.delivered + sum(bus.lost for bus in traffic.buses),
+        "lost": traffic.requested * (nodes_per_bus - 1)
+        - traffic.delivered
+        + sum(bus.counters.lost for bus in traffic.buses),
         "out_of_order": traffic.out_of_order + traffic.wrong,
         "cpu_s": cpu_s,
         "frames_per_s": traffic.requested / cpu_s,

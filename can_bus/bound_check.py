@@ -14,8 +14,9 @@ import heapq
 from collections.abc import Callable, Sequence
 
 from ranger_sim.can_bus.bounds import Bound, Message, level_of, message, response_times, utilisation
-from ranger_sim.can_bus.bus import BUFFERS, Bus
+from ranger_sim.can_bus.bus import Bus
 from ranger_sim.can_bus.frame import INTERMISSION_BITS, frame_bits, worst_case_bits
+from ranger_sim.can_bus.transmit_buffers import BUFFERS
 from ranger_sim.foundation.events import CAN_TX_DONE, FLAG_EXTENDED, NEVER, STAGE_BUS, EventQueue
 from ranger_sim.foundation.random_stream import RandomStream
 
@@ -110,7 +111,7 @@ def play(
     loaded: dict[tuple[int, int], int] = {}  # node, buffer -> message
     answered = [0] * len(senders)
     worst = [0] * len(senders)
-    while events or bus.pending_count:
+    while events or bus.buffers.waiting_count:
         time = events[0][0] if events else NEVER
         if bus.next_time < time:
             bus.advance(bus.next_time)

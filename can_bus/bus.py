@@ -1,6 +1,9 @@
 # cython: boundscheck=False, wraparound=False, initializedcheck=False
 # (every index below counts nodes, transmit buffers or logged frames, or is an identifier that `request` has checked)
-"""One CAN bus to the bit: arbitration, timing, acknowledgement, errors and load.
+"""One CAN bus to the bit: arbitration, timing, acknowledgement, and what an error means for everybody.
+
+Beside it: `node.py`, a controller with its error confinement; `transmit_buffers.py`, the frames that wait;
+`disturbance.py`, wrong bits; `error_frame.py`, what follows them; `load_meter.py`, `bus_counters.py`, `frame_log.py`.
 
 Time. Inside, the bus counts absolute bits since power-up; an instant in ns is made from such a count only
 when a result leaves. Bit k begins at the first whole nanosecond at or after k / bitrate
@@ -19,132 +22,79 @@ written down for the sender where that looks for it (`Node.connect`).
 Receivers have the frame at the end of the sixth bit of EOF, its sender is done at the end of the seventh.
 """
 
-import array
-
 import cython
 
-from ranger_sim.can_bus.frame import INTERMISSION_BITS, arbitration_key, measure, wire
-from ranger_sim.can_bus.transmit_ends import TransmitEnds
-from ranger_sim.foundation.events import (
-    CAN_STATUS,
-    CAN_TX_DONE,
-    FLAG_ERROR,
-    NEVER,
-    TX_ABORTED,
-    TX_LOST,
-    TX_SENT,
-    EventQueue,
-)
+from ranger_sim.can_bus.bus_counters import BusCounters
+from ranger_sim.can_bus.disturbance import HIGHEST_RATE, Disturbance
+from ranger_sim.can_bus.error_frame import collision, error_frame
+from ranger_sim.can_bus.frame import arbitration_end, arbitration_key, measure
+from ranger_sim.can_bus.frame_log import FrameLog
+from ranger_sim.can_bus.load_meter import LoadMeter
+from ranger_sim.can_bus.node import Node
+from ranger_sim.can_bus.transmit_buffers import TransmitBuffers
+from ranger_sim.foundation.events import EventQueue
 from ranger_sim.foundation.numbers import integers
 from ranger_sim.foundation.random_stream import RandomStream
 
+# C constants when compiled: the same numbers stand in the .pxd, and a test holds them together.
 if not cython.compiled:
-    from math import log
+    from ranger_sim.can_bus.frame import (
+        ACK_SLOT_FROM_END,
+        EIGHT_BYTES,
+        INTERMISSION_BITS,
+        LENGTH_CODE,
+        MEASURED_BITS,
+        RECEIVERS_SEE,
+        SENDABLE,
+    )
+    from ranger_sim.can_bus.node import BUS_OFF, ICR_ERROR_WARNING, JOINING, OPERATING, RESET, SUSPEND_BITS
+    from ranger_sim.can_bus.transmit_buffers import (
+        ASKED,
+        BUFFER_MASK,
+        BUFFER_SHIFT,
+        BUFFERS,
+        FLAGS,
+        FREE_AT,
+        HIGH,
+        IDENTIFIER,
+        LOW,
+        NEXT,
+        NODE_SHIFT,
+        READY,
+        ROW,
+    )
+    from ranger_sim.foundation.events import (
+        CAN_RX,
+        CAN_TX_DONE,
+        FLAG_ERROR,
+        FLAG_EXTENDED,
+        FLAG_REMOTE,
+        FLAG_SINGLE_SHOT,
+        NEVER,
+        TX_ABORTED,
+        TX_LOST,
+        TX_SENT,
+    )
 
-# Modes of a node, as `set_mode` takes them (the first two) and as `Node.mode` shows them.
-OPERATING = 0
-RESET = 1  # off the bus: neither sends, receives nor acknowledges
-BUS_OFF = 2  # thrown off by its transmit error counter
-JOINING = 3  # waits for recessive sequences before it takes part
+    # kinds of the messages in `Bus.commands`
+    COMMAND_ABORT = 1
+    COMMAND_MODE = 2
 
-# Interrupt bits of a CAN_STATUS message: CxICR of the LPC2194 (user manual UM10114, table of CANICR).
-ICR_ERROR_WARNING = 1 << 2  # EI: the warning limit was crossed either way, or bus-off entered or left
-ICR_ERROR_PASSIVE = 1 << 5  # EPI: error passive entered or left
-ICR_BUS_ERROR = 1 << 7  # BEI: an error frame; the capture fields below are valid
-ICR_FIELD_SHIFT = 16  # bits 16-20: FIELD_* of can_bus.frame
-ICR_RECEIVING = 1 << 21  # ERRDIR: the error was met while receiving
-ICR_KIND_SHIFT = 22  # bits 22-23: KIND_*
-KIND_BIT = 0
-KIND_FORM = 1
-KIND_STUFF = 2
-KIND_OTHER = 3
-
-WARNING_LIMIT = 96  # CxEWL after reset; ISO 11898-1 recommends the same
-PASSIVE_LIMIT = 128  # ISO 11898-1: error passive from here
-BUS_OFF_LIMIT = 256  # ISO 11898-1: bus-off from here (transmit errors)
-RECOVERY_SEQUENCES = 128  # ISO 11898-1: occurrences of 11 recessive bits before a bus-off node returns
-SEQUENCE_BITS = 11
-
-BUFFERS = 3  # transmit buffers of an LPC2194 CAN controller
-LOG_FIELDS = 6  # time_ns, identifier, flags, lo, hi, node
-WINDOW_RING = 1024  # closed load windows kept, 10.24 s
-
-COMMAND_ABORT = 1
-COMMAND_MODE = 2
-
-# A transmit buffer is a row of eight numbers in `Bus.rows`; buffer 1 ... 3 of a node begins at node * 32 + buffer * 8.
-ROW = 8
-FREE_AT = 0  # instant from which it takes a frame, ns; NEVER while it holds one
-READY = 1  # bit at which its frame may start; NEVER + that bit while its node is joining
-ASKED = 2  # instant of the request, ns
-NEXT = 3  # the row that waits behind this one, -1 for none
-IDENTIFIER = 4
-FLAGS = 5
-LOW = 6  # word 0
-HIGH = 7  # word 1
-
-
-class Node:
-    """A controller on a bus, with its error counters (ISO 11898-1) and what it did so far.
-
-    `following`: the next one of the bus; behind the last comes the first. `listening`: it wants what it receives (a
-    node that does not still acknowledges). `flushed`: frames that waited when it went bus-off. `refused`: requests
-    into an occupied buffer or while off the bus. `ends`: where the ends of its transmissions are written, unless they
-    shall be messages.
-    """
-
-    def __init__(self, name, index, inbox, controller, order) -> None:
-        self.inbox = inbox
-        self.ends = TransmitEnds(by_message=True)
-        self.following = self
-        self.order = order
-        self.controller = controller
-        self.mode = 0  # OPERATING
-        self.listening = True
-        self.transmit_errors = 0
-        self.receive_errors = 0
-        self.passive = False
-        self.warning = False
-        self.sent = 0
-        self.received = 0
-        self.name = name
-        self.index = index
-        self.sequences_left = 0
-        self.join_from = 0
-        self.suspend_bit = 0
-        self.sending_end = -1
-        self.refused = 0
-        self.aborted = 0
-        self.single_shot_skipped = 0
-        self.flushed = 0
-        self.arbitrations_lost = 0
-        self.retries = 0
-
-    def connect(self, ends) -> None:
-        """The ends of transmissions are written into `ends` from now on, None: all are messages."""
-        self.ends = TransmitEnds(by_message=True) if ends is None else ends
-        self.ends.order = self.order
+    SECOND_NS = 1_000_000_000
 
 
 class Bus:
     """A CAN bus. `bitrate` in bit/s; `seed` feeds the noise source of `set_bit_error_rate` only.
 
-    Statistics are fields: `accepted` requests; `frames` sent whole; `bits` the bus was taken (stuff bits,
-    intermission and error frames included); `lost` accepted but received by no listening node (nobody
-    listened, or the sender fell off the bus with the frame still waiting); `single_shot_skipped` single
-    shots that did not go out; `arbitrations_lost`, `retries` after an error; `errors` error frames;
-    `refused` requests; `aborted`; `merged` frames that two nodes sent at once with equal content.
-    At any time accepted = frames + merged + aborted + flushed + single shots dropped + pending_count.
-    `late_results` counts results stamped at or before the `until` that found them: with steps of
-    `advance` shorter than the shortest frame and no errors it stays 0.
+    What happened is in `counters`, `load` and `log`; what waits is in `buffers`.
     """
 
     def __init__(self, name, bitrate, seed=0, log_capacity=4096) -> None:
         if bitrate < 1000 or bitrate > 100_000_000:
             raise ValueError(f"bus {name}: bit rate {bitrate} bit/s is outside 1000 ... 100000000")
+        second: cython.longlong = SECOND_NS
         self.name = name
         self.bitrate = bitrate
-        self.seed = seed
         self.nodes = []
         self.node_count = 0
         self.acknowledging = 0
@@ -156,74 +106,25 @@ class Bus:
         self.advanced = -1
         self.next_bit = NEVER  # where the next frame starts, as far as known
         self.next_time = NEVER
-        self.wakes = integers(1)
-        self.wake_place = 0
-        self.rows = integers(ROW)
-        self.first = -1  # of the rows that wait, in no order
-        self.pending_count = 0
-        self.noise = None
-        self.bit_error_rate = 0.0
-        self.next_noise_bit = NEVER
-        self.next_planned_bit = NEVER
+        self.wake(integers(1), 0)
         self.next_strike = -1  # the next bit that is hit; -1 when the next frame fails wherever that lies
-        self.strikes_left = 0
-        self.strike_position = -1
-        self.planned_bits = []
         self.free_bit = 0  # after the intermission of the last frame; its instant:
         self.free_time = 0
         # the second in which the last frame began: its first bit and its instant
         self.second_bit = 0
         self.second_ns = 0
-        self.bit_ns, self.bit_rest = divmod(1_000_000_000, bitrate)  # a bit in ns, and what is left of it times bitrate
-        self.intermission_ns, self.intermission_rest = divmod(INTERMISSION_BITS * 1_000_000_000, bitrate)
-        self.window_bits = max(bitrate // 100, 1)  # 10 ms
-        self.log_capacity = log_capacity
-        self.log = array.array("q", [0]) * (LOG_FIELDS * log_capacity)
-        self.log_count = 0
-        self.log_dropped = 0
-        self.log_sink = None
-        self.trace = None  # a FrameStream takes the frames instead of the log
-        self.reset_statistics(0)
+        self.bit_ns, self.bit_rest = divmod(second, bitrate)  # a bit in ns, and what is left of it times bitrate
+        self.intermission_ns, self.intermission_rest = divmod(INTERMISSION_BITS * second, bitrate)
+        self.buffers = TransmitBuffers()
+        self.disturbance = Disturbance(RandomStream(seed, f"can_bus/{name}/bit errors"))
+        self.counters = BusCounters()
+        self.load = LoadMeter(bitrate)
+        self.log = FrameLog(log_capacity)
 
     def reset_statistics(self, time) -> None:
         """Set every statistic to zero; loads count from `time` (ns) on. Waiting frames count as accepted."""
-        self.frames = 0
-        self.merged = 0
-        self.bits = 0
-        self.lost = 0
-        self.single_shot_skipped = 0
-        self.single_shot_dropped = 0
-        self.retries = 0
-        self.errors = 0
-        self.refused = 0
-        self.arbitrations_lost = 0
-        self.aborted = 0
-        self.flushed = 0
-        self.late_results = 0
-        self.late_requests = 0
-        self.identifiers = integers(2 * 2048)  # by standard identifier: frames, longest response in ns
-        self._find_numbers()
-        self.frames_by_extended_identifier = {}
-        self.origin_bit = self.bit_of(time)
-        self.window_end = self.origin_bit + self.window_bits
-        self.window_busy = 0
-        self.window_busy_max = 0
-        self.window_count = 0
-        self.windows = integers(WINDOW_RING)
-
-    def _find_numbers(self) -> None:
-        """Set `slots`, `counts` and `due`, by which `rows`, `identifiers` and `wakes` are read and written.
-
-        Compiled they are addresses: three in a line of the processor's cache, where a memoryview takes 208 bytes.
-        """
-        if cython.compiled:
-            self.slots = cython.address(self.rows[0])
-            self.counts = cython.address(self.identifiers[0])
-            self.due = cython.address(self.wakes[0])
-        else:
-            self.slots = self.rows
-            self.counts = self.identifiers
-            self.due = self.wakes
+        self.counters.reset()
+        self.load.start(self.bit_of(time))
 
     @property
     def operating(self) -> int:
@@ -238,42 +139,39 @@ class Bus:
     @property
     def accepted(self) -> int:
         """Requests taken; what waited when the statistics were set to zero counts."""
-        over = self.frames + self.merged + self.aborted + self.flushed + self.single_shot_dropped
-        return over + self.pending_count
+        return self.counters.over + self.buffers.waiting_count
 
-    @property
-    def frames_by_identifier(self) -> list:
-        """Frames sent whole, by standard identifier."""
-        return list(self.identifiers[0::2])
+    def load_mean(self, time) -> float:
+        """Share of the bus that was taken from the start of the statistics to `time` (ns), 0 ... 1."""
+        return self.load.mean(self.bit_of(time))
 
-    @property
-    def response_max_ns(self) -> list:
-        """Longest time from a request to the end of its frame, by standard identifier, ns."""
-        return list(self.identifiers[1::2])
+    def note_outside(self, time, identifier, flags, lo, hi) -> None:
+        """A frame has passed on the real bus that stands in the place of this one, which keeps the record."""
+        self.counters.frames += 1
+        self.log.add(time, identifier, flags, lo, hi, -1)
 
     # ---- time
 
     def bit_of(self, time: cython.longlong) -> cython.longlong:
         """Number of the bit that runs at `time` (ns): floor(time * bitrate / 10^9)."""
-        billion: cython.longlong = 1000000000
-        seconds: cython.longlong = time // billion
-        return seconds * self.bitrate + (time - seconds * billion) * self.bitrate // billion
+        seconds: cython.longlong = time // SECOND_NS
+        return seconds * self.bitrate + (time - seconds * SECOND_NS) * self.bitrate // SECOND_NS
 
     @cython.cdivision(True)  # bits are not negative
     def edge_ns(self, bit: cython.longlong) -> cython.longlong:
         """First whole ns at which bit number `bit` has begun: ceil(bit * 10^9 / bitrate)."""
-        billion: cython.longlong = 1000000000
         seconds: cython.longlong = bit // self.bitrate
         rest: cython.longlong = bit - seconds * self.bitrate
-        return seconds * billion + (rest * billion + self.bitrate - 1) // self.bitrate
+        return seconds * SECOND_NS + (rest * SECOND_NS + self.bitrate - 1) // self.bitrate
 
     def wake(self, wakes, place) -> None:
         """From now on an earlier `next_time` lowers `wakes[place]` (whole numbers, ns) to it."""
         self.wakes = wakes
         self.wake_place = place
-        self._find_numbers()
+        # compiled an address: beside the other fields of every request, where a memoryview takes 208 bytes
+        self.due = cython.address(self.wakes[0]) if cython.compiled else self.wakes
 
-    # ---- nodes
+    # ---- requests
 
     def add_node(self, name, inbox, controller, order) -> int:
         """Put a controller on the bus; returns its node number.
@@ -290,11 +188,7 @@ class Bus:
         self.nodes.append(node)
         self.node_count += 1
         self.acknowledging += 1
-        before = self.rows
-        self.rows = integers(4 * ROW * self.node_count)
-        for place in range(len(before)):
-            self.rows[place] = before[place]
-        self._find_numbers()
+        self.buffers.add_node()
         self._aim()
         return index
 
@@ -319,58 +213,57 @@ class Bus:
         first: cython.longlong
         start: cython.longlong
         second: cython.longlong
-        billion: cython.longlong = 1000000000
         mask: cython.longlong = 0xFFFFFFFF
-        never: cython.longlong = 1 << 62
-        row: cython.longlong = (node << 5) + (buffer << 3)
-        if node < 0 or node >= self.node_count or buffer < 1 or buffer > 3:
+        row: cython.longlong = (node << NODE_SHIFT) + (buffer << BUFFER_SHIFT)
+        if node < 0 or node >= self.node_count or buffer < 1 or buffer > BUFFERS:
             self._no_such_buffer(node, buffer)
+        slots: cython.p_longlong = self.buffers.slots
         lo &= mask
         hi &= mask
-        if identifier >> 11 or flags & ~32 != 8:  # no standard frame of eight bytes
+        if identifier >> 11 or flags & ~FLAG_SINGLE_SHOT != EIGHT_BYTES:  # no standard frame of eight bytes
             self._check_frame(identifier, flags)
-            if flags & 16:  # a remote frame carries no data
+            if flags & FLAG_REMOTE:  # a remote frame carries no data
                 lo = 0
                 hi = 0
-            elif flags & 15 < 4:
-                lo &= (1 << 8 * (flags & 15)) - 1
+            elif flags & LENGTH_CODE < 4:
+                lo &= (1 << 8 * (flags & LENGTH_CODE)) - 1
                 hi = 0
-            elif flags & 15 < 8:
-                hi &= (1 << 8 * ((flags & 15) - 4)) - 1
-        if time < self.slots[row]:  # FREE_AT
+            elif flags & LENGTH_CODE < 8:
+                hi &= (1 << 8 * ((flags & LENGTH_CODE) - 4)) - 1
+        if time < slots[row + FREE_AT]:
             self._refuse(node, flags)
             return False
         if time < self.advanced:
             # stamped before what has been decided: it takes part from here on
-            self.late_requests += 1
+            self.counters.late_requests += 1
             first = max(self.bit_of(self.advanced) + 1, self.free_bit)
             start = self.edge_ns(first)
         elif time < self.free_time:
             first = self.free_bit
             start = self.free_time
         else:  # the bit after bit_of(time), and its edge_ns
-            second = time // billion
-            first = (time - second * billion) * self.bitrate // billion + 1
-            start = second * billion + (first * billion + self.bitrate - 1) // self.bitrate
+            second = time // SECOND_NS
+            first = (time - second * SECOND_NS) * self.bitrate // SECOND_NS + 1
+            start = second * SECOND_NS + (first * SECOND_NS + self.bitrate - 1) // self.bitrate
             first += second * self.bitrate
         if first < self.hindered_until:
             first = self._hindered(node, buffer, time, flags, first)
             if first < 0:
                 return False
-            start = self.edge_ns(first) if first < never else never
+            start = self.edge_ns(first) if first < NEVER else NEVER
         if cython.compiled:
-            self.slots[row] = never
-            self.slots[row + 1] = first
-            self.slots[row + 2] = time
-            self.slots[row + 3] = self.first
-            self.slots[row + 4] = identifier
-            self.slots[row + 5] = flags
-            self.slots[row + 6] = lo
-            self.slots[row + 7] = hi
+            slots[row + FREE_AT] = NEVER
+            slots[row + READY] = first
+            slots[row + ASKED] = time
+            slots[row + NEXT] = self.buffers.first
+            slots[row + IDENTIFIER] = identifier
+            slots[row + FLAGS] = flags
+            slots[row + LOW] = lo
+            slots[row + HIGH] = hi
         else:
-            self.slots[row : row + 8] = (never, first, time, self.first, identifier, flags, lo, hi)
-        self.first = row
-        self.pending_count += 1
+            slots[row : row + ROW] = (NEVER, first, time, self.buffers.first, identifier, flags, lo, hi)
+        self.buffers.first = row
+        self.buffers.waiting_count += 1
         if first < self.next_bit:
             self.next_bit = first
         if start < self.next_time:
@@ -386,20 +279,20 @@ class Bus:
 
     def _check_frame(self, identifier: cython.longlong, flags: cython.longlong) -> None:
         """ValueError for a frame that cannot be sent."""
-        if flags & 64:  # FLAG_EXTENDED
+        if flags & FLAG_EXTENDED:
             if identifier < 0 or identifier > 0x1FFFFFFF:
                 raise ValueError(f"bus {self.name}: identifier {identifier} does not fit in 29 bits")
         elif identifier < 0 or identifier > 0x7FF:
             raise ValueError(f"bus {self.name}: identifier {identifier} does not fit in 11 bits")
-        if flags & ~0x7F:  # length code, remote, single shot, extended
+        if flags & ~SENDABLE:
             raise ValueError(f"bus {self.name}: flags {flags:#x} of identifier {identifier:#x} cannot be sent")
 
     def _refuse(self, node: cython.longlong, flags: cython.longlong) -> None:
         owner: Node = self.nodes[node]
-        self.refused += 1
+        self.counters.refused += 1
         owner.refused += 1
-        if flags & 32:  # FLAG_SINGLE_SHOT
-            self.single_shot_skipped += 1
+        if flags & FLAG_SINGLE_SHOT:
+            self.counters.single_shot_skipped += 1
             owner.single_shot_skipped += 1
 
     def _hindered(
@@ -415,8 +308,7 @@ class Bus:
         owner: Node = self.nodes[node]
         if owner.mode == RESET or owner.mode == BUS_OFF:
             self._refuse(node, flags)
-            if not owner.ends.write(buffer, time, TX_ABORTED):
-                owner.inbox.push(time, owner.order, CAN_TX_DONE, owner.controller, buffer, TX_ABORTED)
+            owner.end_unsent(buffer, time, TX_ABORTED)
             return -1
         if first < owner.suspend_bit:
             first = owner.suspend_bit
@@ -457,8 +349,7 @@ class Bus:
         are held between the first bit after the arbitration field (17, extended 41: inside it a false
         bit reads as a lost arbitration) and the sixth of EOF (after which receivers keep the frame).
         """
-        self.strikes_left = count
-        self.strike_position = position
+        self.disturbance.hit_frames(count, position)
         self._aim()
 
     def inject_error_at(self, time) -> None:
@@ -469,65 +360,19 @@ class Bus:
         bit = self.bit_of(time)
         if bit <= self.bit_of(self.advanced):
             raise ValueError(f"bus {self.name}: {time} ns is decided already (up to {self.advanced} ns)")
-        self.planned_bits.append(bit)
-        self.planned_bits.sort()
-        self.next_planned_bit = self.planned_bits[0]
+        self.disturbance.hit_bit(bit)
         self._aim()
 
     def set_bit_error_rate(self, rate) -> None:
         """Invert each bit with probability `rate` (0 ... 0.1) from now on, from a stream of its own."""
-        if not 0.0 <= rate <= 0.1:
-            raise ValueError(f"bus {self.name}: bit error rate {rate} is outside 0 ... 0.1")
-        if self.noise is None:
-            self.noise = RandomStream(self.seed, f"can_bus/{self.name}/bit errors")
-        self.bit_error_rate = rate
-        self.next_noise_bit = max(self.bit_of(self.advanced), 0)
-        self._draw_noise()
+        if not 0.0 <= rate <= HIGHEST_RATE:
+            raise ValueError(f"bus {self.name}: bit error rate {rate} is outside 0 ... {HIGHEST_RATE}")
+        self.disturbance.set_rate(rate, max(self.bit_of(self.advanced), 0))
         self._aim()
 
     def _aim(self) -> None:
         """Set `next_strike` after anything that decides on it; a lone node fails because nobody acknowledges."""
-        fails = self.strikes_left > 0 or self.acknowledging < 2
-        self.next_strike = -1 if fails else min(self.next_planned_bit, self.next_noise_bit)
-
-    def _draw_noise(self) -> None:
-        """The next disturbed bit: distances between them are exponential with mean 1 / rate."""
-        u: cython.double
-        distance: cython.double
-        if self.bit_error_rate <= 0.0:
-            self.next_noise_bit = NEVER
-            return
-        u = self.noise.uniform()
-        distance = -log(1.0 - u) / self.bit_error_rate
-        self.next_noise_bit += 1 + int(distance)
-
-    def _strike_of(self, first, last, vulnerable) -> int:
-        """Bit position at which the frame on bits first ... last is hit, or -1.
-
-        `vulnerable` is the first position after the arbitration field. Disturbances before the frame
-        are forgotten; one inside its arbitration field is moved behind it.
-        """
-        position = -1
-        if self.strikes_left > 0:
-            self.strikes_left -= 1
-            position = self.strike_position if self.strike_position >= 0 else (last - first) // 2
-        while self.next_planned_bit < first:
-            self._forget_strike()
-        if self.next_noise_bit < first:
-            # what fell on idle bits is forgotten; the distance to the next one has no memory
-            self.next_noise_bit = first - 1
-            self._draw_noise()
-        if min(self.next_planned_bit, self.next_noise_bit) < last and position < 0:
-            position = min(self.next_planned_bit, self.next_noise_bit) - first
-        self._aim()
-        if position < 0:
-            return -1
-        return min(max(position, vulnerable), last - first - 1)
-
-    def _forget_strike(self) -> None:
-        """The first planned disturbance is over."""
-        self.planned_bits.pop(0)
-        self.next_planned_bit = self.planned_bits[0] if self.planned_bits else NEVER
+        self.next_strike = -1 if self.acknowledging < 2 else self.disturbance.next_bit
 
     # ---- passing of time
 
@@ -538,18 +383,35 @@ class Bus:
         (also in the field `next_time`) is the start of the next frame as far as known, or NEVER; a
         call before that instant returns at once.
         """
-        never: cython.longlong = 1 << 62
         if until > self.advanced:
             self.advanced = until  # decided, also where nothing starts
         while self.next_time <= until:
             if self.next_change > until or not self._change(until):
                 self._attempt(self.next_bit)
-            if self.first < 0 and self.next_change == never:
-                self.next_bit = never
-                self.next_time = never
+            if self.buffers.first < 0 and self.next_change == NEVER:
+                self.next_bit = NEVER
+                self.next_time = NEVER
             else:
                 self._look_ahead()
         return self.next_time
+
+    def _look_ahead(self) -> cython.void:
+        """Set `next_bit` and `next_time` from what waits."""
+        first: cython.longlong = self.buffers.first_ready()
+        if first <= self.free_bit:
+            self.next_bit = self.free_bit
+            self.next_time = self.free_time
+        else:
+            self.next_bit = first
+            self.next_time = self.edge_ns(first) if first < NEVER else NEVER
+        if self.next_change < NEVER:
+            first = self._next_join()
+            if first < self.next_bit:
+                self.next_time = self.edge_ns(first)
+            if self.commands.head_time < self.next_time:
+                self.next_time = self.commands.head_time
+
+    # ---- nodes that leave and join
 
     def _note_changes(self) -> None:
         """Set what depends on it after a command came or went, or a node began or ended to join or to take part."""
@@ -559,6 +421,7 @@ class Bus:
 
     def _change(self, until: cython.longlong) -> cython.bint:
         """Carry out the abort or mode change, or let the nodes join, that come before the next frame, if any do."""
+        node: Node
         last: cython.longlong = self.bit_of(until)
         join: cython.longlong = self._next_join()
         first: cython.longlong = self.edge_ns(min(self.next_bit, join, last + 1))
@@ -568,159 +431,89 @@ class Bus:
         if join <= last and join <= self.next_bit:
             self._join(join)
             return True
-        if self.joining > 0:
-            self._count_sequences(self.next_bit)
+        for node in self.nodes:
+            if node.mode == JOINING:
+                node.count_sequences(self.free_bit, self.next_bit)
         return False
 
     def _next_join(self) -> cython.longlong:
         """Bit at which the next joining node has seen its recessive sequences, if no frame comes before."""
-        first: cython.longlong = 1 << 62
-        join: cython.longlong
+        first: cython.longlong = NEVER
         node: Node
-        if self.joining == 0:
-            return first
-        for node in self.nodes:
-            if node.mode == 3:  # JOINING
-                join = max(self.free_bit - 11, node.join_from) + 11 * node.sequences_left
-                if join < first:
-                    first = join
+        if self.joining > 0:
+            for node in self.nodes:
+                if node.mode == JOINING:
+                    first = min(first, node.joins_at(self.free_bit))
         return first
-
-    def _look_ahead(self) -> cython.void:
-        """Set `next_bit` and `next_time` from what waits."""
-        never: cython.longlong = 1 << 62
-        first: cython.longlong = never
-        row: cython.longlong = self.first
-        while row >= 0:
-            if self.slots[row + 1] < first:  # READY
-                first = self.slots[row + 1]
-            row = self.slots[row + 3]  # NEXT
-        if first <= self.free_bit:
-            self.next_bit = self.free_bit
-            self.next_time = self.free_time
-        else:
-            self.next_bit = first
-            self.next_time = self.edge_ns(first) if first < never else never
-        if self.next_change < never:
-            first = self._next_join()
-            if first < self.next_bit:
-                self.next_time = self.edge_ns(first)
-            if self.commands.head_time < self.next_time:
-                self.next_time = self.commands.head_time
 
     def _execute(self) -> None:
         """Carry out the first abort or mode change."""
         node: Node
         commands: EventQueue = self.commands
         commands.take()
-        time = commands.time
         node = self.nodes[commands.a]
         if commands.kind == COMMAND_ABORT:
-            row = (4 * commands.a + commands.b) * ROW
-            if 1 <= commands.b <= BUFFERS and self.rows[row] == NEVER:  # FREE_AT
-                self.aborted += 1
-                node.aborted += 1
-                if node.mode == OPERATING:
-                    time = max(time, self.edge_ns(self.rows[row + READY]))  # after a failed attempt: at its end
-                self._drop(node, row, time, TX_ABORTED)
+            self._abort(node, commands.b, commands.time)
         elif commands.b == RESET:
-            if node.mode == OPERATING:
-                self.acknowledging -= 1
-                node.mode = RESET
-            elif node.mode == JOINING:
-                self.joining -= 1
-                # reset does not spare a bus-off node its recovery
-                node.mode = BUS_OFF if node.transmit_errors >= BUS_OFF_LIMIT else RESET
-            for row in self._waiting(node):
-                self.aborted += 1
-                node.aborted += 1
-                self._drop(node, row, time, TX_ABORTED)
+            self._reset(node, commands.time)
         elif node.mode == RESET or node.mode == BUS_OFF:
-            node.sequences_left = RECOVERY_SEQUENCES if node.mode == BUS_OFF else 1
-            node.join_from = self.bit_of(time) + 1
-            node.mode = JOINING
+            node.start_joining(self.bit_of(commands.time) + 1)
             self.joining += 1
         self._note_changes()
+
+    def _abort(self, node, buffer, time) -> None:
+        """Take back the frame in a buffer, if it holds one; after a failed attempt: at its end."""
+        row = node.index << NODE_SHIFT | buffer << BUFFER_SHIFT
+        if not 1 <= buffer <= BUFFERS or not self.buffers.is_full(row):
+            return
+        self.counters.aborted += 1
+        node.aborted += 1
+        if node.mode == OPERATING:
+            time = max(time, self.edge_ns(self.buffers.rows[row + READY]))
+        self._drop(node, row, time, TX_ABORTED)
+
+    def _reset(self, node, time) -> None:
+        """Take a node off the bus, with what waits there."""
+        if node.mode == OPERATING:
+            self.acknowledging -= 1
+            node.leave()
+        elif node.mode == JOINING:
+            self.joining -= 1
+            node.leave()
+        for row in self.buffers.waiting_of(node.index):
+            self.counters.aborted += 1
+            node.aborted += 1
+            self._drop(node, row, time, TX_ABORTED)
 
     def _join(self, bit) -> None:
         """Let every node whose sequences are complete at `bit` take part."""
         node: Node
         for node in self.nodes:
-            if node.mode != JOINING:
+            if node.mode != JOINING or node.joins_at(self.free_bit) > bit:
                 continue
-            if max(self.free_bit - SEQUENCE_BITS, node.join_from) + SEQUENCE_BITS * node.sequences_left > bit:
-                continue
-            node.mode = OPERATING
-            node.sequences_left = 0
             self.joining -= 1
             self.acknowledging += 1
-            if node.transmit_errors >= BUS_OFF_LIMIT:
-                node.transmit_errors = 0
-                node.receive_errors = 0
-                node.passive = False
-                node.warning = False
-                self._tell(node, self.edge_ns(bit), ICR_ERROR_WARNING)
-            for row in self._waiting(node):
-                self.rows[row + READY] = max(self.rows[row + READY] - NEVER, bit)
+            if node.join():
+                node.tell(self.edge_ns(bit), ICR_ERROR_WARNING)
+                self._note_result(self.edge_ns(bit))
+            for row in self.buffers.waiting_of(node.index):
+                self.buffers.rows[row + READY] = max(self.buffers.rows[row + READY] - NEVER, bit)
         self._note_changes()
 
-    def _waiting(self, node) -> list:
-        """Rows of a node that wait, lowest buffer first."""
-        rows = [(4 * node.index + buffer) * ROW for buffer in range(1, BUFFERS + 1)]
-        return [row for row in rows if self.rows[row] == NEVER]  # FREE_AT
-
-    def rows_waiting(self) -> list:
-        """Rows of all nodes that wait, in no order."""
-        found = []
-        row = self.first
-        while row >= 0:
-            found.append(row)
-            row = self.rows[row + NEXT]
-        return found
+    # ---- for a bus that passes its own time
 
     def alone_and_passive(self) -> bool:
         """True while what waits cannot be acknowledged, by nobody, and only repeats."""
-        if self.pending_count == 0 or self.acknowledging >= 2 or self.joining or self.commands.count:
+        if self.buffers.waiting_count == 0 or self.acknowledging >= 2 or self.joining or self.commands.count:
             return False
-        return all(self.nodes[row // (4 * ROW)].passive for row in self.rows_waiting())
+        return all(self.nodes[row >> NODE_SHIFT].passive for row in self.buffers.waiting())
 
     def hold_off(self, bit) -> None:
         """No attempt before `bit`: what waits is not ready before."""
-        for row in self.rows_waiting():
-            self.rows[row + READY] = max(self.rows[row + READY], bit)
+        for row in self.buffers.waiting():
+            self.buffers.hold(row, bit)
         self.next_bit = max(self.next_bit, bit)
         self.next_time = max(self.next_time, self.edge_ns(bit))
-
-    def pending_of(self, node: cython.longlong) -> cython.longlong:
-        """Frames that wait in the transmit buffers of `node`."""
-        count: cython.longlong = 0
-        row: cython.longlong = self.first
-        while row >= 0:
-            if row >> 5 == node:
-                count += 1
-            row = self.rows[row + 3]  # NEXT
-        return count
-
-    def _remove(self, row: cython.longlong) -> cython.void:
-        """Take a row off the list of those that wait."""
-        before: cython.longlong = self.first
-        following: cython.longlong = self.slots[row + 3]  # NEXT
-        self.pending_count -= 1
-        if before == row:
-            self.first = following
-            return
-        while self.slots[before + 3] != row:
-            before = self.slots[before + 3]
-        self.slots[before + 3] = following
-
-    def _drop(self, node, row, time, status) -> None:
-        """End a waiting request without success, answered at `time`."""
-        self._remove(row)
-        self.rows[row] = time  # FREE_AT
-        if time <= self.advanced:
-            self.late_results += 1
-        if not node.ends.write(row // ROW % 4, time, status):
-            node.inbox.push(time, node.order, CAN_TX_DONE, node.controller, row // ROW % 4, status)
 
     # ---- one frame
 
@@ -730,7 +523,7 @@ class Bus:
 
         Returns the bit at which the bus is free again.
         """
-        row: cython.longlong = self.first
+        row: cython.longlong = self.buffers.first
         merged: cython.bint = False
         heard: cython.bint = False
         identifier: cython.longlong
@@ -743,143 +536,166 @@ class Bus:
         rest: cython.longlong
         asked: cython.longlong
         bits: cython.longlong
-        place: cython.longlong
         rate: cython.longlong = self.bitrate
-        billion: cython.longlong = 1000000000
         sender: Node
         node: Node
-        if self.pending_count > 1:
+        slots: cython.p_longlong = self.buffers.slots
+        if self.buffers.waiting_count > 1:
             row = self._arbitrate(k)
             if row < 0:  # another node sends the same arbitration field
                 row = -row
                 merged = True
         if cython.compiled:
-            asked = self.slots[row + 2]
-            identifier = self.slots[row + 4]
-            flags = self.slots[row + 5]
-            lo = self.slots[row + 6]
-            hi = self.slots[row + 7]
+            asked = slots[row + ASKED]
+            identifier = slots[row + IDENTIFIER]
+            flags = slots[row + FLAGS]
+            lo = slots[row + LOW]
+            hi = slots[row + HIGH]
         else:
-            _, _, asked, _, identifier, flags, lo, hi = self.slots[row : row + 8]
-        bits = measure(identifier, flags, lo, hi) & 0xFFFF
+            _, _, asked, _, identifier, flags, lo, hi = slots[row : row + ROW]
+        bits = measure(identifier, flags, lo, hi) & MEASURED_BITS
         end = k + bits
         if (merged or self.next_strike < end - 1) and self._disturbed(k, row, bits, merged):
             return self.free_bit
         # edge_ns of `end`; from it those of end - 1 (the end of the sixth bit of EOF) and of the intermission's end
         if k - self.second_bit >= rate:
-            self.second_ns = k // rate * billion
+            self.second_ns = k // rate * SECOND_NS
             self.second_bit = k // rate * rate
-        rest = (end - self.second_bit) * billion + rate - 1
+        rest = (end - self.second_bit) * SECOND_NS + rate - 1
         done = rest // rate
         rest -= done * rate
         done += self.second_ns
         received = done - self.bit_ns - (rest < self.bit_rest)
-        bits += 3  # INTERMISSION_BITS
-        self.free_bit = k + bits
+        self.free_bit = end + INTERMISSION_BITS
         self.free_time = done + self.intermission_ns + (rest + self.intermission_rest >= rate)
-        self.frames += 1
-        self.bits += bits
-        self.window_busy += bits
-        if self.free_bit > self.window_end:
-            self._split_windows(k)
+        self.load.take(k, self.free_bit)
+        self.counters.frames += 1
         if received <= self.advanced:
-            self.late_results += 1
+            self.counters.late_results += 1
         # the sender's buffer is free from `done` on
-        if self.pending_count == 1:
-            self.first = -1
-            self.pending_count = 0
-        else:
-            self._remove(row)
-        self.slots[row] = done  # FREE_AT
-        sender = cython.cast(Node, self.nodes[row >> 5])
-        if not sender.ends.write(row >> 3 & 3, done, 0):  # TX_SENT
-            sender.inbox.put(done, sender.order, 3, sender.controller, row >> 3 & 3, 0, 0, 0, 0)  # CAN_TX_DONE
+        self.buffers.remove(row)
+        slots[row + FREE_AT] = done
+        sender = cython.cast(Node, self.nodes[row >> NODE_SHIFT])
+        if not sender.ends.write(row >> BUFFER_SHIFT & BUFFER_MASK, done, TX_SENT):
+            sender.inbox.put(
+                done, sender.order, CAN_TX_DONE, sender.controller, row >> BUFFER_SHIFT & BUFFER_MASK, TX_SENT, 0, 0, 0
+            )
         sender.sent += 1
         if sender.transmit_errors > 0 or sender.passive:
             self._after_success(sender, end, done)
-        flags &= 0x5F  # single shot is not on the wire
+        flags &= RECEIVERS_SEE
         node = sender.following
         while node is not sender:
-            if node.mode == 0 and not (merged and node.sending_end == end):  # OPERATING
+            if node.mode == OPERATING and not (merged and node.sending_end == end):
                 if node.receive_errors > 0:
-                    self._calm_receiver(node, received)
+                    node.count_reception()
+                    self._confine(node, received, 0)
                 if node.listening:
-                    node.inbox.put(received, node.order, 2, node.controller, identifier, flags, lo, hi, 0)  # CAN_RX
+                    node.inbox.put(received, node.order, CAN_RX, node.controller, identifier, flags, lo, hi, 0)
                     node.received += 1
                     heard = True
             node = node.following
         if not heard:
-            self.lost += 1
-        if flags & 64:  # FLAG_EXTENDED
-            self._count_extended(identifier)
-        else:
-            place = 2 * identifier
-            self.counts[place] += 1
-            if done - asked > self.counts[place + 1]:
-                self.counts[place + 1] = done - asked
-        if self.trace is not None:
-            self.trace.add(received, identifier, flags, lo, hi)
-        else:
-            self._record(received, identifier, flags, lo, hi, row >> 5)
+            self.counters.lost += 1
+        if not flags & FLAG_EXTENDED:
+            self.counters.note_answer(identifier, done - asked)
+        self.log.add(received, identifier, flags, lo, hi, row >> NODE_SHIFT)
         return self.free_bit
+
+    def _after_success(self, node: Node, end: cython.longlong, done: cython.longlong) -> None:
+        """What a frame sent whole, to bit `end`, at `done` in ns, means for a sender that has had errors."""
+        if node.passive:
+            self._suspend(node, end + INTERMISSION_BITS)
+        if node.transmit_errors > 0:
+            node.count_success()
+            self._confine(node, done, 0)
+
+    # ---- arbitration
 
     def _key(self, row: cython.longlong) -> cython.longlong:
         """The arbitration field of the frame in a row: the lower one wins."""
-        return arbitration_key(self.slots[row + 4], self.slots[row + 5])  # IDENTIFIER, FLAGS
+        return arbitration_key(self.buffers.slots[row + IDENTIFIER], self.buffers.slots[row + FLAGS])
 
     def _arbitrate(self, k: cython.longlong) -> cython.longlong:
         """The row that wins the frame that starts at bit k; negative when another node offers the very same field."""
         best: cython.longlong = -1
         best_key: cython.longlong = 0
         ready: cython.longlong = 0
-        row: cython.longlong = self.first
+        slots: cython.p_longlong = self.buffers.slots
+        row: cython.longlong = self.buffers.first
         key: cython.longlong
         while row >= 0:
-            if self.slots[row + 1] <= k:  # READY
+            if slots[row + READY] <= k:
                 ready += 1
                 key = self._key(row)
                 if best < 0 or key < best_key or (key == best_key and row < best):
                     best = row
                     best_key = key
-            row = self.slots[row + 3]  # NEXT
+            row = slots[row + NEXT]
         return -best if ready > 1 and self._contend(k, best, best_key) else best
 
     def _contend(self, k: cython.longlong, best: cython.longlong, best_key: cython.longlong) -> cython.bint:
         """Settle with the losers of an arbitration; True when another node offers the very same field."""
-        row: cython.longlong = self.first
-        other: cython.longlong
+        slots: cython.p_longlong = self.buffers.slots
+        row: cython.longlong = self.buffers.first
         key: cython.longlong
-        other_key: cython.longlong
-        offered: cython.bint
         merged: cython.bint = False
         loser: Node
         skipped = None
         while row >= 0:
-            if row >> 5 != best >> 5 and self.slots[row + 1] <= k:  # another node's, READY
+            if row >> NODE_SHIFT != best >> NODE_SHIFT and slots[row + READY] <= k:  # another node's
                 key = self._key(row)
-                offered = True  # a node puts only its lowest frame on the bus
-                other = self.first
-                while other >= 0:
-                    if other >> 5 == row >> 5 and other != row and self.slots[other + 1] <= k:
-                        other_key = self._key(other)
-                        if other_key < key or (other_key == key and other < row):
-                            offered = False
-                    other = self.slots[other + 3]
-                if offered and key == best_key:
+                if not self._is_offered(row, key, k):
+                    pass
+                elif key == best_key:
                     merged = True
-                elif offered:
-                    loser = self.nodes[row >> 5]
+                else:
+                    loser = self.nodes[row >> NODE_SHIFT]
                     loser.arbitrations_lost += 1
-                    self.arbitrations_lost += 1
-                    if self.slots[row + 5] & 32:  # FLAG_SINGLE_SHOT
+                    self.counters.arbitrations_lost += 1
+                    if slots[row + FLAGS] & FLAG_SINGLE_SHOT:
                         if skipped is None:
                             skipped = []
                         skipped.append(row)
-            row = self.slots[row + 3]  # NEXT
+            row = slots[row + NEXT]
         if skipped is not None:
             for lost in sorted(skipped):
                 self._skip(lost, self.edge_ns(k + self._bits_until_loss(lost, best)))
         return merged
+
+    def _is_offered(self, row: cython.longlong, key: cython.longlong, k: cython.longlong) -> cython.bint:
+        """True when this is what its node puts on the bus at bit k: of its frames that are ready, the lowest."""
+        slots: cython.p_longlong = self.buffers.slots
+        other: cython.longlong = self.buffers.first
+        other_key: cython.longlong
+        while other >= 0:
+            if other >> NODE_SHIFT == row >> NODE_SHIFT and other != row and slots[other + READY] <= k:
+                other_key = self._key(other)
+                if other_key < key or (other_key == key and other < row):
+                    return False
+            other = slots[other + NEXT]
+        return True
+
+    def _bits_until_loss(self, row, best) -> int:
+        """Bits from the start of frame to the end of the bit at which the sender of `row` saw that `best` wins."""
+        return collision([self.buffers.wire(row), self.buffers.wire(best)]) + 1
+
+    def _skip(self, row, time) -> None:
+        """End a single shot that did not get through."""
+        node: Node = self.nodes[row >> NODE_SHIFT]
+        node.single_shot_skipped += 1
+        self.counters.single_shot_skipped += 1
+        self.counters.single_shot_dropped += 1
+        self._drop(node, row, time, TX_LOST)
+
+    def _drop(self, node, row, time, status) -> None:
+        """End a waiting request without success, answered at `time`."""
+        self.buffers.remove(row)
+        self.buffers.rows[row + FREE_AT] = time
+        self._note_result(time)
+        node.end_unsent(row >> BUFFER_SHIFT & BUFFER_MASK, time, status)
+
+    # ---- frames that fail, and several senders of one frame
 
     def _disturbed(
         self, k: cython.longlong, best: cython.longlong, bits: cython.longlong, merged: cython.bint
@@ -888,300 +704,109 @@ class Bus:
         senders = self._senders(k, best) if merged else [best]
         position = -1
         if merged:
-            position = self._collision(senders)
+            position = collision([self.buffers.wire(row) for row in senders])
         acknowledged = self.acknowledging > len(senders)
         if position < 0:
-            vulnerable = 41 if self.rows[best + FLAGS] & 64 else 17  # see inject_errors
-            position = self._strike_of(k, k + bits - 1, vulnerable)
-        if not acknowledged and (position < 0 or position > bits - 9):
-            position = bits - 9  # the ACK slot stays recessive
+            position = self.disturbance.strike(k, k + bits - 1, arbitration_end(self.buffers.rows[best + FLAGS]))
+            self._aim()
+        ack_slot = bits - ACK_SLOT_FROM_END
+        if not acknowledged and (position < 0 or position > ack_slot):
+            position = ack_slot  # it stays recessive
         if position >= 0:
             self._fail(k, senders, position, acknowledged)
             return True
         for row in senders:
             if row != best:
-                self.merged += 1
-                self._finish_merged(self.nodes[row // (4 * ROW)], row, k + bits)
+                self.counters.merged += 1
+                self._finish_merged(self.nodes[row >> NODE_SHIFT], row, k + bits)
         return False
-
-    def _finish_merged(self, node, row, end) -> None:
-        """A node sent the same frame as the winner, up to bit `end`: it is a sender too, no receiver."""
-        done = self.edge_ns(end)
-        self._remove(row)
-        self.rows[row] = done  # FREE_AT
-        node.sending_end = end
-        node.sent += 1
-        if not node.ends.write(row // ROW % 4, done, TX_SENT):
-            node.inbox.put(done, node.order, CAN_TX_DONE, node.controller, row // ROW % 4, TX_SENT, 0, 0, 0)
-        self._after_success(node, end, done)
-
-    def _after_success(self, node: Node, end: cython.longlong, done: cython.longlong) -> None:
-        """What a frame sent whole, to bit `end`, at `done` in ns, means for a sender that has had errors."""
-        if node.passive:
-            self._suspend(node, end + INTERMISSION_BITS)
-        if node.transmit_errors > 0:
-            node.transmit_errors -= 1
-            self._confine(node, done, 0)
-
-    def _bits_until_loss(self, row, best) -> int:
-        """Bits from the start of frame to the end of the bit at which the sender of `row` saw that `best` wins."""
-        own = self._wire(row)[0]
-        winner = self._wire(best)[0]
-        return next(i for i, (a, b) in enumerate(zip(own, winner, strict=False)) if a != b) + 1
-
-    def _wire(self, row) -> tuple:
-        """The bits of the frame in a row and their fields."""
-        identifier, flags, lo, hi = (self.rows[row + place] for place in (IDENTIFIER, FLAGS, LOW, HIGH))
-        return wire(identifier, flags, lo, hi)
-
-    def _skip(self, row, time) -> None:
-        """End a single shot that did not get through."""
-        node: Node = self.nodes[row // (4 * ROW)]
-        node.single_shot_skipped += 1
-        self.single_shot_skipped += 1
-        self.single_shot_dropped += 1
-        self._drop(node, row, time, TX_LOST)
 
     def _senders(self, k, best) -> list:
         """Rows whose frames go out together: of each node its first one with the winning field."""
         found: dict = {}
-        for row in self.rows_waiting():
-            if self.rows[row + READY] <= k and self._key(row) == self._key(best):
-                node = row // (4 * ROW)
+        for row in self.buffers.waiting():
+            if self.buffers.rows[row + READY] <= k and self._key(row) == self._key(best):
+                node = row >> NODE_SHIFT
                 found[node] = min(row, found.get(node, row))
         return sorted(found.values())
 
-    def _collision(self, senders) -> int:
-        """First bit at which frames with one arbitration field differ, or -1 when they are equal."""
-        frames = [self._wire(row)[0] for row in senders]
-        for position, levels in enumerate(zip(*frames, strict=False)):
-            if len(set(levels)) > 1:
-                return position
-        return -1
-
-    def _suspend(self, node, free) -> None:
-        """An error-passive sender waits eight bits more after the intermission (ISO 11898-1)."""
-        node.suspend_bit = free + 8
-        self.suspended_until = node.suspend_bit
-        self.hindered_until = max(self.hindered_until, node.suspend_bit)
-        for row in self._waiting(node):
-            self.rows[row + READY] = max(self.rows[row + READY], node.suspend_bit)
-
-    def _calm_receiver(self, node: Node, time: cython.longlong) -> None:
-        """Receive counter after a good frame (ISO 11898-1: above 127 back to 119 ... 127, we take 119)."""
-        node.receive_errors = node.receive_errors - 1 if node.receive_errors < PASSIVE_LIMIT else 119
-        self._confine(node, time, 0)
+    def _finish_merged(self, node, row, end) -> None:
+        """A node sent the same frame as the winner, up to bit `end`: it is a sender too, no receiver."""
+        done = self.edge_ns(end)
+        buffer = row >> BUFFER_SHIFT & BUFFER_MASK
+        self.buffers.remove(row)
+        self.buffers.rows[row + FREE_AT] = done
+        node.sending_end = end
+        node.sent += 1
+        if not node.ends.write(buffer, done, TX_SENT):
+            node.inbox.put(done, node.order, CAN_TX_DONE, node.controller, buffer, TX_SENT, 0, 0, 0)
+        self._after_success(node, end, done)
 
     def _fail(self, k, senders, position, acknowledged) -> None:
         """An error frame because of the bit at `position` of the frame that started at bit k.
 
-        The sender's error flag of six bits begins after that bit; receivers inside the stuffed region
-        notice only when they have seen six equal bits, and add six of their own: the flags together take
-        6 ... 12 bits; behind the CRC everybody notices at once. Then 8 bits delimiter and the intermission.
-        A receiver in error-passive state is taken to need the same time (chosen by us).
+        `senders`: the rows whose frames it was; all of them count as failed (chosen by us).
         """
         node: Node
-        frames = [self._wire(row) for row in senders]
-        bits, fields = frames[0]
-        levels = {frame[0][position] for frame in frames}
-        seen = 0 if len(levels) > 1 else 1 - bits[position]
-        owners = [row // (4 * ROW) for row in senders]
-        level = 1 if all(self.nodes[owner].passive for owner in owners) else 0
-        stuffed = position < len(bits) - 10
-        delay = 0
-        if acknowledged and stuffed:
-            run = 0
-            if seen == level:
-                run = 1
-                while run <= position and run < 6 and bits[position - run] == level:
-                    run += 1
-            delay = 6 - run
-        over = k + position + 1 + 6 + delay + 8
-        self.free_bit = over + INTERMISSION_BITS
+        owners = [self.nodes[row >> NODE_SHIFT] for row in senders]
+        error = error_frame(
+            [self.buffers.wire(row) for row in senders], position, all(owner.passive for owner in owners), acknowledged
+        )
+        self.free_bit = k + error.end + INTERMISSION_BITS
         self.free_time = self.edge_ns(self.free_bit)
-        self.errors += 1
-        self.bits += self.free_bit - k
-        self.window_busy += self.free_bit - k
-        if self.free_bit > self.window_end:
-            self._split_windows(k)
-        capture = ICR_BUS_ERROR | fields[position] << ICR_FIELD_SHIFT
+        self.load.take(k, self.free_bit)
+        self.counters.errors += 1
         for node in self.nodes:
             if node.mode != OPERATING:
                 continue
-            if node.index in owners:
+            if node in owners:
                 if node.passive:
                     self._suspend(node, self.free_bit)
-                if acknowledged or not node.passive:  # a passive sender that nobody answers stays where it is
-                    node.transmit_errors += 8
-                kind = KIND_BIT if acknowledged else KIND_OTHER
-                self._confine(node, self.edge_ns(k + position + 1), capture | kind << ICR_KIND_SHIFT)
+                node.count_failure(acknowledged)
+                self._confine(node, self.edge_ns(k + error.sender_notices), error.sender_capture)
             else:
                 node.receive_errors += 1
-                kind = KIND_STUFF if stuffed else KIND_FORM
-                self._confine(
-                    node,
-                    self.edge_ns(k + position + 1 + delay),
-                    capture | ICR_RECEIVING | kind << ICR_KIND_SHIFT,
-                )
-        end = self.edge_ns(over)
+                self._confine(node, self.edge_ns(k + error.receivers_notice), error.receiver_capture)
+        end = self.edge_ns(k + error.end)
         for row in senders:
-            node = self.nodes[row // (4 * ROW)]
-            if self.rows[row + FLAGS] & 32:  # FLAG_SINGLE_SHOT
-                self._skip(row, end)
-            elif node.mode == OPERATING:
-                # offered again as soon as the bus is free (a passive sender: 8 bits later)
-                self.rows[row + READY] = max(self.rows[row + READY], self.free_bit)
-                self.retries += 1
-                node.retries += 1
-            if node.mode == BUS_OFF:
-                for waiting in self._waiting(node):
-                    self.flushed += 1
-                    node.flushed += 1
-                    self.lost += 1
-                    self._drop(node, waiting, end, TX_ABORTED)
+            self._repeat_or_drop(row, end)
         row = senders[0]
-        flags = self.rows[row + FLAGS] & 0x5F | FLAG_ERROR
-        self._record(end, self.rows[row + IDENTIFIER], flags, fields[position], position, owners[0])
+        flags = self.buffers.rows[row + FLAGS] & RECEIVERS_SEE | FLAG_ERROR
+        self.log.add(end, self.buffers.rows[row + IDENTIFIER], flags, error.field, position, row >> NODE_SHIFT)
 
-    def _confine(self, node, time, interrupts) -> None:
-        """Fault confinement after a counter moved (ISO 11898-1): state changes, told with the counters."""
-        worst = max(node.transmit_errors, node.receive_errors)
-        if (worst >= WARNING_LIMIT) != node.warning:
-            node.warning = not node.warning
-            interrupts |= ICR_ERROR_WARNING
-        if (worst >= PASSIVE_LIMIT) != node.passive:
-            node.passive = not node.passive
-            interrupts |= ICR_ERROR_PASSIVE
-        if node.transmit_errors >= BUS_OFF_LIMIT:
-            node.mode = BUS_OFF
+    def _repeat_or_drop(self, row, end) -> None:
+        """What becomes of the frame in a row after an error frame that ended at `end` (ns)."""
+        node: Node = self.nodes[row >> NODE_SHIFT]
+        if self.buffers.rows[row + FLAGS] & FLAG_SINGLE_SHOT:
+            self._skip(row, end)
+        elif node.mode == OPERATING:
+            # offered again as soon as the bus is free (a passive sender: 8 bits later)
+            self.buffers.hold(row, self.free_bit)
+            self.counters.retries += 1
+            node.retries += 1
+        if node.mode == BUS_OFF:
+            for waiting in self.buffers.waiting_of(node.index):
+                self.counters.flushed += 1
+                node.flushed += 1
+                self.counters.lost += 1
+                self._drop(node, waiting, end, TX_ABORTED)
+
+    def _suspend(self, node, free) -> None:
+        """Suspend transmission: an error-passive sender waits eight bits more after the intermission (ISO 11898-1)."""
+        node.suspend_bit = free + SUSPEND_BITS
+        self.suspended_until = node.suspend_bit
+        self.hindered_until = max(self.hindered_until, node.suspend_bit)
+        for row in self.buffers.waiting_of(node.index):
+            self.buffers.hold(row, node.suspend_bit)
+
+    def _confine(self, node: Node, time: cython.longlong, interrupts: cython.longlong) -> None:
+        """Error confinement of a node of which a counter has moved."""
+        if node.confine(time, interrupts):
             self.acknowledging -= 1
             self._note_changes()
-            interrupts |= ICR_ERROR_WARNING
-        self._tell(node, time, interrupts)
+        self._note_result(time)
 
-    def _tell(self, node, time, interrupts) -> None:
-        """CAN_STATUS to a node. Off the bus its transmit counter reads 127 as in the LPC2194."""
-        off = 1 if node.mode == BUS_OFF else 0
-        shown = 127 if off else node.transmit_errors
+    def _note_result(self, time: cython.longlong) -> None:
+        """Something was told with the stamp `time`."""
         if time <= self.advanced:
-            self.late_results += 1
-        node.inbox.push(time, node.order, CAN_STATUS, node.controller, interrupts, shown, node.receive_errors, off)
-
-    def _count_sequences(self, k) -> None:
-        """The recessive run before the start of frame at bit k counts for the nodes that are joining."""
-        node: Node
-        for node in self.nodes:
-            if node.mode == JOINING:
-                run = k - max(self.free_bit - SEQUENCE_BITS, node.join_from)
-                node.sequences_left -= max(run, 0) // SEQUENCE_BITS
-
-    # ---- load and log
-
-    def _count_extended(self, identifier: cython.longlong) -> None:
-        counts = self.frames_by_extended_identifier
-        counts[identifier] = counts.get(identifier, 0) + 1
-
-    def _split_windows(self, first: cython.longlong) -> cython.void:
-        """The bits from `first` until the bus is free, counted in the open window, reach beyond it."""
-        last: cython.longlong = self.free_bit
-        self.window_busy -= last - first
-        if first >= self.window_end:
-            self._roll(first)
-        while last > self.window_end:
-            self.window_busy += self.window_end - first
-            first = self.window_end
-            self._roll(first)
-        self.window_busy += last - first
-
-    def _roll(self, bit: cython.longlong) -> cython.void:
-        """Close load windows until `bit` lies in the open one."""
-        idle: cython.longlong
-        if self.window_busy > self.window_busy_max:
-            self.window_busy_max = self.window_busy
-        while bit >= self.window_end:
-            self.windows[self.window_count % 1024] = self.window_busy  # WINDOW_RING
-            self.window_count += 1
-            self.window_busy = 0
-            self.window_end += self.window_bits
-            idle = (bit - self.window_end) // self.window_bits - 1024
-            if idle > 0:  # a ring full of idle windows is enough
-                self.window_count += idle
-                self.window_end += idle * self.window_bits
-
-    def load_mean(self, time) -> float:
-        """Share of the bus that was taken from the start of the statistics to `time` (ns), 0 ... 1."""
-        now = self.bit_of(time)
-        if now <= self.origin_bit:
-            return 0.0
-        ahead = max(self.free_bit - now, 0) if self.bits else 0  # of a frame decided but not over
-        return max(self.bits - ahead, 0) / (now - self.origin_bit)
-
-    def load_max(self) -> float:
-        """Largest load of a window of 10 ms (the open one counts with what it has), 0 ... 1."""
-        return max(self.window_busy_max, self.window_busy) / self.window_bits
-
-    def load_windows(self) -> list:
-        """Loads of the closed 10 ms windows still kept (the last 1024), oldest first, 0 ... 1."""
-        kept = min(self.window_count, WINDOW_RING)
-        return [
-            self.windows[i % WINDOW_RING] / self.window_bits for i in range(self.window_count - kept, self.window_count)
-        ]
-
-    def statistics(self, time) -> dict:
-        """The figures of a report at `time` (ns); loads as fractions 0 ... 1."""
-        return {
-            "frames": self.frames,
-            "load_mean": self.load_mean(time),
-            "load_max": self.load_max(),
-            "lost": self.lost,
-            "single_shot_skipped": self.single_shot_skipped,
-            "arbitrations_lost": self.arbitrations_lost,
-            "retries": self.retries,
-            "errors": self.errors,
-            "refused": self.refused,
-            "aborted": self.aborted,
-        }
-
-    def _record(
-        self,
-        time: cython.longlong,
-        identifier: cython.longlong,
-        flags: cython.longlong,
-        lo: cython.longlong,
-        hi: cython.longlong,
-        node: cython.longlong,
-    ) -> cython.longlong:
-        """Append to the frame log; returns how many it holds. A full one is first offered to `log_sink(bus)`."""
-        base: cython.longlong
-        if self.trace is not None:
-            self.trace.add(time, identifier, flags, lo, hi)
-            return 0
-        if self.log_count >= self.log_capacity:
-            if self.log_sink is not None:
-                self.log_sink(self)
-            if self.log_count >= self.log_capacity:
-                self.log_dropped += 1
-                return self.log_count
-        base = self.log_count * 6  # LOG_FIELDS
-        self.log[base] = time
-        self.log[base + 1] = identifier
-        self.log[base + 2] = flags
-        self.log[base + 3] = lo
-        self.log[base + 4] = hi
-        self.log[base + 5] = node
-        self.log_count += 1
-        return self.log_count
-
-    def clear_log(self) -> None:
-        """Forget the logged frames (their reader has them)."""
-        self.log_count = 0
-
-    def take_log(self) -> bytes:
-        """The logged frames as native 64-bit integers, LOG_FIELDS each, in order of their start; then clears.
-
-        Fields: time_ns (receivers' instant; of an error frame its end), identifier, flags, lo, hi, sending
-        node. An error frame has FLAG_ERROR, lo = field (FIELD_*) and hi = bit position of the error.
-        """
-        taken = bytes(memoryview(self.log)[: LOG_FIELDS * self.log_count])
-        self.log_count = 0
-        return taken
+            self.counters.late_results += 1

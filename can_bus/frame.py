@@ -12,38 +12,82 @@ The rules of both chains, CRC and stuffing, stand in `_feed`, bit by bit; tables
 
 import cython
 
-INTERMISSION_BITS = 3  # ISO 11898-1: recessive bits between two frames
-TAIL_BITS = 10  # CRC delimiter, ACK slot, ACK delimiter, 7 bits end of frame
-CRC_POLYNOMIAL = 0x4599  # x^15 + x^14 + x^10 + x^8 + x^7 + x^4 + x^3 + 1 (ISO 11898-1)
+# C constants when compiled: the same numbers stand in the .pxd, and a test holds them together.
+if not cython.compiled:
+    from ranger_sim.foundation.events import FLAG_EXTENDED, FLAG_REMOTE, FLAG_SINGLE_SHOT
 
-DOMINANT = 0
-RECESSIVE = 1
+    # The flags of a frame beside the FLAG_* of foundation.events.
+    LENGTH_CODE = 15  # bits 0-3
+    EIGHT_BYTES = 8  # the flags of a standard data frame of eight bytes, as the robot sends them
+    SENDABLE = 0x7F  # all that a request may have: length code, remote, single shot, extended
+    RECEIVERS_SEE = 0x5F  # of these, what is on the wire: no single shot
 
-# Where in a frame: codes of the error code capture register, LPC2194 CxICR bits 16-20 (as the SJA1000's).
-FIELD_ID_28_21 = 2
-FIELD_START = 3
-FIELD_SRTR = 4
-FIELD_IDE = 5
-FIELD_ID_20_18 = 6
-FIELD_ID_17_13 = 7
-FIELD_CRC = 8
-FIELD_R0 = 9
-FIELD_DATA = 10
-FIELD_DLC = 11
-FIELD_RTR = 12
-FIELD_R1 = 13
-FIELD_ID_4_0 = 14
-FIELD_ID_12_5 = 15
-FIELD_CRC_DELIMITER = 24
-FIELD_ACK_SLOT = 25
-FIELD_END = 26
-FIELD_ACK_DELIMITER = 27
+    INTERMISSION_BITS = 3  # ISO 11898-1: recessive bits between two frames
+    TAIL_BITS = 10  # CRC delimiter, ACK slot, ACK delimiter, 7 bits end of frame
+    ACK_SLOT_FROM_END = 9  # the ACK slot is the ninth bit from the end
+    STANDARD_BITS = 44  # a frame without data and without stuff bits
+    EXTENDED_BITS = 64
+    ARBITRATION_END = 17  # bits up to RTR and IDE, with the most stuff bits that they can have: 14 + 3
+    EXTENDED_ARBITRATION_END = 41  # the same up to the RTR of an extended frame: 33 + 8
 
+    CRC_POLYNOMIAL = 0x4599  # x^15 + x^14 + x^10 + x^8 + x^7 + x^4 + x^3 + 1 (ISO 11898-1)
+    CRC_BITS = 15
+    CRC_MASK = 0x7FFF
 
-# Both chains in one number, as `_feed` takes and returns it: bits 0-14 the CRC register; bits 15-17 the state of the
-# stuffing, level * 4 + run - 1 with run 1 ... 4 equal bits seen last; from bit 18 the stuff bits so far.
-# Before a frame: an empty register, and a recessive bit, so that the start of frame begins a run.
-IDLE = 1 << 17
+    # What `measure` gives: bits 0-15 the length, from bit 16 the CRC.
+    MEASURED_BITS = 0xFFFF
+    MEASURED_CRC_SHIFT = 16
+
+    DOMINANT = 0
+    RECESSIVE = 1
+
+    # Where in a frame: codes of the error code capture register, LPC2194 CxICR bits 16-20 (as the SJA1000's).
+    FIELD_ID_28_21 = 2
+    FIELD_START = 3
+    FIELD_SRTR = 4
+    FIELD_IDE = 5
+    FIELD_ID_20_18 = 6
+    FIELD_ID_17_13 = 7
+    FIELD_CRC = 8
+    FIELD_R0 = 9
+    FIELD_DATA = 10
+    FIELD_DLC = 11
+    FIELD_RTR = 12
+    FIELD_R1 = 13
+    FIELD_ID_4_0 = 14
+    FIELD_ID_12_5 = 15
+    FIELD_CRC_DELIMITER = 24
+    FIELD_ACK_SLOT = 25
+    FIELD_END = 26
+    FIELD_ACK_DELIMITER = 27
+
+    # Both chains in one number, as `_feed` takes and returns it: bits 0-14 the CRC register; bits 15-17 the state of
+    # the stuffing, level * 4 + run - 1 with run 1 ... 4 equal bits seen last; from bit 18 the stuff bits so far.
+    STATE_SHIFT = 15
+    STATE_MASK = 7
+    RUN_MASK = 3
+    LEVEL_SHIFT = 17
+    STUFFED_SHIFT = 18
+    IDLE = 0x20000  # before a frame: an empty register, and a recessive bit, so that the start of frame begins a run
+    STUFF_AFTER = 5  # ISO 11898-1: equal bits that are followed by their complement
+
+    # The frame of eight bytes, which goes through tables.
+    STANDARD_HEADER_BITS = 19  # start of frame ... data length code
+    DATA_BITS = 64
+    STATES = 8
+    BYTES = 256  # values of a byte
+    TABLE_BYTES = 2048  # eight places of BYTES
+    STANDARD_IDENTIFIERS = 2048
+    # an entry of BEGUN
+    BEGUN_CRC_SHIFT = 16
+    BEGUN_STUFFED_SHIFT = 8
+    BEGUN_STUFFED_MASK = 0xFF00
+    # an entry of STUFF: eight steps of eight bits; a step: bits 3-5 the next state, bits 6-7 stuff bits
+    STEP_STATE_SHIFT = 3
+    STEP_STATE_MASK = 56
+    STEP_STUFFED_SHIFT = 6
+    STEP_STUFFED_MASK = 192
+    STEP_PLACE_MASK = 63
 
 
 def _feed(chain: cython.longlong, value: cython.longlong, count: cython.longlong) -> cython.longlong:
@@ -51,32 +95,37 @@ def _feed(chain: cython.longlong, value: cython.longlong, count: cython.longlong
 
     The fifth equal bit is followed at once by its complement, which begins a run of its own.
     """
-    register: cython.longlong = chain & 0x7FFF
-    run: cython.longlong = (chain >> 15 & 3) + 1
-    level: cython.longlong = chain >> 17 & 1
-    stuffed: cython.longlong = chain >> 18
+    register: cython.longlong = chain & CRC_MASK
+    run: cython.longlong = (chain >> STATE_SHIFT & RUN_MASK) + 1
+    level: cython.longlong = chain >> LEVEL_SHIFT & 1
+    stuffed: cython.longlong = chain >> STUFFED_SHIFT
     position: cython.longlong
     bit: cython.longlong
     feedback: cython.longlong
     for position in range(count - 1, -1, -1):
         bit = value >> position & 1
-        feedback = bit ^ register >> 14
-        register = register << 1 & 0x7FFF
+        feedback = bit ^ register >> (CRC_BITS - 1)
+        register = register << 1 & CRC_MASK
         if feedback:
-            register ^= 0x4599  # CRC_POLYNOMIAL
+            register ^= CRC_POLYNOMIAL
         run = run + 1 if bit == level else 1
         level = bit
-        if run == 5:
+        if run == STUFF_AFTER:
             stuffed += 1
             level = 1 - bit
             run = 1
-    return stuffed << 18 | level << 17 | (run - 1) << 15 | register
+    return stuffed << STUFFED_SHIFT | level << LEVEL_SHIFT | (run - 1) << STATE_SHIFT | register
+
+
+def _state(chain: cython.longlong) -> cython.longlong:
+    """The state of the stuffing, 0 ... 7."""
+    return chain >> STATE_SHIFT & STATE_MASK
 
 
 def _header(identifier: cython.longlong, flags: cython.longlong) -> cython.longlong:
     """The bits from the start of frame to the data length code: 19, extended 39."""
-    low: cython.longlong = (flags & 16) << 2 | (flags & 15)
-    if flags & 64:  # FLAG_EXTENDED: SOF id28-18 SRR IDE id17-0 RTR r1 r0 DLC
+    low: cython.longlong = (flags & FLAG_REMOTE) << 2 | (flags & LENGTH_CODE)
+    if flags & FLAG_EXTENDED:  # SOF id28-18 SRR IDE id17-0 RTR r1 r0 DLC
         return ((identifier >> 18 & 0x7FF) << 20 | 0xC0000 | (identifier & 0x3FFFF)) << 7 | low
     return (identifier & 0x7FF) << 7 | low  # SOF id10-0 RTR IDE r0 DLC
 
@@ -87,18 +136,18 @@ def _measure_bitwise(
     """`measure` of any frame by the rules alone."""
     place: cython.longlong
     crc: cython.longlong
-    length: cython.longlong = flags & 15
-    bits: cython.longlong = 64 if flags & 64 else 44
-    chain: cython.longlong = _feed(131072, _header(identifier, flags), bits - 25)  # IDLE
+    length: cython.longlong = flags & LENGTH_CODE
+    bits: cython.longlong = EXTENDED_BITS if flags & FLAG_EXTENDED else STANDARD_BITS
+    chain: cython.longlong = _feed(IDLE, _header(identifier, flags), bits - CRC_BITS - TAIL_BITS)
     if length > 8:
         length = 8  # codes 9-15 also mean eight bytes (ISO 11898-1)
-    if flags & 16:  # FLAG_REMOTE
+    if flags & FLAG_REMOTE:
         length = 0
     for place in range(length):
         chain = _feed(chain, (lo if place < 4 else hi) >> 8 * (place & 3), 8)
-    crc = chain & 0x7FFF
-    chain = _feed(chain, crc, 15)
-    return crc << 16 | (bits + 8 * length + (chain >> 18))
+    crc = chain & CRC_MASK
+    chain = _feed(chain, crc, CRC_BITS)
+    return crc << MEASURED_CRC_SHIFT | (bits + 8 * length + (chain >> STUFFED_SHIFT))
 
 
 # A standard frame of eight bytes, which nearly every frame is, goes through tables, byte by byte. The CRC is linear:
@@ -112,7 +161,7 @@ def _measure_bitwise(
 # Interpreted, the states are lists: by byte what comes behind it, the last item is the number of stuff bits so far.
 # CRC_LISTS: by place, by byte. WALK: by stuff bits, by state. WALKS: by identifier, as `_begin`.
 if not cython.compiled:
-    CRC_OF_BYTE, STUFF, BEGUN = [0] * 2048, [0] * 256, [0] * 2048
+    CRC_OF_BYTE, STUFF, BEGUN = [0] * TABLE_BYTES, [0] * BYTES, [0] * STANDARD_IDENTIFIERS
 CRC_LISTS: list = []
 WALK: list = []
 WALKS: dict = {}
@@ -124,43 +173,45 @@ def _fill_tables() -> None:
     byte: cython.longlong
     state: cython.longlong
     identifier: cython.longlong
-    header: cython.longlong
+    crc: cython.longlong
+    stuffed: cython.longlong
     chain: cython.longlong
     steps: cython.ulonglong
     step: cython.ulonglong
-    for byte in range(256):
+    for byte in range(BYTES):
         for place in range(8):
-            CRC_OF_BYTE[place * 256 + byte] = _feed(_feed(0, byte, 8), 0, 56 - 8 * place) & 0x7FFF
+            CRC_OF_BYTE[place * BYTES + byte] = _feed(_feed(0, byte, 8), 0, 56 - 8 * place) & CRC_MASK
         steps = 0
-        for state in range(8):
-            chain = _feed(state << 15, byte, 8)
-            step = (chain >> 18) << 6 | (chain >> 15 & 7) << 3
+        for state in range(STATES):
+            chain = _feed(state << STATE_SHIFT, byte, 8)
+            step = (chain >> STUFFED_SHIFT) << STEP_STUFFED_SHIFT | _state(chain) << STEP_STATE_SHIFT
             steps |= step << (8 * state)
         STUFF[byte] = steps
-    for identifier in range(2048):
-        header = _header(identifier, 8)
-        chain = _feed(131072, header, 19)  # IDLE
-        BEGUN[identifier] = (_feed(chain, 0, 64) & 0x7FFF) << 16 | (chain >> 18) << 8 | (chain >> 15 & 7) << 3
+    for identifier in range(STANDARD_IDENTIFIERS):
+        chain = _feed(IDLE, _header(identifier, EIGHT_BYTES), STANDARD_HEADER_BITS)
+        crc = _feed(chain, 0, DATA_BITS) & CRC_MASK
+        stuffed = chain >> STUFFED_SHIFT
+        BEGUN[identifier] = crc << BEGUN_CRC_SHIFT | stuffed << BEGUN_STUFFED_SHIFT | _state(chain) << STEP_STATE_SHIFT
 
 
 def _fill_lists() -> None:
     """The lists of the interpreted `measure`."""
     for place in range(8):
-        CRC_LISTS.append([_feed(_feed(0, byte, 8), 0, 56 - 8 * place) & 0x7FFF for byte in range(256)])
-    steps = [[_feed(state << 15, byte, 8) for byte in range(256)] for state in range(8)]
-    most = worst_case_bits(8) - unstuffed_bits(8)
-    WALK.extend([[] for _ in range(8)] for _ in range(most + 1))
+        CRC_LISTS.append([_feed(_feed(0, byte, 8), 0, 56 - 8 * place) & CRC_MASK for byte in range(BYTES)])
+    steps = [[_feed(state << STATE_SHIFT, byte, 8) for byte in range(BYTES)] for state in range(STATES)]
+    most = worst_case_bits(EIGHT_BYTES) - unstuffed_bits(EIGHT_BYTES)
+    WALK.extend([[] for _ in range(STATES)] for _ in range(most + 1))
     for stuffed, states in enumerate(WALK):
         for state, branches in enumerate(states):
             for after in steps[state]:
-                branches.append(WALK[min(stuffed + (after >> 18), most)][after >> 15 & 7])
+                branches.append(WALK[min(stuffed + (after >> STUFFED_SHIFT), most)][_state(after)])
             branches.append(stuffed)
 
 
 def _begin(identifier):
     """CRC of the header of a standard frame of eight bytes with 64 bits 0 behind it, and where on the walk it ends."""
-    chain = _feed(IDLE, _header(identifier, 8), 19)
-    WALKS[identifier] = (_feed(chain, 0, 64) & 0x7FFF, WALK[chain >> 18][chain >> 15 & 7])
+    chain = _feed(IDLE, _header(identifier, EIGHT_BYTES), STANDARD_HEADER_BITS)
+    WALKS[identifier] = (_feed(chain, 0, DATA_BITS) & CRC_MASK, WALK[chain >> STUFFED_SHIFT][_state(chain)])
     return WALKS[identifier]
 
 
@@ -168,24 +219,26 @@ def _begin(identifier):
 @cython.wraparound(False)
 def _measure_by_bytes(identifier: cython.longlong, lo: cython.longlong, hi: cython.longlong) -> cython.longlong:
     """`measure` of a standard frame of eight bytes, compiled."""
-    crc: cython.longlong = BEGUN[identifier] >> 16
-    steps: cython.ulonglong = BEGUN[identifier] & 56  # its six low bits: where in the next map the next state stands
-    stuffed: cython.ulonglong = (BEGUN[identifier] & 0xFF00) >> 2  # times 64, as in the maps
+    crc: cython.longlong = BEGUN[identifier] >> BEGUN_CRC_SHIFT
+    # the six low bits of `steps`: where in the next map the next state stands
+    steps: cython.ulonglong = BEGUN[identifier] & STEP_STATE_MASK
+    # times 64, as in the maps
+    stuffed: cython.ulonglong = (BEGUN[identifier] & BEGUN_STUFFED_MASK) >> (BEGUN_STUFFED_SHIFT - STEP_STUFFED_SHIFT)
     data: cython.ulonglong = hi << 32 | lo
     byte: cython.ulonglong
     place: cython.longlong
-    for place in range(0, 2048, 256):
+    for place in range(0, TABLE_BYTES, BYTES):
         byte = data & 0xFF
         data >>= 8
         crc ^= CRC_OF_BYTE[place + byte]
-        steps = STUFF[byte] >> (steps & 63)
-        stuffed += steps & 192
-    steps = STUFF[crc >> 7] >> (steps & 63)
-    stuffed += steps & 192
+        steps = STUFF[byte] >> (steps & STEP_PLACE_MASK)
+        stuffed += steps & STEP_STUFFED_MASK
+    steps = STUFF[crc >> 7] >> (steps & STEP_PLACE_MASK)
+    stuffed += steps & STEP_STUFFED_MASK
     # the last byte is filled up with the complement of the last bit, which never adds a stuff bit
-    steps = STUFF[(crc << 1 & 0xFE) | (crc & 1 ^ 1)] >> (steps & 63)
-    stuffed += steps & 192
-    return crc << 16 | (108 + (stuffed >> 6))
+    steps = STUFF[(crc << 1 & 0xFE) | (crc & 1 ^ 1)] >> (steps & STEP_PLACE_MASK)
+    stuffed += steps & STEP_STUFFED_MASK
+    return crc << MEASURED_CRC_SHIFT | (STANDARD_BITS + DATA_BITS + (stuffed >> STEP_STUFFED_SHIFT))
 
 
 def measure(
@@ -195,7 +248,7 @@ def measure(
 
     Bits: from start of frame to the end of EOF, stuff bits included, intermission not.
     """
-    if identifier >> 11 or flags & ~32 != 8:  # FLAG_SINGLE_SHOT does not show on the wire
+    if identifier >> 11 or flags & ~FLAG_SINGLE_SHOT != EIGHT_BYTES:  # single shot does not show on the wire
         return _measure_bitwise(identifier, flags, lo, hi)
     if cython.compiled:
         return _measure_by_bytes(identifier, lo, hi)
@@ -206,21 +259,21 @@ def measure(
         crc ^= t[a] ^ u[b] ^ v[c] ^ w[d] ^ x[e] ^ y[f] ^ z[g] ^ s[h]
         # the last byte is filled up with the complement of the last bit, which never adds a stuff bit
         stuffed = walk[a][b][c][d][e][f][g][h][crc >> 7][(crc << 1 & 0xFE) | (crc & 1 ^ 1)][-1]
-        return crc << 16 | (108 + stuffed)
+        return crc << MEASURED_CRC_SHIFT | (STANDARD_BITS + DATA_BITS + stuffed)
 
 
 def crc15(
     identifier: cython.longlong, flags: cython.longlong, lo: cython.longlong, hi: cython.longlong
 ) -> cython.longlong:
     """CRC-15 over start of frame ... data, 0 ... 0x7FFF (ISO 11898-1)."""
-    return measure(identifier, flags, lo, hi) >> 16
+    return measure(identifier, flags, lo, hi) >> MEASURED_CRC_SHIFT
 
 
 def stuff_bits(
     identifier: cython.longlong, flags: cython.longlong, lo: cython.longlong, hi: cython.longlong
 ) -> cython.longlong:
     """Number of stuff bits of this very content (one after every five equal bits, CRC included)."""
-    return (measure(identifier, flags, lo, hi) & 0xFFFF) - unstuffed_bits(flags)
+    return (measure(identifier, flags, lo, hi) & MEASURED_BITS) - unstuffed_bits(flags)
 
 
 def frame_bits(
@@ -230,7 +283,7 @@ def frame_bits(
 
     44 + 8 per byte (extended 64) without stuffing, so 108 for the robot's frames (robot.md N1.2).
     """
-    return measure(identifier, flags, lo, hi) & 0xFFFF
+    return measure(identifier, flags, lo, hi) & MEASURED_BITS
 
 
 def arbitration_key(identifier: cython.longlong, flags: cython.longlong) -> cython.longlong:
@@ -240,19 +293,24 @@ def arbitration_key(identifier: cython.longlong, flags: cython.longlong) -> cyth
     beats an extended one with the same first 11 bits, and data beats remote (ISO 11898-1).
     """
     remote: cython.longlong = flags >> 4 & 1
-    if flags & 64:  # FLAG_EXTENDED
+    if flags & FLAG_EXTENDED:
         return (identifier >> 18 & 0x7FF) << 21 | 0x180000 | (identifier & 0x3FFFF) << 1 | remote
     return (identifier & 0x7FF) << 21 | remote << 20
 
 
 def data_length(flags: int) -> int:
     """Data bytes that a frame with these flags carries, 0 ... 8."""
-    return 0 if flags & 16 else min(flags & 15, 8)
+    return 0 if flags & FLAG_REMOTE else min(flags & LENGTH_CODE, 8)
 
 
 def unstuffed_bits(flags: int) -> int:
     """Length without any stuff bit and without intermission: 108 for 8 bytes, standard."""
-    return (64 if flags & 64 else 44) + 8 * data_length(flags)
+    return (EXTENDED_BITS if flags & FLAG_EXTENDED else STANDARD_BITS) + 8 * data_length(flags)
+
+
+def arbitration_end(flags: int) -> int:
+    """Bits of a frame up to the end of its arbitration field, with the most stuff bits that it can have."""
+    return EXTENDED_ARBITRATION_END if flags & FLAG_EXTENDED else ARBITRATION_END
 
 
 def worst_case_bits(flags: int) -> int:
@@ -273,7 +331,7 @@ def wire(identifier: int, flags: int, lo: int, hi: int) -> tuple[list[int], list
     """
     parts: list[tuple[int, int, int]] = [(FIELD_START, 1, 0)]  # field, number of bits, value
     remote = flags >> 4 & 1
-    if flags & 64:
+    if flags & FLAG_EXTENDED:
         parts += [
             (FIELD_ID_28_21, 8, identifier >> 21),
             (FIELD_ID_20_18, 3, identifier >> 18),
@@ -295,7 +353,7 @@ def wire(identifier: int, flags: int, lo: int, hi: int) -> tuple[list[int], list
     parts += [(FIELD_R0, 1, 0), (FIELD_DLC, 4, flags)]
     for index in range(data_length(flags)):
         parts.append((FIELD_DATA, 8, (lo if index < 4 else hi) >> 8 * (index & 3)))
-    parts.append((FIELD_CRC, 15, crc15(identifier, flags, lo, hi)))
+    parts.append((FIELD_CRC, CRC_BITS, crc15(identifier, flags, lo, hi)))
     bits: list[int] = []
     fields: list[int] = []
     run = 0
@@ -305,7 +363,7 @@ def wire(identifier: int, flags: int, lo: int, hi: int) -> tuple[list[int], list
             run = run + 1 if bits and bits[-1] == bit else 1
             bits.append(bit)
             fields.append(field)
-            if run == 5:
+            if run == STUFF_AFTER:
                 bits.append(1 - bit)
                 fields.append(field)
                 run = 1

@@ -83,7 +83,7 @@ class Ranger:
         self.recorder = Recorder(len(names), len(self.plant.sample_names), all_variables.TABLE_SIZE)
         self.buses: list[Any] = [Bus(name, rates.get(name, BUS_BIT_RATE), seed, log_capacity=0) for name in names]
         for bus, stream in zip(self.buses, self.recorder.frames, strict=True):
-            bus.trace = stream
+            bus.log.stream = stream
             bus.reset_statistics(self.start_ns)  # loads count from the start of the run
         self.logbook = Logbook(self.recorder, log)
         self.loop: Any = lockstep.Lockstep(

@@ -51,8 +51,8 @@ class Recorded:
         self.footholds = robot.plant.recent_footholds()
 
     def _load(self, bus: Any) -> Any:
-        windows = np.array(bus.load_windows())
-        last = bus.window_count * 0.01
+        windows = np.array(bus.load.windows())
+        last = bus.load.count * 0.01
         return last - 0.01 * np.arange(len(windows), 0, -1) + 0.005, windows
 
     @staticmethod

@@ -113,7 +113,7 @@ def can(robot: Any, bus: Any) -> dict:
     queue_full: frames that a full transmit ring of a board or of the router did not accept.
     """
     now = robot.loop.time
-    lost, queue_full, skipped = bus.lost, 0, bus.single_shot_skipped
+    lost, queue_full, skipped = bus.counters.lost, 0, bus.counters.single_shot_skipped
     for wire in wiring.CAN:
         if f"can{wire.bus}" != bus.name:
             continue
@@ -127,13 +127,13 @@ def can(robot: Any, bus: Any) -> dict:
             lost += board.can.controller.data_overruns + board.can.receive_lost
             queue_full += board.can.send_lost
     return {
-        "frames": bus.frames,
+        "frames": bus.counters.frames,
         "load_mean": bus.load_mean(now),
-        "load_max": bus.load_max(),
+        "load_max": bus.load.largest(),
         "lost": lost,
         "queue_full": queue_full,
         "single_shot_skipped": skipped,
-        "errors": bus.errors,
+        "errors": bus.counters.errors,
     }
 
 

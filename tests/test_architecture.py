@@ -229,7 +229,7 @@ def test_a_compiled_declaration_agrees_with_its_source(declaration):
 def test_numbers_in_compiled_fields_have_64_bits(declaration):
     """Narrower ones wrap and round, and only when compiled. Bytes seen through a view are bytes in both modes."""
     text = re.sub(r"#.*", "", (ROOT / declaration).read_text(encoding="utf-8"))
-    fields = re.findall(r"^\s+cdef (?:public |readonly )?([^(\n]+)$", text, re.MULTILINE)
+    fields = re.findall(r"^ +cdef (?:public |readonly )?([^(\n]+)$", text, re.MULTILINE)
     narrow = r"(?:(?:un)?signed )?(?:short|int|char|long(?! long)|float|Py_UCS4)\b"
     found = [field for field in fields if re.match(narrow, field) and not field.startswith("unsigned char[::1] ")]
     assert not found, f"{declaration}: {found}"

@@ -99,7 +99,7 @@ def run(options: argparse.Namespace) -> int:
     finally:
         host.close()
     for bus in buses:
-        figures = bus.bus
+        figures = bus.bus.counters
         print(f"{bus.channel}: {figures.frames} frames, {figures.errors} error frames", flush=True)
     for server in servers:
         counted = {name: value for name, value in server.counters().items() if value and name != "clients"}

@@ -12,11 +12,11 @@ import socket
 from contextlib import suppress
 from typing import Any
 
-from ranger_sim.can_bus.bus import OPERATING
 from ranger_sim.can_bus.edge import attach_records as wire
 from ranger_sim.can_bus.edge.attach import AttachServer
 from ranger_sim.can_bus.edge.slcan import SlcanServer
 from ranger_sim.can_bus.edge.socketcand import SocketcandServer
+from ranger_sim.can_bus.node import OPERATING
 from ranger_sim.foundation import wallclock
 from ranger_sim.foundation.events import FLAG_EXTENDED, FLAG_REMOTE
 from ranger_sim.foundation.random_stream import RandomStream

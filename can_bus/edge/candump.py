@@ -11,7 +11,6 @@ import pathlib
 from collections.abc import Iterable, Iterator
 from typing import Any, TextIO
 
-from ranger_sim.can_bus.bus import LOG_FIELDS
 from ranger_sim.can_bus.edge.messages import data_of_words, words_of_data
 from ranger_sim.foundation.events import FLAG_ERROR, FLAG_EXTENDED, FLAG_REMOTE
 from ranger_sim.foundation.user_error import UserError
@@ -65,16 +64,6 @@ class CandumpWriter:
         lines = [line_of_frame(interface, *frame) for frame in frames]
         self.file.writelines(lines)
         self.frames += len(lines)
-
-    def write_log(self, interface: str, log: bytes) -> None:
-        """Append what `Bus.take_log()` returned."""
-        self.write(interface, frames_of_log(log))
-
-
-def frames_of_log(log: bytes) -> list[Frame]:
-    """The frames in what `Bus.take_log()` returned, without their senders."""
-    v: list[int] = memoryview(log).cast("q").tolist()
-    return [(v[i], v[i + 1], v[i + 2], v[i + 3], v[i + 4]) for i in range(0, len(v), LOG_FIELDS)]
 
 
 def read_candump(path: str | pathlib.Path) -> Iterator[tuple[str, int, int, int, int, int]]:

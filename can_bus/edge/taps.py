@@ -7,7 +7,9 @@ import functools
 from collections import deque
 from typing import Any
 
-from ranger_sim.can_bus.bus import (
+from ranger_sim.can_bus.bus import Bus
+from ranger_sim.can_bus.frame import FIELD_ACK_SLOT, arbitration_key
+from ranger_sim.can_bus.node import (
     BUS_OFF,
     ICR_BUS_ERROR,
     ICR_ERROR_PASSIVE,
@@ -23,9 +25,7 @@ from ranger_sim.can_bus.bus import (
     PASSIVE_LIMIT,
     RESET,
     WARNING_LIMIT,
-    Bus,
 )
-from ranger_sim.can_bus.frame import FIELD_ACK_SLOT, arbitration_key
 from ranger_sim.foundation.events import (
     CAN_RX,
     CAN_STATUS,
@@ -124,11 +124,7 @@ class Tap:
 
     def refresh(self, name: str) -> None:
         """As new: nothing queued, error counters zero."""
-        controller = self.controller
-        controller.name = name
-        controller.transmit_errors = controller.receive_errors = 0
-        controller.passive = controller.warning = False
-        controller.suspend_bit = 0
+        self.controller.renew(name)
         self.inbox.clear()
         self.name = name
         self.waiting: deque[tuple[int, int, int, int]] = deque()
@@ -307,7 +303,7 @@ class Tap:
         if self.silent:
             self._unmute()
         if self.controller.mode == BUS_OFF:
-            self.controller.mode = RESET  # unplugged: the next client is a fresh controller
+            self.controller.unplug()  # the next client is a fresh controller
         else:
             self.bus.set_mode(self.node, RESET, now)
 

@@ -31,11 +31,5 @@ def move_bus(robot: Any, external: Any, openers: dict, boards: tuple) -> None:
             order,
             openers.get(wire.board),
         )
-    bus = robot.buses[number]
-
-    def note(time_ns: int, identifier: int, flags: int, lo: int, hi: int) -> None:
-        bus.trace.add(time_ns, identifier, flags, lo, hi)
-        bus.frames += 1
-
-    external.sinks.append(note)
+    external.sinks.append(robot.buses[number].note_outside)
     robot.attach(external)

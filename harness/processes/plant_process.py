@@ -213,8 +213,8 @@ class PlantRun:
             if bus.name in outside:
                 found[bus.name] = {"load": outside[bus.name].window_load, "errors": outside[bus.name].errors}
             else:
-                load = bus.load_windows()[-1] if bus.window_count else 0.0
-                found[bus.name] = {"load": load, "errors": bus.errors}
+                load = bus.load.windows()[-1] if bus.load.count else 0.0
+                found[bus.name] = {"load": load, "errors": bus.counters.errors}
         return found
 
     # --- boards that are gone -----------------------------------------------------------------------------

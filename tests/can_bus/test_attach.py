@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ranger_sim.can_bus.bus import RESET, Bus
+from ranger_sim.can_bus.bus import Bus
 from ranger_sim.can_bus.edge import attach_records as wire
 from ranger_sim.can_bus.edge import host as host_module
 from ranger_sim.can_bus.edge import links
@@ -17,6 +17,7 @@ from ranger_sim.can_bus.edge.attach import BACKLOG_LIMIT, CLIENT_LIMIT, AttachSe
 from ranger_sim.can_bus.edge.host import BusHost
 from ranger_sim.can_bus.edge.paced import PacedBus
 from ranger_sim.can_bus.edge.taps import RECEIVED, TRANSMIT_QUEUE
+from ranger_sim.can_bus.node import RESET
 from ranger_sim.foundation.events import FLAG_ERROR, FLAG_EXTENDED, FLAG_REMOTE, FLAG_SINGLE_SHOT, STAGE_BUS, EventQueue
 from ranger_sim.foundation.random_stream import RandomStream
 from ranger_sim.foundation.user_error import UserError
@@ -160,7 +161,7 @@ def test_a_sender_that_nobody_acknowledges_hears_of_it_until_nothing_changes_any
     owner.run(2)
     client.send(wire.send_record(0x55, 0, 0, 0))
     owner.run(1000)
-    assert owner.buses["can1"].errors > 100
+    assert owner.buses["can1"].counters.errors > 100
     errors = frames_of(said(client))
     assert len(errors) == 16 and all(frame[2] & FLAG_ERROR for frame in errors)
 
@@ -204,8 +205,7 @@ def test_a_board_sends_the_same_frames_at_the_same_times_whether_somebody_listen
         for number in range(50):
             owner.buses["can1"].request(number % 2 * other, 1, owner.time, 0x100 + number, 8, number, 0)
             owner.run(5)
-        values = memoryview(owner.buses["can1"].take_log()).cast("q").tolist()
-        logs.append([values[i : i + 5] for i in range(0, len(values), 6)])
+        logs.append([frame[:5] for frame in owner.buses["can1"].log.take()])
         owner.close()
     assert len(logs[0]) == 50 and logs[0] == logs[1]
 

@@ -2,18 +2,18 @@
 
 import pytest
 
-from ranger_sim.can_bus import bus as can_bus_module
-from ranger_sim.can_bus.bus import BUS_OFF, JOINING, OPERATING, RESET
+from ranger_sim.can_bus import node as can_node
 from ranger_sim.can_bus.frame import FIELD_ACK_SLOT, FIELD_CRC_DELIMITER, frame_bits
+from ranger_sim.can_bus.node import BUS_OFF, JOINING, OPERATING, RESET
 from ranger_sim.foundation.events import FLAG_ERROR, FLAG_SINGLE_SHOT, TX_ABORTED, TX_LOST, TX_SENT
 
 from .wiring import Wired, edge
 
 SECOND = 10**9
-EI = can_bus_module.ICR_ERROR_WARNING
-EPI = can_bus_module.ICR_ERROR_PASSIVE
-BEI = can_bus_module.ICR_BUS_ERROR
-RECEIVING = can_bus_module.ICR_RECEIVING
+EI = can_node.ICR_ERROR_WARNING
+EPI = can_node.ICR_ERROR_PASSIVE
+BEI = can_node.ICR_BUS_ERROR
+RECEIVING = can_node.ICR_RECEIVING
 
 
 def test_a_corrupted_frame_is_repeated_and_received_once():
@@ -22,7 +22,8 @@ def test_a_corrupted_frame_is_repeated_and_received_once():
     wired.send(0, 0x10, lo=7)
     wired.bus.advance(SECOND)
     assert [frame[1:4] for frame in wired.of(1, "rx")] == [(0x10, 8, 7)]
-    assert (wired.bus.errors, wired.bus.retries, wired.bus.frames, wired.bus.lost) == (1, 1, 1, 0)
+    counters = wired.bus.counters
+    assert (counters.errors, counters.retries, counters.frames, counters.lost) == (1, 1, 1, 0)
     assert [status for *_, status in wired.of(0, "done")] == [TX_SENT]
 
 
@@ -47,7 +48,7 @@ def test_the_length_of_an_error_frame_depends_on_what_receivers_have_seen():
         wired.bus.inject_errors(1, position)
         wired.send(0, identifier, lo=lo, hi=hi)
         wired.bus.advance(SECOND)
-        return wired.bus.bits - frame_bits(identifier, 8, lo, hi) - 3
+        return wired.bus.load.bits - frame_bits(identifier, 8, lo, hi) - 3
 
     # data begins behind 0 10101010101 0 0 0 1000 0...: bits 19 ... hold AA AA AA, alternating
     alternating = {"lo": 0xAAAAAAAA, "hi": 0xAAAAAAAA}
@@ -91,7 +92,7 @@ def test_an_error_at_an_instant_hits_the_frame_that_is_on_the_bus_then():
     wired.bus.advance(SECOND)
     wired.send(0, 0x11, time=SECOND)
     wired.bus.advance(2 * SECOND)
-    assert wired.bus.errors == 1 and wired.bus.frames == 2
+    assert wired.bus.counters.errors == 1 and wired.bus.counters.frames == 2
     assert wired.log()[0][4] == 20_000 * 3 // 1000 - 1  # bit position from the start at bit 1
     with pytest.raises(ValueError, match="decided already"):
         wired.bus.inject_error_at(SECOND)
@@ -103,7 +104,8 @@ def test_a_single_shot_that_meets_an_error_is_not_repeated():
     wired.send(0, 0x10, flags=8 | FLAG_SINGLE_SHOT)
     wired.bus.advance(SECOND)
     assert [status for *_, status in wired.of(0, "done")] == [TX_LOST]
-    assert (wired.bus.frames, wired.bus.single_shot_skipped, wired.bus.retries) == (0, 1, 0)
+    counters = wired.bus.counters
+    assert (counters.frames, counters.single_shot_skipped, counters.retries) == (0, 1, 0)
 
 
 def test_an_abort_during_a_failing_attempt_prevents_its_repetition():
@@ -115,8 +117,8 @@ def test_an_abort_during_a_failing_attempt_prevents_its_repetition():
     wired.bus.advance(SECOND)
     ((time, buffer, status),) = wired.of(0, "done")
     assert (buffer, status) == (1, TX_ABORTED)
-    assert time == edge(wired.bus.bits + 1)  # when the bus is free again
-    assert wired.bus.frames == 0
+    assert time == edge(wired.bus.load.bits + 1)  # when the bus is free again
+    assert wired.bus.counters.frames == 0
 
 
 # ---- acknowledgement -------------------------------------------------------------------------------------
@@ -128,7 +130,7 @@ def test_alone_on_the_bus_a_sender_becomes_passive_but_never_goes_bus_off():
     wired.bus.advance(SECOND // 10)
     node = wired.bus.nodes[0]
     assert (node.transmit_errors, node.passive, node.mode) == (128, True, OPERATING)
-    assert wired.bus.frames == 0 and wired.bus.errors > 1000 and wired.bus.pending_count == 1
+    assert wired.bus.counters.frames == 0 and wired.bus.counters.errors > 1000 and wired.bus.buffers.waiting_count == 1
     told = wired.of(0, "status")
     assert [status[2] for status in told[:16]] == [8 * n for n in range(1, 17)]
     assert told[11][1] & EI and told[15][1] & EPI  # 96, 128
@@ -140,10 +142,10 @@ def test_a_node_that_joins_ends_the_endless_repetition():
     wired.bus.set_mode(1, RESET, 0)
     wired.send(0, 0x10, time=10)
     wired.bus.advance(10_000_000)
-    assert wired.bus.frames == 0
+    assert wired.bus.counters.frames == 0
     wired.bus.set_mode(1, OPERATING, 10_000_000)
     wired.bus.advance(20_000_000)
-    assert wired.bus.frames == 1
+    assert wired.bus.counters.frames == 1
     assert len(wired.of(1, "rx")) == 1
     assert wired.bus.nodes[0].transmit_errors == 127
     assert not wired.bus.nodes[0].passive
@@ -162,7 +164,7 @@ def test_32_errors_in_a_row_make_a_sender_bus_off_and_its_frames_lost():
     wired = Wired(2)
     wired.send(0, 0x20, buffer=2)
     frames_until_bus_off(wired)
-    assert wired.bus.errors == 32  # 32 * 8 = 256
+    assert wired.bus.counters.errors == 32  # 32 * 8 = 256
     assert wired.bus.nodes[0].mode == BUS_OFF
     messages = wired.messages(0)
     told = [message[1:] for message in messages if message[0] == "status"]
@@ -171,10 +173,10 @@ def test_32_errors_in_a_row_make_a_sender_bus_off_and_its_frames_lost():
     assert told[11][1] & EI and told[15][1] & EPI and told[31][1] & EI
     assert told[31][2] == 127  # the register of the LPC2194 once it is off
     assert sorted(done) == [(done[0][0], 1, TX_ABORTED), (done[0][0], 2, TX_ABORTED)]
-    assert wired.bus.lost == wired.bus.flushed == wired.bus.nodes[0].flushed == 2
+    assert wired.bus.counters.lost == wired.bus.counters.flushed == wired.bus.nodes[0].flushed == 2
     # the receiver counted each error once and is well below its limits
     assert wired.bus.nodes[1].receive_errors == 32
-    assert wired.bus.accepted == wired.bus.frames + wired.bus.flushed
+    assert wired.bus.accepted == wired.bus.counters.frames + wired.bus.counters.flushed
 
 
 def test_a_node_off_the_bus_neither_sends_nor_receives_nor_acknowledges():
@@ -187,7 +189,7 @@ def test_a_node_off_the_bus_neither_sends_nor_receives_nor_acknowledges():
     wired.send(1, 0x12, time=SECOND)
     wired.bus.advance(SECOND + SECOND // 100)
     assert wired.messages(0) == []
-    assert wired.bus.frames == 0  # nobody acknowledged
+    assert wired.bus.counters.frames == 0  # nobody acknowledged
 
 
 def test_bus_off_ends_128_times_11_recessive_bits_after_the_request_on_a_quiet_bus():
@@ -215,7 +217,7 @@ def test_on_a_busy_bus_each_gap_between_frames_counts_once_for_the_recovery():
     asked = 2 * SECOND
     time = asked
     wired.bus.set_mode(0, OPERATING, asked)
-    before = wired.bus.frames
+    before = wired.bus.counters.frames
     while wired.bus.nodes[0].mode != OPERATING:
         for buffer in (1, 2, 3):  # node 1 fills the bus
             wired.send(1, 0x100 + buffer, time=time, buffer=buffer)
@@ -223,7 +225,7 @@ def test_on_a_busy_bus_each_gap_between_frames_counts_once_for_the_recovery():
         wired.bus.advance(time)
         assert time < 3 * SECOND
     # ACK delimiter, EOF and intermission are 11 recessive bits; the first gap may give more or less
-    assert 126 <= wired.bus.frames - before <= 129
+    assert 126 <= wired.bus.counters.frames - before <= 129
 
 
 def test_a_passive_sender_lets_others_go_first_for_eight_bits():
@@ -263,7 +265,7 @@ def test_reset_drops_what_waits_and_one_quiet_sequence_brings_back():
     wired.bus.set_mode(0, RESET, 2000)
     wired.bus.advance(100_000)
     assert sorted(status for *_, status in wired.of(0, "done")) == [TX_SENT, TX_ABORTED]
-    assert wired.bus.aborted == 1
+    assert wired.bus.counters.aborted == 1
     wired.bus.set_mode(0, OPERATING, 200_000)
     wired.send(0, 0x12, time=200_000)
     wired.bus.advance(200_000)
@@ -277,9 +279,9 @@ def test_two_nodes_with_one_identifier_and_different_data_destroy_each_other_unt
     wired.send(0, 9, lo=4)
     wired.send(1, 9, lo=5)
     wired.bus.advance(SECOND)
-    assert wired.bus.frames == 0
+    assert wired.bus.counters.frames == 0
     assert [node.mode for node in wired.bus.nodes] == [BUS_OFF, BUS_OFF, OPERATING]
-    assert wired.bus.lost == 2
+    assert wired.bus.counters.lost == 2
     assert wired.of(2, "rx") == []
 
 
@@ -299,21 +301,21 @@ def noisy(seed, rate=1e-4):
 def test_noise_is_seeded_has_the_asked_rate_and_loses_nothing():
     wired = noisy(1)
     # each frame of about 115 bits, less its 18 first ones that move errors behind them, is hit with p = 1.1 %
-    assert 10 <= wired.bus.errors <= 40  # mean 23, standard deviation 4.8
-    assert wired.bus.errors == wired.bus.retries
-    assert wired.bus.frames == wired.bus.accepted == 2000 and wired.bus.lost == 0
+    assert 10 <= wired.bus.counters.errors <= 40  # mean 23, standard deviation 4.8
+    assert wired.bus.counters.errors == wired.bus.counters.retries
+    assert wired.bus.counters.frames == wired.bus.accepted == 2000 and wired.bus.counters.lost == 0
     assert [frame[3] for frame in wired.of(2, "rx")] == list(range(2000))
-    assert noisy(1).bus.take_log() == wired.bus.take_log()
-    assert noisy(2).bus.take_log() != noisy(1).bus.take_log()
+    assert noisy(1).bus.log.take() == wired.bus.log.take()
+    assert noisy(2).bus.log.take() != noisy(1).bus.log.take()
 
 
 def test_noise_can_be_switched_off_and_its_rate_is_checked():
     wired = noisy(1)
-    errors = wired.bus.errors
+    errors = wired.bus.counters.errors
     wired.bus.set_bit_error_rate(0.0)
     for frame in range(500):
         wired.send(0, 1, time=SECOND + frame * 100_000)
         wired.bus.advance(SECOND + frame * 100_000 + 90_000)
-    assert wired.bus.errors == errors
+    assert wired.bus.counters.errors == errors
     with pytest.raises(ValueError, match="0.2 is outside"):
         wired.bus.set_bit_error_rate(0.2)

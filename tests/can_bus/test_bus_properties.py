@@ -13,14 +13,19 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
 
 from ranger_sim.can_bus import benchmark
-from ranger_sim.can_bus.bus import BUS_OFF
 from ranger_sim.can_bus.frame import arbitration_key, frame_bits
+from ranger_sim.can_bus.node import BUS_OFF
 from ranger_sim.foundation.events import FLAG_ERROR, FLAG_EXTENDED, FLAG_SINGLE_SHOT, TX_ABORTED, TX_LOST, TX_SENT
 
 from .wiring import RATE, Wired
 
 SECOND = 10**9
 ROOT = pathlib.Path(__file__).parents[2]
+COUNTED = (
+    "frames", "merged", "lost", "single_shot_skipped", "single_shot_dropped", "retries", "errors", "refused",
+    "arbitrations_lost", "aborted", "flushed", "late_results", "late_requests", "frames_by_identifier",
+    "response_max_ns",
+)  # fmt: skip
 
 
 class BusMachine(RuleBasedStateMachine):
@@ -146,11 +151,12 @@ class BusMachine(RuleBasedStateMachine):
 
     @invariant()
     def every_frame_accounted_for(self):
-        bus = self.wired.bus
+        bus, counters = self.wired.bus, self.wired.bus.counters
         if bus.nodes[0].mode == BUS_OFF or bus.accepted == 0:
             return
         dropped = sum(1 for status in self.finished.values() if status == TX_LOST)
-        assert bus.accepted == bus.frames + bus.aborted + bus.flushed + dropped + bus.pending_count
+        over = counters.frames + counters.aborted + counters.flushed + dropped
+        assert bus.accepted == over + bus.buffers.waiting_count
 
     def teardown(self):
         if not hasattr(self, "wired"):
@@ -170,7 +176,7 @@ class BusMachine(RuleBasedStateMachine):
                 by_identifier.setdefault(self.accepted[number]["key"], []).append(number)
             for numbers in by_identifier.values():
                 assert numbers == sorted(numbers)  # nothing reordered within an identifier
-        assert self.wired.bus.lost == 0
+        assert self.wired.bus.counters.lost == 0
 
 
 BusMachine.TestCase.settings = settings(max_examples=60, stateful_step_count=40, deadline=None)
@@ -216,7 +222,7 @@ def test_results_do_not_depend_on_how_time_is_cut(requests, cuts, noise, errors)
             time = until
         assert waiting == []
         wired.bus.advance(SECOND // 10)
-        return [wired.messages(n) for n in range(4)], wired.bus.take_log(), wired.bus.bits
+        return [wired.messages(n) for n in range(4)], wired.bus.log.take(), wired.bus.load.bits
 
     assert run([25_000]) == run(cuts)
 
@@ -225,12 +231,12 @@ def test_late_results_are_counted_when_steps_are_longer_than_frames():
     wired = Wired(2)
     wired.send(0, 1)
     wired.bus.advance(1_000_000)
-    assert wired.bus.late_results > 0
+    assert wired.bus.counters.late_results > 0
     wired = Wired(2)
     wired.send(0, 1)
     for step in range(10):
         wired.bus.advance(step * 25_000)
-    assert wired.bus.late_results == 0 and wired.bus.frames == 1
+    assert wired.bus.counters.late_results == 0 and wired.bus.counters.frames == 1
 
 
 def test_a_request_from_the_past_takes_part_from_now_on_and_is_counted():
@@ -238,7 +244,7 @@ def test_a_request_from_the_past_takes_part_from_now_on_and_is_counted():
     wired.bus.advance(1_000_000)
     wired.send(0, 1, time=400_000)
     wired.bus.advance(2_000_000)
-    assert wired.bus.late_requests == 1
+    assert wired.bus.counters.late_requests == 1
     assert wired.of(1, "rx")[0][0] > 1_000_000
 
 
@@ -280,9 +286,10 @@ def digest_of_a_busy_second() -> str:
             wired.bus.set_mode(node, 0, time)
     for n in range(4):
         digest.update(json.dumps(wired.messages(n)).encode())
-    digest.update(wired.bus.take_log())
-    digest.update(json.dumps(wired.bus.statistics(time)).encode())
-    assert wired.bus.errors > 10 and wired.bus.frames > 800 and wired.bus.single_shot_skipped > 10
+    counters = wired.bus.counters
+    digest.update(json.dumps([wired.log(), wired.bus.load_mean(time), wired.bus.load.largest()]).encode())
+    digest.update(json.dumps([getattr(counters, name) for name in COUNTED]).encode())
+    assert counters.errors > 10 and counters.frames > 800 and counters.single_shot_skipped > 10
     return digest.hexdigest()
 
 

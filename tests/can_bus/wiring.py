@@ -39,8 +39,7 @@ class Wired:
 
     def log(self):
         """Logged frames as tuples (time, identifier, flags, lo, hi, node)."""
-        raw = memoryview(self.bus.take_log()).cast("q").tolist()
-        return [tuple(raw[i : i + 6]) for i in range(0, len(raw), 6)]
+        return self.bus.log.take()
 
 
 def edge(bit, bitrate=RATE):

@@ -204,7 +204,7 @@ def test_no_frame_of_the_robot_waits_longer_than_its_bound(walked):
     for number, bus in enumerate(BUSES):
         for stream, bound in zip(found[bus].streams, found[bus].bounds, strict=True):
             for name in stream.variables:
-                longest = robot.buses[number].response_max_ns[all_variables.ID_OF[name]]
+                longest = robot.buses[number].counters.response_max_ns[all_variables.ID_OF[name]]
                 assert longest <= bound.response_ns - bound.message.jitter_ns, f"{bus} {name}"
 
 

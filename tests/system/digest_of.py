@@ -42,7 +42,7 @@ def outcome(case: Case) -> str:
         Ranger(scenario, quirks=quirks, profile=profile.load(case.profile) if case.profile else None)
     ) as robot:
         robot.run_for(case.seconds)
-        frames = sum(bus.frames for bus in robot.buses)
+        frames = sum(bus.counters.frames for bus in robot.buses)
         return f"{robot.trace_digest()} {robot.steps} steps {frames} frames {robot.ended or 'on its feet'}"
 
 

@@ -7,12 +7,12 @@ import socket
 import can
 import pytest
 
-from ranger_sim.can_bus.bus import OPERATING
 from ranger_sim.can_bus.edge import attach_records as wire
 from ranger_sim.can_bus.edge.attach import AttachServer
 from ranger_sim.can_bus.edge.candump import read_candump
 from ranger_sim.can_bus.edge.messages import frame_of_message
 from ranger_sim.can_bus.edge.taps import OFF
+from ranger_sim.can_bus.node import OPERATING
 from ranger_sim.foundation.random_stream import RandomStream
 from ranger_sim.harness.ranger import Ranger
 from ranger_sim.harness.scenario import Scenario
@@ -86,7 +86,7 @@ def test_listeners_hear_what_the_robot_logs_and_change_nothing():
         server = AttachServer(name, buses_of(robot))
         clients = {bus: Client(name, bus) for bus in buses_of(robot)}
         pass_time(robot, server, clients.values(), 500 * MS)
-        counted = {bus.name: bus.frames for bus in robot.buses}
+        counted = {bus.name: bus.counters.frames for bus in robot.buses}
         server.close()
         assert robot.trace_digest() == digest
     for bus, client in clients.items():

@@ -2,7 +2,7 @@
 
 import pytest
 
-from ranger_sim.can_bus.bus import RESET
+from ranger_sim.can_bus.node import RESET
 from ranger_sim.firmware_sim.microcontroller import Microcontroller
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.tools import fuzz_can

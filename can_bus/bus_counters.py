@@ -1,0 +1,64 @@
+# cython: boundscheck=False, wraparound=False, initializedcheck=False
+# (every index below is made of a standard identifier, which `Bus.request` has checked)
+"""What a bus counts of its frames."""
+
+import cython
+
+from ranger_sim.can_bus.frame import STANDARD_IDENTIFIERS
+from ranger_sim.foundation.numbers import integers
+
+
+class BusCounters:
+    """Counted since the last `reset`.
+
+    `frames` sent whole; `merged` frames that two nodes sent at once with equal content; `lost` accepted but received
+    by no listening node (nobody listened, or the sender fell off the bus with the frame still waiting); `errors`
+    error frames; `retries` after an error; `refused` requests; `aborted`; `flushed` waited when their sender went
+    bus-off; `arbitrations_lost`; `single_shot_skipped` single shots that did not go out, of which
+    `single_shot_dropped` had been accepted.
+    `late_requests` came with stamps before what had been decided. `late_results` were stamped at or before the `until`
+    that found them: with steps of `Bus.advance` shorter than the shortest frame and no errors there are none.
+    """
+
+    def __init__(self) -> None:
+        self.reset()
+
+    def reset(self) -> None:
+        """Everything to zero."""
+        self.frames = 0
+        self.merged = 0
+        self.lost = 0
+        self.single_shot_skipped = 0
+        self.single_shot_dropped = 0
+        self.retries = 0
+        self.errors = 0
+        self.refused = 0
+        self.arbitrations_lost = 0
+        self.aborted = 0
+        self.flushed = 0
+        self.late_results = 0
+        self.late_requests = 0
+        self.identifiers = integers(2 * STANDARD_IDENTIFIERS)  # of each: frames, longest response in ns
+        self.counts = cython.address(self.identifiers[0]) if cython.compiled else self.identifiers
+
+    def note_answer(self, identifier: cython.longlong, response_ns: cython.longlong) -> cython.void:
+        """A frame with a standard identifier was sent whole, so long after its request."""
+        place: cython.longlong = 2 * identifier
+        self.counts[place] += 1
+        if response_ns > self.counts[place + 1]:
+            self.counts[place + 1] = response_ns
+
+    @property
+    def over(self) -> int:
+        """Requests that have been answered, in whatever way."""
+        return self.frames + self.merged + self.aborted + self.flushed + self.single_shot_dropped
+
+    @property
+    def frames_by_identifier(self) -> list:
+        """Frames sent whole, by standard identifier."""
+        return list(self.identifiers[0::2])
+
+    @property
+    def response_max_ns(self) -> list:
+        """Longest time from a request to the end of its frame, by standard identifier, ns."""
+        return list(self.identifiers[1::2])

@@ -1,0 +1,85 @@
+# cython: boundscheck=False, wraparound=False, initializedcheck=False
+# (every index below is a place of the ring)
+"""How much of a bus is taken: over all, and in windows of 10 ms. Everything here counts bits since power-up."""
+
+import array
+
+import cython
+
+# C constants when compiled: the same numbers stand in the .pxd, and a test holds them together.
+if not cython.compiled:
+    WINDOWS_KEPT = 1024  # closed windows, 10.24 s
+
+WINDOWS_PER_SECOND = 100
+
+
+class LoadMeter:
+    """Counts the bits for which a bus is taken: stuff bits, intermission and error frames included.
+
+    `bits`: so many since `start`. `count`: windows closed since then. `window_busy`: bits of the open window.
+    """
+
+    def __init__(self, bitrate) -> None:
+        self.window_bits = max(bitrate // WINDOWS_PER_SECOND, 1)
+        self.taken_until = 0
+        self.start(0)
+
+    def start(self, bit) -> None:
+        """Count anew, from `bit` on."""
+        self.bits = 0
+        self.origin_bit = bit
+        self.window_end = bit + self.window_bits
+        self.window_busy = 0
+        self.busiest = 0
+        self.count = 0
+        self.ring = array.array("q", [0]) * WINDOWS_KEPT
+
+    def take(self, first: cython.longlong, free: cython.longlong) -> cython.void:
+        """The bus is taken from bit `first` until it is free at bit `free`."""
+        self.bits += free - first
+        self.taken_until = free
+        if free > self.window_end:
+            self._split(first, free)
+        else:
+            self.window_busy += free - first
+
+    def _split(self, first: cython.longlong, last: cython.longlong) -> cython.void:
+        """Bits `first` ... `last` - 1 are taken and reach beyond the open window."""
+        if first >= self.window_end:
+            self._roll(first)
+        while last > self.window_end:
+            self.window_busy += self.window_end - first
+            first = self.window_end
+            self._roll(first)
+        self.window_busy += last - first
+
+    def _roll(self, bit: cython.longlong) -> cython.void:
+        """Close windows until `bit` lies in the open one."""
+        idle: cython.longlong
+        if self.window_busy > self.busiest:
+            self.busiest = self.window_busy
+        while bit >= self.window_end:
+            self.ring[self.count % WINDOWS_KEPT] = self.window_busy
+            self.count += 1
+            self.window_busy = 0
+            self.window_end += self.window_bits
+            idle = (bit - self.window_end) // self.window_bits - WINDOWS_KEPT
+            if idle > 0:  # a ring full of idle windows is enough
+                self.count += idle
+                self.window_end += idle * self.window_bits
+
+    def mean(self, bit) -> float:
+        """Share of the bits from the start to `bit` for which the bus was taken, 0 ... 1."""
+        if bit <= self.origin_bit:
+            return 0.0
+        ahead = max(self.taken_until - bit, 0) if self.bits else 0  # of a frame decided but not over
+        return max(self.bits - ahead, 0) / (bit - self.origin_bit)
+
+    def largest(self) -> float:
+        """Load of the fullest window (the open one counts with what it has), 0 ... 1."""
+        return max(self.busiest, self.window_busy) / self.window_bits
+
+    def windows(self) -> list:
+        """Loads of the closed windows still kept (the last WINDOWS_KEPT), oldest first, 0 ... 1."""
+        kept = min(self.count, WINDOWS_KEPT)
+        return [self.ring[i % WINDOWS_KEPT] / self.window_bits for i in range(self.count - kept, self.count)]

@@ -1,0 +1,181 @@
+"""A controller on a bus, and its error confinement (ISO 11898-1): error counters, error states, bus-off recovery.
+
+A node is error active until one of its counters reaches PASSIVE_LIMIT; then it is error passive: its error flags are
+recessive and destroy nobody's frame, and after sending it suspends transmission. At BUS_OFF_LIMIT transmit errors it is
+bus-off and takes no part. The bus decides what happened to a frame and tells the nodes; the nodes count, change
+state and tell their programs.
+"""
+
+import cython
+
+from ranger_sim.can_bus.transmit_ends import TransmitEnds
+
+# C constants when compiled: the same numbers stand in the .pxd, and a test holds them together.
+if not cython.compiled:
+    from ranger_sim.foundation.events import CAN_STATUS, CAN_TX_DONE
+
+    # Modes: `Bus.set_mode` takes the first two, `Node.mode` shows all.
+    OPERATING = 0
+    RESET = 1  # off the bus: neither sends, receives nor acknowledges
+    BUS_OFF = 2  # thrown off by its transmit error counter
+    JOINING = 3  # waits for recessive sequences before it takes part
+
+    # Interrupt bits of a CAN_STATUS message: CxICR of the LPC2194 (user manual UM10114, table of CANICR).
+    ICR_ERROR_WARNING = 0x4  # bit 2, EI: the warning limit was crossed either way, or bus-off entered or left
+    ICR_ERROR_PASSIVE = 0x20  # bit 5, EPI: error passive entered or left
+    ICR_BUS_ERROR = 0x80  # bit 7, BEI: an error frame; the capture fields below are valid
+    ICR_FIELD_SHIFT = 16  # bits 16-20: FIELD_* of can_bus.frame
+    ICR_RECEIVING = 0x200000  # bit 21, ERRDIR: the error was met while receiving
+    ICR_KIND_SHIFT = 22  # bits 22-23: KIND_*
+    KIND_BIT = 0
+    KIND_FORM = 1
+    KIND_STUFF = 2
+    KIND_OTHER = 3
+
+    # Error confinement: ISO 11898-1, where nothing else is said.
+    WARNING_LIMIT = 96  # CxEWL after reset; ISO 11898-1 recommends the same
+    PASSIVE_LIMIT = 128  # error passive from here
+    BUS_OFF_LIMIT = 256  # bus-off from here (transmit errors)
+    RECEIVER_CALMED = 119  # an error-passive receiver after a good frame; the standard allows 119 ... 127
+    SENDER_PENALTY = 8  # transmit errors that an error costs the sender
+    SUSPEND_BITS = 8  # suspend transmission: how long an error-passive sender waits after the intermission
+    SEQUENCE_BITS = 11  # a recessive sequence, as it stands between two frames
+    RECOVERY_SEQUENCES = 128  # of which a bus-off node waits for so many before it returns
+    TRANSMIT_ERRORS_OFF = 127  # what the transmit counter of an LPC2194 reads while it is bus-off
+
+
+class Node:
+    """A controller on a bus, with its error counters and what it did so far.
+
+    `following`: the next one of the bus; behind the last comes the first. `listening`: it wants what it receives (a
+    node that does not still acknowledges). `flushed`: frames that waited when it went bus-off. `refused`: requests
+    into an occupied buffer or while off the bus. `ends`: where the ends of its transmissions are written, unless they
+    shall be messages. `suspend_bit`: before that it sends nothing. `sending_end`: the last bit of a frame that it sent
+    together with another node. While it is joining, `sequences_left` recessive sequences, of which the first begins at
+    bit `join_from` or later, are missing.
+    """
+
+    def __init__(self, name, index, inbox, controller, order) -> None:
+        self.inbox = inbox
+        self.ends = TransmitEnds(by_message=True)
+        self.following = self
+        self.order = order
+        self.controller = controller
+        self.mode = OPERATING
+        self.listening = True
+        self.sent = 0
+        self.received = 0
+        self.index = index
+        self.sequences_left = 0
+        self.join_from = 0
+        self.sending_end = -1
+        self.refused = 0
+        self.aborted = 0
+        self.single_shot_skipped = 0
+        self.flushed = 0
+        self.arbitrations_lost = 0
+        self.retries = 0
+        self.renew(name)
+
+    def renew(self, name) -> None:
+        """Error confinement as of a new controller, called `name`."""
+        self.name = name
+        self.suspend_bit = 0
+        self.forgive()
+
+    def connect(self, ends) -> None:
+        """The ends of transmissions are written into `ends` from now on, None: all are messages."""
+        self.ends = TransmitEnds(by_message=True) if ends is None else ends
+        self.ends.order = self.order
+
+    def end_unsent(self, buffer, time, status) -> None:
+        """The transmission from `buffer` ends at `time` (ns) without success: TX_ABORTED or TX_LOST."""
+        if not self.ends.write(buffer, time, status):
+            self.inbox.push(time, self.order, CAN_TX_DONE, self.controller, buffer, status)
+
+    # ---- error counters
+
+    def forgive(self) -> None:
+        """Both error counters at zero: error active."""
+        self.transmit_errors = 0
+        self.receive_errors = 0
+        self.passive = False
+        self.warning = False
+
+    def count_failure(self, acknowledged) -> None:
+        """A frame of its own failed; `acknowledged`: there was somebody to acknowledge it.
+
+        An error-passive sender that nobody acknowledges stays where it is: alone on a bus it never goes bus-off.
+        """
+        if acknowledged or not self.passive:
+            self.transmit_errors += SENDER_PENALTY
+
+    def count_success(self) -> None:
+        """A frame of its own, sent when it had transmit errors, is through."""
+        self.transmit_errors -= 1
+
+    def count_reception(self) -> None:
+        """A good frame came in when it had receive errors."""
+        self.receive_errors = self.receive_errors - 1 if self.receive_errors < PASSIVE_LIMIT else RECEIVER_CALMED
+
+    def confine(self, time: cython.longlong, interrupts: cython.longlong) -> cython.bint:
+        """Take the error state that belongs to the counters, and tell it at `time` (ns) with `interrupts` (ICR_*).
+
+        True when the node goes bus-off by that.
+        """
+        worst: cython.longlong = max(self.transmit_errors, self.receive_errors)
+        off: cython.bint = self.transmit_errors >= BUS_OFF_LIMIT
+        if (worst >= WARNING_LIMIT) != self.warning:
+            self.warning = not self.warning
+            interrupts |= ICR_ERROR_WARNING
+        if (worst >= PASSIVE_LIMIT) != self.passive:
+            self.passive = not self.passive
+            interrupts |= ICR_ERROR_PASSIVE
+        if off:
+            self.mode = BUS_OFF
+            interrupts |= ICR_ERROR_WARNING
+        self.tell(time, interrupts)
+        return off
+
+    def tell(self, time: cython.longlong, interrupts: cython.longlong) -> None:
+        """CAN_STATUS to the node's program."""
+        off: cython.longlong = 1 if self.mode == BUS_OFF else 0
+        shown: cython.longlong = TRANSMIT_ERRORS_OFF if off else self.transmit_errors
+        self.inbox.push(time, self.order, CAN_STATUS, self.controller, interrupts, shown, self.receive_errors, off)
+
+    # ---- off the bus and back
+
+    def leave(self) -> None:
+        """Into reset. That does not spare a node that was thrown off its recovery."""
+        self.mode = BUS_OFF if self.transmit_errors >= BUS_OFF_LIMIT else RESET
+
+    def unplug(self) -> None:
+        """Off the bus for good: who takes this place is a new controller."""
+        self.mode = RESET
+
+    def start_joining(self, bit) -> None:
+        """It waits from `bit` on: out of reset for one recessive sequence, out of bus-off for its recovery."""
+        self.sequences_left = RECOVERY_SEQUENCES if self.mode == BUS_OFF else 1
+        self.join_from = bit
+        self.mode = JOINING
+
+    def joins_at(self, free_bit: cython.longlong) -> cython.longlong:
+        """Bit at which the last recessive sequence is over, if no frame comes before.
+
+        `free_bit`: where the bus is free. A frame and its intermission end in one recessive sequence.
+        """
+        return max(free_bit - SEQUENCE_BITS, self.join_from) + SEQUENCE_BITS * self.sequences_left
+
+    def count_sequences(self, free_bit, start) -> None:
+        """A frame starts at bit `start`, after the bus was free from `free_bit` on: so much of the waiting is over."""
+        run = start - max(free_bit - SEQUENCE_BITS, self.join_from)
+        self.sequences_left -= max(run, 0) // SEQUENCE_BITS
+
+    def join(self) -> cython.bint:
+        """Take part; True when that ends bus-off, with both counters at zero."""
+        recovered: cython.bint = self.transmit_errors >= BUS_OFF_LIMIT
+        self.mode = OPERATING
+        self.sequences_left = 0
+        if recovered:
+            self.forgive()
+        return recovered

@@ -1,0 +1,105 @@
+# cython: boundscheck=False, wraparound=False, initializedcheck=False
+# (every index below is made of a node and a buffer, which `Bus.request` has checked, or is a row of the list)
+"""The transmit buffers of all controllers on a bus, and a list of those that wait for it.
+
+A buffer is a row of eight numbers; buffer 1 ... 3 of node n begins at n << NODE_SHIFT | buffer << BUFFER_SHIFT. The
+number of that place is the name of the buffer, `row`. Of equal arbitration fields the lower row goes first: the lower
+node, then the lower buffer.
+"""
+
+import cython
+
+from ranger_sim.can_bus.frame import wire
+from ranger_sim.foundation.numbers import integers
+
+# C constants when compiled: the same numbers stand in the .pxd, and a test holds them together.
+if not cython.compiled:
+    from ranger_sim.foundation.events import NEVER
+
+    BUFFERS = 3  # transmit buffers of an LPC2194 CAN controller
+    # what stands in a row
+    FREE_AT = 0  # instant from which the buffer takes a frame, ns; NEVER while it holds one
+    READY = 1  # bit at which its frame may start; NEVER + that bit while its node is joining
+    ASKED = 2  # instant of the request, ns
+    NEXT = 3  # the row that waits behind this one, -1 for none
+    IDENTIFIER = 4
+    FLAGS = 5
+    LOW = 6  # data bytes 0-3
+    HIGH = 7  # data bytes 4-7
+    ROW = 8  # numbers in a row
+    # the parts of a row's name
+    BUFFER_SHIFT = 3
+    BUFFER_MASK = 3
+    NODE_SHIFT = 5
+
+
+class TransmitBuffers:
+    """`rows`: the numbers. `first`: of the rows that wait, in no order, -1 for none; `waiting_count`: how many.
+
+    `slots` is how `rows` is read and written: compiled an address, in a line of the processor's cache with the other
+    fields, where a memoryview takes 208 bytes.
+    """
+
+    def __init__(self) -> None:
+        self.rows = integers(ROW)
+        self.first = -1
+        self.waiting_count = 0
+
+    def add_node(self) -> None:
+        """Room for the buffers of one more node."""
+        before = self.rows
+        kept = len(before) >> NODE_SHIFT << NODE_SHIFT
+        self.rows = integers(kept + (1 << NODE_SHIFT))
+        for place in range(kept):
+            self.rows[place] = before[place]
+        self.slots = cython.address(self.rows[0]) if cython.compiled else self.rows
+
+    # ---- the list of those that wait
+
+    def remove(self, row: cython.longlong) -> cython.void:
+        """Take a row off the list."""
+        before: cython.longlong = self.first
+        following: cython.longlong = self.slots[row + NEXT]
+        self.waiting_count -= 1
+        if before == row:
+            self.first = following
+            return
+        while self.slots[before + NEXT] != row:
+            before = self.slots[before + NEXT]
+        self.slots[before + NEXT] = following
+
+    def waiting(self) -> list:
+        """Rows of all nodes that wait, in no order."""
+        found = []
+        row = self.first
+        while row >= 0:
+            found.append(row)
+            row = self.rows[row + NEXT]
+        return found
+
+    def waiting_of(self, node) -> list:
+        """Rows of a node that wait, lowest buffer first."""
+        rows = [node << NODE_SHIFT | buffer << BUFFER_SHIFT for buffer in range(1, BUFFERS + 1)]
+        return [row for row in rows if self.is_full(row)]
+
+    def is_full(self, row) -> cython.bint:
+        """True while a frame waits in a buffer."""
+        return self.rows[row + FREE_AT] == NEVER
+
+    def hold(self, row, bit) -> None:
+        """The frame in a row does not start before `bit`."""
+        self.rows[row + READY] = max(self.rows[row + READY], bit)
+
+    def wire(self, row) -> tuple:
+        """The bits of the frame in a row and their fields."""
+        return wire(self.rows[row + IDENTIFIER], self.rows[row + FLAGS], self.rows[row + LOW], self.rows[row + HIGH])
+
+    def first_ready(self) -> cython.longlong:
+        """The first bit at which a frame may start; NEVER or later when none may."""
+        first: cython.longlong = NEVER
+        row: cython.longlong = self.first
+        while row >= 0:
+            if self.slots[row + READY] < first:
+                first = self.slots[row + READY]
+            row = self.slots[row + NEXT]
+        return first
