@@ -24,7 +24,9 @@ class OneLineParser(argparse.ArgumentParser):
 def parser() -> argparse.ArgumentParser:
     """The whole command line."""
     from ranger_sim.datatable import cli as table_command
-    from ranger_sim.tools import bench, bus, can_bounds, check_bus, daq, info, tune, up, walk
+    from ranger_sim.tools import bus, can_bounds, check_bus, daq, info, tune, up, walk
+    from ranger_sim.tools.bench import command as bench
+    from ranger_sim.tools.fuzz import command as fuzz
     from ranger_sim.tools.vm import command as vm
 
     top = OneLineParser(
@@ -36,6 +38,7 @@ def parser() -> argparse.ArgumentParser:
     info.register(commands)
     table_command.register(commands)
     bench.register(commands)
+    fuzz.register(commands)
     tune.register(commands)
     up.register(commands)
     bus.register(commands)

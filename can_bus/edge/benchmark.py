@@ -1,4 +1,4 @@
-"""The same work on our bus, on our python-can interface and on python-can's own interfaces that need no adapter.
+"""The same work on our python-can interface and on python-can's own interfaces that need no adapter.
 
 `python -m ranger_sim.can_bus.edge.benchmark` is not for people: it is the sender and the host in the two-process
 measurement.
@@ -12,7 +12,6 @@ from typing import Any
 
 import can
 
-from ranger_sim.can_bus.benchmark import million_frames
 from ranger_sim.can_bus.edge.attach import AttachServer
 from ranger_sim.can_bus.edge.host import BusHost
 from ranger_sim.can_bus.edge.paced import PacedBus
@@ -106,11 +105,6 @@ def interface_frames(interface: str, frames: int, nodes: int = 3) -> dict:
     }
 
 
-def virtual_frames(frames: int = 20_000, nodes: int = 3) -> dict:
-    """`interface_frames` of python-can's `virtual`. There is no arbitration and no timing in it."""
-    return interface_frames("virtual", frames, nodes)
-
-
 def two_processes(interface: str, frames: int) -> dict:
     """A burst of `frames` from one process to another, as fast as the interface takes them.
 
@@ -171,20 +165,6 @@ class _helper:  # noqa: N801  (used like a function)
         self.process.wait()
         if self.process.stdout is not None:
             self.process.stdout.close()
-
-
-def against_virtual(frames: int = 200_000, virtual: int = 20_000, nodes: int = 3) -> dict:
-    """Our bus and python-can's `virtual` on the same work: {"ours": ..., "python_can_virtual": ..., "ratio": ...}.
-
-    `frames` and `virtual` are how many each gets; the ratio is of frames/s of processor time.
-    """
-    ours = million_frames(frames, 1.0, nodes)
-    theirs = virtual_frames(virtual, nodes)
-    return {
-        "ours": ours,
-        "python_can_virtual": theirs,
-        "ratio": ours["frames_per_s"] / theirs["frames_per_s"],
-    }
 
 
 def _main(arguments: list[str]) -> None:

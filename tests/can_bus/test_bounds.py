@@ -228,7 +228,7 @@ def test_the_bound_is_reached_to_90_percent_by_every_frame_of_a_full_bus():
 
 
 def test_no_answer_exceeds_its_bound_over_random_sets():
-    """The benchmark (`ranger-sim bench --bounds 10000`) in small."""
+    """`ranger-sim bench bounds` in small."""
     figures = bound_check.random_sets(120, seed=7)
     assert figures["sets"] == 120 and figures["exceeded"] == 0 and figures["unbounded"] == 0
     assert figures["worst_in_a_later_instance"] > 0  # else the corrected part of the analysis was not asked

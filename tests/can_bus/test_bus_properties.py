@@ -7,12 +7,10 @@ import pathlib
 import subprocess
 import sys
 
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
 
-from ranger_sim.can_bus import benchmark
 from ranger_sim.can_bus.frame import arbitration_key, frame_bits
 from ranger_sim.can_bus.node import BUS_OFF
 from ranger_sim.foundation.events import FLAG_ERROR, FLAG_EXTENDED, FLAG_SINGLE_SHOT, TX_ABORTED, TX_LOST, TX_SENT
@@ -248,21 +246,7 @@ def test_a_request_from_the_past_takes_part_from_now_on_and_is_counted():
     assert wired.of(1, "rx")[0][0] > 1_000_000
 
 
-# ---- the million, in small, and both ways of running -----------------------------------------------------
-
-
-def test_every_frame_of_four_full_buses_arrives_in_order():
-    figures = benchmark.million_frames(3_000)
-    assert figures["frames"] == figures["sent"] == 3_000
-    assert figures["delivered"] == 6_000
-    assert figures["lost"] == 0 and figures["out_of_order"] == 0
-    assert figures["load_mean"] > 0.9
-
-
-def test_the_benchmark_reaches_the_load_it_aims_at():
-    figures = benchmark.million_frames(2_000, 0.5)
-    assert figures["load_mean"] == pytest.approx(0.5, rel=0.1)
-    assert benchmark.frame_length_cost(500)["mean_bits"] > 108
+# ---- both ways of running --------------------------------------------------------------------------------
 
 
 def digest_of_a_busy_second() -> str:

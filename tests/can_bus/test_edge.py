@@ -11,7 +11,6 @@ from can.io.canutils import CanutilsLogReader, CanutilsLogWriter
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from ranger_sim.can_bus.edge import benchmark
 from ranger_sim.can_bus.edge.candump import CandumpWriter, line_of_frame, read_candump
 from ranger_sim.can_bus.edge.messages import frame_of_message, message_of_frame
 from ranger_sim.can_bus.frame import FIELD_CRC, data_length
@@ -207,10 +206,3 @@ def test_a_file_that_cannot_be_written_or_read_is_the_users_mistake(tmp_path):
         CandumpWriter(tmp_path)
     with pytest.raises(UserError, match="cannot be read"):
         list(read_candump(tmp_path / "missing.log"))
-
-
-def test_python_cans_virtual_interface_does_the_same_work_in_the_comparison():
-    figures = benchmark.against_virtual(600, 300)
-    assert figures["ours"]["lost"] == figures["python_can_virtual"]["lost"] == 0
-    assert figures["python_can_virtual"]["delivered"] == 600
-    assert figures["ratio"] > 0

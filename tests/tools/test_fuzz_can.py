@@ -1,15 +1,15 @@
-"""A short run of the benchmark's hostile clients, and that its checks can fail."""
+"""A short run of `ranger-sim fuzz can`, and that its checks can fail."""
 
 import pytest
 
 from ranger_sim.can_bus.node import RESET
 from ranger_sim.firmware_sim.microcontroller import Microcontroller
-from ranger_sim.foundation.user_error import UserError
-from ranger_sim.tools import fuzz_can
+from ranger_sim.tools.fuzz import Finding
+from ranger_sim.tools.fuzz import can as fuzz_can
 
 
 def test_three_thousand_cases_from_outside_move_the_counters_and_stop_nothing():
-    result = fuzz_can.benchmark(3000)
+    result = fuzz_can.run(3000)
     assert result["cases"] == 3000 and result["robots"] == 1
     for name in ("frames_in", "frames_out", "malformed", "refused", "received_by_boards", "answered_at_the_end"):
         assert result[name] > 50, name
@@ -25,10 +25,10 @@ def test_the_checks_notice():
     dead = Microcontroller("MCH")
     dead.inbox, dead.outbox = board.inbox, board.outbox
     fuzz.robot.loop.boards = [dead if each is board else each for each in fuzz.robot.loop.boards]
-    with pytest.raises(UserError, match="board MCH has stopped"):
+    with pytest.raises(Finding, match="board MCH has stopped"):
         fuzz.slice()
     fuzz.robot.buses[0].nodes[0].mode = RESET
-    with pytest.raises(UserError, match="board CSR is off can1"):
+    with pytest.raises(Finding, match="board CSR is off can1"):
         fuzz.end()
     fuzz.robot.buses[0].nodes[0].mode = 0
     fuzz.end()

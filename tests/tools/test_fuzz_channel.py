@@ -1,4 +1,4 @@
-"""A short run of the benchmark's damaged channel, and that it ends when the board has ended."""
+"""A short run of `ranger-sim fuzz channel`, and that it ends when the board has ended."""
 
 import contextlib
 import os
@@ -6,13 +6,13 @@ import signal
 
 import pytest
 
-from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.ranger import Ranger
-from ranger_sim.tools import fuzz_channel
+from ranger_sim.tools.fuzz import Finding
+from ranger_sim.tools.fuzz import channel as fuzz_channel
 
 
 def test_three_hundred_damaged_turns_are_answered():
-    result = fuzz_channel.benchmark(300)
+    result = fuzz_channel.run(300)
     assert result["cases"] == 300 and result["slots_kept"] >= 300 and result["unreadable_messages"] > 150
 
 
@@ -21,6 +21,6 @@ def test_a_board_that_ends_among_the_cases_is_named():
         fuzz = fuzz_channel.Fuzz(robot)
         with contextlib.closing(fuzz.board):
             os.kill(fuzz.board.process, signal.SIGKILL)
-            with pytest.raises(UserError, match=r"^MCSI \(process \d+\) was killed by signal 9$"):
+            with pytest.raises(Finding, match=r"^MCSI \(process \d+\) was killed by signal 9$"):
                 while True:
                     fuzz.case()

@@ -1,13 +1,13 @@
-"""The benchmark of broken profiles, in small."""
+"""A short run of `ranger-sim fuzz profiles`, and that its checks can fail."""
 
 import pytest
 
 from ranger_sim.harness import profile
-from ranger_sim.tools import fuzz_profiles
+from ranger_sim.tools.fuzz import profiles as fuzz_profiles
 
 
 def test_broken_profiles_pass_or_are_refused_with_a_line_per_fault():
-    figures = fuzz_profiles.benchmark(120)
+    figures = fuzz_profiles.run(120)
     assert figures["passed"] + figures["refused"] == figures["cases"] == 120
     assert figures["passed"] > 5 and figures["refused"] > 50 and figures["faults"] > figures["refused"]
 
@@ -18,4 +18,4 @@ def test_a_traceback_would_end_it(monkeypatch):
 
     monkeypatch.setattr(profile, "_boards", breaks)
     with pytest.raises(KeyError):
-        fuzz_profiles.benchmark(50)
+        fuzz_profiles.run(50)

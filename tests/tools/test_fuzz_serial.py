@@ -1,13 +1,13 @@
-"""A short run of the benchmark's wrong bytes, and that its checks can fail."""
+"""A short run of `ranger-sim fuzz serial`, and that its checks can fail."""
 
 import pytest
 
-from ranger_sim.foundation.user_error import UserError
-from ranger_sim.tools import fuzz_serial
+from ranger_sim.tools.fuzz import Finding
+from ranger_sim.tools.fuzz import serial as fuzz_serial
 
 
 def test_three_hundred_cases_of_wrong_bytes_move_the_counters_and_stop_nothing():
-    result = fuzz_serial.benchmark(300)
+    result = fuzz_serial.run(300)
     assert result["cases"] == 300
     for name in ("packets", "refused", "bad_packets", "daq_segments", "daq_bad_checksums", "daq_skipped_bytes"):
         assert result[name] > 0, name
@@ -25,5 +25,5 @@ def test_the_checks_notice(spoil, words):
     fuzz = fuzz_serial.Fuzz()
     fuzz.case()
     spoil(fuzz)
-    with pytest.raises(UserError, match=words):
+    with pytest.raises(Finding, match=words):
         fuzz.case()

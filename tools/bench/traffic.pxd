@@ -1,6 +1,5 @@
-from ranger_sim.foundation.events cimport EventQueue
+from ranger_sim.foundation.events cimport CAN_RX, CAN_TX_DONE, EventQueue
 from ranger_sim.can_bus.bus cimport Bus
-from ranger_sim.can_bus.frame cimport frame_bits
 
 cdef class Load:
     cdef public list buses, inboxes
@@ -9,5 +8,3 @@ cdef class Load:
     cdef public long long[::1] sent, expected, free, word
     cpdef void run(self, long long frames)
     cdef void _drain(self, Bus bus, long long b, long long n, EventQueue inbox)
-
-cpdef long long add_lengths(long long frames)

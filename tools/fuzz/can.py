@@ -17,12 +17,11 @@ from ranger_sim.can_bus.edge.attach import AttachServer
 from ranger_sim.can_bus.edge.slcan import SlcanServer
 from ranger_sim.can_bus.edge.socketcand import SocketcandServer
 from ranger_sim.can_bus.node import OPERATING
-from ranger_sim.foundation import wallclock
 from ranger_sim.foundation.events import FLAG_EXTENDED, FLAG_REMOTE
 from ranger_sim.foundation.random_stream import RandomStream
-from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.ranger import Ranger
 from ranger_sim.harness.scenario import Scenario
+from ranger_sim.tools.fuzz import Finding
 
 SLICE_NS = 1_000_000
 CASES_PER_SLICE = 8
@@ -31,7 +30,7 @@ ALIVE_NS = 5_000_000  # the slowest board's slot is 2 ms
 
 
 class Fuzz:
-    """`slice()` does some cases and passes a millisecond; UserError as soon as something is not as it must be."""
+    """`slice()` does some cases and passes a millisecond; Finding as soon as something is not as it must be."""
 
     def __init__(self, seed: int = 1) -> None:
         self.stream: Any = RandomStream(seed, "can fuzz")
@@ -155,7 +154,7 @@ class Fuzz:
                     pass
         for name, board in self.robot.boards.items():
             if self.robot.loop.time > 20_000_000 and self.robot.loop.time - board.scheduler.slot_time > ALIVE_NS:
-                raise UserError(f"can fuzz: board {name} has stopped at {self.robot.loop.time} ns (case {self.cases})")
+                raise Finding(f"board {name} has stopped at {self.robot.loop.time} ns (case {self.cases})")
         if self.robot.ended:
             self.end()
             self._start()
@@ -173,17 +172,17 @@ class Fuzz:
                     self.good.send(wire.record(wire.CONTROL, bytes([wire.ACTIVATE])))
                 self.good_off = off
             elif kind == wire.REFUSED:
-                raise UserError(f"can fuzz: the well-behaved client was refused: {body!r}")
+                raise Finding(f"the well-behaved client was refused: {body!r} (case {self.cases})")
 
     def end(self) -> None:
-        """Add up and close; UserError when a board was thrown off its bus."""
+        """Add up and close; Finding when a board was thrown off its bus."""
         for bus in self.robot.buses:
             for node in bus.nodes:
                 if "client" in node.name or "slcan" in node.name:
                     continue
                 self.board_frames += node.received
                 if node.mode != OPERATING:
-                    raise UserError(f"can fuzz: board {node.name} is off {bus.name} (mode {node.mode})")
+                    raise Finding(f"board {node.name} is off {bus.name}, mode {node.mode} (case {self.cases})")
         for server in self.servers:
             for counter, value in server.counters().items():
                 self.totals[counter] = self.totals.get(counter, 0) + value
@@ -195,20 +194,16 @@ class Fuzz:
         self.robot.close()
 
 
-def benchmark(cases: int) -> dict[str, Any]:
-    """So many cases; what was counted, and cases per second of processor time."""
-    fuzz = Fuzz()
-    start = wallclock.process_cpu_s()
+def run(cases: int, seed: int = 1) -> dict[str, int]:
+    """So many cases; what the servers and boards counted."""
+    fuzz = Fuzz(seed)
     answered = 0
     while fuzz.cases < cases:
         robots = fuzz.robots
         fuzz.slice()
         answered = fuzz.answered if fuzz.robots == robots else 0
-    used = max(wallclock.process_cpu_s() - start, 1e-9)
     fuzz.end()
     return {
-        "figure": fuzz.cases / used,
-        "unit": "cases per CPU s",
         "cases": fuzz.cases,
         "robots": fuzz.robots,
         "answered_at_the_end": answered,

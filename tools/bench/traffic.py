@@ -1,6 +1,6 @@
-"""How fast the bus is. Functions return figures; nothing is printed, the wall clock stays in foundation.
+"""How fast the bus is: a load for four of them, every frame checked where it is heard.
 
-The traffic generator is compiled with the rest, so that the figures are those of the bus.
+The load is compiled with the rest, so that the figures are those of the bus.
 """
 
 import array
@@ -8,9 +8,11 @@ import array
 import cython
 
 from ranger_sim.can_bus.bus import Bus
-from ranger_sim.can_bus.frame import frame_bits
 from ranger_sim.foundation import wallclock
 from ranger_sim.foundation.events import STAGE_BUS, EventQueue
+
+if not cython.compiled:
+    from ranger_sim.foundation.events import CAN_RX, CAN_TX_DONE
 
 ROBOT_BIT_RATE = 3_000_000  # bit/s, robot.md N1.2
 ROBOT_BUSES = 4
@@ -109,7 +111,7 @@ class Load:
         node: cython.longlong = b * self.nodes_per_bus + n
         while inbox.head_time <= self.time:
             inbox.take()
-            if inbox.kind == 2:  # CAN_RX
+            if inbox.kind == CAN_RX:
                 sender = inbox.b // 16
                 which = inbox.b % 16 - 1
                 place = (node * self.nodes_per_bus + sender) * self.per_node + which
@@ -119,7 +121,7 @@ class Load:
                     self.wrong += 1
                 self.expected[place] = inbox.e + 1
                 self.delivered += 1
-            elif inbox.kind == 3:  # CAN_TX_DONE
+            elif inbox.kind == CAN_TX_DONE:
                 self.free[node] |= 1 << (inbox.b - 1)
                 self.done += 1
 
@@ -149,32 +151,3 @@ def million_frames(frames: int = 1_000_000, load: float = 1.0, nodes_per_bus: in
         "times_real_time": simulated_s / cpu_s,
         "load_mean": sum(bus.load_mean(traffic.time) for bus in traffic.buses) / len(traffic.buses),
     }
-
-
-def add_lengths(frames: cython.longlong) -> cython.longlong:
-    """Sum of the lengths (bits) of `frames` frames of changing content."""
-    total: cython.longlong = 0
-    i: cython.longlong
-    mixer: cython.longlong = 2654435761  # Knuth's multiplier: changes all bits
-    mask: cython.longlong = 0xFFFFFFFF
-    for i in range(frames):
-        total += frame_bits(i & 0x7FF, 8, i * mixer & mask, i * 40503 & mask)
-    return total
-
-
-def frame_length_cost(frames: int = 200_000) -> dict:
-    """ns of processor time for the exact length of one frame of eight bytes, mean over `frames`."""
-    start = wallclock.process_cpu_s()
-    bits = add_lengths(frames)
-    cpu_s = wallclock.process_cpu_s() - start
-    return {"frames": frames, "mean_bits": bits / frames, "ns_per_frame": cpu_s / frames * 1e9}
-
-
-def cost_against_load(loads=(0.1, 0.3, 0.5, 0.75, 1.0), frames: int = 100_000) -> list[dict]:
-    """`million_frames` with fewer frames at several bus loads (1.0: every buffer always full)."""
-    return [{"load": load, **million_frames(frames, load)} for load in loads]
-
-
-def cost_against_nodes(nodes=(2, 3, 5, 8), frames: int = 100_000) -> list[dict]:
-    """`million_frames` with fewer frames and 2 ... 8 boards on each bus, at 75 % load."""
-    return [{"nodes_per_bus": count, **million_frames(frames, 0.75, count)} for count in nodes]

@@ -9,13 +9,13 @@ from __future__ import annotations
 import contextlib
 from typing import Any
 
-from ranger_sim.foundation import wallclock
 from ranger_sim.foundation.random_stream import RandomStream
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.processes import block as places
 from ranger_sim.harness.processes.channel import SLOT_WORDS
 from ranger_sim.harness.processes.lone_board import LoneBoard
 from ranger_sim.harness.ranger import Ranger
+from ranger_sim.tools.fuzz import Finding
 
 BOARD = "MCSI"
 TURN_NS = 500_000  # one slot of that board
@@ -23,7 +23,7 @@ TOUCHED_SLOTS = 30
 
 
 class Fuzz:
-    """`case()` is one case; UserError as soon as the board does not answer as it must."""
+    """`case()` is one case; Finding as soon as the board does not answer as it must."""
 
     def __init__(self, robot: Ranger, seed: int = 1) -> None:
         self.stream: Any = RandomStream(seed, "channel fuzz")
@@ -44,9 +44,12 @@ class Fuzz:
         return (self.number(1 << 32) << 32 | self.number(1 << 32)) - (1 << 63)
 
     def turn(self, command: int = places.COMMAND_ADVANCE, until: int | None = None) -> None:
-        """One turn; UserError when the board has ended instead, or does not answer."""
+        """One turn; Finding when the board has ended instead, or does not answer."""
         self.until = max(self.until, self.words[places.REACHED]) + TURN_NS
-        self.board.turn(self.until if until is None else until, command)
+        try:
+            self.board.turn(self.until if until is None else until, command)
+        except UserError as ended:
+            raise Finding(str(ended)) from ended
         self.words[places.ASK_USED] = 0
 
     def case(self) -> None:
@@ -65,33 +68,32 @@ class Fuzz:
             used = self.words[places.ASK_USED]
             self.turn()
             if used != 0 and self.words[places.DAMAGED] <= damaged:
-                raise UserError("channel fuzz: damage was not counted")
+                raise Finding("damage was not counted")
         slots = self.words[places.SLOT_COUNT]
         self.turn()
         self.turn()
         if self.words[places.SLOT_COUNT] == slots:
-            raise UserError("channel fuzz: the board has lost its slots")
+            raise Finding("the board has lost its slots")
 
     def end(self) -> None:
-        """Let the board's process end; UserError when it had ended before."""
+        """Let the board's process end; Finding when it had ended before."""
         code = self.board.end()
         if code != 0:
-            raise UserError(f"channel fuzz: the board's process ended with {code}: {self.block.fault()}")
+            raise Finding(f"the board's process ended with {code}: {self.block.fault()}")
 
 
-def benchmark(cases: int) -> dict:
-    """Run so many cases; the figure is cases per second."""
+def run(cases: int, seed: int = 1) -> dict[str, int]:
+    """So many cases; what the board counted."""
     with contextlib.closing(Ranger()) as robot:
-        fuzz = Fuzz(robot)
+        fuzz = Fuzz(robot, seed)
         with contextlib.closing(fuzz.board):
-            started = wallclock.monotonic_s()
-            for _ in range(cases):
-                fuzz.case()
-            seconds = wallclock.monotonic_s() - started
+            for number in range(cases):
+                try:
+                    fuzz.case()
+                except Finding as finding:
+                    raise Finding(f"{finding} (case {number})") from finding
             fuzz.end()
     return {
-        "figure": cases / seconds,
-        "unit": "cases per s",
         "cases": cases,
         "unreadable_messages": fuzz.words[places.DAMAGED],
         "slots_kept": fuzz.words[places.SLOT_COUNT],

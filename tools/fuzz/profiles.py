@@ -1,14 +1,13 @@
-"""Broken profiles by the thousand: whatever a file holds, it loads or every fault is named, never a traceback."""
+"""Broken profiles: whatever a file holds, it loads or every fault is named, never a traceback."""
 
 from __future__ import annotations
 
 import pathlib
 import tempfile
 
-from ranger_sim.foundation import wallclock
 from ranger_sim.foundation.random_stream import RandomStream
-from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness import profile
+from ranger_sim.tools.fuzz import Finding
 
 INTERFACES = ("ranger_sim", "slcan", "socketcan", "virtual")
 WORDS = (
@@ -36,16 +35,15 @@ def damaged(stream: RandomStream, good: bytes) -> bytes:
     return content
 
 
-def benchmark(cases: int, seed: int = 1) -> dict:
-    """So many damaged profiles and schedules: how many passed, how many were refused, faults named, cases per CPU s.
+def run(cases: int, seed: int = 1) -> dict[str, int]:
+    """So many damaged profiles and schedules: how many passed, how many were refused, how many faults were named.
 
-    Anything but a UserError ends it: that is what it looks for.
+    Any other exception than ProfileError is a finding and leaves as it is, with its case: its traceback says where.
     """
     stream = RandomStream(seed, "broken profiles")
     good = (profile.FOLDER / "hil-1mbit.toml").read_bytes()
     schedule = (profile.FOLDER / profile.SCHEDULES / "1mbit.toml").read_bytes()
     passed = refused = faults = 0
-    started = wallclock.process_cpu_s()
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
         (folder / profile.SCHEDULES).mkdir()
@@ -61,13 +59,8 @@ def benchmark(cases: int, seed: int = 1) -> dict:
                 refused += 1
                 faults += len(error.faults)
                 if not error.faults or len(str(error).splitlines()) != len(error.faults):
-                    raise UserError(f"case {case}: not a line per fault: {error}") from None
-    used = max(wallclock.process_cpu_s() - started, 1e-9)
-    return {
-        "figure": cases / used,
-        "unit": "profiles per CPU s",
-        "cases": cases,
-        "passed": passed,
-        "refused": refused,
-        "faults": faults,
-    }
+                    raise Finding(f"not a line per fault: {error} (case {case})") from None
+            except Exception as error:
+                error.add_note(f"ranger-sim fuzz profiles: seed {seed}, case {case}")
+                raise
+    return {"cases": cases, "passed": passed, "refused": refused, "faults": faults}

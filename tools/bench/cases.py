@@ -1,0 +1,126 @@
+"""What `ranger-sim bench` times: each case runs in a process of its own and returns how much it did per CPU second.
+
+`python -m ranger_sim.tools.bench.cases CASE SECONDS` is that process; it prints the figures as JSON.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from ranger_sim.foundation import wallclock
+
+SIMULATED = "simulated s per CPU s"
+FRAMES = "frames per CPU s"
+YARDSTICK = "virtual"  # what stands for the machine: everything is also given as a ratio to it
+BUS_FRAMES_PER_S, VIRTUAL_FRAMES_PER_S = 50_000, 1_000  # frames for each second of --seconds, about as much work
+INTERPRETED_SHARE = 10  # the plain sources take so many times as long at least, and get as much less to do
+
+
+@dataclass(frozen=True)
+class Case:
+    """One thing that is timed; `measure(seconds)` does it for about `seconds` of virtual time: {"figure": ...}."""
+
+    title: str
+    unit: str
+    measure: Callable[[float], dict]
+    interpreted: bool = False
+
+
+def robot(seconds: float, log: str = "none", swap: bool = False) -> dict:
+    """The whole robot for so long, its first second left out; CPU seconds of the stepping loop only."""
+    from ranger_sim.harness.ranger import Ranger
+    from ranger_sim.harness.scenario import Scenario, StopRule
+
+    with contextlib.closing(Ranger(Scenario(), log=log)) as walking:
+        if swap:
+            walking.replace("MCH", "mc_compliant_control", users_law(walking.board("MCH")), cost=4200, limit=6000)
+        walking.run(StopRule(time_s=1.0), 1.0)
+        started = wallclock.process_cpu_s()
+        walking.run(StopRule(time_s=1.0 + seconds), seconds)
+        used = wallclock.process_cpu_s() - started
+        return {"figure": (walking.time_s - 1.0) / used, "steps": walking.steps}
+
+
+def users_law(board: Any) -> Callable[[], None]:
+    """What a user might write: the hip's spring-damper law in floating-point Python, for the firmware's own."""
+    law, limits, loop, readings = board.compliance, board.limits, board.current_control, board.readings
+
+    def control() -> None:
+        position = board.controlled_position() / 65536.0
+        velocity = board.controlled_velocity() / 65536.0
+        current = law.command / 65536.0 - law.stiffness / 65536.0 * position - law.dampness / 65536.0 * velocity
+        target = limits.limit_target(int(current * 65536.0), int(velocity * 65536.0))
+        loop.update(target, readings.motor_current_fixed())
+
+    return control
+
+
+def plant(seconds: float) -> dict:
+    """The body alone, held, motors off."""
+    from ranger_sim.plant.ranger import RangerPlant
+
+    body = RangerPlant()
+    steps = round(seconds * 1e9 / body.step_ns)
+    started = wallclock.process_cpu_s()
+    for _ in range(steps):
+        body.step()
+    return {"figure": seconds / (wallclock.process_cpu_s() - started)}
+
+
+def bus(seconds: float, load: float = 1.0, boards: int = 3) -> dict:
+    """Our bus: send, arbitrate and deliver on four buses of `boards` boards at `load`."""
+    from ranger_sim.tools.bench import traffic
+
+    done = traffic.million_frames(round(BUS_FRAMES_PER_S * seconds), load, boards)
+    return {"figure": done["frames_per_s"], **{name: done[name] for name in ("frames", "lost", "out_of_order")}}
+
+
+def virtual(seconds: float) -> dict:
+    """The same work on python-can's `virtual`, which has no arbitration and no timing."""
+    from ranger_sim.can_bus.edge import benchmark
+
+    done = benchmark.interface_frames("virtual", round(VIRTUAL_FRAMES_PER_S * seconds))
+    return {"figure": done["frames_per_s"], "frames": done["frames"], "lost": done["lost"]}
+
+
+CASES = {
+    "robot": Case("whole robot, trace hashed, nothing kept", SIMULATED, robot),
+    "robot-longer": Case("whole robot, four times as long", SIMULATED, lambda s: robot(4 * s)),
+    "robot-window": Case("whole robot, last 10 s kept", SIMULATED, lambda s: robot(s, log="window")),
+    "robot-full": Case("whole robot, everything kept", SIMULATED, lambda s: robot(s, log="full")),
+    "robot-swapped": Case("hip control law by a user's function", SIMULATED, lambda s: robot(s, swap=True)),
+    "plant": Case("body alone", SIMULATED, plant),
+    "bus": Case("four buses, every buffer always full", FRAMES, bus),
+    "bus-quarter": Case("four buses at 25 % load", FRAMES, lambda s: bus(s, 0.25)),
+    "bus-eight": Case("four buses of eight boards, 75 % load", FRAMES, lambda s: bus(s, 0.75, 8)),
+    "robot-interpreted": Case("whole robot, interpreted", SIMULATED, robot, interpreted=True),
+    "plant-interpreted": Case("body alone, interpreted", SIMULATED, plant, interpreted=True),
+    "bus-interpreted": Case("four full buses, interpreted", FRAMES, bus, interpreted=True),
+    YARDSTICK: Case("python-can's virtual, three boards", FRAMES, virtual),
+}
+
+
+def measured(name: str, seconds: float) -> dict:
+    """One case in its own process. RuntimeError with the last line of what it said when it fails."""
+    case = CASES[name]
+    environment = {key: value for key, value in os.environ.items() if key != "RANGER_SIM_INTERPRETED"}
+    if case.interpreted:
+        environment["RANGER_SIM_INTERPRETED"] = "1"
+        seconds /= INTERPRETED_SHARE
+    call = [sys.executable, "-m", "ranger_sim.tools.bench.cases", name, str(seconds)]
+    done = subprocess.run(call, env=environment, capture_output=True, text=True, check=False)
+    if done.returncode != 0:
+        raise RuntimeError(f"bench: case {name}: {(done.stderr.strip() or 'no word').splitlines()[-1]}")
+    figures: dict = json.loads(done.stdout)
+    return figures
+
+
+if __name__ == "__main__":
+    print(json.dumps(CASES[sys.argv[1]].measure(float(sys.argv[2]))))

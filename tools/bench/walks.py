@@ -1,0 +1,60 @@
+"""`ranger-sim bench walks`: how far, how fast and how evenly the parameter sets walk, over seeds and floors."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable
+
+from ranger_sim.harness.ranger import Ranger
+from ranger_sim.harness.scenario import Scenario, StopRule
+
+# parameter set, seeds, steps, roughness in m
+WALKS = (
+    ("robust", range(1, 4), 1000, 0.0),
+    ("robust", range(1, 4), 200, 0.001),
+    ("record-2011", range(1, 21), 1000, 0.0),
+)
+KEPT = (
+    "controller",
+    "seed",
+    "floor_roughness_m",
+    "steps",
+    "fell",
+    "fall_cause",
+    "mean_step_length_m",
+    "std_step_length_m",
+    "mean_step_time_s",
+    "motor_power_W",
+    "tcot",
+    "heel_strike_delay_ms",
+    "trace_digest",
+)
+
+
+def walked(scenario: Scenario, steps: int) -> dict:
+    """One walk of so many steps, or until the robot falls: what is kept of its summary, frames lost, slots overrun."""
+    with contextlib.closing(Ranger(scenario)) as robot:
+        while not robot.run(StopRule(steps=steps), 10.0):
+            pass
+        summary = robot.summary()
+    return {
+        **{key: summary[key] for key in KEPT},
+        "lost": sum(bus["lost"] for bus in summary["can"].values()),
+        "overruns": sum(board["overruns"] for board in summary["slots"].values()),
+    }
+
+
+def run(say: Callable[[str], None]) -> list[dict]:
+    """Walk every case of WALKS; a line each."""
+    rows = []
+    for controller, seeds, steps, roughness in WALKS:
+        for seed in seeds:
+            row = walked(Scenario(controller=controller, seed=seed, floor_roughness_m=roughness), steps)
+            rows.append(row)
+            say(
+                f"{controller}, seed {seed}, {1000 * roughness:g} mm: {row['steps']} of {steps} steps"
+                f"{', ' + row['fall_cause'] if row['fell'] else ''}; {row['mean_step_length_m']:.3f} m, "
+                f"{row['mean_step_time_s']:.3f} s, {row['motor_power_W']:.1f} W, "
+                f"lost {row['lost']}, overruns {row['overruns']}"
+            )
+    return rows

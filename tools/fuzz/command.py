@@ -1,0 +1,70 @@
+"""`ranger-sim fuzz`: hostile input by the thousand; ends with the first case that the program does not stand."""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import json
+import sys
+from typing import Any
+
+from ranger_sim.tools.files import json_target, replace_file
+from ranger_sim.tools.fuzz import Finding
+from ranger_sim.tools.units import whole_number
+
+EXIT_FOUND = 1
+CASES = 10_000
+TARGETS = {
+    "can": "frames of every kind, and bytes that are none, from outside onto the buses of a walking robot",
+    "channel": "damaged messages in the channel between a board's process and the body's",
+    "profiles": "profiles and bus schedules with pieces cut out, doubled and replaced",
+    "serial": "wrong bytes on the line between main brain and computer, both ways",
+}
+
+
+def register(commands: Any) -> None:
+    """Add the subcommand to the command line."""
+    command = commands.add_parser(
+        "fuzz",
+        help="hostile input by the thousand: wrong frames, bytes, messages, files",
+        description="Hostile input by the thousand. After every case everything is checked. The first case that the\n"
+        "program does not stand is named with its seed; the exit code is then 1.",
+        epilog="targets:\n" + "\n".join(f"  {name:10} {text}" for name, text in TARGETS.items()),
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    command.add_argument(
+        "target", nargs="*", metavar="TARGET", help=f"{', '.join(TARGETS)} (default: one after the other)"
+    )
+    command.add_argument(
+        "--cases", type=whole_number(1), default=CASES, metavar="N", help=f"cases for each target (default {CASES})"
+    )
+    command.add_argument(
+        "--seed", type=int, default=1, metavar="S", help="the same seed gives the same cases (default 1)"
+    )
+    command.add_argument("--json", metavar="FILE|-", help="what was counted, as JSON; - prints it and nothing else")
+    command.set_defaults(run=run, refuse=command.error)
+
+
+def run(options: argparse.Namespace) -> int:
+    """One target after the other; 0 when all stood, 1 with the first finding."""
+    for name in options.target:
+        if name not in TARGETS:
+            options.refuse(f"{name!r} is no target; there are {', '.join(TARGETS)}")
+    json_file = json_target(options.json)
+    found: dict[str, dict] = {}
+    for name in dict.fromkeys(options.target or TARGETS):
+        fuzzer = importlib.import_module(f"ranger_sim.tools.fuzz.{name}")
+        try:
+            counted = found[name] = fuzzer.run(options.cases, options.seed)
+        except Finding as finding:
+            print(f"ranger-sim fuzz: {name}, seed {options.seed}: {finding}", file=sys.stderr)
+            return EXIT_FOUND
+        if options.json != "-":
+            counts = ", ".join(f"{key.replace('_', ' ')} {value}" for key, value in counted.items())
+            print(f"{name}: {counts}", flush=True)
+    text = json.dumps({"seed": options.seed, "fuzz": found}, indent=2)
+    if json_file is not None:
+        replace_file(json_file, (text + "\n").encode())
+    if options.json == "-":
+        print(text)
+    return 0
