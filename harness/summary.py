@@ -78,9 +78,9 @@ def oddities(plant: Any) -> dict:
         "lead_lifts": record.lead_lifts,
         "tensile_strikes": record.tensile_strikes,
         "tensile_impulse_min_Ns": record.tensile_impulse_min_Ns,
-        "friction_ratio_max": body.friction_ratio_max,
-        "slip_s": body.slip_s,
-        "normal_force_min_N": body.normal_force_min,
+        "friction_ratio_max": body.seen.friction_ratio_max,
+        "slip_s": body.seen.slip_s,
+        "normal_force_min_N": body.seen.normal_force_min,
         "min_clearance_m": record.min_clearance_m,
     }
 

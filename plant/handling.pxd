@@ -1,4 +1,5 @@
-from ranger_sim.plant.body cimport Body
+from ranger_sim.plant.body cimport HELD, SINGLE, Body
+from ranger_sim.plant.leg cimport OUTER, Leg
 from ranger_sim.plant.watch cimport fall
 
 cpdef int place(Body body, double outer_leg_rad, double hip_rad) except -1

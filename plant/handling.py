@@ -3,22 +3,20 @@
 import cython
 
 if not cython.compiled:
+    from ranger_sim.plant.body import HELD, SINGLE
+    from ranger_sim.plant.leg import OUTER, Leg
     from ranger_sim.plant.watch import fall
 
 
 def place(body, outer_leg_rad: cython.double, hip_rad: cython.double) -> None:
     """Everything at rest in the operator's hands, feet square to their legs, the hip free."""
-    body.leg_outer = outer_leg_rad
-    body.leg_inner = outer_leg_rad - hip_rad
-    body.foot_outer = body.leg_outer
-    body.foot_inner = body.leg_inner
-    body.motor_outer = 0.0
-    body.motor_inner = 0.0
-    body.foot_outer_rate = 0.0
-    body.foot_inner_rate = 0.0
-    body.leg_inner_rate = 0.0
-    body.motor_outer_rate = 0.0
-    body.motor_inner_rate = 0.0
+    leg: Leg
+    body.outer.angle = outer_leg_rad
+    body.inner.angle = outer_leg_rad - hip_rad
+    for leg in (body.outer, body.inner):
+        leg.foot_angle = leg.angle
+        leg.motor_angle = 0.0
+        leg.lie()
     hold(body, outer_leg_rad)
 
 
@@ -28,36 +26,35 @@ def hold(body, outer_leg_rad: cython.double) -> None:
     The inner leg hangs at the hip and both feet hang free, so the motors move them; the hip is 50 mm higher
     than standing (chosen by us: feet turn free of the floor).
     """
-    body.mode = 0
-    body.stance = 0
-    body.leg_outer = outer_leg_rad
-    body.leg_outer_rate = 0.0
+    leg: Leg
+    body.mode = HELD
+    body.stand_on(body.outer)
+    body.outer.angle = outer_leg_rad
+    body.outer.rate = 0.0
     body.hip_vx = 0.0
     body.hip_vy = 0.0
     body.lift()
-    body.outer_Fx = 0.0
-    body.outer_Fy = 0.0
-    body.inner_Fx = 0.0
-    body.inner_Fy = 0.0
     body.lock_hip = False
     body.standing = False
     body.cause = ""
-    body.last_strike_leg = -1
-    if body.Jf == 0.0:
-        body.limp_foot(0)
-        body.limp_foot(1)
+    body.last_strike = None
+    for leg in (body.outer, body.inner):
+        leg.Fx = 0.0
+        leg.Fy = 0.0
+        if leg.Jf == 0.0:
+            leg.limp()
     body.update_pose()
 
 
 def hold_both(body, outer_leg_rad: cython.double, hip_rad: cython.double) -> None:
     """As `hold`, and the operator keeps the inner legs at this hip angle too."""
-    body.leg_inner = outer_leg_rad - hip_rad
-    body.leg_inner_rate = 0.0
+    body.inner.angle = outer_leg_rad - hip_rad
+    body.inner.rate = 0.0
     hold(body, outer_leg_rad)
     body.lock_hip = True
 
 
-def hold_standing(body, outer_leg_rad: cython.double, hip_rad: cython.double, stance: cython.longlong = 0) -> None:
+def hold_standing(body, outer_leg_rad: cython.double, hip_rad: cython.double, stance: cython.longlong = OUTER) -> None:
     """As `hold_both`, with the stance foot on the floor under the robot's weight, where it may roll.
 
     The hands guide the legs' angles only. They also damp the rolling; 2 N m s/rad, about critical for the
@@ -65,17 +62,17 @@ def hold_standing(body, outer_leg_rad: cython.double, hip_rad: cython.double, st
     """
     hold_both(body, outer_leg_rad, hip_rad)
     body.standing = True
-    body.stance = stance
-    body.height_outer = 0.0
-    body.height_inner = 0.0
-    body.anchor(stance)
+    body.stand_on(body.leg(stance))
+    body.outer.height = 0.0
+    body.inner.height = 0.0
+    body.anchor_foot(body.stance)
     body.update_pose()
 
 
 def release(
     body,
     outer_leg_rate: cython.double,
-    stance: cython.longlong = 0,
+    stance: cython.longlong = OUTER,
     stance_foot_rate: cython.double = 0.0,
     hip_rate: cython.double = 0.0,
 ) -> None:
@@ -84,47 +81,35 @@ def release(
     hip_rate: of h, inner legs forward. When the other foot would stand in the floor the walk ends at once
     with that as its cause.
     """
-    body.mode = 1
-    body.stance = stance
-    body.leg_outer_rate = outer_leg_rate
-    body.leg_inner_rate = outer_leg_rate - hip_rate
-    if stance == 0:
-        body.foot_outer_rate = stance_foot_rate
-    else:
-        body.foot_inner_rate = stance_foot_rate
+    body.mode = SINGLE
+    body.stand_on(body.leg(stance))
+    body.outer.rate = outer_leg_rate
+    body.inner.rate = outer_leg_rate - hip_rate
+    body.stance.foot_rate = stance_foot_rate
     begin_walk(body)
 
 
 def begin_walk(body) -> None:
     """Stand on the stance foot from here on: anchors, footholds and the record start anew."""
     first: cython.double = body.floor.first_height()
-    body.mode = 1
+    leg: Leg
+    body.mode = SINGLE
     body.standing = False
-    body.height_outer = first
-    body.height_inner = first
-    body.foothold_due = True
-    body.last_strike_leg = body.stance
-    body.anchor_outer = 0.0
-    body.anchor_inner = 0.0
-    body.anchor(body.stance)
-    if body.Jf == 0.0:
-        body.limp_foot(1 - body.stance)
+    for leg in (body.outer, body.inner):
+        leg.height = first
+        leg.anchor = 0.0
+    body.last_strike = body.stance
+    body.anchor_foot(body.stance)
+    if body.swing.Jf == 0.0:
+        body.swing.limp()
     body.update_pose()
     body.update_hip_rates()
-    body.outer_armed = body.gap_outer > 1e-6
-    body.inner_armed = body.gap_inner > 1e-6
-    body.released_s = body.time_s
-    body.scuff_time_s = -1.0
-    body.passing_gap = 1.0
-    body.friction_ratio_max = 0.0
-    body.slip_s = 0.0
-    body.normal_force_min = 0.0
-    body.pull_s = 0.0
+    for leg in (body.outer, body.inner):
+        leg.armed = leg.gap > 1e-6
     body.brush = False
-    body.brushing = False
-    body.brush_s = 0.0
     body.cause = ""
+    body.seen.begin(body.time_s)
     body.record.begin(body.step_start_ns, body.contact_x(body.stance))
     body.changes += 1
-    if (body.gap_inner if body.stance == 0 else body.gap_outer) < 0.0:
+    if body.swing.gap < 0.0:
         fall(body, "put down with the swing foot in the floor")

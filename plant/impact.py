@@ -4,199 +4,189 @@
 
 import cython
 
+# C constants when compiled: the same numbers stand in the .pxd, and a test holds them together.
 if not cython.compiled:
     from math import cos, fabs, sin
 
+    from ranger_sim.plant.body import DOUBLE, FLIGHT, SINGLE
+    from ranger_sim.plant.leg import Leg
 
-def touch(body, foot: cython.longlong) -> None:
-    """The foot meets the floor: anchor it, take the impact, count a step when it strikes ahead."""
-    other: cython.longlong = 1 - foot
-    angle: cython.double = body.foot_outer if foot == 0 else body.foot_inner
+    # Columns of `Body.matrix`, and rows of `Body.solution`: what is unknown, and last the right-hand side.
+    COLUMN_VX = 0  # of the hip
+    COLUMN_VY = 1
+    COLUMN_LEG = 2  # rate of the outer, and next of the inner leg
+    COLUMN_FOOT = 4  # rate of the outer, and next of the inner foot
+    COLUMN_IMPULSE = 6  # x and y of the first foot at rest, and of the second
+    COLUMN_RIGHT = 10
+    COLUMNS = 11
+
+
+def touch(body, leg) -> None:
+    """The leg's foot meets the floor: anchor it, take the impact, count a step when it strikes ahead."""
+    before: Leg = body.stance  # the leg that stood, or stood last
+    after: Leg = body.swing
+    other: Leg = body.other(leg)
     energy: cython.double = body.energy_J()
     ahead: cython.double
     strike: cython.bint
-    set_down(body, foot)
-    ahead = body.contact_x(foot) - body.contact_x(other)
-    strike = foot != body.last_strike_leg and ahead > body.strike_ahead
-    if body.mode == 3:
-        land(body, foot)
+    set_down(body, leg)
+    ahead = body.contact_x(leg) - body.contact_x(other)
+    strike = leg is not body.last_strike and ahead > body.strike_ahead
+    if body.mode == FLIGHT:
+        land(body, leg)
     else:
-        close_linkage(body, foot)
+        close_linkage(body, leg)
     body.record.touch(
         body.event_time_ns(),
-        foot,
+        leg.side,
         strike,
         ahead,
-        body.contact_x(foot),
-        angle,
-        (body.P_stance_x, body.P_stance_y, body.P_swing_x, body.P_swing_y),
+        body.contact_x(leg),
+        leg.foot_angle,
+        (before.impulse_x, before.impulse_y, after.impulse_x, after.impulse_y),
         energy - body.energy_J(),
-        body.mode == 2,
-        body.passing_gap,
-        body.height_outer if foot == 0 else body.height_inner,
+        body.mode == DOUBLE,
+        body.seen.passing_gap,
+        leg.height,
     )
     body.changes += 1
     if strike:
-        body.passing_gap = 1.0
-        body.last_strike_leg = foot
-        body.foothold_due = True
-        body.released_s = body.time_s
+        body.seen.passing_gap = 1.0
+        body.last_strike = leg
+        body.seen.foothold_due = True
+        body.seen.released_s = body.time_s
     body.brush = False
-    if body.mode == 1 and body.Jf == 0.0:
-        body.limp_foot(other)
+    if body.mode == SINGLE and other.Jf == 0.0:
+        other.limp()
 
 
-def set_down(body, foot: cython.longlong) -> cython.void:
+def set_down(body, leg) -> cython.void:
     """The foot stands where it is, and as deep as it is when it strikes with its sole already pressed."""
-    body.anchor(foot)
-    if foot == 0:
-        body.outer_armed = False
-        body.height_outer += body.gap_outer
-    else:
-        body.inner_armed = False
-        body.height_inner += body.gap_inner
+    body.anchor_foot(leg)
+    leg.armed = False
+    leg.height += leg.gap
 
 
-def land(body, foot: cython.longlong) -> None:
-    """From flight to single stance on this foot."""
-    impact(body, foot == 0, foot == 1)
-    if foot != body.stance:
-        body.P_stance_x = 0.0
-        body.P_stance_y = 0.0
-    body.mode = 1
-    body.stance = foot
+def land(body, leg) -> None:
+    """From flight to single stance on this leg."""
+    impact(body, leg is body.outer, leg is body.inner)
+    body.mode = SINGLE
+    body.stand_on(leg)
 
 
-def close_linkage(body, foot: cython.longlong) -> None:
-    """From single to double stance with this foot, or on to it alone.
+def close_linkage(body, leg) -> None:
+    """From single to double stance with this leg, or on to it alone.
 
     The rule of the appendix keeps the trailing foot on the floor, by a pull if need be (EQUATIONS 8).
     """
+    trailing: Leg = body.other(leg)
     body.save()
     impact(body, True, True)
-    if body.P_stance_y < 0.0 and body.unilateral:
+    if body.stance.impulse_y < 0.0 and body.unilateral:
         body.restore()
-        impact(body, foot == 0, foot == 1)
-        body.mode = 1
-        if foot == 1:
-            body.outer_armed = False
-        else:
-            body.inner_armed = False
+        impact(body, leg is body.outer, leg is body.inner)
+        body.mode = SINGLE
+        trailing.armed = False
     else:
-        body.mode = 2
-    body.stance = foot
+        body.mode = DOUBLE
+    body.stand_on(leg)
 
 
 def impact(body, outer: cython.bint, inner: cython.bint) -> None:
     """Rates just after the feet named here are at rest on the floor (EQUATIONS 8).
 
-    The motors, behind their cables, keep their rates. Impulses are left in P_stance_* and P_swing_*, where
-    the stance foot is the one of `body.stance` before the impact.
+    The motors, behind their cables, keep their rates. Each leg keeps the impulse that its foot took, 0 without one.
     """
-    row: cython.longlong = 6
-    foot: cython.longlong
+    row: cython.longlong = COLUMN_IMPULSE
+    leg: Leg
     x: cython.p_double = body.solution
     write_momentum(body)
-    for foot in range(2):
-        if outer if foot == 0 else inner:
-            write_foot_at_rest(body, foot, row)
+    for leg in (body.outer, body.inner):
+        if outer if leg is body.outer else inner:
+            write_foot_at_rest(body, leg, row)
             row += 2
-        elif body.Jf == 0.0:
-            write_foot_with_motor(body, foot)
+        elif leg.Jf == 0.0:
+            write_foot_with_motor(body, leg)
     eliminate(body, row)
-    body.hip_vx = x[0]
-    body.hip_vy = x[1]
-    body.leg_outer_rate = x[2]
-    body.leg_inner_rate = x[3]
-    body.foot_outer_rate = x[4]
-    body.foot_inner_rate = x[5]
-    body.P_stance_x = 0.0
-    body.P_stance_y = 0.0
-    body.P_swing_x = 0.0
-    body.P_swing_y = 0.0
-    row = 6
-    for foot in range(2):
-        if outer if foot == 0 else inner:
-            if foot == body.stance:
-                body.P_stance_x = x[row]
-                body.P_stance_y = x[row + 1]
-            else:
-                body.P_swing_x = x[row]
-                body.P_swing_y = x[row + 1]
+    body.hip_vx = x[COLUMN_VX]
+    body.hip_vy = x[COLUMN_VY]
+    row = COLUMN_IMPULSE
+    for leg in (body.outer, body.inner):
+        leg.rate = x[COLUMN_LEG + leg.side]
+        leg.foot_rate = x[COLUMN_FOOT + leg.side]
+        leg.impulse_x = 0.0
+        leg.impulse_y = 0.0
+        if outer if leg is body.outer else inner:
+            leg.impulse_x = x[row]
+            leg.impulse_y = x[row + 1]
             row += 2
 
 
 def write_momentum(body) -> None:
     """Rows 0 ... 5 of `matrix`: what the momentum of hip, legs and feet is, and was before.
 
-    A row has 11 numbers: unknowns vx, vy, leg outer, leg inner, foot outer, foot inner, up to four impulses; last the
-    right-hand side.
+    Rows are in the order of the columns: along x, along y, of each leg about the hip, of each foot about its ankle.
     """
     row: cython.longlong
     column: cython.longlong
+    on: cython.longlong
     total: cython.double
-    Ao: cython.double = body.mc_outer * cos(body.leg_outer) + body.mw_outer * sin(body.leg_outer)
-    Bo: cython.double = body.mc_outer * sin(body.leg_outer) - body.mw_outer * cos(body.leg_outer)
-    Ai: cython.double = body.mc_inner * cos(body.leg_inner) + body.mw_inner * sin(body.leg_inner)
-    Bi: cython.double = body.mc_inner * sin(body.leg_inner) - body.mw_inner * cos(body.leg_inner)
-    before = (
-        body.hip_vx,
-        body.hip_vy,
-        body.leg_outer_rate,
-        body.leg_inner_rate,
-        body.foot_outer_rate,
-        body.foot_inner_rate,
-    )
+    A: cython.double
+    B: cython.double
+    leg: Leg
+    o: Leg = body.outer
+    i: Leg = body.inner
+    before = (body.hip_vx, body.hip_vy, o.rate, i.rate, o.foot_rate, i.foot_rate)
+    JH: cython.double = body.hip.J
     a: cython.p_double = body.matrix
     for row in range(110):
         a[row] = 0.0
-    a[0] = body.M
-    a[2] = -Ao
-    a[3] = -Ai
-    a[11 + 1] = body.M
-    a[11 + 2] = Bo
-    a[11 + 3] = Bi
-    a[22] = -Ao
-    a[22 + 1] = Bo
-    a[22 + 2] = body.J_outer + body.JH
-    a[22 + 3] = -body.JH
-    a[33] = -Ai
-    a[33 + 1] = Bi
-    a[33 + 2] = -body.JH
-    a[33 + 3] = body.J_inner + body.JH
-    a[44 + 4] = body.Jf
-    a[55 + 5] = body.Jf
-    for row in range(6):
+    a[COLUMN_VX] = body.M
+    a[COLUMNS + COLUMN_VY] = body.M
+    for leg in (o, i):
+        A = leg.mc * cos(leg.angle) + leg.mw * sin(leg.angle)
+        B = leg.mc * sin(leg.angle) - leg.mw * cos(leg.angle)
+        on = COLUMN_LEG + leg.side
+        a[on] = -A
+        a[COLUMNS + on] = B
+        a[COLUMNS * on + COLUMN_VX] = -A
+        a[COLUMNS * on + COLUMN_VY] = B
+        a[COLUMNS * on + COLUMN_LEG] = -JH
+        a[COLUMNS * on + COLUMN_LEG + 1] = -JH
+        a[COLUMNS * on + on] = leg.J + JH
+        on = COLUMN_FOOT + leg.side
+        a[COLUMNS * on + on] = leg.Jf
+    for row in range(COLUMN_IMPULSE):
         total = 0.0
-        for column in range(6):
-            total += a[11 * row + column] * before[column]
-        a[11 * row + 10] = total
+        for column in range(COLUMN_IMPULSE):
+            total += a[COLUMNS * row + column] * before[column]
+        a[COLUMNS * row + COLUMN_RIGHT] = total
 
 
-def write_foot_at_rest(body, foot: cython.longlong, row: cython.longlong) -> cython.void:
+def write_foot_at_rest(body, leg, row: cython.longlong) -> cython.void:
     """Rows `row` and the next: this foot does not move along the floor and upwards, which takes two impulses."""
     column: cython.longlong
-    angle: cython.double = body.foot_outer if foot == 0 else body.foot_inner
-    lean: cython.double = body.leg_outer if foot == 0 else body.leg_inner
-    excess: cython.double = body.excess(angle)
+    angle: cython.double = leg.foot_angle
+    excess: cython.double = leg.excess(angle)
     a: cython.p_double = body.matrix
-    a[11 * row] = 1.0
-    a[11 * row + 2 + foot] = -body.el * cos(lean)
-    a[11 * row + 4 + foot] = -(body.r * cos(excess) - body.d * cos(angle))
-    a[11 * (row + 1) + 1] = 1.0
-    a[11 * (row + 1) + 2 + foot] = body.el * sin(lean)
-    a[11 * (row + 1) + 4 + foot] = -(body.d * sin(angle) - body.r * sin(excess))
-    for column in range(6):
-        a[11 * column + row] = -a[11 * row + column]
-        a[11 * column + row + 1] = -a[11 * (row + 1) + column]
+    a[COLUMNS * row + COLUMN_VX] = 1.0
+    a[COLUMNS * row + COLUMN_LEG + leg.side] = -leg.el * cos(leg.angle)
+    a[COLUMNS * row + COLUMN_FOOT + leg.side] = -(leg.r * cos(excess) - leg.d * cos(angle))
+    a[COLUMNS * (row + 1) + COLUMN_VY] = 1.0
+    a[COLUMNS * (row + 1) + COLUMN_LEG + leg.side] = leg.el * sin(leg.angle)
+    a[COLUMNS * (row + 1) + COLUMN_FOOT + leg.side] = -(leg.d * sin(angle) - leg.r * sin(excess))
+    for column in range(COLUMN_IMPULSE):
+        a[COLUMNS * column + row] = -a[COLUMNS * row + column]
+        a[COLUMNS * column + row + 1] = -a[COLUMNS * (row + 1) + column]
 
 
-def write_foot_with_motor(body, foot: cython.longlong) -> cython.void:
+def write_foot_with_motor(body, leg) -> cython.void:
     """A massless foot in the air has no momentum of its own: it follows its motor."""
+    row: cython.longlong = COLUMN_FOOT + leg.side
     a: cython.p_double = body.matrix
-    a[11 * (4 + foot) + 4 + foot] = 1.0
-    a[11 * (4 + foot) + 2 + foot] = -1.0
-    a[11 * (4 + foot) + 10] = body.motor_outer_rate if foot == 0 else body.motor_inner_rate
+    a[COLUMNS * row + row] = 1.0
+    a[COLUMNS * row + COLUMN_LEG + leg.side] = -1.0
+    a[COLUMNS * row + COLUMN_RIGHT] = leg.motor_rate
 
 
 def eliminate(body, n: cython.longlong) -> cython.void:
@@ -212,21 +202,21 @@ def eliminate(body, n: cython.longlong) -> cython.void:
     for k in range(n):
         best = k
         for i in range(k + 1, n):
-            if fabs(a[11 * i + k]) > fabs(a[11 * best + k]):
+            if fabs(a[COLUMNS * i + k]) > fabs(a[COLUMNS * best + k]):
                 best = i
         if best != k:
-            for j in range(11):
-                held = a[11 * k + j]
-                a[11 * k + j] = a[11 * best + j]
-                a[11 * best + j] = held
+            for j in range(COLUMNS):
+                held = a[COLUMNS * k + j]
+                a[COLUMNS * k + j] = a[COLUMNS * best + j]
+                a[COLUMNS * best + j] = held
         for i in range(k + 1, n):
-            factor = a[11 * i + k] / a[11 * k + k]
+            factor = a[COLUMNS * i + k] / a[COLUMNS * k + k]
             if factor != 0.0:
                 for j in range(k, n):
-                    a[11 * i + j] -= factor * a[11 * k + j]
-                a[11 * i + 10] -= factor * a[11 * k + 10]
+                    a[COLUMNS * i + j] -= factor * a[COLUMNS * k + j]
+                a[COLUMNS * i + COLUMN_RIGHT] -= factor * a[COLUMNS * k + COLUMN_RIGHT]
     for k in range(n - 1, -1, -1):
-        factor = a[11 * k + 10]
+        factor = a[COLUMNS * k + COLUMN_RIGHT]
         for j in range(k + 1, n):
-            factor -= a[11 * k + j] * x[j]
-        x[k] = factor / a[11 * k + k]
+            factor -= a[COLUMNS * k + j] * x[j]
+        x[k] = factor / a[COLUMNS * k + k]

@@ -1,142 +1,166 @@
 # cython: cdivision=True
-# (only by a difference of event functions of opposite sign)
-"""A step of the body with the events inside it: located, and acted on where they happen (EQUATIONS 9, 15)."""
+# (only by a difference of witnesses of opposite sign)
+"""A step of the body with the events inside it: located, and acted on where they happen (EQUATIONS 9, 15).
+
+There are two events, each of a leg: its foot touches the floor, or lifts off. Each has a witness, a number that is
+above zero before and falls through zero as it happens: the clearance of a foot in the air (m), the normal force on a
+standing one (N).
+"""
 
 import cython
 
 if not cython.compiled:
     from ranger_sim.plant.air import in_air
+    from ranger_sim.plant.body import DOUBLE, FALLEN, HELD, SINGLE
     from ranger_sim.plant.impact import touch
+    from ranger_sim.plant.leg import Leg
     from ranger_sim.plant.lift_off import leave, lets_go, may_leave, sole_ready
     from ranger_sim.plant.stance import on_feet
     from ranger_sim.plant.watch import watch
+
+# C constants when compiled: the same numbers stand in the .pxd, and a test holds them together.
+if not cython.compiled:
+    # what `Body.event` says of `Body.event_leg`
+    NO_EVENT = 0
+    TOUCH = 1
+    LIFT_OFF = 2
+
+    MOST_EVENTS = 20  # in one step; what comes after is left for the next step
+    MOST_TRIES = 60  # to locate an event; a bisection needs 22
 
 
 def advance(body, h: cython.double) -> None:
     """Move on by `h` seconds under constant laws of the motors' torques, events located inside (EQUATIONS 15)."""
     remaining: cython.double = h
     used: cython.double
-    tries: cython.longlong = 0
+    pulled: cython.bint
+    pieces: cython.longlong = 0
     body.elapsed = 0.0
-    while remaining > 0.0 and body.mode != 4:
-        tries += 1
-        if body.mode != 0:  # nothing happens in the operator's hands that a step would be taken back for
+    while remaining > 0.0 and body.mode != FALLEN:
+        pieces += 1
+        if body.mode != HELD:  # nothing happens in the operator's hands that a step would be taken back for
             body.save()
-        if body.mode == 1 or body.mode == 2:
-            on_feet(body, remaining, 4)
-            if (body.outer_Fy < 0.0 or body.inner_Fy < 0.0) and tries < 20 and let_pulled_foot_go(body, remaining):
-                continue  # a foot left the floor at the start of this piece: nothing has moved yet
-        else:
-            in_air(body, remaining, 4)
-            body.update_pose()
+        move(body, remaining)
+        pulled = body.outer.Fy < 0.0 or body.inner.Fy < 0.0
+        if pulled and pieces < MOST_EVENTS and let_pulled_foot_go(body, remaining):
+            continue  # a foot left the floor at the start of this piece: nothing has moved yet
         used = remaining
-        if tries < 20 and body.mode != 0 and crossed(body) < 0.0:
+        if pieces < MOST_EVENTS and body.mode != HELD and witness(body) < 0.0:
             used = locate(body, remaining)
             body.elapsed += used
             act(body)
         else:
             body.elapsed += used
         remaining -= used
-    if body.mode == 4:
+    if body.mode == FALLEN:
         body.elapsed = h
     body.time_s += h
-    if body.mode != 0 and body.mode != 4:
+    if body.mode != HELD and body.mode != FALLEN:
         watch(body, h)
+
+
+def move(body, h: cython.double) -> None:
+    """One step of the equations of motion, in whatever mode the body is."""
+    if body.mode == SINGLE or body.mode == DOUBLE:
+        on_feet(body, h, 4)
+    else:
+        in_air(body, h, 4)
+        body.update_pose()
 
 
 def let_pulled_foot_go(body, h: cython.double) -> cython.bint:
     """Let a foot go that the floor would have to pull at the start of this piece of `h` seconds.
 
-    True when one was: then the state is that of the start.
+    True when one was: then the state is that of the start. The foot that is pulled more is asked first.
     """
-    first: cython.longlong
-    leg: cython.longlong
-    k: cython.longlong
-    force: cython.double
-    if body.mode == 1:
-        if (body.outer_Fy if body.stance == 0 else body.inner_Fy) >= 0.0:
+    first: Leg
+    second: Leg
+    if body.mode == SINGLE:
+        if body.stance.Fy >= 0.0:
             return False
-    elif body.outer_Fy >= 0.0 and body.inner_Fy >= 0.0:
+    elif body.mode != DOUBLE:
         return False
     body.restore()
     body.update_pose()
-    first = 0 if body.outer_Fy < body.inner_Fy else 1
-    for k in range(2):
-        leg = first if k == 0 else 1 - first
-        force = body.outer_Fy if leg == 0 else body.inner_Fy
-        if force < 0.0 and may_leave(body, leg) and (sole_ready(body, leg) or lets_go(body, leg)):
-            body.update_hip_rates()
-            leave(body, leg)
-            return True
+    first = body.outer if body.outer.Fy < body.inner.Fy else body.inner
+    second = body.other(first)
+    if first.Fy < 0.0 and free_to_leave(body, first):
+        body.update_hip_rates()
+        leave(body, first)
+        return True
+    if second.Fy < 0.0 and free_to_leave(body, second):
+        body.update_hip_rates()
+        leave(body, second)
+        return True
     on_feet(body, h, 4)
     return False
 
 
-def crossed(body) -> cython.double:
-    """Below 0 when an event lies behind. `event`: 1, 2 outer, inner foot touches; 3, 4 outer, inner foot leaves."""
-    value: cython.double = 1.0
-    other: cython.double
-    body.event = 0
-    if body.mode == 2:
+def clearance(leg) -> cython.double:
+    """The witness of a touch: the foot's gap, m. One that has just left the floor must first be clear of it."""
+    return leg.gap + (0.0 if leg.armed else 2e-6)
+
+
+def free_to_leave(body, leg) -> cython.bint:
+    """Whether the normal force on this foot is the witness of its lift-off: it does not stay for another reason.
+
+    A foot that is pulled and yet would not rise stays (EQUATIONS 9).
+    """
+    return may_leave(body, leg) and (leg.Fy >= 0.0 or sole_ready(body, leg) or lets_go(body, leg))
+
+
+def witness(body) -> cython.double:
+    """The witness of the event that is next; below 0 when it lies behind. `event` and `event_leg` name it."""
+    value: cython.double = 1.0  # of no event: far from one
+    body.event = NO_EVENT
+    if body.mode == DOUBLE:
         on_feet(body, 0.0, 1)
-        if may_leave(body, 0):
-            other = body.outer_Fy
-            if other >= 0.0 or sole_ready(body, 0) or lets_go(body, 0):
-                value = other
-                body.event = 3
-        if may_leave(body, 1):
-            other = body.inner_Fy
-            if other < value and (other >= 0.0 or sole_ready(body, 1) or lets_go(body, 1)):
-                value = other
-                body.event = 4
+        if free_to_leave(body, body.outer):
+            value = body.outer.Fy
+            body.event = LIFT_OFF
+            body.event_leg = body.outer
+        if body.inner.Fy < value and free_to_leave(body, body.inner):
+            value = body.inner.Fy
+            body.event = LIFT_OFF
+            body.event_leg = body.inner
         return value
-    if body.mode == 1:
-        if body.stance == 0:
-            value = body.gap_inner + (0.0 if body.inner_armed else 2e-6)
-        else:
-            value = body.gap_outer + (0.0 if body.outer_armed else 2e-6)
+    if body.mode == SINGLE:
+        value = clearance(body.swing)
         # only a foot ahead can strike; beside and behind it brushes with its sole
         if value < 0.0 and body.ahead() <= body.strike_ahead:
             return 1.0
-        body.event = 2 - body.stance  # the other foot
+        body.event = TOUCH
+        body.event_leg = body.swing
         return value
-    body.event = 1
-    value = body.gap_outer + (0.0 if body.outer_armed else 2e-6)
-    other = body.gap_inner + (0.0 if body.inner_armed else 2e-6)
-    if other < value:
-        body.event = 2
-        return other
-    return value
+    body.event = TOUCH
+    body.event_leg = body.inner if clearance(body.inner) < clearance(body.outer) else body.outer
+    return clearance(body.event_leg)
 
 
 def try_piece(body, h: cython.double) -> cython.double:
-    """The event function after a piece of `h` seconds from the saved state."""
+    """The witness after a piece of `h` seconds from the saved state."""
     body.restore()
-    if body.mode == 1 or body.mode == 2:
-        on_feet(body, h, 4)
-    else:
-        in_air(body, h, 4)
-        body.update_pose()
-    return crossed(body)
+    move(body, h)
+    return witness(body)
 
 
 def locate(body, h: cython.double) -> cython.double:
-    """Time in (0, h] at which the event function falls through 0, within 1e-10 s (Illinois method)."""
+    """Time in (0, h] at which the witness falls through 0, within 1e-10 s (Illinois method)."""
     low: cython.double = 0.0
     high: cython.double = h
     middle: cython.double
     value: cython.double
-    f_high: cython.double = crossed(body)
+    f_high: cython.double = witness(body)
     f_low: cython.double
     side: cython.longlong = 0
     tries: cython.longlong = 0
     body.restore()
     body.update_pose()
-    f_low = crossed(body)
+    f_low = witness(body)
     if f_low <= 0.0:
         # already behind at the start: it happens now
         return 0.0
-    while high - low > 1e-10 and tries < 60:
+    while high - low > 1e-10 and tries < MOST_TRIES:
         tries += 1
         middle = (low * f_high - high * f_low) / (f_high - f_low)
         if not low < middle < high:
@@ -163,11 +187,7 @@ def locate(body, h: cython.double) -> cython.double:
 def act(body) -> None:
     """Do what the located event asks for."""
     body.update_hip_rates()
-    if body.event == 1:
-        touch(body, 0)
-    elif body.event == 2:
-        touch(body, 1)
-    elif body.event == 3:
-        leave(body, 0)
-    elif body.event == 4:
-        leave(body, 1)
+    if body.event == TOUCH:
+        touch(body, body.event_leg)
+    elif body.event == LIFT_OFF:
+        leave(body, body.event_leg)

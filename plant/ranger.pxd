@@ -5,6 +5,7 @@ from ranger_sim.plant.body cimport Body
 from ranger_sim.plant.electrics cimport Electrics
 from ranger_sim.plant.imu cimport Imu
 from ranger_sim.plant.incremental_encoder cimport IncrementalEncoder
+from ranger_sim.plant.leg cimport INNER, OUTER, Leg
 from ranger_sim.plant.motion cimport advance
 from ranger_sim.plant.motor_unit cimport MotorUnit
 from ranger_sim.plant.steering cimport Steering

@@ -18,12 +18,14 @@ from ranger_sim.plant.electrics import Electrics
 from ranger_sim.plant.floor import Floor
 from ranger_sim.plant.imu import Imu
 from ranger_sim.plant.incremental_encoder import IncrementalEncoder
+from ranger_sim.plant.leg import Leg
 from ranger_sim.plant.motor_unit import MotorUnit
 from ranger_sim.plant.parameters import BodyParameters
 from ranger_sim.plant.steering import Steering
 from ranger_sim.plant.walk_record import RING
 
 if not cython.compiled:
+    from ranger_sim.plant.leg import INNER, OUTER
     from ranger_sim.plant.motion import advance
 
 STEP_NS = 250_000  # the plant's step; its error is measured in EQUATIONS 15
@@ -164,14 +166,14 @@ class RangerPlant:
         b: Body = self.body
         outer: cython.double = lean_rad if stance == "outer" else lean_rad + hip_angle_rad
         handling.place(b, outer, hip_angle_rad)
-        b.motor_outer = outer_ankle_rad - self.zero
-        b.motor_inner = inner_ankle_rad - self.zero
-        b.foot_outer = outer + b.motor_outer
-        b.foot_inner = outer - hip_angle_rad + b.motor_inner
+        b.outer.motor_angle = outer_ankle_rad - self.zero
+        b.inner.motor_angle = inner_ankle_rad - self.zero
+        b.outer.foot_angle = outer + b.outer.motor_angle
+        b.inner.foot_angle = outer - hip_angle_rad + b.inner.motor_angle
         if lifted:
             handling.hold_both(b, outer, hip_angle_rad)
         else:
-            handling.hold_standing(b, outer, hip_angle_rad, 0 if stance == "outer" else 1)
+            handling.hold_standing(b, outer, hip_angle_rad, OUTER if stance == "outer" else INNER)
         self._settle()
 
     def release(self, rate_rad_s: cython.double, hip_rate_rad_s: cython.double = 0.0) -> cython.void:
@@ -179,7 +181,7 @@ class RangerPlant:
         b: Body = self.body
         b.step_start_ns = self.time_ns
         b.elapsed = 0.0
-        handling.release(b, rate_rad_s, b.stance, rate_rad_s, hip_rate_rad_s)
+        handling.release(b, rate_rad_s, b.stance.side, rate_rad_s, hip_rate_rad_s)
         self.begin()
 
     def begin(self) -> cython.void:
@@ -192,26 +194,30 @@ class RangerPlant:
     def _settle(self) -> cython.void:
         """Sensors as if the robot had stood like this for long, from here on."""
         b: Body = self.body
+        o: Leg = b.outer
+        i: Leg = b.inner
         self.jumped = True
-        h: cython.double = b.leg_outer - b.leg_inner
-        outer: cython.double = b.foot_outer - b.leg_outer + self.zero
-        inner: cython.double = b.foot_inner - b.leg_inner + self.zero
+        h: cython.double = o.angle - i.angle
+        outer: cython.double = o.foot_angle - o.angle + self.zero
+        inner: cython.double = i.foot_angle - i.angle + self.zero
         self.hip_joint.reset(h)
         self.hip_motor.reset(h)
-        self.outer_motor.reset(b.motor_outer + self.zero)
+        self.outer_motor.reset(o.motor_angle + self.zero)
         self.outer_joint.reset(outer)
-        self.inner_motor.reset(b.motor_inner + self.zero)
+        self.inner_motor.reset(i.motor_angle + self.zero)
         self.inner_joint.reset(inner)
         self.words[0] = self.hip_word.word(h)
         self.words[1] = self.outer_word.word(outer)
         self.words[2] = self.inner_word.word(inner)
-        self.electrics.settle(b.outer_Fy > 0.0, b.outer_Fy, b.inner_Fy > 0.0, b.inner_Fy, self.steering.twist)
+        self.electrics.settle(o.Fy > 0.0, o.Fy, i.Fy > 0.0, i.Fy, self.steering.twist)
 
     # ---- passing time -----------------------------------------------------------------------------------------
 
     def step(self) -> None:
         """Integrate over [time_ns, time_ns + step_ns]; sensors then show this step."""
         b: Body = self.body
+        o: Leg = b.outer
+        i: Leg = b.inner
         e: Electrics = self.electrics
         s: Steering = self.steering
         motor: MotorUnit
@@ -219,18 +225,18 @@ class RangerPlant:
         zero: cython.double = self.zero
         t0: cython.longlong = self.time_ns
         t1: cython.longlong = t0 + self.step_ns
-        lean0: cython.double = b.leg_outer
-        lean0_rate: cython.double = b.leg_outer_rate
-        h0: cython.double = lean0 - b.leg_inner
-        h0_rate: cython.double = lean0_rate - b.leg_inner_rate
-        p0: cython.double = b.motor_outer + zero
-        p0_rate: cython.double = b.motor_outer_rate
-        n0: cython.double = b.motor_inner + zero
-        n0_rate: cython.double = b.motor_inner_rate
-        o0: cython.double = b.foot_outer - lean0 + zero
-        o0_rate: cython.double = b.foot_outer_rate - lean0_rate
-        i0: cython.double = b.foot_inner - b.leg_inner + zero
-        i0_rate: cython.double = b.foot_inner_rate - b.leg_inner_rate
+        lean0: cython.double = o.angle
+        lean0_rate: cython.double = o.rate
+        h0: cython.double = lean0 - i.angle
+        h0_rate: cython.double = lean0_rate - i.rate
+        p0: cython.double = o.motor_angle + zero
+        p0_rate: cython.double = o.motor_rate
+        n0: cython.double = i.motor_angle + zero
+        n0_rate: cython.double = i.motor_rate
+        o0: cython.double = o.foot_angle - lean0 + zero
+        o0_rate: cython.double = o.foot_rate - lean0_rate
+        i0: cython.double = i.foot_angle - i.angle + zero
+        i0_rate: cython.double = i.foot_rate - i.rate
         lean1: cython.double
         lean1_rate: cython.double
         h1: cython.double
@@ -244,23 +250,23 @@ class RangerPlant:
         e.step_motors(t0, t1, h0_rate, p0_rate, n0_rate, s.rate, self.jumped)
         self.jumped = False
         motor = self.hip
-        b.hip_drive = motor.drive_Nm
-        b.hip_coulomb = motor.coulomb_Nm
-        b.hip_viscous = motor.viscous_Nms
+        b.hip.drive = motor.drive_Nm
+        b.hip.coulomb = motor.coulomb_Nm
+        b.hip.viscous = motor.viscous_Nms
         motor = self.outer_ankle
-        b.outer_drive = motor.drive_Nm
-        b.outer_coulomb = motor.coulomb_Nm
-        b.outer_viscous = motor.viscous_Nms
+        o.drive = motor.drive_Nm
+        o.coulomb = motor.coulomb_Nm
+        o.viscous = motor.viscous_Nms
         motor = self.inner_ankle
-        b.inner_drive = motor.drive_Nm
-        b.inner_coulomb = motor.coulomb_Nm
-        b.inner_viscous = motor.viscous_Nms
+        i.drive = motor.drive_Nm
+        i.coulomb = motor.coulomb_Nm
+        i.viscous = motor.viscous_Nms
 
         b.step_start_ns = t0
         advance(b, h)
 
-        outer_stands = b.stands(0)
-        inner_stands = b.stands(1)
+        outer_stands = b.stands(o)
+        inner_stands = b.stands(i)
         motor = self.steering_motor
         s.advance(
             h,
@@ -274,24 +280,24 @@ class RangerPlant:
         )
 
         self.time_ns = t1
-        lean1 = b.leg_outer
-        lean1_rate = b.leg_outer_rate
-        h1 = lean1 - b.leg_inner
-        h1_rate = lean1_rate - b.leg_inner_rate
-        o1 = b.foot_outer - lean1 + zero
-        i1 = b.foot_inner - b.leg_inner + zero
+        lean1 = o.angle
+        lean1_rate = o.rate
+        h1 = lean1 - i.angle
+        h1_rate = lean1_rate - i.rate
+        o1 = o.foot_angle - lean1 + zero
+        i1 = i.foot_angle - i.angle + zero
         self.hip_joint.update(t0, t1, h0, h0_rate, h1, h1_rate)
         self.hip_motor.update(t0, t1, h0, h0_rate, h1, h1_rate)
-        self.outer_motor.update(t0, t1, p0, p0_rate, b.motor_outer + zero, b.motor_outer_rate)
-        self.outer_joint.update(t0, t1, o0, o0_rate, o1, b.foot_outer_rate - lean1_rate)
-        self.inner_motor.update(t0, t1, n0, n0_rate, b.motor_inner + zero, b.motor_inner_rate)
-        self.inner_joint.update(t0, t1, i0, i0_rate, i1, b.foot_inner_rate - b.leg_inner_rate)
+        self.outer_motor.update(t0, t1, p0, p0_rate, o.motor_angle + zero, o.motor_rate)
+        self.outer_joint.update(t0, t1, o0, o0_rate, o1, o.foot_rate - lean1_rate)
+        self.inner_motor.update(t0, t1, n0, n0_rate, i.motor_angle + zero, i.motor_rate)
+        self.inner_joint.update(t0, t1, i0, i0_rate, i1, i.foot_rate - i.rate)
         self.words[0] = self.hip_word.word(h1, h)
         self.words[1] = self.outer_word.word(o1, h)
         self.words[2] = self.inner_word.word(i1, h)
         if self.imu.is_due(t1):
             self.imu.update(t0, t1, lean0, lean0_rate, lean1, lean1_rate, s.yaw, (s.yaw - yaw0) / h)
-        e.sense(t0, t1, outer_stands, b.outer_Fy, inner_stands, b.inner_Fy, s.twist)
+        e.sense(t0, t1, outer_stands, o.Fy, inner_stands, i.Fy, s.twist)
         if b.changes != self.changes:
             self._note()
 
@@ -313,28 +319,30 @@ class RangerPlant:
     def fill_sample(self, row: cython.double[::1]) -> cython.void:
         """Write the values named in SAMPLES."""
         b: Body = self.body
+        o: Leg = b.outer
+        i: Leg = b.inner
         s: Steering = self.steering
         V: cython.double = self.electrics.battery.voltage_V
         row[0] = b.hip_x
         row[1] = b.hip_y
-        row[2] = b.foot_outer
-        row[3] = b.leg_outer
-        row[4] = b.leg_inner
-        row[5] = b.foot_inner
-        row[6] = b.leg_outer_rate
-        row[7] = b.leg_inner_rate
-        row[8] = b.leg_outer - b.leg_inner
-        row[9] = b.leg_outer_rate - b.leg_inner_rate
-        row[10] = b.foot_outer - b.leg_outer + self.zero
-        row[11] = b.motor_outer + self.zero
-        row[12] = b.foot_inner - b.leg_inner + self.zero
-        row[13] = b.motor_inner + self.zero
-        row[14] = b.motor_outer_rate
-        row[15] = b.motor_inner_rate
-        row[16] = b.outer_Fx
-        row[17] = b.outer_Fy
-        row[18] = b.inner_Fx
-        row[19] = b.inner_Fy
+        row[2] = o.foot_angle
+        row[3] = o.angle
+        row[4] = i.angle
+        row[5] = i.foot_angle
+        row[6] = o.rate
+        row[7] = i.rate
+        row[8] = o.angle - i.angle
+        row[9] = o.rate - i.rate
+        row[10] = o.foot_angle - o.angle + self.zero
+        row[11] = o.motor_angle + self.zero
+        row[12] = i.foot_angle - i.angle + self.zero
+        row[13] = i.motor_angle + self.zero
+        row[14] = o.motor_rate
+        row[15] = i.motor_rate
+        row[16] = o.Fx
+        row[17] = o.Fy
+        row[18] = i.Fx
+        row[19] = i.Fy
         row[20] = self.hip.current_A
         row[21] = self.outer_ankle.current_A
         row[22] = self.inner_ankle.current_A
@@ -382,7 +390,7 @@ class RangerPlant:
         at = (number - 1) % RING
         length = np.asarray(r.strike_lengths_m, dtype=float)[at]
         seconds = np.asarray(r.strike_durations_ns, dtype=np.int64)[at] * 1e-9
-        outer = np.asarray(r.strike_legs, dtype=np.int64)[at] == 0
+        outer = np.asarray(r.strike_legs, dtype=np.int64)[at] == OUTER
         return number, length, seconds, outer
 
     def recent_footholds(self):

@@ -1,92 +1,71 @@
 # cython: cdivision=True
 # (only by determinants of inertia, which are above zero)
-"""Motion on one or two feet (EQUATIONS 5, 6).
-
-One function from the state to the state after a step: its stages share some sixty numbers, and to hand these from one
-function to the next would cost more than to work them out. It reads in paragraphs: the state by the roles of the legs;
-in every stage the motors, what depends on angles alone, torques and forces, accelerations, the next stage's state; then
-the step's end, back in fixed legs.
-"""
+"""Motion on one or two feet (EQUATIONS 5, 6): the right-hand side of the equations, and a step of them (15)."""
 
 import cython
 
 if not cython.compiled:
     from math import cos, sin
 
+    from ranger_sim.plant.body import DOUBLE
     from ranger_sim.plant.friction import smoothed_sign
+    from ranger_sim.plant.leg import Leg
+    from ranger_sim.plant.parts import Ankle, HipJoint
+    from ranger_sim.plant.term_torques import TermTorques
 
 
 def on_feet(body, h: cython.double, stages: cython.longlong) -> cython.void:
     """One Runge-Kutta-Nystrom step of `h` seconds in single or double stance; stages 4, or 1 to look only.
 
-    Inside, s is the stance (reference) leg and w the other. Accelerations and floor forces of the start of
-    the step are left in the fields (EQUATIONS 5, 6); the stages' angles and rates are those of EQUATIONS 15.
-    The pose of the end, hip and gaps, is left there too.
+    Inside, s is the stance (reference) leg and w the other; numbers without a letter are those of s. Accelerations and
+    floor forces of the start of the step are left in the legs (EQUATIONS 5, 6); the stages' angles and rates are those
+    of EQUATIONS 15. The pose of the end, hip and gaps, is left there too.
+
+    One long function, because its stages share some sixty numbers: to hand these from one function to the next would
+    cost more than to work them out. It reads in paragraphs, each headed by its section of EQUATIONS: in every stage
+    torques, what depends on angles alone, forces, accelerations, the next stage's state; then the step's end.
     """
-    double_stance: cython.bint = body.mode == 2
-    outer_stance: cython.bint = body.stance == 0
-    massless: cython.bint = body.Jf == 0.0 and not double_stance
+    s: Leg = body.stance
+    w: Leg = body.swing
+    joint: HipJoint = body.hip
+    ankle: Ankle = body.ankle
+    terms: TermTorques = body.terms
+    double_stance: cython.bint = body.mode == DOUBLE
+    massless: cython.bint = w.Jf == 0.0 and not double_stance
     brush: cython.bint = body.brush and not double_stance
-    with_terms: cython.bint = body.terms is not None
-    exact_spring: cython.bint = body.exact_spring
+    with_terms: cython.bint = terms is not None
     stage: cython.longlong
     M: cython.double = body.M
-    el: cython.double = body.el
-    r: cython.double = body.r
-    d: cython.double = body.d
     gx: cython.double = body.gx
     gy: cython.double = body.gy
-    kh: cython.double = body.kh
-    ks: cython.double = body.ks
-    Jf: cython.double = body.Jf
-    JH: cython.double = body.JH
-    iJA: cython.double = body.inverse_JA
-    iJf: cython.double = body.inverse_Jf
-    heel: cython.double = body.heel
-    toe: cython.double = body.toe
-    low: cython.double = body.stop_low
-    high: cython.double = body.stop_high
+    JH: cython.double = joint.J
+    ks: cython.double = ankle.k
+    iJA: cython.double = ankle.inverse_J
     eps: cython.double = body.inverse_smoothing
-    hip_coulomb: cython.double = body.hip_coulomb
-    hip_viscous: cython.double = body.hip_viscous
-    # the state, by role
+    # the legs: lengths, feet, masses
+    el: cython.double = s.el
+    r: cython.double = s.r
+    d: cython.double = s.d
+    Jf: cython.double = s.Jf
+    mts: cython.double = s.mt
+    mws: cython.double = s.mw
+    m22: cython.double = s.m22
+    elw: cython.double = w.el
+    rw: cython.double = w.r
+    dw: cython.double = w.d
+    Jfw: cython.double = w.Jf
+    mcw: cython.double = w.mc
+    mww: cython.double = w.mw
+    i33: cython.double = w.i33
+    # the state: foot F, leg th, motor p of the stance leg; foot G, leg tw, motor n of the other one; u their rates
     body.know_angles()
-    if outer_stance:
-        F0, th0, tw0, G0 = body.foot_outer, body.leg_outer, body.leg_inner, body.foot_inner
-        p0, n0 = body.motor_outer, body.motor_inner
-        uF0, us0, uw0, uG0 = (
-            body.foot_outer_rate,
-            body.leg_outer_rate,
-            body.leg_inner_rate,
-            body.foot_inner_rate,
-        )
-        up0, un0 = body.motor_outer_rate, body.motor_inner_rate
-        sF, cF, st, ct = body.sin_foot_outer, body.cos_foot_outer, body.sin_leg_outer, body.cos_leg_outer
-        sw, cw, sG, cG = body.sin_leg_inner, body.cos_leg_inner, body.sin_foot_inner, body.cos_foot_inner
-        mts, mws, mcw, mww = body.mt_outer, body.mw_outer, body.mc_inner, body.mw_inner
-        m22, i33, Cs, Cw = body.m22_outer, body.i33_inner, body.C_outer, body.C_inner
-        hip_drive = body.hip_drive
-        s_drive, s_coulomb, s_viscous = body.outer_drive, body.outer_coulomb, body.outer_viscous
-        w_drive, w_coulomb, w_viscous = body.inner_drive, body.inner_coulomb, body.inner_viscous
-        Xs, Xw, Ys, Yw = body.anchor_outer, body.anchor_inner, body.height_outer, body.height_inner
-    else:
-        F0, th0, tw0, G0 = body.foot_inner, body.leg_inner, body.leg_outer, body.foot_outer
-        p0, n0 = body.motor_inner, body.motor_outer
-        uF0, us0, uw0, uG0 = (
-            body.foot_inner_rate,
-            body.leg_inner_rate,
-            body.leg_outer_rate,
-            body.foot_outer_rate,
-        )
-        up0, un0 = body.motor_inner_rate, body.motor_outer_rate
-        sF, cF, st, ct = body.sin_foot_inner, body.cos_foot_inner, body.sin_leg_inner, body.cos_leg_inner
-        sw, cw, sG, cG = body.sin_leg_outer, body.cos_leg_outer, body.sin_foot_outer, body.cos_foot_outer
-        mts, mws, mcw, mww = body.mt_inner, body.mw_inner, body.mc_outer, body.mw_outer
-        m22, i33, Cs, Cw = body.m22_inner, body.i33_outer, body.C_inner, body.C_outer
-        hip_drive = -body.hip_drive
-        s_drive, s_coulomb, s_viscous = body.inner_drive, body.inner_coulomb, body.inner_viscous
-        w_drive, w_coulomb, w_viscous = body.outer_drive, body.outer_coulomb, body.outer_viscous
-        Xs, Xw, Ys, Yw = body.anchor_inner, body.anchor_outer, body.height_inner, body.height_outer
+    F0, th0, tw0, G0, p0, n0 = s.foot_angle, s.angle, w.angle, w.foot_angle, s.motor_angle, w.motor_angle
+    uF0, us0, uw0, uG0, up0, un0 = s.foot_rate, s.rate, w.rate, w.foot_rate, s.motor_rate, w.motor_rate
+    sF, cF, st, ct = s.sin_foot, s.cos_foot, s.sin_leg, s.cos_leg
+    sw, cw, sG, cG = w.sin_leg, w.cos_leg, w.sin_foot, w.cos_foot
+    # h of the hip counts from the outer to the inner legs: on the stance leg it acts with that leg's sign
+    hip_sign: cython.double = s.hip_sign
+    hip_drive: cython.double = hip_sign * joint.drive
     half: cython.double = 0.5 * h
     quarter: cython.double = 0.25 * h
     sixth: cython.double = h / 6.0
@@ -106,11 +85,11 @@ def on_feet(body, h: cython.double, stages: cython.longlong) -> cython.void:
     up: cython.double = up0
     un: cython.double = un0
     for stage in range(stages):
-        # torques of the motors, first: they are calls, and before a call everything in registers is put aside
+        # EQUATIONS 2.1: motors, first of all: they are calls, and before a call everything in registers is put aside
         hd = us - uw
-        mp = s_drive - s_coulomb * smoothed_sign(up * eps) - s_viscous * up
-        mn = w_drive - w_coulomb * smoothed_sign(un * eps) - w_viscous * un
-        Th = hip_drive - hip_coulomb * smoothed_sign(hd * eps) - hip_viscous * hd
+        mp = s.drive - s.coulomb * smoothed_sign(up * eps) - s.viscous * up
+        mn = w.drive - w.coulomb * smoothed_sign(un * eps) - w.viscous * un
+        Th = hip_drive - joint.coulomb * smoothed_sign(hd * eps) - joint.viscous * hd
         if stage != 2:
             # what depends on angles alone; stages 1 and 2 look at the same ones
             if stage > 0:
@@ -123,22 +102,24 @@ def on_feet(body, h: cython.double, stages: cython.longlong) -> cython.void:
                 if stage == 3 or double_stance or brush:
                     sG = sin(G)
                     cG = cos(G)
-            # the standing chain and the mass matrix, its inverse n from two rows (EQUATIONS 4, 5.1, 5.3)
+            # EQUATIONS 5.1: first moments U, V of everything about the stance ankle, A, B of the other leg
             ls = el * st
             lc = el * ct
             Us = mts * ct - mws * st
             Vs = mts * st + mws * ct
             Aw = mcw * cw + mww * sw
             Bw = mcw * sw - mww * cw
+            # EQUATIONS 4: e and f of the standing chain
             df = d * cF
             f = d * sF
             sg = 0.0
             e = r - df
-            if F < heel or F > toe:
-                sg = F - heel if F < heel else F - toe
+            if F < s.heel or F > s.toe:
+                sg = F - s.heel if F < s.heel else F - s.toe
                 e = r * cos(sg) - df
                 f -= r * sin(sg)
                 df = -e
+            # EQUATIONS 5.2 (S) and 5.3: mass matrix m; n is the inverse of what is left of it without the leg w
             m11 = M * (e * e + f * f) + Jf
             m12 = Us * e - Vs * f
             m13 = Bw * f - Aw * e
@@ -153,26 +134,26 @@ def on_feet(body, h: cython.double, stages: cython.longlong) -> cython.void:
             n11 *= inv
             n12 *= inv
             n22 *= inv
-            # cables and hip spring (EQUATIONS 2.3, 2.4)
+            # EQUATIONS 2.3, 2.4: cables and hip spring
             pull_s = ks * (p - a_s)
             pull_w = 0.0 if massless else ks * (n - a_w)
-            spring = body.spring_torque(hip) if exact_spring else kh * hip
+            spring = joint.spring_torque(hip)
             if brush or double_stance or stage == 3:
-                # the other foot's chain, and its height above the floor
-                dfw = d * cG
-                fw = d * sG
+                # EQUATIONS 4: the other foot's chain, and its height above the floor
+                dfw = dw * cG
+                fw = dw * sG
                 gg = 0.0
-                ew = r - dfw
-                if G < heel or G > toe:
-                    gg = G - heel if G < heel else G - toe
-                    ew = r * cos(gg) - dfw
-                    fw -= r * sin(gg)
+                ew = rw - dfw
+                if G < w.heel or G > w.toe:
+                    gg = G - w.heel if G < w.heel else G - w.toe
+                    ew = rw * cos(gg) - dfw
+                    fw -= rw * sin(gg)
                     dfw = -ew
-                lsw = el * sw
-                lcw = el * cw
-                gap = (Ys - Yw) + (e - ew) + (lc - lcw)
+                lsw = elw * sw
+                lcw = elw * cw
+                gap = (s.height - w.height) + (e - ew) + (lc - lcw)
             if double_stance:
-                # columns: what a unit force on the other foot does to the three accelerations (EQUATIONS 6)
+                # EQUATIONS 6: columns, what a unit force on the other foot does to the three accelerations
                 b1 = e + t13 * lcw
                 b2 = lc + t23 * lcw
                 x1 = n22 * b1 - n12 * b2
@@ -186,67 +167,64 @@ def on_feet(body, h: cython.double, stages: cython.longlong) -> cython.void:
                 Sxx = e * x1 + lc * x2 - lcw * x3
                 Sxy = e * y1 + lc * y2 - lcw * y3
                 Syy = f * y1 - ls * y2 + lsw * y3
-                c11 = -Syy * Jf - fw * fw
-                c12 = ew * fw + Sxy * Jf
+                c11 = -Syy * Jfw - fw * fw
+                c12 = ew * fw + Sxy * Jfw
                 c13 = ew * Syy - Sxy * fw
-                c22 = -Sxx * Jf - ew * ew
+                c22 = -Sxx * Jfw - ew * ew
                 c23 = Sxx * fw - Sxy * ew
                 c33 = Sxx * Syy - Sxy * Sxy
                 idet = 1.0 / (Sxx * c11 + Sxy * c12 - ew * c13)
-                # r (F - sg) - f + l sin th, both legs
-                gap_x = (Xs - Xw) + r * ((F - sg) - (G - gg)) - (f - fw) + (ls - lsw)
+                # r (F - sg) - f + l sin th of both legs; with equal feet the rolled way is one product
+                rolled = r * ((F - sg) - (G - gg)) + (r - rw) * (G - gg)
+                gap_x = (s.anchor - w.anchor) + rolled - (f - fw) + (ls - lsw)
         us2 = us * us
         uw2 = uw * uw
         uF2 = uF * uF
-        # acceleration of the stance ankle without angular accelerations, less gravity (EQUATIONS 5.2)
+        # EQUATIONS 5.2: acceleration of the stance ankle without angular accelerations, less gravity
         ax = f * uF2 - gx
         ay = df * uF2 - gy
         Px = M * ax - Vs * us2 + Bw * uw2
         Py = M * ay - Us * us2 + Aw * uw2
-        # torques: cables with the motors behind them, stops, hip
+        # EQUATIONS 2.3, 2.4, 2.5: cables with the motors behind them, hip, stops
         Ts = pull_s
         Tw = pull_w
         mp -= Ts
         mn -= Tw
         Th -= spring
-        if a_s < low or a_s > high:
-            Ts += body.stop_torque(a_s, uF - us)
-        if a_w < low or a_w > high:
-            stop = body.stop_torque(a_w, uG - uw)
+        if a_s < ankle.low or a_s > ankle.high:
+            Ts += ankle.stop_torque(a_s, uF - us)
+        if a_w < ankle.low or a_w > ankle.high:
+            stop = ankle.stop_torque(a_w, uG - uw)
             Tw += stop
             if massless:
                 mn += stop
-        TF = Ts - Cs * uF
+        # EQUATIONS 2.6: rolling; TF and TG act on the feet, -Ts and -Tw on the legs
+        TF = Ts - s.C * uF
         TG = Tw
         if with_terms:
-            body.ask_terms(outer_stance, hip, a_s, a_w, p, n, hd, uF - us, uG - uw, up, un)
-            if outer_stance:
-                Th += body.extra_hip
-                mp += body.extra_outer_motor
-                mn += body.extra_inner_motor
-                extra_s, extra_w = body.extra_outer, body.extra_inner
-            else:
-                Th -= body.extra_hip
-                mp += body.extra_inner_motor
-                mn += body.extra_outer_motor
-                extra_s, extra_w = body.extra_inner, body.extra_outer
-            Ts += extra_s
-            TF += extra_s
-            Tw += extra_w
-            TG += extra_w
+            # EQUATIONS 12
+            Th += hip_sign * terms.torque_on_hip(hip_sign * hip, hip_sign * hd, joint.drive)
+            terms.act_on_ankle(s, a_s, uF - us, p, up)
+            terms.act_on_ankle(w, a_w, uG - uw, n, un)
+            mp += s.extra_motor
+            mn += w.extra_motor
+            Ts += s.extra_ankle
+            TF += s.extra_ankle
+            Tw += w.extra_ankle
+            TG += w.extra_ankle
             if massless:
-                mn += extra_w
-        # generalised forces on foot s, leg s, leg w (EQUATIONS 5.3)
+                mn += w.extra_ankle
+        # EQUATIONS 5.3: generalised forces on foot s, leg s, leg w
         Q1 = TF - e * Px - f * Py
         Q2 = Th - Ts - Us * ax + Vs * ay + swing * uw2
         Q3 = Aw * ax - Bw * ay - swing * us2 - Th - Tw
         Rx = 0.0
         Ry = 0.0
         if brush and gap < 0.0:
-            # the swing foot brushes the floor with its sole: normal force and sliding friction (EQUATIONS 9)
-            Ry = -body.sole_k * gap - body.sole_c * (f * uF - ls * us - fw * uG + lsw * uw)
+            # EQUATIONS 9: the swing foot brushes the floor with its sole, normal force and sliding friction
+            Ry = -body.sole.k * gap - body.sole.c * (f * uF - ls * us - fw * uG + lsw * uw)
             if Ry > 0.0:
-                Rx = -body.mu * Ry * smoothed_sign((e * uF + lc * us - ew * uG - lcw * uw) * body.sole_v)
+                Rx = -body.sole.mu * Ry * smoothed_sign((e * uF + lc * us - ew * uG - lcw * uw) * body.sole.per_m_s)
                 push = -ew * Rx - fw * Ry
                 Q1 += e * Rx + f * Ry
                 Q2 += lc * Rx - ls * Ry
@@ -257,7 +235,7 @@ def on_feet(body, h: cython.double, stages: cython.longlong) -> cython.void:
                     mn += push
             else:
                 Ry = 0.0
-        # accelerations
+        # EQUATIONS 5.3: accelerations of F_s, th_s, th_w, and of the motors
         b1 = Q1 - t13 * Q3
         b2 = Q2 - t23 * Q3
         aF = n22 * b1 - n12 * b2
@@ -266,14 +244,14 @@ def on_feet(body, h: cython.double, stages: cython.longlong) -> cython.void:
         ap = mp * iJA
         an = mn * iJA
         if double_stance:
-            # the other foot closes the linkage by its force (Rx, Ry): EQUATIONS 6
+            # EQUATIONS 6: the other foot closes the linkage by its force (Rx, Ry)
             uG2 = uG * uG
             om = body.closing_rate
             vx_ = e * uF + lc * us - ew * uG - lcw * uw
             vy_ = f * uF - ls * us - fw * uG + lsw * uw
             bx = fw * uG2 - lsw * uw2 - f * uF2 + ls * us2 - om * (2.0 * vx_ + om * gap_x)
             by = dfw * uG2 - lcw * uw2 - df * uF2 + lc * us2 - om * (2.0 * vy_ + om * gap)
-            TG -= Cw * uG
+            TG -= w.C * uG
             r1 = bx - (e * aF + lc * as_ - lcw * aw)
             r2 = by - (f * aF - ls * as_ + lsw * aw)
             r3 = -TG
@@ -284,38 +262,24 @@ def on_feet(body, h: cython.double, stages: cython.longlong) -> cython.void:
             as_ += x2 * Rx + y2 * Ry
             aw += x3 * Rx + y3 * Ry
         elif massless:
-            aG = aw + an
+            aG = aw + an  # EQUATIONS 5.4
         else:
-            aG = TG * iJf
+            aG = TG * w.inverse_Jf
         if stage == 0:
-            # force of the floor on the stance foot: rate of the whole momentum less gravity and the other foot
-            Px += M * e * aF + Us * as_ - Aw * aw - Rx
-            Py += M * f * aF - Vs * as_ + Bw * aw - Ry
-            if outer_stance:
-                body.outer_Fx = Px
-                body.outer_Fy = Py
-                body.inner_Fx = Rx
-                body.inner_Fy = Ry
-                body.foot_outer_acc = aF
-                body.leg_outer_acc = as_
-                body.leg_inner_acc = aw
-                body.foot_inner_acc = aG
-                body.motor_outer_acc = ap
-                body.motor_inner_acc = an
-            else:
-                body.inner_Fx = Px
-                body.inner_Fy = Py
-                body.outer_Fx = Rx
-                body.outer_Fy = Ry
-                body.foot_inner_acc = aF
-                body.leg_inner_acc = as_
-                body.leg_outer_acc = aw
-                body.foot_outer_acc = aG
-                body.motor_inner_acc = ap
-                body.motor_outer_acc = an
+            # EQUATIONS 5.3: force on the stance foot, rate of the whole momentum less gravity and the other foot
+            s.Fx = Px + (M * e * aF + Us * as_ - Aw * aw - Rx)
+            s.Fy = Py + (M * f * aF - Vs * as_ + Bw * aw - Ry)
+            w.Fx = Rx
+            w.Fy = Ry
+            s.foot_acc = aF
+            s.acc = as_
+            w.acc = aw
+            w.foot_acc = aG
+            s.motor_acc = ap
+            w.motor_acc = an
             if stages == 1:
                 return
-            # the next stage (EQUATIONS 15); k: first accelerations, q: sums k1 + k2 + k3
+            # EQUATIONS 15: the next stage; k: first accelerations, q: sums k1 + k2 + k3
             qF = kF = aF
             qs = ks_ = as_
             qw = kw = aw
@@ -363,64 +327,32 @@ def on_feet(body, h: cython.double, stages: cython.longlong) -> cython.void:
             uG = uG0 + c * aG
             up = up0 + c * ap
             un = un0 + c * an
-    # the step's end, in fixed legs
-    if outer_stance:
-        body.known_foot_outer, body.known_leg_outer, body.known_leg_inner, body.known_foot_inner = F, th, tw, G
-        body.sin_foot_outer, body.cos_foot_outer, body.sin_leg_outer, body.cos_leg_outer = sF, cF, st, ct
-        body.sin_leg_inner, body.cos_leg_inner, body.sin_foot_inner, body.cos_foot_inner = sw, cw, sG, cG
-    else:
-        body.known_foot_inner, body.known_leg_inner, body.known_leg_outer, body.known_foot_outer = F, th, tw, G
-        body.sin_foot_inner, body.cos_foot_inner, body.sin_leg_inner, body.cos_leg_inner = sF, cF, st, ct
-        body.sin_leg_outer, body.cos_leg_outer, body.sin_foot_outer, body.cos_foot_outer = sw, cw, sG, cG
+    # the step's end: sines of the last stage, angles, and rates by k1 + 2 k2 + 2 k3 + k4
+    s.known_foot, s.known_angle, w.known_angle, w.known_foot = F, th, tw, G
+    s.sin_foot, s.cos_foot, s.sin_leg, s.cos_leg = sF, cF, st, ct
+    w.sin_leg, w.cos_leg, w.sin_foot, w.cos_foot = sw, cw, sG, cG
     if double_stance:
         F = F0 + h * (uF0 + sixth * qF)
         th = th0 + h * (us0 + sixth * qs)
         tw = tw0 + h * (uw0 + sixth * qw)
         G = G0 + h * (uG0 + sixth * qG)
-    p = p0 + h * (up0 + sixth * qp)
-    n = n0 + h * (un0 + sixth * qn)
-    # k1 + 2 k2 + 2 k3 + k4
-    uF = uF0 + sixth * (2.0 * qF - kF + aF)
-    us = us0 + sixth * (2.0 * qs - ks_ + as_)
-    uw = uw0 + sixth * (2.0 * qw - kw + aw)
-    uG = uG0 + sixth * (2.0 * qG - kG + aG)
-    up = up0 + sixth * (2.0 * qp - kp + ap)
-    un = un0 + sixth * (2.0 * qn - kn + an)
-    if outer_stance:
-        body.foot_outer = F
-        body.leg_outer = th
-        body.leg_inner = tw
-        body.foot_inner = G
-        body.motor_outer = p
-        body.motor_inner = n
-        body.foot_outer_rate = uF
-        body.leg_outer_rate = us
-        body.leg_inner_rate = uw
-        body.foot_inner_rate = uG
-        body.motor_outer_rate = up
-        body.motor_inner_rate = un
-    else:
-        body.foot_inner = F
-        body.leg_inner = th
-        body.leg_outer = tw
-        body.foot_outer = G
-        body.motor_inner = p
-        body.motor_outer = n
-        body.foot_inner_rate = uF
-        body.leg_inner_rate = us
-        body.leg_outer_rate = uw
-        body.foot_outer_rate = uG
-        body.motor_inner_rate = up
-        body.motor_outer_rate = un
+    s.foot_angle = F
+    s.angle = th
+    w.angle = tw
+    w.foot_angle = G
+    s.motor_angle = p0 + h * (up0 + sixth * qp)
+    w.motor_angle = n0 + h * (un0 + sixth * qn)
+    s.foot_rate = uF0 + sixth * (2.0 * qF - kF + aF)
+    s.rate = us0 + sixth * (2.0 * qs - ks_ + as_)
+    w.rate = uw0 + sixth * (2.0 * qw - kw + aw)
+    w.foot_rate = uG0 + sixth * (2.0 * qG - kG + aG)
+    s.motor_rate = up0 + sixth * (2.0 * qp - kp + ap)
+    w.motor_rate = un0 + sixth * (2.0 * qn - kn + an)
     if double_stance:
         body.update_pose()
         return
-    # the geometry of stage 3 is that of the end: `update_pose` with what stands here (EQUATIONS 4)
-    body.hip_x = Xs + r * (F - sg) - f + ls
-    body.hip_y = Ys + e + lc
-    if outer_stance:
-        body.gap_outer = 0.0
-        body.gap_inner = gap
-    else:
-        body.gap_outer = gap
-        body.gap_inner = 0.0
+    # EQUATIONS 4: the geometry of stage 3 is that of the end, so this is `update_pose` with what stands here
+    body.hip_x = s.anchor + r * (F - sg) - f + ls
+    body.hip_y = s.height + e + lc
+    s.gap = 0.0
+    w.gap = gap

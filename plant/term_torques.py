@@ -30,29 +30,28 @@ if not cython.compiled:
 
     from ranger_sim.plant.friction import smoothed_sign
 
-STRIBECK = 0
-COULOMB = 1
-VISCOUS = 2
-DIRECTION = 3
-DRAG = 4
-SPRING = 5
-COGGING = 6
-COMMUTATION = 7
-TURN = 8
-STIFFENING = 9
-BACKLASH = 10
-SLACK = 11
-CABLE_DAMPING = 12
-
-# Places of a torque; the hip's motor and joint share an angle but not the gear of periodic terms.
-HIP_JOINT = 0
-HIP_MOTOR = 1
-OUTER_ANKLE = 2
-OUTER_MOTOR = 3
-INNER_ANKLE = 4
-INNER_MOTOR = 5
-OUTER_CABLE = 6
-INNER_CABLE = 7
+# C constants when compiled: the same numbers stand in the .pxd, and a test holds them together.
+if not cython.compiled:
+    # forms
+    STRIBECK = 0
+    COULOMB = 1
+    VISCOUS = 2
+    DIRECTION = 3
+    DRAG = 4
+    SPRING = 5
+    COGGING = 6
+    COMMUTATION = 7
+    TURN = 8
+    STIFFENING = 9
+    BACKLASH = 10
+    SLACK = 11
+    CABLE_DAMPING = 12
+    # Places of a torque; the hip's motor and joint share an angle but not the gear of periodic terms.
+    HIP_JOINT = 0
+    HIP_MOTOR = 1
+    ANKLE_JOINT = 2
+    ANKLE_MOTOR = 3
+    ANKLE_CABLE = 4
 
 
 class TermTorques:
@@ -66,19 +65,23 @@ class TermTorques:
         self.inverse_smoothing = 1.0 / smoothing_rad_s
         self.forms = array.array("q")
         self.places = array.array("q")
+        self.sides = array.array("q")  # OUTER or INNER, of places at an ankle
         self.parameters = array.array("d")
 
-    def add(self, form, place, parameters) -> None:
-        """Append a row; `parameters`: up to four numbers."""
+    def add(self, form, place, side, parameters) -> None:
+        """Append a row. `side`: the leg of an ankle's place, any number for the hip's; `parameters`: up to four."""
         four = list(parameters) + [0.0] * (4 - len(parameters))
         forms = array.array("q", self.forms)
         places = array.array("q", self.places)
+        sides = array.array("q", self.sides)
         numbers = array.array("d", self.parameters)
         forms.append(form)
         places.append(place)
+        sides.append(side)
         numbers.extend(four)
         self.forms = forms
         self.places = places
+        self.sides = sides
         self.parameters = numbers
         self.count += 1
 
@@ -97,14 +100,14 @@ class TermTorques:
         p2: cython.double = self.parameters[4 * i + 2]
         x: cython.double
         y: cython.double
-        if form == 0:
+        if form == STRIBECK:
             x = w / p1
             return -p0 * exp(-x * x) * smoothed_sign(w * self.inverse_smoothing)
-        if form == 1:
+        if form == COULOMB:
             return -p0 * smoothed_sign(w * self.inverse_smoothing)
-        if form == 2:
+        if form == VISCOUS:
             return -p0 * w
-        if form == 3:
+        if form == DIRECTION:
             x = smoothed_sign(w * self.inverse_smoothing)
             y = w
             if x < 0.0:
@@ -112,84 +115,69 @@ class TermTorques:
             if y < 0.0:
                 y = -y
             return -p0 * x - p1 * y
-        if form == 4:
+        if form == DRAG:
             return -p0 * w * (w if w > 0.0 else -w)
-        if form == 5:
+        if form == SPRING:
             x = q - self.parameters[4 * i + 3]
             return -x * (p0 + x * (p1 + x * p2))
-        if form == 6:
+        if form == COGGING:
             return p0 * sin(p1 * gear * q + p2)
-        if form == 7:
+        if form == COMMUTATION:
             return p0 * drive * sin(p1 * gear * q + p2)
-        if form == 8:
+        if form == TURN:
             return p0 * sin(p1 * q + p2)
-        if form == 9:
+        if form == STIFFENING:
             return p0 * q * q * q
-        if form == 10:
+        if form == BACKLASH:
             x = q
             if x > p0:
                 x = p0
             elif x < -p0:
                 x = -p0
             return -p1 * x
-        if form == 11:
+        if form == SLACK:
             return -p0 * q if q < 0.0 else 0.0
         return p0 * w
 
-    def joint_torques(
-        self,
-        body: object,
-        h: cython.double,
-        h_rate: cython.double,
-        outer: cython.double,
-        outer_rate: cython.double,
-        inner: cython.double,
-        inner_rate: cython.double,
-        outer_motor: cython.double,
-        outer_motor_rate: cython.double,
-        inner_motor: cython.double,
-        inner_motor_rate: cython.double,
-    ) -> cython.void:
-        """Set the body's five additional torques (N m) for these angles (rad) and rates (rad/s).
+    def torque_on_hip(self, h: cython.double, h_rate: cython.double, drive: cython.double) -> cython.double:
+        """Additional torque on the hip angle h (N m), at h (rad), its rate (rad/s) and the motor's drive torque."""
+        i: cython.longlong
+        total: cython.double = 0.0
+        for i in range(self.count):
+            if self.places[i] == HIP_JOINT:
+                total += self.torque(i, h, h_rate, 1.0, drive)
+            elif self.places[i] == HIP_MOTOR:
+                total += self.torque(i, h, h_rate, self.hip_gear, drive)
+        return total
 
-        Angles of ankles and ankle motors come relative to the body's zero.
+    def act_on_ankle(
+        self,
+        leg,
+        angle: cython.double,
+        rate: cython.double,
+        motor: cython.double,
+        motor_rate: cython.double,
+    ) -> None:
+        """Set the two additional torques of a leg's ankle (N m) for these angles (rad) and rates (rad/s).
+
+        Angles of ankle and ankle motor come relative to the body's zero.
         """
         i: cython.longlong
         place: cython.longlong
         T: cython.double
-        zero: cython.double = self.zero_rad
-        hip: cython.double = 0.0
-        outer_T: cython.double = 0.0
-        inner_T: cython.double = 0.0
-        outer_motor_T: cython.double = 0.0
-        inner_motor_T: cython.double = 0.0
-        hip_drive: cython.double = body.hip_drive
-        outer_drive: cython.double = body.outer_drive
-        inner_drive: cython.double = body.inner_drive
+        joint_T: cython.double = 0.0
+        motor_T: cython.double = 0.0
         for i in range(self.count):
             place = self.places[i]
-            if place == 0:
-                hip += self.torque(i, h, h_rate, 1.0, hip_drive)
-            elif place == 1:
-                hip += self.torque(i, h, h_rate, self.hip_gear, hip_drive)
-            elif place == 2:
-                outer_T += self.torque(i, outer + zero, outer_rate, 1.0, outer_drive)
-            elif place == 3:
-                outer_motor_T += self.torque(i, outer_motor + zero, outer_motor_rate, self.ankle_gear, outer_drive)
-            elif place == 4:
-                inner_T += self.torque(i, inner + zero, inner_rate, 1.0, inner_drive)
-            elif place == 5:
-                inner_motor_T += self.torque(i, inner_motor + zero, inner_motor_rate, self.ankle_gear, inner_drive)
-            elif place == 6:
-                T = self.torque(i, outer_motor - outer, outer_motor_rate - outer_rate, 1.0, outer_drive)
-                outer_T += T
-                outer_motor_T -= T
-            else:
-                T = self.torque(i, inner_motor - inner, inner_motor_rate - inner_rate, 1.0, inner_drive)
-                inner_T += T
-                inner_motor_T -= T
-        body.extra_hip = hip
-        body.extra_outer = outer_T
-        body.extra_inner = inner_T
-        body.extra_outer_motor = outer_motor_T
-        body.extra_inner_motor = inner_motor_T
+            if self.sides[i] != leg.side:
+                continue
+            if place == ANKLE_JOINT:
+                joint_T += self.torque(i, angle + self.zero_rad, rate, 1.0, leg.drive)
+            elif place == ANKLE_MOTOR:
+                motor_T += self.torque(i, motor + self.zero_rad, motor_rate, self.ankle_gear, leg.drive)
+            elif place == ANKLE_CABLE:
+                T = self.torque(i, motor - angle, motor_rate - rate, 1.0, leg.drive)
+                joint_T += T
+                motor_T -= T
+        leg.extra_ankle = joint_T
+        leg.extra_motor = motor_T

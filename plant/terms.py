@@ -22,13 +22,24 @@ from typing import Any
 from ranger_sim.foundation.numbers import reals
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.plant import term_torques as torques
+from ranger_sim.plant.leg import INNER, OUTER
 from ranger_sim.plant.wiring_points import ANALOG_NAMES, ENCODER_NAMES, WORD_NAMES
 
 MOTORS = ("hip_motor", "outer_motor", "inner_motor", "steering_motor")
 TORQUE_PLACES = ("hip_joint", "hip_motor", "outer_ankle", "outer_motor", "inner_ankle", "inner_motor")
 ROTORS = ("hip_motor", "outer_motor", "inner_motor")
 CABLES = ("outer_cable", "inner_cable")
-PLACE_NUMBER = {name: number for number, name in enumerate(TORQUE_PLACES + CABLES)}
+# place and leg of a row of plant/term_torques.py (the hip's places belong to no leg)
+ROW_PLACES = {
+    "hip_joint": (torques.HIP_JOINT, -1),
+    "hip_motor": (torques.HIP_MOTOR, -1),
+    "outer_ankle": (torques.ANKLE_JOINT, OUTER),
+    "outer_motor": (torques.ANKLE_MOTOR, OUTER),
+    "inner_ankle": (torques.ANKLE_JOINT, INNER),
+    "inner_motor": (torques.ANKLE_MOTOR, INNER),
+    "outer_cable": (torques.ANKLE_CABLE, OUTER),
+    "inner_cable": (torques.ANKLE_CABLE, INNER),
+}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -336,7 +347,7 @@ class Model:
                 if rows is None:
                     p = plant.parameters
                     rows = torques.TermTorques(p.ankle_zero_rad, p.hip_gear, p.ankle_gear, p.friction_smoothing_rad_s)
-                rows.add(term.form.torque, PLACE_NUMBER[term.at], list(term.values.values()))
+                rows.add(term.form.torque, *ROW_PLACES[term.at], list(term.values.values()))
             elif term.form.places is MOTORS:  # an encoder may have the same name
                 motors = (electrics.hip, electrics.outer_ankle, electrics.inner_ankle, electrics.steering)
                 unit = motors[MOTORS.index(term.at)]

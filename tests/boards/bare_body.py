@@ -15,7 +15,7 @@ from ranger_sim.datatable.generated import mb as table
 from ranger_sim.datatable.generated.all_variables import TABLE_SIZE
 from ranger_sim.datatable.store import DataStore
 from ranger_sim.plant import handling
-from ranger_sim.plant.body import Body
+from ranger_sim.plant.body import DOUBLE, FALLEN, HELD, SINGLE, Body
 from ranger_sim.plant.motion import advance
 
 STEP_S = 0.0005
@@ -82,10 +82,10 @@ class BareRobot:
         operator = self.controller.operator
         body = self.body
         handling.place(body, operator.lean_rad, operator.hip_angle_rad)
-        body.motor_outer = operator.outer_ankle_rad - 1.68
-        body.motor_inner = operator.inner_ankle_rad - 1.68
-        body.foot_outer = body.leg_outer + body.motor_outer
-        body.foot_inner = body.leg_inner + body.motor_inner
+        body.outer.motor_angle = operator.outer_ankle_rad - 1.68
+        body.inner.motor_angle = operator.inner_ankle_rad - 1.68
+        body.outer.foot_angle = body.outer.angle + body.outer.motor_angle
+        body.inner.foot_angle = body.inner.angle + body.inner.motor_angle
         body.update_pose()
         handling.hold_standing(body, operator.lean_rad, operator.hip_angle_rad)
 
@@ -96,7 +96,7 @@ class BareRobot:
     def contact(self, leg):
         """Counts of both sensors of a leg pair."""
         body = self.body
-        standing = body.mode == 2 or (body.mode == 1 and body.stance == leg)
+        standing = body.mode == DOUBLE or (body.mode == SINGLE and body.stance.side == leg)
         if not standing:
             self.touchdown_s[leg] = None
             return SWING_COUNTS
@@ -114,17 +114,17 @@ class BareRobot:
             MCH_ANGLE=round(body.hip_angle() / ENCODER_RAD) * ENCODER_RAD,
             MCH_ANG_RATE=self.hip.filtered_rate,
             MCH_MOTOR_VELOCITY=self.hip.filtered_rate,
-            MCFO_RIGHT_ANKLE_ANGLE=round((1.68 + body.foot_outer - body.leg_outer) / ENCODER_RAD) * ENCODER_RAD,
-            MCFI_MID_ANKLE_ANGLE=round((1.68 + body.foot_inner - body.leg_inner) / ENCODER_RAD) * ENCODER_RAD,
+            MCFO_RIGHT_ANKLE_ANGLE=round((1.68 + body.outer.foot_angle - body.outer.angle) / ENCODER_RAD) * ENCODER_RAD,
+            MCFI_MID_ANKLE_ANGLE=round((1.68 + body.inner.foot_angle - body.inner.angle) / ENCODER_RAD) * ENCODER_RAD,
             MCFO_RIGHT_ANKLE_RATE=self.outer.filtered_rate,
             MCFI_ANKLE_RATE=self.inner.filtered_rate,
-            MCFO_MOTOR_POSITION=1.68 + body.motor_outer,
-            MCFI_MOTOR_POSITION=1.68 + body.motor_inner,
+            MCFO_MOTOR_POSITION=1.68 + body.outer.motor_angle,
+            MCFI_MOTOR_POSITION=1.68 + body.inner.motor_angle,
             MCFO_LEFT_HEEL_SENSE=outer_counts,
             MCFO_RIGHT_HEEL_SENSE=outer_counts,
             MCFI_LEFT_HEEL_SENSE=inner_counts,
             MCFI_RIGHT_HEEL_SENSE=inner_counts,
-            UI_ANG_RATE_X=self.gyro_bias - body.leg_outer_rate,
+            UI_ANG_RATE_X=self.gyro_bias - body.outer.rate,
             MCH_BATT_POWER=self.hip.power_W,
             MCFO_BATT_POWER=self.outer.power_W,
             MCFI_BATT_POWER=self.inner.power_W,
@@ -143,15 +143,15 @@ class BareRobot:
             )
         for part in range(4):
             body.step_start_ns = self.slots * 2_000_000 + part * 500_000
-            body.hip_drive, body.hip_coulomb = self.hip.torque(body.hip_angle(), body.hip_rate())
-            body.outer_drive, body.outer_coulomb = self.outer.torque(1.68 + body.motor_outer, body.motor_outer_rate)
-            body.inner_drive, body.inner_coulomb = self.inner.torque(1.68 + body.motor_inner, body.motor_inner_rate)
-            body.hip_viscous = body.outer_viscous = body.inner_viscous = 0.01
+            body.hip.drive, body.hip.coulomb = self.hip.torque(body.hip_angle(), body.hip_rate())
+            for joint, leg in ((self.outer, body.outer), (self.inner, body.inner)):
+                leg.drive, leg.coulomb = joint.torque(1.68 + leg.motor_angle, leg.motor_rate)
+            body.hip.viscous = body.outer.viscous = body.inner.viscous = 0.01
             advance(body, STEP_S)
             self.hip.filter_rate(body.hip_rate())
-            self.outer.filter_rate(body.foot_outer_rate - body.leg_outer_rate)
-            self.inner.filter_rate(body.foot_inner_rate - body.leg_inner_rate)
-            if body.mode not in (0, 4):
+            self.outer.filter_rate(body.outer.foot_rate - body.outer.rate)
+            self.inner.filter_rate(body.inner.foot_rate - body.inner.rate)
+            if body.mode not in (HELD, FALLEN):
                 self.motor_energy_J += STEP_S * (self.hip.power_W + self.outer.power_W + self.inner.power_W)
         self.slots += 1
         self.time_s = self.slots * 0.002
@@ -170,6 +170,6 @@ class BareRobot:
     def walk(self, steps, limit_s) -> bool:
         """Walk until so many steps; False when the robot fell or the time was up."""
         end = self.time_s + limit_s
-        while self.body.record.steps < steps and self.time_s < end and self.body.mode != 4:
+        while self.body.record.steps < steps and self.time_s < end and self.body.mode != FALLEN:
             self.step()
         return self.body.record.steps >= steps

@@ -9,6 +9,7 @@ windows here are wide: they are those that the whole robot has to meet.
 import pytest
 
 from ranger_sim.datatable.generated import mb as table
+from ranger_sim.plant.body import FALLEN
 from ranger_sim.plant.floor import Floor
 from ranger_sim.plant.parameters import BodyParameters
 from tests.boards.bare_body import BareRobot
@@ -23,7 +24,7 @@ def robust_walk():
     robot.delays_ms = []
     end = robot.time_s + 80.0
     swing = 1
-    while robot.body.record.steps < 100 and robot.time_s < end and robot.body.mode != 4:
+    while robot.body.record.steps < 100 and robot.time_s < end and robot.body.mode != FALLEN:
         robot.step()
         modes = robot.modes
         robot.seen.update(
@@ -31,7 +32,7 @@ def robust_walk():
             for machine in (modes.leg.machine, modes.hip.machine, modes.inner_foot.machine, modes.outer_foot.machine)
         )
         if robot.body.record.steps > 5:
-            robot.angle_errors.append(robot.store.get_float(table.E_LO_ANGLE) - robot.body.leg_outer)
+            robot.angle_errors.append(robot.store.get_float(table.E_LO_ANGLE) - robot.body.outer.angle)
             if robot.store.get_int(table.E_SWING_LEG) != swing:
                 # the slot that flips the flag starts 2 ms before the time now reached
                 robot.delays_ms.append((robot.time_s - 0.002) * 1e3 - robot.body.record.strike_time_ns * 1e-6)
@@ -102,7 +103,7 @@ def test_the_wrong_sign_of_the_gyro_is_noticed_by_this_very_test():
 
     def turned_round():
         sense()
-        robot.set_ids(UI_ANG_RATE_X=-0.004 + robot.body.leg_outer_rate)
+        robot.set_ids(UI_ANG_RATE_X=-0.004 + robot.body.outer.rate)
 
     robot.sense = turned_round
     robot.start()

@@ -11,7 +11,7 @@ import math
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from ranger_sim.plant.body import Body
+from ranger_sim.plant.body import SINGLE, Body
 from ranger_sim.plant.parameters import BodyParameters
 from ranger_sim.plant.stance import on_feet
 from tests.plant import paper_model as pm
@@ -158,16 +158,16 @@ def richardson(step, x, h):
 
 def swing_state(body):
     """A step's worth of single stance without a strike: mid-swing posture, motors pulling."""
-    body.leg_outer, body.leg_inner = -0.05, 0.15
-    body.foot_outer, body.foot_inner = 0.1, 0.15 - 1.2
-    body.motor_outer, body.motor_inner = 0.17, -1.2
-    body.leg_outer_rate, body.leg_inner_rate = 0.7, -1.0
-    body.foot_outer_rate, body.foot_inner_rate = 0.9, -1.0
-    body.motor_outer_rate, body.motor_inner_rate = 0.0, 0.0
-    body.mode, body.stance = 1, 0
-    body.hip_drive, body.hip_coulomb, body.hip_viscous = 1.2, 0.22, 0.01
-    body.outer_drive, body.outer_coulomb, body.outer_viscous = 0.5, 0.15, 0.01
-    body.inner_drive, body.inner_coulomb, body.inner_viscous = 0.3, 0.13, 0.01
+    body.outer.angle, body.inner.angle = -0.05, 0.15
+    body.outer.foot_angle, body.inner.foot_angle = 0.1, 0.15 - 1.2
+    body.outer.motor_angle, body.inner.motor_angle = 0.17, -1.2
+    body.outer.rate, body.inner.rate = 0.7, -1.0
+    body.outer.foot_rate, body.inner.foot_rate = 0.9, -1.0
+    body.outer.motor_rate, body.inner.motor_rate = 0.0, 0.0
+    body.mode = SINGLE
+    body.hip.drive, body.hip.coulomb, body.hip.viscous = 1.2, 0.22, 0.01
+    body.outer.drive, body.outer.coulomb, body.outer.viscous = 0.5, 0.15, 0.01
+    body.inner.drive, body.inner.coulomb, body.inner.viscous = 0.3, 0.13, 0.01
 
 
 def swing_end(step_s, smoothing, seconds=0.1):
@@ -176,7 +176,7 @@ def swing_end(step_s, smoothing, seconds=0.1):
     swing_state(body)
     for _ in range(round(seconds / step_s)):
         on_feet(body, step_s, 4)
-    return np.array([body.foot_outer, body.leg_outer, body.leg_inner, body.foot_inner])
+    return np.array([body.outer.foot_angle, body.outer.angle, body.inner.angle, body.inner.foot_angle])
 
 
 def step_errors(steps_us=(500.0, 250.0, 125.0, 62.5, 31.25), smoothings=(0.05, 0.01)):

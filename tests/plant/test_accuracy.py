@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ranger_sim.plant import handling
-from ranger_sim.plant.body import Body
+from ranger_sim.plant.body import FLIGHT, Body
 from ranger_sim.plant.motion import advance
 from ranger_sim.plant.ranger import STEP_NS, RangerPlant
 from tests.plant import benchmarks as bm
@@ -73,17 +73,17 @@ def test_touch_is_located_inside_a_step():
     """A robot dropped from 2 mm in flight lands when free fall says so: t = sqrt(2 gap / g)."""
     body = Body()
     handling.place(body, 0.0, 0.0)
-    body.leg_outer, body.leg_inner = 0.1, -0.2
-    body.foot_outer, body.foot_inner = 0.1, -0.2
-    body.motor_outer = body.motor_inner = 0.0
-    body.hip_y = body.chain_y(body.foot_outer, body.leg_outer) + 0.002
-    body.kh = 0.0  # nothing turns: no spring, no cable stretch, centres of mass fall with the hip
-    body.mode = 3
+    body.outer.angle, body.inner.angle = 0.1, -0.2
+    body.outer.foot_angle, body.inner.foot_angle = 0.1, -0.2
+    body.outer.motor_angle = body.inner.motor_angle = 0.0
+    body.hip_y = body.outer.chain_y(body.outer.foot_angle, body.outer.angle) + 0.002
+    body.hip.k = 0.0  # nothing turns: no spring, no cable stretch, centres of mass fall with the hip
+    body.mode = FLIGHT
     body.standing = False
-    body.outer_armed = body.inner_armed = True
+    body.outer.armed = body.inner.armed = True
     body.update_pose()
     count = 0
-    while body.mode == 3:
+    while body.mode == FLIGHT:
         body.step_start_ns = count * STEP_NS
         advance(body, STEP_S)
         count += 1
@@ -122,7 +122,7 @@ def answer(writes, parts):
         for _ in range(SLOT * parts):
             plant.step()
         if slot >= HELD_SLOTS:
-            angles.append((body.foot_outer, body.leg_outer, body.leg_inner, body.foot_inner))
+            angles.append((body.outer.foot_angle, body.outer.angle, body.inner.angle, body.inner.foot_angle))
     return np.array(angles)
 
 

@@ -15,9 +15,10 @@ import pytest
 from ranger_sim.foundation.random_stream import RandomStream
 from ranger_sim.plant import handling
 from ranger_sim.plant.air import in_air
-from ranger_sim.plant.body import DOUBLE, FLIGHT, HELD, INNER, OUTER, SINGLE, Body
+from ranger_sim.plant.body import DOUBLE, FLIGHT, HELD, SINGLE, Body
 from ranger_sim.plant.floor import Floor
 from ranger_sim.plant.impact import impact
+from ranger_sim.plant.leg import INNER, OUTER
 from ranger_sim.plant.motion import advance
 from ranger_sim.plant.parameters import BodyParameters, hip_spring_torque_Nm
 from ranger_sim.plant.ranger import STEP_NS
@@ -26,21 +27,31 @@ from tests.plant import paper_model as pm
 
 STEP_S = STEP_NS * 1e-9
 
-STATE = ("foot_outer", "leg_outer", "leg_inner", "foot_inner", "motor_outer", "motor_inner")
-
 
 def set_state(body, x, v):
-    for name, value, rate in zip(STATE, x, v, strict=True):
-        setattr(body, name, float(value))
-        setattr(body, name + "_rate", float(rate))
+    """Angles and rates in the order foot outer, leg outer, leg inner, foot inner, motor outer, motor inner."""
+    o, i = body.outer, body.inner
+    o.foot_angle, o.angle, i.angle, i.foot_angle, o.motor_angle, i.motor_angle = map(float, x)
+    o.foot_rate, o.rate, i.rate, i.foot_rate, o.motor_rate, i.motor_rate = map(float, v)
 
 
 def state(body):
-    return np.array([getattr(body, n) for n in STATE]), np.array([getattr(body, n + "_rate") for n in STATE])
+    o, i = body.outer, body.inner
+    return (
+        np.array([o.foot_angle, o.angle, i.angle, i.foot_angle, o.motor_angle, i.motor_angle]),
+        np.array([o.foot_rate, o.rate, i.rate, i.foot_rate, o.motor_rate, i.motor_rate]),
+    )
 
 
 def accelerations(body):
-    return np.array([getattr(body, n + "_acc") for n in STATE])
+    o, i = body.outer, body.inner
+    return np.array([o.foot_acc, o.acc, i.acc, i.foot_acc, o.motor_acc, i.motor_acc])
+
+
+def set_random_rates(body, stream):
+    """Of both legs and feet."""
+    o, i = body.outer, body.inner
+    o.foot_rate, o.rate, i.rate, i.foot_rate = (stream.normal() for _ in range(4))
 
 
 def set_motors(body, stream):
@@ -48,8 +59,8 @@ def set_motors(body, stream):
     laws = {}
     for motor in ("hip", "outer", "inner"):
         law = (4 * stream.normal(), abs(stream.normal()), abs(0.1 * stream.normal()))
-        for name, value in zip(("drive", "coulomb", "viscous"), law, strict=True):
-            setattr(body, f"{motor}_{name}", value)
+        at = getattr(body, motor)
+        at.drive, at.coulomb, at.viscous = law
         laws[motor] = law
     return laws
 
@@ -113,12 +124,13 @@ def test_single_stance_agrees_with_the_appendix_formulation(stance):
         x[w[0]], v[w[0]] = x[w[1]] + x[w[2]], v[w[1]] + v[w[2]]  # q4 = q4m
         set_state(body, x, v)
         laws = set_motors(body, stream)
-        body.mode, body.stance = SINGLE, stance
+        body.mode = SINGLE
+        body.stand_on(body.leg(stance))
         on_feet(body, 0.0, 1)
         q, u = pm.paper_angles(x, stance), pm.paper_angles(v, stance)
         acc = pm.single_stance(p, q, u, paper_torques(laws, v, stance))
         force = pm.stance_force(p, q, u, acc)
-        ours = (body.outer_Fx, body.outer_Fy) if stance == OUTER else (body.inner_Fx, body.inner_Fy)
+        ours = (body.stance.Fx, body.stance.Fy)
         # two solutions of systems with condition numbers up to 1e5 in accelerations up to 1e4
         scale = np.abs(acc).max()
         assert accelerations(body) == pytest.approx(pm.fixed_legs(acc, stance), abs=1e-10 * scale, rel=1e-9)
@@ -127,25 +139,23 @@ def test_single_stance_agrees_with_the_appendix_formulation(stance):
 
 def closed_posture(body, stream, stance):
     """A random posture with both feet on the floor, moving with both contacts at rest."""
-    s, w = ("outer", "inner") if stance == OUTER else ("inner", "outer")
-    body.mode, body.stance = DOUBLE, stance
+    body.mode = DOUBLE
+    body.stand_on(body.leg(stance))
+    s, w = body.stance, body.swing
     lean = 0.15 + 0.15 * stream.uniform()
     feet = [0.2 * (stream.uniform() - 0.3) for _ in range(2)]
-    setattr(body, f"foot_{s}", feet[0])
-    setattr(body, f"foot_{w}", feet[1])
-    setattr(body, f"leg_{s}", -lean)
+    s.foot_angle, w.foot_angle = feet
+    s.angle = -lean
     # the lean of the other leg that puts its foot on the floor: heights are equal
-    want = body.chain_y(feet[0], -lean) - body.chain_y(feet[1], 0.0) + body.el
-    setattr(body, f"leg_{w}", math.acos(want / body.el))
-    body.motor_outer, body.motor_inner = 0.3 * stream.normal(), 0.3 * stream.normal()
-    body.motor_outer_rate, body.motor_inner_rate = stream.normal(), stream.normal()
-    body.anchor_outer = body.anchor_inner = 0.0
+    want = s.chain_y(feet[0], -lean) - w.chain_y(feet[1], 0.0) + w.el
+    w.angle = math.acos(want / w.el)
+    body.outer.motor_angle, body.inner.motor_angle = 0.3 * stream.normal(), 0.3 * stream.normal()
+    body.outer.motor_rate, body.inner.motor_rate = stream.normal(), stream.normal()
+    body.outer.anchor = body.inner.anchor = 0.0
     body.update_pose()
-    gap = body.hip_x - body.chain_x(getattr(body, f"foot_{w}"), getattr(body, f"leg_{w}"))
-    setattr(body, f"anchor_{w}", gap)
+    w.anchor = body.hip_x - w.chain_x(w.foot_angle, w.angle)
     # rates: random, then stopped by an impact of both feet
-    for name in STATE[:4]:
-        setattr(body, name + "_rate", stream.normal())
+    set_random_rates(body, stream)
     body.hip_vx, body.hip_vy = stream.normal(), stream.normal()
     impact(body, True, True)
     body.update_pose()
@@ -164,7 +174,7 @@ def test_double_stance_agrees_with_the_appendix_formulation(stance):
         q, u = pm.paper_angles(x, stance), pm.paper_angles(v, stance)
         acc, P = pm.double_stance(p, q, u, paper_torques(laws, v, stance))
         front = pm.stance_force(p, q, u, acc, P)
-        found = [(body.outer_Fx, body.outer_Fy), (body.inner_Fx, body.inner_Fy)]
+        found = [(body.outer.Fx, body.outer.Fy), (body.inner.Fx, body.inner.Fy)]
         if stance == INNER:
             found.reverse()
         # the posture is closed to 1e-15 m; condition numbers up to 1e6
@@ -181,9 +191,9 @@ def test_the_strike_agrees_with_the_appendix_formulation(stance):
     for _ in range(100):
         body = Body(MASSLESS)
         closed_posture(body, stream, 1 - stance)
-        body.mode, body.stance = SINGLE, stance
-        for name in STATE[:4]:
-            setattr(body, name + "_rate", stream.normal())
+        body.mode = SINGLE
+        body.stand_on(body.leg(stance))
+        set_random_rates(body, stream)
         body.update_hip_rates()
         x, v = state(body)
         r, rr = pm.paper_angles(x, stance), pm.paper_angles(v, stance)
@@ -193,7 +203,7 @@ def test_the_strike_agrees_with_the_appendix_formulation(stance):
         assert pm.fixed_legs(q, 1 - stance) == pytest.approx(x, abs=1e-14)
         scale = np.abs(u).max()
         assert after == pytest.approx(pm.fixed_legs(u, 1 - stance), abs=1e-9 * scale)
-        assert (body.P_stance_x, body.P_stance_y) == pytest.approx(P, abs=1e-8 * scale)
+        assert (body.stance.impulse_x, body.stance.impulse_y) == pytest.approx(P, abs=1e-8 * scale)
 
 
 # ---- Lagrange with numerical derivatives ----------------------------------------------------------------------
@@ -341,29 +351,29 @@ def to_z(body):
         [
             body.hip_x,
             body.hip_y,
-            body.leg_outer,
-            body.leg_inner,
-            body.foot_outer,
-            body.foot_inner,
-            body.motor_outer,
-            body.motor_inner,
+            body.outer.angle,
+            body.inner.angle,
+            body.outer.foot_angle,
+            body.inner.foot_angle,
+            body.outer.motor_angle,
+            body.inner.motor_angle,
         ]
     ), np.array(
         [
             body.hip_vx,
             body.hip_vy,
-            body.leg_outer_rate,
-            body.leg_inner_rate,
-            body.foot_outer_rate,
-            body.foot_inner_rate,
-            body.motor_outer_rate,
-            body.motor_inner_rate,
+            body.outer.rate,
+            body.inner.rate,
+            body.outer.foot_rate,
+            body.inner.foot_rate,
+            body.outer.motor_rate,
+            body.inner.motor_rate,
         ]
     )
 
 
 def forces(body):
-    return {OUTER: (body.outer_Fx, body.outer_Fy), INNER: (body.inner_Fx, body.inner_Fy)}
+    return {OUTER: (body.outer.Fx, body.outer.Fy), INNER: (body.inner.Fx, body.inner.Fy)}
 
 
 @pytest.mark.parametrize("stance", [OUTER, INNER])
@@ -380,7 +390,8 @@ def test_single_stance_agrees_with_numerical_lagrange(stance, foot):
         x[s] = foot + 0.02 * stream.normal()
         x[w] = x[wl] + (-1.75, 0.3, 1.6)[trial % 3]
         set_state(body, x, v)
-        body.mode, body.stance = SINGLE, stance
+        body.mode = SINGLE
+        body.stand_on(body.leg(stance))
         body.update_pose()
         body.update_hip_rates()
         on_feet(body, 0.0, 1)
@@ -465,9 +476,9 @@ def test_energy_is_kept_without_friction(mode, foot_inertia, exact_spring):
     else:
         set_state(body, (0.1, -0.05, 0.25, 0.75, 0.17, 0.5), (0.9, 0.7, 0.8, 0.5, 0.0, 0.0))
         body.mode = mode
-        for leg in (OUTER, INNER) if mode == FLIGHT else (INNER,):
+        for leg in (body.outer, body.inner) if mode == FLIGHT else (body.inner,):
             if foot_inertia == 0.0:
-                body.limp_foot(leg)
+                leg.limp()
         body.update_pose()
     before = body.energy_J()
     seconds = 0.03 if mode == DOUBLE else 0.2
@@ -488,7 +499,7 @@ def opening(seed, steps):
     for _ in range(steps):
         on_feet(body, STEP_S, 4)
         body.update_pose()
-        worst.append(abs(body.gap_inner))
+        worst.append(abs(body.inner.gap))
     return worst
 
 
@@ -518,8 +529,8 @@ def test_the_exact_hip_spring_has_the_linear_one_as_its_tangent():
     step = 1e-6
     up, down = [], []
     for sign, store in ((1, up), (-1, down)):
-        body.leg_outer = 0.2 + sign * step
-        body.motor_outer = body.foot_outer - body.leg_outer
+        body.outer.angle = 0.2 + sign * step
+        body.outer.motor_angle = body.outer.foot_angle - body.outer.angle
         body.gx = body.gy = 0.0
         store.append(body.energy_J())
     # torque of the drawing in eq. 1 is the slope of the stored energy: central difference, rounding 1e-16/1e-6

@@ -40,9 +40,9 @@ def test_the_body_feels_the_torque_law_of_its_motors():
 def test_motors_and_body_agree_about_gears_rotors_and_smoothing():
     plant = RangerPlant()
     body = plant.body
-    assert plant.hip.parameters.reflected_inertia_kg_m2 == pytest.approx(body.JH, rel=1e-15)
+    assert plant.hip.parameters.reflected_inertia_kg_m2 == pytest.approx(body.hip.J, rel=1e-15)
     for ankle in (plant.outer_ankle, plant.inner_ankle):
-        assert ankle.parameters.reflected_inertia_kg_m2 == pytest.approx(body.JA, rel=1e-15)
+        assert ankle.parameters.reflected_inertia_kg_m2 == pytest.approx(body.ankle.J, rel=1e-15)
         assert ankle.inverse_smoothing == body.inverse_smoothing
     assert plant.hip.inverse_smoothing == body.inverse_smoothing
 
@@ -58,14 +58,14 @@ def test_a_step_is_250_us_and_starts_where_the_last_one_ended():
 def test_encoders_and_words_show_the_body():
     plant, _ = walking_plant()
     body = plant.body
-    ankle = body.foot_outer - body.leg_outer + 1.68
+    ankle = body.outer.foot_angle - body.outer.angle + 1.68
     # cells: edges below the present position, pi / (lines gear) rad each
     for encoder, angle, per_edge in (
         (point.HIP_JOINT_EDGES, body.hip_angle(), math.pi / 2048),
         (point.HIP_MOTOR_EDGES, body.hip_angle(), math.pi / (192 * 66)),
-        (point.OUTER_MOTOR_EDGES, -(body.motor_outer + 1.68), math.pi / (512 * 34)),
+        (point.OUTER_MOTOR_EDGES, -(body.outer.motor_angle + 1.68), math.pi / (512 * 34)),
         (point.OUTER_ANKLE_EDGES, -ankle, math.pi / 2048),
-        (point.INNER_MOTOR_EDGES, body.motor_inner + 1.68, math.pi / (512 * 34)),
+        (point.INNER_MOTOR_EDGES, body.inner.motor_angle + 1.68, math.pi / (512 * 34)),
     ):
         cell = plant.encoders[encoder].cell
         assert cell <= angle / per_edge <= cell + 1, encoder
@@ -104,10 +104,10 @@ def test_the_gyro_sends_the_outer_legs_rate():
         plant.imu.receive_byte(plant.time_ns, byte)
     for _ in range(1_000_000 // STEP_NS):
         plant.step()
-    a_millisecond_ago = plant.body.leg_outer_rate
+    a_millisecond_ago = plant.body.outer.rate
     for _ in range(1_000_000 // STEP_NS):
         plant.step()
-    rate = plant.body.leg_outer_rate
+    rate = plant.body.outer.rate
     # bias -0.004 rad/s; the newest sample is at most 1 ms old and has noise of 4 mrad/s, of which four sigma
     tolerance = abs(rate - a_millisecond_ago) + 4 * 0.004
     assert tolerance < 0.03 < abs(rate)
@@ -126,7 +126,7 @@ def test_the_same_seed_gives_the_same_robot_and_another_seed_other_noise():
     two, _ = walking_plant(seed=5, seconds=2.5)
     three, _ = walking_plant(seed=6, seconds=2.5)
     assert list(one.analog_end) == list(two.analog_end)
-    assert one.body.leg_inner_rate == two.body.leg_inner_rate
+    assert one.body.inner.rate == two.body.inner.rate
     assert list(one.analog_end) != list(three.analog_end)
 
 
@@ -134,8 +134,9 @@ def walk_in_bits(seconds=2.6):
     """Every state of the body, all voltages and edge counts after a walk, exactly."""
     plant, _ = walking_plant(seed=3, seconds=seconds)
     body = plant.body
-    numbers = [body.leg_outer, body.leg_inner, body.foot_outer, body.foot_inner, body.hip_x, plant.battery_V]
-    numbers += [body.leg_outer_rate, body.foot_inner_rate, plant.steering.path_x, *plant.analog_end]
+    o, i = body.outer, body.inner
+    numbers = [o.angle, i.angle, o.foot_angle, i.foot_angle, body.hip_x, plant.battery_V]
+    numbers += [o.rate, i.foot_rate, plant.steering.path_x, *plant.analog_end]
     return " ".join([*(x.hex() for x in numbers), *(str(e.total) for e in plant.encoders), str(plant.strike_time_ns)])
 
 
@@ -155,7 +156,7 @@ def test_a_sample_holds_what_its_names_say():
     values = dict(zip(SAMPLES, row, strict=False))
     body = plant.body
     assert values["hip_rad"] == body.hip_angle()
-    assert values["ankle_inner_rad"] == body.foot_inner - body.leg_inner + 1.68
+    assert values["ankle_inner_rad"] == body.inner.foot_angle - body.inner.angle + 1.68
     assert values["battery_V"] == plant.battery_V
     assert values["steps"] == plant.steps
     assert values["path_x_m"] == plant.steering.path_x
@@ -198,11 +199,11 @@ def test_a_hold_takes_the_pose_asked_for():
     plant = RangerPlant()
     plant.hold("inner", 0.05, -0.3, 1.7, 2.1)
     body = plant.body
-    assert body.leg_inner == pytest.approx(0.05) and body.hip_angle() == pytest.approx(-0.3)
-    assert body.foot_inner - body.leg_inner + 1.68 == pytest.approx(2.1)
-    assert body.motor_outer + 1.68 == pytest.approx(1.7)
+    assert body.inner.angle == pytest.approx(0.05) and body.hip_angle() == pytest.approx(-0.3)
+    assert body.inner.foot_angle - body.inner.angle + 1.68 == pytest.approx(2.1)
+    assert body.outer.motor_angle + 1.68 == pytest.approx(1.7)
     plant.release(0.6)
-    assert body.leg_inner_rate == 0.6 and body.stance == 1
+    assert body.inner.rate == 0.6 and body.stance is body.inner
 
 
 # ---- steering -------------------------------------------------------------------------------------------------

@@ -6,30 +6,28 @@ import pytest
 
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.plant import terms
+from ranger_sim.plant.leg import INNER, OUTER, Leg
+from ranger_sim.plant.parameters import BodyParameters
 from ranger_sim.plant.ranger import RangerPlant
 from ranger_sim.plant.term_torques import TermTorques
 
 STEP = 125_000
 
 
-class Joints:
-    """The fields of the body that terms read and write."""
-
-    hip_drive = outer_drive = inner_drive = 0.0
-    extra_hip = extra_outer = extra_inner = extra_outer_motor = extra_inner_motor = 0.0
-
-
-def torques(form, at, body=None, state=(0.0,) * 10, **values):
+def torques(form, at, state=(0.0,) * 10, outer_drive=0.0, **values):
     """The five torques of one term at a state: h, outer, inner angle and rate, outer, inner motor angle and rate."""
     term = terms.Model([dict(form=form, at=at, **values)]).terms[0]
     rows = TermTorques(1.68, 66.0, 34.0, 0.05)
-    rows.add(term.form.torque, terms.PLACE_NUMBER[at], list(term.values.values()))
-    body = body if body is not None else Joints()
-    rows.joint_torques(body, *state)
-    return (body.extra_hip, body.extra_outer, body.extra_inner, body.extra_outer_motor, body.extra_inner_motor)
+    rows.add(term.form.torque, *terms.ROW_PLACES[at], list(term.values.values()))
+    outer, inner = Leg(OUTER, BodyParameters()), Leg(INNER, BodyParameters())
+    outer.drive = outer_drive
+    hip = rows.torque_on_hip(state[0], state[1], 0.0)
+    rows.act_on_ankle(outer, *state[2:4], *state[6:8])
+    rows.act_on_ankle(inner, *state[4:6], *state[8:10])
+    return (hip, outer.extra_ankle, inner.extra_ankle, outer.extra_motor, inner.extra_motor)
 
 
-MOVING = (0.2, 1.5, 0.3, -2.0, -0.1, 3.0, 0.35, -2.5, -0.15, 2.0)  # in the order of joint_torques
+MOVING = (0.2, 1.5, 0.3, -2.0, -0.1, 3.0, 0.35, -2.5, -0.15, 2.0)
 
 
 def test_stribeck_friction_is_largest_at_low_speed():
@@ -77,9 +75,7 @@ def test_cogging_repeats_with_the_rotor():
 
 
 def test_commutation_ripple_goes_with_the_current():
-    body = Joints()
-    body.outer_drive = 3.0
-    shown = torques("commutation_ripple", "outer_motor", body, MOVING, fraction=0.1, periods_per_turn=14)
+    shown = torques("commutation_ripple", "outer_motor", MOVING, 3.0, fraction=0.1, periods_per_turn=14)
     assert shown[3] == pytest.approx(0.3 * math.sin(14 * 34 * (0.35 + 1.68)))
 
 
@@ -123,7 +119,7 @@ def test_a_torque_term_of_zero_leaves_the_walk_as_it_is():
         plant.release(0.7)
         for _ in range(400):
             plant.step()
-        ends.append((plant.body.leg_outer, plant.body.leg_inner, plant.body.foot_inner))
+        ends.append((plant.body.outer.angle, plant.body.inner.angle, plant.body.inner.foot_angle))
     assert ends[0] == ends[1]
 
 

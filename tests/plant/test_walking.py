@@ -52,7 +52,7 @@ def test_the_robust_gait_repeats_itself_bit_for_bit():
         body = Body()
         mid_stance_start(body)
         Walker(body, PaperGait()).run(10)
-        ends.append((body.leg_outer, body.foot_inner_rate, body.hip_x, body.record.strike_time_ns))
+        ends.append((body.outer.angle, body.inner.foot_rate, body.hip_x, body.record.strike_time_ns))
     assert ends[0] == ends[1]
 
 
@@ -111,6 +111,6 @@ def test_a_robot_without_current_falls_forward_and_the_walk_ends_with_that():
     assert body.record.fell
     assert body.cause in ("fell forward", "fell backward", "legs split", "tripped")
     assert body.record.fall_cause == body.cause
-    fallen = body.leg_outer
+    fallen = body.outer.angle
     advance(body, STEP_S)
-    assert body.leg_outer == fallen and body.record.fall_time_ns > 0
+    assert body.outer.angle == fallen and body.record.fall_time_ns > 0

@@ -67,9 +67,9 @@ class Walker:
         self.ankles[0].current_A = outer
         self.ankles[1].current_A = inner
         b = self.body
-        b.hip_drive, b.hip_coulomb, b.hip_viscous = self.hip.laws()
-        b.outer_drive, b.outer_coulomb, b.outer_viscous = self.ankles[0].laws()
-        b.inner_drive, b.inner_coulomb, b.inner_viscous = self.ankles[1].laws()
+        b.hip.drive, b.hip.coulomb, b.hip.viscous = self.hip.laws()
+        b.outer.drive, b.outer.coulomb, b.outer.viscous = self.ankles[0].laws()
+        b.inner.drive, b.inner.coulomb, b.inner.viscous = self.ankles[1].laws()
 
     def obey(self):
         """The motor boards at 2 kHz, with currents that follow at once."""
@@ -77,8 +77,8 @@ class Walker:
         hip, outer, inner = self.commands
         self.set_currents(
             hip[0] - hip[1] * b.hip_angle() - hip[2] * b.hip_rate(),
-            outer[0] - outer[1] * (b.motor_outer + ZERO) - outer[2] * b.motor_outer_rate,
-            inner[0] - inner[1] * (b.motor_inner + ZERO) - inner[2] * b.motor_inner_rate,
+            outer[0] - outer[1] * (b.outer.motor_angle + ZERO) - outer[2] * b.outer.motor_rate,
+            inner[0] - inner[1] * (b.inner.motor_angle + ZERO) - inner[2] * b.inner.motor_rate,
         )
 
     @property
@@ -98,8 +98,8 @@ class Walker:
             if self.commands is not None and self.count % SLOT == 0:
                 self.obey()
             self.hip.spend(b.hip_rate(), STEP_S)
-            self.ankles[0].spend(b.motor_outer_rate, STEP_S)
-            self.ankles[1].spend(b.motor_inner_rate, STEP_S)
+            self.ankles[0].spend(b.outer.motor_rate, STEP_S)
+            self.ankles[1].spend(b.inner.motor_rate, STEP_S)
             b.step_start_ns = self.count * STEP_NS
             advance(b, STEP_S)
             self.count += 1
@@ -150,11 +150,11 @@ class PaperGait:
             self.hip_state, self.stance_state, self.swing_state = "SWING", "STANCE", "PUSH"
             self.passed = False
         if self.stance == 0:
-            phi, phi_w, phi_rate, phi_w_rate = -b.leg_outer, -b.leg_inner, -b.leg_outer_rate, -b.leg_inner_rate
-            ms, ms_rate, mw, mw_rate = b.motor_outer, b.motor_outer_rate, b.motor_inner, b.motor_inner_rate
+            phi, phi_w, phi_rate, phi_w_rate = -b.outer.angle, -b.inner.angle, -b.outer.rate, -b.inner.rate
+            ms, ms_rate, mw, mw_rate = b.outer.motor_angle, b.outer.motor_rate, b.inner.motor_angle, b.inner.motor_rate
         else:
-            phi, phi_w, phi_rate, phi_w_rate = -b.leg_inner, -b.leg_outer, -b.leg_inner_rate, -b.leg_outer_rate
-            ms, ms_rate, mw, mw_rate = b.motor_inner, b.motor_inner_rate, b.motor_outer, b.motor_outer_rate
+            phi, phi_w, phi_rate, phi_w_rate = -b.inner.angle, -b.outer.angle, -b.inner.rate, -b.outer.rate
+            ms, ms_rate, mw, mw_rate = b.inner.motor_angle, b.inner.motor_rate, b.outer.motor_angle, b.outer.motor_rate
         q3, q3_rate = phi - phi_w, phi_rate - phi_w_rate
         if not self.passed and phi < 0.0:
             self.passed = True
@@ -247,13 +247,13 @@ class RecordGait:
             self.flag = 1 - self.flag
             self.strike_s = now
         self.t_hs = (now - self.strike_s) * 1e3
-        self.lean = (b.leg_outer, b.leg_inner)
+        self.lean = (b.outer.angle, b.inner.angle)
         self.h = b.hip_angle()
         self.h_rate = self.filter.tick(b.hip_rate())
-        self.a = (b.foot_outer - b.leg_outer + ZERO, b.foot_inner - b.leg_inner + ZERO)
-        self.a_rate = (b.foot_outer_rate - b.leg_outer_rate, b.foot_inner_rate - b.leg_inner_rate)
-        self.m = (b.motor_outer + ZERO, b.motor_inner + ZERO)
-        self.published = (b.foot_outer + 1.75, b.foot_inner + 1.75)
+        self.a = (b.outer.foot_angle - b.outer.angle + ZERO, b.inner.foot_angle - b.inner.angle + ZERO)
+        self.a_rate = (b.outer.foot_rate - b.outer.rate, b.inner.foot_rate - b.inner.rate)
+        self.m = (b.outer.motor_angle + ZERO, b.inner.motor_angle + ZERO)
+        self.published = (b.outer.foot_angle + 1.75, b.inner.foot_angle + 1.75)
         self.leg_machine()
         hip = self.hip_machine()
         inner = self.foot_machine(1)
@@ -400,8 +400,8 @@ class ElectricWalker(Walker):
 
     def obey(self):
         b, plant = self.body, self.plant
-        rates = (b.hip_rate(), b.motor_outer_rate, b.motor_inner_rate)
-        places = (b.hip_angle(), b.motor_outer + ZERO, b.motor_inner + ZERO)
+        rates = (b.hip_rate(), b.outer.motor_rate, b.inner.motor_rate)
+        places = (b.hip_angle(), b.outer.motor_angle + ZERO, b.inner.motor_angle + ZERO)
         for k, (low, high, ceiling) in enumerate(((-4.0, 4.0, 250), (-1.0, 6.0, 300), (-1.0, 6.0, 300))):
             i0, stiffness, damping = self.commands[k]
             target = clip(i0 - stiffness * places[k] - damping * rates[k], low, high)
@@ -437,17 +437,17 @@ def electric_start(plant, walker, lean=0.09, rate=0.8, seconds=1.5):
 def mid_stance_start(body, leg_rate=0.62, hip_rate=2.1, stance_foot=0.0, swing_ankle=-1.3):
     """Outer leg upright and going forward, inner leg swinging forward, inner foot flipped up."""
     b = body
-    b.leg_outer = 0.0
-    b.leg_inner = 0.0
-    b.foot_outer = stance_foot
-    b.motor_outer = stance_foot
-    b.motor_inner = swing_ankle
-    b.foot_inner = b.leg_inner + swing_ankle
-    b.motor_outer_rate = 0.0
-    b.motor_inner_rate = 0.0
-    b.foot_inner_rate = leg_rate - hip_rate
+    b.outer.angle = 0.0
+    b.inner.angle = 0.0
+    b.outer.foot_angle = stance_foot
+    b.outer.motor_angle = stance_foot
+    b.inner.motor_angle = swing_ankle
+    b.inner.foot_angle = b.inner.angle + swing_ankle
+    b.outer.motor_rate = 0.0
+    b.inner.motor_rate = 0.0
+    b.inner.foot_rate = leg_rate - hip_rate
     handling.release(b, leg_rate, 0, leg_rate, hip_rate)
-    b.foothold_due = False
+    b.seen.foothold_due = False
 
 
 __all__ = [

@@ -101,7 +101,7 @@ def test_the_estimator_knows_the_leg_angle(walking):
     errors = []
     for _ in range(100):
         walking.run_for(0.02)
-        errors.append(walking.variable("E_LO_ANGLE") - walking.plant.body.leg_outer)
+        errors.append(walking.variable("E_LO_ANGLE") - walking.plant.body.outer.angle)
     # appendix 4.3: swing height to about 2 mm in 0.96 m, and steps that differ by several mrad; 30 mrad would be a
     # sign or a scale gone wrong
     assert np.max(np.abs(errors)) < 0.03
