@@ -227,10 +227,10 @@ def _measure_by_bytes(identifier: cython.longlong, lo: cython.longlong, hi: cyth
     data: cython.ulonglong = hi << 32 | lo
     byte: cython.ulonglong
     place: cython.longlong
-    for place in range(0, TABLE_BYTES, BYTES):
+    for place in range(8):
         byte = data & 0xFF
         data >>= 8
-        crc ^= CRC_OF_BYTE[place + byte]
+        crc ^= CRC_OF_BYTE[place * BYTES + byte]
         steps = STUFF[byte] >> (steps & STEP_PLACE_MASK)
         stuffed += steps & STEP_STUFFED_MASK
     steps = STUFF[crc >> 7] >> (steps & STEP_PLACE_MASK)
