@@ -3,7 +3,11 @@ from ranger_sim.boards.modules.joint_safety cimport AnkleSafety
 from ranger_sim.boards.modules.limit_switch cimport LimitSwitch
 from ranger_sim.boards.modules.quadrature_decoder cimport QuadratureDecoder
 from ranger_sim.boards.motor_board cimport MotorBoard
-from ranger_sim.foundation.numbers cimport fixed_of_float, float32, float_of_fixed
+from ranger_sim.foundation.numbers cimport fixed_of_float
+
+cpdef enum:
+    LEFT_FOOT = 2
+    RIGHT_FOOT = 3
 
 cdef class AnkleBoard(MotorBoard):
     cdef public QuadratureDecoder joint
@@ -11,6 +15,6 @@ cdef class AnkleBoard(MotorBoard):
     cdef public FootContact left_foot, right_foot
     cdef public LimitSwitch left_switch, right_switch
     cdef public long long rezero_share, rezero_angle, rezero_rate
-    cdef public long long id_right_hs, id_left_hs, id_right_heel_sense, id_left_heel_sense
-    cdef public long long id_right_ls, id_left_ls, id_ankle_angle, id_ankle_rate
     cpdef int set_start_values(self) except -1
+    cpdef long long right_heel_sense(self) noexcept
+    cpdef long long left_heel_sense(self) noexcept

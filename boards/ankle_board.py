@@ -14,7 +14,7 @@ from ranger_sim.boards.motor_board import PINS, MotorBoard
 from ranger_sim.datatable.generated import errors as codes
 
 if not cython.compiled:
-    from ranger_sim.foundation.numbers import fixed_of_float, float32, float_of_fixed
+    from ranger_sim.foundation.numbers import fixed_of_float
 
 # (place, multiplexer code, gain code): differential 4-5 and 2-3 times 2, single-ended 0 and 1 times 1
 SEQUENCE = (
@@ -23,6 +23,10 @@ SEQUENCE = (
     ("left_foot", 8, 0),
     ("right_foot", 9, 0),
 )
+if not cython.compiled:
+    # places in SEQUENCE
+    LEFT_FOOT = 2
+    RIGHT_FOOT = 3
 LIMITS = dict(
     target_min=-1.0,
     target_max=6.0,
@@ -88,18 +92,13 @@ class AnkleBoard(MotorBoard):
             self.left_switch,
             self.right_switch,
             self.current_control,
-            self.leds,
+            self.heartbeat,
             self.errors,
             getattr(codes, board + "_ANKL_LS"),
             getattr(codes, board + "_CBL_STRCH"),
             getattr(codes, board + "_ANKL_LO"),
             getattr(codes, board + "_ANKL_HI"),
         )
-        for field in ("RIGHT_HS", "LEFT_HS", "RIGHT_HEEL_SENSE", "LEFT_HEEL_SENSE", "RIGHT_LS", "LEFT_LS"):
-            setattr(self, "id_" + field.lower(), getattr(table, f"{board}_{field}"))
-        # set by the rooms, whose ankles have different names
-        self.id_ankle_angle = -1
-        self.id_ankle_rate = -1
 
     def set_start_values(self) -> None:
         """Both incremental encoders start at the absolute angle."""
@@ -110,35 +109,21 @@ class AnkleBoard(MotorBoard):
         """ls_update: both limit switches and both feet, with the newest converter results."""
         self.left_switch.read()
         self.right_switch.read()
-        self.right_foot.read(self.adc_external.results[3])
-        self.left_foot.read(self.adc_external.results[2])
+        self.right_foot.read(self.adc_external.results[RIGHT_FOOT])
+        self.left_foot.read(self.adc_external.results[LEFT_FOOT])
 
-    def rezero(self) -> None:
+    def motor_encoder_rezero(self) -> None:
         """Motor encoder towards the ankle, only while the foot rests near its upper stop."""
         rate: cython.longlong = self.joint.rate
         if self.encoder.angle < self.rezero_angle and -self.rezero_rate < rate < self.rezero_rate:
             self.rezero_motor(self.rezero_share)
 
-    def send_ankle_angle(self) -> None:
-        self.can.send_float(self.id_ankle_angle, float32(self.encoder.angle_rad()))
+    # --- what is published ------------------------------------------------------------------------------
 
-    def send_ankle_rate(self) -> None:
-        self.can.send_float(self.id_ankle_rate, float_of_fixed(self.joint.rate))
+    def right_heel_sense(self) -> cython.longlong:
+        """Counts of the right foot's sensor."""
+        return self.adc_external.results[RIGHT_FOOT]
 
-    def send_right_heel_sense(self) -> None:
-        self.can.send_float(self.id_right_heel_sense, self.adc_external.results[3])
-
-    def send_left_heel_sense(self) -> None:
-        self.can.send_float(self.id_left_heel_sense, self.adc_external.results[2])
-
-    def send_right_contact(self) -> None:
-        self.can.send_float(self.id_right_hs, self.right_foot.state)
-
-    def send_left_contact(self) -> None:
-        self.can.send_float(self.id_left_hs, self.left_foot.state)
-
-    def send_right_switch(self) -> None:
-        self.can.send_float(self.id_right_ls, self.right_switch.state)
-
-    def send_left_switch(self) -> None:
-        self.can.send_float(self.id_left_ls, self.left_switch.state)
+    def left_heel_sense(self) -> cython.longlong:
+        """Counts of the left foot's sensor."""
+        return self.adc_external.results[LEFT_FOOT]

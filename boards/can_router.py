@@ -8,35 +8,44 @@ main loop moves frames whenever no slot runs: run the scheduler, then four times
 
 import cython
 
+from ranger_sim.boards.firmware_board import ALL_CAN_INTERRUPTS, FirmwareBoard
+from ranger_sim.boards.modules.can_errors import CanErrors
 from ranger_sim.boards.modules.can_load import CanLoad
-from ranger_sim.boards.modules.error_module import ErrorModule
 from ranger_sim.boards.modules.mcu_led import Heartbeat
 from ranger_sim.boards.modules.network_clock import CYCLES_PER_SYNC, NetworkClock
 from ranger_sim.boards.modules.network_time import NetworkTime
+from ranger_sim.boards.modules.publishing import Send, laid_out
 from ranger_sim.boards.modules.routing import Router, RoutingTable
+from ranger_sim.boards.modules.sender import Sender
 from ranger_sim.boards.modules.ssp_link import RouterSspLink
 from ranger_sim.datatable.generated import csr as table
 from ranger_sim.datatable.generated import errors as codes
 from ranger_sim.datatable.generated import routes
-from ranger_sim.firmware_sim.microcontroller import Microcontroller
 from ranger_sim.firmware_sim.peripherals.adc_internal import AdcInternal
-from ranger_sim.firmware_sim.peripherals.can_controller import (
-    ICR_BEI,
-    ICR_DOI,
-    ICR_EI,
-    ICR_EPI,
-    ICR_RI,
-    CanController,
-)
+from ranger_sim.firmware_sim.peripherals.can_controller import CanController
 from ranger_sim.firmware_sim.peripherals.gpio import Gpio
 from ranger_sim.firmware_sim.peripherals.ssp import SspPort, SspSegment
 from ranger_sim.firmware_sim.peripherals.timer_capture import TimerCapture
-from ranger_sim.firmware_sim.scheduler import Occasional, Schedule, Task
+from ranger_sim.firmware_sim.scheduler import Schedule, Task
 from ranger_sim.firmware_sim.vic import FIQ, TIMER_MATCH
 from ranger_sim.foundation.events import CAN_RX, CAN_STATUS, SSP_SEGMENT
 
 if not cython.compiled:
-    from ranger_sim.foundation.numbers import float32, word_of_float
+    from ranger_sim.boards.modules.can_link import EIGHT_BYTES, FIRST_BUFFER, RFS_EIGHT_BYTES, SECOND_BUFFER
+    from ranger_sim.boards.modules.routing import TO_SEND, TRANSMIT_MASK, TRANSMIT_RING
+    from ranger_sim.boards.modules.ssp_link import SEGMENT_HALF_WORDS
+    from ranger_sim.foundation.numbers import float32
+
+    BUSES = 4
+    MOD_RESET = 1  # CxMOD: in reset mode
+    IR_MR0 = 1  # T1IR: the match that restarts the timer
+    # lights of a bus, and from how many frames per ms on they show it (robot.md N1.10)
+    LED_OFF = 0
+    LED_TRAFFIC = 1
+    LED_WARNING = 2
+    LED_FULL = 3
+    WARNING_FRAMES_PER_MS = 20
+    FULL_FRAMES_PER_MS = 30
 
 # Cycles of the interrupts and of the main loop, chosen by us, because no cycle count of this firmware is
 # known; each is an estimate of instructions and of accesses over the slow peripheral bus.
@@ -49,15 +58,15 @@ ROUTE_IDLE_CYCLES = 60  # three empty rings looked at
 ROUTE_FRAME_CYCLES = 220  # table, learning, one push
 FLUSH_IDLE_CYCLES = 25
 FLUSH_FRAME_CYCLES = 110  # status, four registers, command
+ERROR_CYCLES = 150  # the capture registers of four controllers
 LOOP_CYCLES = 20  # the scheduler's look at its flag, once per turn of four
+ERROR_SLOT = 10  # of the VIC (robot.md N4.16)
+SEGMENT_PERIOD_CYCLES = 12_000  # of Timer1: 200 us
 # Supply of the electronics (robot.md N5): ten-bit readings, gain and offset
 CURRENT_GAIN_A, CURRENT_OFFSET = 0.000501, 6
 VOLTAGE_GAIN_V, VOLTAGE_OFFSET = 0.03046, 5
 # Places on `chip.analog`, in volts at the converter's input: AIN0 and AIN1.
 ANALOG = {"supply_current": 0, "supply_voltage": 1}
-WARNING_FRAMES_PER_MS = 20  # robot.md N1.10
-FULL_FRAMES_PER_MS = 30
-LED_OFF, LED_TRAFFIC, LED_WARNING, LED_FULL = 0, 1, 2, 3
 
 
 def supply_pins_V(current_A, voltage_V):
@@ -79,61 +88,68 @@ class BusReceiver:
     def on_frame(self, queue) -> None:
         """Copy the older receive buffer and release it."""
         controller: CanController = self.controller
-        flags: cython.longlong = 8
+        flags: cython.longlong = EIGHT_BYTES
         if controller.rx_count == 0:
             return
-        if controller.RFS != 524288:  # anything but eight bytes of an ordinary frame
+        if controller.RFS != RFS_EIGHT_BYTES:
             flags = (controller.RFS >> 16 & 15) | (controller.RFS >> 30 & 1) << 4
         self.router.receive(controller.number, controller.RID, flags, controller.RDA, controller.RDB)
         controller.release()
 
 
-class CanRouterBoard(Microcontroller):
+class OwnFrames(Sender):
+    """The router's own variables, stamped with its own time, into its own ring. `lost`: frames that found it full."""
+
+    def __init__(self, router: Router, time: NetworkTime, report, report_full) -> None:
+        Sender.__init__(self, time)
+        self.router = router
+        self.report = report
+        self.report_full = report_full
+        self.lost = 0
+
+    def send_words(
+        self, identifier: cython.longlong, value_word: cython.longlong, time_word: cython.longlong
+    ) -> cython.bint:
+        """A frame into the ring; False when it is lost."""
+        if self.router.send(identifier, value_word, time_word):
+            return True
+        self.lost += 1
+        if self.report_full:
+            self.report(codes.CAN_TX_QUEUE_FULL)
+        return False
+
+
+class CanRouterBoard(FirmwareBoard):
     """Slots of 1 ms, 10 rows. `phase_ns`: when its program starts; the first sync comes 1 ms later."""
 
     def __init__(self, crystal, quirks, phase_ns=0) -> None:
-        Microcontroller.__init__(self, "CSR", table.CLOCK_HZ, crystal)
-        self.quirks = quirks
-        self.code_dnf = codes.ASCHED_DNF
-        self.code_near_limit = codes.SCHED_SLOT_NEAR_LIMIT
-        self.code_task_limit = codes.SCHED_TASK_LIMIT
-        self.code_queue_full = codes.CAN_TX_QUEUE_FULL
-        self.errors_one_late = quirks.errors_reported_one_late
-        self.report_full = quirks.full_queues_reported
-        self.error_before = codes.DEFAULT
+        board: object = self  # a compiled class would hand out wrappers of inherited methods
+        FirmwareBoard.__init__(self, table, crystal, quirks, quirks.errors_reported_one_late)
         self.lost_before = 0
 
-        self.time = NetworkTime()
-        self.errors = ErrorModule(
-            table.BOARD_NUMBER, self.time, quirks.errors_counted_per_event, quirks.new_errors_lost_after_repeat
-        )
         self.gpio = Gpio(self)
-        self.leds = self.heartbeat = Heartbeat(self.time, self.gpio, 1000)
+        self.heartbeat = Heartbeat(self.time, self.gpio, table.SLOT_US)
         self.adc = AdcInternal(self, clkdiv=182)
-        interrupts = ICR_RI | ICR_EI | ICR_DOI | ICR_EPI | ICR_BEI
-        self.can1 = CanController(self, 1, IER=interrupts)
-        self.can2 = CanController(self, 2, IER=interrupts)
-        self.can3 = CanController(self, 3, IER=interrupts)
-        self.can4 = CanController(self, 4, IER=interrupts)
+        self.can1 = CanController(self, 1, IER=ALL_CAN_INTERRUPTS)
+        self.can2 = CanController(self, 2, IER=ALL_CAN_INTERRUPTS)
+        self.can3 = CanController(self, 3, IER=ALL_CAN_INTERRUPTS)
+        self.can4 = CanController(self, 4, IER=ALL_CAN_INTERRUPTS)
         self.controllers = [self.can1, self.can2, self.can3, self.can4]
         self.ssp = SspPort(self, 0)
-        self.timer1 = TimerCapture(self, 1, period=12000, phase_ns=phase_ns, match_interrupt=True)
+        self.timer1 = TimerCapture(self, 1, period=SEGMENT_PERIOD_CYCLES, phase_ns=phase_ns, match_interrupt=True)
         self.load = CanLoad()
         self.clock = NetworkClock(self.time, self.controllers, self.load)
-        self.link = RouterSspLink(self.report, quirks.ssp_frames_may_straddle)
+        self.link = RouterSspLink(board.report, quirks.ssp_frames_may_straddle)
         self.router = Router(
             RoutingTable(enumerate(routes.DESTINATIONS)),
             self.link,
             self.load,
-            self.report,
+            board.report,
             quirks.router_one_frame_lag,
         )
         self.can_leds = [0] * 5
-        self.own_lost = 0
-
-        # bus-off, warning, overrun, passive, error while receiving, while sending; per controller
-        kinds = ("TX_BUSOFF", "ERR_WARN", "DATA_OVRN", "ERR_PASS", "BUS_RX", "BUS_TX")
-        self.error_codes = [[getattr(codes, f"CAN{n}_{kind}") for kind in kinds] for n in (1, 2, 3, 4)]
+        self.own = OwnFrames(self.router, self.time, board.report, quirks.full_queues_reported)
+        self.can_errors = [CanErrors(controller, board.report) for controller in self.controllers]
         errors_line = self.vic.source(CAN_STATUS, 0)  # the chip has one error line for all controllers
         for controller in self.controllers:
             controller.error_source = errors_line
@@ -145,20 +161,15 @@ class CanRouterBoard(Microcontroller):
             number = controller.number
             receiver: object = BusReceiver(controller, self.router)
             attach(CAN_RX, number, receiver.on_frame, RECEIVE_CYCLES, slot=FIQ, name=f"can{number} receive")
-        attach(CAN_STATUS, 0, self.on_can_error, 150, slot=10, name="can error")
-
-        self.on_overrun = self.slot_exceeded
-        if quirks.warn_near_slot_limit:
-            self.on_limit = self.task_limit
-            self.on_near_limit = self.slot_near_limit
+        attach(CAN_STATUS, 0, self.on_can_error, ERROR_CYCLES, slot=ERROR_SLOT, name="can error")
 
         # ns that a turn takes by the frames it moves: one each from three sources; into two transmit buffers
         route_cycles = [ROUTE_IDLE_CYCLES + ROUTE_FRAME_CYCLES * moved for moved in range(4)]
         flush_cycles = [FLUSH_IDLE_CYCLES + FLUSH_FRAME_CYCLES * moved for moved in range(3)]
         self.route_ns = [int(cycles * self.ns_per_cycle) for cycles in route_cycles]
         self.flush_ns = [int(cycles * self.ns_per_cycle) for cycles in flush_cycles]
-        self.sync_cycles = 4 * CYCLES_PER_SYNC
-        self.pair_ns = int((ROUTE_IDLE_CYCLES + FLUSH_IDLE_CYCLES + LOOP_CYCLES // 4) * self.ns_per_cycle)
+        self.sync_cycles = BUSES * CYCLES_PER_SYNC
+        self.pair_ns = int((ROUTE_IDLE_CYCLES + FLUSH_IDLE_CYCLES + LOOP_CYCLES // BUSES) * self.ns_per_cycle)
         self.idle = True
         self.idle_since = phase_ns
         self.flush_next = 0
@@ -168,9 +179,8 @@ class CanRouterBoard(Microcontroller):
 
     def schedule(self) -> Schedule:
         """Source: robot.md N3.7. Costs and limits are chosen by us: no execution times of this board are known."""
-        # untyped names: the compiler cannot hand out a bound method of another module's compiled class
-        leds: object = self.leds
-        heartbeat: object = self.heartbeat
+        board: object = self  # a compiled class would hand out wrappers of its parts' methods
+        load: object = self.load
         return Schedule(
             slot_us=1000,
             tick_slot=0,
@@ -179,52 +189,29 @@ class CanRouterBoard(Microcontroller):
                 Task(self.send_time,       cost=120,      limit=300),
                 Task(self.update_errors,   cost=60,       limit=4000, per_item=150, item="error"),
                 Task(self.count_load,      cost=110,      limit=200),
-                Task(leds.update,          cost=50,       limit=150),
+                Task(board.heartbeat.update, cost=50,     limit=150),
                 Task(self.show_load,       cost=100,      limit=200),
-                Task(heartbeat.beat,       cost=40,       limit=150),
+                Task(board.heartbeat.beat, cost=40,       limit=150),
             ),
-            rows=((Occasional(
-                (
-                    Task(self.send_error,    cost=150,    limit=400),
-                    Task(self.send_power,    cost=700,    limit=1000),  # two readings, soft-float product
-                    Task(self.send_current,  cost=350,    limit=600),
-                    Task(self.send_voltage,  cost=350,    limit=600),
-                    Task(self.send_load_1,   cost=200,    limit=400),
-                    Task(self.send_load_2,   cost=200,    limit=400),
-                    Task(self.send_load_3,   cost=200,    limit=400),
-                    Task(self.send_load_4,   cost=200,    limit=400),
-                ),
-                extra_idle_call=self.quirks.occasional_idle_call,
-            ),), (), (), (), (), (), (), (), (), ()),
+            **laid_out(table, self.own, (
+                #    variable           value                         cost limit
+                Send("ERROR_CSR",       board.errors,                  150,  400),
+                Send("CSR_MCU_POWER",   board.power_W,                 700, 1000),  # two readings, soft-float product
+                Send("CSR_MCU_CURRENT", board.current_A,               350,  600),
+                Send("CSR_MCU_VOLTAGE", board.voltage_V,               350,  600),
+                Send("CSR_CAN1_LOAD",   lambda: load.report_peak(1),   200,  400),
+                Send("CSR_CAN2_LOAD",   lambda: load.report_peak(2),   200,  400),
+                Send("CSR_CAN3_LOAD",   lambda: load.report_peak(3),   200,  400),
+                Send("CSR_CAN4_LOAD",   lambda: load.report_peak(4),   200,  400),
+            )),
+            extra_idle_call=self.quirks.occasional_idle_call,
         )  # fmt: skip
-
-    # --- errors -----------------------------------------------------------------------------------------
-
-    def report(self, code: cython.longlong) -> None:
-        """Note an error; with the firmware's quirk each report carries the one before, the first is 0."""
-        if self.errors_one_late:
-            self.errors.report(self.error_before)
-            self.error_before = code
-        else:
-            self.errors.report(code)
-
-    def slot_exceeded(self) -> None:
-        """A tick found the row unfinished."""
-        self.report(self.code_dnf)
-
-    def slot_near_limit(self) -> None:
-        """A slot took more than 90 % of its length."""
-        self.report(self.code_near_limit)
-
-    def task_limit(self, task: Task) -> None:
-        """A task took longer than its limit."""
-        self.report(self.code_task_limit)
 
     # --- interrupts -------------------------------------------------------------------------------------
 
     def on_segment_timer(self, queue) -> None:
         """Timer1, every 200 us: the time, and the next exchange with the main brain."""
-        self.timer1.clear(1)
+        self.timer1.clear(IR_MR0)
         if self.clock.tick():
             self.extra_cycles += self.sync_cycles
         self.ssp.start(self.link.tick(self.now))
@@ -237,28 +224,12 @@ class CanRouterBoard(Microcontroller):
         self.link.receive(segment)
         if self.idle and self.nothing_waits():  # the segment waits for the timer's next interrupt
             self.background_wanted = False
-        return 31
+        return SEGMENT_HALF_WORDS
 
     def on_can_error(self, queue) -> None:
-        """Read every controller's capture register; restart one that is bus-off."""
-        controller: CanController
-        cause: cython.longlong
-        for controller in self.controllers:
-            cause = controller.read_ICR()
-            named = self.error_codes[controller.number - 1]
-            if controller.bus_off:
-                self.report(named[0])
-                controller.write_MOD(0)
-                continue
-            if cause & 4:
-                self.report(named[1])
-            if cause & 8:
-                self.report(named[2])
-                controller.write_CMR(8)
-            if cause & 32:
-                self.report(named[3])
-            if cause & 128:
-                self.report(named[4] if cause >> 21 & 1 else named[5])
+        """Look at every controller: read its capture register, restart it when it is bus-off."""
+        for controller in self.can_errors:
+            controller.look()
 
     # --- main loop --------------------------------------------------------------------------------------
 
@@ -282,23 +253,20 @@ class CanRouterBoard(Microcontroller):
         read: cython.longlong = router.tx_read[channel]
         moved: cython.longlong = 0
         while read != router.tx_write[channel]:
-            if controller.free_at(1, began):
-                buffer = 1
-            elif controller.free_at(2, began):
-                buffer = 2
+            if controller.free_at(FIRST_BUFFER, began):
+                buffer = FIRST_BUFFER
+            elif controller.free_at(SECOND_BUFFER, began):
+                buffer = SECOND_BUFFER
             else:
                 break
-            row = 4 * (channel * 8 + read)
+            row = TO_SEND * (channel * TRANSMIT_RING + read)
             if not controller.transmit_if_free(
                 buffer, router.tx_rows[row], router.tx_rows[row + 1], router.tx_rows[row + 2], router.tx_rows[row + 3]
             ):
                 break
-            read = (read + 1) & 7
+            read = (read + 1) & TRANSMIT_MASK
             moved += 1
         if moved > 0:
-            if read == router.tx_write[channel]:  # empty: the next frame goes to the front again
-                read = 0
-                router.tx_write[channel] = 0
             router.tx_read[channel] = read
             router.waiting -= moved
             self.load.counts[channel] += moved
@@ -311,12 +279,12 @@ class CanRouterBoard(Microcontroller):
         """
         controller: CanController
         channel: cython.longlong
-        for channel in range(1, 5):
+        for channel in range(1, BUSES + 1):
             if self.router.tx_read[channel] != self.router.tx_write[channel]:
                 controller = self.controllers[channel - 1]
-                if not controller.free_at(1, at) and not controller.free_at(2, at):
+                if not controller.free_at(FIRST_BUFFER, at) and not controller.free_at(SECOND_BUFFER, at):
                     controller.tell_first_end()
-                elif not controller.MOD & 1:
+                elif not controller.MOD & MOD_RESET:
                     return True
         return False
 
@@ -350,7 +318,7 @@ class CanRouterBoard(Microcontroller):
                 if passed > 0:
                     pairs += 1
                     at += self.pair_ns - passed
-                self.flush_next = (self.flush_next + pairs) & 3
+                self.flush_next = (self.flush_next + pairs) % BUSES
             moved = router.route_step(at) if to_route else 0
             at += self.route_ns[moved]
             moved = 0
@@ -360,7 +328,7 @@ class CanRouterBoard(Microcontroller):
                 moved = self.flush(self.controllers[self.flush_next], began)
                 to_flush = False  # not known any more
             at += self.flush_ns[moved]
-            self.flush_next = channel & 3
+            self.flush_next = channel % BUSES
             if at >= self.horizon or at >= self.alarm_time or at >= self.inbox.head_time:
                 return at
         if self.idle:
@@ -372,34 +340,24 @@ class CanRouterBoard(Microcontroller):
 
     # --- slot tasks -------------------------------------------------------------------------------------
 
-    def send_float(self, identifier: cython.longlong, value: cython.double) -> None:
-        """A variable of the router itself, stamped with its own time, into its own ring."""
-        if not self.router.send(identifier, word_of_float(value), self.time.ms):
-            self.own_lost += 1
-            if self.report_full:
-                self.report(self.code_queue_full)
-
     def send_time(self) -> None:
         """The main brain's copy of the time.
 
         ROBOT PARITY: on the robot the first word of this copy is the count as a float; the table has the
         variable as a whole number, so here both words are the count, as on the buses.
         """
-        if not self.router.send(0, self.time.ms, self.time.ms):
-            self.own_lost += 1
-            if self.report_full:
-                self.report(self.code_queue_full)
+        self.own.send_words(table.TIMESTAMP, self.time.ms, self.time.ms)
 
     def update_errors(self) -> object:
         """Collect the errors of the slot; frames lost to full transmit rings since the last look are one."""
         lost: cython.longlong = 0
         i: cython.longlong
-        if self.report_full:
-            for i in range(1, 5):
+        if self.own.report_full:
+            for i in range(1, BUSES + 1):
                 lost += self.router.transmit_lost[i]
             while self.lost_before < lost:
                 self.lost_before += 1
-                self.report(self.code_queue_full)
+                self.report(codes.CAN_TX_QUEUE_FULL)
         return self.errors.update()
 
     def count_load(self) -> None:
@@ -413,22 +371,16 @@ class CanRouterBoard(Microcontroller):
         """
         i: cython.longlong
         count: cython.longlong
-        for i in range(1, 5):
+        for i in range(1, BUSES + 1):
             count = self.load.last_counts[i]
             if count == 0:
-                self.can_leds[i] = 0
-            elif count < 20:
-                self.can_leds[i] = 1
-            elif count < 30:
-                self.can_leds[i] = 2
+                self.can_leds[i] = LED_OFF
+            elif count < WARNING_FRAMES_PER_MS:
+                self.can_leds[i] = LED_TRAFFIC
+            elif count < FULL_FRAMES_PER_MS:
+                self.can_leds[i] = LED_WARNING
             else:
-                self.can_leds[i] = 3
-
-    def send_error(self) -> None:
-        """The error that waits longest, if one does."""
-        if self.errors.take():
-            if not self.router.send(table.ERROR_VARIABLE, self.errors.word, self.errors.stamp):
-                self.own_lost += 1
+                self.can_leds[i] = LED_FULL
 
     def current_A(self) -> cython.double:
         """Supply current of the electronics by the converter."""
@@ -438,30 +390,6 @@ class CanRouterBoard(Microcontroller):
         """Supply voltage of the electronics by the converter."""
         return float32(VOLTAGE_GAIN_V * (self.adc.DR(1) + VOLTAGE_OFFSET))
 
-    def send_power(self) -> None:
-        """CSR_MCU_POWER, W: the product of both readings."""
-        self.send_float(table.CSR_MCU_POWER, self.current_A() * self.voltage_V())
-
-    def send_current(self) -> None:
-        """CSR_MCU_CURRENT, A."""
-        self.send_float(table.CSR_MCU_CURRENT, self.current_A())
-
-    def send_voltage(self) -> None:
-        """CSR_MCU_VOLTAGE, V."""
-        self.send_float(table.CSR_MCU_VOLTAGE, self.voltage_V())
-
-    def send_load_1(self) -> None:
-        """CSR_CAN1_LOAD, most frames in one ms since the last report."""
-        self.send_float(table.CSR_CAN1_LOAD, self.load.report_peak(1))
-
-    def send_load_2(self) -> None:
-        """CSR_CAN2_LOAD."""
-        self.send_float(table.CSR_CAN2_LOAD, self.load.report_peak(2))
-
-    def send_load_3(self) -> None:
-        """CSR_CAN3_LOAD."""
-        self.send_float(table.CSR_CAN3_LOAD, self.load.report_peak(3))
-
-    def send_load_4(self) -> None:
-        """CSR_CAN4_LOAD."""
-        self.send_float(table.CSR_CAN4_LOAD, self.load.report_peak(4))
+    def power_W(self) -> cython.double:
+        """Power of the electronics: the product of both."""
+        return self.current_A() * self.voltage_V()

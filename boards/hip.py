@@ -6,16 +6,16 @@ Positive hip angle: inner legs swung forward.
 
 import cython
 
-from ranger_sim.boards.modules.can_link import HIP_INTERRUPTS
 from ranger_sim.boards.modules.joint_safety import HipSafety
+from ranger_sim.boards.modules.publishing import Send, laid_out
 from ranger_sim.boards.motor_board import ANALOG, PINS, WORDS, MotorBoard
 from ranger_sim.datatable.generated import mch as table
+from ranger_sim.firmware_sim.peripherals.can_controller import ICR_BEI, ICR_EI, ICR_RI, ICR_TI1
 from ranger_sim.firmware_sim.scheduler import Schedule, Task, Wait
 
-if not cython.compiled:
-    from ranger_sim.foundation.numbers import float32, float_of_fixed
-
 __all__ = ["ANALOG", "PINS", "WORDS", "HipBoard"]
+
+CAN_INTERRUPTS = ICR_RI | ICR_TI1 | ICR_EI | ICR_BEI  # its TX1 bit reaches no handler
 
 # (place, multiplexer code, gain code): motor current on 4-5, battery current on 2-3, both times 2
 SEQUENCE = (("motor_current", 2, 1), ("battery_current", 1, 1))
@@ -56,15 +56,13 @@ class HipBoard(MotorBoard):
             sign=1,
             largest_duty=250,
             gear=66.0,
-            interrupts=HIP_INTERRUPTS,
+            interrupts=CAN_INTERRUPTS,
         )
         self.add_encoders(phase_ns, cap01=JOINT_ENCODER, cap23=MOTOR_ENCODER)
         self.joint = self.cap01
         self.motor = self.cap23
         self.add_absolute_encoder(second_connector=0, zero=4590, sign=1, rpm=94)
-        self.safety = HipSafety(self.encoder, self.current_control, self.leds)
-        self.id_angle = table.MCH_ANGLE
-        self.id_ang_rate = table.MCH_ANG_RATE
+        self.safety = HipSafety(self.encoder, self.current_control, self.heartbeat)
         self.begin(phase_ns)
 
     def schedule(self) -> Schedule:
@@ -83,32 +81,30 @@ class HipBoard(MotorBoard):
                 Task(board.start_absolute_encoder,      80,  110,   0, "",      "ae_update"),
                 Task(board.can.receive_all,            120, 4000, 220, "frame", "can_rx_dispatch_all"),
                 Task(board.heartbeat.beat,              40,   60,   0, "",      "hb_beat"),
-                Task(board.leds.update,                 60,   80,   0, "",      "mcu_led_update"),
+                Task(board.heartbeat.update,            60,   80,   0, "",      "mcu_led_update"),
                 Task(board.safety.check,                80,  110,   0, "",      "dn_safety"),
                 Task(board.errors.update,               90, 2700, 120, "error", "error_update"),
                 Task(board.can.feed,                    50,  300,  80, "frame", "can_tx1"),
                 Wait(board.adc_external.sequence_done,  20, 4500,              "adcx_conversion_wait"),
                 Task(board.compliant_control,         3900, 5200,   0, "",      "mc_compliant_control"),
             ),
-            rows=(
-                (Task(board.send_angle,                420,  560,   0, "",      "MCH_ANGLE"),),
-                (Task(board.send_ang_rate,             380,  510,   0, "",      "MCH_ANG_RATE"),),
-                (Task(board.send_battery_power,        900, 1200,   0, "",      "MCH_BATT_POWER"),),
-                (),  # the occasional list
-            ),
-            occasional_row=3,
-            occasional=(
-                Task(board.send_error,                 200,  270,   0, "",      "ERROR_MCH"),
-                Task(board.send_motor_position,        380,  510,   0, "",      "MCH_MOTOR_POSITION"),
-                Task(board.send_motor_current,         480,  640,   0, "",      "MCH_MOTOR_CURRENT"),
-                Task(board.send_status,                260,  350,   0, "",      "MCH_STATUS"),
-                Task(board.send_battery_current,       480,  640,   0, "",      "MCH_BATT_CURRENT"),
-                Task(board.send_battery_voltage,       420,  560,   0, "",      "MCH_BATT_VOLTAGE"),
-                Task(board.send_motor_velocity,        380,  510,   0, "",      "MCH_MOTOR_VELOCITY"),
-                Task(board.rezero,                     700,  940,   0, "",      "motor_encoder_rezero"),
-                Task(board.send_execution_time,        420,  560,   0, "",      "MCH_EXECUTION_TIME"),
-                Task(board.send_max_execution_time,    420,  560,   0, "",      "MCH_MAX_EXECUTION_TIME"),
-            ),
+            **laid_out(table, self.can, (
+                #    variable                   value                              cost limit
+                Send("MCH_ANGLE",               board.encoder.angle_rad,            420,  560),
+                Send("MCH_ANG_RATE",            board.joint.rate_rad_s,             380,  510),
+                Send("MCH_BATT_POWER",          board.readings.battery_power,       900, 1200),
+                # the occasional list, as far as not above
+                Send("ERROR_MCH",               board.errors,                       200,  270),
+                Send("MCH_MOTOR_POSITION",      board.motor.position_rad,           380,  510),
+                Send("MCH_MOTOR_CURRENT",       board.readings.motor_current,       480,  640),
+                Send("MCH_STATUS",              1.0,                                260,  350),
+                Send("MCH_BATT_CURRENT",        board.readings.battery_current,     480,  640),
+                Send("MCH_BATT_VOLTAGE",        board.readings.battery_voltage,     420,  560),
+                Send("MCH_MOTOR_VELOCITY",      board.motor.rate_rad_s,             380,  510),
+                Task(board.motor_encoder_rezero,                                    700,  940),
+                Send("MCH_EXECUTION_TIME",      board.execution.seconds,            420,  560),
+                Send("MCH_MAX_EXECUTION_TIME",  board.execution.longest_seconds,    420,  560),
+            )),
             extra_idle_call=self.quirks.occasional_idle_call,
             speakers=("can_tx1",),
             last=(
@@ -126,13 +122,7 @@ class HipBoard(MotorBoard):
         """The joint's own angle, rad x 65536."""
         return self.encoder.angle
 
-    def rezero(self) -> None:
+    def motor_encoder_rezero(self) -> None:
         """5 % of the difference per call, always."""
         if self.quirks.hip_rezero:
             self.rezero_motor(REZERO_SHARE)
-
-    def send_angle(self) -> None:
-        self.can.send_float(self.id_angle, float32(self.encoder.angle_rad()))
-
-    def send_ang_rate(self) -> None:
-        self.can.send_float(self.id_ang_rate, float_of_fixed(self.joint.rate))

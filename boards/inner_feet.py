@@ -5,7 +5,8 @@ Ankle angle: 0 with the foot flipped up, growing as the foot is pushed down.
 """
 
 from ranger_sim.boards.ankle_board import AnkleBoard
-from ranger_sim.boards.motor_board import ANALOG, PINS, WORDS
+from ranger_sim.boards.modules.publishing import Send, laid_out
+from ranger_sim.boards.motor_board import ANALOG, NOT_CONVERTED, PINS, WORDS
 from ranger_sim.boards.quirks import Quirks
 from ranger_sim.datatable.generated import mcfi as table
 from ranger_sim.firmware_sim.scheduler import Schedule, Task, Wait
@@ -45,14 +46,11 @@ class InnerFeetBoard(AnkleBoard):
             rezero_share=REZERO_SHARE,
             right_off_level=quirks.inner_right_off_level,
         )
-        self.id_ankle_angle = table.MCFI_MID_ANKLE_ANGLE
-        self.id_ankle_rate = table.MCFI_ANKLE_RATE
         self.begin(phase_ns)
 
     def schedule(self) -> Schedule:
         """One pass takes 4 ms; each row's variable goes out at 250 Hz, the occasional ones at 16.67 Hz."""
         board: object = self
-        right_heel = Task(board.send_right_heel_sense, 330, 440, 0, "", "MCFI_RIGHT_HEEL_SENSE")
         return Schedule(
             slot_us=table.SLOT_US,
             every=(
@@ -65,7 +63,7 @@ class InnerFeetBoard(AnkleBoard):
                 Task(board.joint.update_rate,          850, 3600,  30, "edge",  "qdc_cap23_rate"),
                 Task(board.can.receive_all,            120, 4000, 220, "frame", "can_rx_dispatch_all"),
                 Task(board.heartbeat.beat,              40,   60,   0, "",      "hb_beat"),
-                Task(board.leds.update,                 60,   80,   0, "",      "mcu_led_update"),
+                Task(board.heartbeat.update,            60,   80,   0, "",      "mcu_led_update"),
                 Task(board.start_absolute_encoder,      80,  110,   0, "",      "ae_update"),
                 Task(board.update_switches,            180,  240,   0, "",      "ls_update"),
                 Task(board.safety.check,               140,  190,   0, "",      "dn_safety"),
@@ -74,33 +72,30 @@ class InnerFeetBoard(AnkleBoard):
                 Wait(board.adc_external.sequence_done,  20, 6500,              "adcx_conversion_wait"),
                 Task(board.compliant_control,         3900, 5200,   0, "",      "mc_compliant_control"),
             ),
-            rows=(
-                (Task(board.send_ankle_angle,          420,  560,   0, "",      "MCFI_MID_ANKLE_ANGLE"),),
-                (Task(board.send_ankle_rate,           380,  510,   0, "",      "MCFI_ANKLE_RATE"),),
-                (Task(board.send_left_heel_sense,      330,  440,   0, "",      "MCFI_LEFT_HEEL_SENSE"),),
-                (Task(board.send_motor_position,       380,  510,   0, "",      "MCFI_MOTOR_POSITION"),),
-                (Task(board.send_right_contact,        300,  400,   0, "",      "MCFI_RIGHT_HS"),),
-                (Task(board.send_battery_power,        900, 1200,   0, "",      "MCFI_BATT_POWER"),),
-                (right_heel,),
-                (),  # the occasional list
-            ),
-            occasional_row=7,
-            occasional=(
-                Task(board.send_error,                 200,  270,   0, "",      "ERROR_MCFI"),
-                Task(board.send_motor_velocity,        380,  510,   0, "",      "MCFI_MOTOR_VELOCITY"),
-                Task(board.send_motor_current,         480,  640,   0, "",      "MCFI_MOTOR_CURRENT"),
-                Task(board.send_left_contact,          300,  400,   0, "",      "MCFI_LEFT_HS"),
-                Task(board.send_status,                260,  350,   0, "",      "MCFI_STATUS"),
-                Task(board.send_battery_current,       480,  640,   0, "",      "MCFI_BATT_CURRENT"),
-                Task(board.send_battery_voltage,       420,  560,   0, "",      "MCFI_BATT_VOLTAGE"),
-                Task(board.send_bridge_temperature,    260,  350,   0, "",      "MCFI_HBRIDGE_TEMP"),
-                Task(board.send_right_switch,          300,  400,   0, "",      "MCFI_RIGHT_LS"),
-                Task(board.send_left_switch,           300,  400,   0, "",      "MCFI_LEFT_LS"),
-                Task(board.send_execution_time,        420,  560,   0, "",      "MCFI_EXECUTION_TIME"),
-                Task(board.send_max_execution_time,    420,  560,   0, "",      "MCFI_MAX_EXECUTION_TIME"),
-                right_heel,
-                Task(board.rezero,                     700,  940,   0, "",      "motor_encoder_rezero"),
-            ),
+            **laid_out(table, self.can, (
+                #    variable                    value                              cost limit
+                Send("MCFI_MID_ANKLE_ANGLE",     board.encoder.angle_rad,            420,  560),
+                Send("MCFI_ANKLE_RATE",          board.joint.rate_rad_s,             380,  510),
+                Send("MCFI_LEFT_HEEL_SENSE",     board.left_heel_sense,              330,  440),
+                Send("MCFI_MOTOR_POSITION",      board.motor.position_rad,           380,  510),
+                Send("MCFI_RIGHT_HS",            board.right_foot.contact,           300,  400),
+                Send("MCFI_BATT_POWER",          board.readings.battery_power,       900, 1200),
+                Send("MCFI_RIGHT_HEEL_SENSE",    board.right_heel_sense,             330,  440),
+                # the occasional list, as far as not above
+                Send("ERROR_MCFI",               board.errors,                       200,  270),
+                Send("MCFI_MOTOR_VELOCITY",      board.motor.rate_rad_s,             380,  510),
+                Send("MCFI_MOTOR_CURRENT",       board.readings.motor_current,       480,  640),
+                Send("MCFI_LEFT_HS",             board.left_foot.contact,            300,  400),
+                Send("MCFI_STATUS",              1.0,                                260,  350),
+                Send("MCFI_BATT_CURRENT",        board.readings.battery_current,     480,  640),
+                Send("MCFI_BATT_VOLTAGE",        board.readings.battery_voltage,     420,  560),
+                Send("MCFI_HBRIDGE_TEMP",        NOT_CONVERTED,                      260,  350),
+                Send("MCFI_RIGHT_LS",            board.right_switch.contact,         300,  400),
+                Send("MCFI_LEFT_LS",             board.left_switch.contact,          300,  400),
+                Send("MCFI_EXECUTION_TIME",      board.execution.seconds,            420,  560),
+                Send("MCFI_MAX_EXECUTION_TIME",  board.execution.longest_seconds,    420,  560),
+                Task(board.motor_encoder_rezero,                                     700,  940),
+            )),
             extra_idle_call=self.quirks.occasional_idle_call,
             speakers=("can_tx2",),
             last=(

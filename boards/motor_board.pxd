@@ -1,36 +1,28 @@
+from ranger_sim.boards.firmware_board cimport SatelliteBoard
 from ranger_sim.boards.modules.absolute_encoder cimport AbsoluteEncoder
 from ranger_sim.boards.modules.adc_readings cimport AdcReadings
-from ranger_sim.boards.modules.can_link cimport CanLink
 from ranger_sim.boards.modules.compliant_control cimport CompliantControl
 from ranger_sim.boards.modules.current_control cimport CurrentControl
 from ranger_sim.boards.modules.encoder_capture cimport EncoderCapture, WrapCounter
-from ranger_sim.boards.modules.error_module cimport ErrorModule
-from ranger_sim.boards.modules.execution_timer cimport ExecutionTimer
-from ranger_sim.boards.modules.mcu_led cimport Heartbeat, McuLed
 from ranger_sim.boards.modules.motor_limits cimport MotorLimits
 from ranger_sim.boards.modules.motor_output cimport MotorOutput
-from ranger_sim.boards.modules.network_time cimport NetworkTime
 from ranger_sim.boards.modules.quadrature_decoder cimport QuadratureDecoder
-from ranger_sim.firmware_sim.microcontroller cimport Alarm, Microcontroller, Peripheral
+from ranger_sim.firmware_sim.microcontroller cimport Alarm, Peripheral
 from ranger_sim.firmware_sim.peripherals.adc_external cimport Ads7871
 from ranger_sim.firmware_sim.peripherals.adc_internal cimport AdcInternal
-from ranger_sim.firmware_sim.peripherals.can_controller cimport CanController
-from ranger_sim.firmware_sim.peripherals.gpio cimport Gpio
 from ranger_sim.firmware_sim.peripherals.pwm cimport Pwm
 from ranger_sim.firmware_sim.peripherals.spi_encoder cimport SpiEncoder
 from ranger_sim.firmware_sim.peripherals.timer_capture cimport TimerCapture
-from ranger_sim.firmware_sim.scheduler cimport Schedule, Task
-from ranger_sim.foundation.numbers cimport float_of_fixed
 
-cdef long long CODE_ADCI_DNF, CODE_ADCX_DNF, CODE_OVERRUN, CODE_TASK_LIMIT, CODE_NEAR_LIMIT
-cdef long long BATTERY_VOLTAGE_CHANNEL
+cpdef enum:
+    BATTERY_VOLTAGE_CHANNEL = 1
 
 cdef class PowerUp(Peripheral):
     cdef public MotorBoard board
     cdef public Alarm first, second
     cpdef int begin(self, long long phase_ns) except -1
 
-cdef class MotorBoard(Microcontroller):
+cdef class MotorBoard(SatelliteBoard):
     # what the tasks of every slot and the interrupts touch
     cdef public Ads7871 adc_external
     cdef public AdcInternal adc_internal
@@ -41,16 +33,7 @@ cdef class MotorBoard(Microcontroller):
     cdef public MotorLimits limits
     cdef public CurrentControl current_control
     cdef public AdcReadings readings
-    cdef public CanLink can
-    cdef public ErrorModule errors
-    cdef public ExecutionTimer execution
     # the rest
-    cdef public object table, quirks
-    cdef public NetworkTime time
-    cdef public Gpio gpio
-    cdef public McuLed leds
-    cdef public Heartbeat heartbeat
-    cdef public CanController can_controller
     cdef public Pwm pwm
     cdef public MotorOutput output
     cdef public QuadratureDecoder cap01, cap23
@@ -59,10 +42,6 @@ cdef class MotorBoard(Microcontroller):
     cdef public TimerCapture timer0
     cdef public long long encoder_select
     cdef public PowerUp power_up
-    cdef public long long id_error, id_motor_position, id_motor_velocity, id_motor_current, id_batt_power
-    cdef public long long id_batt_current, id_batt_voltage, id_hbridge_temp, id_status, id_execution_time
-    cdef public long long id_max_execution_time
-    cpdef Schedule schedule(self)
     cpdef int read_sensors_once(self) except -1
     cpdef int set_start_values(self) except -1
     cpdef long long controlled_position(self) noexcept

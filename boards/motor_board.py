@@ -1,7 +1,7 @@
 """What the four motor boards (B2A) share: chip, peripherals, modules, publishing, start-up.
 
-Each board's own room (hip.py, outer_feet.py, inner_feet.py, steering.py) holds its constants and its one
-schedule table. Source: robot.md N1.2, N4, N5, N6.1.
+Each board's own room (hip.py, outer_feet.py, inner_feet.py, steering.py) holds its constants and its table
+of what runs when. Source: robot.md N1.2, N4, N5, N6.1.
 
 Where the numbers of cycles come from: the encoder interrupt's is the appendix's (about 150 cycles, appendix
 4.6). All others are chosen by us, not yet those of robot.md T1 and T2: instructions of the described work at 1.5 cycles
@@ -13,9 +13,9 @@ A task's limit is what it may take at the busiest (ring full, fastest motor), pl
 
 import cython
 
+from ranger_sim.boards.firmware_board import ALL_CAN_INTERRUPTS, SatelliteBoard
 from ranger_sim.boards.modules.absolute_encoder import AbsoluteEncoder
 from ranger_sim.boards.modules.adc_readings import AdcReadings
-from ranger_sim.boards.modules.can_link import ALL_INTERRUPTS, CanLink
 from ranger_sim.boards.modules.compliant_control import (
     COMMAND,
     DAMPNESS,
@@ -26,32 +26,21 @@ from ranger_sim.boards.modules.compliant_control import (
 )
 from ranger_sim.boards.modules.current_control import INTEGRAL_GAIN, PROPORTIONAL_GAIN, CurrentControl
 from ranger_sim.boards.modules.encoder_capture import EncoderCapture, WrapCounter
-from ranger_sim.boards.modules.error_module import ErrorModule
-from ranger_sim.boards.modules.execution_timer import ExecutionTimer
 from ranger_sim.boards.modules.mcu_led import PINS as LED_PINS
-from ranger_sim.boards.modules.mcu_led import Heartbeat
 from ranger_sim.boards.modules.motor_limits import MotorLimits
 from ranger_sim.boards.modules.motor_output import PERIOD_COUNTS, MotorOutput
 from ranger_sim.boards.modules.motor_output import PINS as MOTOR_PINS
-from ranger_sim.boards.modules.network_time import NetworkTime
 from ranger_sim.boards.modules.quadrature_decoder import QuadratureDecoder
-from ranger_sim.boards.quirks import Quirks
 from ranger_sim.datatable.generated import errors as codes
-from ranger_sim.firmware_sim.microcontroller import Microcontroller, Peripheral
+from ranger_sim.firmware_sim.microcontroller import Peripheral
 from ranger_sim.firmware_sim.peripherals.adc_external import Ads7871
 from ranger_sim.firmware_sim.peripherals.adc_internal import AdcInternal
-from ranger_sim.firmware_sim.peripherals.can_controller import CanController
-from ranger_sim.firmware_sim.peripherals.gpio import Gpio, p0
+from ranger_sim.firmware_sim.peripherals.gpio import p0
 from ranger_sim.firmware_sim.peripherals.pwm import Pwm
 from ranger_sim.firmware_sim.peripherals.spi_encoder import SpiEncoder
 from ranger_sim.firmware_sim.peripherals.timer_capture import TimerCapture
-from ranger_sim.firmware_sim.scheduler import Schedule, Task
 from ranger_sim.firmware_sim.vic import ADC_DONE, EXTERNAL_INTERRUPT, SPI_DONE, InterruptSource
 from ranger_sim.foundation.events import EventQueue
-from ranger_sim.foundation.user_error import UserError
-
-if not cython.compiled:
-    from ranger_sim.foundation.numbers import float_of_fixed
 
 # Processor pins by what hangs on them (robot.md N4.1, N4.4, N4.7, N4.9, N4.11); for the wiring table.
 PINS = {
@@ -74,23 +63,20 @@ ANALOG = {
     "steering_sensor": 4,
     "battery_voltage": 5,
 }
+NOT_CONVERTED = 0.0  # what is sent of the bridge's temperature on AIN3, which no board converts (robot.md N4.6)
 # Places on `chip.words`.
 WORDS = {"absolute_encoder": 0}
 
-BATTERY_VOLTAGE_CHANNEL = 1  # AIN1, P0.28
 # About 23,000 instructions pass from reset to the first slot (robot.md N7.3): at 1.3 cycles each 0.5 ms.
 START_VALUES_NS = 400_000
 SLOTS_BEGIN_NS = 500_000
+# The two alarms of the start
+START_VALUES, SLOTS_BEGIN = 0, 1
 
-# Error codes as C numbers of the compiled module
-CODE_ADCI_DNF = codes.ADCI_DNF
-CODE_ADCX_DNF = codes.ADCX_DNF
-CODE_OVERRUN = codes.ASCHED_DNF
-CODE_TASK_LIMIT = codes.SCHED_TASK_LIMIT
-CODE_NEAR_LIMIT = codes.SCHED_SLOT_NEAR_LIMIT
+if not cython.compiled:
+    BATTERY_VOLTAGE_CHANNEL = 1  # AIN1, P0.28
 
 # VIC slots (robot.md N4.16)
-CAN_RECEIVE_SLOT = 0
 EXTERNAL_ADC_SLOT = 1
 INTERNAL_ADC_SLOT = 3
 TIMER_SLOT = 4
@@ -108,8 +94,8 @@ class PowerUp(Peripheral):
     def __init__(self, chip, board) -> None:
         Peripheral.__init__(self, chip)
         self.board = board
-        self.first = chip.new_alarm(self, 0)
-        self.second = chip.new_alarm(self, 1)
+        self.first = chip.new_alarm(self, START_VALUES)
+        self.second = chip.new_alarm(self, SLOTS_BEGIN)
 
     def begin(self, phase_ns: cython.longlong) -> None:
         """Power comes at `phase_ns`."""
@@ -117,14 +103,14 @@ class PowerUp(Peripheral):
         self.second.set(phase_ns + SLOTS_BEGIN_NS - 1)
 
     def on_alarm(self, alarm: cython.longlong, time: cython.longlong) -> InterruptSource | None:
-        if alarm == 0:
+        if alarm == START_VALUES:
             self.board.read_sensors_once()
         else:
             self.board.set_start_values()
         return None
 
 
-class MotorBoard(Microcontroller):
+class MotorBoard(SatelliteBoard):
     """A B2A board. `table`: generated module of the board; `quirks`: switches; `phase_ns`: when it gets power.
 
     `largest_duty` in counts of 600, `sign` of the motor's mounting, `gear` of the motor (0: no encoder).
@@ -142,23 +128,11 @@ class MotorBoard(Microcontroller):
         sign,
         largest_duty,
         gear,
-        interrupts=ALL_INTERRUPTS,
+        interrupts=ALL_CAN_INTERRUPTS,
     ) -> None:
         board: object = self  # bound methods are looked up dynamically
-        quirks = quirks if quirks is not None else Quirks()
-        Microcontroller.__init__(self, name=table.BOARD, hz=table.CLOCK_HZ, crystal=crystal)
-        self.table = table
-        self.quirks = quirks
-        self.time = NetworkTime()
-        self.errors = ErrorModule(
-            table.BOARD_NUMBER,
-            self.time,
-            per_event=quirks.errors_counted_per_event,
-            lose_new_after_repeat=quirks.new_errors_lost_after_repeat,
-        )
-        self.gpio = Gpio(self)
-        self.leds = self.heartbeat = Heartbeat(self.time, self.gpio, table.SLOT_US)
-        self.execution = ExecutionTimer(self, self.time)
+        SatelliteBoard.__init__(self, table, crystal, quirks, CAN_ERROR_SLOT, interrupts)
+        quirks = self.quirks
         # converters
         self.adc_external = Ads7871(self, eint=1)
         self.adc_external.set_sequence(*((channel, gain, ANALOG[place]) for place, channel, gain in sequence))
@@ -182,10 +156,6 @@ class MotorBoard(Microcontroller):
             name="adcx_busy",
         )
         self.vic.attach(ADC_DONE, 0, board.on_internal_adc, cost=80, slot=INTERNAL_ADC_SLOT, name="adci_done")
-        # network
-        self.can_controller = CanController(self, table.CONTROLLER, IER=interrupts)
-        self.can = CanLink(self, self.can_controller, self.time, self.errors, codes, quirks.full_queues_reported)
-        self.can.attach(receive_slot=CAN_RECEIVE_SLOT, error_slot=CAN_ERROR_SLOT)
         # motor
         self.pwm = Pwm(self, period=PERIOD_COUNTS, phase_ns=phase_ns)
         self.output = MotorOutput(
@@ -208,7 +178,7 @@ class MotorBoard(Microcontroller):
         self.current_control = CurrentControl(
             self.limits,
             self.output,
-            self.leds,
+            self.heartbeat,
             self.errors,
             codes,
             proportional_gain=PROPORTIONAL_GAIN if quirks.proportional_current_control else 0,
@@ -218,25 +188,7 @@ class MotorBoard(Microcontroller):
         self.encoder = None
         self.spi = None
         self.encoder_select = 0
-        # identifiers, from the generated table
-        self.id_error = table.ERROR_VARIABLE
-        for field in (
-            "MOTOR_POSITION",
-            "MOTOR_VELOCITY",
-            "MOTOR_CURRENT",
-            "BATT_POWER",
-            "BATT_CURRENT",
-            "BATT_VOLTAGE",
-            "HBRIDGE_TEMP",
-            "STATUS",
-            "EXECUTION_TIME",
-            "MAX_EXECUTION_TIME",
-        ):
-            setattr(self, "id_" + field.lower(), getattr(table, f"{table.BOARD}_{field}", -1))
         self.listen()
-        self.on_overrun = board.note_overrun
-        self.on_limit = board.note_limit if quirks.warn_near_slot_limit else None
-        self.on_near_limit = board.note_near_limit if quirks.warn_near_slot_limit else None
         self.power_up = PowerUp(self, self)
         self.power_up.begin(phase_ns)
 
@@ -289,10 +241,6 @@ class MotorBoard(Microcontroller):
         """Start the scheduler; the first slot comes when the start values are set."""
         self.start(self.schedule(), phase_ns + SLOTS_BEGIN_NS)
 
-    def schedule(self) -> Schedule:
-        """The board's table; every room has its own."""
-        raise UserError(f"{self.name}: this board has no schedule")
-
     # --- start-up ---------------------------------------------------------------------------------------
 
     def read_sensors_once(self) -> None:
@@ -308,9 +256,9 @@ class MotorBoard(Microcontroller):
     # --- tasks ------------------------------------------------------------------------------------------
 
     def start_internal_adc(self) -> None:
-        """adci_convert_all: battery voltage on AIN1 (BATTERY_VOLTAGE_CHANNEL)."""
-        if not self.adc_internal.start(1):
-            self.errors.report(CODE_ADCI_DNF)
+        """adci_convert_all: battery voltage."""
+        if not self.adc_internal.start(BATTERY_VOLTAGE_CHANNEL):
+            self.errors.report(codes.ADCI_DNF)
 
     def start_absolute_encoder(self) -> None:
         """ae_update: begin a transfer; the interrupt 14 us later has the result for this slot's control."""
@@ -326,7 +274,7 @@ class MotorBoard(Microcontroller):
     def start_external_adc(self) -> None:
         """adcx_convert_all: start the sequence; the last one unfinished is an error, and it goes on."""
         if not self.adc_external.start_sequence():
-            self.errors.report(CODE_ADCX_DNF)
+            self.errors.report(codes.ADCX_DNF)
 
     def controlled_position(self) -> cython.longlong:
         """Position in the compliant law, rad x 65536: of the motor, unless a room says otherwise."""
@@ -348,53 +296,3 @@ class MotorBoard(Microcontroller):
         """Move the motor's angle towards the joint's by `share` (x 65536) of their difference."""
         difference: cython.longlong = self.encoder.angle - self.motor.position
         self.motor.set_position(self.motor.position + ((difference * share) >> 16))
-
-    # --- what is published --------------------------------------------------------------------------------
-
-    def send_error(self) -> None:
-        self.can.send_error(self.id_error)
-
-    def send_motor_position(self) -> None:
-        self.can.send_float(self.id_motor_position, float_of_fixed(self.motor.position))
-
-    def send_motor_velocity(self) -> None:
-        self.can.send_float(self.id_motor_velocity, float_of_fixed(self.motor.rate))
-
-    def send_motor_current(self) -> None:
-        self.can.send_float(self.id_motor_current, self.readings.motor_current())
-
-    def send_battery_power(self) -> None:
-        self.can.send_float(self.id_batt_power, self.readings.battery_power())
-
-    def send_battery_current(self) -> None:
-        self.can.send_float(self.id_batt_current, self.readings.battery_current())
-
-    def send_battery_voltage(self) -> None:
-        self.can.send_float(self.id_batt_voltage, self.readings.battery_voltage())
-
-    def send_bridge_temperature(self) -> None:
-        """AIN3 is never converted, so 0 is sent (robot.md N4.6)."""
-        self.can.send_float(self.id_hbridge_temp, 0.0)
-
-    def send_status(self) -> None:
-        self.can.send_float(self.id_status, 1.0)
-
-    def send_execution_time(self) -> None:
-        self.can.send_float(self.id_execution_time, self.execution.seconds())
-
-    def send_max_execution_time(self) -> None:
-        self.can.send_float(self.id_max_execution_time, self.execution.longest_seconds())
-
-    # --- what the scheduler tells ---------------------------------------------------------------------------
-
-    def note_overrun(self) -> None:
-        """A tick found the row unfinished."""
-        self.errors.report(CODE_OVERRUN)
-
-    def note_limit(self, task: Task) -> None:
-        """A task took longer than its limit."""
-        self.errors.report(CODE_TASK_LIMIT)
-
-    def note_near_limit(self) -> None:
-        """A slot took more than 90 % of its length."""
-        self.errors.report(CODE_NEAR_LIMIT)

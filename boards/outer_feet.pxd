@@ -1,5 +1,4 @@
 from ranger_sim.boards.ankle_board cimport AnkleBoard
-from ranger_sim.firmware_sim.scheduler cimport Schedule
 
 cdef class OuterFeetBoard(AnkleBoard):
-    cpdef Schedule schedule(self)
+    pass

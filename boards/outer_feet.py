@@ -5,7 +5,8 @@ Ankle angle: 0 with the foot flipped up, growing as the foot is pushed down.
 """
 
 from ranger_sim.boards.ankle_board import FOOT_OFF_LEVEL, AnkleBoard
-from ranger_sim.boards.motor_board import ANALOG, PINS, WORDS
+from ranger_sim.boards.modules.publishing import Send, laid_out
+from ranger_sim.boards.motor_board import ANALOG, NOT_CONVERTED, PINS, WORDS
 from ranger_sim.datatable.generated import mcfo as table
 from ranger_sim.firmware_sim.scheduler import Schedule, Task, Wait
 
@@ -43,15 +44,11 @@ class OuterFeetBoard(AnkleBoard):
             rezero_share=REZERO_SHARE,
             right_off_level=FOOT_OFF_LEVEL,
         )
-        self.id_ankle_angle = table.MCFO_RIGHT_ANKLE_ANGLE
-        self.id_ankle_rate = table.MCFO_RIGHT_ANKLE_RATE
         self.begin(phase_ns)
 
     def schedule(self) -> Schedule:
         """One pass takes 4.5 ms; each row's variable goes out at 222.2 Hz, the occasional ones at 14.81 Hz."""
         board: object = self
-        rate = Task(board.send_ankle_rate, 380, 510, 0, "", "MCFO_RIGHT_ANKLE_RATE")
-        right_heel = Task(board.send_right_heel_sense, 330, 440, 0, "", "MCFO_RIGHT_HEEL_SENSE")
         return Schedule(
             slot_us=table.SLOT_US,
             every=(
@@ -65,7 +62,7 @@ class OuterFeetBoard(AnkleBoard):
                 Task(board.start_absolute_encoder,      80,  110,   0, "",      "ae_update"),
                 Task(board.can.receive_all,            120, 4000, 220, "frame", "can_rx_dispatch_all"),
                 Task(board.heartbeat.beat,              40,   60,   0, "",      "hb_beat"),
-                Task(board.leds.update,                 60,   80,   0, "",      "mcu_led_update"),
+                Task(board.heartbeat.update,            60,   80,   0, "",      "mcu_led_update"),
                 Task(board.update_switches,            180,  240,   0, "",      "ls_update"),
                 Task(board.safety.check,               140,  190,   0, "",      "dn_safety"),
                 Task(board.errors.update,               90, 2700, 120, "error", "error_update"),
@@ -73,34 +70,30 @@ class OuterFeetBoard(AnkleBoard):
                 Wait(board.adc_external.sequence_done,  20, 6500,              "adcx_conversion_wait"),
                 Task(board.compliant_control,         3900, 5200,   0, "",      "mc_compliant_control"),
             ),
-            rows=(
-                (Task(board.send_ankle_angle,          420,  560,   0, "",      "MCFO_RIGHT_ANKLE_ANGLE"),),
-                (rate,),
-                (right_heel,),
-                (Task(board.send_right_contact,        300,  400,   0, "",      "MCFO_RIGHT_HS"),),
-                (Task(board.send_left_contact,         300,  400,   0, "",      "MCFO_LEFT_HS"),),
-                (Task(board.send_motor_position,       380,  510,   0, "",      "MCFO_MOTOR_POSITION"),),
-                (Task(board.send_left_heel_sense,      330,  440,   0, "",      "MCFO_LEFT_HEEL_SENSE"),),
-                (Task(board.send_battery_power,        900, 1200,   0, "",      "MCFO_BATT_POWER"),),
-                (),  # the occasional list
-            ),
-            occasional_row=8,
-            occasional=(
-                Task(board.send_error,                 200,  270,   0, "",      "ERROR_MCFO"),
-                Task(board.send_motor_velocity,        380,  510,   0, "",      "MCFO_MOTOR_VELOCITY"),
-                Task(board.send_motor_current,         480,  640,   0, "",      "MCFO_MOTOR_CURRENT"),
-                Task(board.send_status,                260,  350,   0, "",      "MCFO_STATUS"),
-                Task(board.send_battery_current,       480,  640,   0, "",      "MCFO_BATT_CURRENT"),
-                Task(board.send_battery_voltage,       420,  560,   0, "",      "MCFO_BATT_VOLTAGE"),
-                Task(board.send_bridge_temperature,    260,  350,   0, "",      "MCFO_HBRIDGE_TEMP"),
-                Task(board.send_right_switch,          300,  400,   0, "",      "MCFO_RIGHT_LS"),
-                Task(board.send_left_switch,           300,  400,   0, "",      "MCFO_LEFT_LS"),
-                Task(board.rezero,                     700,  940,   0, "",      "motor_encoder_rezero"),
-                Task(board.send_execution_time,        420,  560,   0, "",      "MCFO_EXECUTION_TIME"),
-                Task(board.send_max_execution_time,    420,  560,   0, "",      "MCFO_MAX_EXECUTION_TIME"),
-                rate,
-                right_heel,
-            ),
+            **laid_out(table, self.can, (
+                #    variable                    value                              cost limit
+                Send("MCFO_RIGHT_ANKLE_ANGLE",   board.encoder.angle_rad,            420,  560),
+                Send("MCFO_RIGHT_ANKLE_RATE",    board.joint.rate_rad_s,             380,  510),
+                Send("MCFO_RIGHT_HEEL_SENSE",    board.right_heel_sense,             330,  440),
+                Send("MCFO_RIGHT_HS",            board.right_foot.contact,           300,  400),
+                Send("MCFO_LEFT_HS",             board.left_foot.contact,            300,  400),
+                Send("MCFO_MOTOR_POSITION",      board.motor.position_rad,           380,  510),
+                Send("MCFO_LEFT_HEEL_SENSE",     board.left_heel_sense,              330,  440),
+                Send("MCFO_BATT_POWER",          board.readings.battery_power,       900, 1200),
+                # the occasional list, as far as not above
+                Send("ERROR_MCFO",               board.errors,                       200,  270),
+                Send("MCFO_MOTOR_VELOCITY",      board.motor.rate_rad_s,             380,  510),
+                Send("MCFO_MOTOR_CURRENT",       board.readings.motor_current,       480,  640),
+                Send("MCFO_STATUS",              1.0,                                260,  350),
+                Send("MCFO_BATT_CURRENT",        board.readings.battery_current,     480,  640),
+                Send("MCFO_BATT_VOLTAGE",        board.readings.battery_voltage,     420,  560),
+                Send("MCFO_HBRIDGE_TEMP",        NOT_CONVERTED,                      260,  350),
+                Send("MCFO_RIGHT_LS",            board.right_switch.contact,         300,  400),
+                Send("MCFO_LEFT_LS",             board.left_switch.contact,          300,  400),
+                Task(board.motor_encoder_rezero,                                     700,  940),
+                Send("MCFO_EXECUTION_TIME",      board.execution.seconds,            420,  560),
+                Send("MCFO_MAX_EXECUTION_TIME",  board.execution.longest_seconds,    420,  560),
+            )),
             extra_idle_call=self.quirks.occasional_idle_call,
             speakers=("can_tx1",),
             last=(

@@ -9,6 +9,7 @@ quirks.py for what the firmware of 2016 made of it.
 
 import cython
 
+from ranger_sim.boards.modules.publishing import Send, laid_out
 from ranger_sim.boards.motor_board import ANALOG, PINS, WORDS, MotorBoard
 from ranger_sim.datatable.generated import errors as codes
 from ranger_sim.datatable.generated import mcsi as table
@@ -65,10 +66,6 @@ class SteeringBoard(MotorBoard):
         self.direct = self.quirks.steering_output in ("duty", "duty_then_current")
         self.closed_loop = self.quirks.steering_output in ("current", "duty_then_current")
         self.check_limits = self.quirks.steering_limit_check
-        self.code_left = codes.MCSI_LEFT
-        self.code_right = codes.MCSI_RIGHT
-        self.code_stopped = codes.MC_NOT_RUNNING
-        self.id_steer_angle = table.MCSI_STEER_ANGLE
         self.begin(phase_ns)
 
     def schedule(self) -> Schedule:
@@ -82,26 +79,24 @@ class SteeringBoard(MotorBoard):
                 Task(board.start_internal_adc,          60,  100,   0, "",      "adci_convert_all"),
                 Task(board.can.receive_all,            120, 4000, 220, "frame", "can_rx_dispatch_all"),
                 Task(board.heartbeat.beat,              40,   60,   0, "",      "hb_beat"),
-                Task(board.leds.update,                 60,   80,   0, "",      "mcu_led_update"),
+                Task(board.heartbeat.update,            60,   80,   0, "",      "mcu_led_update"),
                 Task(board.errors.update,               90, 2700, 120, "error", "error_update"),
                 Task(board.can.feed,                    50,  300,  80, "frame", "can_tx2"),
                 Wait(board.adc_external.sequence_done,  20, 6500,              "adcx_conversion_wait"),
                 Task(board.update_pwm,                 250,  340,   0, "",      "dn_update_pwm"),
                 Task(board.steering_control,          3900, 5200,   0, "",      "mc_compliant_control"),
             ),
-            rows=(
-                (Task(board.send_steer_angle,          330,  440,   0, "",      "MCSI_STEER_ANGLE"),),
-                (Task(board.send_motor_current,        480,  640,   0, "",      "MCSI_MOTOR_CURRENT"),),
-                (Task(board.send_power,                600,  800,   0, "",      "MCSI_BATT_POWER"),),
-                (),  # the occasional list
-            ),
-            occasional_row=3,
-            occasional=(
-                Task(board.send_error,                 200,  270,   0, "",      "ERROR_MCSI"),
-                Task(board.send_status,                260,  350,   0, "",      "MCSI_STATUS"),
-                Task(board.send_execution_time,        420,  560,   0, "",      "MCSI_EXECUTION_TIME"),
-                Task(board.send_max_execution_time,    420,  560,   0, "",      "MCSI_MAX_EXECUTION_TIME"),
-            ),
+            **laid_out(table, self.can, (
+                #    variable                    value                                 cost limit
+                Send("MCSI_STEER_ANGLE",         board.steer_angle_counts,              330,  440),
+                Send("MCSI_MOTOR_CURRENT",       board.readings.motor_current,          480,  640),
+                Send("MCSI_BATT_POWER",          board.readings.battery_power_fixed,    600,  800),
+                # the occasional list, as far as not above
+                Send("ERROR_MCSI",               board.errors,                          200,  270),
+                Send("MCSI_STATUS",              1.0,                                   260,  350),
+                Send("MCSI_EXECUTION_TIME",      board.execution.seconds,               420,  560),
+                Send("MCSI_MAX_EXECUTION_TIME",  board.execution.longest_seconds,       420,  560),
+            )),
             extra_idle_call=self.quirks.occasional_idle_call,
             speakers=("can_tx2",),
             last=(
@@ -151,7 +146,7 @@ class SteeringBoard(MotorBoard):
         if self.closed_loop:
             self.compliant_control()
         elif self.current_control.supervise(self.readings.motor_current_fixed()) and self.output.off:
-            self.errors.report(self.code_stopped)
+            self.errors.report(self.current_control.code_stopped)
 
     def check(self) -> None:
         """The limit check of the firmware, which never calls it: +/-200 counts about 4803.
@@ -162,14 +157,12 @@ class SteeringBoard(MotorBoard):
         high: cython.bint = counts > LIMIT_COUNTS
         low: cython.bint = counts < -LIMIT_COUNTS
         if high:
-            self.errors.report(self.code_right)
+            self.errors.report(codes.MCSI_RIGHT)
         elif low:
-            self.errors.report(self.code_left)
+            self.errors.report(codes.MCSI_LEFT)
         self.current_control.block_positive = high
         self.current_control.block_negative = low
 
-    def send_steer_angle(self) -> None:
-        self.can.send_float(self.id_steer_angle, self.adc_external.results[SENSOR] - self.zero)
-
-    def send_power(self) -> None:
-        self.can.send_float(self.id_batt_power, self.readings.battery_power_fixed())
+    def steer_angle_counts(self) -> cython.longlong:
+        """MCSI_STEER_ANGLE: counts from the zero."""
+        return self.adc_external.results[SENSOR] - self.zero

@@ -6,11 +6,9 @@ Source: robot.md N3.6, N4.10-N4.12, N4.16; appendix 3.7, 3.8. What a person sees
 
 import cython
 
+from ranger_sim.boards.firmware_board import SatelliteBoard
 from ranger_sim.boards.modules.buzzer import Buzzer, BuzzerFrequency, ErrorSound, TuneStart
-from ranger_sim.boards.modules.can_link import CanLink
 from ranger_sim.boards.modules.colour_leds import CYCLES_PER_WRITE, ColourLeds, LedReceiver
-from ranger_sim.boards.modules.error_module import ErrorModule
-from ranger_sim.boards.modules.execution_timer import ExecutionTimer
 from ranger_sim.boards.modules.imu_parser import (
     HEADER_ANGLES_AND_RATES,
     HEADER_RATES_ONLY,
@@ -20,15 +18,11 @@ from ranger_sim.boards.modules.imu_parser import (
 from ranger_sim.boards.modules.keypad import KEY_PINS, Keypad
 from ranger_sim.boards.modules.lcd import Lcd, LcdQuarter
 from ranger_sim.boards.modules.mcu_led import PINS as LED_PINS
-from ranger_sim.boards.modules.mcu_led import Heartbeat
-from ranger_sim.boards.modules.network_time import NetworkTime
+from ranger_sim.boards.modules.publishing import Send, laid_out
 from ranger_sim.boards.modules.rc_receiver import RcReceiver
 from ranger_sim.boards.modules.sync_light import SYNC_PIN, SyncLight
-from ranger_sim.datatable.generated import errors as codes
 from ranger_sim.datatable.generated import ui as table
-from ranger_sim.firmware_sim.microcontroller import Microcontroller
-from ranger_sim.firmware_sim.peripherals.can_controller import ICR_BEI, ICR_DOI, ICR_EI, ICR_EPI, ICR_RI, CanController
-from ranger_sim.firmware_sim.peripherals.gpio import Gpio, p0
+from ranger_sim.firmware_sim.peripherals.gpio import p0
 from ranger_sim.firmware_sim.peripherals.timer_capture import TimerCapture
 from ranger_sim.firmware_sim.peripherals.uart import Uart
 from ranger_sim.firmware_sim.scheduler import Schedule, Task
@@ -46,7 +40,6 @@ PINS = {
 IMU_UART = 1
 
 # VIC slots (robot.md N4.16)
-CAN_RECEIVE_SLOT = 0
 TIMER_SLOT = 1
 RC_SLOT = 2
 UART_SLOT = 3
@@ -63,55 +56,37 @@ LCD_IDLE_CYCLES = 25  # chosen by us, as above
 LCD_BYTE_CYCLES = 110  # eight data pins, three control pins, each a read-modify-write: chosen by us, as above
 
 
-class UserInterfaceBoard(Microcontroller):
+class UserInterfaceBoard(SatelliteBoard):
     """Slots of 1 ms, 3 rows. `phase_ns`: when it gets power, and its first slot begins."""
 
     def __init__(self, crystal, quirks, phase_ns=0) -> None:
-        Microcontroller.__init__(self, table.BOARD, table.CLOCK_HZ, crystal)
-        self.quirks = quirks
-        self.time = NetworkTime()
-        self.errors = ErrorModule(
-            table.BOARD_NUMBER,
-            self.time,
-            per_event=quirks.errors_counted_per_event,
-            lose_new_after_repeat=quirks.new_errors_lost_after_repeat,
-        )
-        self.gpio = Gpio(self)
-        self.mcu_leds = self.heartbeat = Heartbeat(self.time, self.gpio, table.SLOT_US)
-        self.execution = ExecutionTimer(self, self.time)
-        # network
-        interrupts = ICR_RI | ICR_EI | ICR_DOI | ICR_EPI | ICR_BEI
-        self.can2 = CanController(self, table.CONTROLLER, IER=interrupts)
-        self.can = CanLink(self, self.can2, self.time, self.errors, codes, quirks.full_queues_reported)
-        self.can.attach(receive_slot=CAN_RECEIVE_SLOT, error_slot=CAN_ERROR_SLOT)
+        board: object = self  # a compiled class would hand out wrappers of inherited methods
+        SatelliteBoard.__init__(self, table, crystal, quirks, CAN_ERROR_SLOT)
+        quirks = self.quirks
         # inertial sensor: 460 526 baud (robot.md N4.10)
         rates_only = quirks.imu_packets == "rates"
         header = HEADER_RATES_ONLY if rates_only else HEADER_ANGLES_AND_RATES
         self.uart1 = Uart(self, IMU_UART, divisor=6, divaddval=5, mulval=14, trigger=8)
-        self.imu = ImuParser(self.report, header, not rates_only)
+        self.imu = ImuParser(board.report, header, not rates_only)
         self.imu_command = start_command(header)
         self.imu_start_slots = IMU_START_SLOTS
         self.slots = 0
         self.vic.attach(UART_BYTE, IMU_UART, self.on_uart, UART_CYCLES, UART_BYTE_CYCLES, slot=UART_SLOT, name="uart1")
         # radio control: one interrupt of the timer for its four captures
         self.timer0 = TimerCapture(self, 0, period=600_000, phase_ns=phase_ns)
-        self.rc = RcReceiver(self.report)
+        self.rc = RcReceiver(board.report)
         captures = self.vic.source(TIMER_MATCH, 0)
         for channel in (0, 1, 3):
             self.timer0.use_channel(channel, RC_PINS[channel], source=captures)
         self.vic.attach(TIMER_MATCH, 0, self.on_rc_edge, RC_CYCLES, slot=RC_SLOT, name="timer0 capture")
         # what a person touches, sees and hears
-        self.keypad = Keypad(self.gpio, self.report)
-        self.lcd = Lcd(self.report)
+        self.keypad = Keypad(self.gpio, board.report)
+        self.lcd = Lcd(board.report)
         self.leds = ColourLeds()
         self.buzzer = Buzzer(quirks.buzzer_beeps, quirks.song_repeats_for_ever)
         self.sync_light = SyncLight(self.gpio, self.keypad, self.leds)
         self.listen()
         self.on_timer_tick = self.lcd_tick
-        self.on_overrun = self.note_overrun
-        if quirks.warn_near_slot_limit:
-            self.on_limit = self.note_limit
-            self.on_near_limit = self.note_near_limit
         self.start(self.schedule(), phase_ns)
 
     def listen(self) -> None:
@@ -129,53 +104,52 @@ class UserInterfaceBoard(Microcontroller):
             listen(table.ERROR_LCD, ErrorSound(self.buzzer))
 
     def schedule(self) -> Schedule:
-        """Source: robot.md N3.6. Costs and limits are chosen by us; robot.md T1 has the board's measured slots."""
-        # untyped names: the compiler cannot hand out a bound method of another module's compiled class
-        can: object = self.can
-        heartbeat: object = self.heartbeat
-        mcu_leds: object = self.mcu_leds
-        execution: object = self.execution
+        """Source: robot.md N3.6. Costs and limits are chosen by us; robot.md T1 has the board's measured slots.
+
+        UI_ROLL, UI_PITCH and UI_YAW are 0 while the IMU sends rates alone. If the IMU falls silent, the last values are
+        sent on.
+        """
+        board: object = self  # a compiled class would hand out wrappers of its parts' methods
+        imu: object = self.imu
+        rc: object = self.rc
         return Schedule(
             slot_us=table.SLOT_US,
             tick_slot=TIMER_SLOT,
             every=(
                 #    function                   cost (cycles)  limit
-                Task(can.receive_all,           cost=80,       limit=9000, per_item=90, item="frame"),
-                Task(heartbeat.beat,            cost=40,       limit=150),
-                Task(mcu_leds.update,           cost=50,       limit=150),
+                Task(board.can.receive_all,     cost=80,       limit=9000, per_item=90, item="frame"),
+                Task(board.heartbeat.beat,      cost=40,       limit=150),
+                Task(board.heartbeat.update,    cost=50,       limit=150),
                 Task(self.update_imu,           cost=60,       limit=2800, per_item=16, item="byte"),
                 Task(self.update_errors,        cost=60,       limit=4000, per_item=150, item="error"),
-                Task(can.feed,                  cost=50,       limit=1000, per_item=110, item="frame"),
+                Task(board.can.feed,            cost=50,       limit=1000, per_item=110, item="frame"),
                 Task(self.watch_sync_key,       cost=30,       limit=100),
                 Task(self.update_sync_light,    cost=40,       limit=900,
                      per_item=CYCLES_PER_WRITE, item="transfer"),
                 Task(self.update_buzzer,        cost=60,       limit=200),
             ),
-            rows=(
-                (Task(self.send_roll,           cost=260,      limit=500),),
-                (Task(self.send_rate_x,         cost=260,      limit=500),),
-                (),
-            ),
-            occasional_row=2,
-            occasional=(
-                Task(self.send_error,           cost=150,      limit=500),
-                Task(self.send_buttons,         cost=280,      limit=500),
-                Task(self.send_rc_0,            cost=260,      limit=500),
-                Task(self.send_rc_1,            cost=260,      limit=500),
-                Task(self.send_status,          cost=230,      limit=500),
-                Task(self.send_execution_time,  cost=300,      limit=500),
-                Task(self.send_max_execution_time, cost=300,   limit=500),
-                Task(self.send_pitch,           cost=260,      limit=500),
-                Task(self.send_roll,            cost=260,      limit=500, name="send_roll_again"),
-                Task(self.send_yaw,             cost=260,      limit=500),
-                Task(self.send_rate_y,          cost=260,      limit=500),
-                Task(self.send_rate_z,          cost=260,      limit=500),
-                Task(self.send_rc_2,            cost=260,      limit=500),
-                Task(self.send_rc_3,            cost=260,      limit=500),
-            ),
+            **laid_out(table, self.can, (
+                #    variable                 value                              cost limit
+                Send("UI_ROLL",               lambda: imu.roll,                   260,  500),
+                Send("UI_ANG_RATE_X",         lambda: imu.rate_x,                 260,  500),
+                # the occasional list, as far as not above; RC channel 2's pin drives the sync light, so it is 0
+                Send("ERROR_UI",              board.errors,                       150,  500),
+                Send("UI_BUTTONS",            board.keypad.buttons,               280,  500),
+                Send("UI_RC_0",               lambda: rc.width(0),                260,  500),
+                Send("UI_RC_1",               lambda: rc.width(1),                260,  500),
+                Send("UI_STATUS",             1.0,                                230,  500),
+                Send("UI_EXECUTION_TIME",     board.execution.seconds,            300,  500),
+                Send("UI_MAX_EXECUTION_TIME", board.execution.longest_seconds,    300,  500),
+                Send("UI_PITCH",              lambda: imu.pitch,                  260,  500),
+                Send("UI_YAW",                lambda: imu.yaw,                    260,  500),
+                Send("UI_ANG_RATE_Y",         lambda: imu.rate_y,                 260,  500),
+                Send("UI_ANG_RATE_Z",         lambda: imu.rate_z,                 260,  500),
+                Send("UI_RC_2",               lambda: rc.width(2),                260,  500),
+                Send("UI_RC_3",               lambda: rc.width(3),                260,  500),
+            )),
             extra_idle_call=self.quirks.occasional_idle_call,
             speakers=("feed",),
-            last=(Task(execution.record,       cost=40,       limit=80, name="record_execution_time"),),
+            last=(Task(board.execution.record,       cost=40,       limit=80, name="record_execution_time"),),
         )  # fmt: skip
 
     # --- interrupts -------------------------------------------------------------------------------------
@@ -199,24 +173,6 @@ class UserInterfaceBoard(Microcontroller):
             self.extra_cycles += LCD_BYTE_CYCLES
         else:
             self.extra_cycles += LCD_IDLE_CYCLES
-
-    # --- errors -----------------------------------------------------------------------------------------
-
-    def report(self, code: cython.longlong) -> None:
-        """Note an error of a module."""
-        self.errors.report(code)
-
-    def note_overrun(self) -> None:
-        """A tick found the row unfinished."""
-        self.errors.report(codes.ASCHED_DNF)
-
-    def note_limit(self, task: Task) -> None:
-        """A task took longer than its limit."""
-        self.errors.report(codes.SCHED_TASK_LIMIT)
-
-    def note_near_limit(self) -> None:
-        """A slot took more than 90 % of its length."""
-        self.errors.report(codes.SCHED_SLOT_NEAR_LIMIT)
 
     # --- tasks of every slot ----------------------------------------------------------------------------
 
@@ -248,65 +204,3 @@ class UserInterfaceBoard(Microcontroller):
     def update_buzzer(self) -> None:
         """One millisecond of beeps and tune."""
         self.buzzer.update()
-
-    # --- what is published ------------------------------------------------------------------------------
-
-    def send_roll(self) -> None:
-        """UI_ROLL, rad; 0 while the IMU sends rates alone. Old values are sent on if the IMU falls silent."""
-        self.can.send_float(table.UI_ROLL, self.imu.roll)
-
-    def send_pitch(self) -> None:
-        """UI_PITCH, rad."""
-        self.can.send_float(table.UI_PITCH, self.imu.pitch)
-
-    def send_yaw(self) -> None:
-        """UI_YAW, rad."""
-        self.can.send_float(table.UI_YAW, self.imu.yaw)
-
-    def send_rate_x(self) -> None:
-        """UI_ANG_RATE_X, rad/s."""
-        self.can.send_float(table.UI_ANG_RATE_X, self.imu.rate_x)
-
-    def send_rate_y(self) -> None:
-        """UI_ANG_RATE_Y, rad/s."""
-        self.can.send_float(table.UI_ANG_RATE_Y, self.imu.rate_y)
-
-    def send_rate_z(self) -> None:
-        """UI_ANG_RATE_Z, rad/s."""
-        self.can.send_float(table.UI_ANG_RATE_Z, self.imu.rate_z)
-
-    def send_error(self) -> None:
-        """ERROR_UI, the error that waits longest, if one does."""
-        self.can.send_error(table.ERROR_VARIABLE)
-
-    def send_buttons(self) -> None:
-        """UI_BUTTONS, bit mask of the keys that are down."""
-        self.can.send_int(table.UI_BUTTONS, self.keypad.buttons())
-
-    def send_rc_0(self) -> None:
-        """UI_RC_0, pulse width in 1/60 us."""
-        self.can.send_float(table.UI_RC_0, self.rc.width(0))
-
-    def send_rc_1(self) -> None:
-        """UI_RC_1."""
-        self.can.send_float(table.UI_RC_1, self.rc.width(1))
-
-    def send_rc_2(self) -> None:
-        """UI_RC_2; its pin drives the sync light, so 0."""
-        self.can.send_float(table.UI_RC_2, self.rc.width(2))
-
-    def send_rc_3(self) -> None:
-        """UI_RC_3."""
-        self.can.send_float(table.UI_RC_3, self.rc.width(3))
-
-    def send_status(self) -> None:
-        """UI_STATUS, always 1."""
-        self.can.send_float(table.UI_STATUS, 1.0)
-
-    def send_execution_time(self) -> None:
-        """UI_EXECUTION_TIME, s."""
-        self.can.send_float(table.UI_EXECUTION_TIME, self.execution.seconds())
-
-    def send_max_execution_time(self) -> None:
-        """UI_MAX_EXECUTION_TIME, s."""
-        self.can.send_float(table.UI_MAX_EXECUTION_TIME, self.execution.longest_seconds())

@@ -39,6 +39,11 @@ def quoted(text: str) -> str:
     return f'"{text}"'  # the loader refuses quotes and backslashes
 
 
+def names_literal(names: Iterable[str]) -> str:
+    """A tuple of names as Python source."""
+    return "(" + "".join(f"{quoted(name)}, " for name in names).rstrip() + ")"
+
+
 def sent_by(table: Table, board: Board) -> list[Variable]:
     """What a board puts on a bus or link: its variables that some bus carries.
 
@@ -96,6 +101,12 @@ def board_module(table: Table, board: Board) -> str:
         f"CLOCK_HZ = {board.clock_hz}",
         f"SLOT_US = {schedule.slot_us}",
         f"ROWS = {len(schedule.rows)}",
+        "",
+        "# what the schedule sends, by row and in the occasional list; in parentheses what sends nothing",
+        *tuple_lines("ROW_NAMES", "tuple[tuple[str, ...], ...]", (names_literal(row) for row in schedule.rows)),
+        *tuple_lines("OCCASIONAL_NAMES", "tuple[str, ...]", (quoted(name) for name in schedule.occasional)),
+        f"OCCASIONAL_ROW = {schedule.occasional_row or 0}",
+        "",
         f"ERROR_VARIABLE = {own_error[0] if own_error and board.role != 'main brain' else None}",
         "",
         "# ids by name",

@@ -12,20 +12,18 @@ from typing import NamedTuple
 
 import cython
 
+from ranger_sim.boards.firmware_board import FirmwareBoard
 from ranger_sim.boards.main_brain import controllers
 from ranger_sim.boards.main_brain.data_link import DataLink
 from ranger_sim.boards.main_brain.error_distribution import ErrorDistribution
 from ranger_sim.boards.main_brain.estimator import Estimator
 from ranger_sim.boards.main_brain.io_data import IoData
 from ranger_sim.boards.main_brain.mode_machine import ModeMachine
-from ranger_sim.boards.modules.error_module import ErrorModule
-from ranger_sim.boards.modules.network_time import NetworkTime
 from ranger_sim.boards.modules.ssp_link import MainBrainSspLink
 from ranger_sim.datatable.generated import errors as codes
 from ranger_sim.datatable.generated import mb as table
 from ranger_sim.datatable.generated.all_variables import ID_OF_LAST, TABLE_SIZE
 from ranger_sim.datatable.store import DataStore
-from ranger_sim.firmware_sim.microcontroller import Microcontroller
 from ranger_sim.firmware_sim.peripherals.ssp import SspPort, SspSegment
 from ranger_sim.firmware_sim.peripherals.uart_hs import HsUart
 from ranger_sim.firmware_sim.scheduler import Schedule, Task
@@ -54,26 +52,16 @@ DMA_CYCLES = 450
 RESTART_CYCLES = 500
 
 
-class MainBrainBoard(Microcontroller):
+class MainBrainBoard(FirmwareBoard):
     """`controller`: name of a parameter set, path of a .toml file, or a loaded Controller.
 
     Open to the harness and to tests: `store` (the data table), `estimator`, `modes`, `errors`, `distribution`.
     """
 
     def __init__(self, crystal, quirks, phase_ns=0, controller="record-2011") -> None:
-        Microcontroller.__init__(self, table.BOARD, table.CLOCK_HZ, crystal)
-        self.quirks = quirks
+        board: object = self  # a compiled class would hand out wrappers of inherited methods
+        FirmwareBoard.__init__(self, table, crystal, quirks, quirks.errors_reported_one_late)
         self.store = DataStore(TABLE_SIZE)
-        self.time = NetworkTime()
-        self.errors = ErrorModule(
-            table.BOARD_NUMBER, self.time, quirks.errors_counted_per_event, quirks.new_errors_lost_after_repeat
-        )
-        self.errors_one_late = quirks.errors_reported_one_late
-        self.error_before = codes.DEFAULT
-        self.code_dnf = codes.ASCHED_DNF
-        self.code_near_limit = codes.SCHED_SLOT_NEAR_LIMIT
-        self.code_task_limit = codes.SCHED_TASK_LIMIT
-        self.code_id_out_of_range = codes.MB_IO_ID_OOR
         self.store.on_out_of_range = self.id_out_of_range
         for number, value in table.INITIAL.items():
             if table.TYPES[number] == "f32":
@@ -82,7 +70,7 @@ class MainBrainBoard(Microcontroller):
                 self.store.set_int(number, int(value))
 
         self.ssp = SspPort(self, 0)
-        self.link = MainBrainSspLink(self.report, ID_OF_LAST)
+        self.link = MainBrainSspLink(board.report, ID_OF_LAST)
         self.io = IoData(self.store, self.link, self.time, table.SEND)
         port = COMPUTER_PORTS[quirks.computer_link]
         self.computer_uart = HsUart(self, port.uart, TRANSMIT_CHANNEL, port.rate, cts_pin=port.cts_pin)
@@ -90,11 +78,11 @@ class MainBrainBoard(Microcontroller):
             self,
             self.computer_uart,
             self.store,
-            self.report,
+            board.report,
             checked=quirks.parameter_writes_checked,
             dma_off_at_start=quirks.serial_dma_off_at_start,
         )
-        self.estimator = Estimator(self.store, quirks, self.report)
+        self.estimator = Estimator(self.store, quirks, board.report)
         self.modes = ModeMachine(self.store, quirks, self.estimator)
         self.distribution = ErrorDistribution(self.store, self.errors, quirks.error_distribution_inverted)
         self.controller = None
@@ -111,11 +99,9 @@ class MainBrainBoard(Microcontroller):
             DMA_DONE, TRANSMIT_CHANNEL, self.computer.on_sent, DMA_CYCLES, slot=DMA_SLOT, name="serial sent"
         )
         self.computer.build_lists()
-        if quirks.main_brain_overrun_check:
-            self.on_overrun = self.slot_exceeded
-        self.on_limit = self.task_limit
-        if quirks.warn_near_slot_limit:
-            self.on_near_limit = self.slot_near_limit
+        if not quirks.main_brain_overrun_check:
+            self.on_overrun = None
+        self.on_limit = self.note_limit  # on this board also in 2016
         self.ssp.load(self.link.next_segment())
         self.start(self.schedule(), phase_ns)
 
@@ -196,24 +182,6 @@ class MainBrainBoard(Microcontroller):
         counts = (self.now - since) * 13 // 1000
         self.store.set_float(self.execution_time_id, counts / 13e6)
 
-    # --- errors -----------------------------------------------------------------------------------------
-
-    def report(self, code: cython.longlong) -> None:
-        """Note an error; with the firmware's quirk each report carries the one before, the first is 0."""
-        if self.errors_one_late:
-            self.errors.report(self.error_before)
-            self.error_before = code
-        else:
-            self.errors.report(code)
-
     def id_out_of_range(self) -> None:
-        self.report(self.code_id_out_of_range)
-
-    def slot_exceeded(self) -> None:
-        self.report(self.code_dnf)
-
-    def slot_near_limit(self) -> None:
-        self.report(self.code_near_limit)
-
-    def task_limit(self, task: Task) -> None:
-        self.report(self.code_task_limit)
+        """The store was asked for an identifier that no variable has."""
+        self.report(codes.MB_IO_ID_OOR)

@@ -28,6 +28,10 @@ class Debounce:
             self.state = level
         self.settled = level if level == self.state else -1
 
+    def contact(self) -> cython.longlong:
+        """The level that is believed, as it is published."""
+        return self.state
+
 
 class FootContact(Debounce):
     """A foot sensor's reading (counts) made into contact 0/1 (`state`): above `on_level` on, below `off_level`

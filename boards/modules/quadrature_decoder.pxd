@@ -1,7 +1,12 @@
 cimport cython
 
 from ranger_sim.boards.modules.error_module cimport ErrorModule
-from ranger_sim.foundation.numbers cimport divide_toward_zero
+from ranger_sim.foundation.numbers cimport divide_toward_zero, float_of_fixed
+
+cpdef enum:
+    RING_MASK = 63
+    SLOT_CYCLES = 30000
+    LARGEST = 0x7FFFFFFF
 
 @cython.final
 cdef class QuadratureDecoder:
@@ -21,4 +26,6 @@ cdef class QuadratureDecoder:
     cpdef int glitch(self) except -1
     cdef void _be_silent(self) noexcept
     cdef void _filter(self, long long speed, long long mean) noexcept
+    cpdef double position_rad(self) noexcept
+    cpdef double rate_rad_s(self) noexcept
     cpdef int set_position(self, long long position) except -1

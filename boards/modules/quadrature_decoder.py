@@ -12,12 +12,14 @@ import cython
 from ranger_sim.boards.modules.error_module import ErrorModule
 
 if not cython.compiled:
-    from ranger_sim.foundation.numbers import divide_toward_zero
+    from ranger_sim.foundation.numbers import divide_toward_zero, float_of_fixed
+
+    RING_MASK = 63  # places of the 64 edge times that wait for the next slot; one stays empty
+    SLOT_CYCLES = 30_000
+    LARGEST = 0x7FFFFFFF  # of 32 bits
 
 PI = 3.141592653589793
 TIMER_HZ = 60000000  # the capture timer counts processor cycles
-
-RING_SIZE = 64  # edge times waiting for the next slot; one place stays empty
 
 
 def normalised_gain(gain, low, high):
@@ -57,14 +59,14 @@ class QuadratureDecoder:
         self.position = 0
         self.rate = 0
         # the interrupt's side
-        self.ring = [0] * 64
+        self.ring = [0] * 64  # RING_MASK + 1
         self.write = 0
         self.read = 0
         self.glitches = 0
         self.dropped_times = 0
         # the slot's side
         self.sign = 1
-        self.mean = 0x7FFFFFFF  # cycles between counts; the longest: standing still
+        self.mean = LARGEST  # cycles between counts; the longest: standing still
         self.idle = 0
         self.speed = 0  # counts per cycle x 2^31, unfiltered
         self.filtered = 0
@@ -76,7 +78,7 @@ class QuadratureDecoder:
         not.
         """
         write: cython.longlong = self.write
-        after: cython.longlong = (write + 1) & 63  # RING_SIZE
+        after: cython.longlong = (write + 1) & RING_MASK
         self.count += step
         if after == self.read:
             self.dropped_times += 1
@@ -116,7 +118,7 @@ class QuadratureDecoder:
         other: cython.longlong
         while here != write:
             elapsed = self.ring[here]
-            after = (here + 1) & 63
+            after = (here + 1) & RING_MASK
             if elapsed * sign > 0:
                 total += elapsed
                 valid += 1
@@ -124,7 +126,7 @@ class QuadratureDecoder:
                 self.errors.report(self.glitch_code)
                 if after != write:
                     seen += 1
-                    after = (after + 1) & 63
+                    after = (after + 1) & RING_MASK
             elif after == write:
                 break  # alone at the end: judged when its successor is here
             else:
@@ -136,7 +138,7 @@ class QuadratureDecoder:
                 else:
                     self.errors.report(self.glitch_code)
                     seen += 1
-                    after = (after + 1) & 63
+                    after = (after + 1) & RING_MASK
             seen += 1
             here = after
         if valid == 0:
@@ -145,12 +147,9 @@ class QuadratureDecoder:
             self.idle = 0
             self.sign = sign
             total *= sign  # without the sign
-            self._filter(valid * (0x7FFFFFFF // total), total // valid)
+            self._filter(valid * (LARGEST // total), total // valid)
         if seen == 0:
             return None
-        if here == write:  # empty: the next time goes to the front again, which is in the cache
-            here = 0
-            self.write = 0
         self.read = here
         return seen
 
@@ -158,13 +157,13 @@ class QuadratureDecoder:
         """A slot without a valid time: the longer the silence, the slower it must be, so the rate falls with the
         inverse of the silence."""
         mean: cython.longlong = self.mean if self.mean >= 0 else -self.mean
-        idle: cython.longlong = self.idle + 30000  # cycles per slot
-        if idle > 0x7FFFFFFF:
-            idle = 0x7FFFFFFF
+        idle: cython.longlong = self.idle + SLOT_CYCLES
+        if idle > LARGEST:
+            idle = LARGEST
         self.idle = idle
         if idle > mean:
             mean = idle
-        self._filter(0x7FFFFFFF // mean, mean)
+        self._filter(LARGEST // mean, mean)
 
     def _filter(self, speed: cython.longlong, mean: cython.longlong) -> cython.void:
         """Follow a new speed (counts per cycle x 2^31) and mean (cycles), both without the sign."""
@@ -175,6 +174,14 @@ class QuadratureDecoder:
         filtered += (speed - filtered) >> self.filter_exponent
         self.filtered = filtered
         self.rate = (self.rate_gain * filtered) >> self.rate_bits
+
+    def position_rad(self) -> cython.double:
+        """Angle of the joint in rad, as it is published."""
+        return float_of_fixed(self.position)
+
+    def rate_rad_s(self) -> cython.double:
+        """Rate of the joint in rad/s, as it is published."""
+        return float_of_fixed(self.rate)
 
     def set_position(self, position: cython.longlong) -> None:
         """Set the count so that the position reads `position` (rad x 65536), truncated as in C."""

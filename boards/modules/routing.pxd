@@ -1,7 +1,29 @@
 from ranger_sim.boards.modules.can_load cimport CanLoad
+from ranger_sim.boards.modules.can_link cimport EIGHT_BYTES
 from ranger_sim.boards.modules.ssp_link cimport RouterSspLink
+from ranger_sim.foundation.events cimport FLAG_REMOTE
 
 cimport cython
+
+cpdef enum:
+    IDENTIFIERS = 2032
+    CHANNEL_SSP = 0
+    FIRST_BUS = 1
+    LAST_BUS = 4
+    CHANNEL_OWN = 5
+    SOURCE_UNKNOWN = 7
+    DESTINATIONS = 0xFF
+    SOURCE_SHIFT = 8
+    ALL_CHANNELS = 0x1F
+    TO_SSP = 1
+    NOT_LEARNED = 0x701
+    RECEIVE_RING = 64
+    RECEIVE_MASK = 63
+    RECEIVED = 5
+    TRANSMIT_RING = 8
+    TRANSMIT_MASK = 7
+    OWN_MASK = 7
+    TO_SEND = 4
 
 @cython.final
 cdef class RoutingTable:

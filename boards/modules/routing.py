@@ -13,21 +13,38 @@ from ranger_sim.boards.modules.can_load import CanLoad
 from ranger_sim.boards.modules.ssp_link import RouterSspLink
 from ranger_sim.datatable.generated import errors
 
-IDENTIFIERS = 2032  # 2032-2047 would begin with seven recessive bits, which CAN forbids
-CHANNEL_SSP = 0
-CHANNEL_OWN = 5
-SOURCE_UNKNOWN = 7
-RECEIVE_RING = 64
-TRANSMIT_RING = 8
-OWN_RING = 8
+if not cython.compiled:
+    from ranger_sim.boards.modules.can_link import EIGHT_BYTES
+    from ranger_sim.foundation.events import FLAG_REMOTE
+
+    IDENTIFIERS = 2032  # 2032-2047 would begin with seven recessive bits, which CAN forbids
+    CHANNEL_SSP = 0
+    FIRST_BUS = 1
+    LAST_BUS = 4
+    CHANNEL_OWN = 5
+    SOURCE_UNKNOWN = 7
+    # a row of the table: destinations, and the source above them
+    DESTINATIONS = 0xFF
+    SOURCE_SHIFT = 8
+    ALL_CHANNELS = 0x1F
+    TO_SSP = 1  # destinations: the main brain alone
+    NOT_LEARNED = 0x701  # a row to the main brain, its source unknown
+    # rings: places are masked; one place stays empty
+    RECEIVE_RING = 64
+    RECEIVE_MASK = 63
+    RECEIVED = 5  # numbers in a place: channel, identifier, flags and two words
+    TRANSMIT_RING = 8
+    TRANSMIT_MASK = 7
+    OWN_MASK = 7
+    TO_SEND = 4  # numbers in a place of a transmit ring or the own ring: identifier, flags and two words
 
 
 class RoutingTable:
     """Destinations and learned sources of every identifier. `routes`: pairs (identifier, mask)."""
 
     def __init__(self, routes=()) -> None:
-        # destinations + 256 x source; every identifier that the table does not name goes to the main brain
-        self.rows = [1793] * 2032  # 1 + 256 x 7
+        # every identifier that the table does not name goes to the main brain
+        self.rows = [NOT_LEARNED] * 2032  # IDENTIFIERS
         self.learned = 0
         self.changed = 0
         for identifier, mask in routes:
@@ -37,28 +54,28 @@ class RoutingTable:
         """Replace the destinations of `identifier`; IndexError above 2031."""
         if not 0 <= identifier < IDENTIFIERS:
             raise IndexError(f"routing table: identifier {identifier} is not 0 ... {IDENTIFIERS - 1}")
-        self.rows[identifier] = self.rows[identifier] & ~0xFF | mask & 0x1F
+        self.rows[identifier] = self.rows[identifier] & ~DESTINATIONS | mask & ALL_CHANNELS
 
     @property
     def destinations(self):
         """Masks by identifier."""
-        return [row & 0xFF for row in list(self.rows)]
+        return [row & DESTINATIONS for row in list(self.rows)]
 
     @property
     def sources(self):
         """Channels by identifier; 7: none yet."""
-        return [row >> 8 for row in list(self.rows)]
+        return [row >> SOURCE_SHIFT for row in list(self.rows)]
 
     def learn(self, identifier: cython.longlong, channel: cython.longlong) -> cython.void:
         """Note where `identifier` comes from; a source that changed is accepted without a word."""
-        before: cython.longlong = self.rows[identifier] >> 8
+        before: cython.longlong = self.rows[identifier] >> SOURCE_SHIFT
         if before == channel:
             return
-        if before == 7:
+        if before == SOURCE_UNKNOWN:
             self.learned += 1
         else:
             self.changed += 1
-        self.rows[identifier] = self.rows[identifier] & 0xFF | channel << 8
+        self.rows[identifier] = self.rows[identifier] & DESTINATIONS | channel << SOURCE_SHIFT
 
     def subscribe(self, identifier: cython.longlong, channel: cython.longlong) -> cython.void:
         """A remote frame came from `channel`: send `identifier` there too from now on."""
@@ -79,15 +96,15 @@ class Router:
         self.report = report
         self.one_frame_lag = one_frame_lag
         # rings of rows: channel, identifier, flags and two words; the two others without the channel
-        self.rx_rows = [0] * 320  # 5 RECEIVE_RING
+        self.rx_rows = [0] * 320  # RECEIVED x RECEIVE_RING
         self.rx_write = 0
         self.rx_read = 0
         self.to_route = 0  # frames in this ring and in the router's own
-        self.tx_rows = [0] * 160  # 4 TRANSMIT_RING for each of five channels
+        self.tx_rows = [0] * 160  # TO_SEND x TRANSMIT_RING for each channel; that of the link stays empty
         self.waiting = 0  # frames in the four transmit rings
         self.tx_write = [0] * 5
         self.tx_read = [0] * 5
-        self.own_rows = [0] * 32  # 4 OWN_RING
+        self.own_rows = [0] * 32  # TO_SEND x 8
         self.own_write = 0
         self.own_read = 0
         self.receive_full_codes = [
@@ -117,13 +134,13 @@ class Router:
 
         63 frames fit; one more is lost, False, and CANn_RX_BUF_OF reported.
         """
-        following: cython.longlong = (self.rx_write + 1) & 63
-        row: cython.longlong = 5 * self.rx_write
+        following: cython.longlong = (self.rx_write + 1) & RECEIVE_MASK
+        row: cython.longlong = RECEIVED * self.rx_write
         self.load.counts[channel] += 1
         if following == self.rx_read:
             return self._lose(channel)
         if self.one_frame_lag:
-            row = 5 * following
+            row = RECEIVED * following
         self.rx_rows[row] = channel
         self.rx_rows[row + 1] = identifier
         self.rx_rows[row + 2] = flags
@@ -142,13 +159,13 @@ class Router:
 
     def send(self, identifier: cython.longlong, word0: cython.longlong, word1: cython.longlong) -> cython.bint:
         """A frame of the router itself into its own ring (7 fit); False when it is lost."""
-        following: cython.longlong = (self.own_write + 1) & 7
-        row: cython.longlong = 4 * self.own_write
+        following: cython.longlong = (self.own_write + 1) & OWN_MASK
+        row: cython.longlong = TO_SEND * self.own_write
         if following == self.own_read:
             self.own_lost += 1
             return False
         self.own_rows[row] = identifier
-        self.own_rows[row + 1] = 8
+        self.own_rows[row + 1] = EIGHT_BYTES
         self.own_rows[row + 2] = word0
         self.own_rows[row + 3] = word1
         self.own_write = following
@@ -159,17 +176,14 @@ class Router:
         """Move up to three frames, one each from the link, the CAN ring and the own ring; return how many."""
         moved: cython.longlong = 0
         read: cython.longlong = self.rx_read
-        row: cython.longlong = 5 * read
+        row: cython.longlong = RECEIVED * read
         if self.ssp.received_read != self.ssp.received_write and self.ssp.take():
-            self.load.counts[0] += 1
-            self.route(0, self.ssp.rx_id, self.ssp.rx_flags, self.ssp.rx_word0, self.ssp.rx_word1, now)
+            self.load.counts[CHANNEL_SSP] += 1
+            self.route(CHANNEL_SSP, self.ssp.rx_id, self.ssp.rx_flags, self.ssp.rx_word0, self.ssp.rx_word1, now)
             moved += 1
         if read != self.rx_write:
             self.to_route -= 1
-            self.rx_read = (read + 1) & 63
-            if self.rx_read == self.rx_write and not self.one_frame_lag:
-                self.rx_read = 0  # empty: the next frame goes to the front again, which is in the cache
-                self.rx_write = 0
+            self.rx_read = (read + 1) & RECEIVE_MASK
             self.route(
                 self.rx_rows[row],
                 self.rx_rows[row + 1],
@@ -181,11 +195,16 @@ class Router:
             moved += 1
         read = self.own_read
         if read != self.own_write:
-            row = 4 * read
+            row = TO_SEND * read
             self.to_route -= 1
-            self.own_read = (read + 1) & 7
+            self.own_read = (read + 1) & OWN_MASK
             self.route(
-                5, self.own_rows[row], self.own_rows[row + 1], self.own_rows[row + 2], self.own_rows[row + 3], now
+                CHANNEL_OWN,
+                self.own_rows[row],
+                self.own_rows[row + 1],
+                self.own_rows[row + 2],
+                self.own_rows[row + 3],
+                now,
             )
             moved += 1
         return moved
@@ -201,17 +220,17 @@ class Router:
     ) -> cython.longlong:
         """Learn where the frame came from and copy it to its destinations; return the number of copies."""
         mask: cython.longlong
-        if not 0 <= identifier <= 2031:
+        if not 0 <= identifier < IDENTIFIERS:
             self.unroutable += 1
             return 0
         self.routed += 1
-        if flags & 16 and 1 <= source <= 4:  # FLAG_REMOTE
+        if flags & FLAG_REMOTE and FIRST_BUS <= source <= LAST_BUS:
             return self._ask(source, identifier, flags, word0, word1)
         mask = self.table.rows[identifier]
-        if mask >> 8 != source:
+        if mask >> SOURCE_SHIFT != source:
             self.table.learn(identifier, source)
-        mask = mask & 0xFF & ~(1 << source)
-        if mask == 1:  # nearly all that satellites send
+        mask = mask & DESTINATIONS & ~(1 << source)
+        if mask == TO_SSP:  # nearly all that satellites send
             self.copies += 1
             self.ssp.push(identifier, flags, word0, word1, now)
             return 1
@@ -226,9 +245,9 @@ class Router:
         word1: cython.longlong,
     ) -> cython.longlong:
         """Somebody on bus `source` asks for a value: it goes there from now on, and the frame where it comes from."""
-        channel: cython.longlong = self.table.rows[identifier] >> 8
+        channel: cython.longlong = self.table.rows[identifier] >> SOURCE_SHIFT
         self.table.subscribe(identifier, source)
-        if not 1 <= channel <= 4 or channel == source:
+        if not FIRST_BUS <= channel <= LAST_BUS or channel == source:
             return 0
         self.queue(channel, identifier, flags, word0, word1)
         self.copies += 1
@@ -246,7 +265,7 @@ class Router:
         """Copy a frame to all destinations of `mask`; return their number."""
         channel: cython.longlong = 0
         n: cython.longlong = 0
-        if mask & 1:
+        if mask & TO_SSP:
             self.ssp.push(identifier, flags, word0, word1, now)
             n += 1
         mask >>= 1
@@ -269,8 +288,8 @@ class Router:
     ) -> cython.bint:
         """Into the transmit ring of a bus: 7 fit, one more is lost without an error, as on the robot."""
         write: cython.longlong = self.tx_write[channel]
-        following: cython.longlong = (write + 1) & 7
-        row: cython.longlong = 4 * (channel * 8 + write)
+        following: cython.longlong = (write + 1) & TRANSMIT_MASK
+        row: cython.longlong = TO_SEND * (channel * TRANSMIT_RING + write)
         if following == self.tx_read[channel]:
             self.transmit_lost[channel] += 1
             return False
@@ -284,4 +303,4 @@ class Router:
 
     def frames_for(self, channel: cython.longlong) -> cython.longlong:
         """Frames in the transmit ring of `channel`."""
-        return (self.tx_write[channel] - self.tx_read[channel]) & 7
+        return (self.tx_write[channel] - self.tx_read[channel]) & TRANSMIT_MASK

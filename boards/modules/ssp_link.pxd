@@ -1,6 +1,28 @@
+from ranger_sim.boards.modules.can_link cimport EIGHT_BYTES
 from ranger_sim.firmware_sim.peripherals.ssp cimport SspSegment
+from ranger_sim.foundation.events cimport FLAG_REMOTE
 
 cimport cython
+
+cpdef enum:
+    SEGMENT_HALF_WORDS = 31
+    CHECKSUM = 30
+    FRAME_HALF_WORDS = 5
+    FRAME_ROW = 3
+    SEGMENT_ROWS = 18
+    HEADER_ONES = 0x7800
+    HEADER_REMOTE = 0x8000
+    HEADER_SHIFT = 11
+    HEADER_MARK = 0x0F
+    IDENTIFIER = 0x7FF
+    HALF_WORD = 0xFFFF
+    ROUTER_RING_HALF_WORDS = 500
+    RING_HALF_WORDS_USED = 494
+    ROUTER_RECEIVE_SEGMENTS = 8
+    RECEIVE_MASK = 7
+    MAIN_BRAIN_SEGMENTS = 16
+    ROUTER_CIRCLE = 35
+    MAIN_BRAIN_CIRCLE = 27
 
 @cython.final
 cdef class MainBrainSspLink:

@@ -21,29 +21,43 @@ import cython
 from ranger_sim.datatable.generated import errors
 from ranger_sim.firmware_sim.peripherals.ssp import SspSegment
 
-SEGMENT_HALF_WORDS = 31
-FRAME_HALF_WORDS = 5
+if not cython.compiled:
+    from ranger_sim.boards.modules.can_link import EIGHT_BYTES
+    from ranger_sim.foundation.events import FLAG_REMOTE
+
+    SEGMENT_HALF_WORDS = 31
+    CHECKSUM = 30  # its place: the half-words before it are frames and zeros
+    FRAME_HALF_WORDS = 5
+    FRAME_ROW = 3  # numbers of a frame in `SspSegment.rows`: header and two words
+    SEGMENT_ROWS = 18  # of six frames
+    HEADER_ONES = 0x7800  # bits 11-14 of every header
+    HEADER_REMOTE = 0x8000
+    HEADER_SHIFT = 11
+    HEADER_MARK = 0x0F  # what stands above the identifier of a data frame
+    IDENTIFIER = 0x7FF
+    HALF_WORD = 0xFFFF
+    ROUTER_RING_HALF_WORDS = 500
+    RING_HALF_WORDS_USED = 494  # above this no frame fits: of the 500 one stays free
+    ROUTER_RECEIVE_SEGMENTS = 8
+    RECEIVE_MASK = 7
+    MAIN_BRAIN_SEGMENTS = 16  # each way
+    # 17 hold the ring; one in an exchange, one being delivered; and the 16 that wait at the main brain
+    ROUTER_CIRCLE = 35
+    # 16 queued, one being packed; one in an exchange, one being delivered; and the 8 that wait at the router
+    MAIN_BRAIN_CIRCLE = 27
 FRAMES_PER_SEGMENT = 6
-HEADER_ONES = 0x7800  # bits 11-14 of every header
 SEGMENT_PERIOD_NS = 200_000  # Timer1 of the router, match 11 999 at 60 MHz
 EXCHANGE_NS = 165_333  # 496 bits at 3.0 Mbit/s
-ROUTER_RING_HALF_WORDS = 500  # one stays free: 99 frames
-ROUTER_RECEIVE_SEGMENTS = 8
-MAIN_BRAIN_SEGMENTS = 16  # each way
-# 17 hold the ring; one in an exchange, one being delivered; and those that wait at the main brain
-ROUTER_CIRCLE = 17 + 2 + MAIN_BRAIN_SEGMENTS
-# 16 queued, one being packed; one in an exchange, one being delivered; and those that wait at the router
-MAIN_BRAIN_CIRCLE = MAIN_BRAIN_SEGMENTS + 3 + ROUTER_RECEIVE_SEGMENTS
 
 
 def checksum(segment: SspSegment) -> cython.longlong:
     """(1 + sum of the first 30 half-words) modulo 65536; half-words from `used` on are zeros."""
-    return (1 + sum(segment.words[: segment.used])) & 0xFFFF
+    return (1 + sum(segment.words[: segment.used])) & HALF_WORD
 
 
 def finish(segment: SspSegment, used: cython.longlong) -> None:
     """Zero everything behind `used` half-words; the checksum is right."""
-    segment.words = [*segment.words[:used], *[0] * (31 - used)]
+    segment.words = [*segment.words[:used], *[0] * (SEGMENT_HALF_WORDS - used)]
     segment.used = used
     segment.checksum_error = 0
 
@@ -57,8 +71,8 @@ def add_frame(
     segment: SspSegment, header: cython.longlong, word0: cython.longlong, word1: cython.longlong
 ) -> cython.longlong:
     """Append a frame to a segment that holds less than six, and nothing else; returns how many half-words are used."""
-    used: cython.longlong = segment.used + 5
-    row: cython.longlong = 3 * used // 5
+    used: cython.longlong = segment.used + FRAME_HALF_WORDS
+    row: cython.longlong = FRAME_ROW * used // FRAME_HALF_WORDS
     segment.rows[row - 3] = header
     segment.rows[row - 2] = word0
     segment.rows[row - 1] = word1
@@ -74,18 +88,18 @@ def frames_in(segment: SspSegment) -> cython.longlong:
     row: cython.longlong = 0
     if segment.checksum_error != 0:
         return -1
-    while row < 18 and segment.rows[row] >> 11 == 0x0F:
-        row += 3
-    return row // 3
+    while row < SEGMENT_ROWS and segment.rows[row] >> HEADER_SHIFT == HEADER_MARK:
+        row += FRAME_ROW
+    return row // FRAME_ROW
 
 
 def corrupted_copy(segment: SspSegment, index: cython.longlong, flipped_bits: cython.longlong) -> SspSegment:
     """A copy of `segment` with bits of half-word `index` (0-30) flipped: a disturbance on the wires."""
     copy: SspSegment = SspSegment()
     half_words = segment.words
-    half_words[index] ^= flipped_bits & 0xFFFF
+    half_words[index] ^= flipped_bits & HALF_WORD
     copy.words = half_words
-    copy.used = index + 1 if segment.used <= index < 30 else segment.used
+    copy.used = index + 1 if segment.used <= index < CHECKSUM else segment.used
     return copy
 
 
@@ -136,7 +150,7 @@ class MainBrainSspLink:
         With all places full the segment is dropped and MB_SSP_RX_FULL reported (dropping the newest is
         chosen by us, because only the error is known).
         """
-        if self.received_count == 16:
+        if self.received_count == MAIN_BRAIN_SEGMENTS:
             return self._miss()
         if self.segments_received == 0 and self.first_is_junk:
             segment = self.shifted(segment)
@@ -156,14 +170,17 @@ class MainBrainSspLink:
         found = []
         for segment, frames in zip(self.received[: self.segments], self.received_frames, strict=False):
             rows = list(segment.rows)
-            found += [(rows[row] & 0x7FF, rows[row + 1], rows[row + 2]) for row in range(0, 3 * frames, 3)]
+            found += [
+                (rows[row] & IDENTIFIER, rows[row + 1], rows[row + 2])
+                for row in range(0, FRAME_ROW * frames, FRAME_ROW)
+            ]
         return found
 
     def shifted(self, segment: SspSegment) -> SspSegment:
         """A copy of `segment` as it looks from its second half-word on."""
         copy: SspSegment = SspSegment()
         copy.words = [*segment.words[1:], 0]
-        copy.used = 30
+        copy.used = CHECKSUM
         return copy
 
     def next_segment(self) -> SspSegment:
@@ -174,7 +191,7 @@ class MainBrainSspLink:
             return self.empty
         segment = cython.cast(SspSegment, self.queue[self.queue_read])
         self.queue_read += 1
-        if self.queue_read == 27:  # MAIN_BRAIN_CIRCLE
+        if self.queue_read == MAIN_BRAIN_CIRCLE:
             self.queue_read = 0
         self.queue_count -= 1
         return segment
@@ -200,8 +217,8 @@ class MainBrainSspLink:
                 frames = 0
                 self.checksum_errors += 1
                 self.report(self.code_checksum)
-            for row in range(0, 3 * frames, 3):
-                if segment.rows[row] & 0x7FF > self.last_id:
+            for row in range(0, FRAME_ROW * frames, FRAME_ROW):
+                if segment.rows[row] & IDENTIFIER > self.last_id:
                     frames = self._drop_strangers(i, frames)
                     break
             self.received_frames[i] = frames
@@ -213,14 +230,14 @@ class MainBrainSspLink:
         """Keep the received segment at `place` without the frames that no variable has; returns how many are left."""
         segment: SspSegment = self.received[place]
         known: SspSegment = SspSegment()
-        for row in range(0, 3 * frames, 3):
-            if segment.rows[row] & 0x7FF > self.last_id:
+        for row in range(0, FRAME_ROW * frames, FRAME_ROW):
+            if segment.rows[row] & IDENTIFIER > self.last_id:
                 self.ids_out_of_range += 1
                 self.report(self.code_id_out_of_range)
             else:
                 add_frame(known, segment.rows[row], segment.rows[row + 1], segment.rows[row + 2])
         self.received[place] = known
-        return known.used // 5
+        return known.used // FRAME_HALF_WORDS
 
     def send(self, identifier: cython.longlong, word0: cython.longlong, word1: cython.longlong) -> cython.bint:
         """Pack one frame; False (and MB_SSP_TX_FULL) when all 16 segments are queued.
@@ -230,18 +247,17 @@ class MainBrainSspLink:
         if self.packing is None and not self._begin_segment():
             return False
         self.frames_sent += 1
-        if add_frame(self.packing, (identifier & 0x7FF) | 0x7800, word0, word1) == 30:
+        if add_frame(self.packing, (identifier & IDENTIFIER) | HEADER_ONES, word0, word1) == CHECKSUM:
             self.flush()
         return True
 
     def _begin_segment(self) -> cython.bint:
         """Let an empty segment be the one that is packed; False when all are queued."""
-        if self.queue_count >= 16:
+        if self.queue_count >= MAIN_BRAIN_SEGMENTS:
             self.transmit_full += 1
             self.report(self.code_transmit_full)
             return False
-        # MAIN_BRAIN_CIRCLE
-        self.packing = cython.cast(SspSegment, self.queue[(self.queue_read + self.queue_count) % 27])
+        self.packing = cython.cast(SspSegment, self.queue[(self.queue_read + self.queue_count) % MAIN_BRAIN_CIRCLE])
         self.packing.clear()
         return True
 
@@ -287,7 +303,7 @@ class RouterSspLink:
         self.exchange_running = False
         self.exchange_done = False
         self.rx_id = 0
-        self.rx_flags = 8  # every frame becomes one of eight bytes
+        self.rx_flags = EIGHT_BYTES  # every frame becomes one of eight bytes
         self.rx_word0 = 0
         self.rx_word1 = 0
         self.segments_sent = 0
@@ -319,16 +335,16 @@ class RouterSspLink:
 
         `flags` as in foundation.events; `now` is the instant in ns at which the pushing begins.
         """
-        header: cython.longlong = (identifier & 0x7FF) | 0x7800
-        if self.half_words > 494:
+        header: cython.longlong = (identifier & IDENTIFIER) | HEADER_ONES
+        if self.half_words > RING_HALF_WORDS_USED:
             return self._lose()
-        if flags & 16:  # FLAG_REMOTE
-            header |= 0x8000
-        self.half_words += 5
+        if flags & FLAG_REMOTE:
+            header |= HEADER_REMOTE
+        self.half_words += FRAME_HALF_WORDS
         self.push_time = now
-        if self.packing.used == 30:
+        if self.packing.used == CHECKSUM:
             self._begin_segment()
-        elif self.frames_may_straddle and self.packing.used % 5 != 0:  # a frame was cut before
+        elif self.frames_may_straddle and self.packing.used % FRAME_HALF_WORDS != 0:  # a frame was cut before
             return self._put_half_words(header, word0, word1)
         add_frame(self.packing, header, word0, word1)
         return True
@@ -342,20 +358,20 @@ class RouterSspLink:
     def _put_half_words(self, header: cython.longlong, word0: cython.longlong, word1: cython.longlong) -> cython.bint:
         """Append a frame that does not lie as the others do, and may go on in the next segment: True."""
         for word in (header, word0 >> 16, word0, word1 >> 16, word1):
-            self._put(word & 0xFFFF)
+            self._put(word & HALF_WORD)
         return True
 
     def _begin_segment(self) -> cython.void:
         """Let the segment after the last be the one that is packed."""
         self.last += 1
-        if self.last == 35:  # ROUTER_CIRCLE
+        if self.last == ROUTER_CIRCLE:
             self.last = 0
         self.packing = cython.cast(SspSegment, self.segments[self.last])
         self.packing.clear()
 
     def _put(self, word: cython.longlong) -> None:
         """Append one half-word."""
-        if self.packing.used == 30:
+        if self.packing.used == CHECKSUM:
             self._begin_segment()
         half_words = self.packing.words
         half_words[self.packing.used] = word
@@ -373,12 +389,12 @@ class RouterSspLink:
         if self.half_words == 0:
             return self.empty
         segment = cython.cast(SspSegment, self.segments[self.first])
-        if now - self.push_time < 5 * self.push_step_ns:
-            take = self.half_words - 5
+        if now - self.push_time < FRAME_HALF_WORDS * self.push_step_ns:
+            take = self.half_words - FRAME_HALF_WORDS
             if now > self.push_time:
                 take += (now - self.push_time) // self.push_step_ns
             if not self.frames_may_straddle:
-                take -= take % 5
+                take -= take % FRAME_HALF_WORDS
             if take <= 0:
                 return self.empty
             if take < segment.used:
@@ -386,10 +402,10 @@ class RouterSspLink:
         if self.first == self.last:
             self._begin_segment()
         self.first += 1
-        if self.first == 35:  # ROUTER_CIRCLE
+        if self.first == ROUTER_CIRCLE:
             self.first = 0
         self.half_words -= segment.used
-        self.frames_sent += segment.used // 5
+        self.frames_sent += segment.used // FRAME_HALF_WORDS
         return segment
 
     def _cut(self, segment: SspSegment, used: cython.longlong) -> None:
@@ -397,7 +413,7 @@ class RouterSspLink:
         moved = segment.words[used : segment.used]
         if self.first == self.last:
             self._begin_segment()
-        self.packing.words = [*moved, *self.packing.words[: 31 - len(moved)]]
+        self.packing.words = [*moved, *self.packing.words[: SEGMENT_HALF_WORDS - len(moved)]]
         finish(self.packing, self.packing.used + len(moved))
         finish(segment, used)
 
@@ -409,7 +425,7 @@ class RouterSspLink:
         """
         following: cython.longlong
         if self.exchange_running:
-            following = (self.received_write + 1) & 7
+            following = (self.received_write + 1) & RECEIVE_MASK
             if not self.exchange_done or following == self.received_read:
                 self._miss_segment()
             else:
@@ -456,8 +472,8 @@ class RouterSspLink:
             frames = self.received_frames[self.received_read]
             if self.position < frames:
                 segment = cython.cast(SspSegment, self.received[self.received_read])
-                row = 3 * self.position
-                self.rx_id = segment.rows[row] & 0x7FF
+                row = FRAME_ROW * self.position
+                self.rx_id = segment.rows[row] & IDENTIFIER
                 self.rx_word0 = segment.rows[row + 1]
                 self.rx_word1 = segment.rows[row + 2]
                 self.position += 1
@@ -466,5 +482,5 @@ class RouterSspLink:
             if frames < 0:
                 self._drop_segment()
             self.position = 0
-            self.received_read = (self.received_read + 1) & 7
+            self.received_read = (self.received_read + 1) & RECEIVE_MASK
         return False

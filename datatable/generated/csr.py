@@ -10,6 +10,17 @@ CONTROLLER = 0  # CAN controller on the board, 0 for none or all
 CLOCK_HZ = 60000000
 SLOT_US = 1000
 ROWS = 10
+
+# what the schedule sends, by row and in the occasional list; in parentheses what sends nothing
+ROW_NAMES: tuple[tuple[str, ...], ...] = (
+    (), (), (), (), (), (), (), (), (), (),
+)
+OCCASIONAL_NAMES: tuple[str, ...] = (
+    "ERROR_CSR", "CSR_MCU_POWER", "CSR_MCU_CURRENT", "CSR_MCU_VOLTAGE", "CSR_CAN1_LOAD", "CSR_CAN2_LOAD",
+    "CSR_CAN3_LOAD", "CSR_CAN4_LOAD",
+)
+OCCASIONAL_ROW = 0
+
 ERROR_VARIABLE = 2
 
 # ids by name

@@ -10,6 +10,14 @@ CONTROLLER = 0  # CAN controller on the board, 0 for none or all
 CLOCK_HZ = 208000000
 SLOT_US = 2000
 ROWS = 11
+
+# what the schedule sends, by row and in the occasional list; in parentheses what sends nothing
+ROW_NAMES: tuple[tuple[str, ...], ...] = (
+    (), (), (), (), (), (), (), (), (), (), ("MB_EXECUTION_TIME",),
+)
+OCCASIONAL_NAMES: tuple[str, ...] = ()
+OCCASIONAL_ROW = 0
+
 ERROR_VARIABLE = None
 
 # ids by name

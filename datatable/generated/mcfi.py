@@ -10,6 +10,19 @@ CONTROLLER = 2  # CAN controller on the board, 0 for none or all
 CLOCK_HZ = 60000000
 SLOT_US = 500
 ROWS = 8
+
+# what the schedule sends, by row and in the occasional list; in parentheses what sends nothing
+ROW_NAMES: tuple[tuple[str, ...], ...] = (
+    ("MCFI_MID_ANKLE_ANGLE",), ("MCFI_ANKLE_RATE",), ("MCFI_LEFT_HEEL_SENSE",), ("MCFI_MOTOR_POSITION",),
+    ("MCFI_RIGHT_HS",), ("MCFI_BATT_POWER",), ("MCFI_RIGHT_HEEL_SENSE",), (),
+)
+OCCASIONAL_NAMES: tuple[str, ...] = (
+    "ERROR_MCFI", "MCFI_MOTOR_VELOCITY", "MCFI_MOTOR_CURRENT", "MCFI_LEFT_HS", "MCFI_STATUS",
+    "MCFI_BATT_CURRENT", "MCFI_BATT_VOLTAGE", "MCFI_HBRIDGE_TEMP", "MCFI_RIGHT_LS", "MCFI_LEFT_LS",
+    "MCFI_EXECUTION_TIME", "MCFI_MAX_EXECUTION_TIME", "MCFI_RIGHT_HEEL_SENSE", "(motor_encoder_rezero)",
+)
+OCCASIONAL_ROW = 7
+
 ERROR_VARIABLE = 5
 
 # ids by name

@@ -10,6 +10,19 @@ CONTROLLER = 1  # CAN controller on the board, 0 for none or all
 CLOCK_HZ = 60000000
 SLOT_US = 500
 ROWS = 9
+
+# what the schedule sends, by row and in the occasional list; in parentheses what sends nothing
+ROW_NAMES: tuple[tuple[str, ...], ...] = (
+    ("MCFO_RIGHT_ANKLE_ANGLE",), ("MCFO_RIGHT_ANKLE_RATE",), ("MCFO_RIGHT_HEEL_SENSE",), ("MCFO_RIGHT_HS",),
+    ("MCFO_LEFT_HS",), ("MCFO_MOTOR_POSITION",), ("MCFO_LEFT_HEEL_SENSE",), ("MCFO_BATT_POWER",), (),
+)
+OCCASIONAL_NAMES: tuple[str, ...] = (
+    "ERROR_MCFO", "MCFO_MOTOR_VELOCITY", "MCFO_MOTOR_CURRENT", "MCFO_STATUS", "MCFO_BATT_CURRENT",
+    "MCFO_BATT_VOLTAGE", "MCFO_HBRIDGE_TEMP", "MCFO_RIGHT_LS", "MCFO_LEFT_LS", "(motor_encoder_rezero)",
+    "MCFO_EXECUTION_TIME", "MCFO_MAX_EXECUTION_TIME", "MCFO_RIGHT_ANKLE_RATE", "MCFO_RIGHT_HEEL_SENSE",
+)
+OCCASIONAL_ROW = 8
+
 ERROR_VARIABLE = 4
 
 # ids by name

@@ -10,6 +10,18 @@ CONTROLLER = 1  # CAN controller on the board, 0 for none or all
 CLOCK_HZ = 60000000
 SLOT_US = 500
 ROWS = 4
+
+# what the schedule sends, by row and in the occasional list; in parentheses what sends nothing
+ROW_NAMES: tuple[tuple[str, ...], ...] = (
+    ("MCH_ANGLE",), ("MCH_ANG_RATE",), ("MCH_BATT_POWER",), (),
+)
+OCCASIONAL_NAMES: tuple[str, ...] = (
+    "ERROR_MCH", "MCH_MOTOR_POSITION", "MCH_MOTOR_CURRENT", "MCH_STATUS", "MCH_BATT_CURRENT",
+    "MCH_BATT_VOLTAGE", "MCH_MOTOR_VELOCITY", "(motor_encoder_rezero)", "MCH_EXECUTION_TIME",
+    "MCH_MAX_EXECUTION_TIME",
+)
+OCCASIONAL_ROW = 3
+
 ERROR_VARIABLE = 3
 
 # ids by name

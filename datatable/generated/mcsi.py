@@ -10,6 +10,16 @@ CONTROLLER = 2  # CAN controller on the board, 0 for none or all
 CLOCK_HZ = 60000000
 SLOT_US = 500
 ROWS = 4
+
+# what the schedule sends, by row and in the occasional list; in parentheses what sends nothing
+ROW_NAMES: tuple[tuple[str, ...], ...] = (
+    ("MCSI_STEER_ANGLE",), ("MCSI_MOTOR_CURRENT",), ("MCSI_BATT_POWER",), (),
+)
+OCCASIONAL_NAMES: tuple[str, ...] = (
+    "ERROR_MCSI", "MCSI_STATUS", "MCSI_EXECUTION_TIME", "MCSI_MAX_EXECUTION_TIME",
+)
+OCCASIONAL_ROW = 3
+
 ERROR_VARIABLE = 7
 
 # ids by name

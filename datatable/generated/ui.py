@@ -10,6 +10,18 @@ CONTROLLER = 2  # CAN controller on the board, 0 for none or all
 CLOCK_HZ = 60000000
 SLOT_US = 1000
 ROWS = 3
+
+# what the schedule sends, by row and in the occasional list; in parentheses what sends nothing
+ROW_NAMES: tuple[tuple[str, ...], ...] = (
+    ("UI_ROLL",), ("UI_ANG_RATE_X",), (),
+)
+OCCASIONAL_NAMES: tuple[str, ...] = (
+    "ERROR_UI", "UI_BUTTONS", "UI_RC_0", "UI_RC_1", "UI_STATUS", "UI_EXECUTION_TIME",
+    "UI_MAX_EXECUTION_TIME", "UI_PITCH", "UI_ROLL", "UI_YAW", "UI_ANG_RATE_Y", "UI_ANG_RATE_Z", "UI_RC_2",
+    "UI_RC_3",
+)
+OCCASIONAL_ROW = 2
+
 ERROR_VARIABLE = 8
 
 # ids by name

@@ -116,13 +116,13 @@ def test_the_traffic_of_the_users_bus_is_that_of_the_firmware():
     three = ThreeBoards()
     three.run(200 * MS)
     sync = three.buses[2].counters.frames_by_identifier[0]
-    up = three.ui.can2.sent
+    up = three.ui.can_controller.sent
     three.run(1200 * MS)
     # per second: 1000 sync, 955.6 up (robot.md N1.10); down only what the main brain rewrites
     assert three.buses[2].counters.frames_by_identifier[0] - sync == pytest.approx(1000, abs=1)
-    assert three.ui.can2.sent - up == pytest.approx(955.6, rel=0.01)
+    assert three.ui.can_controller.sent - up == pytest.approx(955.6, rel=0.01)
     assert 0 <= three.router.can2.sent - three.ui.can.received <= 1
-    assert 0 <= three.ui.can2.sent - three.router.can2.received <= 1
+    assert 0 <= three.ui.can_controller.sent - three.router.can2.received <= 1
 
 
 def test_with_the_lag_the_last_key_still_arrives_because_other_frames_follow():

@@ -80,8 +80,8 @@ def test_the_schedule_is_that_of_the_firmware():
     ]  # fmt: skip
     assert [len(row) for row in schedule.rows] == [1] + [0] * 9
     assert [task.name for task in schedule.rows[0][0].tasks] == [
-        "send_error", "send_power", "send_current", "send_voltage",
-        "send_load_1", "send_load_2", "send_load_3", "send_load_4",
+        "ERROR_CSR", "CSR_MCU_POWER", "CSR_MCU_CURRENT", "CSR_MCU_VOLTAGE",
+        "CSR_CAN1_LOAD", "CSR_CAN2_LOAD", "CSR_CAN3_LOAD", "CSR_CAN4_LOAD",
     ]  # fmt: skip
 
 

@@ -430,7 +430,7 @@ def test_an_ankle_is_blocked_at_its_ends_and_when_the_cable_is_off(name, angle, 
     assert (control.block_negative, control.block_positive) == (negative, positive)
     new = {key for key, value in bench.errors().items() if value > before.get(key, 0) and key.startswith(name)}
     assert new == ({f"{name}_{error}"} if error else set())
-    assert bool(bench.board.leds.remaining_red) is bool(error)
+    assert bool(bench.board.heartbeat.remaining_red) is bool(error)
 
 
 def test_a_closed_limit_switch_blocks_pulling():

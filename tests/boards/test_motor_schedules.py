@@ -170,7 +170,7 @@ def test_no_task_exceeds_its_limit_when_everything_comes_at_once(name):
     if name != "MCSI":
         bench.turn(4300, 9_300, pair="01")
         bench.turn(520, 77_000, pair="23")
-    identifiers = [bench.table.TIMESTAMP, bench.board.id_status + 500]
+    identifiers = [bench.table.TIMESTAMP, getattr(bench.table, f"{name}_STATUS") + 500]
     for ms in range(40):
         for i in range(20):  # a bus so full that 27 frames come per ms, most of them for others
             bench.board.inbox.push(
@@ -347,7 +347,7 @@ class Link:
         self.controller = CanController(self.chip, number, IER=0xFFF)
         self.time = NetworkTime()
         self.errors = ErrorModule(3, self.time)
-        self.can = CanLink(self.chip, self.controller, self.time, self.errors, codes, report_full)
+        self.can = CanLink(self.chip, self.controller, self.time, self.errors, report_full)
         self.can.attach()
         self.now = 0
 

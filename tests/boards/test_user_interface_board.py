@@ -79,7 +79,7 @@ def test_the_every_slot_list_is_that_of_the_firmware():
         "watch_sync_key", "update_sync_light", "update_buzzer",
     ]  # fmt: skip
     assert [[task.name for task in row] for row in schedule.rows] == [
-        ["send_roll"], ["send_rate_x"], ["occasional"],
+        ["UI_ROLL"], ["UI_ANG_RATE_X"], ["occasional"],
     ]  # fmt: skip
 
 

@@ -1,0 +1,48 @@
+"""What a CAN controller's error interrupt tells, as error codes: the same chain of tests on every board."""
+
+from collections.abc import Callable
+
+from ranger_sim.datatable.generated import errors as codes
+from ranger_sim.firmware_sim.peripherals.can_controller import (
+    CMR_CDO,
+    ICR_BEI,
+    ICR_DOI,
+    ICR_EI,
+    ICR_EPI,
+    CanController,
+)
+
+OPERATING = 0  # CxMOD: not in reset
+ICR_ERRDIR = 1 << 21  # of the capture bits of a bus error: 1 while receiving, 0 while sending
+
+
+class CanErrors:
+    """The error interrupt of one controller; `report(code)` hears what it was."""
+
+    def __init__(self, controller: CanController, report: Callable[[int], object]) -> None:
+        self.controller = controller
+        self.report = report
+        prefix = f"CAN{controller.number}_"
+        self.bus_off = getattr(codes, prefix + "TX_BUSOFF")
+        self.warning = getattr(codes, prefix + "ERR_WARN")
+        self.overrun = getattr(codes, prefix + "DATA_OVRN")
+        self.passive = getattr(codes, prefix + "ERR_PASS")
+        self.while_receiving = getattr(codes, prefix + "BUS_RX")
+        self.while_sending = getattr(codes, prefix + "BUS_TX")
+
+    def look(self) -> None:
+        """Read CxICR, restart after bus-off, report each cause."""
+        cause = self.controller.read_ICR()
+        if self.controller.bus_off:
+            self.report(self.bus_off)
+            self.controller.write_MOD(OPERATING)
+            return
+        if cause & ICR_EI:
+            self.report(self.warning)
+        if cause & ICR_DOI:
+            self.report(self.overrun)
+            self.controller.write_CMR(CMR_CDO)
+        if cause & ICR_EPI:
+            self.report(self.passive)
+        if cause & ICR_BEI:
+            self.report(self.while_receiving if cause & ICR_ERRDIR else self.while_sending)

@@ -1,0 +1,101 @@
+"""What a satellite or the router publishes: one line per variable, laid out in rows as the master table says.
+
+The master table (`datatable/master/boards.toml`) says which variable goes out in which row, because bounds, DBC files
+and supervision need that of boards whose firmware is not ours, too. A board's room says where a value comes from and
+what sending it costs: a `Send` for each variable, in the order in which boards.toml names them first.
+"""
+
+import cython
+
+from ranger_sim.boards.modules.error_module import ErrorModule
+from ranger_sim.boards.modules.sender import Sender
+from ranger_sim.firmware_sim.scheduler import Task
+from ranger_sim.foundation.user_error import UserError
+
+if not cython.compiled:
+    from ranger_sim.firmware_sim.calls import call
+
+
+class Publication:
+    """A variable that a sender's frames carry: what `function()` returns, or always the same `constant`."""
+
+    def __init__(self, sender: Sender, identifier, function, constant, whole) -> None:
+        self.sender = sender
+        self.identifier = identifier
+        self.function = function
+        self.constant = constant
+        self.whole = whole
+
+    def send(self) -> None:
+        """A line of the schedule: take the value, send it as the table's type."""
+        if self.function is None:
+            self.sender.send_float(self.identifier, self.constant)
+        elif self.whole:
+            self.sender.send_int(self.identifier, call(self.function))
+        else:
+            self.sender.send_float(self.identifier, call(self.function))
+
+
+class ErrorPublication:
+    """The error variable of a board: the error that waits longest, if one does."""
+
+    def __init__(self, sender: Sender, identifier, errors: ErrorModule) -> None:
+        self.sender = sender
+        self.identifier = identifier
+        self.errors = errors
+
+    def send(self) -> None:
+        """A line of the schedule."""
+        if self.errors.take():
+            self.sender.send_words(self.identifier, self.errors.word, self.errors.stamp)
+
+
+class Send:
+    """One published variable in a board's table: its name, its value, modelled cycles, and the limit on them.
+
+    `value`: a function without arguments, a number that never changes, or the board's ErrorModule. Units are those of
+    the master table.
+    """
+
+    def __init__(self, variable, value, cost, limit) -> None:
+        self.variable = variable
+        self.value = value
+        self.cost = cost
+        self.limit = limit
+
+    def task(self, table, sender: Sender) -> Task:
+        """The line as a task that sends by `sender`; `table`: the board's generated module."""
+        identifier = getattr(table, self.variable)
+        if isinstance(self.value, ErrorModule):
+            line: object = ErrorPublication(sender, identifier, self.value)
+        elif callable(self.value):
+            line = Publication(sender, identifier, self.value, 0.0, table.TYPES[identifier] != "f32")
+        else:
+            line = Publication(sender, identifier, None, self.value, False)
+        return Task(line.send, self.cost, self.limit, 0, "", self.variable)
+
+
+def laid_out(table, sender: Sender, lines) -> dict:
+    """`rows`, `occasional` and `occasional_row` of a Schedule: the `lines` where the master table names them.
+
+    `lines`: a Send for every variable; a Task for work that sends nothing, which the table names in parentheses. The
+    first line that is not the one which the table names there is a UserError.
+    """
+    named = list(dict.fromkeys(name for names in (*table.ROW_NAMES, table.OCCASIONAL_NAMES) for name in names))
+    given = [line.variable if isinstance(line, Send) else f"({line.name})" for line in lines]
+    for place in range(max(len(named), len(given))):
+        wanted, found = ([*names, "no more"][min(place, len(names))] for names in (named, given))
+        if wanted != found:
+            raise UserError(
+                f"{table.BOARD}: line {place + 1} of what is sent is {found} in the board's room; in the master table "
+                f"(datatable/master/boards.toml, then `ranger-sim table generate`) it is {wanted}"
+            )
+    tasks = {
+        name: line.task(table, sender) if isinstance(line, Send) else line
+        for name, line in zip(named, lines, strict=True)
+    }
+    return {
+        "rows": tuple(tuple(tasks[name] for name in names) for names in table.ROW_NAMES),
+        "occasional": tuple(tasks[name] for name in table.OCCASIONAL_NAMES) or None,
+        "occasional_row": table.OCCASIONAL_ROW,
+    }
