@@ -18,27 +18,37 @@ from ranger_sim.tools.units import whole_number
 def register(commands: Any) -> None:
     """Add the subcommand to the command line."""
     command = commands.add_parser(
-        "bus", help="emulated CAN buses for programs of your own: python-can, slcan, socketcand; no robot needed"
+        "bus",
+        help="emulated CAN buses for programs of your own, without a robot",
+        description="Emulated CAN buses for programs of your own, which attach by python-can, slcan or socketcand.",
     )
     command.add_argument("channel", nargs="*", default=["can1"], help="names of the buses (default can1)")
-    command.add_argument("--name", default=DEFAULT_NAME, help=f"attach under this name (default {DEFAULT_NAME})")
+    command.add_argument(
+        "--name", default=DEFAULT_NAME, help=f"name under which programs attach (default {DEFAULT_NAME})"
+    )
     command.add_argument(
         "--bitrate", type=whole_number(1000), default=DEFAULT_BITRATE, help="bit/s of every bus (default 1000000)"
     )
     command.add_argument("--speed", default="1", help="times real time, or max: as fast as frames are sent (default 1)")
-    command.add_argument("--bit-error-rate", type=float, default=0.0, help="share of disturbed bits, 0 ... 0.1")
+    command.add_argument(
+        "--bit-error-rate", type=float, default=0.0, help="share of disturbed bits, 0 to 0.1 (default 0)"
+    )
     command.add_argument("--seed", type=whole_number(0), default=0, help="seed of the disturbances (default 0)")
     add_server_options(command)
-    command.add_argument("--seconds", type=float, default=math.inf, help="end after so long (default: on Ctrl-C)")
+    command.add_argument("--seconds", type=float, default=math.inf, help="end after so long (default: with Ctrl-C)")
     command.set_defaults(run=run)
 
 
 def add_server_options(command: argparse.ArgumentParser) -> None:
     """--slcan and --socketcand, which `up` has as well."""
     command.add_argument(
-        "--slcan", action="append", default=[], metavar="CHANNEL", help="this bus on a pseudo-terminal (repeatable)"
+        "--slcan",
+        action="append",
+        default=[],
+        metavar="CHANNEL",
+        help="show this bus as a serial-line adapter on a pseudo-terminal (repeatable)",
     )
-    command.add_argument("--socketcand", metavar="[HOST:]PORT", help="all buses over TCP (port 0: a free one)")
+    command.add_argument("--socketcand", metavar="[HOST:]PORT", help="show all buses over TCP (port 0: a free one)")
 
 
 def open_servers(

@@ -24,14 +24,16 @@ def register(commands: Any) -> None:
     """Add the subcommand to the command line."""
     command = commands.add_parser(
         "can-bounds",
-        help="worst-case response time of every CAN frame",
+        help="how late every CAN frame can be: worst-case response times",
         description="Worst-case response times (Davis, Burns, Bril, Lukkien 2007) on the robot's buses, a profile's, "
         "or of the messages of a DBC file. Exit code 1 when something can miss its deadline.",
     )
     what = command.add_mutually_exclusive_group()
-    what.add_argument("--profile", metavar="FILE", help="bit rates and schedules of a profile (name or .toml)")
-    what.add_argument("--dbc", metavar="FILE", help="messages with GenMsgCycleTime of a DBC file")
-    command.add_argument("--bit-rate", type=whole_number(1000), metavar="BIT/S", help="of the DBC file's bus")
+    what.add_argument(
+        "--profile", metavar="FILE", help="buses of a profile, by name or as a .toml file (default: the robot's own)"
+    )
+    what.add_argument("--dbc", metavar="FILE", help="messages of a DBC file that have a cycle time (GenMsgCycleTime)")
+    command.add_argument("--bit-rate", type=whole_number(1000), metavar="BIT/S", help="bit rate of the DBC file's bus")
     command.add_argument("--json", metavar="FILE|-", help="the bounds as JSON; - prints them and nothing else")
     command.set_defaults(run=run)
 

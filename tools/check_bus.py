@@ -23,7 +23,7 @@ def register(commands: Any) -> None:
     """Add the subcommand to the command line."""
     command = commands.add_parser(
         "check-bus",
-        help="are the CAN interfaces of a profile ready",
+        help="whether the CAN interfaces of a profile are ready",
         description="Interfaces there, up, bit rate as in the profile, state and error counters, traffic. Each failure "
         "comes with the command that mends it. Exit code 1 when there is one.",
     )
@@ -33,7 +33,7 @@ def register(commands: Any) -> None:
         type=quantity(TIMES, "s", 0.0),
         default=1.0,
         metavar="1s",
-        help="hear for so long what passes (default 1 s)",
+        help="listen for so long (default 1 s)",
     )
     command.add_argument("--json", metavar="FILE|-", help="the findings as JSON; - prints them and nothing else")
     command.set_defaults(run=run)

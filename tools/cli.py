@@ -5,6 +5,7 @@ import os
 import sys
 from typing import Any, NoReturn
 
+from ranger_sim import __version__
 from ranger_sim.foundation.user_error import UserError
 
 EXIT_DONE = 0
@@ -33,6 +34,7 @@ def parser() -> argparse.ArgumentParser:
         prog="ranger-sim",
         description="The Cornell Ranger biped emulated whole: seven boards' firmware, four CAN buses, one body.",
     )
+    top.add_argument("--version", action="version", version=f"ranger-sim {__version__}")
     commands: Any = top.add_subparsers(dest="command", required=True, metavar="COMMAND")
     walk.register(commands)
     info.register(commands)

@@ -51,26 +51,31 @@ def register(commands: Any) -> None:
     )
     command.add_argument("--port", required=True, help="serial port, pseudo-terminal, or a URL that pyserial knows")
     command.add_argument(
-        "--link", choices=("wired", "bluetooth"), default="wired", help="921600 baud, or 460800 with RTS/CTS"
+        "--link", choices=("wired", "bluetooth"), default="wired", help="921600 baud (default), or 460800 with RTS/CTS"
     )
-    command.add_argument("--baud", type=whole_number(1), help="another rate")
+    command.add_argument("--baud", type=whole_number(1), help="another baud rate")
     command.add_argument(
         "--fast",
         nargs="+",
         action="extend",
         default=[],
         metavar="NAME",
-        help="in every cycle, when new; patterns like 'MCH_*' are taken",
+        help="variables sent in every cycle in which they are new; patterns like 'MCH_*' are allowed",
     )
     command.add_argument(
-        "--medium", nargs="+", action="extend", default=[], metavar="NAME", help="one of these per cycle, when new"
+        "--medium",
+        nargs="+",
+        action="extend",
+        default=[],
+        metavar="NAME",
+        help="variables of which one is sent per cycle, if new",
     )
     command.add_argument(
         "--log",
         action="append",
         default=[],
         metavar="FILE",
-        help="FILE.txt: RoboDAQ's text format; FILE.mf4: that of `walk`",
+        help="keep what comes: FILE.txt in RoboDAQ's format, FILE.mf4 as `walk` writes it (repeatable)",
     )
     command.add_argument(
         "--read", nargs="+", action="extend", default=[], metavar="NAME", help="wait for a fresh value and print it"
@@ -78,16 +83,27 @@ def register(commands: Any) -> None:
     command.add_argument(
         "--write", nargs="+", action="extend", default=[], metavar="NAME=VALUE", help="set parameters of the robot"
     )
-    command.add_argument("--load", metavar="FILE", help="set all parameters of a file (.txt, .toml) or controller")
-    command.add_argument("--save", metavar="FILE", help="keep all parameters: .txt, or .toml for `walk --controller`")
-    command.add_argument("--base", default="robust", metavar="NAME", help="what a saved .toml differs from")
+    command.add_argument(
+        "--load", metavar="FILE", help="set all parameters of a file (.txt, .toml) or of a parameter set by name"
+    )
+    command.add_argument(
+        "--save",
+        metavar="FILE",
+        help="write all parameters of the robot to a file: .txt, or .toml for `walk --controller`",
+    )
+    command.add_argument(
+        "--base",
+        default="robust",
+        metavar="NAME",
+        help="parameter set whose values a saved .toml leaves out (default robust)",
+    )
     command.add_argument("--time", type=quantity(TIMES, "s", 0.0), metavar="60s", help="end after so much time")
     command.add_argument(
         "--timeout",
         type=quantity(TIMES, "s", 0.0),
         default=TIMEOUT_S,
         metavar="10s",
-        help="wait so long for what was asked",
+        help="wait so long for an answer (default 10s)",
     )
     command.add_argument(
         "--json", metavar="FILE|-", help="what came and was read as JSON; - prints it and nothing else"

@@ -30,8 +30,8 @@ def add_options(command: Any) -> None:
         action="store_true",
         help="silences of 50 to 180 ms every 3.7 s on average, as the real robot's Bluetooth logs have them; seeded",
     )
-    group.add_argument("--imu-port", metavar="PORT", help="a real inertial unit there, instead of the plant's")
-    group.add_argument("--imu-offer", metavar="PORT", help="the plant's inertial unit, for a real host to read")
+    group.add_argument("--imu-port", metavar="PORT", help="a real inertial unit, in place of the emulated one")
+    group.add_argument("--imu-offer", metavar="PORT", help="the emulated inertial unit, for a real host to read")
 
 
 def quirks_of(options: argparse.Namespace) -> Quirks:
@@ -42,7 +42,7 @@ def quirks_of(options: argparse.Namespace) -> Quirks:
     if (options.daq_dropouts or options.daq_link) and not options.daq_port:
         raise UserError("--daq-link and --daq-dropouts need --daq-port")
     if options.imu_port and options.imu_offer:
-        raise UserError("--imu-port and --imu-offer exclude each other: one replaces the plant's unit, one shows it")
+        raise UserError("--imu-port and --imu-offer exclude each other: one replaces the emulated unit, one shows it")
     link = options.daq_link or ("bluetooth" if options.daq_dropouts else "wired")
     return Quirks(computer_link=link)
 
@@ -69,7 +69,7 @@ def ports_of(options: argparse.Namespace) -> dict[str, serial_ports.Port]:
 MEANINGS = {
     "daq": "data link: ranger-sim daq --port {}",
     "imu": "inertial unit at {}",
-    "imu-offer": "the plant's inertial unit: {}",
+    "imu-offer": "emulated inertial unit: {}",
 }
 
 

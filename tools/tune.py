@@ -70,11 +70,16 @@ def register(commands: argparse._SubParsersAction) -> None:
     """Add the subcommand to the command line."""
     command = commands.add_parser(
         "tune",
-        help="search controller parameters through the whole emulator",
-        description="Pattern search, one parameter at a time; writes the best set as a .toml file.",
+        help="search for better controller parameters by walking the whole robot",
+        description="Pattern search, one parameter at a time. The best set is written as a .toml file.",
     )
-    command.add_argument("--base", default="record-2011", metavar="NAME", help="set whose values are not repeated")
-    command.add_argument("--start", metavar="NAME", help="set to begin with (default: the base itself)")
+    command.add_argument(
+        "--base",
+        default="record-2011",
+        metavar="NAME",
+        help="parameter set whose values the result leaves out (default record-2011)",
+    )
+    command.add_argument("--start", metavar="NAME", help="parameter set to begin with (default: the base)")
     command.add_argument(
         "--vary",
         action="append",
@@ -92,8 +97,10 @@ def register(commands: argparse._SubParsersAction) -> None:
         help="a floor to walk on; may be given several times (default 0 and 1mm)",
     )
     command.add_argument("--rounds", type=whole_number(0), default=2, help="passes over the parameters (default 2)")
-    command.add_argument("--worth", type=float, default=0.05, help="least gain in cost that keeps a change")
-    command.add_argument("--out", required=True, metavar="FILE.toml", help="the set that was found")
+    command.add_argument(
+        "--worth", type=float, default=0.05, help="a change is kept that lowers the cost by so much (default 0.05)"
+    )
+    command.add_argument("--out", required=True, metavar="FILE.toml", help="file for the set that was found")
     command.set_defaults(run=run)
 
 

@@ -63,21 +63,27 @@ def register(commands: Any) -> None:
     """Add both subcommands to the command line."""
     up = commands.add_parser(
         "up",
-        help="the robot as processes, in real time",
-        description="One process per board and one for the body. Without an end it walks until Ctrl-C.",
+        help="let Ranger walk in real time, each board a process of its own",
+        description="One process for each board and one for the body. Without an end it walks until Ctrl-C.",
     )
     walk.add_run_options(up)
     group = up.add_argument_group("processes")
     group.add_argument(
-        "--speed", type=speed, default=1.0, metavar="FACTOR|max", help="virtual seconds per second (default 1.0)"
+        "--speed",
+        type=speed,
+        default=1.0,
+        metavar="FACTOR|max",
+        help="virtual seconds per second of the wall clock; max: as fast as it goes (default 1.0)",
     )
     group.add_argument(
         "--restart",
         choices=(NEVER, ON_FAILURE),
         default=NEVER,
-        help="what becomes of a board that dies (default never)",
+        help="whether a board that dies is started again (default never)",
     )
-    group.add_argument("--name", default="ranger", help="under which others find this robot (default ranger)")
+    group.add_argument(
+        "--name", default="ranger", help="name under which other programs find this robot (default ranger)"
+    )
     group.add_argument(
         "--no-real-time", action="store_true", help="do not ask for SCHED_FIFO and locked memory, even if permitted"
     )
@@ -85,12 +91,16 @@ def register(commands: Any) -> None:
         "--processor",
         default="one",
         metavar="one|all|N",
-        help="processors for plant and boards (default one, the fastest: they take turns; interpreted all)",
+        help="processors for body and boards. They take turns, so one is the fastest (default; interpreted: all)",
     )
     group.add_argument(
-        "--slcan", action="append", default=[], metavar="CHANNEL", help="a bus on a pseudo-terminal (repeatable)"
+        "--slcan",
+        action="append",
+        default=[],
+        metavar="CHANNEL",
+        help="show this bus as a serial-line adapter on a pseudo-terminal (repeatable)",
     )
-    group.add_argument("--socketcand", metavar="[HOST:]PORT", help="all buses over TCP (port 0: a free one)")
+    group.add_argument("--socketcand", metavar="[HOST:]PORT", help="show all buses over TCP (port 0: a free one)")
     group.add_argument(
         "--bus",
         action="append",
@@ -104,12 +114,15 @@ def register(commands: Any) -> None:
 
     ctl = commands.add_parser(
         "ctl",
-        help="pause, resume, look at or change a robot that `up` runs",
-        description="status | pause | resume | restart BOARD | key N | set NAME VALUE",
+        help="look at, pause, resume or change a robot that `up` runs",
+        description="status, pause, resume; restart BOARD; key N: press a key for 0.2 s (1: walk; 2: stop, and a "
+        "walking robot falls); set NAME VALUE: write a variable of the main brain's table.",
     )
-    ctl.add_argument("request", choices=("status", "pause", "resume", "restart", "key", "set"))
-    ctl.add_argument("values", nargs="*", metavar="VALUE")
-    ctl.add_argument("--name", default="ranger", help="of the robot (default ranger)")
+    ctl.add_argument(
+        "request", choices=("status", "pause", "resume", "restart", "key", "set"), help="what is asked for"
+    )
+    ctl.add_argument("values", nargs="*", metavar="VALUE", help="its board, key, or name and value")
+    ctl.add_argument("--name", default="ranger", help="name of the robot (default ranger)")
     ctl.set_defaults(run=run_ctl)
 
 

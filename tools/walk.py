@@ -38,7 +38,7 @@ def register(commands: Any) -> None:
     """Add the subcommand to the command line."""
     command = commands.add_parser(
         "walk",
-        help="let Ranger walk",
+        help="let Ranger walk in virtual time, as fast as it goes",
         description="All seven boards, four buses and the body in virtual time. Without an end it walks 100 steps.",
     )
     add_run_options(command)
@@ -47,36 +47,51 @@ def register(commands: Any) -> None:
 
 def add_run_options(command: Any) -> None:
     """The options of every command that lets the robot walk: which end, which scenario, which files."""
-    command.add_argument("--steps", type=whole_number(1), help="stop after so many steps")
-    command.add_argument("--time", type=quantity(TIMES, "s", 0.0), metavar="60s", help="stop after so much time")
+    command.add_argument("--steps", type=whole_number(1), metavar="N", help="end after so many steps")
+    command.add_argument("--time", type=quantity(TIMES, "s", 0.0), metavar="60s", help="end after so much virtual time")
     command.add_argument(
-        "--distance", type=quantity(LENGTHS, "m", 0.0), metavar="1km", help="stop after so much distance"
+        "--distance", type=quantity(LENGTHS, "m", 0.0), metavar="1km", help="end after so much distance"
     )
     command.add_argument(
         "--controller",
         default=None,
         metavar="NAME",
-        help="a parameter set by name, or the path of a .toml file",
+        help="parameter set, by name or as a .toml file (default robust)",
     )
-    command.add_argument("--seed", type=int, default=1, help="crystals, phases, noise and footholds (default 1)")
+    command.add_argument(
+        "--seed", type=int, default=1, help="chooses crystals, phases, noise and footholds (default 1)"
+    )
     command.add_argument(
         "--floor-roughness",
         type=quantity(LENGTHS, "m"),
         default=0.0,
         metavar="1mm",
-        help="standard deviation of the height of each foothold",
+        help="standard deviation of the footholds' heights (default 0)",
     )
-    command.add_argument("--slope", type=float, default=0.0, metavar="RAD", help="rad, positive downhill")
-    command.add_argument("--model", default=None, metavar="FILE", help="additional terms of motors, joints, sensors")
+    command.add_argument(
+        "--slope", type=float, default=0.0, metavar="RAD", help="slope of the floor, positive downhill (default 0)"
+    )
+    command.add_argument(
+        "--model",
+        default=None,
+        metavar="FILE",
+        help="model file (.toml) with additional terms of motors, joints, sensors",
+    )
     command.add_argument(
         "--log",
         choices=("full", "window", "none"),
         default="window",
-        help="what the files keep: default the last 10 s",
+        help="what the files in --out keep: everything, the last 10 s (default), or no more than the summary",
     )
-    command.add_argument("--out", metavar="DIR", help="folder for logs, summary and report (made if missing)")
+    command.add_argument(
+        "--out",
+        metavar="DIR",
+        help="folder for logs, summary and report, made if missing; without it only --json writes one",
+    )
     command.add_argument("--json", metavar="FILE|-", help="the summary as JSON; - prints it and nothing else")
-    command.add_argument("--profile", metavar="FILE", help="bit rates and bus schedules of a profile (name or .toml)")
+    command.add_argument(
+        "--profile", metavar="FILE", help="boards, bit rates and bus schedules of a profile, by name or as a .toml file"
+    )
     serial_options.add_options(command)
 
 

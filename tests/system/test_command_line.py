@@ -3,11 +3,14 @@
 import json
 import os
 import pathlib
+import re
 import signal
 import subprocess
 import sys
 
 import pytest
+
+from ranger_sim.tools import cli
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 BROKEN_PARAMETERS = "[parameters]\nCTRL_NO_SUCH_PARAMETER = 1.0\n"
@@ -163,3 +166,23 @@ def test_json_on_standard_output_is_json_only(command):
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout)["controller"] == "robust"
     assert done.stderr == ""
+
+
+def test_the_version_is_said(command):
+    from ranger_sim import __version__
+
+    done = command("--version")
+    assert (done.returncode, done.stdout) == (0, f"ranger-sim {__version__}\n")
+
+
+def test_every_command_says_what_it_does(capsys):
+    def told(*arguments):
+        with pytest.raises(SystemExit) as left:
+            cli.main([*arguments, "--help"])
+        assert left.value.code == 0
+        return capsys.readouterr().out
+
+    names = re.findall(r"^    ([a-z][a-z-]*)\b", told(), re.MULTILINE)
+    assert {"walk", "up", "ctl", "daq", "bench", "fuzz", "can-bounds", "check-bus", "table", "vm"} <= set(names)
+    for name in names:
+        assert told(name).startswith(f"usage: ranger-sim {name} ")

@@ -36,7 +36,7 @@ def test_the_name_of_the_pseudo_terminal_is_told_and_the_walk_keeps_to_the_clock
     assert cli.main(["walk", "--time", "0.1s", "--daq-port", "pty", "--daq-dropouts", "--imu-offer", "pty"]) == 0
     told = capsys.readouterr().err
     assert re.search(r"data link: ranger-sim daq --port /dev/pts/\d+\n", told)
-    assert re.search(r"the plant's inertial unit: /dev/pts/\d+\n", told)
+    assert re.search(r"emulated inertial unit: /dev/pts/\d+\n", told)
     assert "daq: no traffic" in told  # the rate controller has only begun
     assert re.search(r"imu-offer: bytes out \d+", told)
     assert "cannot be repeated" not in told

@@ -29,24 +29,28 @@ def register(commands: Any) -> None:
         type=quantity(TIMES, "s", 0.0),
         default=default.time_limit_s,
         metavar="10min",
-        help="then it is switched off, exit code 124 (default 10min)",
+        help="the machine is switched off after so long, with exit code 124 (default 10min)",
     )
     command.add_argument(
-        "--memory", type=whole_number(256), default=default.memory_MiB, metavar="MiB", help="default 2048"
+        "--memory",
+        type=whole_number(256),
+        default=default.memory_MiB,
+        metavar="MiB",
+        help="memory of the machine (default 2048)",
     )
     command.add_argument(
         "--processors",
         type=whole_number(1),
         default=default.processors,
         metavar="N",
-        help="default 1, best for many processes that wait for each other; more for work that runs side by side",
+        help="processors of the machine (default 1, the best for processes that wait for each other)",
     )
     command.add_argument(
         "--shared",
         action="append",
         default=[],
         metavar="DIR",
-        help="a folder that COMMAND may write to; may be repeated",
+        help="folder that COMMAND may write to (repeatable)",
     )
     command.add_argument(
         "--kvm", action="store_true", help="use /dev/kvm instead of emulation: far faster where it works"
