@@ -8,44 +8,38 @@ SOURCES := $(shell find ranger_sim foundation datatable can_bus plant firmware_s
 
 .PHONY: walk test test-vm lint setup bench lock clean
 
-walk: $(VENV)/.built
+walk: $(VENV)/.walk
 	$(RUN) -m ranger_sim walk --steps $(STEPS) --out runs/walk
 
-test: $(VENV)/.built
+test: $(VENV)/.all
 	$(RUN) -m pytest -q -rs
 
-test-vm: $(VENV)/.built
+test-vm: $(VENV)/.all
 	$(RUN) -m tests.vm.run
 
-lint: $(VENV)/.built
+lint: $(VENV)/.all
 	$(RUN) -m ruff check .
 	$(RUN) -m ruff format --check --quiet .
 	$(RUN) -m mypy
 
-bench: $(VENV)/.built
+bench: $(VENV)/.walk
 	$(RUN) -m ranger_sim bench
 
-setup: $(VENV)/.built
+setup: $(VENV)/.all
 
-# Dependencies are locked with hashes and without index addresses: the machine's own pip settings say where from.
-$(VENV)/.installed: requirements.lock
+# Once: the environment, packages (locked with hashes, without index addresses: the machine's own pip settings say where
+# from) and the library; then only what changed. set_up.py says how. A walk needs fewer packages than the tests do.
+$(VENV)/.walk: set_up.py requirements.lock pyproject.toml setup.py $(SOURCES)
 	@$(PYTHON) -c 'import sys; sys.exit(0 if sys.version_info >= (3, 11) else "ranger-sim needs Python 3.11 or newer, this is " + sys.version.split()[0] + "; try make PYTHON=python3.12")'
-	@echo "Setting up $(VENV) (once) ..."
-	$(PYTHON) -m venv $(VENV)
-	$(RUN) -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
+	@$(PYTHON) set_up.py walk --venv $(VENV)
 	@touch $@
 
-# Compiled where a C compiler is found, interpreted otherwise (told, with the reason); only changed modules are rebuilt.
-# Installing it as editable would build everything a second time, in a folder of its own: RANGER_SIM_BUILT=1 stops that.
-# It is linked again when pyproject.toml changes: the commands and python-can's entry point are found through it.
-$(VENV)/.built: $(VENV)/.installed pyproject.toml setup.py $(SOURCES)
-	@echo "Building (compiled where a C compiler is found; the first time takes some minutes) ..."
-	@$(RUN) setup.py -q build_ext --inplace
-	@test -f $(VENV)/.linked -a ! pyproject.toml -nt $(VENV)/.linked || RANGER_SIM_BUILT=1 $(RUN) -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
-	@touch $(VENV)/.linked $@
+$(VENV)/.all: $(VENV)/.walk
+	@$(PYTHON) set_up.py all --venv $(VENV)
+	@touch $@
 
 lock:
-	uv pip compile pyproject.toml --extra dev --universal --generate-hashes --no-emit-index-url --no-header --python-version 3.11 -o requirements.lock
+	uv pip compile pyproject.toml --all-extras --universal --generate-hashes --no-emit-index-url --no-header --python-version 3.11 -o requirements.lock
 
 clean:
 	rm -rf $(VENV) build *.egg-info

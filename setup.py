@@ -8,15 +8,20 @@ All or nothing: a compiled module reads the fields of another's classes at fixed
 modules must not be mixed. When anything fails, this is told, the reason is written to ranger_sim/build_record.json,
 and the whole robot runs interpreted (ranger_sim/loading.py reads the record).
 
+What Cython and the compiler print goes to build/setup.log; the terminal shows how far the build is.
+
 RANGER_SIM_BUILD_JOBS: how many modules are translated and compiled at once (default: one per processor).
 RANGER_SIM_BUILT=1: an editable install does not build again what `make` has just built in place.
 """
 
+import contextlib
 import json
 import os
 import pathlib
+import re
 import sys
 import tempfile
+import threading
 from concurrent.futures import ThreadPoolExecutor
 
 from setuptools import Extension, find_namespace_packages, setup
@@ -36,9 +41,46 @@ ROOMS = (
 )
 DATA_FOLDERS = ("profiles",)  # shipped like a room, no Python in them
 LIBRARY = "ranger_sim._compiled"
+SHARED = "ranger_sim._shared"  # Cython's helpers (memoryviews above all), once instead of in every module
+LOG = HERE / "build" / "setup.log"
 RECORD = "build_record.json"  # in the package ranger_sim
 # no fused multiply-add, no fast-math: both change the last bit of a trajectory
-COMPILE_ARGUMENTS = ["-O2", "-g0", "-ffp-contract=off", "-fno-fast-math", "-w"]
+COMPILE_ARGUMENTS = ["-g0", "-ffp-contract=off", "-fno-fast-math", "-w"]
+# The compiler needs a third of the time for -Og. Each of these modules runs less than 0.1 % of a walk's instructions
+# (callgrind), all of them together 1 %. A module that is not named here is compiled as one that a walk needs fast.
+OPTIMISE, OPTIMISE_LITTLE = "-O2", "-Og"
+RARELY_RUN = (
+    SHARED,
+    "ranger_sim.boards.hip",
+    "ranger_sim.boards.inner_feet",
+    "ranger_sim.boards.main_brain.data_link",
+    "ranger_sim.boards.main_brain.error_distribution",
+    "ranger_sim.boards.main_brain.foot_machines",
+    "ranger_sim.boards.main_brain.geometry",
+    "ranger_sim.boards.main_brain.hip_machine",
+    "ranger_sim.boards.main_brain.leg_machine",
+    "ranger_sim.boards.main_brain.mode_machine",
+    "ranger_sim.boards.main_brain.state_machine",
+    "ranger_sim.boards.main_brain.steering_machine",
+    "ranger_sim.boards.modules.absolute_encoder",
+    "ranger_sim.boards.modules.adc_readings",
+    "ranger_sim.boards.modules.buzzer",
+    "ranger_sim.boards.modules.can_load",
+    "ranger_sim.boards.modules.colour_leds",
+    "ranger_sim.boards.modules.execution_timer",
+    "ranger_sim.boards.modules.foot_contact",
+    "ranger_sim.boards.modules.keypad",
+    "ranger_sim.boards.modules.lcd",
+    "ranger_sim.boards.modules.limit_switch",
+    "ranger_sim.boards.modules.rc_receiver",
+    "ranger_sim.boards.modules.receiver",
+    "ranger_sim.boards.modules.sync_light",
+    "ranger_sim.boards.outer_feet",
+    "ranger_sim.firmware_sim.peripherals.uart_hs",
+    "ranger_sim.harness.processes.remote_board",
+    "ranger_sim.harness.recorder",
+    "ranger_sim.plant.handling",
+)
 DIRECTIVES = {
     "always_allow_keywords": False,  # no keywords for functions of no or one argument: called directly from tables
     "auto_pickle": False,  # nobody pickles a board: less C to compile
@@ -48,6 +90,8 @@ DIRECTIVES = {
     "cdivision": False,
     "initializedcheck": False,  # every array field is set in __init__
     "embedsignature": True,
+    "embedsignature.format": "clinic",  # inspect.signature reads it
+    "emit_code_comments": False,  # our lines as comments in the C code: half of its lines, and nobody reads them there
 }
 # Where code lies, for tool chains that know these arguments (a trial tells). Of 10 MB of code a walk runs 130 KB: first
 # methods, then what tables call by address, last getters, setters, constructors and initialisation; fewer gaps between.
@@ -121,8 +165,9 @@ class OptionalBuild(build_ext):
         jobs = int(os.environ.get("RANGER_SIM_BUILD_JOBS", "0")) or os.cpu_count() or 1
         try:
             self.check_wish_and_compiler()
-            self.modules, self.jobs = self.translate(jobs), jobs
-            super().run()
+            with chatter_to_log() as self.progress:
+                self.modules, self.jobs = self.translate(jobs), jobs
+                super().run()
         except NotCompiledError as why:
             reason = str(why)
         except Exception as error:  # noqa: BLE001  (whatever the tool chain throws, we fall back)
@@ -132,7 +177,8 @@ class OptionalBuild(build_ext):
         if reason:
             print(
                 f"\n*** ranger-sim: NOT COMPILED: {reason}\n"
-                "*** The interpreted sources will run: same results, many times slower.\n",
+                + (f"*** What the tools said is in {LOG}\n" if LOG.exists() else "")
+                + "*** The interpreted sources will run: same results, many times slower.\n",
                 file=sys.stderr,
             )
         self.write_record(reason)
@@ -165,11 +211,16 @@ class OptionalBuild(build_ext):
         try:
             os.chdir(tree_of_links())
             translated = cythonize(
-                [Extension(name, [name.replace(".", "/") + ".py"]) for name in declared_modules()],
+                [
+                    *(Extension(name, [name.replace(".", "/") + ".py"]) for name in declared_modules()),
+                    Extension(SHARED, [SHARED.replace(".", "/") + ".c"]),
+                ],
                 build_dir="../cython",
                 language_level=3,
                 nthreads=jobs if jobs > 1 else 0,
                 compiler_directives=DIRECTIVES,
+                shared_utility_qualified_name=SHARED,
+                force=not same_as_kept(pathlib.Path("../cython/directives.json"), json.dumps([SHARED, DIRECTIVES])),
             )
         except Exception as error:  # noqa: BLE001  (Cython has printed the place)
             raise NotCompiledError(f"Cython could not translate the sources ({one_line(error)})") from error
@@ -181,7 +232,10 @@ class OptionalBuild(build_ext):
         """The library: an object file of each module, and the directory of them."""
         compiling, linking = self.layout()
         with ThreadPoolExecutor(self.jobs) as pool:
-            objects = list(pool.map(lambda name: self.compile_module(name, compiling), self.modules))
+            objects = []
+            for compiled in pool.map(lambda name: self.compile_module(name, compiling), self.modules):
+                objects.append(compiled)
+                self.progress.show("compiled", len(objects), len(self.modules))
         library.sources = [self.write_directory()]
         library.extra_objects = library.depends = objects
         library.extra_link_args = linking
@@ -209,7 +263,7 @@ class OptionalBuild(build_ext):
                 output_dir=self.build_temp,
                 # last parts of names are not unique, and nobody outside the library looks for them
                 macros=[("CYTHON_NO_PYINIT_EXPORT", None), ("PyInit_" + name.rpartition(".")[2], entry(name))],
-                extra_postargs=COMPILE_ARGUMENTS + layout,
+                extra_postargs=[OPTIMISE_LITTLE if name in RARELY_RUN else OPTIMISE, *COMPILE_ARGUMENTS, *layout],
             )
         return compiled
 
@@ -222,8 +276,7 @@ class OptionalBuild(build_ext):
             "library": LIBRARY,
         }
         path = pathlib.Path("build/cython/directory.c")
-        if not path.exists() or path.read_text(encoding="ascii") != text:
-            path.write_text(text, encoding="ascii")
+        same_as_kept(path, text)
         return path.as_posix()
 
     def write_record(self, reason):
@@ -232,6 +285,80 @@ class OptionalBuild(build_ext):
         folder.mkdir(parents=True, exist_ok=True)
         record = {"compiled": not reason, "reason": reason}
         (folder / RECORD).write_text(json.dumps(record) + "\n", encoding="utf-8")
+
+
+class Progress:
+    """How far the build is: on a terminal one line that is rewritten, elsewhere a few lines."""
+
+    def __init__(self, out):
+        self.out = out
+        self.rewritten = out.isatty()
+        self.shown = ""
+
+    def show(self, what, done, of):
+        """`done` of `of` modules are `what`; told at every one on a terminal, else at the last one."""
+        if done < of and not self.rewritten and not wanted_by_set_up():
+            return
+        text = f"{what} {done} of {of} modules"
+        if text != self.shown:
+            self.shown = text
+            self.out.write(f"\r{text:<40}" + ("\n" if done == of else "") if self.rewritten else f"{text}\n")
+            self.out.flush()
+
+
+def wanted_by_set_up():
+    """True when set_up.py has started this and makes its own line of every one of ours."""
+    return os.environ.get("RANGER_SIM_SETUP", "") not in ("", "0")
+
+
+def open_log():
+    """The log, new; set_up.py has made it already and writes there beside us."""
+    return LOG.open("a" if wanted_by_set_up() else "w", encoding="utf-8")
+
+
+@contextlib.contextmanager
+def chatter_to_log():
+    """Everything that this process and its children print goes to the log; gives what shows the progress instead."""
+    LOG.parent.mkdir(exist_ok=True)
+    sys.stdout.flush()
+    sys.stderr.flush()
+    kept = os.dup(1), os.dup(2)
+    reading, writing = os.pipe()
+    with os.fdopen(kept[0], "w", closefd=False) as terminal, open_log() as log:
+        progress = Progress(terminal)
+
+        def keep():
+            with os.fdopen(reading, encoding="utf-8", errors="replace") as lines:
+                for line in lines:
+                    log.write(line)
+                    log.flush()
+                    if told := re.match(r"\[ *(\d+)/(\d+)\] Cythonizing", line):
+                        progress.show("translated", int(told[1]), int(told[2]))
+
+        keeper = threading.Thread(target=keep)
+        keeper.start()
+        for number in (1, 2):
+            os.dup2(writing, number)
+        os.close(writing)
+        try:
+            yield progress
+        finally:
+            sys.stdout.flush()
+            sys.stderr.flush()
+            for number, was in zip((1, 2), kept, strict=True):
+                os.dup2(was, number)
+            keeper.join()
+            for was in kept:
+                os.close(was)
+
+
+def same_as_kept(path, text):
+    """True when the file holds this text already; otherwise it is written."""
+    if path.exists() and path.read_text(encoding="utf-8") == text:
+        return True
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(text, encoding="utf-8")
+    return False
 
 
 def one_line(error):

@@ -4,8 +4,9 @@ Follow the loop here: `Ranger.__init__` builds the plant, the boards and the bus
 tables of harness/wiring.py; `harness/lockstep.py` then passes time and carries what goes over the wires.
 """
 
+import difflib
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Literal, overload
 
 from ranger_sim.boards.can_router import CanRouterBoard
 from ranger_sim.boards.hip import HipBoard
@@ -23,6 +24,7 @@ from ranger_sim.firmware_sim.clock import seeded_crystal
 from ranger_sim.foundation import wallclock
 from ranger_sim.foundation.events import STAGE_BUS
 from ranger_sim.foundation.random_stream import RandomStream
+from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness import bus_schedule, lockstep, wiring
 from ranger_sim.harness.logbook import Logbook
 from ranger_sim.harness.operator import Operator
@@ -235,22 +237,47 @@ class Ranger:
 
     # --- looking in, reaching in --------------------------------------------------------------------------
 
+    @overload
+    def board(self, name: Literal["MCH"]) -> HipBoard: ...
+    @overload
+    def board(self, name: Literal["MCFO"]) -> OuterFeetBoard: ...
+    @overload
+    def board(self, name: Literal["MCFI"]) -> InnerFeetBoard: ...
+    @overload
+    def board(self, name: Literal["MCSI"]) -> SteeringBoard: ...
+    @overload
+    def board(self, name: Literal["UI"]) -> UserInterfaceBoard: ...
+    @overload
+    def board(self, name: Literal["CSR"]) -> CanRouterBoard: ...
+    @overload
+    def board(self, name: Literal["MB"]) -> MainBrainBoard: ...
+    @overload
+    def board(self, name: str) -> Any: ...
     def board(self, name: str) -> Any:
-        """The board MCH, MCFO, MCFI, MCSI, UI, CSR or MB."""
+        """The board MCH, MCFO, MCFI, MCSI, UI, CSR or MB. UserError for any other name."""
+        if name not in self.boards:
+            raise UserError(f"board {name!r}: there is none of this name, but {', '.join(self.boards)}")
         return self.boards[name]
 
     def variable(self, name: str) -> float:
-        """Value of a variable as the main brain's data table has it."""
+        """Value of a variable as the main brain's data table has it. UserError for a name that is not in the table."""
         from ranger_sim.datatable.packing import value_of_word
 
-        number = all_variables.ID_OF[name]
+        number = all_variables.ID_OF.get(name)
+        if number is None:
+            near = difflib.get_close_matches(name, all_variables.ID_OF, 3)
+            instead = f"meant was perhaps {' or '.join(near)}; " if near else ""
+            raise UserError(
+                f"variable {name!r}: none of the table's {len(all_variables.ID_OF)} has this name; "
+                f"{instead}`ranger-sim table list` shows them"
+            )
         return value_of_word(all_variables.TYPES[number], self.boards["MB"].store.get_word(number))
 
     def replace(
         self, board: str, task: str, function: Callable[[], int | None], cost: int, limit: int | None = None
     ) -> None:
         """Put your own function in a schedule entry; it declares its cost in cycles."""
-        self.boards[board].scheduler.replace(task, function, cost=cost, limit=limit)
+        self.board(board).scheduler.replace(task, function, cost=cost, limit=limit)
 
     def trace_digest(self) -> str:
         """BLAKE2b-256 of the canonical trace so far."""

@@ -1,9 +1,62 @@
 """The Cornell Ranger biped emulated whole: seven boards' firmware, four CAN buses, one walking body.
 
+    from ranger_sim import Ranger, Scenario
+
+    robot = Ranger(Scenario(seed=3))
+    robot.run_for(5.0)
+    print(robot.steps, robot.variable("MCH_ANGLE"), robot.board("MCH").scheduler.max_slot_cycles)
+
+What a user needs by name:
+
+    Ranger      one robot in one scenario: pass time, look in, reach in
+    Scenario    what is to be run: seed, controller, slope, floor, model of motors, joints and sensors
+    StopRule    when a walk is done: steps, time or distance
+    Quirks      in what the firmware is to follow the one of 2016 instead of the appendix
+    Profile     which boards and buses are real, on what bit rates and schedules the buses run; `load_profile` reads one
+    UserError   a mistake of the user, told in one line
+
+Everything else is internal and changes without notice; CAN programs find the interface `ranger_sim` by python-can.
+
 The rooms (`ranger_sim.boards`, `ranger_sim.plant`, ...) are top-level folders of the repository; importing this package
-finds them and chooses, once for all of them, whether compiled or plain modules run (`ranger_sim.loading`).
+finds them and chooses, once for all of them, whether compiled or plain modules run (`ranger_sim.loading`). It loads
+none of them: each name is imported when it is first asked for (PEP 562).
 """
+
+import importlib
+from typing import TYPE_CHECKING, Any
 
 from ranger_sim import loading  # noqa: F401  (first: it finds the rooms)
 
+if TYPE_CHECKING:
+    from ranger_sim.boards.quirks import Quirks
+    from ranger_sim.foundation.user_error import UserError
+    from ranger_sim.harness.profile import Profile
+    from ranger_sim.harness.profile import load as load_profile
+    from ranger_sim.harness.ranger import Ranger
+    from ranger_sim.harness.scenario import Scenario, StopRule
+
+__all__ = ["Profile", "Quirks", "Ranger", "Scenario", "StopRule", "UserError", "load_profile"]
 __version__ = "0.1.0"
+
+_PLACES = {
+    "Profile": ("harness.profile", "Profile"),
+    "Quirks": ("boards.quirks", "Quirks"),
+    "Ranger": ("harness.ranger", "Ranger"),
+    "Scenario": ("harness.scenario", "Scenario"),
+    "StopRule": ("harness.scenario", "StopRule"),
+    "UserError": ("foundation.user_error", "UserError"),
+    "load_profile": ("harness.profile", "load"),
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _PLACES:
+        raise AttributeError(f"module 'ranger_sim' has no attribute {name!r}; it offers {', '.join(__all__)}")
+    module, inside = _PLACES[name]
+    value = getattr(importlib.import_module(f"ranger_sim.{module}"), inside)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

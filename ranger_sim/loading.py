@@ -30,6 +30,7 @@ ROOMS = (
     "harness",
     "tools",
 )
+SHARED = "ranger_sim._shared"  # Cython's helpers, which all compiled modules use
 PACKAGE = Path(__file__).resolve().parent
 # in a checkout the rooms stand beside this package
 HOUSE = PACKAGE if (PACKAGE / ROOMS[0]).is_dir() else PACKAGE.parent
@@ -83,11 +84,11 @@ class RoomFinder:
         """The spec of a room or of a module inside one; None for everything else."""
         package, _, rest = fullname.partition(".")
         room, _, inside = rest.partition(".")
-        if package != "ranger_sim" or room not in ROOMS:
-            return None
-        if fullname in COMPILED_MODULES:
+        if fullname in COMPILED_MODULES or fullname == SHARED:
             loader = LibraryLoader(fullname, LIBRARY.__file__)
             return importlib.util.spec_from_file_location(fullname, LIBRARY.__file__, loader=loader)
+        if package != "ranger_sim" or room not in ROOMS:
+            return None
         sources = (DeclaredFieldsLoader, importlib.machinery.SOURCE_SUFFIXES)
         for folder in (path or ()) if inside else (str(HOUSE),):
             spec = importlib.machinery.FileFinder(folder, sources).find_spec(fullname)
@@ -105,6 +106,6 @@ def declared_modules() -> Iterator[str]:
 
 # decided once: modules are not exchanged while a process runs
 LIBRARY, RUNS_INTERPRETED_BECAUSE = load_library()
-COMPILED_MODULES = frozenset(LIBRARY.names.split() if LIBRARY else ())
+COMPILED_MODULES = frozenset(LIBRARY.names.split() if LIBRARY else ()) - {SHARED}
 RUNS_COMPILED = not RUNS_INTERPRETED_BECAUSE
 sys.meta_path.insert(0, RoomFinder)

@@ -14,6 +14,7 @@ import tomllib
 import pytest
 
 from ranger_sim import loading
+from set_up import SetUpError, name_of, part_of_lock
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
@@ -206,7 +207,9 @@ def test_a_build_compiles_rebuilds_only_what_changed_and_survives_a_broken_decla
     ahead = library.stat().st_mtime_ns + 1_000_000_000
     os.utime(source, ns=(ahead, ahead))
     told = build_in(small_house).stdout
-    assert re.findall(r"Cythonizing (\S+)", told) == ["ranger_sim/foundation/numbers.py"]
+    assert told.splitlines() == ["translated 1 of 1 modules", "compiled 6 of 6 modules"]
+    log = (small_house / "build" / "setup.log").read_text(encoding="utf-8")
+    assert re.findall(r"Compiling (\S+) because it changed", log) == ["ranger_sim/foundation/numbers.py"]
     changed = {name for name, time in times_of_objects(small_house).items() if time != built[name]}
     assert changed == {"numbers.o", "directory.o"}
     assert set(how_it_runs(small_house)[0]) == {str(library)}
@@ -219,7 +222,8 @@ def test_a_build_compiles_rebuilds_only_what_changed_and_survives_a_broken_decla
     declaration = small_house / "foundation" / "numbers.pxd"
     declaration.write_text(declaration.read_text(encoding="utf-8") + "cdef class (\n", encoding="utf-8")
     told = build_in(small_house).stderr
-    assert "NOT COMPILED" in told and "numbers" in told
+    assert "NOT COMPILED" in told and "numbers" in told and "setup.log" in told
+    assert "cdef class (" in (small_house / "build" / "setup.log").read_text(encoding="utf-8")
     files, reason = how_it_runs(small_house)
     assert all(file.endswith(".py") for file in files)
     assert "could not translate" in reason
@@ -258,9 +262,10 @@ def test_a_build_can_be_told_not_to_compile(small_house):
 # --- the papers -------------------------------------------------------------------------------------------
 
 
-def requirement_name(text):
-    """The normalised name of a requirement such as `python-can>=4.5`."""
-    return re.sub(r"[-_.]+", "-", re.match(r"[A-Za-z0-9._-]+", text).group(0)).lower()
+def wanted_packages():
+    """(what a walk needs, what the extras add), as pyproject.toml has them."""
+    extras = PROJECT["project"]["optional-dependencies"].values()
+    return PROJECT["project"]["dependencies"], [each for extra in extras for each in extra]
 
 
 def locked():
@@ -268,7 +273,7 @@ def locked():
     entries, name = {}, None
     for line in (ROOT / "requirements.lock").read_text(encoding="utf-8").splitlines():
         if line and not line.startswith((" ", "#")):
-            name = requirement_name(line)
+            name = name_of(line)
         if name:
             entries.setdefault(name, []).append(line)
     return entries
@@ -276,22 +281,82 @@ def locked():
 
 def test_the_lock_has_every_direct_dependency_with_hashes_and_names_no_index():
     entries = locked()
-    direct = PROJECT["project"]["dependencies"] + PROJECT["project"]["optional-dependencies"]["dev"]
-    direct += PROJECT["build-system"]["requires"]
-    assert [text for text in direct if requirement_name(text) not in entries] == []
+    walk, more = wanted_packages()
+    direct = walk + more + PROJECT["build-system"]["requires"]
+    assert [text for text in direct if name_of(text) not in entries] == []
     assert [name for name, lines in entries.items() if not any("--hash=sha256:" in line for line in lines)] == []
     text = (ROOT / "requirements.lock").read_text(encoding="utf-8")
     assert "://" not in text and "--index" not in text and "--find-links" not in text
     for wanted in direct:  # what the lock says it is there for
         if wanted not in PROJECT["build-system"]["requires"]:
-            assert any("ranger-sim (pyproject.toml)" in line for line in entries[requirement_name(wanted)]), wanted
+            assert any("ranger-sim (pyproject.toml)" in line for line in entries[name_of(wanted)]), wanted
+
+
+LOCK = """\
+beta==2.0 ; python_full_version < '3.12' \\
+    --hash=sha256:02
+    # via
+    #   alpha
+    #   other
+alpha==1.0 \\
+    --hash=sha256:01
+    # via ranger-sim (pyproject.toml)
+gamma==3.0 \\
+    --hash=sha256:03
+    # via beta
+other-one==4.0 \\
+    --hash=sha256:04
+    # via ranger-sim (pyproject.toml)
+other==5.0 \\
+    --hash=sha256:05
+    # via other-one
+"""
+
+
+def names_in(lock):
+    return [name_of(line) for line in lock.splitlines() if re.match("[a-z]", line)]
+
+
+def test_a_part_of_the_lock_has_what_is_wanted_and_what_that_needs_with_all_hashes():
+    part = part_of_lock(LOCK, {"alpha"})
+    assert names_in(part) == ["beta", "alpha", "gamma"]
+    assert part.count("--hash") == 3 and "python_full_version < '3.12'" in part
+    assert names_in(part_of_lock(LOCK, {"other"})) == ["beta", "gamma", "other"]
+    assert part_of_lock(LOCK, None) == LOCK
+    with pytest.raises(SetUpError, match="does not have delta"):
+        part_of_lock(LOCK, {"alpha", "delta"})
+
+
+def test_a_walk_is_set_up_without_what_fits_tests_or_reads_dbc_files():
+    lock = (ROOT / "requirements.lock").read_text(encoding="utf-8")
+    walk, more = wanted_packages()
+    builders = PROJECT["build-system"]["requires"]
+    names = names_in(part_of_lock(lock, {name_of(each) for each in walk + builders}))
+    assert {name_of(each) for each in walk + builders} | {"pandas", "packaging"} <= set(names)
+    assert not {"scipy", "cantools", "pytest", "hypothesis", "mypy", "ruff", "pluggy"} & set(names)
+    assert {name_of(each) for each in more} <= set(names_in(part_of_lock(lock, None)))
+
+
+def test_a_missing_extra_is_named_in_one_line():
+    hidden = "import sys; sys.modules['cantools'] = None\n"  # what an environment without it looks like
+    done = run(
+        ["-c", hidden + "from ranger_sim.tools.cli import main; sys.exit(main(['can-bounds', '--dbc', 'x.dbc']))"], ROOT
+    )
+    assert done.returncode == 2 and "Traceback" not in done.stderr
+    assert "this needs cantools, which comes with the extra 'dbc'" in " ".join(done.stderr.split())
+
+
+def test_modules_that_are_optimised_little_exist():
+    source = (ROOT / "setup.py").read_text(encoding="utf-8")
+    listed = re.findall(r'"([\w.]+)"', re.search(r"RARELY_RUN = \((.*?)\)\n", source, re.DOTALL)[1])
+    assert len(listed) > 20 and set(listed) <= set(declared_modules())
 
 
 def test_every_dependency_has_its_reason_beside_it():
     text = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
     listed = re.findall(r'^  "[A-Za-z][\w.-]*>=[^"]*",(.*)$', text, re.MULTILINE)
-    wanted = PROJECT["project"]["dependencies"] + PROJECT["project"]["optional-dependencies"]["dev"]
-    assert len(listed) == len(wanted) + len(PROJECT["build-system"]["requires"])
+    walk, more = wanted_packages()
+    assert len(listed) == len(walk + more) + len(PROJECT["build-system"]["requires"])
     assert all(re.fullmatch(r"\s+# \w.{10,}", rest) for rest in listed)
 
 

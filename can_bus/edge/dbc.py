@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import pathlib
-
-import cantools
-from cantools.database.can import Database
+from typing import TYPE_CHECKING
 
 from ranger_sim.can_bus.bounds import Message, message
 from ranger_sim.foundation.events import FLAG_EXTENDED
+from ranger_sim.foundation.extras import imported
 from ranger_sim.foundation.user_error import UserError
+
+if TYPE_CHECKING:
+    from cantools.database.can import Database
 
 LARGEST_PERIOD_MS = 10**9
 
@@ -20,6 +22,7 @@ def read_messages(path: pathlib.Path, bit_rate: int | None) -> tuple[list[Messag
     Period: GenMsgCycleTime, in ms; deadline the same; no jitter; every node sends its frames by priority. Bit rate: as
     given, else the file's attribute Baudrate. UserError for what cannot be read or is not classic CAN.
     """
+    cantools = imported("cantools", "dbc")
     try:
         database = cantools.database.load_file(str(path), database_format="dbc", strict=False)
     except OSError as error:
@@ -27,7 +30,7 @@ def read_messages(path: pathlib.Path, bit_rate: int | None) -> tuple[list[Messag
     except Exception as error:  # what a broken file makes of cantools is of many kinds
         said = " ".join(f"{type(error).__name__}: {error}".split())
         raise UserError(f"{path}: not a DBC file that cantools can read: {said}") from None
-    if not isinstance(database, Database):
+    if not isinstance(database, cantools.database.can.Database):
         raise UserError(f"{path}: holds no CAN messages")
     rate = bit_rate if bit_rate is not None else _baudrate(database)
     if rate is None:
