@@ -4,6 +4,10 @@ from libc.math cimport exp, sin
 from ranger_sim.foundation.random_stream cimport RandomStream
 from ranger_sim.plant.noise cimport NoiseSource
 
+cpdef enum:
+    WORD_BITS = 13
+    COUNTS_PER_TURN = 8192
+
 @cython.final
 cdef class AbsoluteEncoder:
     # what every word asks for stands first, beside each other

@@ -14,7 +14,11 @@ from ranger_sim.plant.noise import NoiseSource
 if not cython.compiled:
     from math import exp, sin
 
-COUNTS_PER_TURN = 8192
+# C constants when compiled: the same numbers stand in the .pxd, and a test holds them together.
+if not cython.compiled:
+    WORD_BITS = 13
+    COUNTS_PER_TURN = 8192
+
 PI = 3.141592653589793
 
 
@@ -66,8 +70,8 @@ class AbsoluteEncoder:
         n = int(x)
         if x < n:
             n -= 1
-        n &= 8191
+        n &= COUNTS_PER_TURN - 1
         if self.bit_flip > 0.0 and self.flips.uniform() < self.bit_flip:
-            n ^= 1 << self.flips.integer(13)
+            n ^= 1 << self.flips.integer(WORD_BITS)
             self.flipped += 1
         return n

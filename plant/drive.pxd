@@ -1,5 +1,13 @@
 cimport cython
 
+from ranger_sim.foundation.events cimport NEVER
+
+cpdef enum:
+    PWM_WRITE = 0
+    WATCHDOG_EDGE = 1
+    LOW_SIDE_WRITE = 2
+    ROW = 5
+
 @cython.final
 cdef class Drive:
     # what a motor looks at in every step stands first, beside each other

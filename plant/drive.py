@@ -12,10 +12,16 @@ import cython
 
 from ranger_sim.foundation.numbers import integers
 
-# Kinds of changes.
-PWM_WRITE = 0
-WATCHDOG_EDGE = 1
-LOW_SIDE_WRITE = 2
+# C constants when compiled: the same numbers stand in the .pxd, and a test holds them together.
+if not cython.compiled:
+    from ranger_sim.foundation.events import NEVER
+
+    # kinds of changes
+    PWM_WRITE = 0
+    WATCHDOG_EDGE = 1
+    LOW_SIDE_WRITE = 2
+
+    ROW = 5  # numbers of a change in the queue
 
 
 class Drive:
@@ -42,11 +48,11 @@ class Drive:
         self.switching_leads = 0
         self.sensed_lead_switches = False
         self.power_losses = 0  # times the watchdog ran out
-        # the queue, five numbers per change: time (ns), kind, what it writes
-        self.changes = integers(5 * 16)
+        # the queue, a row of numbers per change: time (ns), kind, what it writes
+        self.changes = integers(ROW * 16)
         self.capacity = 16
         self.count = 0
-        self.next_change_ns = 1 << 62  # first queued change or the end of the watchdog's time
+        self.next_change_ns = NEVER  # first queued change or the end of the watchdog's time
 
     def write_pwm(
         self,
@@ -56,12 +62,12 @@ class Drive:
         mr0: cython.longlong,
     ) -> cython.void:
         """Match values of the two leads and of the period, in counts, from `time` on."""
-        self._queue(time, 0, mr2, mr6, mr0)
+        self._queue(time, PWM_WRITE, mr2, mr6, mr0)
 
     def watchdog_edge(self, time: cython.longlong) -> cython.void:
         """The watchdog line changed its level at `time`."""
         if not self.powered or time > self.power_off_ns:
-            self._queue(time, 1, 0, 0, 0)  # the bridge gets its power back at this edge
+            self._queue(time, WATCHDOG_EDGE, 0, 0, 0)  # the bridge gets its power back at this edge
             return
         # it keeps its power, as it would if the edge were kept until its time
         self.power_off_ns = time + self.watchdog_ns
@@ -71,7 +77,7 @@ class Drive:
 
     def low_side(self, time: cython.longlong, enable2: cython.bint, enable6: cython.bint) -> cython.void:
         """The two low-side enables from `time` on."""
-        self._queue(time, 2, enable2, enable6, 0)
+        self._queue(time, LOW_SIDE_WRITE, enable2, enable6, 0)
 
     def _queue(
         self,
@@ -82,14 +88,14 @@ class Drive:
         c: cython.longlong,
     ) -> cython.void:
         """Keep a change until its time; equal times keep their order of arrival."""
-        at: cython.longlong = 5 * self.count
+        at: cython.longlong = ROW * self.count
         k: cython.longlong
         if self.count == self.capacity:
             self._grow()
-        while at > 0 and self.changes[at - 5] > time:
-            for k in range(at, at + 5):
-                self.changes[k] = self.changes[k - 5]
-            at -= 5
+        while at > 0 and self.changes[at - ROW] > time:
+            for k in range(at, at + ROW):
+                self.changes[k] = self.changes[k - ROW]
+            at -= ROW
         self.changes[at] = time
         self.changes[at + 1] = kind
         self.changes[at + 2] = a
@@ -102,7 +108,7 @@ class Drive:
     def _grow(self) -> None:
         """Double the queue, keeping what is there."""
         self.capacity = 2 * self.capacity
-        grown = integers(5 * self.capacity)
+        grown = integers(ROW * self.capacity)
         for k, number in enumerate(self.changes):
             grown[k] = number
         self.changes = grown
@@ -113,27 +119,27 @@ class Drive:
         k: cython.longlong
         kind: cython.longlong
         left: cython.longlong = self.count
-        following: cython.longlong = 1 << 62
+        following: cython.longlong = NEVER
         if time < self.next_change_ns:
             return
         while left > 0 and self.changes[at] <= time:
             kind = self.changes[at + 1]
-            if kind == 0:
+            if kind == PWM_WRITE:
                 self.mr2 = self.changes[at + 2]
                 self.mr6 = self.changes[at + 3]
                 self.mr0 = self.changes[at + 4]
-            elif kind == 1:
+            elif kind == WATCHDOG_EDGE:
                 self.powered = True
                 self.power_off_ns = self.changes[at] + self.watchdog_ns
             else:
                 self.enable2 = self.changes[at + 2] != 0
                 self.enable6 = self.changes[at + 3] != 0
-            at += 5
+            at += ROW
             left -= 1
         self.count = left
         if left > 0:
             following = self.changes[at]
-            for k in range(5 * left):
+            for k in range(ROW * left):
                 self.changes[k] = self.changes[k + at]
         if self.powered:
             if time >= self.power_off_ns:

@@ -5,6 +5,10 @@ from ranger_sim.plant.battery cimport Battery
 from ranger_sim.plant.foot_sensor cimport FootSensors
 from ranger_sim.plant.motor_unit cimport MotorUnit
 from ranger_sim.plant.noise cimport NoiseSource
+from ranger_sim.plant.wiring_points cimport (
+    ANALOG_COUNT, BATTERY_CURRENT, BATTERY_VOLTAGE, INNER_FOOT_LEFT, INNER_FOOT_RIGHT, MOTOR_COUNT, MOTOR_CURRENT,
+    OUTER_FOOT_LEFT, OUTER_FOOT_RIGHT, PER_MOTOR, ROUTER_CURRENT, ROUTER_VOLTAGE, STEERING, STEERING_ANGLE,
+)
 
 @cython.final
 cdef class Electrics:
@@ -18,6 +22,7 @@ cdef class Electrics:
     cdef public NoiseSource noise
     cdef public double lag_h, lag_factor, pwm_offset_A, voltage_clip_V, steering_rad, steering_shown_rad
     cdef public bint has_terms
+    # as long as there are motors and analog wiring points
     cdef public double[4] battery_A
     cdef public double[19] values, zero_V, slope_V, noise_V
     cdef public double[::1] analog_end, analog_start

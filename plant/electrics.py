@@ -30,11 +30,28 @@ from ranger_sim.plant.foot_sensor import FootSensors
 from ranger_sim.plant.motor_parameters import ANKLE_MOTOR, HIP_MOTOR, STEERING_MOTOR, MotorParameters
 from ranger_sim.plant.motor_unit import MotorUnit
 from ranger_sim.plant.noise import NoiseSource
-from ranger_sim.plant.wiring_points import ANALOG_COUNT, MOTOR_NAMES
+from ranger_sim.plant.wiring_points import MOTOR_NAMES
 
 if not cython.compiled:
     from math import exp
     from operator import add, mul
+
+    from ranger_sim.plant.wiring_points import (
+        ANALOG_COUNT,
+        BATTERY_CURRENT,
+        BATTERY_VOLTAGE,
+        INNER_FOOT_LEFT,
+        INNER_FOOT_RIGHT,
+        MOTOR_COUNT,
+        MOTOR_CURRENT,
+        OUTER_FOOT_LEFT,
+        OUTER_FOOT_RIGHT,
+        PER_MOTOR,
+        ROUTER_CURRENT,
+        ROUTER_VOLTAGE,
+        STEERING,
+        STEERING_ANGLE,
+    )
 
 ADS7871_REFERENCE_V = 2.5  # robot.md N4.5 (external reference; 2.5 V as the internal one)
 INTERNAL_REFERENCE_V = 3.3
@@ -114,6 +131,7 @@ class Electrics:
         self.noise = NoiseSource(seed, "analog sensors")
         self.analog_start = reals([0.0] * ANALOG_COUNT)
         self.analog_end = reals([0.0] * ANALOG_COUNT)
+        # C arrays of ANALOG_COUNT and of MOTOR_COUNT numbers: their length is a literal
         self.values = [0.0] * 19  # what is measured: A, V, rad
         self.zero_V = [0.0] * 19
         self.slope_V = [0.0] * 19  # volts per ampere, volt or rad
@@ -141,28 +159,29 @@ class Electrics:
         for motor in range(len(MOTOR_NAMES)):
             g, off, gain, battery_g, battery_off, battery_gain, volt_g = BOARD_CONSTANTS[motor]
             volts = ADS7871_REFERENCE_V / 8192.0
-            self.zero_V[3 * motor] = off * volts / gain
-            self.slope_V[3 * motor] = -volts / gain / g
-            self.zero_V[3 * motor + 1] = battery_off * volts / battery_gain
-            self.slope_V[3 * motor + 1] = volts / battery_gain / battery_g
-            self.slope_V[3 * motor + 2] = INTERNAL_REFERENCE_V / 1024.0 / volt_g
-            amps = p.steering_current_noise_A if motor == 3 else p.motor_current_noise_A
-            self.noise_V[3 * motor] = amps * abs(self.slope_V[3 * motor])
-            amps = p.steering_current_noise_A if motor == 3 else p.battery_current_noise_A
-            self.noise_V[3 * motor + 1] = amps * self.slope_V[3 * motor + 1]
-            self.noise_V[3 * motor + 2] = p.voltage_noise_V * self.slope_V[3 * motor + 2]
-        for foot in range(12, 16):
+            i = PER_MOTOR * motor
+            self.zero_V[i + MOTOR_CURRENT] = off * volts / gain
+            self.slope_V[i + MOTOR_CURRENT] = -volts / gain / g
+            self.zero_V[i + BATTERY_CURRENT] = battery_off * volts / battery_gain
+            self.slope_V[i + BATTERY_CURRENT] = volts / battery_gain / battery_g
+            self.slope_V[i + BATTERY_VOLTAGE] = INTERNAL_REFERENCE_V / 1024.0 / volt_g
+            amps = p.steering_current_noise_A if motor == STEERING else p.motor_current_noise_A
+            self.noise_V[i + MOTOR_CURRENT] = amps * abs(self.slope_V[i + MOTOR_CURRENT])
+            amps = p.steering_current_noise_A if motor == STEERING else p.battery_current_noise_A
+            self.noise_V[i + BATTERY_CURRENT] = amps * self.slope_V[i + BATTERY_CURRENT]
+            self.noise_V[i + BATTERY_VOLTAGE] = p.voltage_noise_V * self.slope_V[i + BATTERY_VOLTAGE]
+        for foot in (OUTER_FOOT_LEFT, OUTER_FOOT_RIGHT, INNER_FOOT_LEFT, INNER_FOOT_RIGHT):
             self.slope_V[foot] = 1.0
             self.noise_V[foot] = p.foot_noise_counts * ADS7871_REFERENCE_V / 8192.0
-        self.zero_V[16] = STEERING_CENTRE_V
-        self.slope_V[16] = STEERING_V_PER_RAD
-        self.noise_V[16] = p.steering_noise_V
+        self.zero_V[STEERING_ANGLE] = STEERING_CENTRE_V
+        self.slope_V[STEERING_ANGLE] = STEERING_V_PER_RAD
+        self.noise_V[STEERING_ANGLE] = p.steering_noise_V
         count_V = INTERNAL_REFERENCE_V / 1024.0
-        self.zero_V[17] = -ROUTER_CURRENT_OFFSET * count_V
-        self.slope_V[17] = count_V / ROUTER_CURRENT_A_PER_COUNT
-        self.zero_V[18] = -ROUTER_VOLT_OFFSET * count_V
-        self.slope_V[18] = count_V / ROUTER_VOLT_PER_COUNT
-        self.noise_V[18] = p.voltage_noise_V * self.slope_V[18]
+        self.zero_V[ROUTER_CURRENT] = -ROUTER_CURRENT_OFFSET * count_V
+        self.slope_V[ROUTER_CURRENT] = count_V / ROUTER_CURRENT_A_PER_COUNT
+        self.zero_V[ROUTER_VOLTAGE] = -ROUTER_VOLT_OFFSET * count_V
+        self.slope_V[ROUTER_VOLTAGE] = count_V / ROUTER_VOLT_PER_COUNT
+        self.noise_V[ROUTER_VOLTAGE] = p.voltage_noise_V * self.slope_V[ROUTER_VOLTAGE]
         self.settle(False, 0.0, False, 0.0, 0.0)
 
     def step_motors(
@@ -234,7 +253,7 @@ class Electrics:
         self.lag_h = 0.0
         self.lag_factor = 1.0
         self._read(0.0, steering_rad)
-        for i in range(19):
+        for i in range(ANALOG_COUNT):
             self.analog_start[i] = self.analog_end[i]
 
     def _read(self, h: cython.double, steering_rad: cython.double) -> cython.void:
@@ -253,7 +272,7 @@ class Electrics:
         motors: list = self.motors
         values: cython.p_double = self.values
         battery_A: cython.p_double = self.battery_A
-        for motor in range(4):
+        for motor in range(MOTOR_COUNT):
             # what the three sensors of a motor board measure
             unit = motors[motor]
             amps = unit.current_A
@@ -262,44 +281,44 @@ class Electrics:
             value = battery_A[motor]
             value += (unit.battery_current_A - value) * lag
             battery_A[motor] = value
-            values[i] = amps
-            values[i + 1] = value
-            values[i + 2] = seen
-            i += 3
+            values[i + MOTOR_CURRENT] = amps
+            values[i + BATTERY_CURRENT] = value
+            values[i + BATTERY_VOLTAGE] = seen
+            i += PER_MOTOR
         feet: FootSensors = self.outer_feet
-        values[12] = feet.left_V
-        values[13] = feet.right_V
+        values[OUTER_FOOT_LEFT] = feet.left_V
+        values[OUTER_FOOT_RIGHT] = feet.right_V
         feet = self.inner_feet
-        values[14] = feet.left_V
-        values[15] = feet.right_V
+        values[INNER_FOOT_LEFT] = feet.left_V
+        values[INNER_FOOT_RIGHT] = feet.right_V
         if steering_rad != self.steering_rad:
             # the sensor's own 1024 steps of a turn: the nearest one
             self.steering_rad = steering_rad
             steps = steering_rad * (1024.0 / 6.283185307179586)
             nearest = int(steps + 0.5) if steps >= 0.0 else -int(0.5 - steps)
             self.steering_shown_rad = nearest * (6.283185307179586 / 1024.0)
-        values[16] = self.steering_shown_rad
-        values[17] = self.electronics_W / V if V > 0.0 else 0.0
-        values[18] = V
+        values[STEERING_ANGLE] = self.steering_shown_rad
+        values[ROUTER_CURRENT] = self.electronics_W / V if V > 0.0 else 0.0
+        values[ROUTER_VOLTAGE] = V
         if self.has_terms:
             self._apply_terms(h)
         noise: NoiseSource = self.noise
         place = noise.block()
         if cython.compiled:
-            for i in range(19):
+            for i in range(ANALOG_COUNT):
                 value = self.zero_V[i] + self.slope_V[i] * values[i] + self.noise_V[i] * noise.table[place + i]
                 self.analog_start[i] = self.analog_end[i]
                 self.analog_end[i] = value
         else:  # the same in a fraction of the time: a fifth of a step of the plant went into this loop
             self.analog_start[:] = self.analog_end
             volts = map(add, self.zero_V, map(mul, self.slope_V, values))
-            self.analog_end[:] = map(add, volts, map(mul, self.noise_V, noise.table[place : place + 19]))
+            self.analog_end[:] = map(add, volts, map(mul, self.noise_V, noise.table[place : place + ANALOG_COUNT]))
 
     def _apply_terms(self, h: cython.double) -> cython.void:
         """Scale, offset and lag of a model file on what is measured."""
         i: cython.longlong
         value: cython.double
-        for i in range(19):
+        for i in range(ANALOG_COUNT):
             value = self.scale[i] * self.values[i] + self.offset[i]
             if self.lag_s[i] > 0.0:
                 if h > 0.0:

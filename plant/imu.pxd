@@ -7,6 +7,16 @@ from ranger_sim.foundation.edge_buffer cimport ByteBuffer
 
 cdef long long _MASK, _TEN_BITS
 
+cpdef enum:
+    SILENT = 0
+    HEADER_ANGLES_AND_RATES = 0xCF
+    HEADER_RATES = 0xC2
+    SET_MODE = 0xC4
+    SET_MODE_SECOND = 0xC1
+    SET_MODE_THIRD = 0x29
+    PACKET_BYTES = 31
+    MAX_FILTER = 64
+
 @cython.final
 cdef class Imu:
     # what every step and every packet look at stands first, beside each other
@@ -18,7 +28,7 @@ cdef class Imu:
     cdef public double lagged, rate_x, roll
     cdef public long long command, acknowledge_ns
     cdef public double ring_sum
-    cdef public double[64] ring
+    cdef public double[64] ring  # MAX_FILTER
     cpdef void receive_byte(self, long long time, long long byte) noexcept
     cpdef long long sample_time(self, long long n)
     cpdef bint is_due(self, long long t1) noexcept

@@ -30,10 +30,19 @@ if not cython.compiled:
 
     from ranger_sim.foundation.numbers import word_of_float
 
-HEADER_ANGLES_AND_RATES = 0xCF
-HEADER_RATES = 0xC2
-PACKET_BYTES = 31
-MAX_FILTER = 64
+# C constants when compiled: the same numbers stand in the .pxd, and a test holds them together.
+if not cython.compiled:
+    # `Imu.mode`: the header of the packets that it sends
+    SILENT = 0
+    HEADER_ANGLES_AND_RATES = 0xCF
+    HEADER_RATES = 0xC2
+    # the command that sets the mode: three bytes, then the header asked for
+    SET_MODE = 0xC4
+    SET_MODE_SECOND = 0xC1
+    SET_MODE_THIRD = 0x29
+
+    PACKET_BYTES = 31
+    MAX_FILTER = 64  # samples
 # C variables when compiled (.pxd): Cython makes a Python object of every literal above 31 bits.
 _MASK = 0xFFFFFFFF
 _TEN_BITS = 10000000000  # ns times baud
@@ -90,7 +99,7 @@ class Imu:
         self.line_free_ns = 0
         self.byte_ns = 0
         self.packets = 0
-        self.mode = 0  # header of the packet that is sent, 0: silent
+        self.mode = SILENT
         self.command = 0  # bytes of a command received so far
         self.acknowledge = -1  # command byte to acknowledge
         self.acknowledge_ns = 0
@@ -105,15 +114,15 @@ class Imu:
         """A byte of the board arrived complete at `time` (ns)."""
         if self.command == 3:
             self.mode = byte & 255
-            if self.mode != 0xCF and self.mode != 0xC2:
-                self.mode = 0
+            if self.mode != HEADER_ANGLES_AND_RATES and self.mode != HEADER_RATES:
+                self.mode = SILENT
             self.acknowledge = byte & 255
             self.acknowledge_ns = time
             self.command = 0
-        elif self.command == 1 and byte == 0xC1 or self.command == 2 and byte == 0x29:
+        elif self.command == 1 and byte == SET_MODE_SECOND or self.command == 2 and byte == SET_MODE_THIRD:
             self.command += 1
         else:
-            self.command = 1 if byte == 0xC4 else 0
+            self.command = 1 if byte == SET_MODE else 0
 
     def sample_time(self, n: cython.longlong) -> cython.longlong:
         """Instant (ns) of sample n, from the count, in a clock that is `ppb` fast."""
@@ -165,11 +174,11 @@ class Imu:
             start = self.next_sample_ns + self.latency_ns
             if start < self.line_free_ns:
                 start = self.line_free_ns
-            if self.mode == 0xC2:
+            if self.mode == HEADER_RATES:
                 roll = self.roll_bias_rad - (lean0 + fraction * (lean1 - lean0))
                 self.roll = roll
                 self._packet(start, 0.0, -sin(roll), -cos(roll), yaw_rate)
-            elif self.mode == 0xCF and self.samples % self.fusion_divider == 0:
+            elif self.mode == HEADER_ANGLES_AND_RATES and self.samples % self.fusion_divider == 0:
                 roll = self.roll_bias_rad - (lean0 + fraction * (lean1 - lean0))
                 if self.roll_noise_rad > 0.0:
                     roll += self.roll_noise_rad * self.stream.normal()
@@ -181,7 +190,7 @@ class Imu:
     def _begin(self) -> cython.void:
         """Make room for a packet and start its sum."""
         line: ByteBuffer = self.bytes
-        if line.count + 32 > line.capacity:
+        if line.count + PACKET_BYTES > line.capacity:
             line.grow()
         self.byte_ns = _TEN_BITS // self.baud
         self.checksum = 0
@@ -249,7 +258,7 @@ class Imu:
         if start > self.line_free_ns:
             self.line_free_ns = start
         self._begin()
-        self._send(0xC4)
+        self._send(SET_MODE)
         self._send(self.acknowledge)
         self._word(self.acknowledge_ns // 16000 & _MASK)
         self._sum()

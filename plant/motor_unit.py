@@ -45,6 +45,9 @@ class MotorUnit:
     `coulomb_Nm`, `viscous_Nms` for the body: torque = drive - coulomb tanh(rate / epsilon) - viscous rate.
     Sums since power-up in J: battery_J = drawn_J - returned_J = mechanical + winding + series + contact + ripple
     + gate + diode + change of magnetic energy.
+
+    More than 40 fields, because the lines of a step use the winding's numbers and its books alike: in an object of
+    their own the books would be looked up in every line.
     """
 
     def __init__(self, name, parameters=None, mounting=1) -> None:

@@ -9,6 +9,7 @@ from ranger_sim.plant.leg cimport INNER, OUTER, Leg
 from ranger_sim.plant.motion cimport advance
 from ranger_sim.plant.motor_unit cimport MotorUnit
 from ranger_sim.plant.steering cimport Steering
+from ranger_sim.plant.wiring_points cimport HIP_WORD, INNER_ANKLE_WORD, OUTER_ANKLE_WORD
 
 @cython.final
 cdef class RangerPlant:

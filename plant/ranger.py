@@ -27,6 +27,7 @@ from ranger_sim.plant.walk_record import RING
 if not cython.compiled:
     from ranger_sim.plant.leg import INNER, OUTER
     from ranger_sim.plant.motion import advance
+    from ranger_sim.plant.wiring_points import HIP_WORD, INNER_ANKLE_WORD, OUTER_ANKLE_WORD
 
 STEP_NS = 250_000  # the plant's step; its error is measured in EQUATIONS 15
 
@@ -124,7 +125,7 @@ class RangerPlant:
         self.hip_word = AbsoluteEncoder("hip", 4590, 1, seed=seed)
         self.outer_word = AbsoluteEncoder("outer_ankle", 6562, -1, seed=seed)
         self.inner_word = AbsoluteEncoder("inner_ankle", 1572, 1, seed=seed)
-        self.words = [0, 0, 0]  # of the three absolute encoders
+        self.words = [0] * 3  # of the absolute encoders
         self.imu = Imu(seed, phase_ns=start_ns)
         self.analog_start = self.electrics.analog_start
         self.analog_end = self.electrics.analog_end
@@ -206,9 +207,9 @@ class RangerPlant:
         self.outer_joint.reset(outer)
         self.inner_motor.reset(i.motor_angle + self.zero)
         self.inner_joint.reset(inner)
-        self.words[0] = self.hip_word.word(h)
-        self.words[1] = self.outer_word.word(outer)
-        self.words[2] = self.inner_word.word(inner)
+        self.words[HIP_WORD] = self.hip_word.word(h)
+        self.words[OUTER_ANKLE_WORD] = self.outer_word.word(outer)
+        self.words[INNER_ANKLE_WORD] = self.inner_word.word(inner)
         self.electrics.settle(o.Fy > 0.0, o.Fy, i.Fy > 0.0, i.Fy, self.steering.twist)
 
     # ---- passing time -----------------------------------------------------------------------------------------
@@ -292,9 +293,9 @@ class RangerPlant:
         self.outer_joint.update(t0, t1, o0, o0_rate, o1, o.foot_rate - lean1_rate)
         self.inner_motor.update(t0, t1, n0, n0_rate, i.motor_angle + zero, i.motor_rate)
         self.inner_joint.update(t0, t1, i0, i0_rate, i1, i.foot_rate - i.rate)
-        self.words[0] = self.hip_word.word(h1, h)
-        self.words[1] = self.outer_word.word(o1, h)
-        self.words[2] = self.inner_word.word(i1, h)
+        self.words[HIP_WORD] = self.hip_word.word(h1, h)
+        self.words[OUTER_ANKLE_WORD] = self.outer_word.word(o1, h)
+        self.words[INNER_ANKLE_WORD] = self.inner_word.word(i1, h)
         if self.imu.is_due(t1):
             self.imu.update(t0, t1, lean0, lean0_rate, lean1, lean1_rate, s.yaw, (s.yaw - yaw0) / h)
         e.sense(t0, t1, outer_stands, o.Fy, inner_stands, i.Fy, s.twist)
@@ -323,42 +324,47 @@ class RangerPlant:
         i: Leg = b.inner
         s: Steering = self.steering
         V: cython.double = self.electrics.battery.voltage_V
-        row[0] = b.hip_x
-        row[1] = b.hip_y
-        row[2] = o.foot_angle
-        row[3] = o.angle
-        row[4] = i.angle
-        row[5] = i.foot_angle
-        row[6] = o.rate
-        row[7] = i.rate
-        row[8] = o.angle - i.angle
-        row[9] = o.rate - i.rate
-        row[10] = o.foot_angle - o.angle + self.zero
-        row[11] = o.motor_angle + self.zero
-        row[12] = i.foot_angle - i.angle + self.zero
-        row[13] = i.motor_angle + self.zero
-        row[14] = o.motor_rate
-        row[15] = i.motor_rate
-        row[16] = o.Fx
-        row[17] = o.Fy
-        row[18] = i.Fx
-        row[19] = i.Fy
-        row[20] = self.hip.current_A
-        row[21] = self.outer_ankle.current_A
-        row[22] = self.inner_ankle.current_A
-        row[23] = self.steering_motor.current_A
-        row[24] = V * self.hip.battery_current_A
-        row[25] = V * self.outer_ankle.battery_current_A
-        row[26] = V * self.inner_ankle.battery_current_A
-        row[27] = V * self.steering_motor.battery_current_A
-        row[28] = V
-        row[29] = self.electrics.battery.current_A
-        row[30] = s.twist
-        row[31] = s.yaw
-        row[32] = s.path_x
-        row[33] = s.path_y
-        row[34] = b.mode
-        row[35] = self.steps
+        place: cython.longlong
+        values = (
+            b.hip_x,
+            b.hip_y,
+            o.foot_angle,
+            o.angle,
+            i.angle,
+            i.foot_angle,
+            o.rate,
+            i.rate,
+            o.angle - i.angle,
+            o.rate - i.rate,
+            o.foot_angle - o.angle + self.zero,
+            o.motor_angle + self.zero,
+            i.foot_angle - i.angle + self.zero,
+            i.motor_angle + self.zero,
+            o.motor_rate,
+            i.motor_rate,
+            o.Fx,
+            o.Fy,
+            i.Fx,
+            i.Fy,
+            self.hip.current_A,
+            self.outer_ankle.current_A,
+            self.inner_ankle.current_A,
+            self.steering_motor.current_A,
+            V * self.hip.battery_current_A,
+            V * self.outer_ankle.battery_current_A,
+            V * self.inner_ankle.battery_current_A,
+            V * self.steering_motor.battery_current_A,
+            V,
+            self.electrics.battery.current_A,
+            s.twist,
+            s.yaw,
+            s.path_x,
+            s.path_y,
+            b.mode,
+            self.steps,
+        )
+        for place in range(len(values)):
+            row[place] = values[place]
 
     @property
     def electronics_power_W(self):
