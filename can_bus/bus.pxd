@@ -5,8 +5,8 @@ from ranger_sim.foundation.events cimport (
 from ranger_sim.can_bus.bus_counters cimport BusCounters
 from ranger_sim.can_bus.disturbance cimport Disturbance
 from ranger_sim.can_bus.frame cimport (
-    ACK_SLOT_FROM_END, EIGHT_BYTES, INTERMISSION_BITS, LENGTH_CODE, MEASURED_BITS, RECEIVERS_SEE, SENDABLE,
-    arbitration_key, measure,
+    ACK_SLOT_FROM_END, EIGHT_BYTES, HIGHEST_EXTENDED, HIGHEST_STANDARD, INTERMISSION_BITS, LENGTH_CODE, MEASURED_BITS,
+    RECEIVERS_SEE, SENDABLE, arbitration_key, measure,
 )
 from ranger_sim.can_bus.frame_log cimport FrameLog
 from ranger_sim.can_bus.load_meter cimport LoadMeter

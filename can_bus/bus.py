@@ -1,5 +1,5 @@
 # cython: boundscheck=False, wraparound=False, initializedcheck=False
-# (every index below counts nodes, transmit buffers or logged frames, or is an identifier that `request` has checked)
+# (every index below is made of a node and a buffer, which `request` has checked, or is a row that waits)
 """One CAN bus to the bit: arbitration, timing, acknowledgement, and what an error means for everybody.
 
 Beside it: `node.py`, a controller with its error confinement; `transmit_buffers.py`, the frames that wait;
@@ -18,7 +18,7 @@ Order. The lowest arbitration field among the controllers ready wins; a controll
 three buffers, ties by buffer number (LPC2194 with TPM = 0). Nothing is pre-empted.
 
 A frame is decided at its start: its results are pushed, stamped in the future, into the nodes' inboxes; its end is
-written down for the sender where that looks for it (`Node.connect`).
+written where the sender looks for it (`Node.connect`).
 Receivers have the frame at the end of the sixth bit of EOF, its sender is done at the end of the seventh.
 """
 
@@ -41,6 +41,8 @@ if not cython.compiled:
     from ranger_sim.can_bus.frame import (
         ACK_SLOT_FROM_END,
         EIGHT_BYTES,
+        HIGHEST_EXTENDED,
+        HIGHEST_STANDARD,
         INTERMISSION_BITS,
         LENGTH_CODE,
         MEASURED_BITS,
@@ -280,9 +282,9 @@ class Bus:
     def _check_frame(self, identifier: cython.longlong, flags: cython.longlong) -> None:
         """ValueError for a frame that cannot be sent."""
         if flags & FLAG_EXTENDED:
-            if identifier < 0 or identifier > 0x1FFFFFFF:
+            if identifier < 0 or identifier > HIGHEST_EXTENDED:
                 raise ValueError(f"bus {self.name}: identifier {identifier} does not fit in 29 bits")
-        elif identifier < 0 or identifier > 0x7FF:
+        elif identifier < 0 or identifier > HIGHEST_STANDARD:
             raise ValueError(f"bus {self.name}: identifier {identifier} does not fit in 11 bits")
         if flags & ~SENDABLE:
             raise ValueError(f"bus {self.name}: flags {flags:#x} of identifier {identifier:#x} cannot be sent")
@@ -414,7 +416,7 @@ class Bus:
     # ---- nodes that leave and join
 
     def _note_changes(self) -> None:
-        """Set what depends on it after a command came or went, or a node began or ended to join or to take part."""
+        """Set what depends on waiting commands and on the nodes that join or take part, after any of them changed."""
         self.next_change = -1 if self.joining > 0 else self.commands.head_time
         self.hindered_until = self.suspended_until if self.acknowledging == self.node_count else NEVER
         self._aim()
@@ -603,7 +605,7 @@ class Bus:
         return self.free_bit
 
     def _after_success(self, node: Node, end: cython.longlong, done: cython.longlong) -> None:
-        """What a frame sent whole, to bit `end`, at `done` in ns, means for a sender that has had errors."""
+        """A sender that has had errors has sent a frame whole: to bit `end`, at `done` (ns)."""
         if node.passive:
             self._suspend(node, end + INTERMISSION_BITS)
         if node.transmit_errors > 0:
@@ -635,21 +637,21 @@ class Bus:
         return -best if ready > 1 and self._contend(k, best, best_key) else best
 
     def _contend(self, k: cython.longlong, best: cython.longlong, best_key: cython.longlong) -> cython.bint:
-        """Settle with the losers of an arbitration; True when another node offers the very same field."""
+        """Note who loses the arbitration; True when another node offers the very same field."""
         slots: cython.p_longlong = self.buffers.slots
         row: cython.longlong = self.buffers.first
         key: cython.longlong
+        offered: cython.bint
         merged: cython.bint = False
         loser: Node
         skipped = None
         while row >= 0:
             if row >> NODE_SHIFT != best >> NODE_SHIFT and slots[row + READY] <= k:  # another node's
                 key = self._key(row)
-                if not self._is_offered(row, key, k):
-                    pass
-                elif key == best_key:
+                offered = self._is_offered(row, key, k)
+                if offered and key == best_key:
                     merged = True
-                else:
+                elif offered:
                     loser = self.nodes[row >> NODE_SHIFT]
                     loser.arbitrations_lost += 1
                     self.counters.arbitrations_lost += 1
@@ -700,7 +702,7 @@ class Bus:
     def _disturbed(
         self, k: cython.longlong, best: cython.longlong, bits: cython.longlong, merged: cython.bint
     ) -> cython.bint:
-        """Settle the frame on bits k ... k + bits - 1 where something may be wrong; True when it failed."""
+        """Decide the frame on bits k ... k + bits - 1, in which something may be wrong; True when it fails."""
         senders = self._senders(k, best) if merged else [best]
         position = -1
         if merged:

@@ -5,6 +5,8 @@ cpdef enum:
     EIGHT_BYTES = 8
     SENDABLE = 0x7F
     RECEIVERS_SEE = 0x5F
+    HIGHEST_STANDARD = 0x7FF
+    HIGHEST_EXTENDED = 0x1FFFFFFF
     INTERMISSION_BITS = 3
     TAIL_BITS = 10
     ACK_SLOT_FROM_END = 9
@@ -70,6 +72,5 @@ cdef long long _measure_bitwise(long long identifier, long long flags, long long
 cdef long long _measure_by_bytes(long long identifier, long long lo, long long hi) noexcept
 cpdef long long measure(long long identifier, long long flags, long long lo, long long hi) noexcept
 cpdef long long crc15(long long identifier, long long flags, long long lo, long long hi) noexcept
-cpdef long long stuff_bits(long long identifier, long long flags, long long lo, long long hi)
 cpdef long long frame_bits(long long identifier, long long flags, long long lo, long long hi) noexcept
 cpdef long long arbitration_key(long long identifier, long long flags) noexcept

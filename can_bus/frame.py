@@ -22,6 +22,9 @@ if not cython.compiled:
     SENDABLE = 0x7F  # all that a request may have: length code, remote, single shot, extended
     RECEIVERS_SEE = 0x5F  # of these, what is on the wire: no single shot
 
+    HIGHEST_STANDARD = 0x7FF  # identifiers of 11 bits
+    HIGHEST_EXTENDED = 0x1FFFFFFF  # identifiers of 29 bits
+
     INTERMISSION_BITS = 3  # ISO 11898-1: recessive bits between two frames
     TAIL_BITS = 10  # CRC delimiter, ACK slot, ACK delimiter, 7 bits end of frame
     ACK_SLOT_FROM_END = 9  # the ACK slot is the ninth bit from the end
@@ -267,13 +270,6 @@ def crc15(
 ) -> cython.longlong:
     """CRC-15 over start of frame ... data, 0 ... 0x7FFF (ISO 11898-1)."""
     return measure(identifier, flags, lo, hi) >> MEASURED_CRC_SHIFT
-
-
-def stuff_bits(
-    identifier: cython.longlong, flags: cython.longlong, lo: cython.longlong, hi: cython.longlong
-) -> cython.longlong:
-    """Number of stuff bits of this very content (one after every five equal bits, CRC included)."""
-    return (measure(identifier, flags, lo, hi) & MEASURED_BITS) - unstuffed_bits(flags)
 
 
 def frame_bits(

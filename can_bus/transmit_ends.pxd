@@ -1,3 +1,5 @@
+from ranger_sim.foundation.events cimport NEVER
+
 cimport cython
 
 @cython.final

@@ -1,15 +1,16 @@
 # cython: boundscheck=False, wraparound=False
 # (every index below is a transmit buffer, 1 ... 3, as bus and controller have checked)
-"""The ends of transmissions, which a bus knows from the starts of their frames on and nearly nobody waits for.
+"""The ends of transmissions: a bus knows them from the start of the frame on, and hardly anybody waits for them.
 
 Bus and controller hold the same object: the bus writes the end down, and the controller takes it in when a register
-that depends on it is looked at. Only an end that somebody waits for travels as a message (CAN_TX_DONE), or one between
+is read that depends on it. An end travels as a message (CAN_TX_DONE) where somebody waits for it, and between
 processes.
 """
 
 import cython
 
-from ranger_sim.foundation.events import NEVER
+if not cython.compiled:
+    from ranger_sim.foundation.events import NEVER
 
 BY_MESSAGE = NEVER + 1
 
@@ -29,8 +30,7 @@ class TransmitEnds:
 
     def write(self, buffer: cython.longlong, time: cython.longlong, status: cython.longlong) -> cython.bint:
         """The bus: the transmission from `buffer` ends at `time`. False when it shall send a message instead."""
-        never: cython.longlong = 1 << 62
-        if self.times[buffer] != never:
+        if self.times[buffer] != NEVER:
             return False
         self.times[buffer] = time
         self.statuses[buffer] = status

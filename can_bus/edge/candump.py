@@ -12,6 +12,7 @@ from collections.abc import Iterable, Iterator
 from typing import Any, TextIO
 
 from ranger_sim.can_bus.edge.messages import data_of_words, words_of_data
+from ranger_sim.can_bus.frame import HIGHEST_EXTENDED, HIGHEST_STANDARD, LENGTH_CODE
 from ranger_sim.foundation.events import FLAG_ERROR, FLAG_EXTENDED, FLAG_REMOTE
 from ranger_sim.foundation.user_error import UserError
 
@@ -29,7 +30,7 @@ def line_of_frame(interface: str, time_ns: int, identifier: int, flags: int, lo:
     else:
         name = f"{identifier:08X}" if flags & FLAG_EXTENDED else f"{identifier:03X}"
         if flags & FLAG_REMOTE:
-            text = f"{name}#R{min(flags & 15, 8)}"
+            text = f"{name}#R{min(flags & LENGTH_CODE, 8)}"
         else:
             text = f"{name}#{data_of_words(flags, lo, hi).hex().upper()}"
     return f"({seconds:010d}.{rest // 1000:06d}) {interface} {text}\n"
@@ -107,14 +108,14 @@ def _frame_of_line(line: str) -> tuple[str, int, int, int, int, int]:
         raise ValueError(f"identifier {name[:20]!r} is not three or eight hexadecimal digits")
     identifier = int(name, 16)
     flags = FLAG_EXTENDED if len(name) == 8 else 0
-    if len(name) == 3 and identifier > 0x7FF:
+    if len(name) == 3 and identifier > HIGHEST_STANDARD:
         raise ValueError(f"identifier {name} is above 7FF")
     if len(name) == 8 and identifier & ERROR_FLAG:
         if not _hexadecimal(data or "0") or len(data) % 2 or len(data) > 16:
             raise ValueError(f"data {data[:40]!r} is not up to eight bytes in hexadecimal")
         content = bytes.fromhex(data).ljust(8, b"\0")
         return interface, time_ns, 0, FLAG_ERROR, content[3], 0
-    if identifier > 0x1FFFFFFF:
+    if identifier > HIGHEST_EXTENDED:
         raise ValueError(f"identifier {name} is above 1FFFFFFF")
     if data[:1] in ("R", "r"):
         length = data[1:] or "0"

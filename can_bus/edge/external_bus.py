@@ -27,7 +27,7 @@ import can
 from can import cli as can_options
 
 from ranger_sim.can_bus.edge.messages import frame_of_message, message_of_frame
-from ranger_sim.can_bus.frame import INTERMISSION_BITS, frame_bits
+from ranger_sim.can_bus.frame import INTERMISSION_BITS, LENGTH_CODE, frame_bits
 from ranger_sim.foundation.events import (
     CAN_ABORT,
     CAN_MODE,
@@ -218,7 +218,7 @@ class Peer:
             if flags & FLAG_ERROR:
                 self.owner.count_error(self)
                 continue
-            flags = flags & ~15 | min(flags & 15, 8)
+            flags = flags & ~LENGTH_CODE | min(flags & LENGTH_CODE, 8)
             end_ns = max(now_ns, self.read_ns + self.owner.length_ns(identifier, flags, lo, hi))
             self.owner.frames_in += self is self.owner.peers[0]
             self.owner.seen(self, min(end_ns, now_ns + AHEAD_NS), identifier, flags, lo, hi)

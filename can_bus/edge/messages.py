@@ -2,7 +2,7 @@
 
 import can
 
-from ranger_sim.can_bus.frame import data_length
+from ranger_sim.can_bus.frame import LENGTH_CODE, data_length
 from ranger_sim.foundation.events import FLAG_ERROR, FLAG_EXTENDED, FLAG_REMOTE
 from ranger_sim.foundation.user_error import UserError
 
@@ -24,7 +24,7 @@ def message_of_frame(
         return can.Message(timestamp=time_ns * 1e-9, is_error_frame=True, channel=channel, is_rx=is_rx)
     remote = bool(flags & FLAG_REMOTE)
     # python-can holds classic lengths to 8; codes above mean eight bytes
-    length = min(flags & 15, 8)
+    length = min(flags & LENGTH_CODE, 8)
     data = None if remote else data_of_words(flags, lo, hi)
     return can.Message(
         timestamp=time_ns * 1e-9,

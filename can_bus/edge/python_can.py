@@ -14,16 +14,11 @@ import can
 from can.broadcastmanager import CyclicSendTaskABC, ThreadBasedCyclicSendTask
 
 from ranger_sim.can_bus.edge.attach_records import DEFAULT_NAME, names_running
-from ranger_sim.can_bus.edge.links import (
-    RECEIVE_QUEUE,
-    AttachedLink,
-    LinkError,
-    PrivateBus,
-    PrivateLink,
-    channels_of,
-)
+from ranger_sim.can_bus.edge.attached_link import AttachedLink, channels_of
+from ranger_sim.can_bus.edge.links import RECEIVE_QUEUE, LinkError
 from ranger_sim.can_bus.edge.messages import frame_of_message
 from ranger_sim.can_bus.edge.paced import DEFAULT_BITRATE, PacedBus, speed_of
+from ranger_sim.can_bus.edge.private_link import PrivateBus, PrivateLink
 from ranger_sim.can_bus.edge.taps import (
     ERROR_ACTIVE,
     ERROR_PASSIVE,
@@ -33,7 +28,7 @@ from ranger_sim.can_bus.edge.taps import (
     Event,
     fault_of_frame,
 )
-from ranger_sim.can_bus.frame import data_length
+from ranger_sim.can_bus.frame import LENGTH_CODE, data_length
 from ranger_sim.foundation import wallclock
 from ranger_sim.foundation.events import FLAG_ERROR, FLAG_EXTENDED, FLAG_REMOTE
 from ranger_sim.foundation.user_error import UserError
@@ -327,7 +322,7 @@ def message_of_event(event: Event, channel: str) -> can.Message:
         arbitration_id=identifier,
         is_extended_id=bool(flags & FLAG_EXTENDED),
         is_remote_frame=remote,
-        dlc=min(flags & 15, 8),
+        dlc=min(flags & LENGTH_CODE, 8),
         data=None if remote else (lo | hi << 32).to_bytes(8, "little")[: data_length(flags)],
         channel=channel,
         is_rx=kind != SENT,

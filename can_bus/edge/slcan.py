@@ -14,6 +14,7 @@ from ranger_sim.can_bus.bus import Bus
 from ranger_sim.can_bus.edge.messages import data_of_words, words_of_data
 from ranger_sim.can_bus.edge.stream_server import COUNTERS, NEXT_POLL_NS, QUICK_POLL_NS
 from ranger_sim.can_bus.edge.taps import ERROR_PASSIVE, OFF, QUEUED, RECEIVED, Event, Tap, Taps, taps_of
+from ranger_sim.can_bus.frame import HIGHEST_EXTENDED, HIGHEST_STANDARD, LENGTH_CODE
 from ranger_sim.foundation.events import FLAG_ERROR, FLAG_EXTENDED, FLAG_REMOTE
 from ranger_sim.foundation.user_error import UserError
 
@@ -176,7 +177,7 @@ class SlcanServer:
             self._refuse()
             return
         identifier = int(name, 16)
-        if identifier > (0x1FFFFFFF if flags & FLAG_EXTENDED else 0x7FF):
+        if identifier > (HIGHEST_EXTENDED if flags & FLAG_EXTENDED else HIGHEST_STANDARD):
             self._refuse()
             return
         lo, hi = words_of_data(bytes.fromhex(data))
@@ -198,7 +199,7 @@ class SlcanServer:
             return
         extended, remote = flags & FLAG_EXTENDED, flags & FLAG_REMOTE
         letter = ("R" if remote else "T") if extended else ("r" if remote else "t")
-        text = f"{letter}{identifier:0{8 if extended else 3}X}{min(flags & 15, 8)}"
+        text = f"{letter}{identifier:0{8 if extended else 3}X}{min(flags & LENGTH_CODE, 8)}"
         if not remote:
             text += data_of_words(flags, lo, hi).hex().upper()
         if self.stamps:

@@ -14,6 +14,7 @@ from ranger_sim.can_bus.bus import Bus
 from ranger_sim.can_bus.edge.messages import data_of_words, words_of_data
 from ranger_sim.can_bus.edge.stream_server import BACKLOG_LIMIT, CLIENT_LIMIT, Connection, StreamServer
 from ranger_sim.can_bus.edge.taps import QUEUED, RECEIVED, Event, Tap, Taps
+from ranger_sim.can_bus.frame import HIGHEST_EXTENDED, HIGHEST_STANDARD
 from ranger_sim.foundation import wallclock
 from ranger_sim.foundation.events import FLAG_ERROR, FLAG_EXTENDED, FLAG_REMOTE
 from ranger_sim.foundation.user_error import UserError
@@ -117,7 +118,11 @@ class SocketcandServer(StreamServer[_Client]):
             self._refuse(client, "a send is: identifier length bytes, in hexadecimal")
             return
         extended = len(words[0]) > 3
-        if not 0 <= identifier <= (0x1FFFFFFF if extended else 0x7FF) or length > 8 or length != len(data):
+        if (
+            not 0 <= identifier <= (HIGHEST_EXTENDED if extended else HIGHEST_STANDARD)
+            or length > 8
+            or length != len(data)
+        ):
             self._refuse(client, "a send of an impossible identifier or length")
             return
         lo, hi = words_of_data(data)

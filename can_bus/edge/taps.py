@@ -8,29 +8,14 @@ from collections import deque
 from typing import Any
 
 from ranger_sim.can_bus.bus import Bus
-from ranger_sim.can_bus.frame import FIELD_ACK_SLOT, arbitration_key
-from ranger_sim.can_bus.node import (
-    BUS_OFF,
-    ICR_BUS_ERROR,
-    ICR_ERROR_PASSIVE,
-    ICR_ERROR_WARNING,
-    ICR_FIELD_SHIFT,
-    ICR_KIND_SHIFT,
-    ICR_RECEIVING,
-    KIND_BIT,
-    KIND_FORM,
-    KIND_OTHER,
-    KIND_STUFF,
-    OPERATING,
-    PASSIVE_LIMIT,
-    RESET,
-    WARNING_LIMIT,
-)
+from ranger_sim.can_bus.edge import linux_errors
+from ranger_sim.can_bus.frame import HIGHEST_EXTENDED, HIGHEST_STANDARD, LENGTH_CODE, arbitration_key
+from ranger_sim.can_bus.node import BUS_OFF, OPERATING, PASSIVE_LIMIT, RESET
+from ranger_sim.can_bus.transmit_buffers import BUFFERS
 from ranger_sim.foundation.events import (
     CAN_RX,
     CAN_STATUS,
     CAN_TX_DONE,
-    FLAG_ERROR,
     FLAG_EXTENDED,
     FLAG_REMOTE,
     NEVER,
@@ -40,7 +25,7 @@ from ranger_sim.foundation.events import (
 )
 
 # Kinds of event, the first field of each entry of `Tap.events`.
-RECEIVED = 1  # time_ns, identifier, flags, lo, hi; with FLAG_ERROR an error frame, see `error_frame`
+RECEIVED = 1  # time_ns, identifier, flags, lo, hi; with FLAG_ERROR an error frame, see linux_errors.py
 SENT = 2  # the same of a frame of ours that is on the bus whole
 DROPPED = 3  # the same of a frame of ours that never went out whole
 STATE = 4  # time_ns, state, transmit errors, receive errors, 0
@@ -59,22 +44,8 @@ NOT_ON_BUS = 2  # bus-off or listening only
 TRANSMIT_QUEUE = 64  # frames; chosen by us, because at 3 Mbit/s it holds 3 ms: more than a poll every 1 ms needs
 LINGER_NS = 1_000_000_000  # how long a client that left may still send what it had queued; chosen by us
 ORDER = STAGE_BUS * 256 + 255  # after every board's controller; a tap's inbox has no other source
-BUFFERS = (1, 2, 3)
 
-# Error frames as Linux shows them: classes in the identifier, details in eight bytes (linux/can/error.h).
-CAN_ERR_CRTL = 0x004
-CAN_ERR_PROT = 0x008
-CAN_ERR_ACK = 0x020
-CAN_ERR_BUSOFF = 0x040
-CAN_ERR_BUSERROR = 0x080
-CAN_ERR_RESTARTED = 0x100
-CAN_ERR_CNT = 0x200  # bytes 6 and 7 hold the counters
-CRTL_RX_OVERFLOW = 0x01
-CRTL_RX_WARNING, CRTL_TX_WARNING, CRTL_RX_PASSIVE, CRTL_TX_PASSIVE, CRTL_ACTIVE = 0x04, 0x08, 0x10, 0x20, 0x40
-PROT_OF_KIND = {KIND_BIT: 0x01, KIND_FORM: 0x02, KIND_STUFF: 0x04, KIND_OTHER: 0x00}
-PROT_TX = 0x80
-
-Event = tuple[int, int, int, int, int, int]
+Event = tuple[int, int, int, int, int, int]  # kind and what stands behind it, as told above
 
 
 @functools.lru_cache(maxsize=4096)
@@ -84,23 +55,17 @@ def _key(identifier: int, kind: int) -> int:
     return key
 
 
-def error_frame(time_ns: int, classes: int, data: bytes) -> Event:
-    """An error frame as an event: identifier = classes (CAN_ERR_*), eight data bytes."""
-    lo, hi = int.from_bytes(data[:4], "little"), int.from_bytes(data[4:], "little")
-    return (RECEIVED, time_ns, classes, FLAG_ERROR | 8, lo, hi)
-
-
 def overflow_frame(time_ns: int) -> Event:
     """The error frame that says: here frames are missing, the reader was too slow."""
-    return error_frame(time_ns, CAN_ERR_CRTL, bytes([0, CRTL_RX_OVERFLOW, 0, 0, 0, 0, 0, 0]))
+    return (RECEIVED, time_ns, *linux_errors.overflow())
 
 
 def fault_of_frame(identifier: int, flags: int, lo: int, hi: int) -> str:
     """What is wrong with a frame that a client wants to send; empty when nothing is."""
-    limit = 0x1FFFFFFF if flags & FLAG_EXTENDED else 0x7FF
+    limit = HIGHEST_EXTENDED if flags & FLAG_EXTENDED else HIGHEST_STANDARD
     if not 0 <= identifier <= limit:
         return f"identifier {identifier:#x} is above {limit:#x}"
-    if flags & ~(15 | FLAG_REMOTE | FLAG_EXTENDED) or flags & 15 > 8:
+    if flags & ~(LENGTH_CODE | FLAG_REMOTE | FLAG_EXTENDED) or flags & LENGTH_CODE > 8:
         return f"flags {flags:#x} are not a classic data or remote frame of 0 ... 8 bytes"
     if lo >> 32 or hi >> 32:
         return "a data word has more than 32 bits"
@@ -175,7 +140,7 @@ class Tap:
                 self._done(inbox.time, inbox.b, inbox.c)
             elif inbox.kind == CAN_STATUS:
                 self._status(inbox.time, inbox.b, inbox.c, inbox.d, bool(inbox.e))
-        if self.waiting and len(self.loaded) < 3:
+        if self.waiting and len(self.loaded) < BUFFERS:
             self._load(now)
 
     def _load(self, now: int) -> None:
@@ -186,7 +151,7 @@ class Tap:
         loaded, waiting = self.loaded, self.waiting
         if self.controller.mode == RESET or self.controller.mode == BUS_OFF:
             return  # just plugged in, or about to hear that it is off
-        while waiting and len(loaded) < 3:
+        while waiting and len(loaded) < BUFFERS:
             frame = waiting[0]
             key = _key(frame[0], frame[1] & (FLAG_REMOTE | FLAG_EXTENDED))
             buffer = 1
@@ -196,7 +161,7 @@ class Tap:
                     return
                 used = [entry[0] for entry in loaded]
                 above = last_buffer if key == last_key else 0
-                buffer = next((b for b in BUFFERS if b > above and b not in used), 0)
+                buffer = next((b for b in range(1, BUFFERS + 1) if b > above and b not in used), 0)
                 if buffer == 0:
                     return
             waiting.popleft()
@@ -232,33 +197,10 @@ class Tap:
         counters = (transmit_errors, receive_errors)
         if counters == self.counters and off == self.off:
             return
-        classes, data = CAN_ERR_CNT, bytearray(8)
-        data[6], data[7] = min(transmit_errors, 255), min(receive_errors, 255)
-        if interrupts & ICR_BUS_ERROR:
-            field, kind = interrupts >> ICR_FIELD_SHIFT & 31, interrupts >> ICR_KIND_SHIFT & 3
-            classes |= CAN_ERR_BUSERROR
-            if kind == KIND_OTHER and field == FIELD_ACK_SLOT:
-                classes |= CAN_ERR_ACK
-            else:
-                classes |= CAN_ERR_PROT
-                data[2] = PROT_OF_KIND[kind] | (0 if interrupts & ICR_RECEIVING else PROT_TX)
-            data[3] = field  # the codes of the SJA1000, which linux/can/error.h has taken over
-        if off and not self.off:
-            classes |= CAN_ERR_BUSOFF
-        elif self.off and not off:
-            classes |= CAN_ERR_RESTARTED
-        elif interrupts & (ICR_ERROR_WARNING | ICR_ERROR_PASSIVE):
-            classes |= CAN_ERR_CRTL
-            for count, warning, passive in (
-                (transmit_errors, CRTL_TX_WARNING, CRTL_TX_PASSIVE),
-                (receive_errors, CRTL_RX_WARNING, CRTL_RX_PASSIVE),
-            ):
-                data[1] |= passive if count >= PASSIVE_LIMIT else warning if count >= WARNING_LIMIT else 0
-            if max(counters) < WARNING_LIMIT:
-                data[1] = CRTL_ACTIVE
+        frame = linux_errors.frame_of_status(interrupts, counters, self.off, off)
         self.counters, self.off = counters, off
-        if classes != CAN_ERR_CNT:
-            self.events.append(error_frame(time, classes, bytes(data)))
+        if frame is not None:
+            self.events.append((RECEIVED, time, *frame))
         self.tell_state(time)
         if off:
             while self.waiting:

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from ranger_sim.can_bus.bus import Bus
 from ranger_sim.can_bus.edge import attach_records as wire
+from ranger_sim.can_bus.edge import attached_link
 from ranger_sim.can_bus.edge import host as host_module
-from ranger_sim.can_bus.edge import links
 from ranger_sim.can_bus.edge.attach import BACKLOG_LIMIT, CLIENT_LIMIT, AttachServer
 from ranger_sim.can_bus.edge.host import BusHost
 from ranger_sim.can_bus.edge.paced import PacedBus
@@ -111,7 +111,7 @@ def test_records_are_the_bytes_that_the_description_says():
 
 
 def test_the_description_names_every_record():
-    page = pathlib.Path(links.__file__).with_name("ATTACH.md").read_text(encoding="utf-8")
+    page = pathlib.Path(attached_link.__file__).with_name("ATTACH.md").read_text(encoding="utf-8")
     for name in ("HELLO", "WELCOME", "REFUSED", "SEND", "FRAME", "SENT", "DROPPED", "STATE", "CONTROL", "OVERFLOW"):
         assert f"| {getattr(wire, name)} | " in page.replace(f"| {name} |", f"| {name} |") and f"| {name} |" in page
     assert f"version {wire.VERSION}" in page.splitlines()[0]
@@ -311,10 +311,10 @@ def test_who_listens_under_the_address_but_is_no_robot_is_told():
     impostor.bind(wire.SOCKET_PREFIX + name)
     impostor.listen()
     with pytest.raises(UserError, match="is running but has not answered for 0.01 s"):
-        links.greeted(name, "can1", patience_s=0.01)
+        attached_link.greeted(name, "can1", patience_s=0.01)
     impostor.close()
     with pytest.raises(FileNotFoundError):
-        links.greeted(name, "can1")
+        attached_link.greeted(name, "can1")
 
 
 def test_a_frame_directly_behind_the_welcome_is_not_forgotten():
@@ -334,7 +334,7 @@ def test_a_frame_directly_behind_the_welcome_is_not_forgotten():
         connections = []
         thread = threading.Thread(target=answer, daemon=True)
         thread.start()
-        link = links.AttachedLink(name, "can1")
+        link = attached_link.AttachedLink(name, "can1")
         thread.join(PATIENCE_S)
         assert connections, "the connection is never answered"
         assert link.receive(0) == (RECEIVED, 5, 0x77, 0, 0, 0)

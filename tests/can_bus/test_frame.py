@@ -75,7 +75,7 @@ def test_a_frame_counted_by_hand():
     # identifier 0, no data: 0 00000000000 0 0 0 0000 = 19 zeros, CRC of zeros = 15 zeros: 34 zeros.
     # Stuffed: 5 zeros and a one, then again from the sixth zero on: 34 zeros hold six whole fives.
     assert frame.crc15(0, 0, 0, 0) == 0
-    assert frame.stuff_bits(0, 0, 0, 0) == 6
+    assert frame.frame_bits(0, 0, 0, 0) - frame.unstuffed_bits(0) == 6
     assert frame.frame_bits(0, 0, 0, 0) == 44 + 6
 
 
@@ -118,7 +118,8 @@ def test_crc_stuffing_and_length_agree_with_long_division_and_string_stuffing(ki
     crc = remainder(body)
     assert frame.crc15(identifier, flags, lo, hi) == crc
     expected = len(stuffed(body + f"{crc:015b}"))
-    assert frame.stuff_bits(identifier, flags, lo, hi) == expected - len(body) - 15
+    stuff_bits = frame.frame_bits(identifier, flags, lo, hi) - frame.unstuffed_bits(flags)
+    assert stuff_bits == expected - len(body) - 15
     assert frame.frame_bits(identifier, flags, lo, hi) == expected + 10
     assert expected + 10 <= frame.worst_case_bits(flags)
 

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ranger_sim.can_bus.edge import python_can
-from ranger_sim.can_bus.edge.links import PrivateLink
+from ranger_sim.can_bus.edge.private_link import PrivateLink
 from ranger_sim.can_bus.frame import frame_bits
 from ranger_sim.foundation import wallclock
 

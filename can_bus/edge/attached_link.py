@@ -1,0 +1,271 @@
+"""A client's place on a bus of another process: a running robot, or a host of private buses."""
+
+import select
+import socket
+from collections.abc import Callable
+from contextlib import suppress
+
+from ranger_sim.can_bus.edge import attach_records as wire
+from ranger_sim.can_bus.edge.links import (
+    BUS_OFF_TEXT,
+    FOR_EVER,
+    LISTENING_TEXT,
+    RECEIVE_QUEUE,
+    STALE_S,
+    Link,
+    LinkError,
+)
+from ranger_sim.can_bus.edge.taps import (
+    DROPPED,
+    ERROR_ACTIVE,
+    LISTENING,
+    OFF,
+    RECEIVED,
+    SENT,
+    STATE,
+    Event,
+    overflow_frame,
+)
+from ranger_sim.foundation import wallclock
+from ranger_sim.foundation.user_error import UserError
+
+HANDSHAKE_S = 60.0  # chosen by us: a robot answers once its boards have started, on a slow machine after half a minute
+
+
+class AttachedLink(Link):
+    """A client's place on a bus of another process. UserError when that process or its channel is not there."""
+
+    def __init__(
+        self,
+        name: str,
+        channel: str,
+        listen_only: bool = False,
+        receive_own: bool = False,
+        queue_limit: int = RECEIVE_QUEUE,
+    ) -> None:
+        super().__init__(f"{name}/{channel}", receive_own, queue_limit)
+        self.socket, welcome = greeted(name, channel, wire.OPTION_LISTEN if listen_only else 0)
+        _, self.window, self.bitrate, self.epoch_ns, self.channels, rest = welcome
+        self.state = LISTENING if listen_only else ERROR_ACTIVE
+        self.incoming = rest
+        self.outstanding = 0
+        self.reading = False
+        self.gone = ""
+        self.waiter = select.poll()
+        self.waiter.register(self.socket, select.POLLIN)
+        self.epoll: select.epoll | None = None
+        with self.changed:
+            self._understand()  # frames may have come directly behind the welcome
+
+    def send(self, identifier: int, flags: int, lo: int, hi: int, timeout: float | None) -> None:
+        """Queue a frame, waiting up to `timeout` s for a place (None: for ever)."""
+        with self.changed:
+            if self.outstanding >= self.window:
+                self._wait(lambda: self.outstanding < self.window, timeout)
+                if self.outstanding >= self.window:
+                    raise self._full()
+            self._check()
+            if self.state in (OFF, LISTENING):
+                self._read(0.0)
+                self._check_state()
+            self.outstanding += 1
+            self._write(wire.send_record(identifier, flags, lo, hi))
+
+    def _check_state(self) -> None:
+        if self.state == OFF:
+            raise LinkError(f"{self.label}: {BUS_OFF_TEXT}")
+        if self.state == LISTENING:
+            raise LinkError(f"{self.label}: {LISTENING_TEXT}")
+
+    def receive(self, timeout: float | None) -> Event | None:
+        """The oldest frame, waiting up to `timeout` s (None: for ever). LinkError when the other side is gone."""
+        with self.changed:
+            event = self._take()
+            if event is None:
+                self._wait(lambda: bool(self.arrived), timeout)
+                event = self._take()
+                if event is None:
+                    self._check()
+            return event
+
+    def activate(self) -> None:
+        """Take part again."""
+        self._control(wire.ACTIVATE)
+
+    def listen(self) -> None:
+        """Receive only."""
+        self._control(wire.LISTEN)
+
+    def flush(self) -> None:
+        """Drop what waits to be sent."""
+        self._control(wire.FLUSH)
+
+    def present_state(self) -> int:
+        """The controller's state as far as the other side has told it."""
+        with self.changed:
+            if not self.reading and not self.gone and not self.closed:
+                self._read(0.0)
+            return self.state
+
+    def fileno(self) -> int:
+        """A descriptor that is readable when `receive` has something, or may have after a look."""
+        with self.changed:
+            if self.epoll is None:
+                self._make_signal()
+                self.epoll = select.epoll()
+                self.epoll.register(self.socket, select.EPOLLIN)
+                self.epoll.register(self.signal, select.EPOLLIN)
+            return self.epoll.fileno()
+
+    def close(self) -> None:
+        """Leave; what is queued is still sent by the other side."""
+        with self.changed:
+            if self.closed:
+                return
+            self.closed = True
+            with suppress(OSError):
+                self.socket.shutdown(socket.SHUT_RDWR)  # whoever waits in another thread wakes up
+            self.changed.notify_all()
+        if self.epoll is not None:
+            self.epoll.close()
+        self._close_signal()
+        self.socket.close()
+
+    def _control(self, wish: int) -> None:
+        with self.changed:
+            self._check()
+            self._write(wire.record(wire.CONTROL, bytes([wish])))
+
+    def _check(self) -> None:
+        if self.closed:
+            raise LinkError(f"{self.label}: is shut down")
+        if self.gone:
+            raise LinkError(f"{self.label}: {self.gone}")
+
+    def _write(self, data: bytes) -> None:
+        try:
+            self.socket.sendall(data)
+        except OSError as error:
+            self._read(0.0)  # why, if the other side has said it
+            self.gone = self.gone or f"the other side has gone ({error.strerror})"
+            self._check()
+
+    def _wait(self, ready: Callable[[], bool], timeout: float | None) -> None:
+        """Until `ready()`, the time is over or the other side is gone. One thread reads, the others wait for it."""
+        end = FOR_EVER if timeout is None else wallclock.monotonic_s() + max(timeout, 0.0)
+        first = True
+        while not (ready() or self.gone or self.closed):
+            left = end - wallclock.monotonic_s()
+            if left <= 0.0 and not first:
+                return
+            first = False
+            left = min(max(left, 0.0), STALE_S)
+            if self.reading:
+                self.changed.wait(left)
+            else:
+                self._read(left)
+
+    def _read(self, timeout: float) -> None:
+        """Everything that has come in, after waiting up to `timeout` s for something. Lets go of the lock meanwhile."""
+        if timeout > 0.0:
+            self.reading = True
+            self.changed.release()
+            try:
+                self.waiter.poll(timeout * 1000.0)
+            finally:
+                self.changed.acquire()
+                self.reading = False
+        if self.closed:
+            return
+        try:
+            data = self.socket.recv(1 << 16, socket.MSG_DONTWAIT)
+            if not data:
+                self.gone = self.gone or "the other side has gone"
+            self.incoming += data
+            self._understand()
+        except BlockingIOError:
+            pass
+        except OSError as error:
+            self.gone = self.gone or f"the other side has gone ({error.strerror})"
+        except wire.MalformedError as fault:
+            self.gone = f"the other side does not speak the attach protocol: {fault}"
+        self._raise_signal()
+        self.changed.notify_all()
+
+    def _understand(self) -> None:
+        """The records that have come in, one after the other."""
+        frame_size, unpack = wire.FRAME_BODY.size, wire.FRAME_BODY.unpack
+        for kind, body in wire.records_of(self.incoming):
+            if kind == wire.FRAME and len(body) == frame_size:
+                self._arrive((RECEIVED, *unpack(body)))
+            elif kind in (wire.SENT, wire.DROPPED):
+                self.outstanding -= 1
+                self._arrive((SENT if kind == wire.SENT else DROPPED, *wire.unpacked(wire.FRAME_BODY, body)))
+            elif kind == wire.STATE:
+                time, state, transmit, receive = wire.unpacked(wire.STATE_BODY, body)
+                self._arrive((STATE, time, state, transmit, receive, 0))
+            elif kind == wire.OVERFLOW:
+                time, self.missed_frames = wire.unpacked(wire.OVERFLOW_BODY, body)
+                self._arrive(overflow_frame(time))
+            elif kind == wire.REFUSED:
+                self.gone = body.decode("utf-8", "replace")
+            else:
+                raise wire.MalformedError(f"record type {kind} with {len(body)} bytes")
+
+
+Welcome = tuple[int, int, int, int, list[str], bytearray]
+
+
+def greeted(
+    name: str, channel: str, options: int = 0, patience_s: float = HANDSHAKE_S
+) -> tuple[socket.socket, Welcome]:
+    """A connection to the robot `name` and what it said: version, window, bit rate, epoch, channels, the rest.
+
+    FileNotFoundError when nobody of that name is running; UserError when it refuses or is not understood.
+    """
+    connection = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+    try:
+        connection.settimeout(patience_s)
+        address = wire.address_of(name)
+        try:
+            connection.connect(address)
+        except ConnectionRefusedError:
+            raise FileNotFoundError(name) from None
+        hello = wire.HELLO_BODY.pack(wire.MAGIC, wire.VERSION, options) + channel.encode("utf-8")
+        connection.sendall(wire.record(wire.HELLO, hello))
+        incoming = bytearray()
+        while True:
+            data = connection.recv(4096)
+            if not data:
+                raise UserError(f"{name!r} ended the connection without a word")
+            incoming += data
+            for kind, body in wire.records_of(incoming):
+                if kind == wire.REFUSED:
+                    raise UserError(body.decode("utf-8", "replace"))
+                if kind != wire.WELCOME or len(body) < wire.WELCOME_BODY.size:
+                    raise UserError(f"{name!r} does not speak the attach protocol")
+                version, window, bitrate, epoch_ns = wire.WELCOME_BODY.unpack_from(body)
+                channels = body[wire.WELCOME_BODY.size :].decode("utf-8", "replace").split("\n")
+                connection.settimeout(None)
+                return connection, (version, window, bitrate, epoch_ns, channels, incoming)
+    except TimeoutError:
+        connection.close()
+        raise UserError(f"{name!r} is running but has not answered for {patience_s:g} s (is it stopped?)") from None
+    except wire.MalformedError as fault:
+        connection.close()
+        raise UserError(f"{name!r} does not speak the attach protocol: {fault}") from None
+    except OSError as error:
+        connection.close()
+        if isinstance(error, FileNotFoundError):
+            raise
+        raise UserError(f"attaching to {name!r}: {error.strerror or error}") from None
+    except UserError:
+        connection.close()
+        raise
+
+
+def channels_of(name: str, patience_s: float = HANDSHAKE_S) -> list[str]:
+    """The channels of a running robot or host."""
+    connection, welcome = greeted(name, "", patience_s=patience_s)
+    connection.close()
+    return welcome[4]
