@@ -1,0 +1,46 @@
+"""Every Python example of the documents is run as it stands there."""
+
+import pathlib
+import re
+import subprocess
+import sys
+
+import pytest
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+# What each document's examples, run one after the other in one process, must print among other things.
+PRINTED = {
+    "README.md": (r"ID: +123 .*'ranger'", r"^BusState\.ERROR$", r"^[1-9]\d* -?0\.\d+ \d{4,5}$"),
+    "firmware_sim/README.md": (r"^5 1 0$",),
+}
+
+
+def examples(name):
+    """The Python blocks of a document, in order."""
+    return re.findall(r"^```python\n(.*?)^```", (ROOT / name).read_text(encoding="utf-8"), re.DOTALL | re.MULTILINE)
+
+
+def test_every_document_with_python_examples_is_run():
+    documents = [path.relative_to(ROOT) for path in ROOT.rglob("*.md")]
+    found = {
+        path.as_posix()
+        for path in documents
+        if not {".venv", "build", "tests", ".pytest_cache"} & set(path.parts) and examples(path)
+    }
+    assert found == set(PRINTED)
+
+
+@pytest.mark.parametrize("name", PRINTED)
+def test_the_examples_run_without_a_warning_and_print_what_they_promise(name):
+    program = "\n".join(examples(name))
+    done = subprocess.run(
+        [sys.executable, "-W", "error", "-c", program],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=300,
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    for pattern in PRINTED[name]:
+        assert re.search(pattern, done.stdout, re.MULTILINE), f"no {pattern!r} in:\n{done.stdout}"
