@@ -249,7 +249,7 @@ def _command_streams(
         return [variable for variable in variables if bus.upper() in variable.buses]
 
     def common(variable: Variable, beside: Sequence[Variable], offset: int) -> dict[str, Any]:
-        """Those of lower numbers leave before it: the regular ones, and what else comes in its slot."""
+        """Frames of lower numbers leave before it: the regular ones, and others of its slot."""
         before = sum(1 for one, _ in commands.regular if one.id < variable.id)
         before += sum(1 for one in beside if one.id < variable.id)
         jitter = EXCHANGE_NS * (1 + before // FRAMES_PER_EXCHANGE) + COMMAND_VARIATION_NS

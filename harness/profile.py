@@ -184,7 +184,7 @@ class _Reader:
 
 
 def _plain(text: str) -> str:
-    """Without what would break a line, and not too long."""
+    """The text on one line, shortened where it is long."""
     printable = text if text.isprintable() else repr(text)[1:-1]
     return printable if len(printable) <= 160 else printable[:157] + "..."
 

@@ -15,7 +15,7 @@ EXIT_INTERRUPTED = 130
 
 
 class OneLineParser(argparse.ArgumentParser):
-    """An argument parser whose complaint is one line."""
+    """An argument parser that complains in one line."""
 
     def error(self, message: str) -> NoReturn:
         """Print what is wrong and where help is; exit code 2."""

@@ -138,7 +138,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 class Asked:
-    """What the command line wants of the robot. UserError for whatever is no such thing."""
+    """What the command line wants of the robot. UserError for a name, value or file that is none."""
 
     def __init__(self, session: Session, options: argparse.Namespace) -> None:
         self.fast = [row for pattern in options.fast for row in catalogue.match(pattern)]
@@ -167,11 +167,11 @@ class Asked:
         self.asked_to_read = False
 
     def anything(self) -> bool:
-        """True when there is something that can be done with."""
+        """True when something was asked that can be finished."""
         return bool(self.written or self.read or self.save)
 
     def after_writing(self, session: Session) -> bool:
-        """Ask for values once everything is written, so that they are those that hold; True when all is done."""
+        """When everything is written, ask for values, so that the new ones come back; True when all is done."""
         if session.writes:
             return False
         if not self.asked_to_read:

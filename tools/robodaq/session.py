@@ -99,7 +99,7 @@ class Session:
             self._want(FIRST_CHANNEL + place, word_of_value("f32", value))
 
     def write(self, name: str, value: float, place: str = "") -> None:
-        """Set a parameter; UserError for everything that is none, and outside its limits."""
+        """Set a parameter; UserError when it is none, or the value is outside its limits."""
         row = catalogue.parameter(name)
         self._want(row.id, catalogue.checked_word(row, value, place))
 
