@@ -8,12 +8,10 @@ import cython
 
 from ranger_sim.boards.modules.joint_safety import HipSafety
 from ranger_sim.boards.modules.publishing import Send, laid_out
-from ranger_sim.boards.motor_board import ANALOG, PINS, WORDS, MotorBoard
+from ranger_sim.boards.motor_board import MotorBoard
 from ranger_sim.datatable.generated import mch as table
 from ranger_sim.firmware_sim.peripherals.can_controller import ICR_BEI, ICR_EI, ICR_RI, ICR_TI1
 from ranger_sim.firmware_sim.scheduler import Schedule, Task, Wait
-
-__all__ = ["ANALOG", "PINS", "WORDS", "HipBoard"]
 
 CAN_INTERRUPTS = ICR_RI | ICR_TI1 | ICR_EI | ICR_BEI  # its TX1 bit reaches no handler
 

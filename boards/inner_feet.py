@@ -6,12 +6,10 @@ Ankle angle: 0 with the foot flipped up, growing as the foot is pushed down.
 
 from ranger_sim.boards.ankle_board import AnkleBoard
 from ranger_sim.boards.modules.publishing import Send, laid_out
-from ranger_sim.boards.motor_board import ANALOG, NOT_CONVERTED, PINS, WORDS
+from ranger_sim.boards.motor_board import NOT_CONVERTED
 from ranger_sim.boards.quirks import Quirks
 from ranger_sim.datatable.generated import mcfi as table
 from ranger_sim.firmware_sim.scheduler import Schedule, Task, Wait
-
-__all__ = ["ANALOG", "PINS", "WORDS", "InnerFeetBoard"]
 
 READINGS = dict(
     motor_gain=0.001525,

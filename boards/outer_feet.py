@@ -6,11 +6,9 @@ Ankle angle: 0 with the foot flipped up, growing as the foot is pushed down.
 
 from ranger_sim.boards.ankle_board import FOOT_OFF_LEVEL, AnkleBoard
 from ranger_sim.boards.modules.publishing import Send, laid_out
-from ranger_sim.boards.motor_board import ANALOG, NOT_CONVERTED, PINS, WORDS
+from ranger_sim.boards.motor_board import NOT_CONVERTED
 from ranger_sim.datatable.generated import mcfo as table
 from ranger_sim.firmware_sim.scheduler import Schedule, Task, Wait
-
-__all__ = ["ANALOG", "PINS", "WORDS", "OuterFeetBoard"]
 
 READINGS = dict(
     motor_gain=-0.00152,

@@ -10,12 +10,10 @@ quirks.py for what the firmware of 2016 made of it.
 import cython
 
 from ranger_sim.boards.modules.publishing import Send, laid_out
-from ranger_sim.boards.motor_board import ANALOG, PINS, WORDS, MotorBoard
+from ranger_sim.boards.motor_board import MotorBoard
 from ranger_sim.datatable.generated import errors as codes
 from ranger_sim.datatable.generated import mcsi as table
 from ranger_sim.firmware_sim.scheduler import Schedule, Task, Wait
-
-__all__ = ["ANALOG", "PINS", "WORDS", "SteeringBoard"]
 
 # (place, multiplexer code, gain code): single-ended 0 times 2, 4-5 times 2, 2-3 times 20
 SEQUENCE = (("steering_sensor", 8, 1), ("motor_current", 2, 1), ("battery_current", 1, 7))

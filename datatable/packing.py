@@ -6,8 +6,6 @@ import struct
 
 from ranger_sim.foundation.numbers import float_of_word, word_of_float, wrap_i32, wrap_u32
 
-ERROR_CODE_BITS, ERROR_BOARD_BITS, ERROR_COUNT_BITS = 16, 6, 10
-
 
 def word_of_value(kind: str, value: float) -> int:
     """The 32-bit word of `value` (0 ... 2^32-1). Floats are rounded to single precision, integers wrap."""

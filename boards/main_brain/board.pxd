@@ -9,6 +9,12 @@ from ranger_sim.firmware_sim.peripherals.ssp cimport SspPort, SspSegment
 from ranger_sim.firmware_sim.peripherals.uart_hs cimport HsUart
 from ranger_sim.firmware_sim.scheduler cimport Schedule
 
+cpdef enum:
+    EXECUTION_TIMER_HZ = 13000000
+    EXECUTION_TIMER_MHZ = 13
+    HEARTBEAT_BIT = 8
+    HEARTBEAT_MS = 50
+
 cdef class MainBrainBoard(FirmwareBoard):
     cdef public object distribution, controller
     cdef public DataStore store

@@ -30,9 +30,14 @@ from ranger_sim.firmware_sim.scheduler import Schedule, Task
 from ranger_sim.firmware_sim.vic import DMA_DONE, FIQ, SOFTWARE
 from ranger_sim.foundation.events import SSP_SEGMENT, EventQueue
 
+if not cython.compiled:
+    EXECUTION_TIMER_HZ = 13_000_000  # Timer0 counts the peripheral clock (robot.md N3.8)
+    EXECUTION_TIMER_MHZ = 13
+    HEARTBEAT_BIT = 8  # of the network time
+    HEARTBEAT_MS = 50
+
 # Both edges of slave select: stop and restart two DMA channels; about 300 instructions of C (chosen by us).
 SEGMENT_CYCLES = 450
-EXECUTION_TIMER_HZ = 13_000_000  # Timer0 counts the peripheral clock (robot.md N3.8)
 
 
 class ComputerPort(NamedTuple):
@@ -165,10 +170,10 @@ class MainBrainBoard(FirmwareBoard):
 
     def beat(self) -> None:
         """The heartbeat light: on for 50 ms when bit 8 of the network time rises (robot.md N1.8)."""
-        bit: cython.longlong = self.time.ms >> 8 & 1
+        bit: cython.longlong = self.time.ms >> HEARTBEAT_BIT & 1
         if bit == 1 and self.heartbeat_bit == 0:
             self.heartbeat_on = True
-            self.heartbeat_until = self.time.ms + 50
+            self.heartbeat_until = self.time.ms + HEARTBEAT_MS
         elif self.heartbeat_on and (self.time.ms - self.heartbeat_until) >> 31 & 1 == 0:
             self.heartbeat_on = False
         self.heartbeat_bit = bit
@@ -179,8 +184,8 @@ class MainBrainBoard(FirmwareBoard):
         counts: cython.longlong
         if self.execution_time_folds:
             since = self.match_time
-        counts = (self.now - since) * 13 // 1000
-        self.store.set_float(self.execution_time_id, counts / 13e6)
+        counts = (self.now - since) * EXECUTION_TIMER_MHZ // 1000
+        self.store.set_float(self.execution_time_id, counts / EXECUTION_TIMER_HZ)
 
     def id_out_of_range(self) -> None:
         """The store was asked for an identifier that no variable has."""

@@ -3,6 +3,31 @@ from ranger_sim.firmware_sim.microcontroller cimport Microcontroller
 from ranger_sim.firmware_sim.peripherals.uart_hs cimport HsUart
 from ranger_sim.firmware_sim.vic cimport InterruptSource
 
+cpdef enum:
+    POINTS_PER_SEGMENT = 9
+    POINT_BYTES = 10
+    SEGMENT_BYTES = 92
+    SEGMENT_SUM = 90
+    RING_SEGMENTS = 20
+    MOST_FULL = 18
+    HALF_FULL = 10
+    PACKET_BYTES = 8
+    PACKET_SUM = 6
+    RECEIVE_RING = 500
+    CHANNELS = 48
+    MEDIUM = 65536
+    FAST = 131072
+    IDENTIFIER = 65535
+    LARGEST_SUM = 40960
+    STEP_SHIFT = 12
+    FAST_LIST = 0
+    MEDIUM_LIST = 1
+    ALL_VARIABLES = 2
+    RETURN = 3
+    NEW_FOR_COMPUTER = 1
+    COMPUTERS_BITS = 5
+    BYTE = 0xFF
+
 cdef class DataLink:
     cdef public Microcontroller chip
     cdef public HsUart uart

@@ -22,18 +22,40 @@ from ranger_sim.firmware_sim.peripherals.uart_hs import HsUart
 from ranger_sim.firmware_sim.vic import SOFTWARE
 from ranger_sim.foundation.events import EventQueue
 
-POINTS_PER_SEGMENT = 9
-POINT_BYTES = 10
-SEGMENT_BYTES = 92
-RING_SEGMENTS = 20  # 18 may be full: one is being filled, and one stays between writer and reader
-PACKET_BYTES = 8
-RECEIVE_RING = 500  # one place stays empty, as in all rings of the firmware
-CHANNELS = 48
-MEDIUM, FAST = 1 << 16, 1 << 17  # added to the identifier in a channel's value
+if not cython.compiled:
+    POINTS_PER_SEGMENT = 9
+    POINT_BYTES = 10
+    SEGMENT_BYTES = 92
+    SEGMENT_SUM = 90  # where its checksum stands
+    RING_SEGMENTS = 20
+    MOST_FULL = 18  # of them: one is being filled, and one stays between writer and reader
+    HALF_FULL = 10  # what the rate controller aims at, with the one being filled
+    PACKET_BYTES = 8
+    PACKET_SUM = 6  # where its checksum stands
+    RECEIVE_RING = 500  # one place stays empty, as in all rings of the firmware
+    CHANNELS = 48
+    # Added to the identifier in a channel's value; below 2 x FAST it is such a value.
+    MEDIUM = 65536
+    FAST = 131072
+    IDENTIFIER = 65535
+    # The rate controller's sum, clipped to this, either way; its steps are the sum by 4096.
+    LARGEST_SUM = 40960
+    STEP_SHIFT = 12
+    # Phases of a cycle.
+    FAST_LIST = 0
+    MEDIUM_LIST = 1
+    ALL_VARIABLES = 2
+    RETURN = 3
+    # Bits of what is unread: BLUETOOTH, by which this link goes; and LABVIEW, which the error distribution asks.
+    NEW_FOR_COMPUTER = 1
+    COMPUTERS_BITS = 5
+    BYTE = 0xFF
 
 
 class DataLink:
     """Both directions. `report(code)` hears the errors; `checked`: only parameters can be written.
+
+    Its 42 fields are two rings, three lists and the counters of both directions, each a number of the firmware's.
 
     Counters: points, segments, steps, packets (good ones), bad_packets (bytes skipped), refused (writes to what is no
     parameter), ring_full (bytes lost because they came faster than they were parsed).
@@ -70,7 +92,7 @@ class DataLink:
         self.fast_count = 0
         self.medium = array.array("q", [0]) * CHANNELS
         self.medium_count = 0
-        self.phase = 0  # of a cycle: 0 fast list, 1 medium, 2 slow, 3 return to the start
+        self.phase = FAST_LIST
         self.fast_place = 0
         self.medium_place = 0
         self.slow_id = 0
@@ -98,34 +120,34 @@ class DataLink:
         value: cython.double
         self.fast_count = 0
         self.medium_count = 0
-        for i in range(48):
+        for i in range(CHANNELS):
             value = self.store.get_float(self.first_channel + i)
-            if not 65536.0 <= value < 262144.0:
+            if not MEDIUM <= value < 2 * FAST:
                 continue  # neither list, or no number at all
             wanted = cython.cast(cython.longlong, value) if cython.compiled else int(value)
-            number = wanted & 65535
+            number = wanted & IDENTIFIER
             if number > self.last_id:
                 self.report(self.code_id_out_of_range)
                 continue
-            if wanted & 65536:
+            if wanted & MEDIUM:
                 self.medium[self.medium_count] = number
                 self.medium_count += 1
-            if wanted & 131072:
+            if wanted & FAST:
                 self.fast[self.fast_count] = number
                 self.fast_count += 1
 
     def allowed_steps(self) -> cython.longlong:
         """The rate controller: steps of this call, 0 ... 10."""
         calls: cython.longlong
-        self.rate_sum += 18 - self.used - 10
-        if self.rate_sum > 40960:
-            self.rate_sum = 40960
-        elif self.rate_sum < -40960:
-            self.rate_sum = -40960
+        self.rate_sum += MOST_FULL - self.used - HALF_FULL
+        if self.rate_sum > LARGEST_SUM:
+            self.rate_sum = LARGEST_SUM
+        elif self.rate_sum < -LARGEST_SUM:
+            self.rate_sum = -LARGEST_SUM
         if self.rate_sum > 0:
             self.calls_without_step = 0
-            return self.rate_sum >> 12
-        calls = (-self.rate_sum >> 12) + 1
+            return self.rate_sum >> STEP_SHIFT
+        calls = (-self.rate_sum >> STEP_SHIFT) + 1
         self.calls_without_step += 1
         if self.calls_without_step < calls:
             return 0
@@ -136,7 +158,7 @@ class DataLink:
         """Slot task: as many steps as are allowed; returns how many were done. A full ring ends the call."""
         allowed: cython.longlong = self.allowed_steps()
         done: cython.longlong = 0
-        while done < allowed and self.used < 18:
+        while done < allowed and self.used < MOST_FULL:
             self._step()
             done += 1
         self.steps += done
@@ -144,51 +166,50 @@ class DataLink:
 
     def _step(self) -> cython.void:
         number: cython.longlong
-        if self.phase == 0:
+        if self.phase == FAST_LIST:
             if self.fast_place < self.fast_count:
                 number = self.fast[self.fast_place]
                 self.fast_place += 1
-                if self.store.unread[number] & 1:  # new for BLUETOOTH
+                if self.store.unread[number] & NEW_FOR_COMPUTER:
                     self._put(number)
                 return
-            self.phase = 1
-        if self.phase == 1:
-            self.phase = 2
+            self.phase = MEDIUM_LIST
+        if self.phase == MEDIUM_LIST:
+            self.phase = ALL_VARIABLES
             if self.medium_count > 0:
                 if self.medium_place >= self.medium_count:
                     self.medium_place = 0
                 number = self.medium[self.medium_place]
                 self.medium_place += 1
-                if self.store.unread[number] & 1:
+                if self.store.unread[number] & NEW_FOR_COMPUTER:
                     self._put(number)
-        elif self.phase == 2:
-            self.phase = 3
+        elif self.phase == ALL_VARIABLES:
+            self.phase = RETURN
             self._put(self.slow_id)
             self.slow_id += 1
             if self.slow_id > self.last_id:
                 self.slow_id = 0
         else:
-            self.phase = 0
+            self.phase = FAST_LIST
             self.fast_place = 0
 
     def _put(self, number: cython.longlong) -> None:
         """One point into the segment being filled; the computer has now read that variable."""
-        at: cython.longlong = self.filling * 92 + self.in_segment * 10
+        at: cython.longlong = self.filling * SEGMENT_BYTES + self.in_segment * POINT_BYTES
         self._byte(at, number >> 8)
-        self._byte(at + 1, number & 255)
+        self._byte(at + 1, number & BYTE)
         self._word(at + 2, self.store.words[number])
         self._word(at + 6, self.store.stamps[number])
-        # the computer's two bits: BLUETOOTH, by which this link goes, and LABVIEW, which the error distribution asks
-        self.store.unread[number] &= ~5
+        self.store.unread[number] &= ~COMPUTERS_BITS
         self.points += 1
         self.in_segment += 1
-        if self.in_segment == 9:
-            at = self.filling * 92 + 90
-            self.segments[at] = self.checksum >> 8 & 255
-            self.segments[at + 1] = self.checksum & 255
+        if self.in_segment == POINTS_PER_SEGMENT:
+            at = self.filling * SEGMENT_BYTES + SEGMENT_SUM
+            self.segments[at] = self.checksum >> 8 & BYTE
+            self.segments[at + 1] = self.checksum & BYTE
             self.in_segment = 0
             self.checksum = 1
-            self.filling = (self.filling + 1) % 20
+            self.filling = (self.filling + 1) % RING_SEGMENTS
             self.used += 1
             if not self.uart.busy:
                 self.chip.request(self.restart_source)
@@ -198,10 +219,10 @@ class DataLink:
         self.checksum += byte
 
     def _word(self, at: cython.longlong, word: cython.longlong) -> None:
-        self._byte(at, word >> 24 & 255)
-        self._byte(at + 1, word >> 16 & 255)
-        self._byte(at + 2, word >> 8 & 255)
-        self._byte(at + 3, word & 255)
+        self._byte(at, word >> 24 & BYTE)
+        self._byte(at + 1, word >> 16 & BYTE)
+        self._byte(at + 2, word >> 8 & BYTE)
+        self._byte(at + 3, word & BYTE)
 
     def on_restart(self, queue: EventQueue) -> None:
         """Software interrupt: the ring was empty and has a segment again."""
@@ -210,15 +231,15 @@ class DataLink:
 
     def on_sent(self, queue: EventQueue) -> None:
         """DMA channel 3 is through with a segment: its place is free, the next one goes."""
-        self.sending = (self.sending + 1) % 20
+        self.sending = (self.sending + 1) % RING_SEGMENTS
         self.used -= 1
         self.segments_sent += 1
         self._start()
 
     def _start(self) -> None:
-        at: cython.longlong = self.sending * 92
+        at: cython.longlong = self.sending * SEGMENT_BYTES
         if self.used > 0:
-            self.uart.transmit(bytes(self.segments[at : at + 92]))
+            self.uart.transmit(bytes(self.segments[at : at + SEGMENT_BYTES]))
 
     # --- from the computer ------------------------------------------------------------------------------
 
@@ -236,7 +257,7 @@ class DataLink:
             self.report(self.code_dma_off)
         count = uart.swap()
         for i in range(count):
-            following = (self.ring_write + 1) % 500
+            following = (self.ring_write + 1) % RECEIVE_RING
             if following == self.ring_read:
                 self.ring_full += count - i
                 self.report(self.code_full)
@@ -247,7 +268,7 @@ class DataLink:
 
     def waiting(self) -> cython.longlong:
         """Bytes in the ring."""
-        return (self.ring_write - self.ring_read) % 500
+        return (self.ring_write - self.ring_read) % RECEIVE_RING
 
     def parse(self) -> object:
         """Row task: every whole packet in the ring; returns how many places it looked at."""
@@ -256,26 +277,26 @@ class DataLink:
         i: cython.longlong
         read: cython.longlong = self.ring_read
         left: cython.longlong = self.waiting()
-        while left >= 8:
+        while left >= PACKET_BYTES:
             tested += 1
             total = 1
-            for i in range(6):
-                total += self.ring[(read + i) % 500]
-            if total != self.ring[(read + 6) % 500] << 8 | self.ring[(read + 7) % 500]:
+            for i in range(PACKET_SUM):
+                total += self.ring[(read + i) % RECEIVE_RING]
+            if total != self.ring[(read + 6) % RECEIVE_RING] << 8 | self.ring[(read + 7) % RECEIVE_RING]:
                 self.bad_packets += 1
                 self.report(self.code_checksum)
-                read = (read + 1) % 500
+                read = (read + 1) % RECEIVE_RING
                 left -= 1
                 continue
             self._write(
-                self.ring[read] << 8 | self.ring[(read + 1) % 500],
-                self.ring[(read + 2) % 500] << 24
-                | self.ring[(read + 3) % 500] << 16
-                | self.ring[(read + 4) % 500] << 8
-                | self.ring[(read + 5) % 500],
+                self.ring[read] << 8 | self.ring[(read + 1) % RECEIVE_RING],
+                self.ring[(read + 2) % RECEIVE_RING] << 24
+                | self.ring[(read + 3) % RECEIVE_RING] << 16
+                | self.ring[(read + 4) % RECEIVE_RING] << 8
+                | self.ring[(read + 5) % RECEIVE_RING],
             )
-            read = (read + 8) % 500
-            left -= 8
+            read = (read + PACKET_BYTES) % RECEIVE_RING
+            left -= PACKET_BYTES
         self.ring_read = read
         return tested
 

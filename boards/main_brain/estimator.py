@@ -137,7 +137,11 @@ class HeelSensor:
 
 
 class Estimator:
-    """update() once per slot. report(code): callable told of an error that was noticed."""
+    """update() once per slot. report(code): callable told of an error that was noticed.
+
+    More than 40 fields: half are the numbers of its variables in the data table, which compiled code then finds without
+    a look into a dictionary.
+    """
 
     def __init__(self, store, quirks, report) -> None:
         self.store = store

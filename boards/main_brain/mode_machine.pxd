@@ -7,6 +7,12 @@ from ranger_sim.boards.main_brain.steering_machine cimport SteeringMachine
 from ranger_sim.datatable.store cimport DataStore
 from ranger_sim.foundation.numbers cimport elapsed_u32
 
+cpdef enum:
+    KEY_0 = 1
+    KEY_1 = 2
+    KEY_2 = 4
+    PAGES = 3
+
 cdef class ModeMachine:
     cdef public DataStore store
     cdef public Estimator estimator

@@ -19,6 +19,12 @@ from ranger_sim.datatable.store import DataStore
 if not cython.compiled:
     from ranger_sim.foundation.numbers import elapsed_u32
 
+    # Bits of UI_BUTTONS.
+    KEY_0 = 1
+    KEY_1 = 2
+    KEY_2 = 4
+    PAGES = 3  # of the display while walking
+
 READS = (
     "TIMESTAMP",
     "UI_BUTTONS",
@@ -61,7 +67,10 @@ def lcd_words(upper, lower):
 
 
 class ModeMachine:
-    """update() once per slot, after the estimator. Holds every machine of the walk."""
+    """update() once per slot, after the estimator. Holds every machine of the walk.
+
+    More than 40 fields: half are the numbers of its variables in the data table, as in the estimator.
+    """
 
     def __init__(self, store, quirks, estimator) -> None:
         self.store = store
@@ -184,7 +193,7 @@ class ModeMachine:
             late = 1
         if late != self.late_push_light:
             self.late_push_light = late
-            store.set_int(self.UI_SET_LED_3, 0x000080 if late else 0)
+            store.set_int(self.UI_SET_LED_3, RED if late else DARK)
 
     def show_page(self) -> None:
         if self.page == 0:
@@ -193,7 +202,7 @@ class ModeMachine:
             self.show("STEPS", f"{self.store.get_int(self.E_STEP_COUNT)}")
         else:
             self.show("METRES", f"{self.store.get_float(self.E_DISTANCE):.1f}")
-        self.page = (self.page + 1) % 3
+        self.page = (self.page + 1) % PAGES
 
     def show_mode(self, name, colour) -> None:
         self.show(name, "")
@@ -207,13 +216,13 @@ class ModeMachine:
     # -- conditions ------------------------------------------------------------------------------
 
     def key_0(self) -> cython.bint:
-        return (self.pressed & 1) != 0
+        return (self.pressed & KEY_0) != 0
 
     def key_1(self) -> cython.bint:
-        return (self.pressed & 2) != 0
+        return (self.pressed & KEY_1) != 0
 
     def key_2(self) -> cython.bint:
-        return (self.pressed & 4) != 0
+        return (self.pressed & KEY_2) != 0
 
     def robot_fell(self) -> cython.bint:
         return self.estimator.fallen and self.store.get_float(self.D_UI_STOP_ON_FALL) != 0.0

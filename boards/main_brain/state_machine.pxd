@@ -23,7 +23,6 @@ cdef class StateMachine:
     cdef public long long changes
     cdef public State start, current
     cdef public bint entered
-    cpdef object state_names(self)
     cpdef object put(self, name)
     cpdef object _tell(self)
     cpdef int step(self) except -1

@@ -82,10 +82,6 @@ class StateMachine:
         self.current = self.start
         self.entered = False
 
-    def state_names(self) -> object:
-        """Names by state number."""
-        return {state.number: state.name for state in self.states}
-
     def put(self, name) -> object:
         """Place the machine in a state whose entry action has yet to run."""
         for state in self.states:

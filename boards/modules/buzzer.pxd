@@ -8,7 +8,6 @@ cdef class Buzzer:
     cdef public long long tunes_started, beeps_made
     cpdef void tone(self, long long hertz) noexcept
     cpdef void start_tune(self) noexcept
-    cpdef int stop_tune(self) except -1
     cpdef void error_sound(self, long long code) noexcept
     cpdef long long update(self) except? -1
 

@@ -22,6 +22,7 @@ MOST_WAITING = 8
 # an error's code modulo 4 chooses its pitch, so different errors sound different
 PITCHES_HZ = (1047, 1319, 1568, 2093)
 PWM_CLOCK_HZ = 60_000_000
+LOWEST_HZ, HIGHEST_HZ = 1, 30_000
 
 
 class Buzzer:
@@ -39,7 +40,7 @@ class Buzzer:
         self.note_left_ms = 0
         self.beep_left_ms = 0
         self.beep_hertz = 0
-        self.beep_queue = array.array("q", [0]) * 8
+        self.beep_queue = array.array("q", [0]) * MOST_WAITING
         self.beep_next = 0
         self.beeps_waiting = 0
         self.silence_left_ms = 0
@@ -51,7 +52,7 @@ class Buzzer:
 
     def tone(self, hertz: cython.longlong) -> cython.void:
         """Sound `hertz` (1-30 000; anything else is silence) by writing MR0 and MR5."""
-        if hertz < 1 or hertz > 30000:
+        if hertz < LOWEST_HZ or hertz > HIGHEST_HZ:
             hertz = 0
         if hertz == self.hertz:
             return
@@ -59,7 +60,7 @@ class Buzzer:
         if hertz == 0:
             self.mr5 = 0
             return
-        self.mr0 = 60000000 // hertz
+        self.mr0 = PWM_CLOCK_HZ // hertz
         self.mr5 = self.mr0 // 2
 
     def start_tune(self) -> cython.void:
@@ -71,15 +72,11 @@ class Buzzer:
         self.note = 0
         self.note_left_ms = self.tune_ms[0]
 
-    def stop_tune(self) -> None:
-        """Silence from the next update on."""
-        self.playing = False
-
     def error_sound(self, code: cython.longlong) -> cython.void:
         """Queue a beep for an error code, if beeps are switched on."""
-        if not self.beeps or self.beeps_waiting >= 8:
+        if not self.beeps or self.beeps_waiting >= MOST_WAITING:
             return
-        self.beep_queue[(self.beep_next + self.beeps_waiting) % 8] = self.pitches[code % 4]
+        self.beep_queue[(self.beep_next + self.beeps_waiting) % MOST_WAITING] = self.pitches[code % len(PITCHES_HZ)]
         self.beeps_waiting += 1
 
     def update(self) -> cython.longlong:
@@ -92,13 +89,13 @@ class Buzzer:
         elif self.beep_left_ms > 0:
             self.beep_left_ms -= 1
             if self.beep_left_ms == 0:
-                self.silence_left_ms = 60
+                self.silence_left_ms = PAUSE_MS
         elif self.beeps_waiting > 0:
             self.beeps_waiting -= 1
             self.beep_hertz = self.beep_queue[self.beep_next]
-            self.beep_next = (self.beep_next + 1) % 8
+            self.beep_next = (self.beep_next + 1) % MOST_WAITING
             self.beeps_made += 1
-            self.beep_left_ms = 60
+            self.beep_left_ms = BEEP_MS
         if self.beep_left_ms > 0:
             self.tone(self.beep_hertz)
             return 1

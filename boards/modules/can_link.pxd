@@ -37,5 +37,4 @@ cdef class CanLink(Sender):
     cdef public bint report_full
     cdef public long long receive_lost, send_lost
     cdef public long long code_receive_full, code_send_full
-    cpdef int send_error(self, long long identifier) except -1
     cpdef object feed(self)

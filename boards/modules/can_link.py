@@ -187,11 +187,6 @@ class CanLink(Sender):
         self.feed()
         return True
 
-    def send_error(self, identifier: cython.longlong) -> None:
-        """Occasional task: send the error that waits longest, if one does."""
-        if self.errors.take():
-            self.send_words(identifier, self.errors.word, self.errors.stamp)
-
     def feed(self) -> object:
         """Slot task, and after each queued frame: fill free hardware buffers, 1 before 2.
 

@@ -1,9 +1,13 @@
 from ranger_sim.boards.modules.error_module cimport ErrorModule
-from ranger_sim.boards.modules.mcu_led cimport McuLed
+from ranger_sim.boards.modules.mcu_led cimport GREEN, McuLed
 from ranger_sim.boards.modules.motor_limits cimport MotorLimits
-from ranger_sim.boards.modules.motor_output cimport MotorOutput
+from ranger_sim.boards.modules.motor_output cimport STOPPED, MotorOutput
 
 cimport cython
+
+cpdef enum:
+    START_CALLS = 2
+    ONE = 65536
 
 @cython.final
 cdef class CurrentControl:

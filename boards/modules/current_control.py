@@ -8,14 +8,19 @@ from ranger_sim.boards.modules.mcu_led import McuLed
 from ranger_sim.boards.modules.motor_limits import MotorLimits
 from ranger_sim.boards.modules.motor_output import MotorOutput
 
+if not cython.compiled:
+    from ranger_sim.boards.modules.mcu_led import GREEN
+    from ranger_sim.boards.modules.motor_output import STOPPED
+
+    START_CALLS = 2  # the first calls only feed the watchdog
+    ONE = 65536  # in 16.16
+
 # Counts per A and sample, all four boards (robot.md N4.2). The current settles within one sample, so the motor is a
 # gain of 1/31 A per count (1.34 ohm at 25.9 V): the integral alone has its pole at 1 - 20/31 = 0.35.
 INTEGRAL_GAIN = 20
 # Chosen by us: a fifth of the integral gain, "with the emphasis on the integral" (appendix 4.7). Poles of
 # z^2 + (a + b - 1) z - a with a = 4/31, b = 20/31: 0.49 and -0.26; at 1.0 ohm and 28 V (21 counts/A): 0.37, -0.51.
 PROPORTIONAL_GAIN = 4
-
-START_CALLS = 2  # the first calls only feed the watchdog
 
 
 class CurrentControl:
@@ -42,9 +47,9 @@ class CurrentControl:
         self.code_sum = codes.MC_FIXED_LIMIT
         self.code_duty = codes.MC_PWM_LIMIT
         self.code_stopped = codes.MC_NOT_RUNNING
-        self.proportional_gain = proportional_gain * 65536
-        self.integral_gain = integral_gain * 65536
-        self.integral_limit = output.largest * 65536 // integral_gain
+        self.proportional_gain = proportional_gain * ONE
+        self.integral_gain = integral_gain * ONE
+        self.integral_limit = output.largest * ONE // integral_gain
         self.integral = 0  # A samples x 65536
         self.duty = 0
         self.calls = 0
@@ -57,16 +62,16 @@ class CurrentControl:
         False in the first two calls, which do nothing else than feed.
         """
         self.output.feed_watchdog()
-        if self.calls < 2:  # START_CALLS
+        if self.calls < START_CALLS:
             self.calls += 1
             return False
         if self.limits.monitor(current):
-            if self.output.off & 4 == 0:  # STOPPED
-                self.output.off |= 4
-                self.leds.on(0)  # GREEN
-        elif self.output.off & 4:
-            self.output.off &= ~4
-            self.leds.off(0)
+            if self.output.off & STOPPED == 0:
+                self.output.off |= STOPPED
+                self.leds.on(GREEN)
+        elif self.output.off & STOPPED:
+            self.output.off &= ~STOPPED
+            self.leds.off(GREEN)
         return True
 
     def update(self, target: cython.longlong, current: cython.longlong) -> None:

@@ -15,12 +15,21 @@ from ranger_sim.firmware_sim.peripherals.timer_capture import TimerCapture
 from ranger_sim.firmware_sim.vic import FIQ, TIMER_MATCH
 from ranger_sim.foundation.events import EventQueue
 
+if not cython.compiled:
+    LONGEST_TIME = 0x7F000000  # cycles, about 35 s: longer silences count as this
+    # Bits of T0IR: the match that wraps the timer, the first capture channel. Of T0CCR: both edges of that channel.
+    IR_MR0 = 1
+    IR_CR0 = 16
+    CCR_BOTH_EDGES = 3
+    CCR_BITS = 3  # per channel
+    WRAP = 30_000  # cycles from wrap to wrap
+    EARLY = 15_000  # a capture below this is of after the wrap
+
 # Appendix 4.6: the hand-written handler takes about 150 cycles, entry included.
 EDGE_CYCLES = 150
 # Chosen by us: clear the flag, count the wrap, return; the same entry and exit as an edge.
 WRAP_CYCLES = 50
 LATENCY_CYCLES = 12
-LONGEST_TIME = 0x7F000000  # cycles, about 35 s: longer silences count as this
 
 
 class WrapCounter:
@@ -44,8 +53,8 @@ class WrapCounter:
 
     def on_wrap(self, queue: EventQueue):
         """Fast interrupt: the timer restarted at 0."""
-        self.timer.IR &= -2
-        self.cycles += 30000
+        self.timer.IR &= ~IR_MR0
+        self.cycles += WRAP
 
 
 class EncoderCapture:
@@ -58,8 +67,8 @@ class EncoderCapture:
         self.timer = wraps.timer
         self.wraps = wraps
         self.channel = channel
-        self.flag = 16 << channel
-        self.edge_bits = 3 << 3 * channel  # rising and falling in T0CCR
+        self.flag = IR_CR0 << channel
+        self.edge_bits = CCR_BOTH_EDGES << CCR_BITS * channel  # rising and falling in T0CCR
         self.pin = pin
         self.partner_pin = partner_pin
         self.decoder = decoder
@@ -85,12 +94,12 @@ class EncoderCapture:
         elapsed: cython.longlong
         timer.IR &= ~self.flag
         # a wrap that is not counted yet came before this capture if the capture is a small number
-        if timer.IR & 1 and capture < 15000:
-            now += 30000
+        if timer.IR & IR_MR0 and capture < EARLY:
+            now += WRAP
         elapsed = now - self.last
         self.last = now
-        if elapsed > 0x7F000000:  # LONGEST_TIME
-            elapsed = 0x7F000000
+        if elapsed > LONGEST_TIME:
+            elapsed = LONGEST_TIME
         if level == self.armed_level:
             self.armed_level = 1 - level
             timer.CCR ^= self.edge_bits  # from one of the two to the other

@@ -2,6 +2,16 @@ from ranger_sim.boards.modules.network_time cimport NetworkTime
 
 cimport cython
 
+cpdef enum:
+    CODES = 1024
+    RING_MASK = 31
+    MOST_WAITING = 31
+    MOST_COUNTED = 1023
+    CODE_MASK = 0xFFFF
+    BOARD_MASK = 0x3F
+    BOARD_SHIFT = 16
+    COUNT_SHIFT = 22
+
 @cython.final
 cdef class ErrorModule:
     # what every slot looks at

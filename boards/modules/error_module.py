@@ -11,13 +11,22 @@ import cython
 from ranger_sim.boards.modules.network_time import NetworkTime
 from ranger_sim.foundation.numbers import integers
 
-CODES = 1024  # codes 0 ... CODES-1 can be noted (the table has about 120)
-RING_SIZE = 32  # errors waiting to be sent; one place stays empty, as in all rings of the firmware
+if not cython.compiled:
+    CODES = 1024  # codes 0 ... CODES-1 can be noted (the table has about 120)
+    # Errors that wait to be sent: a ring of 32, one place stays empty, as in all rings of the firmware.
+    RING_MASK = 31
+    MOST_WAITING = 31
+    # Fields of an error word: code, number of the board, count.
+    MOST_COUNTED = 1023
+    CODE_MASK = 0xFFFF
+    BOARD_MASK = 0x3F
+    BOARD_SHIFT = 16
+    COUNT_SHIFT = 22
 
 
 def error_word(code, board, count):
     """Value word of an error frame: 16-bit code, 6-bit board number, 10-bit count (at most 1023)."""
-    return (code & 0xFFFF) | (board & 0x3F) << 16 | min(count, 1023) << 22
+    return (code & CODE_MASK) | (board & BOARD_MASK) << BOARD_SHIFT | min(count, MOST_COUNTED) << COUNT_SHIFT
 
 
 class ErrorModule:
@@ -37,9 +46,9 @@ class ErrorModule:
         self.flags = integers(CODES)
         self.flagged = integers(CODES)
         self.flagged_count = 0
-        self.codes = [0] * 32
-        self.counts = [0] * 32
-        self.stamps = [0] * 32
+        self.codes = [0] * 32  # RING_MASK + 1
+        self.counts = [0] * 32  # RING_MASK + 1
+        self.stamps = [0] * 32  # RING_MASK + 1
         self.first = 0
         self.waiting = 0
         self.dropped = 0
@@ -49,7 +58,7 @@ class ErrorModule:
     def report(self, code: cython.longlong) -> cython.void:
         """Note error `code`; it goes into the ring at the end of the slot. Codes above the table are taken
         as 0 (DEFAULT), so a wrong call is visible rather than lost."""
-        if code < 0 or code >= 1024:
+        if code < 0 or code >= CODES:
             code = 0
         self.totals[code] += 1
         if self.flags[code] == 0:
@@ -75,9 +84,9 @@ class ErrorModule:
             self.flags[code] = 0
             found = False
             for j in range(self.waiting):
-                place = (self.first + j) & 31
+                place = (self.first + j) & RING_MASK
                 if self.codes[place] == code:
-                    self.counts[place] = min(self.counts[place] + events, 1023)
+                    self.counts[place] = min(self.counts[place] + events, MOST_COUNTED)
                     found = True
                     break
             if found:
@@ -85,13 +94,13 @@ class ErrorModule:
                 continue
             if repeated and self.lose_new_after_repeat:
                 continue
-            if self.waiting == 31:  # full: the oldest goes
-                self.first = (self.first + 1) & 31
+            if self.waiting == MOST_WAITING:  # full: the oldest goes
+                self.first = (self.first + 1) & RING_MASK
                 self.waiting -= 1
                 self.dropped += 1
-            place = (self.first + self.waiting) & 31
+            place = (self.first + self.waiting) & RING_MASK
             self.codes[place] = code
-            self.counts[place] = min(events, 1023)
+            self.counts[place] = min(events, MOST_COUNTED)
             self.stamps[place] = self.time.ms
             self.waiting += 1
         self.flagged_count = 0
@@ -102,9 +111,12 @@ class ErrorModule:
         if self.waiting == 0:
             return False
         place: cython.longlong = self.first
-        count: cython.longlong = self.counts[place] & 0x3FF
-        self.word = (self.codes[place] & 0xFFFF) | (self.board & 0x3F) << 16 | count << 22
+        self.word = (
+            (self.codes[place] & CODE_MASK)
+            | (self.board & BOARD_MASK) << BOARD_SHIFT
+            | (self.counts[place] & MOST_COUNTED) << COUNT_SHIFT
+        )
         self.stamp = self.stamps[place]
-        self.first = (self.first + 1) & 31
+        self.first = (self.first + 1) & RING_MASK
         self.waiting -= 1
         return True

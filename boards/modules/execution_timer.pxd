@@ -3,6 +3,9 @@ from ranger_sim.firmware_sim.microcontroller cimport Microcontroller
 
 cimport cython
 
+cpdef enum:
+    ANEW_MASK = 255
+
 @cython.final
 cdef class ExecutionTimer:
     cdef public Microcontroller chip

@@ -6,6 +6,9 @@ import cython
 from ranger_sim.boards.modules.network_time import NetworkTime
 from ranger_sim.firmware_sim.microcontroller import Microcontroller
 
+if not cython.compiled:
+    ANEW_MASK = 255  # ms of the network time: the longest slot is looked for anew
+
 
 class ExecutionTimer:
     """`longest_ns` and `longest_ever_ns`: from the slot's start to the last entry of its row; `longest` and
@@ -23,7 +26,7 @@ class ExecutionTimer:
     def record(self) -> None:
         """Last entry of every row: read the slot timer's count."""
         since: cython.longlong = self.chip.now - self.chip.match_time
-        if since > self.longest_ns or self.time.ms & 255 == 0:
+        if since > self.longest_ns or self.time.ms & ANEW_MASK == 0:
             self.longest_ns = since
             if since > self.longest_ever_ns:
                 self.longest_ever_ns = since

@@ -3,6 +3,15 @@ from ranger_sim.foundation.numbers cimport float_of_word
 
 cimport cython
 
+cpdef enum:
+    HEADER_ANGLES_AND_RATES = 0xCF
+    HEADER_RATES_ONLY = 0xC2
+    PACKET_BYTES = 31
+    PACKET_WORDS = 7
+    RING_BYTES = 128
+    RING_MASK = 127
+    CHECKSUM_MASK = 0xFFFF
+
 @cython.final
 cdef class ImuParser:
     cdef public long long ring_write, ring_read, header, needed

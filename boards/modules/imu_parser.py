@@ -21,10 +21,13 @@ from ranger_sim.firmware_sim.peripherals.uart import Uart
 if not cython.compiled:
     from ranger_sim.foundation.numbers import float_of_word
 
-HEADER_ANGLES_AND_RATES = 0xCF
-HEADER_RATES_ONLY = 0xC2
-PACKET_BYTES = 31
-RING_BYTES = 128
+    HEADER_ANGLES_AND_RATES = 0xCF
+    HEADER_RATES_ONLY = 0xC2
+    PACKET_BYTES = 31
+    PACKET_WORDS = 7  # six values and the timer
+    RING_BYTES = 128
+    RING_MASK = 127
+    CHECKSUM_MASK = 0xFFFF
 
 
 def start_command(header) -> bytes:
@@ -39,14 +42,14 @@ class ImuParser:
     more than 31 bytes, so a packet stays unread until its successor has begun.
     """
 
-    def __init__(self, report, header=0xCF, late_by_one_byte=False) -> None:
+    def __init__(self, report, header=HEADER_ANGLES_AND_RATES, late_by_one_byte=False) -> None:
         self.report = report
         self.header = header
-        self.has_angles = header == 0xCF
-        self.needed = 32 if late_by_one_byte else 31
+        self.has_angles = header == HEADER_ANGLES_AND_RATES
+        self.needed = PACKET_BYTES + 1 if late_by_one_byte else PACKET_BYTES
         self.code_ring_full = errors.MSIMU_RX_OF
-        self.ring = [0] * 128
-        self.words = [0] * 7  # of the packet that was looked at last: six values and the timer
+        self.ring = [0] * 128  # RING_BYTES
+        self.words = [0] * 7  # PACKET_WORDS of the packet that was looked at last: six values and the timer
         self.ring_write = 0
         self.ring_read = 0
         self.roll = 0.0
@@ -66,7 +69,7 @@ class ImuParser:
 
     def push(self, byte: cython.longlong) -> cython.bint:
         """Store a received byte; 127 fit, a byte more is lost and reported (MSIMU_RX_OF): False."""
-        following: cython.longlong = (self.ring_write + 1) & 127
+        following: cython.longlong = (self.ring_write + 1) & RING_MASK
         if following == self.ring_read:
             self.bytes_lost += 1
             self.report(self.code_ring_full)
@@ -80,11 +83,11 @@ class ImuParser:
         count: cython.longlong = uart.fifo_count
         write: cython.longlong = self.ring_write
         i: cython.longlong
-        if self.waiting() + count < 128:
+        if self.waiting() + count < RING_BYTES:
             for i in range(count):
-                self.ring[(write + i) & 127] = uart.fifo[i]
+                self.ring[(write + i) & RING_MASK] = uart.fifo[i]
             uart.were_read(count)
-            self.ring_write = (write + count) & 127
+            self.ring_write = (write + count) & RING_MASK
         else:
             for _byte in range(count):
                 self.push(uart.RBR())
@@ -92,7 +95,7 @@ class ImuParser:
 
     def waiting(self) -> cython.longlong:
         """Bytes in the ring."""
-        return (self.ring_write - self.ring_read) & 127
+        return (self.ring_write - self.ring_read) & RING_MASK
 
     def update(self) -> cython.longlong:
         """Look for one packet; return the number of bytes examined (the cost depends on it).
@@ -111,26 +114,26 @@ class ImuParser:
         read: cython.longlong
         waiting: cython.longlong = self.waiting()
         while waiting >= self.needed and self.ring[self.ring_read] != self.header:
-            self.ring_read = (self.ring_read + 1) & 127
+            self.ring_read = (self.ring_read + 1) & RING_MASK
             self.skipped_bytes += 1
             examined += 1
             waiting -= 1
         if waiting < self.needed:
             return examined
         read = self.ring_read + 1
-        for i in range(7):
-            byte_0 = self.ring[read & 127]
-            byte_1 = self.ring[(read + 1) & 127]
-            byte_2 = self.ring[(read + 2) & 127]
-            byte_3 = self.ring[(read + 3) & 127]
+        for i in range(PACKET_WORDS):
+            byte_0 = self.ring[read & RING_MASK]
+            byte_1 = self.ring[(read + 1) & RING_MASK]
+            byte_2 = self.ring[(read + 2) & RING_MASK]
+            byte_3 = self.ring[(read + 3) & RING_MASK]
             total += byte_0 + byte_1 + byte_2 + byte_3
             self.words[i] = byte_0 << 24 | byte_1 << 16 | byte_2 << 8 | byte_3
             read += 4
-        sent = (self.ring[read & 127] << 8) | self.ring[(read + 1) & 127]
-        examined += 31
-        if (total & 0xFFFF) != sent:
+        sent = (self.ring[read & RING_MASK] << 8) | self.ring[(read + 1) & RING_MASK]
+        examined += PACKET_BYTES
+        if (total & CHECKSUM_MASK) != sent:
             self.bad_checksums += 1
-            self.ring_read = (self.ring_read + 1) & 127
+            self.ring_read = (self.ring_read + 1) & RING_MASK
             return examined
         if self.has_angles:
             self.roll = float_of_word(self.words[0])
@@ -144,6 +147,6 @@ class ImuParser:
         self.rate_y = float_of_word(self.words[4])
         self.rate_z = float_of_word(self.words[5])
         self.timer = self.words[6]
-        self.ring_read = (read + 2) & 127
+        self.ring_read = (read + 2) & RING_MASK
         self.packets += 1
         return examined

@@ -2,11 +2,15 @@ from ranger_sim.boards.modules.absolute_encoder cimport AbsoluteEncoder
 from ranger_sim.boards.modules.current_control cimport CurrentControl
 from ranger_sim.boards.modules.error_module cimport ErrorModule
 from ranger_sim.boards.modules.limit_switch cimport LimitSwitch
-from ranger_sim.boards.modules.mcu_led cimport McuLed
+from ranger_sim.boards.modules.mcu_led cimport GREEN, RED, McuLed
 from ranger_sim.boards.modules.quadrature_decoder cimport QuadratureDecoder
 from ranger_sim.foundation.numbers cimport fixed_of_float
 
 cimport cython
+
+cpdef enum:
+    HIP_LIMIT_COUNTS = 800
+    FLASH_MS = 100
 
 @cython.final
 cdef class HipSafety:

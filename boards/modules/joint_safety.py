@@ -10,13 +10,15 @@ from ranger_sim.boards.modules.mcu_led import McuLed
 from ranger_sim.boards.modules.quadrature_decoder import QuadratureDecoder
 
 if not cython.compiled:
+    from ranger_sim.boards.modules.mcu_led import GREEN, RED
     from ranger_sim.foundation.numbers import fixed_of_float
 
-HIP_LIMIT_COUNTS = 800  # 0.614 rad
+    HIP_LIMIT_COUNTS = 800  # 0.614 rad
+    FLASH_MS = 100
+
 ANKLE_LOW_RAD = 0.2
 ANKLE_HIGH_RAD = 2.9
 CABLE_STRETCH_RAD = 0.3  # joint ahead of the motor by this: the cable has slipped or torn
-FLASH_MS = 100
 
 
 class HipSafety:
@@ -30,12 +32,12 @@ class HipSafety:
     def check(self) -> None:
         """Slot task."""
         counts: cython.longlong = self.encoder.counts
-        high: cython.bint = counts > 800  # HIP_LIMIT_COUNTS
-        low: cython.bint = counts < -800
+        high: cython.bint = counts > HIP_LIMIT_COUNTS
+        low: cython.bint = counts < -HIP_LIMIT_COUNTS
         if high:
-            self.leds.flash(1, 100)  # RED
+            self.leds.flash(RED, FLASH_MS)
         elif low:
-            self.leds.flash(0, 100)  # GREEN
+            self.leds.flash(GREEN, FLASH_MS)
         self.control.block_positive = high
         self.control.block_negative = low
 
@@ -98,6 +100,6 @@ class AnkleSafety:
             positive = True
             self.errors.report(self.code_high)
         if negative or positive:
-            self.leds.flash(1, 100)  # RED, FLASH_MS
+            self.leds.flash(RED, FLASH_MS)
         self.control.block_negative = negative
         self.control.block_positive = positive

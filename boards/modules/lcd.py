@@ -18,6 +18,12 @@ QUEUES = 4
 QUEUE_CHARACTERS = 100
 CURSOR_WAIT_MS = 50
 DATA_WAIT_MS = 1
+PLACES, PLACES_PER_LINE, PLACES_PER_QUARTER = 16, 8, 4
+IDLE, CURSOR_SET, CHARACTER_WRITTEN = 0, 1, 2  # states of the firmware's side
+SPACE = 0x20
+# Commands, each named by the highest bit that is set; the second line begins at this address.
+SET_ADDRESS, ENTRY_MODE, DISPLAY_ON, FUNCTION_SET, HOME, CLEAR = 0x80, 0x04, 0x08, 0x20, 0x02, 0x01
+SECOND_LINE = 0x40
 
 
 class CharacterDisplay:
@@ -27,7 +33,7 @@ class CharacterDisplay:
     """
 
     def __init__(self) -> None:
-        self.memory = array.array("q", [0x20]) * 128
+        self.memory = array.array("q", [SPACE]) * 128
         self.address = 0
         self.commands = 0
         self.characters = 0
@@ -40,24 +46,24 @@ class CharacterDisplay:
         """A byte with R/S low: the highest bit that is set says what it is."""
         i: cython.longlong
         self.commands += 1
-        if byte & 0x80:
+        if byte & SET_ADDRESS:
             self.address = byte & 0x7F
         elif byte & 0x40:
             pass  # character shapes: the firmware defines none
-        elif byte & 0x20:
+        elif byte & FUNCTION_SET:
             self.wide_bus = (byte & 0x10) != 0
             self.two_lines = (byte & 0x08) != 0
         elif byte & 0x10:
             pass  # shifting the whole display: not used
-        elif byte & 0x08:
+        elif byte & DISPLAY_ON:
             self.on = (byte & 0x04) != 0
-        elif byte & 0x04:
+        elif byte & ENTRY_MODE:
             self.increment = 1 if byte & 0x02 else -1
-        elif byte & 0x02:
+        elif byte & HOME:
             self.address = 0
-        elif byte & 0x01:
+        elif byte & CLEAR:
             for i in range(128):
-                self.memory[i] = 0x20
+                self.memory[i] = SPACE
             self.address = 0
 
     def data(self, byte: cython.longlong) -> None:
@@ -71,7 +77,7 @@ class CharacterDisplay:
         if not self.on:
             return (" " * 8, " " * 8)
         shown = []
-        for start in (0x00, 0x40):
+        for start in (0, SECOND_LINE):
             shown.append("".join(chr(b) if 0x20 <= b < 0x7F else " " for b in self.memory[start : start + 8]))
         return tuple(shown)
 
@@ -84,11 +90,11 @@ class Lcd:
         self.display = CharacterDisplay()
         for byte in START_COMMANDS:
             self.display.command(byte)
-        self.positions = array.array("q", [0]) * 400
-        self.characters = array.array("q", [0]) * 400
-        self.reads = array.array("q", [0]) * 4
-        self.counts = array.array("q", [0]) * 4
-        self.state = 0  # 0 idle, 1 cursor is set, 2 character is written
+        self.positions = array.array("q", [0]) * (QUEUES * QUEUE_CHARACTERS)
+        self.characters = array.array("q", [0]) * (QUEUES * QUEUE_CHARACTERS)
+        self.reads = array.array("q", [0]) * QUEUES
+        self.counts = array.array("q", [0]) * QUEUES
+        self.state = IDLE
         self.countdown = 0
         self.position = 0
         self.character = 0
@@ -106,15 +112,15 @@ class Lcd:
         """Queue one character for place 0-15; False and an error when the place or the queue is wrong."""
         queue: cython.longlong
         slot: cython.longlong
-        if position < 0 or position > 15:
+        if position < 0 or position >= PLACES:
             self.report(self.code_position)
             return False
-        queue = position // 4
-        if self.counts[queue] >= 100:
+        queue = position // PLACES_PER_QUARTER
+        if self.counts[queue] >= QUEUE_CHARACTERS:
             self.lost += 1
             self.report(self.code_full)
             return False
-        slot = queue * 100 + (self.reads[queue] + self.counts[queue]) % 100
+        slot = queue * QUEUE_CHARACTERS + (self.reads[queue] + self.counts[queue]) % QUEUE_CHARACTERS
         self.positions[slot] = position
         self.characters[slot] = character & 0xFF
         self.counts[queue] += 1
@@ -125,8 +131,8 @@ class Lcd:
         """Queue the four characters of `word`, first in byte 0, for quarter 0-3; returns how many fit."""
         i: cython.longlong
         n: cython.longlong = 0
-        for i in range(4):
-            if self.put(quarter * 4 + i, (word >> (8 * i)) & 0xFF):
+        for i in range(PLACES_PER_QUARTER):
+            if self.put(quarter * PLACES_PER_QUARTER + i, (word >> (8 * i)) & 0xFF):
                 n += 1
         return n
 
@@ -138,27 +144,29 @@ class Lcd:
             self.countdown -= 1
             if self.countdown > 0:
                 return 0
-        if self.state == 1:
+        if self.state == CURSOR_SET:
             self.display.data(self.character)
             self.written += 1
-            self.state = 2
-            self.countdown = 1
+            self.state = CHARACTER_WRITTEN
+            self.countdown = DATA_WAIT_MS
             return 1
-        self.state = 0
+        self.state = IDLE
         if self.waiting == 0:
             return 0
         queue = 0
         while self.counts[queue] == 0:
             queue += 1
-        slot = queue * 100 + self.reads[queue]
+        slot = queue * QUEUE_CHARACTERS + self.reads[queue]
         self.position = self.positions[slot]
         self.character = self.characters[slot]
-        self.reads[queue] = (self.reads[queue] + 1) % 100
+        self.reads[queue] = (self.reads[queue] + 1) % QUEUE_CHARACTERS
         self.counts[queue] -= 1
         self.waiting -= 1
-        self.display.command(0x80 + 0x40 * (self.position // 8) + self.position % 8)
-        self.state = 1
-        self.countdown = 50
+        self.display.command(
+            SET_ADDRESS + SECOND_LINE * (self.position // PLACES_PER_LINE) + self.position % PLACES_PER_LINE
+        )
+        self.state = CURSOR_SET
+        self.countdown = CURSOR_WAIT_MS
         return 1
 
 

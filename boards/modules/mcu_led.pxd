@@ -3,6 +3,14 @@ from ranger_sim.firmware_sim.peripherals.gpio cimport Gpio
 
 cimport cython
 
+cpdef enum:
+    GREEN = 0
+    RED = 1
+    BLUE = 2
+    FIRST_PIN = 55
+    HEARTBEAT_MS = 50
+    HEARTBEAT_BIT = 8
+
 cdef class McuLed:
     cdef public long long lit, remaining_green, remaining_red, remaining_blue
     cdef public Gpio gpio

@@ -5,12 +5,15 @@ import cython
 from ranger_sim.boards.modules.network_time import NetworkTime
 from ranger_sim.firmware_sim.peripherals.gpio import Gpio, p1
 
-GREEN = 0
-RED = 1
-BLUE = 2
-PINS = {"green": p1(23), "red": p1(24), "blue": p1(25)}  # active low
+if not cython.compiled:
+    GREEN = 0
+    RED = 1
+    BLUE = 2
+    FIRST_PIN = 55  # P1.23; the others follow
+    HEARTBEAT_MS = 50
+    HEARTBEAT_BIT = 8  # of the network time
 
-HEARTBEAT_MS = 50
+PINS = {"green": p1(23), "red": p1(24), "blue": p1(25)}  # active low
 
 
 class McuLed:
@@ -29,13 +32,13 @@ class McuLed:
 
     def pin(self, led: cython.longlong) -> cython.longlong:
         """Pin number of an LED."""
-        return 55 + led  # P1.23, P1.24, P1.25
+        return FIRST_PIN + led
 
     def set_remaining(self, led: cython.longlong, slots: cython.longlong) -> None:
         """Slots until `led` goes out (-1: never, 0: now)."""
-        if led == 0:
+        if led == GREEN:
             self.remaining_green = slots
-        elif led == 1:
+        elif led == RED:
             self.remaining_red = slots
         else:
             self.remaining_blue = slots
@@ -67,15 +70,15 @@ class McuLed:
         if self.remaining_green > 0:
             self.remaining_green -= 1
             if self.remaining_green == 0:
-                self.set_remaining(0, 0)
+                self.set_remaining(GREEN, 0)
         if self.remaining_red > 0:
             self.remaining_red -= 1
             if self.remaining_red == 0:
-                self.set_remaining(1, 0)
+                self.set_remaining(RED, 0)
         if self.remaining_blue > 0:
             self.remaining_blue -= 1
             if self.remaining_blue == 0:
-                self.set_remaining(2, 0)
+                self.set_remaining(BLUE, 0)
 
 
 class Heartbeat(McuLed):
@@ -90,9 +93,9 @@ class Heartbeat(McuLed):
 
     def beat(self) -> None:
         """Slot task."""
-        bit: cython.longlong = self.time.ms >> 8 & 1
+        bit: cython.longlong = self.time.ms >> HEARTBEAT_BIT & 1
         if bit != self.last_bit:
             self.last_bit = bit
             if bit:
                 self.beats += 1
-                self.flash(2, 50)  # BLUE, HEARTBEAT_MS
+                self.flash(BLUE, HEARTBEAT_MS)

@@ -3,6 +3,10 @@ from ranger_sim.foundation.numbers cimport fixed_multiply, fixed_of_float
 
 cimport cython
 
+cpdef enum:
+    SLOT_S_FIXED = 32
+    ONE = 65536
+
 @cython.final
 cdef class MotorLimits:
     # what every slot touches

@@ -15,7 +15,9 @@ from ranger_sim.boards.modules.error_module import ErrorModule
 if not cython.compiled:
     from ranger_sim.foundation.numbers import fixed_multiply, fixed_of_float
 
-SLOT_S_FIXED = 32  # 0.5 ms x 65536, truncated (0.488 ms), as in the firmware
+    SLOT_S_FIXED = 32  # 0.5 ms x 65536, truncated (0.488 ms), as in the firmware
+    ONE = 65536  # in 16.16
+
 RATED_SPEED_RAD_S = 659.734  # 6300 rpm at the motor shaft (appendix 4.7)
 SOFT_SPEED = 0.9  # the current fades from here to the rated speed (chosen by us: one tenth of the range)
 SOFT_THERMAL = 0.75  # of the thermal limit (robot.md N4.3)
@@ -68,17 +70,17 @@ class MotorLimits:
         else:
             # a current minus a thermal state: the firmware's mistake of units, hence the wrong sign
             self.thermal_slope = fixed_of_float(1.0 / (thermal_current - SOFT_THERMAL * limit))
-        self.excess_limit = excess_limit * 65536
+        self.excess_limit = excess_limit * ONE
         self.excess_fade = max(1, excess_limit // 10)  # the duty has faded to 0 at a tenth of the limit
         self.peak = peak
         # nothing turns so fast where speed is not limited
         self.speed_max = fixed_of_float(RATED_SPEED_RAD_S / gear if speed and gear else math.inf)
         self.speed_soft = fixed_of_float(SOFT_SPEED * RATED_SPEED_RAD_S / gear if speed and gear else math.inf)
         self.thermal = 0  # A^2 s
-        self.thermal_multiplier = 65536
+        self.thermal_multiplier = ONE
         self.too_hot = False
         self.excess = 0  # A samples
-        self.excess_multiplier = 65536
+        self.excess_multiplier = ONE
         self.overloaded = False
 
     def monitor(self, current: cython.longlong) -> cython.bint:
@@ -87,15 +89,15 @@ class MotorLimits:
         thermal: cython.longlong = self.thermal
         excess: cython.longlong = self.excess
         loss: cython.longlong = fixed_multiply(current, current) - fixed_multiply(thermal, self.thermal_rate)
-        thermal += (loss * 32) >> 16  # SLOT_S_FIXED
+        thermal += (loss * SLOT_S_FIXED) >> 16
         self.thermal = thermal
         if thermal < self.thermal_soft:  # nearly always
-            self.thermal_multiplier = 65536
+            self.thermal_multiplier = ONE
             if self.too_hot:
                 self.too_hot = False
                 self.errors.report(self.code_cooled)
         elif thermal < self.thermal_limit:
-            self.thermal_multiplier = 65536 - fixed_multiply(thermal - self.thermal_soft, self.thermal_slope)
+            self.thermal_multiplier = ONE - fixed_multiply(thermal - self.thermal_soft, self.thermal_slope)
             self.errors.report(self.code_warm)
         else:
             self.thermal_multiplier = 0
@@ -108,13 +110,13 @@ class MotorLimits:
             excess += self.current_min - current
         if excess <= 0:  # nearly always
             self.excess = 0
-            self.excess_multiplier = 65536
+            self.excess_multiplier = ONE
             if self.overloaded:
                 self.overloaded = False
                 self.errors.report(self.code_excess_over)
             return self.too_hot
         self.excess = excess
-        self.excess_multiplier = max(0, 65536 - excess // self.excess_fade)
+        self.excess_multiplier = max(0, ONE - excess // self.excess_fade)
         if excess >= self.excess_limit and not self.overloaded:
             self.overloaded = True
             self.errors.report(self.code_excess)
@@ -137,7 +139,7 @@ class MotorLimits:
         elif target < low:
             target = low
             self.errors.report(self.code_target)
-        if self.derating and self.thermal_multiplier < 65536:
+        if self.derating and self.thermal_multiplier < ONE:
             high = fixed_multiply(high, self.thermal_multiplier)
             low = fixed_multiply(low, self.thermal_multiplier)
         if speed > self.speed_soft:
@@ -165,7 +167,7 @@ class MotorLimits:
         multiplier: cython.longlong = self.excess_multiplier
         if not self.derating and self.thermal_multiplier < multiplier:
             multiplier = self.thermal_multiplier
-        if multiplier != 65536:
+        if multiplier != ONE:
             duty = (duty * multiplier) >> 16
         if self.peak:
             if current > self.current_max and duty > 0:

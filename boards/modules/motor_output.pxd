@@ -5,6 +5,13 @@ from ranger_sim.foundation.numbers cimport wrap_i32
 
 cimport cython
 
+cpdef enum:
+    PERIOD_COUNTS = 600
+    SLEEP = 1
+    SHUTDOWN = 2
+    STOPPED = 4
+    OFF_UNLESS_0 = 0x7FFF
+
 @cython.final
 cdef class OffRequest(IntReceiver):
     cdef public MotorOutput output

@@ -12,6 +12,13 @@ from ranger_sim.firmware_sim.peripherals.pwm import Pwm
 if not cython.compiled:
     from ranger_sim.foundation.numbers import wrap_i32
 
+    PERIOD_COUNTS = 600  # 100 kHz at 60 MHz
+    # Bits of `off`.
+    SLEEP = 1
+    SHUTDOWN = 2
+    STOPPED = 4
+    OFF_UNLESS_0 = 0x7FFF  # what SLEEP and SHUTDOWN look at in the word they get
+
 PINS = {
     "pwm_lead_2": p0(7),
     "pwm_lead_6": p0(9),
@@ -19,12 +26,6 @@ PINS = {
     "low_side_6": p1(17),
     "motor_watchdog": p0(6),
 }
-PERIOD_COUNTS = 600  # 100 kHz at 60 MHz
-
-
-SLEEP = 1  # bits of `off`
-SHUTDOWN = 2
-STOPPED = 4
 
 
 class OffRequest(IntReceiver):
@@ -40,7 +41,7 @@ class OffRequest(IntReceiver):
         self.frames += 1
         self.value = wrap_i32(value_word)
         self.output.off &= ~self.bit
-        if value_word & 0x7FFF != 0:
+        if value_word & OFF_UNLESS_0 != 0:
             self.output.off |= self.bit
 
 
@@ -71,7 +72,7 @@ class MotorOutput:
 
     def feed_watchdog(self) -> None:
         """Toggle the watchdog pin, unless the motor is stopped or shut down."""
-        if self.off & 6 == 0:  # SHUTDOWN, STOPPED
+        if self.off & (SHUTDOWN | STOPPED) == 0:
             self.gpio.toggle(self.watchdog_pin)
 
     def enable_low_side(self, on: cython.longlong) -> None:
@@ -92,7 +93,7 @@ class MotorOutput:
         low_side: cython.longlong = 1
         if self.off:
             duty = 0
-            low_side = 1 - (self.off & 1)  # SLEEP
+            low_side = 0 if self.off & SLEEP else 1
         else:
             if duty > self.largest:
                 duty = self.largest
@@ -102,11 +103,11 @@ class MotorOutput:
             if self.second_pattern:
                 self.second_pattern = False
                 if counts >= 0:
-                    MR2 = 600  # PERIOD_COUNTS
-                    MR6 = 600 - counts - self.offset
+                    MR2 = PERIOD_COUNTS
+                    MR6 = PERIOD_COUNTS - counts - self.offset
                 else:
-                    MR2 = 600 + counts - self.offset
-                    MR6 = 600
+                    MR2 = PERIOD_COUNTS + counts - self.offset
+                    MR6 = PERIOD_COUNTS
             else:
                 self.second_pattern = True
                 if counts >= 0:

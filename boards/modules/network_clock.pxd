@@ -1,8 +1,15 @@
+from ranger_sim.boards.modules.can_link cimport EIGHT_BYTES
+from ranger_sim.foundation.events cimport FLAG_SINGLE_SHOT
 from ranger_sim.boards.modules.can_load cimport CanLoad
 from ranger_sim.boards.modules.network_time cimport NetworkTime
 from ranger_sim.firmware_sim.peripherals.can_controller cimport CanController
 
 cimport cython
+
+cpdef enum:
+    TICKS_PER_MS = 5
+    SYNC_BUFFER = 3
+    SYNC_IDENTIFIER = 0
 
 cdef long long _MASK
 

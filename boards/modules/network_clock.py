@@ -13,8 +13,14 @@ from ranger_sim.boards.modules.can_load import CanLoad
 from ranger_sim.boards.modules.network_time import NetworkTime
 from ranger_sim.firmware_sim.peripherals.can_controller import CanController
 
-TICKS_PER_MS = 5
-SYNC_BUFFER = 3
+if not cython.compiled:
+    from ranger_sim.boards.modules.can_link import EIGHT_BYTES
+    from ranger_sim.foundation.events import FLAG_SINGLE_SHOT
+
+    TICKS_PER_MS = 5
+    SYNC_BUFFER = 3
+    SYNC_IDENTIFIER = 0
+
 CYCLES_PER_SYNC = 60  # four register writes and a command per controller: chosen by us, no listing says
 # A C variable when compiled (.pxd): Cython makes a Python object of every literal above 31 bits.
 _MASK = 0xFFFFFFFF
@@ -39,7 +45,7 @@ class NetworkClock:
         """One 200 us interrupt; True when a millisecond has passed and sync went out."""
         self.ticks += 1
         self.divider += 1
-        if self.divider < 5:
+        if self.divider < TICKS_PER_MS:
             return False
         self.divider = 0
         self.time.ms = (self.time.ms + 1) & _MASK
@@ -51,8 +57,9 @@ class NetworkClock:
         controller: CanController
         ms: cython.longlong = self.time.ms
         for controller in self.controllers:
-            # 40: eight bytes, single shot
-            if controller.free_at(3, controller.chip.instant) and controller.transmit(3, 0, 40, ms, ms):
+            if controller.free_at(SYNC_BUFFER, controller.chip.instant) and controller.transmit(
+                SYNC_BUFFER, SYNC_IDENTIFIER, EIGHT_BYTES | FLAG_SINGLE_SHOT, ms, ms
+            ):
                 self.sent[controller.number] += 1
                 self.load.counts[controller.number] += 1
             else:

@@ -12,7 +12,8 @@ import cython
 from ranger_sim.datatable.generated import errors
 
 TIMER_TICKS = 600_000
-TICKS_PER_US = 60
+CHANNELS = 4
+FILTER = 16.0  # a pulse moves the smoothed width by this part of the difference
 
 
 class RcReceiver:
@@ -20,12 +21,12 @@ class RcReceiver:
 
     def __init__(self, report) -> None:
         self.report = report
-        self.levels = array.array("q", [0]) * 4
-        self.rising = array.array("q", [0]) * 4
-        self.seen = array.array("q", [0]) * 4
-        self.measured = array.array("q", [0]) * 4
-        self.pulses = array.array("q", [0]) * 4
-        self.filtered = array.array("d", [0.0]) * 4
+        self.levels = array.array("q", [0]) * CHANNELS
+        self.rising = array.array("q", [0]) * CHANNELS
+        self.seen = array.array("q", [0]) * CHANNELS
+        self.measured = array.array("q", [0]) * CHANNELS
+        self.pulses = array.array("q", [0]) * CHANNELS
+        self.filtered = array.array("d", [0.0]) * CHANNELS
         self.code_levels = errors.RCX_BAD_LVLS
         self.code_channel = errors.RCX_BAD_CHAN
         self.bad_levels = 0
@@ -37,7 +38,7 @@ class RcReceiver:
         chosen by us, because the firmware gives only the filter).
         """
         width: cython.longlong
-        if channel < 0 or channel > 3:
+        if channel < 0 or channel >= CHANNELS:
             self.report(self.code_channel)
             return 0
         if self.seen[channel] and self.levels[channel] == level:
@@ -51,19 +52,19 @@ class RcReceiver:
             self.seen[channel] = 1
             return 1
         if self.seen[channel]:
-            width = (ticks - self.rising[channel]) % 600000
+            width = (ticks - self.rising[channel]) % TIMER_TICKS
             self.measured[channel] = width
             if self.pulses[channel] == 0:
                 self.filtered[channel] = width
             else:
-                self.filtered[channel] += (width - self.filtered[channel]) / 16.0
+                self.filtered[channel] += (width - self.filtered[channel]) / FILTER
             self.pulses[channel] += 1
         self.seen[channel] = 1
         return 1
 
     def width(self, channel: cython.longlong) -> cython.double:
         """Smoothed high time of `channel` 0-3 in ticks; 0.0 before its first pulse, RCX_BAD_CHAN outside."""
-        if channel < 0 or channel > 3:
+        if channel < 0 or channel >= CHANNELS:
             self.report(self.code_channel)
             return 0.0
         return self.filtered[channel]

@@ -36,8 +36,7 @@ if not cython.compiled:
     HEADER_MARK = 0x0F  # what stands above the identifier of a data frame
     IDENTIFIER = 0x7FF
     HALF_WORD = 0xFFFF
-    ROUTER_RING_HALF_WORDS = 500
-    RING_HALF_WORDS_USED = 494  # above this no frame fits: of the 500 one stays free
+    MOST_BEFORE_A_FRAME = 494  # half-words in the ring of 500: with more a frame does not fit, as one stays free
     ROUTER_RECEIVE_SEGMENTS = 8
     RECEIVE_MASK = 7
     MAIN_BRAIN_SEGMENTS = 16  # each way
@@ -45,8 +44,6 @@ if not cython.compiled:
     ROUTER_CIRCLE = 35
     # 16 queued, one being packed; one in an exchange, one being delivered; and the 8 that wait at the router
     MAIN_BRAIN_CIRCLE = 27
-FRAMES_PER_SEGMENT = 6
-SEGMENT_PERIOD_NS = 200_000  # Timer1 of the router, match 11 999 at 60 MHz
 EXCHANGE_NS = 165_333  # 496 bits at 3.0 Mbit/s
 
 
@@ -217,7 +214,7 @@ class MainBrainSspLink:
                 frames = 0
                 self.checksum_errors += 1
                 self.report(self.code_checksum)
-            for row in range(0, FRAME_ROW * frames, FRAME_ROW):
+            for row in range(0, FRAME_ROW * frames, 3):  # FRAME_ROW: as a step it would make this Python's range
                 if segment.rows[row] & IDENTIFIER > self.last_id:
                     frames = self._drop_strangers(i, frames)
                     break
@@ -336,7 +333,7 @@ class RouterSspLink:
         `flags` as in foundation.events; `now` is the instant in ns at which the pushing begins.
         """
         header: cython.longlong = (identifier & IDENTIFIER) | HEADER_ONES
-        if self.half_words > RING_HALF_WORDS_USED:
+        if self.half_words > MOST_BEFORE_A_FRAME:
             return self._lose()
         if flags & FLAG_REMOTE:
             header |= HEADER_REMOTE

@@ -8,7 +8,7 @@ flashes in the first n + 1, so the run of flashes tells where in the cycle a vid
 
 import cython
 
-from ranger_sim.boards.modules.colour_leds import ColourLeds
+from ranger_sim.boards.modules.colour_leds import DARK, TRANSFERS_PER_LED, WHITE, ColourLeds
 from ranger_sim.boards.modules.keypad import Keypad
 from ranger_sim.firmware_sim.peripherals.gpio import Gpio
 
@@ -34,15 +34,15 @@ class SyncLight:
         self.held_slots = 0
         self.milliseconds = 0
         self.flashes = 0
-        self.pin = 16
-        gpio.write(16, 1)
+        self.pin = SYNC_PIN
+        gpio.write(SYNC_PIN, 1)
 
     def watch_key(self) -> cython.longlong:
         """Count the slots in which key 4 is down; at the hundredth start or stop the pattern."""
-        if not self.keypad.pressed(4):
+        if not self.keypad.pressed(SYNC_KEY):
             return 0
         self.held_slots += 1
-        if self.held_slots >= 100:
+        if self.held_slots >= TOGGLE_SLOTS:
             self.held_slots = 0
             self.running = not self.running
             self.milliseconds = 0
@@ -57,21 +57,21 @@ class SyncLight:
         on: cython.bint
         if not self.running:
             return 0
-        cell = self.milliseconds // 125
-        inside = self.milliseconds % 125
-        on = inside < 50 and cell % 10 <= cell // 10
+        cell = self.milliseconds // CELL_MS
+        inside = self.milliseconds % CELL_MS
+        on = inside < FLASH_MS and cell % CELLS_PER_PATTERN <= cell // CELLS_PER_PATTERN
         self.milliseconds += 1
-        if self.milliseconds >= 12500:
+        if self.milliseconds >= PATTERNS * CELLS_PER_PATTERN * CELL_MS:
             self.milliseconds = 0
         if on == self.lit:
             return 0
         if on:
             self.flashes += 1
         self._show(on)
-        return 3
+        return TRANSFERS_PER_LED
 
     def _show(self, on: cython.bint) -> None:
         """Both lights on or off."""
         self.lit = on
         self.gpio.write(self.pin, 0 if on else 1)
-        self.leds.set_led(1, 0xFFFFFF if on else 0)
+        self.leds.set_led(SYNC_LED, WHITE if on else DARK)

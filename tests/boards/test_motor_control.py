@@ -434,7 +434,7 @@ def test_an_ankle_is_blocked_at_its_ends_and_when_the_cable_is_off(name, angle, 
 
 
 def test_a_closed_limit_switch_blocks_pulling():
-    from ranger_sim.boards.outer_feet import PINS
+    from ranger_sim.boards.motor_board import PINS
 
     bench = Bench("MCFO")
     encoder = bench.board.encoder
