@@ -21,6 +21,7 @@ from ranger_sim.boards.modules.ssp_link import RouterSspLink
 from ranger_sim.datatable.generated import csr as table
 from ranger_sim.datatable.generated import errors as codes
 from ranger_sim.datatable.generated import routes
+from ranger_sim.firmware_sim.board import EVERY_KIND
 from ranger_sim.firmware_sim.peripherals.adc_internal import AdcInternal
 from ranger_sim.firmware_sim.peripherals.can_controller import CanController
 from ranger_sim.firmware_sim.peripherals.gpio import Gpio
@@ -28,7 +29,7 @@ from ranger_sim.firmware_sim.peripherals.ssp import SspPort, SspSegment
 from ranger_sim.firmware_sim.peripherals.timer_capture import TimerCapture
 from ranger_sim.firmware_sim.scheduler import Schedule, Task
 from ranger_sim.firmware_sim.vic import FIQ, TIMER_MATCH
-from ranger_sim.foundation.events import CAN_RX, CAN_STATUS, SSP_SEGMENT
+from ranger_sim.foundation.events import CAN_RX, CAN_STATUS, CAN_TX_DONE, SSP_SEGMENT
 
 if not cython.compiled:
     from ranger_sim.boards.modules.can_link import EIGHT_BYTES, FIRST_BUFFER, RFS_EIGHT_BYTES, SECOND_BUFFER
@@ -232,6 +233,10 @@ class CanRouterBoard(FirmwareBoard):
             controller.look()
 
     # --- main loop --------------------------------------------------------------------------------------
+
+    def urgent_kinds(self) -> cython.longlong:
+        """Any kind, but that a transmit buffer comes free when nothing waits for it."""
+        return EVERY_KIND if self.router.waiting else EVERY_KIND & ~(1 << CAN_TX_DONE)
 
     def nothing_waits(self) -> cython.bint:
         """True while the main loop has nothing to move, now or when a buffer gets free."""

@@ -13,6 +13,7 @@ cdef class DataStore:
     cdef public long long out_of_range_count, out_of_range_id
     cdef public object on_out_of_range
 
+    cpdef int move(self, words) except -1
     cpdef bint has(self, long long number) except? -1
     cpdef bint set_word(self, long long number, long long word, long long stamp) except? -1
     cpdef long long get_word(self, long long number) except? <long long>-1

@@ -41,6 +41,11 @@ class DataStore:
         self.out_of_range_id = -1
         self.on_out_of_range = None
 
+    def move(self, words) -> None:
+        """The words of the records stand in `words` from now on, as they are: memory that processes share."""
+        words[:] = memoryview(self.words)
+        self.words = words
+
     def has(self, number: cython.longlong) -> cython.bint:
         """True when `number` is an id of the table; otherwise the miss is told and False returned."""
         if 0 <= number < self.size:

@@ -14,27 +14,28 @@ How time passes inside:
 Each busy time is rounded down to whole ns; cycle counts are exact integers.
 """
 
-import array
-
 import cython
 
-from ranger_sim.firmware_sim.analog import AnalogPins
+from ranger_sim.firmware_sim.board import Board
 from ranger_sim.firmware_sim.clock import Crystal, TickTrain
 from ranger_sim.firmware_sim.scheduler import Occasional, Schedule, SlotScheduler, Task, Wait
 from ranger_sim.firmware_sim.vic import SLOT_TIMER, InterruptController, InterruptSource
 from ranger_sim.foundation.edge_buffer import EdgeBuffer
-from ranger_sim.foundation.events import NEVER, PIN_EDGE, EventQueue
+from ranger_sim.foundation.events import EventQueue
 from ranger_sim.foundation.numbers import integers
 from ranger_sim.foundation.user_error import UserError
 
 if not cython.compiled:
-    from ranger_sim.firmware_sim.calls import call, handle, own_code, run
+    from ranger_sim.firmware_sim.calls import call, handle, run
+    from ranger_sim.firmware_sim.scheduler import ENTRY, ENTRY_CALLS, ENTRY_NS, OCCASIONAL_TASK, WAIT_TASK
+    from ranger_sim.firmware_sim.vic import FIRST_FIQ
+    from ranger_sim.foundation.events import CAN_TX_DONE, NEVER, PIN_EDGE
 
-PINS = 64  # P0.0 ... P0.31 are 0 ... 31, P1.0 ... P1.31 are 32 ... 63
-WORDS = 16
-ALARMS = 16
-MESSAGE_KINDS = 32
-INDICES_PER_KIND = 16
+    PINS = 64  # P0.0 ... P0.31 are 0 ... 31, P1.0 ... P1.31 are 32 ... 63
+    ALARMS = 16  # of peripherals
+    ALARM_PLACES = 18  # with the slot timer's, and one that never comes
+    MESSAGE_KINDS = 32  # to a board
+    INDICES_PER_KIND = 16
 
 
 class Peripheral:
@@ -56,6 +57,10 @@ class Peripheral:
 
     def on_alarm(self, alarm: cython.longlong, time: cython.longlong) -> InterruptSource | None:
         """The alarm that this peripheral numbered `alarm` is due; returns what `on_message` does."""
+        return None
+
+    def transmit_ends(self) -> object:
+        """Where a bus writes the ends of a CAN controller's transmissions; None: they come as messages."""
         return None
 
 
@@ -89,12 +94,11 @@ class Alarm:
 
     def set(self, time: cython.longlong) -> cython.longlong:
         """It is due at `time` (ns); NEVER takes it back. Returns the instant of the chip's first alarm."""
-        never: cython.longlong = 1 << 62
         at: cython.longlong = self.chip.alarms_set
-        if self.time < never:
+        if self.time < NEVER:
             return self._set_again(time)
         self.time = time
-        if time < never:
+        if time < NEVER:
             self.chip.alarms_set = at + 1
             while self.chip.alarm_times[at - 1] <= time and (
                 self.chip.alarm_times[at - 1] < time or self.chip.alarm_places[at - 1] < self.place
@@ -122,7 +126,7 @@ class Alarm:
             self._move(at + 1, at)
             at += 1
         self.chip.alarm_time = self.chip.alarm_times[at - 1]
-        self.time = 1 << 62
+        self.time = NEVER
         return self.set(time)
 
     @cython.final
@@ -137,7 +141,7 @@ class Alarm:
         self.chip.now = time
         self.chip.alarms_set -= 1
         self.chip.alarm_time = self.chip.alarm_times[self.chip.alarms_set - 1]
-        self.time = 1 << 62
+        self.time = NEVER
         if self.chip.waiting:
             self.chip.check_wait = True
             if self.chip.code_time < time:
@@ -185,11 +189,11 @@ class EdgeLine:
             self.next_time = edge >> 2
             self.levels = edge & 3  # of A x 2 + of B
         else:
-            self.next_time = 1 << 62
+            self.next_time = NEVER
         return self.next_time
 
 
-class Microcontroller:
+class Microcontroller(Board):
     """A chip of `hz` core clock on `crystal`, with schedule, interrupts, pins and queues.
 
     Hooks (None or a callable): `on_overrun()` when a tick finds the row unfinished, `on_limit(task)` when a
@@ -199,25 +203,19 @@ class Microcontroller:
     instant (ns) at which it is done, or 0 when it found nothing to do: it is then called again after the
     next input, interrupt or slot. It may move `now` forward for its effects, and must return once it is past
     `horizon`, the next input, alarm or slot, so that steps of any size give the same run.
-    `words`: digital words that sensors hold out to the chip, set from outside.
     """
 
     def __init__(self, name="chip", hz=60_000_000, crystal=None) -> None:
         if hz <= 0:
             raise UserError(f"{name}: hz {hz} must be above 0")
-        self.name = name
+        Board.__init__(self, name)
         self.hz = hz
         self.crystal = crystal if crystal is not None else Crystal()
-        self.inbox = EventQueue()
-        self.outbox = EventQueue()
         self.now = 0
-        self.next_time = 0
         self.ns_per_cycle = self.crystal.ns_per_cycle(hz)
         self.cycles_per_ns = self.crystal.cycles_per_ns(hz)
         self.scheduler = SlotScheduler(Schedule(), 1)
         self.vic = InterruptController(self.ns_per_cycle)
-        self.analog = AnalogPins()
-        self.words = array.array("q", [0]) * WORDS
         self.pins = integers(PINS)
         self.on_overrun = None
         self.on_limit = None
@@ -225,7 +223,6 @@ class Microcontroller:
         self.on_timer_tick = None
         self.background = None
         self.background_wanted = True
-        self.horizon = 0
         self.extra_cycles = 0
         self.tick_time = NEVER
         self.ticks = TickTrain(self.crystal, 1, 0)
@@ -246,17 +243,16 @@ class Microcontroller:
         self.slot_timer = SlotTimer(self)
         self.alarms = [None] * ALARMS + [self.slot_timer.alarm]
         # those that are set: instants and places in `alarms`, the first to come last; at 0 stands one that never comes
-        self.alarm_times = [NEVER] * 18  # ALARMS + 2
-        self.alarm_places = [0] * 18
+        self.alarm_times = [NEVER] * ALARM_PLACES
+        self.alarm_places = [0] * ALARM_PLACES
         self.alarms_set = 1  # where the next one would stand
         self.others = Unclaimed(self)
         self.message_table = [self.others] * (MESSAGE_KINDS * INDICES_PER_KIND)
         self.pin_owners = [None] * PINS
-        self.pin_channels = [-1] * 64  # PINS
+        self.pin_channels = [-1] * PINS
         self.pin_sources = [None] * PINS
         self.first_line = EdgeLine(EdgeBuffer(1))  # no encoder: never an edge
         self.second_line = self.first_line
-        self.edge_time = NEVER
         self.unclaimed = 0
 
     # --- set-up -------------------------------------------------------------------------------------------
@@ -294,7 +290,7 @@ class Microcontroller:
         self.pin_sources[pin] = source if source is not None else self.vic.source(PIN_EDGE, pin)
         return self.pin_sources[pin]
 
-    def listen_to_edges(self, buffer: EdgeBuffer, pin, partner_pin) -> None:
+    def listen_to_edges(self, buffer: EdgeBuffer, pin: cython.longlong, partner_pin: cython.longlong) -> None:
         """Edges of `buffer` arrive on `pin`, claimed before, with the level of `partner_pin`; tell by `edges_came`.
 
         Two encoders can be connected so; the edges of more would have to come as messages.
@@ -316,6 +312,15 @@ class Microcontroller:
         """
         self.edge_time = min(self.first_line.find_next(), self.second_line.find_next())
         return self.edge_time
+
+    def transmit_ends(self, controller: cython.longlong) -> object:
+        """Where the CAN controller of this number looks for the ends of its transmissions; None: it has to be told."""
+        owner: Peripheral = self.message_table[controller * MESSAGE_KINDS + CAN_TX_DONE]
+        return owner.transmit_ends()
+
+    def latest_slot(self) -> cython.longlong:
+        """Start of its latest slot (ns); 0 before the first."""
+        return self.scheduler.slot_time
 
     def new_alarm(self, peripheral, number) -> Alarm:
         """An alarm; when due, `peripheral.on_alarm(number, time)` runs."""
@@ -403,9 +408,9 @@ class Microcontroller:
             if self.edge_time < first:
                 first = self.edge_time
             # what the processor does before that: a handler, tasks, or the main loop beside them
-            own = 1 << 62
+            own = NEVER
             if vic.pending != 0:
-                own = self.fiq_free if vic.pending >= 65536 else self.irq_free  # FIRST_FIQ
+                own = self.fiq_free if vic.pending >= FIRST_FIQ else self.irq_free
                 own = own if own > self.instant else self.instant
             elif not scheduler.done:
                 if not self.waiting or self.check_wait:
@@ -430,13 +435,13 @@ class Microcontroller:
                 while scheduler.position < scheduler.end:
                     number = scheduler.numbers[scheduler.position]
                     scheduler.position += 1
-                    usual_ns = scheduler.table[4 * number + 2]  # ENTRY
+                    usual_ns = scheduler.table[ENTRY * number + ENTRY_NS]
                     self.now = self.code_time
                     if usual_ns >= 0:
                         items = run(scheduler, number) if cython.compiled else scheduler.functions[number]() or 0
                         if items == 0 and self.extra_cycles == 0:
                             self.code_time += usual_ns
-                            scheduler.table[4 * number + 3] += 1
+                            scheduler.table[ENTRY * number + ENTRY_CALLS] += 1
                         else:
                             self._spent(cython.cast(Task, scheduler.tasks[number]), items)
                     elif not self._special_task(cython.cast(Task, scheduler.tasks[number])):
@@ -487,6 +492,12 @@ class Microcontroller:
             time = self.horizon
         return self.scheduler.speaks_from(time, self.tick_time)
 
+    def quiet_until(self) -> cython.longlong:
+        """Before this instant (ns) the board puts nothing out at all, whatever comes in of a kind that can wait."""
+        if not self.scheduler.done or self.vic.pending != 0 or (self.background is not None and self.background_wanted):
+            return 0
+        return self.alarm_time  # the slot timer's match is one, too
+
     @cython.final
     def _edges(self) -> cython.longlong:
         """Edges from the first one on, each with its fast interrupt, until something else comes first.
@@ -515,8 +526,8 @@ class Microcontroller:
             if line.peripheral.on_pin(line.channel, level, time):
                 if (
                     self.fiq_free > time
-                    or vic.pending >= 65536
-                    or line.source.bit < 65536
+                    or vic.pending >= FIRST_FIQ
+                    or line.source.bit < FIRST_FIQ
                     or time >= self.edge_time
                     or time >= self.stop_time
                 ):
@@ -535,10 +546,10 @@ class Microcontroller:
         """The message just taken: hardware first. Returns the interrupt source that it makes ask for service."""
         self.now = self.instant
         self.background_wanted = True
-        if queue.kind == 1:  # PIN_EDGE
+        if queue.kind == PIN_EDGE:
             return self._pin_edge(queue)
-        if 0 <= queue.kind < 32 and 0 <= queue.a < 16:
-            return cython.cast(Peripheral, self.message_table[queue.a * 32 + queue.kind]).on_message(queue)
+        if 0 <= queue.kind < MESSAGE_KINDS and 0 <= queue.a < INDICES_PER_KIND:
+            return cython.cast(Peripheral, self.message_table[queue.a * MESSAGE_KINDS + queue.kind]).on_message(queue)
         return self.others.on_message(queue)
 
     @cython.final
@@ -591,7 +602,7 @@ class Microcontroller:
             busy = source.base_ns
         else:
             busy = self._note_service(source, 0 if items is None else items)
-        if source.bit >= 65536:  # FIRST_FIQ
+        if source.bit >= FIRST_FIQ:
             self.fiq_free = time + busy
         self.irq_free = (self.irq_free if self.irq_free > time else time) + busy
         self.code_time = (self.code_time if self.code_time > time else time) + busy
@@ -650,9 +661,9 @@ class Microcontroller:
         """A task of which not every call is alike, or whose calls are recorded. False when it has to spin."""
         entry: Task
         items: cython.longlong = 0
-        if task.kind == 2:
+        if task.kind == WAIT_TASK:
             return self._begin_wait(task)
-        if task.kind == 1:
+        if task.kind == OCCASIONAL_TASK:
             entry = cython.cast(Occasional, task).next_task()
             if entry is None:
                 self._charge(task, task.base_cycles)
@@ -725,7 +736,3 @@ class Microcontroller:
         if scheduler.close(cycles) and self.on_near_limit is not None:
             self.on_near_limit()
         return cycles
-
-
-if not cython.compiled:
-    Microcontroller.__init_subclass__ = classmethod(own_code)

@@ -13,6 +13,17 @@ cdef extern from "Python.h":
     int METH_NOARGS
     int METH_O
 
+cpdef enum:
+    NORMAL_TASK = 0
+    OCCASIONAL_TASK = 1
+    WAIT_TASK = 2
+    HISTOGRAM_BINS = 21
+    ENTRY = 4
+    ENTRY_CODE = 0
+    ENTRY_OWNER = 1
+    ENTRY_NS = 2
+    ENTRY_CALLS = 3
+
 # What stands in a schedule is mostly a bound method of a compiled class. Its C function is then called without the
 # general machinery of Python calls; anything else is called in the ordinary way. (With always_allow_keywords off, as
 # setup.py has it, methods without arguments are METH_NOARGS and methods with one are METH_O.)
@@ -45,7 +56,9 @@ cdef inline object call_with(long long code, long long owner, object argument):
 
 # What the task of this number in a scheduler's table returns, None as 0.
 cdef inline long long run(SlotScheduler scheduler, long long number) except? -1:
-    items = (<plain_call><void*>scheduler.table[4 * number])(<PyObject*><void*>scheduler.table[4 * number + 1], NULL)
+    items = (<plain_call><void*>scheduler.table[ENTRY * number + ENTRY_CODE])(
+        <PyObject*><void*>scheduler.table[ENTRY * number + ENTRY_OWNER], NULL
+    )
     return 0 if items is None else items
 
 cdef class Task:

@@ -20,12 +20,16 @@ if not cython.compiled:
     from ranger_sim.firmware_sim.calls import code_of, owner_of
     from ranger_sim.foundation.events import NEVER
 
-NORMAL_TASK = 0
-OCCASIONAL_TASK = 1
-WAIT_TASK = 2
-
-HISTOGRAM_BINS = 21  # twenty of 5 % of a slot, the last for overruns
-ENTRY = 4  # numbers per task in the table laid out: code, owner, usual_ns, usual calls
+    NORMAL_TASK = 0
+    OCCASIONAL_TASK = 1
+    WAIT_TASK = 2
+    HISTOGRAM_BINS = 21  # twenty of 5 % of a slot, the last for overruns
+    # the table laid out: numbers per task, and which is which
+    ENTRY = 4
+    ENTRY_CODE = 0  # the two addresses by which its function is called
+    ENTRY_OWNER = 1
+    ENTRY_NS = 2  # of a call without items, or -1: every call must be looked at more closely
+    ENTRY_CALLS = 3  # calls that took that
 
 
 class Task:
@@ -69,11 +73,11 @@ class Task:
         if cycles > self.noted_most:
             self.noted_most = cycles
         self.noted_last = cycles
-        self.noted_when = self.scheduler.table[4 * self.number + 3]  # ENTRY
+        self.noted_when = self.scheduler.table[ENTRY * self.number + ENTRY_CALLS]
 
     def usual_calls(self) -> cython.longlong:
         """Calls that took exactly `cost`, since that was last changed."""
-        return 0 if self.scheduler is None else self.scheduler.table[4 * self.number + 3]
+        return 0 if self.scheduler is None else self.scheduler.table[ENTRY * self.number + ENTRY_CALLS]
 
     def settle(self) -> None:
         """Note the usual calls so far: their cost or their scheduler is about to change."""
@@ -81,7 +85,7 @@ class Task:
         self.noted_calls, self.noted_cycles, self.noted_most = calls, total, most
         self.noted_last, self.noted_when = last, 0
         if self.scheduler is not None:
-            self.scheduler.table[4 * self.number + 3] = 0
+            self.scheduler.table[ENTRY * self.number + ENTRY_CALLS] = 0
 
     @property
     def function(self):
@@ -368,9 +372,9 @@ class SlotScheduler:
         within = task.base_cycles <= task.most_cycles or task.most_cycles == 0
         plain = task.kind == NORMAL_TASK and within and not self.recording
         self.functions[task.number] = task.routine
-        self.table[at] = code_of(task.routine, 0)
-        self.table[at + 1] = owner_of(task.routine, 0)
-        self.table[at + 2] = int(task.base_cycles * self.ns_per_cycle) if plain else -1
+        self.table[at + ENTRY_CODE] = code_of(task.routine, 0)
+        self.table[at + ENTRY_OWNER] = owner_of(task.routine, 0)
+        self.table[at + ENTRY_NS] = int(task.base_cycles * self.ns_per_cycle) if plain else -1
         self.lay_leads()
 
     def lay_leads(self) -> None:
@@ -442,10 +446,10 @@ class SlotScheduler:
         """A row (or the last task of an overrun one) ended `cycles` after its tick. True: near the limit."""
         index: cython.longlong = cycles // self.histogram_step
         near: cython.bint = False
-        if cycles > self.slot_cycles or index > 20:
-            index = 20
-        elif index == 20:
-            index = 19
+        if cycles > self.slot_cycles or index >= HISTOGRAM_BINS:
+            index = HISTOGRAM_BINS - 1
+        elif index == HISTOGRAM_BINS - 1:
+            index = HISTOGRAM_BINS - 2
         self.histogram[index] += 1
         self.last_slot_cycles = cycles
         self.total_slot_cycles += cycles

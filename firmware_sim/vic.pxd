@@ -3,6 +3,11 @@ cimport cython
 from ranger_sim.foundation.events cimport EventQueue
 from ranger_sim.firmware_sim.scheduler cimport call_with, code_of, owner_of
 
+cpdef enum:
+    FIQ = -1
+    IRQ_SLOTS = 16
+    FIRST_FIQ = 65536
+
 # What the handler returns for the message in the fields of `queue`.
 cdef inline object handle(InterruptSource source, EventQueue queue):
     return call_with(source.code, source.owner, queue)

@@ -14,8 +14,11 @@ from ranger_sim.foundation.user_error import UserError
 if not cython.compiled:
     from ranger_sim.firmware_sim.calls import code_of, owner_of
 
-FIQ = -1
-FIRST_FIQ = 1 << 16  # in the word of pending sources the FIQ sources stand above the 16 slots
+    FIQ = -1
+    IRQ_SLOTS = 16
+    FIRST_FIQ = 1 << 16  # in the word of pending sources the FIQ sources stand above the slots
+
+MOST_FIQ_SOURCES = 46  # bits of a word of 64, without the sign and the slots
 
 # Kinds of sources that are not messages of foundation/events.py (those use their own numbers below 64).
 TIMER_MATCH = 64  # index: timer number; MR0 reached
@@ -161,7 +164,7 @@ class InterruptController:
         self.ns_per_cycle = ns_per_cycle
         self.sources = {}
         self.fiq_list = []
-        self.irq_list = [None] * 16
+        self.irq_list = [None] * IRQ_SLOTS
         # one bit per source, as in VICIRQStatus (bits 0-15) and VICFIQStatus (from bit 16 on)
         self.pending = 0
         self.newest = None
@@ -183,7 +186,7 @@ class InterruptController:
         source = self.source(kind, index)
         if not callable(handler):
             raise UserError(f"interrupt {kind}/{index}: handler {handler!r} cannot be called")
-        if slot != FIQ and not 0 <= slot <= 15:
+        if slot != FIQ and not 0 <= slot < IRQ_SLOTS:
             raise UserError(f"interrupt {kind}/{index}: slot {slot} is neither FIQ (-1) nor 0 ... 15")
         if cost < 0 or per_item < 0:
             raise UserError(f"interrupt {kind}/{index}: cost {cost} and per_item {per_item} must not be negative")
@@ -202,8 +205,8 @@ class InterruptController:
         source.base_ns = int(source.base_cycles * self.ns_per_cycle)
         source.latency_ns = int(source.latency * self.ns_per_cycle)
         if slot == FIQ:
-            if len(self.fiq_list) >= 46:
-                raise UserError(f"interrupt {kind}/{index}: more than 46 sources on the FIQ")
+            if len(self.fiq_list) >= MOST_FIQ_SOURCES:
+                raise UserError(f"interrupt {kind}/{index}: more than {MOST_FIQ_SOURCES} sources on the FIQ")
             source.bit = FIRST_FIQ << len(self.fiq_list)
             self.fiq_list.append(source)
         else:
@@ -241,19 +244,9 @@ class InterruptController:
         first: InterruptSource = self.newest
         place: cython.longlong
         if self.pending != first.bit:  # not alone, as it nearly always is
-            place = 16 if self.pending >= 65536 else 0  # FIRST_FIQ
+            place = IRQ_SLOTS if self.pending >= FIRST_FIQ else 0
             while self.pending >> place & 1 == 0:
                 place += 1
-            first = self.fiq_list[place - 16] if place >= 16 else self.irq_list[place]
+            first = self.fiq_list[place - IRQ_SLOTS] if place >= IRQ_SLOTS else self.irq_list[place]
         self.pending ^= first.bit
         return first
-
-    @property
-    def fiq_pending(self):
-        """One bit per FIQ source that waits, in attaching order."""
-        return self.pending >> 16
-
-    @property
-    def irq_pending(self):
-        """One bit per IRQ slot that waits."""
-        return self.pending & 65535

@@ -37,6 +37,7 @@ cpdef enum:
     TX_ABORTED = 1
     TX_LOST = 2
     ROW = 10
+    ROW_KIND = 2
 
 cdef class Outbox:
     cpdef int push(

@@ -56,6 +56,7 @@ if not cython.compiled:
     TX_LOST = 2  # single shot that lost arbitration or met an error
 
     ROW = 10  # numbers in a row of a queue
+    ROW_KIND = 2  # where the kind stands in it
 else:
     globals()["NEVER"] = 1 << 62  # too long for an enum: a macro in C, so Python gets it here
 

@@ -15,7 +15,7 @@ with their interrupts and slots, then their outputs.
 
 A board is due when it has something to do: an alarm, a slot, a task, an interrupt, a message. Where frames, edges and
 bytes wait for a task (`hears_in_its_slots`) it is due only when it may put something on a bus
-(`Microcontroller.speaks_from`): it does everything else, each thing at its instant, when that has come, or at the end
+(`Board.speaks_from`): it does everything else, each thing at its instant, when that has come, or at the end
 of the plant's step, while edges and voltages still stand; what it hears alone does not even need that.
 
 Boards in processes of their own run side by side instead: in windows of 31 us, each from the first instant at which
@@ -30,295 +30,162 @@ import array
 import cython
 
 from ranger_sim.can_bus.bus import Bus
-from ranger_sim.firmware_sim.microcontroller import MESSAGE_KINDS, Microcontroller
-from ranger_sim.firmware_sim.peripherals.can_controller import CanController
-from ranger_sim.foundation.edge_buffer import ByteBuffer
-from ranger_sim.foundation.events import CAN_REQUEST, CAN_TX_DONE, Outbox
+from ranger_sim.firmware_sim.board import Board
 from ranger_sim.foundation.numbers import integers
-from ranger_sim.foundation.row_stream import RowStream
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.processes.remote_board import RemoteBoard
+from ranger_sim.harness.board_wires import BoardWires, SspWire, WordWire
+from ranger_sim.harness.imu_wire import ImuWire
+from ranger_sim.harness.sampler import Sampler
+from ranger_sim.harness.strike_watch import StrikeWatch
 from ranger_sim.plant.ranger import RangerPlant
 
+if not cython.compiled:
+    from ranger_sim.foundation.events import NEVER
+
+    # Why `run` returned.
+    REACHED_TIME = 0
+    REACHED_STEPS = 1
+    REACHED_DISTANCE = 2
+    FELL = 3
+
 WINDOW_NS = 31_000
-SAMPLE_NS = 2_000_000  # the canonical trace samples body and data table at the main brain's rate
-
-# Why `run` returned.
-REACHED_TIME = 0
-REACHED_STEPS = 1
-REACHED_DISTANCE = 2
-FELL = 3
-
-
-class WordWire:
-    """The register of one digital sensor of the plant, as a board reads it over its serial interface."""
-
-    def __init__(self, source, board, word) -> None:
-        self.source = source
-        self.board = board
-        self.word = word
-
-
-class SspWire:
-    """The serial link between router (master) and main brain (slave): an exchange takes 165.3 us."""
-
-    def __init__(self, master, slave, exchange_ns, idle_segment) -> None:
-        self.master = master
-        self.slave = slave
-        self.exchange_ns = exchange_ns
-        self.loaded = idle_segment
-        self.exchanges = 0
-
-    def start(self, time_ns: cython.longlong, segment: object) -> cython.void:
-        """The master starts an exchange; both sides have the other's segment at its end."""
-        # order 768: stage interrupts; kind 6: SSP_SEGMENT
-        self.slave.inbox.push(time_ns + self.exchange_ns, 768, 6, 0, 0, 0, 0, 0, 0, segment)
-        self.master.inbox.push(time_ns + self.exchange_ns, 768, 6, 0, 0, 0, 0, 0, 0, self.loaded)
-        self.exchanges += 1
-
-    def load(self, segment: object) -> cython.void:
-        """The slave puts up what it will send in the next exchange."""
-        self.loaded = segment
-
-
-class BoardWires(Outbox):
-    """The wires that lead away from one board: its outbox in the assembled robot.
-
-    What the board puts out is carried on at once, with its stamp: frames to its buses, PWM and pins to its bridge,
-    segments over the link, bytes to whoever listens. A pin, a controller or a UART that is not connected here leads
-    nowhere.
-    """
-
-    def __init__(self, board, window_ns) -> None:
-        self.board = board
-        self.window_ns = window_ns  # nothing that the board puts out comes back to it sooner
-        # by controller 1 ... 4: the bus and the node number there
-        self.buses = [None] * 5
-        self.nodes = [-1] * 5
-        self.can_lines = {}  # {controller: what takes its requests}, where the bus is outside
-        self.drive = None
-        self.watchdog_pin = -1
-        self.low_side_2_pin = -1
-        self.low_side_6_pin = -1
-        self.low_side_2 = False
-        self.low_side_6 = False
-        self.silent_until = 0  # ns: before that the board was to put nothing on a bus
-        self.link = None
-        self.imu = None
-        self.imu_uart = -1
-        self.serial_lines = {}  # {UART: what hears it}, where something outside is connected
-
-    def connect_bus(self, controller, bus, node) -> None:
-        """Controller 1 ... 4 of the board is `node` of `bus`; None for `bus` takes it off.
-
-        The bus writes the ends of its transmissions where the controller looks for them.
-        """
-        if bus is not None and not isinstance(bus, Bus):  # taken for one without asking again
-            raise UserError(f"{self.board.name}: {bus!r} is no Bus")
-        self.end_by_message(controller)
-        self.buses[controller] = bus
-        self.nodes[controller] = node
-        owner = self.board.message_table[controller * MESSAGE_KINDS + CAN_TX_DONE]
-        if bus is not None and isinstance(owner, CanController):
-            bus.nodes[node].connect(owner.ends)
-
-    def end_by_message(self, controller) -> None:
-        """The ends of a controller's transmissions are messages from now on: the one that looks is not here."""
-        if self.buses[controller] is not None:
-            self.buses[controller].nodes[self.nodes[controller]].connect(None)
-
-    def connect_drive(self, drive, watchdog_pin, low_side_2_pin, low_side_6_pin) -> None:
-        """The board's PWM unit and three of its pins drive a bridge."""
-        self.drive = drive
-        self.watchdog_pin = watchdog_pin
-        self.low_side_2_pin = low_side_2_pin
-        self.low_side_6_pin = low_side_6_pin
-
-    def push(
-        self,
-        time: cython.longlong,
-        order: cython.longlong,
-        kind: cython.longlong,
-        a: cython.longlong = 0,
-        b: cython.longlong = 0,
-        c: cython.longlong = 0,
-        d: cython.longlong = 0,
-        e: cython.longlong = 0,
-        f: cython.longlong = 0,
-        ref: object = None,
-    ) -> None:
-        """Carry on what the board puts out at `time` (ns)."""
-        if kind == 36:  # PIN_OUTPUT
-            if a == self.watchdog_pin:
-                self.drive.watchdog_edge(time)
-            elif a == self.low_side_2_pin:
-                self.low_side_2 = b != 0
-                self.drive.low_side(time, self.low_side_2, self.low_side_6)
-            elif a == self.low_side_6_pin:
-                self.low_side_6 = b != 0
-                self.drive.low_side(time, self.low_side_2, self.low_side_6)
-        elif kind == 35:  # PWM_UPDATE
-            if self.drive is not None:
-                self.drive.write_pwm(time, a, b, c)
-        elif kind == 32:  # CAN_REQUEST
-            self.request(time, a, b, c, d, e, f)
-        elif kind == 33 or kind == 34:  # CAN_ABORT, CAN_MODE
-            if self.buses[a] is None:
-                self._to_bus_outside(kind, time, a, b, c, d, e, f)
-            elif kind == 33:
-                self.buses[a].abort(self.nodes[a], b, time)
-            else:
-                self.buses[a].set_mode(self.nodes[a], b, time)
-        elif kind == 37:  # SSP_START
-            self.link.start(time, ref)
-            self.board.stop_at(time + self.link.exchange_ns + self.window_ns)
-        elif kind == 38:  # SSP_LOAD
-            self.link.load(ref)
-        elif kind == 39:  # UART_OUTPUT
-            self._to_serial_line(time, a, b, c, ref)
-
-    def request(
-        self,
-        time: cython.longlong,
-        controller: cython.longlong,
-        buffer: cython.longlong,
-        identifier: cython.longlong,
-        flags: cython.longlong,
-        lo: cython.longlong,
-        hi: cython.longlong,
-    ) -> None:
-        """Carry a frame to its bus."""
-        if time < self.silent_until:
-            self._spoke_early(time)
-        if self.buses[controller] is None:
-            self._to_bus_outside(CAN_REQUEST, time, controller, buffer, identifier, flags, lo, hi)
-        else:
-            cython.cast(Bus, self.buses[controller]).request(
-                self.nodes[controller], buffer, time, identifier, flags, lo, hi
-            )
-            if time + self.window_ns < self.board.horizon:
-                self.board.stop_at(time + self.window_ns)
-
-    def _spoke_early(self, time) -> None:
-        raise UserError(
-            f"{self.board.name}: a frame was sent at {time} ns, but by its schedule's `speakers` none could be before"
-            f" {self.silent_until} ns: name the task that sends there; for a handler that sends, leave `speakers` out"
-        )
-
-    def _to_bus_outside(self, kind, time, controller, b, c, d, e, f) -> None:
-        line = self.can_lines.get(controller)
-        if line is not None:
-            line.from_board(kind, time, b, c, d, e, f)
-
-    def _to_serial_line(self, time, uart, byte, count, data) -> None:
-        if self.imu is not None and uart == self.imu_uart:
-            self.imu.receive_byte(time, byte)
-            return
-        line = self.serial_lines.get(uart)
-        if line is not None:
-            line.from_board(time, byte, count, data)
+ANY_DISTANCE_M = 1e300
 
 
 class Lockstep:
     """Boards, buses and plant on one clock. Built by `harness.ranger.Ranger`, which wires it."""
 
-    def __init__(self, plant, boards, buses, recorder, start_ns) -> None:
+    def __init__(self, plant, boards, buses, sampler, start_ns) -> None:
         # the compiled loop takes these for what they should be without asking again
-        for thing, kind in (*((b, Microcontroller) for b in boards), *((b, Bus) for b in buses)):
+        for thing, kind in (*((b, Board) for b in boards), *((b, Bus) for b in buses)):
             if not isinstance(thing, kind):
                 raise UserError(f"lockstep: {thing!r} is no {kind.__name__}")
         self.plant = plant
-        self.boards = boards
-        self.remote = all(isinstance(board, RemoteBoard) for board in boards)  # each in a process of its own
+        self.boards = list(boards)
         self.buses = buses
-        self.samples = recorder.samples
-        self.words = recorder.words
+        self.sampler = sampler
+        self.strikes = None
         self.time = start_ns
         self.window_ns = WINDOW_NS
-        self.next_sample = start_ns
-        self.main_brain = None
-        self.encoder_boards = array.array("q")  # numbers of the boards with encoders on their pins
+        self.side_by_side = False
+        self.stop_steps = NEVER
+        self.stop_distance_m = ANY_DISTANCE_M
         self.step_times = array.array("q", [start_ns, start_ns])  # ns, of the step that the sensors show
-        self.word_wires = []
-        self.main_brain_words = array.array("q")
-        self.records_words = False
-        self.sample_row = array.array("d", [0.0]) * 64
-        self.sample_count = 0
         # per board the instant (ns) at which it must run, and that at which something comes in that may wait;
         # behind the boards' the instant at which a bus must decide
         self.due = integers(len(boards) + 1, start_ns)
         self.came = integers(len(boards), start_ns)
         self.prompt = integers(len(boards), 1)
+        self.wires = []
         for place, board in enumerate(boards):
+            self.wires.append(BoardWires(board, WINDOW_NS))
+            self._put(place, board)
             board.inbox.wake(self.due, self.due, place)
-        self.wires = [BoardWires(board, WINDOW_NS) for board in boards]
-        for board, wires in zip(boards, self.wires, strict=True):
-            board.outbox = wires
         for bus in buses:
             bus.wake(self.due, len(boards))
-        self.stop_steps = 1 << 62
-        self.stop_distance_m = 1e300
-        self.imu = None
-        self.imu_board = None
-        self.imu_uart = 0
-        self.imu_tap = None  # hears what the inertial unit sends, beside its board
-        self.estimator = None
-        self.swing_leg = 1
-        self.strike_seen_ns = -1
-        self.strike_count = 0
-        self.strikes_unmatched = 0
-        self.strikes_missed = 0
-        self.steps_noticed = 0
-        self.strike_sum_ms = 0.0
-        self.strike_squares_ms2 = 0.0
+        self.word_wires = []
+        self.encoder_wires = []  # (place of the board, edges, two pins)
+        self.encoder_boards = array.array("q")  # places of the boards with encoders on their pins
+        self.imu_wire = None
+
+    def _put(self, place, board) -> None:
+        """`board` stands at `place`, on the wires there."""
+        self.boards[place] = board
+        self.wires[place].lead_from(board)
+        self.side_by_side = any(each.apart for each in self.boards)
+
+    # --- wiring -------------------------------------------------------------------------------------------
+
+    def place(self, name) -> int:
+        """Where the board of this name stands among the boards."""
+        for place, board in enumerate(self.boards):
+            if board.name == name:
+                return place
+        raise UserError(f"lockstep: no board is called {name}")
+
+    def board(self, name) -> Board:
+        """The board of this name."""
+        return self.boards[self.place(name)]
+
+    def replace(self, board) -> None:
+        """`board` stands from now on where the board of its name stood: on the same wires, at the same sensors.
+
+        Its inbox is that of the other one, because buses, link and operator write there.
+        """
+        place = self.place(board.name)
+        before = self.boards[place]
+        if not isinstance(board, Board):
+            raise UserError(f"lockstep: {board!r} is no Board")
+        if board.inbox is not before.inbox:
+            raise UserError(f"lockstep: the inbox of the new {board.name} is not that of the one whose place it takes")
+        self._put(place, board)
+        for wire in self.encoder_wires:
+            if wire[0] == place:
+                board.listen_to_edges(*wire[1:])
+        for wire in self.word_wires:
+            if wire.board is before:
+                wire.board = board
+        for watcher in (self.sampler, self.strikes):
+            if watcher is not None and watcher.board is before:
+                watcher.board = board
 
     def hears_in_its_slots(self, board) -> None:
         """Not urgent messages (`EventQueue.put`) wait for tasks of `board`: no handler sends or looks at a sensor."""
-        place = self.boards.index(board)
+        place = self.place(board.name)
         self.prompt[place] = 0
         board.inbox.wake(self.came, self.due, place)
 
     def connect_encoder(self, encoder, board, pin_a, pin_b) -> None:
         """Channels A and B of `encoder` on two pins of `board`."""
+        place = self.place(board.name)
         board.listen_to_edges(encoder.edges, pin_a, pin_b)
-        number = self.boards.index(board)
-        if number not in self.encoder_boards:
-            self.encoder_boards = array.array("q", list(self.encoder_boards) + [number])
-
-    def connect_imu(self, imu, board, uart) -> None:
-        """The inertial unit's bytes go to UART `uart` of `board`, the board's to the unit; None: no unit is there."""
-        wires: BoardWires = self.wires[self.boards.index(board)]
-        self.imu = imu
-        self.imu_board = board
-        self.imu_uart = uart
-        wires.imu = imu
-        wires.imu_uart = uart
-
-    def connect_link(self, wire) -> None:
-        """The serial link `wire` between two boards."""
-        for board in (wire.master, wire.slave):
-            wires: BoardWires = self.wires[self.boards.index(board)]
-            wires.link = wire
+        self.encoder_wires.append((place, encoder.edges, pin_a, pin_b))
+        self.encoder_boards = array.array("q", sorted({wire[0] for wire in self.encoder_wires}))
 
     def connect_voltage(self, source, board, channel) -> None:
         """Voltage `source` of the plant on analog input `channel` of `board`."""
         board.analog.follow(channel, self.step_times, self.plant.analog_start, self.plant.analog_end, source)
 
+    def connect_word(self, source, board, word) -> None:
+        """Digital word `source` of the plant is word `word` of `board`."""
+        self.word_wires.append(WordWire(source, board, word))
+
+    def connect_link(self, master, slave, exchange_ns, idle_segment) -> None:
+        """The serial link between two boards; the slave sends `idle_segment` until it has put one up itself."""
+        link = SspWire(master, slave, exchange_ns, idle_segment)
+        for board in (master, slave):
+            self.wires[self.place(board.name)].link = link
+
+    def connect_imu(self, imu, board, uart) -> None:
+        """The inertial unit `imu` of the plant hangs on UART `uart` of `board`."""
+        self.imu_wire = ImuWire(imu, board, uart)
+        self.connect_serial_line(board, uart, self.imu_wire)
+
+    def connect_serial_line(self, board, uart, line) -> None:
+        """What `board` sends by UART `uart` goes to `line.from_board(time, byte, count, data)`, and nowhere else."""
+        self.wires[self.place(board.name)].serial_lines[uart] = line
+
     def watch_strikes(self, main_brain) -> None:
         """Time from the body's heel strikes to the main-brain slots that notice them."""
-        self.main_brain = main_brain
-        self.estimator = main_brain.estimator
-        self.swing_leg = main_brain.estimator.swing_leg
+        self.strikes = StrikeWatch(self.plant, main_brain)
+
+    # --- passing time -------------------------------------------------------------------------------------
+
+    def stop_at(self, steps, distance_m) -> None:
+        """The walk is over after so many steps, or so many metres; None: no such end."""
+        self.stop_steps = NEVER if steps is None else steps
+        self.stop_distance_m = ANY_DISTANCE_M if distance_m is None else distance_m
 
     def run(self, until: cython.longlong) -> cython.longlong:
         """Advance to `until` (ns) or until the walk is over; returns one of the reasons above."""
         plant: RangerPlant = self.plant
-        board: Microcontroller
+        sampler: Sampler = self.sampler
+        board: Board
         wires: BoardWires
         i: cython.longlong
         now: cython.longlong
         end: cython.longlong
-        reason: cython.longlong = 0
+        reason: cython.longlong = REACHED_TIME
         boards: list = self.boards
         board_count: cython.longlong = len(boards)
         due: cython.longlong[::1] = self.due
@@ -333,8 +200,8 @@ class Lockstep:
         while self.time < until:
             now = self.time
             if plant.time_ns <= now:
-                if now >= self.next_sample:
-                    self._sample(now)
+                if now >= sampler.next_ns:
+                    sampler.take(now)
                 reason = self._walk_is_over()
                 if reason:
                     break
@@ -342,13 +209,13 @@ class Lockstep:
                 plant.step()
                 self._sense()
             end = plant.time_ns if plant.time_ns < until else until
-            if self.remote:
+            if self.side_by_side:
                 self._run_side_by_side(end)
             else:
                 self._run_in_turn(end, end == until)
             self.time = end
-            if self.estimator is not None and self.estimator.swing_leg != self.swing_leg:
-                self._notice_strike()
+            if self.strikes is not None:
+                self.strikes.look()
         due[board_count] = self._decide(self.time - 1)
         return reason
 
@@ -358,7 +225,7 @@ class Lockstep:
 
         `last`: somebody looks at the boards then. Otherwise a board that has only heard something is left alone.
         """
-        board: Microcontroller
+        board: Board
         i: cython.longlong
         alone: cython.longlong
         first: cython.longlong
@@ -373,7 +240,7 @@ class Lockstep:
             if cython.compiled:  # without a branch: no processor could foresee which board is next
                 alone = board_count
                 first = due[board_count]
-                second = 1 << 62
+                second = NEVER
                 for i in range(board_count):
                     time = due[i]
                     later = first if first > time else time
@@ -392,20 +259,20 @@ class Lockstep:
                 due[alone] = self._advance(alone, second if second < end else end)
         for i in range(board_count):
             if came[i] < end:
-                board = cython.cast(Microcontroller, self.boards[i])
+                board = cython.cast(Board, self.boards[i])
                 if last or board.next_time < end or board.edge_time < end:
                     due[i] = self._advance(i, end)
         return first
 
     @cython.final
     def _run_side_by_side(self, end: cython.longlong) -> cython.longlong:
-        """Run boards in processes of their own, and buses, to `end` (ns) in windows; returns how many there were."""
+        """Run boards that run apart, and buses, to `end` (ns) in windows; returns how many there were."""
         i: cython.longlong
         now: cython.longlong = self.time
         late: cython.longlong = 0
         windows: cython.longlong = 0
         first: cython.longlong
-        away: RemoteBoard
+        board: Board
         due: cython.longlong[::1] = self.due
         came: cython.longlong[::1] = self.came
         board_count: cython.longlong = len(self.boards)
@@ -423,8 +290,8 @@ class Lockstep:
                 now = late = end
             for i in range(board_count):
                 if due[i] < now or came[i] < late:
-                    away = cython.cast(RemoteBoard, self.boards[i])
-                    away.begin(now)
+                    board = cython.cast(Board, self.boards[i])
+                    board.begin(now)
             for i in range(board_count):
                 if due[i] < now or came[i] < late:
                     due[i] = self._advance(i, now)
@@ -434,7 +301,7 @@ class Lockstep:
     @cython.final
     def _advance(self, place: cython.longlong, until: cython.longlong) -> cython.longlong:
         """Run a board to `until` (ns) or less; returns when it is due again."""
-        board: Microcontroller = cython.cast(Microcontroller, self.boards[place])
+        board: Board = cython.cast(Board, self.boards[place])
         wires: BoardWires
         following: cython.longlong = board.advance(until)
         if board.inbox.head_time < following:
@@ -463,7 +330,7 @@ class Lockstep:
         bus: Bus
         i: cython.longlong
         next_time: cython.longlong
-        first: cython.longlong = 1 << 62
+        first: cython.longlong = NEVER
         buses: list = self.buses
         for i in range(len(buses)):
             bus = cython.cast(Bus, buses[i])
@@ -474,26 +341,7 @@ class Lockstep:
                 first = next_time
         return first
 
-    def _notice_strike(self) -> cython.void:
-        """The main brain has flipped the swing leg: how long after the body's strike began that slot?"""
-        delay_ms: cython.double
-        struck: cython.longlong = self.plant.strike_time_ns
-        self.swing_leg = self.estimator.swing_leg
-        if self.plant.steps == 0:
-            return  # the reset on entering the walk
-        if struck == self.strike_seen_ns:
-            self.strikes_unmatched += 1
-            return
-        if self.plant.steps > self.steps_noticed + 1:
-            self.strikes_missed += self.plant.steps - self.steps_noticed - 1
-        self.steps_noticed = self.plant.steps
-        self.strike_seen_ns = struck
-        delay_ms = (self.main_brain.scheduler.slot_time - struck) * 1e-6
-        self.strike_count += 1
-        self.strike_sum_ms += delay_ms
-        self.strike_squares_ms2 += delay_ms * delay_ms
-
-    def _sense(self) -> cython.void:
+    def _sense(self) -> None:
         """What the plant's sensors showed during the step that was just integrated."""
         plant: RangerPlant = self.plant
         i: cython.longlong
@@ -501,21 +349,19 @@ class Lockstep:
         start: cython.longlong = end - plant.step_ns
         self.step_times[0] = start
         self.step_times[1] = end
-        board: Microcontroller
+        board: Board
         place: cython.longlong
         first: cython.longlong
         for i in range(len(self.encoder_boards)):
             place = self.encoder_boards[i]
-            board = cython.cast(Microcontroller, self.boards[place])
+            board = cython.cast(Board, self.boards[place])
             first = board.edges_came()
             if first < self.came[place]:
                 self.came[place] = first
                 if self.prompt[place] and first < self.due[place]:
                     self.due[place] = first
-        if self.imu is not None and self.imu.bytes.count:
-            if self.imu_tap is not None:
-                self.imu_tap.bytes_sent(self.imu.bytes.times, self.imu.bytes.values, self.imu.bytes.count)
-            self._deliver_bytes()
+        if self.imu_wire is not None:
+            self.imu_wire.deliver()
 
     def _show_words(self) -> cython.void:
         """What the absolute encoders hold at the start of the step: their words stand until the next one."""
@@ -523,48 +369,3 @@ class Lockstep:
         wire: WordWire
         for wire in self.word_wires:
             wire.board.words[wire.word] = plant.words[wire.source]
-
-    def _deliver_bytes(self) -> cython.void:
-        """Bytes of the inertial unit: up to eight that follow each other closely travel as one message."""
-        line: ByteBuffer = self.imu.bytes
-        board: Microcontroller = self.imu_board
-        time: cython.longlong = line.times[0]
-        following: cython.longlong
-        byte: cython.longlong
-        n: cython.longlong = 0  # bytes in `low` and `high`, the first one in the lowest place
-        low: cython.longlong = 0
-        high: cython.longlong = 0
-        i: cython.longlong
-        for i in range(line.count):
-            following = line.times[i]
-            if n == 8 or following - time >= 25_000:
-                # order 256: stage pins; kind 5: UART_BYTE
-                board.inbox.put(time, 256, 5, self.imu_uart, low & 255, n, low, high, 0)
-                n = low = high = 0
-            byte = line.values[i]
-            if n < 4:
-                low |= byte << (8 * n)
-            else:
-                high |= byte << (8 * n - 32)
-            n += 1
-            time = following
-        board.inbox.put(time, 256, 5, self.imu_uart, low & 255, n, low, high, 0)
-
-    def _sample(self, now: cython.longlong) -> None:
-        """One row of the trace: the body, and when a log is kept the main brain's data table."""
-        stream: RowStream = self.samples
-        at: cython.longlong = stream.used
-        i: cython.longlong
-        self.plant.fill_sample(self.sample_row)
-        stream.reals[at] = now * 1e-9
-        for i in range(self.sample_count):
-            stream.reals[at + 1 + i] = self.sample_row[i]
-        stream.finish_row(now)
-        if self.records_words:
-            stream = self.words
-            at = stream.used
-            stream.integers[at] = now
-            for i in range(stream.columns - 1):
-                stream.integers[at + 1 + i] = self.main_brain_words[i]
-            stream.finish_row(now)
-        self.next_sample += SAMPLE_NS

@@ -22,7 +22,7 @@ from ranger_sim.can_bus.bus import Bus
 from ranger_sim.datatable.generated import all_variables
 from ranger_sim.firmware_sim.clock import seeded_crystal
 from ranger_sim.foundation import wallclock
-from ranger_sim.foundation.events import STAGE_BUS
+from ranger_sim.foundation.events import NEVER, STAGE_BUS
 from ranger_sim.foundation.random_stream import RandomStream
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness import bus_schedule, lockstep, wiring
@@ -30,6 +30,7 @@ from ranger_sim.harness.logbook import Logbook
 from ranger_sim.harness.operator import Operator
 from ranger_sim.harness.profile import Profile
 from ranger_sim.harness.recorder import Recorder
+from ranger_sim.harness.sampler import Sampler
 from ranger_sim.harness.scenario import Scenario, StopRule
 from ranger_sim.plant.ranger import RangerPlant
 
@@ -88,9 +89,10 @@ class Ranger:
             bus.log.stream = stream
             bus.reset_statistics(self.start_ns)  # loads count from the start of the run
         self.logbook = Logbook(self.recorder, log)
-        self.loop: Any = lockstep.Lockstep(
-            self.plant, [self.boards[name] for name in wiring.BOARDS], self.buses, self.recorder, self.start_ns
-        )
+        words = self.recorder.words if self.logbook.records_words else None
+        sampler = Sampler(self.plant, self.boards["MB"], self.recorder.samples, words, self.start_ns)
+        boards = [self.boards[name] for name in wiring.BOARDS]
+        self.loop: Any = lockstep.Lockstep(self.plant, boards, self.buses, sampler, self.start_ns)
         self._connect()
         if profile is not None:
             for board in self.boards.values():
@@ -128,9 +130,7 @@ class Ranger:
             channel = wiring.ANALOG_INPUTS[analog.board][analog.input]
             loop.connect_voltage(analog.voltage, boards[analog.board], channel)
         for word in wiring.WORDS:
-            loop.word_wires.append(
-                lockstep.WordWire(word.word, boards[word.board], wiring.WORD_REGISTERS[word.register])
-            )
+            loop.connect_word(word.word, boards[word.board], wiring.WORD_REGISTERS[word.register])
         for can_wire in wiring.CAN:
             board, bus = boards[can_wire.board], self.buses[can_wire.bus - 1]
             node = bus.add_node(
@@ -145,12 +145,9 @@ class Ranger:
             loop.wires[place[name]].connect_drive(
                 self.plant.motors[motor].drive, pins["motor_watchdog"], pins["low_side_2"], pins["low_side_6"]
             )
-        loop.connect_link(lockstep.SspWire(boards["CSR"], boards["MB"], EXCHANGE_NS, empty_segment()))
+        loop.connect_link(boards["CSR"], boards["MB"], EXCHANGE_NS, empty_segment())
         loop.connect_imu(self.plant.imu, boards[wiring.IMU_BOARD], wiring.IMU_UART)
         loop.watch_strikes(boards["MB"])
-        loop.sample_count = len(self.plant.sample_names)
-        loop.main_brain_words = boards["MB"].store.words
-        loop.records_words = self.logbook.records_words
 
     # --- passing time -------------------------------------------------------------------------------------
 
@@ -159,9 +156,8 @@ class Ranger:
         if self.ended:
             return True
         loop = self.loop
-        loop.stop_steps = stop.steps if stop.steps is not None else 1 << 62
-        loop.stop_distance_m = stop.distance_m if stop.distance_m is not None else 1e300
-        limit = 1 << 62 if stop.time_s is None else self.start_ns + round(stop.time_s * 1e9)
+        loop.stop_at(stop.steps, stop.distance_m)
+        limit = NEVER if stop.time_s is None else self.start_ns + round(stop.time_s * 1e9)
         until = min(loop.time + round(slice_s * 1e9), limit)
         cpu, wall = wallclock.process_cpu_s(), wallclock.monotonic_s()
         reason = lockstep.REACHED_TIME
@@ -271,7 +267,7 @@ class Ranger:
                 f"variable {name!r}: none of the table's {len(all_variables.ID_OF)} has this name; "
                 f"{instead}`ranger-sim table list` shows them"
             )
-        return value_of_word(all_variables.TYPES[number], self.boards["MB"].store.get_word(number))
+        return value_of_word(all_variables.TYPES[number], self.loop.board("MB").memory[number])
 
     def replace(
         self, board: str, task: str, function: Callable[[], int | None], cost: int, limit: int | None = None

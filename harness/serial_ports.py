@@ -384,19 +384,19 @@ def connect_imu(robot: Ranger, port: Port) -> SerialLine:
     """A real inertial unit at the port, instead of the plant's, on the user interface board's UART."""
     board = robot.boards[wiring.IMU_BOARD]
     line = SerialLine(board.inbox.push, wiring.IMU_UART, port, board.uart1.byte_ns)
-    robot.loop.connect_imu(None, board, wiring.IMU_UART)
+    robot.loop.imu_wire.unplug()
     return _connect(robot, wiring.IMU_BOARD, line)
 
 
 def offer_imu(robot: Ranger, port: Port) -> ImuOffer:
     """The plant's inertial unit for a real host at the port."""
     offer = ImuOffer(robot.plant.imu, port)
-    robot.loop.imu_tap = offer
+    robot.loop.imu_wire.tap = offer
     robot.attach(offer)
     return offer
 
 
 def _connect(robot: Ranger, board: str, line: SerialLine) -> SerialLine:
-    robot.loop.wires[wiring.BOARDS.index(board)].serial_lines[line.uart] = line
+    robot.loop.connect_serial_line(robot.boards[board], line.uart, line)
     robot.attach(line)
     return line

@@ -1,6 +1,5 @@
 """The walk in numbers."""
 
-import math
 from typing import Any
 
 from ranger_sim import loading
@@ -40,7 +39,7 @@ def of(robot: Any) -> dict:
         "total_power_W": total,
         "tcot": total / (MASS_KG * GRAVITY * speed) if speed > 0.0 else None,
         "battery_V": plant.battery_V,
-        "heel_strike_delay_ms": strike_delay(robot.loop),
+        "heel_strike_delay_ms": robot.loop.strikes.statistics(),
         "oddities": oddities(plant),
         "can": {bus.name: can(robot, bus) for bus in robot.buses},
         "slots": {name: slots(board) for name, board in robot.boards.items()},
@@ -82,27 +81,6 @@ def oddities(plant: Any) -> dict:
         "slip_s": body.seen.slip_s,
         "normal_force_min_N": body.seen.normal_force_min,
         "min_clearance_m": record.min_clearance_m,
-    }
-
-
-def strike_delay(loop: Any) -> dict:
-    """From the plant's strike to the start of the main-brain slot that flips the swing flag."""
-    n = loop.strike_count
-    if n == 0:
-        return {
-            "mean": None,
-            "std": None,
-            "count": 0,
-            "unmatched": loop.strikes_unmatched,
-            "missed": loop.strikes_missed,
-        }
-    mean = loop.strike_sum_ms / n
-    return {
-        "mean": mean,
-        "std": math.sqrt(max(0.0, loop.strike_squares_ms2 / n - mean * mean)),
-        "count": n,
-        "unmatched": loop.strikes_unmatched,
-        "missed": loop.strikes_missed,
     }
 
 

@@ -16,8 +16,7 @@ from ranger_sim import loading
 from ranger_sim.foundation import wallclock
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness import wiring
-from ranger_sim.harness.processes import block as places
-from ranger_sim.harness.processes import control
+from ranger_sim.harness.processes import control, places
 from ranger_sim.harness.processes.hardware import HardwareInTheLoop
 from ranger_sim.harness.processes.lateness import figures
 from ranger_sim.harness.processes.outside import move_bus

@@ -67,6 +67,7 @@ class MainBrainBoard(FirmwareBoard):
         board: object = self  # a compiled class would hand out wrappers of inherited methods
         FirmwareBoard.__init__(self, table, crystal, quirks, quirks.errors_reported_one_late)
         self.store = DataStore(TABLE_SIZE)
+        self.memory = self.store.words
         self.store.on_out_of_range = self.id_out_of_range
         for number, value in table.INITIAL.items():
             if table.TYPES[number] == "f32":
@@ -116,6 +117,15 @@ class MainBrainBoard(FirmwareBoard):
             controller = controllers.load(controller)
         self.controller = controller
         controller.apply(self.store)
+
+    def move_memory(self, words) -> None:
+        """The data table stands in `words` from now on."""
+        self.store.move(words)
+        self.memory = words
+
+    def watched(self) -> cython.longlong:
+        """The swing leg, as the estimator has it."""
+        return self.estimator.swing_leg
 
     def schedule(self) -> Schedule:
         """Source: robot.md N3.8.

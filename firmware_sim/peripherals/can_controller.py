@@ -21,8 +21,10 @@ import cython
 from ranger_sim.can_bus.transmit_ends import TransmitEnds
 from ranger_sim.firmware_sim.microcontroller import Peripheral
 from ranger_sim.firmware_sim.vic import InterruptSource
-from ranger_sim.foundation.events import CAN_RX, CAN_STATUS, CAN_TX_DONE
 from ranger_sim.foundation.user_error import UserError
+
+if not cython.compiled:
+    from ranger_sim.foundation.events import CAN_RX, CAN_STATUS, CAN_TX_DONE, NEVER
 
 CMR_TR, CMR_AT, CMR_RRB, CMR_CDO, CMR_SRR, CMR_STB1, CMR_STB2, CMR_STB3 = 1, 2, 4, 8, 16, 32, 64, 128
 ICR_RI, ICR_TI1, ICR_EI, ICR_DOI, ICR_EPI, ICR_ALI, ICR_BEI, ICR_TI2, ICR_TI3 = 1, 2, 4, 8, 32, 64, 128, 512, 1024
@@ -115,6 +117,10 @@ class CanController(Peripheral):
         chip.claim(CAN_TX_DONE, number, self)
         chip.claim(CAN_STATUS, number, self)
 
+    def transmit_ends(self) -> object:
+        """Where a bus writes the ends of its transmissions."""
+        return self.ends
+
     def bit_rate(self) -> cython.double:
         """Bits per second by CxBTR and the chip's clock."""
         return bit_rate_of(self.BTR, self.chip.hz)
@@ -134,21 +140,19 @@ class CanController(Peripheral):
 
     def tell_end(self, buffer: cython.longlong) -> None:
         """The next end of a transmission from a buffer shall come as a message."""
-        never: cython.longlong = 1 << 62
         end: cython.longlong = self.ends.times[buffer]
         status: cython.longlong = self.ends.statuses[buffer]
-        self.ends.times[buffer] = never + 1  # BY_MESSAGE
-        if end < never:
-            self.chip.inbox.put(end, self.ends.order, 3, self.number, buffer, status, 0, 0, 0)  # CAN_TX_DONE
+        self.ends.times[buffer] = NEVER + 1  # BY_MESSAGE
+        if end < NEVER:
+            self.chip.inbox.put(end, self.ends.order, CAN_TX_DONE, self.number, buffer, status, 0, 0, 0)
             if end < self.chip.stop_time:
                 self.chip.stop_time = end
 
     def tell_first_end(self) -> None:
         """Buffers 1 and 2 are not free: the end that frees one of them first shall come as a message."""
-        never: cython.longlong = 1 << 62
-        if self.ends.times[1] < never:
+        if self.ends.times[1] < NEVER:
             self.tell_end(1)
-        elif self.ends.times[2] < never:
+        elif self.ends.times[2] < NEVER:
             self.tell_end(2)
         else:  # neither has started
             self.tell_end(1)
@@ -172,7 +176,7 @@ class CanController(Peripheral):
 
     def _end(self, buffer: cython.longlong, status: cython.longlong) -> cython.void:
         """The transmission from a buffer has ended."""
-        self.ends.times[buffer] = 1 << 62
+        self.ends.times[buffer] = NEVER
         self.ended |= 1 << buffer
         if status == 0:
             self.sent += 1

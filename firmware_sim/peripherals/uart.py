@@ -87,7 +87,7 @@ class Uart(Peripheral):
             bytes_left >>= 8
         self.fifo_count = behind
         if behind >= self.trigger:
-            self.timeout_alarm.set(1 << 62)  # NEVER
+            self.timeout_alarm.set(NEVER)
             self.IIR = 4
             return self.source
         self.timeout_alarm.set(queue.time + 4 * self.byte_ns)
@@ -121,7 +121,7 @@ class Uart(Peripheral):
                 self.fifo[i] = self.fifo[count + i]
             if self.fifo_count == 0:
                 self.IIR = 1
-                self.timeout_alarm.set(1 << 62)
+                self.timeout_alarm.set(NEVER)
             else:
                 self.timeout_alarm.set(self.chip.now + 4 * self.byte_ns)
 

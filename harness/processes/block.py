@@ -1,8 +1,7 @@
-"""Where every word stands in the memory that the processes share. All anonymous: it is gone with the processes.
+"""The memory that the processes share. All of it is anonymous: it is gone with the processes.
 
 One block per board, written by its board process, the plant process and the supervisor; one stage, written by the
-plant process, where all boards see what the sensors show. Every word is a signed 64-bit integer in the machine's
-order; doubles stand in the same words.
+plant process, where all boards see what the sensors show. places.py says where every word stands.
 """
 
 import mmap
@@ -11,59 +10,22 @@ from typing import Any
 
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.processes.channel import SLOT_WORDS, VERSION
+from ranger_sim.harness.processes.places import (
+    FAULT_TEXT,
+    FAULT_WORDS,
+    MAGIC_WORD,
+    PLACE_WORD,
+    ROW_SIZE,
+    SLOTS,
+    SLOTS_WORD,
+    STAGE_FIRST,
+    STAGE_RING,
+    TABLE,
+    TABLE_WORD,
+    VERSION_WORD,
+)
 
 MAGIC = 0x52414E4745523031  # "RANGER01"
-SLOTS = 1024  # of each mailbox: forty times what a turn of the default scenario needs at most
-
-# --- a board's block: header
-MAGIC_WORD, VERSION_WORD, PLACE_WORD, SLOTS_WORD, TABLE_WORD = 0, 1, 2, 3, 4
-# the plant's words
-ASKED = 16  # how often the plant has rung
-BOARD_SLEEPS = 17
-COMMAND = 18  # one of the COMMAND_* below
-UNTIL = 19  # ns: run everything before this instant
-ASK_USED = 20  # slots in use of the mailbox to the board
-ROWS = 21  # rows of the stage that were written so far
-POWER_UP = 22  # ns: when a restarted board gets its power
-# the board's words
-ANSWERED = 32  # how often the board has rung
-PLANT_SLEEPS = 33
-RESULT = 34  # one of the RESULT_* below
-NEXT_TIME = 35  # ns: `next_time` of the board
-NEXT_OUTPUT = 36  # ns: before this instant it puts nothing out, whatever comes in of a kind that can wait
-ANSWER_USED = 37  # slots in use of the mailbox from the board
-SWING_LEG = 38  # of the main brain's estimator
-SLOT_TIME = 39  # ns: start of the latest slot
-SLOT_COUNT = 40
-OVERRUNS = 41
-MAX_SLOT_CYCLES = 42
-ERRORS = 43  # errors that the board noted, all names together
-DAMAGED = 44  # messages to the board that were not readable
-REACHED = 45  # ns: the instant up to which it has run
-LATE_MAX = 46  # ns
-LATE_COUNT = 47
-TURNS = 48
-URGENT = 49  # message kinds (bits) that the board may answer at once
-# the supervisor's words
-FATE = 56  # 0 alive, 1 gone: nobody will answer
-# text of what ended the process, UTF-8, its length in bytes in the first word
-FAULT_TEXT, FAULT_WORDS = 64, 64
-LATENESS, LATENESS_WORDS = 128, 1344  # see lateness.py
-TABLE = LATENESS + LATENESS_WORDS
-
-COMMAND_ADVANCE, COMMAND_MORE, COMMAND_SNAPSHOT, COMMAND_STOP = 1, 2, 3, 4
-RESULT_DONE, RESULT_MORE = 0, 1
-
-# --- the stage: header, pace, then a ring of rows, one per step of the plant
-STAGE_ROWS = 2  # rows written so far
-PACED = 3  # 1 when virtual time follows the wall clock
-PACE_WALL_NS = 4  # monotonic clock when virtual time was PACE_TIME_NS
-PACE_TIME_NS = 5
-PACE_WALL_PER_TIME = 6  # a double: 1 / speed
-HEARTBEAT_NS = 8  # monotonic clock when the plant process last went round its loop
-STAGE_FIRST, STAGE_RING = 64, 64
-ROW_START, ROW_END, ROW_WORDS, ROW_ANALOG_START, ROW_ANALOG_END, ROW_SIZE = 0, 1, 2, 16, 48, 80
-MOST_WORDS, MOST_VOLTAGES = 14, 32
 
 
 class Block:

@@ -5,8 +5,7 @@ import traceback
 from typing import Any
 
 from ranger_sim.harness import wiring
-from ranger_sim.harness.processes import block as places
-from ranger_sim.harness.processes import kernel
+from ranger_sim.harness.processes import kernel, places
 from ranger_sim.harness.processes.block import Block
 from ranger_sim.harness.processes.channel import Bell
 from ranger_sim.harness.processes.endpoint import Endpoint
@@ -34,9 +33,7 @@ def serve(robot: Any, name: str, block: Block, stage: tuple, settings: Settings,
             pass
         board = wire_fresh_board(robot, name, block.words[places.POWER_UP])
     if block.table_words:
-        table = block.table()
-        table[:] = memoryview(board.store.words)
-        board.store.words = table
+        board.move_memory(block.table())
     wires = [
         (number, wire.word) for number, wire in enumerate(robot.loop.word_wires) if wire.board is robot.boards[name]
     ]

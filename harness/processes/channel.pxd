@@ -1,5 +1,42 @@
-from ranger_sim.foundation.events cimport EventQueue, Outbox
+from ranger_sim.foundation.events cimport CAN_REQUEST, FLAG_EXTENDED, EventQueue, Outbox
 from ranger_sim.firmware_sim.peripherals.ssp cimport SspSegment
+from ranger_sim.harness.processes.places cimport (
+    DIRECTION,
+    LEAST_PAYLOAD,
+    LIMIT_SIZE,
+    MOST_PAYLOAD,
+    RANGES,
+    SSP_USED,
+    SSP_WORDS,
+)
+
+cpdef enum:
+    VERSION = 1
+    SLOT_WORDS = 12
+    STAMP_WORD = 1
+    ORDER_WORD = 2
+    FIELDS_WORD = 3
+    CHECK_WORD = 11
+    FIELD_COUNT = 6
+    LONGEST = 23
+    FIRST_OWN_KIND = 64
+    LAST_KIND = 127
+    KIND_MASK = 255
+    VERSION_SHIFT = 8
+    PAYLOAD_SHIFT = 16
+    PAYLOAD_MASK = 65535
+    NUMBER_SHIFT = 32
+    NUMBER_MASK = 16777215
+    LAST_STANDARD_ID = 2047
+    FARTHEST_NS = 1000000000
+    OF_UNKNOWN_KIND = 1
+    OF_OTHER_VERSION = 2
+    TOO_LONG = 3
+    CHECK_WRONG = 4
+    NO_IDENTIFIER = 5
+    BAD_PAYLOAD = 6
+    OUT_OF_TIME = 7
+    FIELD_WRONG = 16
 
 # What a shared word needs that a plain array does not: order between processes, and a bell (an eventfd).
 cdef extern from *:

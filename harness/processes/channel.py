@@ -24,18 +24,55 @@ import cython
 
 from ranger_sim.firmware_sim.peripherals.ssp import SspSegment
 from ranger_sim.foundation.events import EventQueue, Outbox
-from ranger_sim.harness.processes.kinds import FIELDS, KINDS, NOTE_WORDS, PAYLOADS, limits
+from ranger_sim.harness.processes.kinds import FIELDS, KINDS, PAYLOADS, limits
+from ranger_sim.harness.processes.places import NOTE_WORDS
 
 if not cython.compiled:
+    from ranger_sim.foundation.events import CAN_REQUEST, FLAG_EXTENDED
+    from ranger_sim.harness.processes.places import (
+        DIRECTION,
+        LEAST_PAYLOAD,
+        LIMIT_SIZE,
+        MOST_PAYLOAD,
+        RANGES,
+        SSP_USED,
+        SSP_WORDS,
+    )
     from ranger_sim.harness.processes.plain import load, mix, pause, post, store
 
-VERSION = 1
-SLOT_WORDS = 12
-CHECK_WORD = 11
-LONGEST = 1 + (NOTE_WORDS + SLOT_WORDS - 1) // SLOT_WORDS  # slots of the longest message
+# C constants when compiled: the same numbers stand in the .pxd, and a test holds them together.
+if not cython.compiled:
+    VERSION = 1
+    SLOT_WORDS = 12
+    # where the parts of a message stand in its first slot
+    STAMP_WORD = 1
+    ORDER_WORD = 2
+    FIELDS_WORD = 3  # and the five after it
+    CHECK_WORD = 11
+    FIELD_COUNT = 6
+    LONGEST = 23  # slots of the longest message: one and those of NOTE_WORDS
+    FIRST_OWN_KIND = 64  # kinds from here on are between the processes only: no chip sees them
+    LAST_KIND = 127
+    # in word 0 of a message
+    KIND_MASK = 0xFF
+    VERSION_SHIFT = 8
+    PAYLOAD_SHIFT = 16
+    PAYLOAD_MASK = 0xFFFF
+    NUMBER_SHIFT = 32
+    NUMBER_MASK = 0xFFFFFF
+    LAST_STANDARD_ID = 0x7FF
+    FARTHEST_NS = 1_000_000_000  # between a stamp and the instant of its turn
 
-# What can be wrong with a message; 16 + i: field i is out of range.
-OF_UNKNOWN_KIND, OF_OTHER_VERSION, TOO_LONG, CHECK_WRONG, NO_IDENTIFIER, BAD_PAYLOAD, OUT_OF_TIME = 1, 2, 3, 4, 5, 6, 7
+    # What can be wrong with a message; FIELD_WRONG + i: field i is out of range.
+    OF_UNKNOWN_KIND = 1
+    OF_OTHER_VERSION = 2
+    TOO_LONG = 3
+    CHECK_WRONG = 4
+    NO_IDENTIFIER = 5
+    BAD_PAYLOAD = 6
+    OUT_OF_TIME = 7
+    FIELD_WRONG = 16
+
 FAULTS = {
     OF_UNKNOWN_KIND: "its kind is not one that goes this way",
     OF_OTHER_VERSION: f"it is not of version {VERSION}",
@@ -107,26 +144,31 @@ class Mailbox:
 
     def put(self, queue: EventQueue) -> cython.bint:
         """Add the message in the fields of `queue`; False when the mailbox is full (then nothing is written)."""
-        at: cython.longlong = self.first + self.used * 12
+        at: cython.longlong = self.first + self.used * SLOT_WORDS
         payload: cython.longlong = 0
         if self.used + LONGEST > self.slots:
             return False
-        self.words[at + 1] = queue.time
-        self.words[at + 2] = queue.order
-        self.words[at + 3] = queue.a
-        self.words[at + 4] = queue.b
-        self.words[at + 5] = queue.c
-        self.words[at + 6] = queue.d
-        self.words[at + 7] = queue.e
-        self.words[at + 8] = queue.f
+        self.words[at + STAMP_WORD] = queue.time
+        self.words[at + ORDER_WORD] = queue.order
+        self.words[at + FIELDS_WORD] = queue.a
+        self.words[at + FIELDS_WORD + 1] = queue.b
+        self.words[at + FIELDS_WORD + 2] = queue.c
+        self.words[at + FIELDS_WORD + 3] = queue.d
+        self.words[at + FIELDS_WORD + 4] = queue.e
+        self.words[at + FIELDS_WORD + 5] = queue.f
         self.words[at + 9] = 0
         self.words[at + 10] = 0
         if queue.ref is not None:
-            payload = self._write_payload(queue.kind, queue.ref, at + 12)
-        self.words[at] = queue.kind | 1 << 8 | payload << 16 | (self.sequence & 0xFFFFFF) << 32
-        self.words[at + 11] = self._check(at, payload)
+            payload = self._write_payload(queue.kind, queue.ref, at + SLOT_WORDS)
+        self.words[at] = (
+            queue.kind
+            | VERSION << VERSION_SHIFT
+            | payload << PAYLOAD_SHIFT
+            | (self.sequence & NUMBER_MASK) << NUMBER_SHIFT
+        )
+        self.words[at + CHECK_WORD] = self._check(at, payload)
         self.sequence += 1
-        self.used += 1 + (payload + 11) // 12
+        self.used += 1 + (payload + SLOT_WORDS - 1) // SLOT_WORDS
         return True
 
     def send(self) -> cython.void:
@@ -142,8 +184,8 @@ class Mailbox:
             segment = ref
             for i, half_word in enumerate(segment.words):
                 self.words[at + i] = half_word
-            self.words[at + 31] = segment.used
-            return 32
+            self.words[at + SSP_USED] = segment.used
+            return SSP_WORDS
         data = bytes(ref)
         padded = array.array("q", data + bytes(-len(data) % 8))  # the bytes themselves, eight to a word
         self.words[at] = len(data)
@@ -166,12 +208,13 @@ class Mailbox:
     def take(self, queue: Outbox) -> cython.bint:
         """Push the next whole message into `queue` (a kind of ours alone into `notes`); False at the end."""
         at: cython.longlong
+        kind: cython.longlong
         payload: cython.longlong
         fault: cython.longlong
         skipping: cython.bint = False
         ref: object
         while self.at < self.closed:
-            at = self.first + self.at * 12
+            at = self.first + self.at * SLOT_WORDS
             fault = self._fault(at)
             if fault != 0:
                 if not skipping:
@@ -179,31 +222,32 @@ class Mailbox:
                     self._damage(self.explain(at, fault))
                 self.at += 1
                 continue
-            payload = self.words[at] >> 16 & 0xFFFF
-            if (self.words[at] >> 32 & 0xFFFFFF) != (self.sequence & 0xFFFFFF):
+            kind = self.words[at] & KIND_MASK
+            payload = self.words[at] >> PAYLOAD_SHIFT & PAYLOAD_MASK
+            if (self.words[at] >> NUMBER_SHIFT & NUMBER_MASK) != (self.sequence & NUMBER_MASK):
                 if not skipping:
                     self._damage("messages before this one are missing")
-                self.sequence = self.words[at] >> 32 & 0xFFFFFF
+                self.sequence = self.words[at] >> NUMBER_SHIFT & NUMBER_MASK
             self.sequence += 1
-            self.at += 1 + (payload + 11) // 12
+            self.at += 1 + (payload + SLOT_WORDS - 1) // SLOT_WORDS
             ref = None
             if payload > 0:
-                ref = self._read_payload(at + 12, payload, self.words[at] & 0xFF)
-            if (self.words[at] & 0xFF) >= 64:
-                fields = [self.words[at + 1 + i] for i in range(8)]
-                self.notes.append((self.words[at] & 0xFF, *fields, ref))
+                ref = self._read_payload(at + SLOT_WORDS, payload, kind)
+            if kind >= FIRST_OWN_KIND:
+                fields = [self.words[at + STAMP_WORD + i] for i in range(2 + FIELD_COUNT)]
+                self.notes.append((kind, *fields, ref))
                 return True
-            self.kinds |= self.bit_of_kind << (self.words[at] & 0x3F)
+            self.kinds |= self.bit_of_kind << kind
             queue.push(
-                self.words[at + 1],
-                self.words[at + 2],
-                self.words[at] & 0xFF,
-                self.words[at + 3],
-                self.words[at + 4],
-                self.words[at + 5],
-                self.words[at + 6],
-                self.words[at + 7],
-                self.words[at + 8],
+                self.words[at + STAMP_WORD],
+                self.words[at + ORDER_WORD],
+                kind,
+                self.words[at + FIELDS_WORD],
+                self.words[at + FIELDS_WORD + 1],
+                self.words[at + FIELDS_WORD + 2],
+                self.words[at + FIELDS_WORD + 3],
+                self.words[at + FIELDS_WORD + 4],
+                self.words[at + FIELDS_WORD + 5],
                 ref,
             )
             return True
@@ -212,10 +256,10 @@ class Mailbox:
     def _read_payload(self, at: cython.longlong, count: cython.longlong, kind: cython.longlong) -> object:
         """The object whose words begin at `at`."""
         segment: SspSegment
-        if self.limits[kind * 15 + 2] == 32:  # SSP_WORDS
+        if self.limits[kind * LIMIT_SIZE + MOST_PAYLOAD] == SSP_WORDS:
             segment = SspSegment()
-            segment.words = [self.words[at + i] for i in range(31)]
-            segment.used = self.words[at + 31]
+            segment.words = [self.words[at + i] for i in range(SSP_USED)]
+            segment.used = self.words[at + SSP_USED]
             return segment
         data = array.array("q", [self.words[at + i] for i in range(1, count)]).tobytes()
         return data[: self.words[at]]
@@ -226,57 +270,68 @@ class Mailbox:
         """The check of the message at word `at`."""
         i: cython.longlong
         sum: cython.longlong = 1
-        for i in range(11):
+        for i in range(CHECK_WORD):
             sum = mix(sum, self.words[at + i])
-        for i in range(12, 12 + payload):
+        for i in range(SLOT_WORDS, SLOT_WORDS + payload):
             sum = mix(sum, self.words[at + i])
         return sum
 
     def _fault(self, at: cython.longlong) -> cython.longlong:
         """What is wrong with the message at word `at`; 0 when nothing is."""
         head: cython.longlong = self.words[at]
-        kind: cython.longlong = head & 0xFF
-        payload: cython.longlong = head >> 16 & 0xFFFF
-        row: cython.longlong = kind * 15  # kinds.LIMIT_SIZE
+        kind: cython.longlong = head & KIND_MASK
+        payload: cython.longlong = head >> PAYLOAD_SHIFT & PAYLOAD_MASK
+        row: cython.longlong = kind * LIMIT_SIZE
+        body: cython.longlong = at + SLOT_WORDS
         i: cython.longlong
-        if kind > 127 or self.limits[row] != self.direction:
+        if kind > LAST_KIND or self.limits[row + DIRECTION] != self.direction:
             return OF_UNKNOWN_KIND
-        if (head >> 8 & 0xFF) != 1 or head < 0:
+        if (head >> VERSION_SHIFT & KIND_MASK) != VERSION or head < 0:
             return OF_OTHER_VERSION
-        if payload < self.limits[row + 1] or payload > self.limits[row + 2]:
+        if payload < self.limits[row + LEAST_PAYLOAD] or payload > self.limits[row + MOST_PAYLOAD]:
             return TOO_LONG
-        if self.at + 1 + (payload + 11) // 12 > self.closed:
+        if self.at + 1 + (payload + SLOT_WORDS - 1) // SLOT_WORDS > self.closed:
             return TOO_LONG
-        if self.words[at + 11] != self._check(at, payload):
+        if self.words[at + CHECK_WORD] != self._check(at, payload):
             return CHECK_WRONG
-        if self.words[at + 1] < self.until - 1000000000 or self.words[at + 1] > self.until + 1000000000:
+        if (
+            self.words[at + STAMP_WORD] < self.until - FARTHEST_NS
+            or self.words[at + STAMP_WORD] > self.until + FARTHEST_NS
+        ):
             return OUT_OF_TIME
-        for i in range(6):
-            if self.words[at + 3 + i] < self.limits[row + 3 + 2 * i]:
-                return 16 + i
-            if self.words[at + 3 + i] > self.limits[row + 4 + 2 * i]:
-                return 16 + i
-        if kind == 32 and self.words[at + 5] > 0x7FF and not self.words[at + 6] & 64:  # CAN_REQUEST
+        for i in range(FIELD_COUNT):
+            if self.words[at + FIELDS_WORD + i] < self.limits[row + RANGES + 2 * i]:
+                return FIELD_WRONG + i
+            if self.words[at + FIELDS_WORD + i] > self.limits[row + RANGES + 2 * i + 1]:
+                return FIELD_WRONG + i
+        # fields c and d: identifier and flags
+        if (
+            kind == CAN_REQUEST
+            and self.words[at + FIELDS_WORD + 2] > LAST_STANDARD_ID
+            and not self.words[at + FIELDS_WORD + 3] & FLAG_EXTENDED
+        ):
             return NO_IDENTIFIER
         if payload > 0:
-            if self.limits[row + 2] == 32:  # SSP_WORDS
-                if payload != 32 or self.words[at + 12 + 31] < 0 or self.words[at + 12 + 31] > 31:
+            if self.limits[row + MOST_PAYLOAD] == SSP_WORDS:
+                if payload != SSP_WORDS or self.words[body + SSP_USED] < 0 or self.words[body + SSP_USED] > SSP_USED:
                     return BAD_PAYLOAD
-                for i in range(31):
-                    if self.words[at + 12 + i] < 0 or self.words[at + 12 + i] > 0xFFFF:
+                for i in range(SSP_USED):
+                    if self.words[body + i] < 0 or self.words[body + i] > 0xFFFF:
                         return BAD_PAYLOAD
-            elif self.words[at + 12] < 0 or self.words[at + 12] > 8 * (payload - 1):
+            elif self.words[body] < 0 or self.words[body] > 8 * (payload - 1):
                 return BAD_PAYLOAD
         return 0
 
     def explain(self, at, fault) -> str:
         """The fault of the message at word `at`, in words."""
-        kind = KINDS.get(self.words[at] & 0xFF)
-        name = kind.name if kind is not None else f"kind {self.words[at] & 0xFF}"
-        if fault >= 16:
-            least, largest = kind.ranges[fault - 16]
-            value = self.words[at + 3 + fault - 16]
-            return f"{name}: field {FIELDS[fault - 16]} is {value}, allowed are {least} to {largest}"
+        number = self.words[at] & KIND_MASK
+        kind = KINDS.get(number)
+        name = kind.name if kind is not None else f"kind {number}"
+        if fault >= FIELD_WRONG:
+            field = fault - FIELD_WRONG
+            least, largest = kind.ranges[field]
+            value = self.words[at + FIELDS_WORD + field]
+            return f"{name}: field {FIELDS[field]} is {value}, allowed are {least} to {largest}"
         return f"{name}: {FAULTS[fault]}"
 
     def _damage(self, text) -> None:
@@ -285,4 +340,4 @@ class Mailbox:
         self.last_damage = f"channel {self.name}, message {self.sequence}: {text}"
 
 
-assert max(PAYLOADS.values()) <= NOTE_WORDS
+assert max(PAYLOADS.values()) <= NOTE_WORDS <= (LONGEST - 1) * SLOT_WORDS

@@ -10,14 +10,57 @@ import cython
 from ranger_sim.firmware_sim.microcontroller import Microcontroller
 from ranger_sim.foundation import wallclock
 from ranger_sim.foundation.events import CAN_RX, CAN_TX_DONE, PIN_EDGE, UART_BYTE, EventQueue
-from ranger_sim.harness.processes import block as places
 from ranger_sim.harness.processes import snapshot
 from ranger_sim.harness.processes.channel import Bell, Mailbox
 from ranger_sim.harness.processes.kinds import FROM_BOARD, KINDS, NOTE, NOTE_SNAPSHOT, NOTE_WORDS, SET_WORD, TO_BOARD
 from ranger_sim.harness.processes.lateness import bin_of
 from ranger_sim.harness.wiring import HEAR_IN_SLOTS
 
-EVERYTHING = 0xFFFF  # bits of all message kinds to a board
+if not cython.compiled:
+    from ranger_sim.harness.processes.channel import LONGEST
+    from ranger_sim.harness.processes.places import (
+        ANSWER_USED,
+        ANSWERED,
+        ASK_USED,
+        ASKED,
+        BOARD_SLEEPS,
+        COMMAND,
+        COMMAND_ADVANCE,
+        COMMAND_SNAPSHOT,
+        COMMAND_STOP,
+        DAMAGED,
+        ERRORS,
+        LATE_COUNT,
+        LATE_MAX,
+        LATENESS,
+        MAX_SLOT_CYCLES,
+        NEXT_OUTPUT,
+        NEXT_TIME,
+        OVERRUNS,
+        PACE_TIME_NS,
+        PACE_WALL_NS,
+        PACE_WALL_PER_TIME,
+        PACED,
+        PLANT_SLEEPS,
+        REACHED,
+        RESULT,
+        RESULT_DONE,
+        RESULT_MORE,
+        ROWS,
+        SLOT_COUNT,
+        SLOT_TIME,
+        SLOTS,
+        STAGE_RING,
+        TURNS,
+        UNTIL,
+        URGENT,
+        WATCHED,
+    )
+
+# Kinds that wait for a task of a board that hears in its slots: edges, frames, bytes and buffers that come free.
+SLOT_KINDS = 1 << PIN_EDGE | 1 << CAN_RX | 1 << CAN_TX_DONE | 1 << UART_BYTE
+LONGEST_TURN_NS = 1_000_000_000
+ERRORS_EVERY = 1023  # turns; a mask. Some ten times a second
 NOTE_BYTES = 8 * (NOTE_WORDS - 1)
 
 
@@ -32,27 +75,20 @@ class Endpoint:
         self.shared = shared
         self.block = shared.words
         self.stage, self.stage_doubles = stage
-        self.ask = Bell(shared.words, places.ASKED, places.BOARD_SLEEPS, shared.ask_descriptor)
-        self.answer = Bell(shared.words, places.ANSWERED, places.PLANT_SLEEPS, shared.answer_descriptor)
+        self.ask = Bell(shared.words, ASKED, BOARD_SLEEPS, shared.ask_descriptor)
+        self.answer = Bell(shared.words, ANSWERED, PLANT_SLEEPS, shared.answer_descriptor)
         # a board that takes another one's place goes on where that one's turns ended
-        self.turns = shared.words[places.ANSWERED]
-        self.answer.rung = shared.words[places.ANSWERED]
-        self.to_board = Mailbox(
-            shared.words, f"to {board.name}", shared.to_board_first, places.SLOTS, places.ASK_USED, TO_BOARD
-        )
+        self.turns = shared.words[ANSWERED]
+        self.answer.rung = shared.words[ANSWERED]
+        self.to_board = Mailbox(shared.words, f"to {board.name}", shared.to_board_first, SLOTS, ASK_USED, TO_BOARD)
         self.from_board = Mailbox(
-            shared.words, f"from {board.name}", shared.from_board_first, places.SLOTS, places.ANSWER_USED, FROM_BOARD
+            shared.words, f"from {board.name}", shared.from_board_first, SLOTS, ANSWER_USED, FROM_BOARD
         )
         self.audience = audience
         errors = getattr(board, "errors", None)
         self.totals: object = None if errors is None else errors.totals
-        self.router = getattr(board, "router", None)
-        self.urgent_kinds = EVERYTHING
-        if board.name in HEAR_IN_SLOTS:
-            # edges, frames, bytes and buffers that come free wait for a task
-            self.urgent_kinds &= ~(1 << PIN_EDGE | 1 << CAN_RX | 1 << CAN_TX_DONE | 1 << UART_BYTE)
+        self.can_wait = SLOT_KINDS if board.name in HEAR_IN_SLOTS else 0
         self.promised = 0
-        self.estimator = getattr(board, "estimator", None)
         self.clock: object = wallclock.monotonic_ns
         self.pending = EventQueue(64)
         self.slots_seen = 0
@@ -65,23 +101,23 @@ class Endpoint:
             self.turns += 1
             while not self.ask.wait(self.turns):
                 pass
-            command = self.block[18]  # COMMAND
-            if command == 4:  # COMMAND_STOP
+            command = self.block[COMMAND]
+            if command == COMMAND_STOP:
                 return
-            if command == 1:  # COMMAND_ADVANCE
+            if command == COMMAND_ADVANCE:
                 self._advance()
-            elif command == 3:  # COMMAND_SNAPSHOT
+            elif command == COMMAND_SNAPSHOT:
                 self.tell(NOTE_SNAPSHOT, snapshot.take(self.board))
-            self.block[34] = 1 if self._put_out() else 0  # RESULT
+            self.block[RESULT] = RESULT_MORE if self._put_out() else RESULT_DONE
             self._show()
             self.answer.ring()
 
     def _advance(self) -> cython.void:
         """Take in what came, and run; step after step of the plant, as its sensors showed them."""
-        until: cython.longlong = self.block[19]  # UNTIL
-        rows: cython.longlong = self.block[21]  # ROWS
+        until: cython.longlong = self.block[UNTIL]
+        rows: cython.longlong = self.block[ROWS]
         start: cython.longlong
-        if until < self.reached or (self.reached > 0 and until > self.reached + 1000000000):
+        if until < self.reached or (self.reached > 0 and until > self.reached + LONGEST_TURN_NS):
             self.to_board.damaged += 1
             self.to_board.last_damage = f"channel to {self.board.name}: a turn until {until} ns after {self.reached} ns"
             return
@@ -89,12 +125,12 @@ class Endpoint:
         self.to_board.open()
         while self.to_board.take(self.board.inbox):
             pass
-        if self.to_board.kinds & self.block[49] or self.to_board.notes:  # URGENT
+        if self.to_board.kinds & self.block[URGENT] or self.to_board.notes:
             self.promised = 0
         if self.to_board.notes:
             self.obey()
-        if rows - self.audience.rows > 64:
-            self.audience.rows = rows - 64
+        if rows - self.audience.rows > STAGE_RING:
+            self.audience.rows = rows - STAGE_RING
         while self.audience.rows < rows:
             start = self.audience.row_start(self.audience.rows)
             if start >= until:
@@ -118,24 +154,26 @@ class Endpoint:
         late: cython.longlong
         place: cython.longlong
         self.slots_seen = self.board.scheduler.slot_count
-        if self.stage[3] == 0:  # PACED
+        if self.stage[PACED] == 0:
             return
-        due = self.stage[4] + int((self.board.scheduler.slot_time - self.stage[5]) * self.stage_doubles[6])
+        due = self.stage[PACE_WALL_NS] + int(
+            (self.board.scheduler.slot_time - self.stage[PACE_TIME_NS]) * self.stage_doubles[PACE_WALL_PER_TIME]
+        )
         late = self.clock()
         late -= due
         if late < 0:
             late = 0
-        if late > self.block[46]:  # LATE_MAX
-            self.block[46] = late
-        self.block[47] += 1  # LATE_COUNT
+        if late > self.block[LATE_MAX]:
+            self.block[LATE_MAX] = late
+        self.block[LATE_COUNT] += 1
         place = bin_of(late // 1000)
-        self.block[128 + place] += 1  # LATENESS
+        self.block[LATENESS + place] += 1
 
     def _put_out(self) -> cython.bint:
         """What the board put out goes into the mailbox; True when more is left than fits."""
         out: EventQueue = self.out
         while True:
-            if self.from_board.used + 23 > self.from_board.slots:  # longest message: channel.LONGEST
+            if self.from_board.used + LONGEST > self.from_board.slots:
                 self.from_board.send()
                 return out.count > 0 or self.pending.count > 0
             if out.take():
@@ -152,36 +190,21 @@ class Endpoint:
     def _show(self) -> None:
         """The words that the plant's process and the supervisor look at."""
         board: Microcontroller = self.board
-        self.block[35] = board.next_time  # NEXT_TIME
-        self.promised = self._next_output()
-        self.block[36] = self.promised  # NEXT_OUTPUT
-        self.block[49] = self.urgent_kinds  # URGENT
-        if self.router is not None and self.router.waiting == 0:
-            self.block[49] = (
-                self.urgent_kinds & ~8
-            )  # a transmit buffer comes free (CAN_TX_DONE) and nothing waits for it
-        self.block[39] = board.scheduler.slot_time  # SLOT_TIME
-        self.block[40] = board.scheduler.slot_count  # SLOT_COUNT
-        self.block[41] = board.scheduler.overruns  # OVERRUNS
-        self.block[42] = board.scheduler.max_slot_cycles  # MAX_SLOT_CYCLES
-        self.block[44] = self.to_board.damaged  # DAMAGED
-        self.block[45] = self.reached  # REACHED
-        self.block[48] += 1  # TURNS
-        if (self.block[48] & 1023) == 1 and self.totals is not None:  # some ten times a second
-            self.block[43] = sum(self.totals)  # ERRORS
-        if self.estimator is not None:
-            self.block[38] = self.estimator.swing_leg  # SWING_LEG
-
-    def _next_output(self) -> cython.longlong:
-        """Before this instant (ns) the board puts nothing out, whatever comes in of a kind that can wait."""
-        board: Microcontroller = self.board
-        if self.out.count > 0:  # more than the mailbox held: it goes out in the next turn, whatever that turn is
-            return 0
-        if not board.scheduler.done or board.vic.pending != 0:
-            return 0
-        if board.background is not None and board.background_wanted:
-            return 0
-        return board.alarm_time  # the slot timer's match is one, too
+        self.block[NEXT_TIME] = board.next_time
+        # more than the mailbox held goes out in the next turn, whatever that turn is
+        self.promised = 0 if self.out.count > 0 else board.quiet_until()
+        self.block[NEXT_OUTPUT] = self.promised
+        self.block[URGENT] = board.urgent_kinds() & ~self.can_wait
+        self.block[SLOT_TIME] = board.latest_slot()
+        self.block[SLOT_COUNT] = board.scheduler.slot_count
+        self.block[OVERRUNS] = board.scheduler.overruns
+        self.block[MAX_SLOT_CYCLES] = board.scheduler.max_slot_cycles
+        self.block[WATCHED] = board.watched()
+        self.block[DAMAGED] = self.to_board.damaged
+        self.block[REACHED] = self.reached
+        self.block[TURNS] += 1
+        if (self.block[TURNS] & ERRORS_EVERY) == 1 and self.totals is not None:
+            self.block[ERRORS] = sum(self.totals)
 
     def broke_its_promise(self) -> None:
         """An output before the instant that the last answer named: the plant has gone on without it."""

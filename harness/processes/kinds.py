@@ -7,13 +7,13 @@ whose codec is in `Mailbox` (channel.py). Meanings of the fields: foundation/eve
 from typing import NamedTuple
 
 from ranger_sim.foundation import events
+from ranger_sim.harness.processes.places import LIMIT_SIZE, NOTE_WORDS, SSP_WORDS
 
 TO_BOARD, FROM_BOARD = 0, 1
 WORD = (0, 0xFFFFFFFF)
 NONE = (0, 0)
 CONTROLLER, BUFFER, PIN, LEVEL, PORT, BYTE = (1, 4), (1, 3), (0, 63), (0, 1), (0, 15), (0, 255)
 IDENTIFIER = (0, 0x1FFFFFFF)
-ANYTHING = (-(1 << 62), 1 << 62)
 
 # Kinds between the processes only: no chip sees them.
 NOTE = 64  # a NOTE_*, b part, c parts, ref bytes (UTF-8 of JSON, cut into parts)
@@ -49,8 +49,6 @@ KINDS = {
     SET_WORD: Kind("SET_WORD", TO_BOARD, ((0, 65535), WORD, NONE, NONE, NONE, NONE)),
 }
 # kind -> most words of its payload; the others carry none
-SSP_WORDS = 32  # 31 half-words and how many are used
-NOTE_WORDS = 256  # 2 KB: a length in bytes and the bytes
 PAYLOADS = {
     events.SSP_SEGMENT: SSP_WORDS,
     events.SSP_START: SSP_WORDS,
@@ -59,7 +57,6 @@ PAYLOADS = {
     NOTE: NOTE_WORDS,
 }
 OPTIONAL = (events.UART_OUTPUT,)  # kinds that may come without their payload
-LIMIT_SIZE = 15  # numbers per kind in `limits`
 FIELDS = ("a", "b", "c", "d", "e", "f")
 
 

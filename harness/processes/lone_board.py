@@ -11,8 +11,7 @@ from typing import Any
 
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness import wiring
-from ranger_sim.harness.processes import block as places
-from ranger_sim.harness.processes import board_process, kernel
+from ranger_sim.harness.processes import board_process, kernel, places
 from ranger_sim.harness.processes.block import Block, new_stage
 from ranger_sim.harness.processes.channel import Bell
 from ranger_sim.harness.processes.settings import Settings

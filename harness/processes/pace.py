@@ -8,7 +8,7 @@ on the pace.
 from typing import Any
 
 from ranger_sim.foundation import wallclock
-from ranger_sim.harness.processes import block as places
+from ranger_sim.harness.processes import places
 
 
 class Pace:

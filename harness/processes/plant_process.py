@@ -12,8 +12,7 @@ from ranger_sim.datatable.packing import word_of_value
 from ranger_sim.foundation import wallclock
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness import wiring
-from ranger_sim.harness.processes import block as places
-from ranger_sim.harness.processes import kernel, snapshot
+from ranger_sim.harness.processes import kernel, places, snapshot
 from ranger_sim.harness.processes.kinds import NOTE, NOTE_SNAPSHOT, SET_WORD
 from ranger_sim.harness.processes.pace import Pace
 from ranger_sim.harness.processes.remote_board import RemoteBoard
@@ -50,29 +49,16 @@ class PlantRun:
         self.next_status_s = 0.0
         self.wall_s = 0.0  # wall clock since the pace began, pauses included
         loop = robot.loop
-        show = Stage(
-            words, doubles, robot.plant, loop.step_times, [(wire.board, wire.word) for wire in loop.word_wires]
-        )
+        show = Stage(words, doubles, robot.plant, loop.step_times, loop.word_wires)
         self.remotes = {
-            name: RemoteBoard(
-                robot.boards[name],
-                blocks[name],
-                show,
-                place,
-                name == "MB",
-            )
+            name: RemoteBoard(robot.boards[name], blocks[name], show, place, name == "MB")
             for place, name in enumerate(wiring.BOARDS)
         }
-        loop.boards = list(self.remotes.values())
-        loop.remote = True
-        for wires in loop.wires:
-            for controller in range(1, 5):  # those that look for what a bus writes down are in the other processes
-                wires.end_by_message(controller)
-        loop.main_brain_words = blocks["MB"].table()
-        robot.boards["MB"].store.words = blocks["MB"].table()
+        for remote in self.remotes.values():
+            loop.replace(remote)
         for name, remote in self.remotes.items():
             if name not in settings.boards:  # it has no process: another one stands outside in its place, or none
-                remote.gone = True
+                remote.leave()
                 self.mourned.add(name)
                 self.unplug(name)
 
@@ -221,7 +207,7 @@ class PlantRun:
 
     def nodes_of(self, name: str) -> list:
         """(bus, node) of every controller of a board."""
-        wires = self.robot.loop.wires[wiring.BOARDS.index(name)]
+        wires = self.robot.loop.wires[self.robot.loop.place(name)]
         return [(bus, wires.nodes[controller]) for controller, bus in enumerate(wires.buses) if bus is not None]
 
     def bury(self) -> None:
@@ -240,24 +226,17 @@ class PlantRun:
 
     def make_room(self, name: str) -> None:
         """The old process of a board has ended: set its channel back for a new one."""
-        remote, words = self.remotes[name], self.blocks[name].words
-        remote.gone = True
+        remote = self.remotes[name]
+        remote.leave()
         self.bury()
-        remote.posted = False
-        words[places.ASKED] = words[places.ANSWERED] = remote.ask.rung
-        words[places.ASK_USED] = words[places.ANSWER_USED] = 0
-        remote.to_board.sequence = remote.from_board.sequence = 0
-        remote.to_board.used = 0
+        remote.reset_channel()
 
     def revive(self, name: str) -> None:
         """The board has a process again: it gets its power a millisecond from now."""
         remote = self.remotes[name]
         power_up_ns = self.robot.loop.time + POWER_UP_NS
         self.blocks[name].words[places.POWER_UP] = power_up_ns
-        remote.gone = False
-        remote.next_time = power_up_ns
-        remote.quiet_until = 0
-        remote.reached = self.robot.loop.time
+        remote.come_back(self.robot.loop.time, power_up_ns)
         self.mourned.discard(name)
         for bus, node in self.nodes_of(name):
             bus.set_mode(node, OPERATING, self.robot.loop.time)

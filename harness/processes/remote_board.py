@@ -1,9 +1,8 @@
 """A board that runs in a process of its own, as the lockstep of the plant process sees it.
 
-`inbox` and `outbox` are those of the board that this process built and wired but does not run (its shadow): what
-is pushed into the inbox goes through the channel when the board is next asked to run, what the board put out
-comes back onto the board's wires. `begin(until)` posts the request, so that all boards of a window run at the same
-time; `advance(until)` waits for the answer.
+Its inbox is that of the board that this process built but does not run: what is pushed into it goes through the
+channel when the board is next asked to run. What the board put out comes back onto the wires. `begin(until)` posts the
+request, so that all boards of a window run at the same time; `advance(until)` waits for the answer.
 
 A board is asked only when that can matter. With each answer it says before which instant it puts nothing out;
 until then it is left alone, unless something comes in that may make it answer at once (`urgent_kinds`). It then runs
@@ -12,65 +11,117 @@ the missed time later, and reads its sensors from the stage's rows of that time.
 
 import cython
 
-from ranger_sim.firmware_sim.microcontroller import EdgeLine, Microcontroller
+from ranger_sim.firmware_sim.board import EVERY_KIND, Board
+from ranger_sim.firmware_sim.microcontroller import EdgeLine
+from ranger_sim.foundation.edge_buffer import EdgeBuffer
 from ranger_sim.foundation.events import EventQueue
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.processes import block as places
 from ranger_sim.harness.processes.channel import Bell, Mailbox
 from ranger_sim.harness.processes.kinds import FROM_BOARD, TO_BOARD
 
 if not cython.compiled:
+    from ranger_sim.foundation.events import NEVER, ORDER_PINS, PIN_EDGE, ROW, ROW_KIND
+    from ranger_sim.harness.processes.channel import FIRST_OWN_KIND, LONGEST
+    from ranger_sim.harness.processes.places import (
+        ALIVE,
+        ANSWER_USED,
+        ANSWERED,
+        ASK_USED,
+        ASKED,
+        BOARD_SLEEPS,
+        COMMAND,
+        COMMAND_ADVANCE,
+        COMMAND_MORE,
+        COMMAND_STOP,
+        FATE,
+        NEXT_OUTPUT,
+        NEXT_TIME,
+        PLANT_SLEEPS,
+        RESULT,
+        RESULT_MORE,
+        ROWS,
+        SLOT_TIME,
+        SLOTS,
+        UNTIL,
+        URGENT,
+        WATCHED,
+    )
     from ranger_sim.harness.processes.plain import load
 
+    MOST_WAITING = 200  # messages that a board left alone lets wait: some two thirds of its queue
 
-class RemoteBoard(Microcontroller):
-    """`shadow`: the wired board object of this process. `urgent_kinds`: message kinds (bits) that cannot wait.
+
+class RemoteBoard(Board):
+    """Stands for the board `built`, which was built in this process; `shared`: the block of its own process.
+
+    Inputs other than messages and edges stand on the `stage`. `urgent`: message kinds (bits) that cannot wait.
 
     `follows_steps`: the plant's process reads what this board shows (the main brain's table and swing leg) after
     every step of the plant, so it is up to date by then.
     """
 
-    def __init__(self, shadow, shared, stage, place, follows_steps) -> None:
-        Microcontroller.__init__(self, shadow.name, shadow.hz, shadow.crystal)
+    def __init__(self, built, shared, stage, place, follows_steps) -> None:
+        Board.__init__(self, built.name)
         shared.check(place)
-        self.shadow = shadow
-        self.inbox = shadow.inbox
-        self.outbox = shadow.outbox
-        self.first_line = shadow.first_line
-        self.second_line = shadow.second_line
-        self.next_time = shadow.next_time
+        self.apart = True
+        self.inbox = built.inbox
+        self.next_time = built.next_time
+        if shared.table_words:
+            self.memory = shared.table()
+        self.lines = []
+        self.watched_number = built.watched()
+        self.slot_time = built.latest_slot()
         self.block = shared.words
-        self.ask = Bell(shared.words, places.ASKED, places.BOARD_SLEEPS, shared.ask_descriptor)
-        self.answer = Bell(shared.words, places.ANSWERED, places.PLANT_SLEEPS, shared.answer_descriptor)
-        self.to_board = Mailbox(
-            shared.words, f"to {self.name}", shared.to_board_first, places.SLOTS, places.ASK_USED, TO_BOARD
-        )
+        self.ask = Bell(shared.words, ASKED, BOARD_SLEEPS, shared.ask_descriptor)
+        self.answer = Bell(shared.words, ANSWERED, PLANT_SLEEPS, shared.answer_descriptor)
+        self.to_board = Mailbox(shared.words, f"to {self.name}", shared.to_board_first, SLOTS, ASK_USED, TO_BOARD)
         self.from_board = Mailbox(
-            shared.words, f"from {self.name}", shared.from_board_first, places.SLOTS, places.ANSWER_USED, FROM_BOARD
+            shared.words, f"from {self.name}", shared.from_board_first, SLOTS, ANSWER_USED, FROM_BOARD
         )
         self.stage = stage
         self.place = place
-        self.urgent_kinds = 0xFFFF  # all, until the board has said which
+        self.urgent = EVERY_KIND  # until the board has said which
         self.follows_steps = follows_steps
-        self.estimator = getattr(shadow, "estimator", None)
         self.posted = False
         self.gone = False
-        self.quiet_until = 0
+        self.silent_until = 0
         self.turns = 0
         self.reached = 0
 
+    def listen_to_edges(self, buffer: EdgeBuffer, pin: cython.longlong, partner_pin: cython.longlong) -> None:
+        """Edges of `buffer` go to `pin` of the board, each with the level of `partner_pin`; tell by `edges_came`."""
+        self.lines.append(EdgeLine(buffer, pin, partner_pin))
+
     def edges_came(self) -> cython.longlong:
-        """Edges travel as messages to a board that cannot see the sensor's buffer."""
-        self._send_edges(self.first_line)
-        self._send_edges(self.second_line)
+        """Make messages of the edges that have come: the board cannot see the sensors' buffers."""
+        line: EdgeLine
+        for line in self.lines:
+            while line.find_next() < NEVER:
+                line.buffer.read += 1
+                self.inbox.put(
+                    line.next_time,
+                    ORDER_PINS,
+                    PIN_EDGE,
+                    line.pin,
+                    line.levels >> 1,
+                    line.partner_pin,
+                    line.levels & 1,
+                    0,
+                    0,
+                )
         return self.edge_time
 
-    def _send_edges(self, line: EdgeLine) -> cython.void:
-        """Make messages of the edges that have come on one line."""
-        while line.find_next() < 1 << 62:
-            line.buffer.read += 1
-            # order 256: stage pins; kind 1: PIN_EDGE
-            self.inbox.put(line.next_time, 256, 1, line.pin, line.levels >> 1, line.partner_pin, line.levels & 1, 0, 0)
+    def stop_at(self, time: cython.longlong) -> cython.longlong:
+        """It has run already when its outputs arrive: it stops where it was told. Returns that."""
+        return self.horizon
+
+    def watched(self) -> cython.longlong:
+        """What `watched` of the board in its process was at the end of its latest turn."""
+        return self.watched_number
+
+    def latest_slot(self) -> cython.longlong:
+        """Start of its latest slot (ns), as of the end of its latest turn."""
+        return self.slot_time
 
     def begin(self, until: cython.longlong) -> cython.void:
         """Ask the board to run everything before `until` (ns), if that can matter already."""
@@ -81,12 +132,12 @@ class RemoteBoard(Microcontroller):
             return
         self.stage.update()
         if (
-            until <= self.quiet_until
+            until <= self.silent_until
             and not (self.follows_steps and until >= self.stage.shown_end)
             and not self._urgent(until)
         ):
             return
-        self._post(1, until)
+        self._post(COMMAND_ADVANCE, until)
 
     def advance(self, until: cython.longlong) -> cython.longlong:
         """What the board put out before `until` comes into the outbox; returns the instant of its next event."""
@@ -96,7 +147,7 @@ class RemoteBoard(Microcontroller):
         if self.posted:
             self._collect()
         if self.gone:
-            self.next_time = 1 << 62
+            self.next_time = NEVER
         return self.next_time
 
     def catch_up(self, until) -> None:
@@ -104,7 +155,7 @@ class RemoteBoard(Microcontroller):
         if self.gone or self.reached >= until:
             return
         self.stage.update()
-        self._post(places.COMMAND_ADVANCE, until)
+        self._post(COMMAND_ADVANCE, until)
         self._collect()
 
     def command(self, command) -> None:
@@ -113,10 +164,29 @@ class RemoteBoard(Microcontroller):
             self._post(command, self.reached)
             self._collect()
 
+    def leave(self) -> None:
+        """It has no process any more: nothing is asked, and what comes for it is lost."""
+        self.gone = True
+
+    def reset_channel(self) -> None:
+        """Set the channel back for a new process: no turn is open, both mailboxes are empty."""
+        self.posted = False
+        self.block[ASKED] = self.block[ANSWERED] = self.ask.rung
+        self.block[ASK_USED] = self.block[ANSWER_USED] = 0
+        self.to_board.sequence = self.from_board.sequence = 0
+        self.to_board.used = 0
+
+    def come_back(self, now, power_up_ns) -> None:
+        """It has a process again, which has run until `now` (ns), and gets its power at `power_up_ns`."""
+        self.gone = False
+        self.next_time = power_up_ns
+        self.silent_until = 0
+        self.reached = now
+
     def dismiss(self) -> None:
         """Tell the board's process to end; nothing is answered."""
         if not self.gone:
-            self._ring(places.COMMAND_STOP, self.reached)
+            self._ring(COMMAND_STOP, self.reached)
             self.posted = False
             self.gone = True
 
@@ -133,20 +203,20 @@ class RemoteBoard(Microcontroller):
         waiting: cython.longlong = 0
         kind: cython.longlong
         while at < inbox.tail and inbox.rows[at] < until:
-            kind = inbox.rows[at + 2]
-            if kind >= 60 or self.urgent_kinds >> kind & 1:
+            kind = inbox.rows[at + ROW_KIND]
+            if kind >= FIRST_OWN_KIND or self.urgent >> kind & 1:
                 return True
             waiting += 1
-            if waiting > 200:
+            if waiting > MOST_WAITING:
                 return True
-            at += 10  # ROW
+            at += ROW
         return False
 
     def _post(self, command: cython.longlong, until: cython.longlong) -> cython.void:
         """Write what has come for the board, and the instant, and ring."""
-        while self.inbox.head_time < until and command == 1:
+        while self.inbox.head_time < until and command == COMMAND_ADVANCE:
             self.to_board.until = until
-            if self.to_board.used + 23 > self.to_board.slots:  # longest message: channel.LONGEST
+            if self.to_board.used + LONGEST > self.to_board.slots:
                 # more than a mailbox holds: a turn up to the first message that does not fit
                 self._ring(command, self.inbox.head_time)
                 if not self._collect():
@@ -159,9 +229,9 @@ class RemoteBoard(Microcontroller):
     def _ring(self, command: cython.longlong, until: cython.longlong) -> None:
         """Hand the turn over."""
         self.to_board.send()
-        self.block[18] = command  # COMMAND
-        self.block[19] = until  # UNTIL
-        self.block[21] = self.stage.rows  # ROWS
+        self.block[COMMAND] = command
+        self.block[UNTIL] = until
+        self.block[ROWS] = self.stage.rows
         self.reached = until
         self.turns += 1
         self.posted = True
@@ -173,7 +243,7 @@ class RemoteBoard(Microcontroller):
         self.posted = False
         while more:
             while True:
-                if load(self.block, 56) != 0:  # FATE: looked at before every sleep, as its ring wakes only once
+                if load(self.block, FATE) != ALIVE:  # looked at before every sleep, as its ring wakes only once
                     self.gone = True
                     self.inbox.clear()
                     return False
@@ -183,15 +253,14 @@ class RemoteBoard(Microcontroller):
             self.from_board.open()
             while self.from_board.take(self.outbox):
                 pass
-            more = self.block[34] == 1  # RESULT, RESULT_MORE
+            more = self.block[RESULT] == RESULT_MORE
             if more:
-                self.block[18] = 2  # COMMAND, COMMAND_MORE
-                self.block[20] = 0  # ASK_USED
+                self.block[COMMAND] = COMMAND_MORE
+                self.block[ASK_USED] = 0
                 self.ask.ring()
-        self.next_time = self.block[35]
-        self.quiet_until = self.block[36]
-        self.urgent_kinds = self.block[49]
-        if self.estimator is not None:
-            self.estimator.swing_leg = self.block[38]
-            self.shadow.scheduler.slot_time = self.block[39]
+        self.next_time = self.block[NEXT_TIME]
+        self.silent_until = self.block[NEXT_OUTPUT]
+        self.urgent = self.block[URGENT]
+        self.watched_number = self.block[WATCHED]
+        self.slot_time = self.block[SLOT_TIME]
         return True

@@ -1,11 +1,24 @@
-from ranger_sim.firmware_sim.microcontroller cimport Microcontroller
+from ranger_sim.harness.board_wires cimport WordWire
+from ranger_sim.harness.processes.places cimport (
+    MOST_VOLTAGES,
+    MOST_WORDS,
+    ROW_ANALOG_END,
+    ROW_ANALOG_START,
+    ROW_END,
+    ROW_SIZE,
+    ROW_START,
+    ROW_WORDS,
+    STAGE_FIRST,
+    STAGE_RING,
+    STAGE_ROWS,
+)
 from ranger_sim.plant.ranger cimport RangerPlant
 
 cdef class Stage:
-    cdef public long long[::1] words, step_times, registers
+    cdef public long long[::1] words, step_times
     cdef public double[::1] doubles
     cdef public RangerPlant plant
-    cdef public list boards
+    cdef public list wires
     cdef public long long rows, shown_end, word_count, voltage_count
     cpdef void update(self) noexcept
 

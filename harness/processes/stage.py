@@ -7,19 +7,30 @@ import array
 
 import cython
 
-from ranger_sim.firmware_sim.microcontroller import Microcontroller
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.processes.block import MOST_VOLTAGES, MOST_WORDS
+from ranger_sim.harness.board_wires import WordWire
 from ranger_sim.plant.ranger import RangerPlant
 
-# Places of block.py as C numbers
-FIRST, RING, SIZE = 64, 64, 80
+if not cython.compiled:
+    from ranger_sim.harness.processes.places import (
+        MOST_VOLTAGES,
+        MOST_WORDS,
+        ROW_ANALOG_END,
+        ROW_ANALOG_START,
+        ROW_END,
+        ROW_SIZE,
+        ROW_START,
+        ROW_WORDS,
+        STAGE_FIRST,
+        STAGE_RING,
+        STAGE_ROWS,
+    )
 
 
 class Stage:
     """The plant's side. `step_times`: start and end of the step that is shown (ns), as the lockstep keeps them.
 
-    `wires`: (board, register) of the digital sensors, in the order of the rows' words.
+    `wires`: of the digital sensors, in the order of the rows' words.
     """
 
     def __init__(self, words, doubles, plant, step_times, wires) -> None:
@@ -29,8 +40,7 @@ class Stage:
         self.step_times = step_times
         self.rows = 0
         self.shown_end = -1
-        self.boards = [board for board, _ in wires]
-        self.registers = array.array("q", [register for _, register in wires])
+        self.wires = wires
         self.word_count = len(wires)
         self.voltage_count = len(plant.analog_start)
         if self.word_count > MOST_WORDS or self.voltage_count > MOST_VOLTAGES:
@@ -44,21 +54,21 @@ class Stage:
         at: cython.longlong
         i: cython.longlong
         plant: RangerPlant = self.plant
-        board: Microcontroller
+        wire: WordWire
         if self.step_times[1] == self.shown_end:
             return
         self.shown_end = self.step_times[1]
-        at = FIRST + (self.rows % RING) * SIZE
-        self.words[at] = self.step_times[0]
-        self.words[at + 1] = self.shown_end
+        at = STAGE_FIRST + (self.rows % STAGE_RING) * ROW_SIZE
+        self.words[at + ROW_START] = self.step_times[0]
+        self.words[at + ROW_END] = self.shown_end
         for i in range(self.word_count):
-            board = cython.cast(Microcontroller, self.boards[i])
-            self.words[at + 2 + i] = board.words[self.registers[i]]
+            wire = cython.cast(WordWire, self.wires[i])
+            self.words[at + ROW_WORDS + i] = wire.board.words[wire.word]
         for i in range(self.voltage_count):
-            self.doubles[at + 16 + i] = plant.analog_start[i]
-            self.doubles[at + 48 + i] = plant.analog_end[i]
+            self.doubles[at + ROW_ANALOG_START + i] = plant.analog_start[i]
+            self.doubles[at + ROW_ANALOG_END + i] = plant.analog_end[i]
         self.rows += 1
-        self.words[2] = self.rows
+        self.words[STAGE_ROWS] = self.rows
 
 
 class Audience:
@@ -82,17 +92,17 @@ class Audience:
 
     def row_start(self, row: cython.longlong) -> cython.longlong:
         """Start of the step of a row (ns)."""
-        return self.words[FIRST + (row % RING) * SIZE]
+        return self.words[STAGE_FIRST + (row % STAGE_RING) * ROW_SIZE]
 
     def show(self, row: cython.longlong) -> cython.void:
         """From now on the board's pins show this row."""
-        at: cython.longlong = FIRST + (row % RING) * SIZE
+        at: cython.longlong = STAGE_FIRST + (row % STAGE_RING) * ROW_SIZE
         i: cython.longlong
-        self.step_times[0] = self.words[at]
-        self.step_times[1] = self.words[at + 1]
+        self.step_times[0] = self.words[at + ROW_START]
+        self.step_times[1] = self.words[at + ROW_END]
         for i in range(self.word_count):
-            self.board_words[self.registers[i]] = self.words[at + 2 + self.sources[i]]
+            self.board_words[self.registers[i]] = self.words[at + ROW_WORDS + self.sources[i]]
         for i in range(self.voltage_count):
-            self.analog_start[i] = self.doubles[at + 16 + i]
-            self.analog_end[i] = self.doubles[at + 48 + i]
+            self.analog_start[i] = self.doubles[at + ROW_ANALOG_START + i]
+            self.analog_end[i] = self.doubles[at + ROW_ANALOG_END + i]
         self.rows = row + 1

@@ -21,8 +21,7 @@ from typing import Any
 from ranger_sim.foundation import wallclock
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness import wiring
-from ranger_sim.harness.processes import block as places
-from ranger_sim.harness.processes import board_process, kernel, plant_process
+from ranger_sim.harness.processes import board_process, kernel, places, plant_process
 from ranger_sim.harness.processes.block import Block, new_stage
 from ranger_sim.harness.processes.control import ControlServer
 from ranger_sim.harness.processes.lateness import figures

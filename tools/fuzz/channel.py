@@ -11,7 +11,7 @@ from typing import Any
 
 from ranger_sim.foundation.random_stream import RandomStream
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.processes import block as places
+from ranger_sim.harness.processes import places
 from ranger_sim.harness.processes.channel import SLOT_WORDS
 from ranger_sim.harness.processes.lone_board import LoneBoard
 from ranger_sim.harness.ranger import Ranger

@@ -4,8 +4,7 @@ import os
 import select
 import signal
 
-from ranger_sim.harness.processes import block as places
-from ranger_sim.harness.processes import kernel
+from ranger_sim.harness.processes import kernel, places
 
 PATIENCE_S = 60.0  # a guard against waiting for ever; nothing asserts on it
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from ranger_sim.foundation.events import PIN_EDGE, EventQueue
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.processes import block as places
+from ranger_sim.harness.processes import places
 from ranger_sim.harness.processes.channel import SLOT_WORDS, Mailbox
 from ranger_sim.harness.processes.kinds import FROM_BOARD, TO_BOARD
 from ranger_sim.harness.processes.lone_board import LoneBoard

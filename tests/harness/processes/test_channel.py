@@ -9,14 +9,14 @@ from hypothesis import strategies as st
 
 from ranger_sim.firmware_sim.peripherals.ssp import SspSegment
 from ranger_sim.foundation import events
-from ranger_sim.foundation.events import EventQueue
+from ranger_sim.foundation.events import NEVER, EventQueue
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness import wiring
-from ranger_sim.harness.processes import block as places
-from ranger_sim.harness.processes import kinds, plain
-from ranger_sim.harness.processes.block import SLOTS, Block, new_stage
+from ranger_sim.harness.processes import kinds, places, plain
+from ranger_sim.harness.processes.block import Block, new_stage
 from ranger_sim.harness.processes.channel import SLOT_WORDS, Bell, Mailbox
 from ranger_sim.harness.processes.kinds import FROM_BOARD, KINDS, TO_BOARD
+from ranger_sim.harness.processes.places import SLOTS
 from ranger_sim.harness.processes.remote_board import RemoteBoard
 from ranger_sim.harness.processes.stage import Stage
 from ranger_sim.harness.ranger import Ranger
@@ -297,11 +297,10 @@ def test_who_sleeps_on_the_bell_of_a_process_that_ends_is_woken_and_told(bells):
 
 def test_a_board_that_ends_in_its_turn_is_gone_for_the_plant_and_not_asked_again():
     with contextlib.closing(Ranger()) as robot:
-        shadow = robot.boards["MCSI"]
         block = Block("MCSI", wiring.BOARDS.index("MCSI"), 0)
         words, doubles = new_stage()
         stage = Stage(words, doubles, robot.plant, robot.loop.step_times, [])
-        remote = RemoteBoard(shadow, block, stage, wiring.BOARDS.index("MCSI"), False)
+        remote = RemoteBoard(robot.boards["MCSI"], block, stage, wiring.BOARDS.index("MCSI"), False)
         ask = Bell(block.words, places.ASKED, places.BOARD_SLEEPS, block.ask_descriptor)
 
         def end_when_asked():
@@ -310,7 +309,7 @@ def test_a_board_that_ends_in_its_turn_is_gone_for_the_plant_and_not_asked_again
             return 7
 
         with Child(block, end_when_asked):
-            assert remote.advance(1_000_000) == 1 << 62
+            assert remote.advance(1_000_000) == NEVER
         assert remote.gone
         remote.catch_up(2_000_000)
         remote.command(places.COMMAND_SNAPSHOT)

@@ -3,8 +3,8 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ranger_sim.harness.processes.block import LATENESS_WORDS
 from ranger_sim.harness.processes.lateness import BINS, bin_of, figures, quantile_us, upper_edge_us
+from ranger_sim.harness.processes.places import LATENESS_WORDS
 
 
 def test_bins_by_hand():

@@ -1,0 +1,103 @@
+"""What a board is to everything outside: stamped messages in, stamped messages out, and when it must run next.
+
+An emulated microcontroller is one, and so is what stands for a board in another process; firmware compiled for the
+host or an original image would be others. Whoever passes time needs nothing but what stands here.
+"""
+
+import array
+
+import cython
+
+from ranger_sim.firmware_sim.analog import AnalogPins
+from ranger_sim.foundation.edge_buffer import EdgeBuffer
+from ranger_sim.foundation.events import EventQueue
+
+if not cython.compiled:
+    from ranger_sim.foundation.events import NEVER
+
+WORDS = 16
+EVERY_KIND = 0xFFFF  # bits of the message kinds to a board
+
+
+class Board:
+    """A board called `name`. `advance` is what a kind of board must have; the rest has a meaning for any board.
+
+    Inputs: `inbox`, the stamped messages; `analog`, the voltages at its pins; `words`, digital words that sensors hold
+    out to it; the edges of encoders (`listen_to_edges`). Outputs: `outbox` takes each message as it is put out.
+    `next_time`: the instant (ns) at which it must run if nothing comes in; NEVER for none. `edge_time`: that of the
+    first edge that waits. `horizon`: how far it runs at most, or has run.
+    `apart`: it runs beside the others, in a process of its own: between `begin` and `advance` of one instant others
+    may begin as well.
+    `memory`: the words of its program's memory that others may read at any instant (None: none are shown).
+    """
+
+    def __init__(self, name) -> None:
+        self.name = name
+        self.inbox = EventQueue()
+        self.outbox = EventQueue()
+        self.analog = AnalogPins()
+        self.words = array.array("q", [0]) * WORDS
+        self.next_time = 0
+        self.edge_time = NEVER
+        self.horizon = 0
+        self.apart = False
+        self.memory = None
+
+    # --- passing time -------------------------------------------------------------------------------------
+
+    def begin(self, until: cython.longlong) -> cython.void:
+        """`advance(until)` will follow: a board that runs apart starts now."""
+
+    def advance(self, until: cython.longlong) -> cython.longlong:
+        """Run everything before `until` (ns), or less far where an output asks for it; returns `next_time`."""
+        raise NotImplementedError(f"{self.name}: a board must say how it advances")
+
+    def stop_at(self, time: cython.longlong) -> cython.longlong:
+        """While it runs: run no further than to `time` (ns), which is later than now. Returns where it stops."""
+        if time < self.horizon:
+            self.horizon = time
+        return self.horizon
+
+    def speaks_from(self) -> cython.longlong:
+        """Before this instant (ns) the board puts nothing on a bus, unless an urgent message comes in."""
+        return self.next_time
+
+    def quiet_until(self) -> cython.longlong:
+        """Before this instant (ns) the board puts nothing out at all, whatever comes in of a kind that can wait."""
+        return 0
+
+    def urgent_kinds(self) -> cython.longlong:
+        """Bits of the message kinds that it may answer at once: they cannot wait."""
+        return EVERY_KIND
+
+    # --- what is connected to it --------------------------------------------------------------------------
+
+    def listen_to_edges(self, buffer: EdgeBuffer, pin: cython.longlong, partner_pin: cython.longlong) -> None:
+        """Edges of `buffer` arrive on `pin`, each with the level of `partner_pin`; tell by `edges_came`."""
+        raise NotImplementedError(f"{self.name}: this kind of board has no pins for an encoder")
+
+    def edges_came(self) -> cython.longlong:
+        """The buffers of encoders may hold new edges; returns `edge_time`."""
+        return self.edge_time
+
+    def transmit_ends(self, controller: cython.longlong) -> object:
+        """Where a bus writes the ends of the transmissions of a CAN controller; None: it sends them as messages."""
+        return None
+
+    # --- looking in ---------------------------------------------------------------------------------------
+
+    def move_memory(self, words) -> None:
+        """What `memory` shows stands in `words` from now on, as it is: memory that processes share."""
+        raise NotImplementedError(f"{self.name} shows no memory")
+
+    def watched(self) -> cython.longlong:
+        """One number of its program, as a debugger would watch it; which, the kind of board says."""
+        return 0
+
+    def latest_slot(self) -> cython.longlong:
+        """Start of its latest slot (ns); 0 before the first."""
+        return 0
+
+    def counters(self) -> object:
+        """What it counted, by name."""
+        raise NotImplementedError(f"{self.name}: this kind of board counts nothing")

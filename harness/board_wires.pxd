@@ -1,0 +1,43 @@
+cimport cython
+
+from ranger_sim.can_bus.bus cimport Bus
+from ranger_sim.firmware_sim.board cimport Board
+from ranger_sim.foundation.events cimport (
+    CAN_ABORT,
+    CAN_MODE,
+    CAN_REQUEST,
+    ORDER_INTERRUPTS,
+    PIN_OUTPUT,
+    PWM_UPDATE,
+    SSP_LOAD,
+    SSP_SEGMENT,
+    SSP_START,
+    UART_OUTPUT,
+    EventQueue,
+    Outbox,
+)
+from ranger_sim.plant.drive cimport Drive
+
+@cython.final
+cdef class WordWire:
+    cdef public long long source, word
+    cdef public Board board
+
+@cython.final
+cdef class SspWire:
+    cdef public EventQueue master, slave
+    cdef public long long exchange_ns, exchanges
+    cdef public object loaded
+    cpdef void start(self, long long time_ns, object segment) noexcept
+    cpdef void load(self, object segment) noexcept
+
+@cython.final
+cdef class BoardWires(Outbox):
+    cdef public Board board
+    cdef public Drive drive
+    cdef public long long window_ns, silent_until, watchdog_pin, low_side_2_pin, low_side_6_pin
+    cdef public bint low_side_2, low_side_6
+    cdef public list buses
+    cdef public long long[5] nodes
+    cdef public SspWire link
+    cdef public dict can_lines, serial_lines

@@ -1,0 +1,198 @@
+# cython: boundscheck=False, wraparound=False
+# (every index below is a controller 1 ... 4, as the tables of the wires say)
+"""The wires that lead away from the boards: to buses, bridges, the serial link, and whatever hangs on a UART.
+
+A message is carried on in the moment in which a board puts it out, with its stamp. What goes the other way, into a
+board's inbox, is written there by whoever sends it: the bus, the link, the plant's sensors.
+"""
+
+import cython
+
+from ranger_sim.can_bus.bus import Bus
+from ranger_sim.foundation.events import Outbox
+from ranger_sim.foundation.user_error import UserError
+
+if not cython.compiled:
+    from ranger_sim.foundation.events import (
+        CAN_ABORT,
+        CAN_MODE,
+        CAN_REQUEST,
+        ORDER_INTERRUPTS,
+        PIN_OUTPUT,
+        PWM_UPDATE,
+        SSP_LOAD,
+        SSP_SEGMENT,
+        SSP_START,
+        UART_OUTPUT,
+    )
+
+CONTROLLERS = range(1, 5)
+
+
+class WordWire:
+    """The register of one digital sensor of the plant, as a board reads it over its serial interface."""
+
+    def __init__(self, source, board, word) -> None:
+        self.source = source
+        self.board = board
+        self.word = word
+
+
+class SspWire:
+    """The serial link between two boards; an exchange that the master starts takes `exchange_ns`."""
+
+    def __init__(self, master, slave, exchange_ns, idle_segment) -> None:
+        self.master = master.inbox
+        self.slave = slave.inbox
+        self.exchange_ns = exchange_ns
+        self.loaded = idle_segment
+        self.exchanges = 0
+
+    def start(self, time_ns: cython.longlong, segment: object) -> cython.void:
+        """The master starts an exchange; both sides have the other's segment at its end."""
+        end: cython.longlong = time_ns + self.exchange_ns
+        self.slave.push(end, ORDER_INTERRUPTS, SSP_SEGMENT, 0, 0, 0, 0, 0, 0, segment)
+        self.master.push(end, ORDER_INTERRUPTS, SSP_SEGMENT, 0, 0, 0, 0, 0, 0, self.loaded)
+        self.exchanges += 1
+
+    def load(self, segment: object) -> cython.void:
+        """The slave puts up what it will send in the next exchange."""
+        self.loaded = segment
+
+
+class BoardWires(Outbox):
+    """The wires that lead away from one board: its outbox in the assembled robot.
+
+    Frames go to its buses, PWM and pins to its bridge, segments over the link, bytes to whoever listens. A pin, a
+    controller or a UART that is not connected here leads nowhere.
+    """
+
+    def __init__(self, board, window_ns) -> None:
+        self.board = board
+        self.window_ns = window_ns  # nothing that the board puts out comes back to it sooner
+        # by controller 1 ... 4: the bus and the node number there
+        self.buses = [None] * 5
+        self.nodes = [-1] * 5
+        self.can_lines = {}  # {controller: what takes its requests}, where the bus is outside
+        self.drive = None
+        self.watchdog_pin = -1
+        self.low_side_2_pin = -1
+        self.low_side_6_pin = -1
+        self.low_side_2 = False
+        self.low_side_6 = False
+        self.silent_until = 0  # ns: before that the board was to put nothing on a bus
+        self.link = None
+        self.serial_lines = {}  # {UART: what hears it}
+
+    def connect_bus(self, controller, bus, node) -> None:
+        """Controller 1 ... 4 of the board is `node` of `bus`; None for `bus` takes it off.
+
+        The bus writes the ends of its transmissions where the controller looks for them.
+        """
+        if bus is not None and not isinstance(bus, Bus):  # taken for one without asking again
+            raise UserError(f"{self.board.name}: {bus!r} is no Bus")
+        if self.buses[controller] is not None:
+            self.buses[controller].nodes[self.nodes[controller]].connect(None)
+        self.buses[controller] = bus
+        self.nodes[controller] = node
+        self._connect_ends(controller)
+
+    def _connect_ends(self, controller) -> None:
+        bus = self.buses[controller]
+        if bus is not None:
+            bus.nodes[self.nodes[controller]].connect(self.board.transmit_ends(controller))
+
+    def lead_from(self, board) -> None:
+        """`board` hangs on these wires from now on."""
+        self.board = board
+        board.outbox = self
+        for controller in CONTROLLERS:
+            self._connect_ends(controller)
+
+    def connect_drive(self, drive, watchdog_pin, low_side_2_pin, low_side_6_pin) -> None:
+        """The board's PWM unit and three of its pins drive a bridge."""
+        self.drive = drive
+        self.watchdog_pin = watchdog_pin
+        self.low_side_2_pin = low_side_2_pin
+        self.low_side_6_pin = low_side_6_pin
+
+    def push(
+        self,
+        time: cython.longlong,
+        order: cython.longlong,
+        kind: cython.longlong,
+        a: cython.longlong = 0,
+        b: cython.longlong = 0,
+        c: cython.longlong = 0,
+        d: cython.longlong = 0,
+        e: cython.longlong = 0,
+        f: cython.longlong = 0,
+        ref: object = None,
+    ) -> None:
+        """Carry on what the board puts out at `time` (ns)."""
+        if kind == PIN_OUTPUT:
+            if a == self.watchdog_pin:
+                self.drive.watchdog_edge(time)
+            elif a == self.low_side_2_pin:
+                self.low_side_2 = b != 0
+                self.drive.low_side(time, self.low_side_2, self.low_side_6)
+            elif a == self.low_side_6_pin:
+                self.low_side_6 = b != 0
+                self.drive.low_side(time, self.low_side_2, self.low_side_6)
+        elif kind == PWM_UPDATE:
+            if self.drive is not None:
+                self.drive.write_pwm(time, a, b, c)
+        elif kind == CAN_REQUEST:
+            self.request(time, a, b, c, d, e, f)
+        elif kind == CAN_ABORT or kind == CAN_MODE:
+            if self.buses[a] is None:
+                self._to_bus_outside(kind, time, a, b, c, d, e, f)
+            elif kind == CAN_ABORT:
+                self.buses[a].abort(self.nodes[a], b, time)
+            else:
+                self.buses[a].set_mode(self.nodes[a], b, time)
+        elif kind == SSP_START:
+            self.link.start(time, ref)
+            self.board.stop_at(time + self.link.exchange_ns + self.window_ns)
+        elif kind == SSP_LOAD:
+            self.link.load(ref)
+        elif kind == UART_OUTPUT:
+            self._to_serial_line(time, a, b, c, ref)
+
+    def request(
+        self,
+        time: cython.longlong,
+        controller: cython.longlong,
+        buffer: cython.longlong,
+        identifier: cython.longlong,
+        flags: cython.longlong,
+        lo: cython.longlong,
+        hi: cython.longlong,
+    ) -> None:
+        """Carry a frame to its bus."""
+        if time < self.silent_until:
+            self._spoke_early(time)
+        if self.buses[controller] is None:
+            self._to_bus_outside(CAN_REQUEST, time, controller, buffer, identifier, flags, lo, hi)
+        else:
+            cython.cast(Bus, self.buses[controller]).request(
+                self.nodes[controller], buffer, time, identifier, flags, lo, hi
+            )
+            if time + self.window_ns < self.board.horizon:
+                self.board.stop_at(time + self.window_ns)
+
+    def _spoke_early(self, time) -> None:
+        raise UserError(
+            f"{self.board.name}: a frame was sent at {time} ns, but by its schedule's `speakers` none could be before"
+            f" {self.silent_until} ns: name the task that sends there; for a handler that sends, leave `speakers` out"
+        )
+
+    def _to_bus_outside(self, kind, time, controller, b, c, d, e, f) -> None:
+        line = self.can_lines.get(controller)
+        if line is not None:
+            line.from_board(kind, time, b, c, d, e, f)
+
+    def _to_serial_line(self, time, uart, byte, count, data) -> None:
+        line = self.serial_lines.get(uart)
+        if line is not None:
+            line.from_board(time, byte, count, data)

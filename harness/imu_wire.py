@@ -1,0 +1,66 @@
+# cython: boundscheck=False, wraparound=False
+# (every index below is a byte's place in the buffer of the sensor)
+"""The wire between the plant's inertial unit and a UART of a board: the unit's bytes one way, commands the other."""
+
+import cython
+
+from ranger_sim.foundation.edge_buffer import ByteBuffer
+from ranger_sim.foundation.events import EventQueue
+
+if not cython.compiled:
+    from ranger_sim.foundation.events import ORDER_PINS, UART_BYTE
+
+    MESSAGE_BYTES = 8  # a UART_BYTE carries so many at most,
+    WORD_BYTES = 4  # half of them in each of its two words
+    PAUSE_NS = 25_000  # from byte to byte; after more a new message begins (at 460,800 baud a byte takes 21.7 us)
+
+
+class ImuWire:
+    """`imu` on UART `uart` of `board`. `tap.bytes_sent(times, values, count)` hears what the unit sends, beside it."""
+
+    def __init__(self, imu, board, uart) -> None:
+        self.imu = imu
+        self.inbox = board.inbox
+        self.uart = uart
+        self.tap = None
+        self.plugged = True
+
+    def unplug(self) -> None:
+        """The unit is no longer heard: another one takes its place on the UART."""
+        self.plugged = False
+
+    def from_board(self, time, byte, count, data) -> None:
+        """A byte of the board arrives at the unit."""
+        self.imu.receive_byte(time, byte)
+
+    def deliver(self) -> None:
+        """Carry on what the unit sent during the step that was just integrated."""
+        if self.plugged and self.imu.bytes.count:
+            if self.tap is not None:
+                self.tap.bytes_sent(self.imu.bytes.times, self.imu.bytes.values, self.imu.bytes.count)
+            self._put_bytes()
+
+    def _put_bytes(self) -> cython.void:
+        """Up to eight bytes that follow each other closely travel as one message."""
+        line: ByteBuffer = self.imu.bytes
+        inbox: EventQueue = self.inbox
+        time: cython.longlong = line.times[0]
+        following: cython.longlong
+        byte: cython.longlong
+        n: cython.longlong = 0  # bytes in `low` and `high`, the first one in the lowest place
+        low: cython.longlong = 0
+        high: cython.longlong = 0
+        i: cython.longlong
+        for i in range(line.count):
+            following = line.times[i]
+            if n == MESSAGE_BYTES or following - time >= PAUSE_NS:
+                inbox.put(time, ORDER_PINS, UART_BYTE, self.uart, low & 255, n, low, high, 0)
+                n = low = high = 0
+            byte = line.values[i]
+            if n < WORD_BYTES:
+                low |= byte << (8 * n)
+            else:
+                high |= byte << (8 * (n - WORD_BYTES))
+            n += 1
+            time = following
+        inbox.put(time, ORDER_PINS, UART_BYTE, self.uart, low & 255, n, low, high, 0)

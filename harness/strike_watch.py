@@ -1,0 +1,68 @@
+"""How long after the body's heel strikes the main brain notices them: from the strike to the slot that does."""
+
+import math
+
+import cython
+
+from ranger_sim.firmware_sim.board import Board
+from ranger_sim.plant.ranger import RangerPlant
+
+
+class StrikeWatch:
+    """`board`: the main brain, of which the swing leg can be watched (`Board.watched`).
+
+    `count` strikes were noticed; `missed`: steps of which no flip of the swing leg told; `unmatched`: flips without a
+    new strike. `sum_ms`, `squares_ms2`: of the delays.
+    """
+
+    def __init__(self, plant, board) -> None:
+        self.plant = plant
+        self.board = board
+        self.swing_leg = board.watched()
+        self.seen_ns = -1
+        self.steps_noticed = 0
+        self.count = 0
+        self.unmatched = 0
+        self.missed = 0
+        self.sum_ms = 0.0
+        self.squares_ms2 = 0.0
+
+    def look(self) -> None:
+        """Once per step of the plant: has the main brain flipped the swing leg?"""
+        board: Board = self.board
+        leg: cython.longlong = board.watched()
+        if leg != self.swing_leg:
+            self.swing_leg = leg
+            self._notice()
+
+    def _notice(self) -> cython.void:
+        """It has: how long after the body's strike did that slot begin?"""
+        plant: RangerPlant = self.plant
+        delay_ms: cython.double
+        if plant.steps == 0:
+            return  # the reset on entering the walk
+        if plant.strike_time_ns == self.seen_ns:
+            self.unmatched += 1
+            return
+        if plant.steps > self.steps_noticed + 1:
+            self.missed += plant.steps - self.steps_noticed - 1
+        self.steps_noticed = plant.steps
+        self.seen_ns = plant.strike_time_ns
+        delay_ms = (self.board.latest_slot() - self.seen_ns) * 1e-6
+        self.count += 1
+        self.sum_ms += delay_ms
+        self.squares_ms2 += delay_ms * delay_ms
+
+    def statistics(self) -> dict:
+        """Mean and standard deviation of the delay in ms (None without a strike), and what was counted."""
+        mean = deviation = None
+        if self.count:
+            mean = self.sum_ms / self.count
+            deviation = math.sqrt(max(0.0, self.squares_ms2 / self.count - mean * mean))
+        return {
+            "mean": mean,
+            "std": deviation,
+            "count": self.count,
+            "unmatched": self.unmatched,
+            "missed": self.missed,
+        }
