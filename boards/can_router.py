@@ -8,6 +8,7 @@ main loop moves frames whenever no slot runs: run the scheduler, then four times
 
 import cython
 
+from ranger_sim.boards import counters
 from ranger_sim.boards.firmware_board import ALL_CAN_INTERRUPTS, FirmwareBoard
 from ranger_sim.boards.modules.can_errors import CanErrors
 from ranger_sim.boards.modules.can_load import CanLoad
@@ -177,6 +178,15 @@ class CanRouterBoard(FirmwareBoard):
         self.background = self.main_loop
         self.adc.start_burst(ANALOG["supply_current"], ANALOG["supply_voltage"])
         self.start(self.schedule(), phase_ns)
+
+    def counters(self) -> object:
+        """What the board counted, by name."""
+        router, skipped = self.router, self.clock.skipped
+        can = [
+            counters.of_controller(each, router.receive_lost_from[n], router.transmit_lost[n], skipped[n])
+            for n, each in enumerate(self.controllers, start=1)
+        ]
+        return counters.of_board(self, can, self.link, router)
 
     def schedule(self) -> Schedule:
         """Source: robot.md N3.7. Costs and limits are chosen by us: no execution times of this board are known."""

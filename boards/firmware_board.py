@@ -5,6 +5,7 @@ Below, in the order of building: FirmwareBoard (all), SatelliteBoard (one CAN bu
 
 import cython
 
+from ranger_sim.boards import counters
 from ranger_sim.boards.modules.can_link import CanLink
 from ranger_sim.boards.modules.error_module import ErrorModule
 from ranger_sim.boards.modules.execution_timer import ExecutionTimer
@@ -94,3 +95,7 @@ class SatelliteBoard(FirmwareBoard):
         self.can_controller = CanController(self, table.CONTROLLER, IER=interrupts)
         self.can = CanLink(self, self.can_controller, self.time, self.errors, self.quirks.full_queues_reported)
         self.can.attach(receive_slot=CAN_RECEIVE_SLOT, error_slot=error_slot)
+
+    def counters(self) -> object:
+        """What the board counted, by name."""
+        return counters.of_board(self, [counters.of_can_link(self.can)])

@@ -18,6 +18,7 @@ import cython
 
 from ranger_sim.firmware_sim.board import Board
 from ranger_sim.firmware_sim.clock import Crystal, TickTrain
+from ranger_sim.firmware_sim.counters import BoardCounters
 from ranger_sim.firmware_sim.scheduler import Occasional, Schedule, SlotScheduler, Task, Wait
 from ranger_sim.firmware_sim.vic import SLOT_TIMER, InterruptController, InterruptSource
 from ranger_sim.foundation.edge_buffer import EdgeBuffer
@@ -243,13 +244,13 @@ class Microcontroller(Board):
         self.slot_timer = SlotTimer(self)
         self.alarms = [None] * ALARMS + [self.slot_timer.alarm]
         # those that are set: instants and places in `alarms`, the first to come last; at 0 stands one that never comes
-        self.alarm_times = [NEVER] * ALARM_PLACES
-        self.alarm_places = [0] * ALARM_PLACES
+        self.alarm_times = [NEVER] * 18  # ALARM_PLACES
+        self.alarm_places = [0] * 18
         self.alarms_set = 1  # where the next one would stand
         self.others = Unclaimed(self)
         self.message_table = [self.others] * (MESSAGE_KINDS * INDICES_PER_KIND)
         self.pin_owners = [None] * PINS
-        self.pin_channels = [-1] * PINS
+        self.pin_channels = [-1] * 64  # PINS
         self.pin_sources = [None] * PINS
         self.first_line = EdgeLine(EdgeBuffer(1))  # no encoder: never an edge
         self.second_line = self.first_line
@@ -321,6 +322,10 @@ class Microcontroller(Board):
     def latest_slot(self) -> cython.longlong:
         """Start of its latest slot (ns); 0 before the first."""
         return self.scheduler.slot_time
+
+    def counters(self) -> object:
+        """What the board counted, by name."""
+        return BoardCounters(hz=self.hz, unclaimed=self.unclaimed, slots=self.scheduler.counters())
 
     def new_alarm(self, peripheral, number) -> Alarm:
         """An alarm; when due, `peripheral.on_alarm(number, time)` runs."""

@@ -13,6 +13,7 @@ against `limit`. The event loop that spends the time is in microcontroller.py; h
 
 import cython
 
+from ranger_sim.firmware_sim.counters import SlotCounters
 from ranger_sim.foundation.numbers import integers
 from ranger_sim.foundation.user_error import UserError
 
@@ -400,6 +401,20 @@ class SlotScheduler:
         if not self.done and code_time + self.leads[self.position] < first:
             first = code_time + self.leads[self.position]
         return first
+
+    def counters(self) -> SlotCounters:
+        """How the slots were kept."""
+        return SlotCounters(
+            count=self.slot_count,
+            latest_ns=self.slot_time,
+            overruns=self.overruns,
+            dropped_tasks=self.dropped_tasks,
+            near_limits=self.near_limits,
+            max_cycles=self.max_slot_cycles,
+            total_cycles=self.total_slot_cycles,
+            histogram=list(self.histogram),
+            slot_ns=self.schedule.slot_ns,
+        )
 
     @property
     def run_tasks(self):

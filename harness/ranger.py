@@ -9,6 +9,7 @@ from collections.abc import Callable
 from typing import Any, Literal, overload
 
 from ranger_sim.boards.can_router import CanRouterBoard
+from ranger_sim.boards.counters import RangerCounters
 from ranger_sim.boards.hip import HipBoard
 from ranger_sim.boards.inner_feet import InnerFeetBoard
 from ranger_sim.boards.main_brain import controllers
@@ -274,6 +275,10 @@ class Ranger:
     ) -> None:
         """Put your own function in a schedule entry; it declares its cost in cycles."""
         self.board(board).scheduler.replace(task, function, cost=cost, limit=limit)
+
+    def counters(self) -> dict[str, RangerCounters]:
+        """What every board counted, by its name; also of a board that runs in another process."""
+        return {name: self.loop.board(name).counters() for name in self.boards}
 
     def trace_digest(self) -> str:
         """BLAKE2b-256 of the canonical trace so far."""

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from ranger_sim import datatable
+from ranger_sim.boards.counters import RangerCounters
 from ranger_sim.datatable.generated import all_variables
 
 # machine: variable of its state in the main brain's table
@@ -47,7 +48,7 @@ class Recorded:
         self.word_times_ns, self.words = robot.logbook.words()
         self.steps = robot.plant.recent_steps()
         self.bus_load = {bus.name: self._load(bus) for bus in robot.buses}
-        self.slot_histograms = {name: self._histogram(board) for name, board in robot.boards.items()}
+        self.slot_histograms = {name: self._histogram(counters) for name, counters in robot.counters().items()}
         self.footholds = robot.plant.recent_footholds()
 
     def _load(self, bus: Any) -> Any:
@@ -56,8 +57,8 @@ class Recorded:
         return last - 0.01 * np.arange(len(windows), 0, -1) + 0.005, windows
 
     @staticmethod
-    def _histogram(board: Any) -> Any:
-        counts = np.array(board.scheduler.histogram)
+    def _histogram(counters: RangerCounters) -> Any:
+        counts = np.array(counters.slots.histogram)
         return 5.0 * np.arange(len(counts)), counts
 
     def machine_states(self, machine: str) -> Any:

@@ -1,8 +1,10 @@
 """The walk in numbers."""
 
+from collections.abc import Mapping
 from typing import Any
 
 from ranger_sim import loading
+from ranger_sim.boards.counters import RangerCounters
 from ranger_sim.datatable.generated import errors as error_table
 from ranger_sim.harness import wiring
 
@@ -19,7 +21,8 @@ def of(robot: Any) -> dict:
     motor_power = sum(powers.values())
     electronics_power = plant.electronics_power_W
     total = motor_power + electronics_power
-    failed = [name for name, board in robot.boards.items() if not alive(robot, name, board)]
+    counters: dict[str, RangerCounters] = robot.counters()
+    failed = [name for name, board in counters.items() if not alive(robot, board)]
     return {
         "steps": plant.steps,
         "fell": bool(plant.fell),
@@ -41,9 +44,9 @@ def of(robot: Any) -> dict:
         "battery_V": plant.battery_V,
         "heel_strike_delay_ms": robot.loop.strikes.statistics(),
         "oddities": oddities(plant),
-        "can": {bus.name: can(robot, bus) for bus in robot.buses},
-        "slots": {name: slots(board) for name, board in robot.boards.items()},
-        "errors": {name: errors(board) for name, board in robot.boards.items()},
+        "can": {bus.name: can(robot, bus, counters) for bus in robot.buses},
+        "slots": {name: slots(board) for name, board in counters.items()},
+        "errors": {name: errors(board) for name, board in counters.items()},
         "realtime_factor": robot.realtime_factor(),
         "cpu_factor": robot.time_s / robot.cpu_s if robot.cpu_s > 0.0 else None,
         "compiled": loading.RUNS_COMPILED,
@@ -84,55 +87,43 @@ def oddities(plant: Any) -> dict:
     }
 
 
-def can(robot: Any, bus: Any) -> dict:
+def can(robot: Any, bus: Any, counters: Mapping[str, RangerCounters]) -> dict:
     """Traffic of one bus; loads as fractions 0-1 with stuff bits and intermission.
 
     lost: frames accepted for sending that a listening node did not get, on the wire or in its receive buffers.
     queue_full: frames that a full transmit ring of a board or of the router did not accept.
     """
     now = robot.loop.time
-    lost, queue_full, skipped = bus.counters.lost, 0, bus.counters.single_shot_skipped
-    for wire in wiring.CAN:
-        if f"can{wire.bus}" != bus.name:
-            continue
-        board = robot.boards[wire.board]
-        if wire.board == "CSR":
-            lost += board.controllers[wire.controller - 1].data_overruns
-            lost += board.router.receive_lost_from[wire.controller]
-            queue_full += board.router.transmit_lost[wire.controller]
-            skipped += board.clock.skipped[wire.controller]
-        else:
-            lost += board.can.controller.data_overruns + board.can.receive_lost
-            queue_full += board.can.send_lost
+    wired = {(wire.board, wire.controller) for wire in wiring.CAN if f"can{wire.bus}" == bus.name}
+    ends = [each for name, board in counters.items() for each in board.can if (name, each.controller) in wired]
     return {
         "frames": bus.counters.frames,
         "load_mean": bus.load_mean(now),
         "load_max": bus.load.largest(),
-        "lost": lost,
-        "queue_full": queue_full,
-        "single_shot_skipped": skipped,
+        "lost": bus.counters.lost + sum(end.data_overruns + end.receive_lost for end in ends),
+        "queue_full": sum(end.queue_full for end in ends),
+        "single_shot_skipped": bus.counters.single_shot_skipped + sum(end.skipped for end in ends),
         "errors": bus.counters.errors,
     }
 
 
-def slots(board: Any) -> dict:
+def slots(counters: RangerCounters) -> dict:
     """How one board kept its slots; interrupts included."""
-    scheduler = board.scheduler
+    kept = counters.slots
     return {
-        "count": scheduler.slot_count,
-        "overruns": scheduler.overruns,
-        "max_execution_us": scheduler.max_slot_cycles * 1e6 / board.hz,
-        "budget_us": scheduler.schedule.slot_ns / 1000.0,
+        "count": kept.count,
+        "overruns": kept.overruns,
+        "max_execution_us": kept.max_cycles * 1e6 / counters.hz,
+        "budget_us": kept.slot_ns / 1000.0,
     }
 
 
-def errors(board: Any) -> dict:
+def errors(counters: RangerCounters) -> dict:
     """Errors the board itself noted, by name."""
-    totals = board.errors.totals
-    return {name: totals[code] for code, name in error_table.NAMES.items() if totals[code]}
+    return {name: counters.errors[code] for code, name in error_table.NAMES.items() if counters.errors[code]}
 
 
-def alive(robot: Any, name: str, board: Any) -> bool:
+def alive(robot: Any, counters: RangerCounters) -> bool:
     """True when the board's slots are as recent as they should be."""
-    silent_ns = robot.loop.time - board.scheduler.slot_time
-    return robot.loop.time - robot.start_ns < 20_000_000 or silent_ns < 20 * board.scheduler.schedule.slot_ns
+    silent_ns = robot.loop.time - counters.slots.latest_ns
+    return robot.loop.time - robot.start_ns < 20_000_000 or silent_ns < 20 * counters.slots.slot_ns

@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import cython
 
+from ranger_sim.boards import counters
 from ranger_sim.boards.firmware_board import FirmwareBoard
 from ranger_sim.boards.main_brain import controllers
 from ranger_sim.boards.main_brain.data_link import DataLink
@@ -126,6 +127,10 @@ class MainBrainBoard(FirmwareBoard):
     def watched(self) -> cython.longlong:
         """The swing leg, as the estimator has it."""
         return self.estimator.swing_leg
+
+    def counters(self) -> object:
+        """What the board counted, by name."""
+        return counters.of_board(self, [], self.link)
 
     def schedule(self) -> Schedule:
         """Source: robot.md N3.8.

@@ -9,7 +9,7 @@ from ranger_sim.harness.processes.places cimport (
     BOARD_SLEEPS,
     COMMAND,
     COMMAND_ADVANCE,
-    COMMAND_SNAPSHOT,
+    COMMAND_COUNTERS,
     COMMAND_STOP,
     DAMAGED,
     ERRORS,

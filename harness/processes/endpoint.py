@@ -7,12 +7,12 @@ import json
 
 import cython
 
+from ranger_sim.boards.counters import as_dict
 from ranger_sim.firmware_sim.microcontroller import Microcontroller
 from ranger_sim.foundation import wallclock
 from ranger_sim.foundation.events import CAN_RX, CAN_TX_DONE, PIN_EDGE, UART_BYTE, EventQueue
-from ranger_sim.harness.processes import snapshot
 from ranger_sim.harness.processes.channel import Bell, Mailbox
-from ranger_sim.harness.processes.kinds import FROM_BOARD, KINDS, NOTE, NOTE_SNAPSHOT, NOTE_WORDS, SET_WORD, TO_BOARD
+from ranger_sim.harness.processes.kinds import FROM_BOARD, KINDS, NOTE, NOTE_COUNTERS, NOTE_WORDS, SET_WORD, TO_BOARD
 from ranger_sim.harness.processes.lateness import bin_of
 from ranger_sim.harness.wiring import HEAR_IN_SLOTS
 
@@ -26,7 +26,7 @@ if not cython.compiled:
         BOARD_SLEEPS,
         COMMAND,
         COMMAND_ADVANCE,
-        COMMAND_SNAPSHOT,
+        COMMAND_COUNTERS,
         COMMAND_STOP,
         DAMAGED,
         ERRORS,
@@ -106,8 +106,8 @@ class Endpoint:
                 return
             if command == COMMAND_ADVANCE:
                 self._advance()
-            elif command == COMMAND_SNAPSHOT:
-                self.tell(NOTE_SNAPSHOT, snapshot.take(self.board))
+            elif command == COMMAND_COUNTERS:
+                self.tell(NOTE_COUNTERS, as_dict(self.board.counters()))
             self.block[RESULT] = RESULT_MORE if self._put_out() else RESULT_DONE
             self._show()
             self.answer.ring()

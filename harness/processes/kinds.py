@@ -18,7 +18,7 @@ IDENTIFIER = (0, 0x1FFFFFFF)
 # Kinds between the processes only: no chip sees them.
 NOTE = 64  # a NOTE_*, b part, c parts, ref bytes (UTF-8 of JSON, cut into parts)
 SET_WORD = 65  # a number of the variable, b its word: written into the board's data table
-NOTE_SNAPSHOT = 1  # what the board's objects count, for summary and report
+NOTE_COUNTERS = 1  # what the board counted, for summary and report
 NOTE_FAULT = 2  # why a board process ends
 
 

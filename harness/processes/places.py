@@ -55,7 +55,7 @@ if not cython.compiled:
 
     COMMAND_ADVANCE = 1
     COMMAND_MORE = 2
-    COMMAND_SNAPSHOT = 3
+    COMMAND_COUNTERS = 3
     COMMAND_STOP = 4
     RESULT_DONE = 0
     RESULT_MORE = 1

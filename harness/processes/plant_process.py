@@ -12,8 +12,8 @@ from ranger_sim.datatable.packing import word_of_value
 from ranger_sim.foundation import wallclock
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness import wiring
-from ranger_sim.harness.processes import kernel, places, snapshot
-from ranger_sim.harness.processes.kinds import NOTE, NOTE_SNAPSHOT, SET_WORD
+from ranger_sim.harness.processes import kernel, places
+from ranger_sim.harness.processes.kinds import SET_WORD
 from ranger_sim.harness.processes.pace import Pace
 from ranger_sim.harness.processes.remote_board import RemoteBoard
 from ranger_sim.harness.processes.settings import Settings
@@ -250,15 +250,9 @@ class PlantRun:
         for end in self.robot.polled:
             if hasattr(end, "drain"):
                 end.drain(self.robot.loop.time)
-        for name, remote in self.remotes.items():
+        for remote in self.remotes.values():
             remote.catch_up(self.robot.loop.time)
-            remote.from_board.notes.clear()
-            remote.command(places.COMMAND_SNAPSHOT)
-            if remote.gone:
-                continue
-            parts = [note for note in remote.from_board.notes if note[0] == NOTE and note[3] == NOTE_SNAPSHOT]
-            parts.sort(key=lambda note: note[4])
-            snapshot.put(self.robot.boards[name], json.loads(b"".join(note[-1] for note in parts)))
+            remote.fetch_counters()
             remote.dismiss()
 
 

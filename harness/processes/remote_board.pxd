@@ -13,6 +13,7 @@ from ranger_sim.harness.processes.places cimport (
     COMMAND,
     COMMAND_ADVANCE,
     COMMAND_MORE,
+    COMMAND_COUNTERS,
     COMMAND_STOP,
     FATE,
     NEXT_OUTPUT,
@@ -38,6 +39,7 @@ cdef class RemoteBoard(Board):
     cdef public Mailbox to_board, from_board
     cdef public Stage stage
     cdef public list lines
+    cdef public object counted, uncounted
     cdef public bint posted, gone, follows_steps
     cdef public long long place, silent_until, urgent, turns, reached, watched_number, slot_time
     cdef bint _urgent(self, long long until) noexcept

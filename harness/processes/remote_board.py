@@ -9,15 +9,19 @@ until then it is left alone, unless something comes in that may make it answer a
 the missed time later, and reads its sensors from the stage's rows of that time.
 """
 
+import json
+from dataclasses import replace
+
 import cython
 
+from ranger_sim.boards.counters import from_dict
 from ranger_sim.firmware_sim.board import EVERY_KIND, Board
 from ranger_sim.firmware_sim.microcontroller import EdgeLine
 from ranger_sim.foundation.edge_buffer import EdgeBuffer
 from ranger_sim.foundation.events import EventQueue
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.processes.channel import Bell, Mailbox
-from ranger_sim.harness.processes.kinds import FROM_BOARD, TO_BOARD
+from ranger_sim.harness.processes.kinds import FROM_BOARD, NOTE, NOTE_COUNTERS, TO_BOARD
 
 if not cython.compiled:
     from ranger_sim.foundation.events import NEVER, ORDER_PINS, PIN_EDGE, ROW, ROW_KIND
@@ -31,6 +35,7 @@ if not cython.compiled:
         BOARD_SLEEPS,
         COMMAND,
         COMMAND_ADVANCE,
+        COMMAND_COUNTERS,
         COMMAND_MORE,
         COMMAND_STOP,
         FATE,
@@ -71,6 +76,8 @@ class RemoteBoard(Board):
         self.lines = []
         self.watched_number = built.watched()
         self.slot_time = built.latest_slot()
+        self.counted = None
+        self.uncounted = built.counters()
         self.block = shared.words
         self.ask = Bell(shared.words, ASKED, BOARD_SLEEPS, shared.ask_descriptor)
         self.answer = Bell(shared.words, ANSWERED, PLANT_SLEEPS, shared.answer_descriptor)
@@ -182,6 +189,22 @@ class RemoteBoard(Board):
         self.next_time = power_up_ns
         self.silent_until = 0
         self.reached = now
+
+    def fetch_counters(self) -> None:
+        """Ask the board for what it counted; `counters` says it from then on."""
+        self.from_board.notes.clear()
+        self.command(COMMAND_COUNTERS)
+        if self.gone:
+            return
+        parts = [note for note in self.from_board.notes if note[0] == NOTE and note[3] == NOTE_COUNTERS]
+        parts.sort(key=lambda note: note[4])
+        self.counted = from_dict(json.loads(b"".join(note[-1] for note in parts)))
+
+    def counters(self) -> object:
+        """What the board counted, as it was fetched last; of a board that was gone by then, nothing but its last slot."""
+        if self.counted is not None:
+            return self.counted
+        return replace(self.uncounted, slots=replace(self.uncounted.slots, latest_ns=self.slot_time))
 
     def dismiss(self) -> None:
         """Tell the board's process to end; nothing is answered."""

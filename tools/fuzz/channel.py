@@ -60,7 +60,7 @@ class Fuzz:
         kind, damaged = self.number(8), self.words[places.DAMAGED]
         if kind == 0:
             command = self.word()
-            ends = (places.COMMAND_STOP, places.COMMAND_SNAPSHOT, places.COMMAND_ADVANCE)
+            ends = (places.COMMAND_STOP, places.COMMAND_COUNTERS, places.COMMAND_ADVANCE)
             self.turn(places.COMMAND_MORE if command in ends else command)
         elif kind == 1:
             self.turn(until=self.word())

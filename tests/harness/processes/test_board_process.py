@@ -63,7 +63,7 @@ def lone():
 @settings(max_examples=200, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_a_board_survives_whatever_stands_in_its_channel(served, damage, used, until, command):
     """It answers, counts what it could not read, and goes on with its slots."""
-    if command in (places.COMMAND_STOP, places.COMMAND_SNAPSHOT):
+    if command in (places.COMMAND_STOP, places.COMMAND_COUNTERS):
         command = places.COMMAND_MORE
     for place, value in damage:
         served.words[served.block.to_board_first + place] = value

@@ -312,7 +312,7 @@ def test_a_board_that_ends_in_its_turn_is_gone_for_the_plant_and_not_asked_again
             assert remote.advance(1_000_000) == NEVER
         assert remote.gone
         remote.catch_up(2_000_000)
-        remote.command(places.COMMAND_SNAPSHOT)
+        remote.command(places.COMMAND_COUNTERS)
         with pytest.raises(UserError, match="MCSI is gone"):
             remote.send(kinds.SET_WORD, 2_000_000, 1, 1)
 

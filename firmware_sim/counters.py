@@ -1,0 +1,41 @@
+"""What a board counted, by name. A board says it itself (`Board.counters`), whether it runs here or elsewhere."""
+
+import dataclasses
+
+
+@dataclasses.dataclass(frozen=True)
+class SlotCounters:
+    """How a board kept its slots. Cycles are those of whole slots, interrupts included."""
+
+    count: int
+    latest_ns: int  # start of the latest slot
+    overruns: int
+    dropped_tasks: int
+    near_limits: int
+    max_cycles: int
+    total_cycles: int
+    histogram: list[int]  # slots by cycles: bins of 5 % of a slot, the last one for overruns
+    slot_ns: int  # length of a slot
+
+
+@dataclasses.dataclass(frozen=True)
+class CanCounters:
+    """One CAN controller, and the program's queues at it."""
+
+    controller: int
+    received: int
+    sent: int
+    data_overruns: int  # frames that came while both receive buffers were taken
+    receive_lost: int  # frames that a full receive queue did not take
+    queue_full: int  # frames that a full transmit queue did not take
+    skipped: int = 0  # frames that were not sent because the one before still waited
+
+
+@dataclasses.dataclass(frozen=True)
+class BoardCounters:
+    """A board of `hz` core clock. `unclaimed`: messages for which it has no peripheral."""
+
+    hz: int
+    unclaimed: int
+    slots: SlotCounters
+    can: list[CanCounters] = dataclasses.field(default_factory=list)
