@@ -201,7 +201,7 @@ class RemoteBoard(Board):
         self.counted = from_dict(json.loads(b"".join(note[-1] for note in parts)))
 
     def counters(self) -> object:
-        """What the board counted, as it was fetched last; of a board that was gone by then, nothing but its last slot."""
+        """What the board counted, as it was fetched last; only its last slot where it was gone by then."""
         if self.counted is not None:
             return self.counted
         return replace(self.uncounted, slots=replace(self.uncounted.slots, latest_ns=self.slot_time))
