@@ -28,8 +28,6 @@ cdef class Leg:
     cdef double reach(self) noexcept
     cpdef double behind(self) noexcept
     cdef double rise(self) noexcept
-    cpdef double ankle_angle(self) noexcept
-    cpdef double ankle_rate(self) noexcept
     cpdef void limp(self) noexcept
     cpdef void lie(self) noexcept
     cdef void save(self) noexcept

@@ -165,14 +165,6 @@ class Leg:
             - self.el * cos(self.angle) * self.rate * self.rate
         )
 
-    def ankle_angle(self) -> cython.double:
-        """a, foot against leg, rad; 0 with the sweet spot below an upright leg."""
-        return self.foot_angle - self.angle
-
-    def ankle_rate(self) -> cython.double:
-        """Rate of a, rad/s."""
-        return self.foot_rate - self.rate
-
     # ---- what happens to it ---------------------------------------------------------------------------------
 
     def limp(self) -> cython.void:

@@ -508,6 +508,21 @@ def test_the_closed_linkage_stays_closed():
     assert max(opening(4, round(0.05 / STEP_S))) < 1e-11
 
 
+@pytest.mark.parametrize("stance", [OUTER, INNER])
+def test_a_linkage_of_unequal_feet_stays_closed(stance):
+    """Each leg has its own foot: with other radii and ankle offsets both contacts still rest, along and upwards."""
+    body = Body(BodyParameters(arc_heel_rad=-0.2))
+    body.inner.r, body.inner.d = 0.23, 0.14
+    closed_posture(body, RandomStream(4, "closed"), stance)
+    w = body.swing
+    for _ in range(round(0.05 / STEP_S)):
+        on_feet(body, STEP_S, 4)
+        body.update_pose()
+        # as for equal feet: the method's own error
+        assert abs(w.gap) < 1e-10
+        assert abs(body.hip_x - w.chain_x(w.foot_angle, w.angle) - w.anchor) < 1e-10
+
+
 def test_a_linkage_opened_by_the_end_of_an_arc_closes_again():
     # This stance rolls over the heel end inside a step: the jump of the acceleration (some 1e3 m/s^2) acts for at most
     # one step, 0.5 x 1e3 x (250 us)^2 = 31 um, and decays at 100 1/s.
