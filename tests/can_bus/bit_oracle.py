@@ -189,6 +189,13 @@ class Node:
         self.sequences = 0
         self.count = 0
 
+    def join(self):
+        """The program asks to take part: after 11 recessive bits, out of bus-off after 128 times 11."""
+        if self.state in (OFF, BUS_OFF):
+            self.sequences = 128 if self.state == BUS_OFF else 1
+            self.state = INTEGRATING
+            self.recessive = 0
+
     # what it drives in the bit to come
     def decide(self, bit):
         self.drive = RECESSIVE
