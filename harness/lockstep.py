@@ -1,28 +1,34 @@
 # cython: boundscheck=False, wraparound=False
 # (every index below counts boards, buses or wires, or stands in a table filled when the robot is wired)
-"""The loop that everything serves, in virtual time and in one process.
+"""The loop that everything serves: conservative simulation with lookahead, in virtual time.
 
     plant -> sensors -> pins -> interrupts and slots -> data table -> CAN -> router -> main brain
           -> CAN -> slots -> PWM -> plant
 
-Within a step of the plant the board that is due first runs, and it runs ahead: to 31 us beyond the instant at which
-the next board or bus is due, or less far where something that it puts out could come back to it (`stop_at`). Those
-31 us are shorter than the shortest frame on Ranger's buses (its receivers have it 35.6 us after its start) and than
-the pause between two exchanges on the serial link: 34.67 us, less the 1.7 us by which a frame's interrupt can hold up
-the start of the first. So nothing that any board puts out can reach a board that has run on already, and the result
-depends neither on the order in which boards run nor on how far. At one instant: plant, pins, buses, then the boards
-with their interrupts and slots, then their outputs.
+Boards, buses and plant have events of their own, each with its instant. In conservative simulation nobody runs past an
+instant at which something may still reach it, so nothing is ever taken back. How far ahead of the others a board may
+run safely is its lookahead: the least time in which something that another one puts out can arrive.
 
-A board is due when it has something to do: an alarm, a slot, a task, an interrupt, a message. Where frames, edges and
-bytes wait for a task (`hears_in_its_slots`) it is due only when it may put something on a bus
-(`Board.speaks_from`): it does everything else, each thing at its instant, when that has come, or at the end
-of the plant's step, while edges and voltages still stand; what it hears alone does not even need that.
+The lookahead is 31 us (WINDOW_NS). That is shorter than the shortest frame on Ranger's buses: its receivers have it
+35.6 us after its start. And it is shorter than the pause between two exchanges on the serial link: 34.67 us, less the
+1.7 us by which a frame's interrupt can hold up the start of the first. So the result depends neither on the order in
+which boards run nor on how far each of them goes.
 
-Boards in processes of their own run side by side instead: in windows of 31 us, each from the first instant at which
-anything is due, all boards that are due in a window at once.
+Within a step of the plant the board that is due first runs, to 31 us beyond the instant at which the next board or bus
+is due. It stops earlier where an answer to its own output could reach it (`Board.stop_at`). At one instant the order
+is: plant, pins, buses, then the boards with their interrupts and slots, then their outputs.
+
+A board is due when it has something to do: an alarm, a slot, a task, an interrupt, a message. On some boards frames,
+edges and bytes wait for a task (`hears_in_its_slots`). Such a board is due only when it may put something on a bus
+(`Board.speaks_from`). Until then it is left alone, and does everything else later, each thing at its instant. Edges and
+voltages stand for one step of the plant, so it has caught up with its own events by the end of the step. A frame or a
+byte that it has only heard may wait longer: until the board is due, or until `run` returns.
+
+Boards that run apart (`Board.apart`), each in a process of its own, run side by side: in windows as long as the
+lookahead, each from the first instant at which anything is due, all boards that are due in a window at once.
 
 ROBOT PARITY: the plant moves in steps of 250 us. What a board writes to its bridge acts from the next step on, so up
-to 250 us late; what sensors show is a straight line over a step (voltages) or stands through it (words).
+to 250 us late. Sensors show a straight line over a step (voltages) or stand through it (words).
 """
 
 import array
@@ -48,7 +54,7 @@ if not cython.compiled:
     REACHED_DISTANCE = 2
     FELL = 3
 
-WINDOW_NS = 31_000
+WINDOW_NS = 31_000  # the lookahead
 ANY_DISTANCE_M = 1e300
 
 

@@ -4,6 +4,8 @@ import pathlib
 
 import pytest
 
+from ranger_sim.firmware_sim.board import Board
+from ranger_sim.foundation.events import NEVER
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness import lockstep, profile, wiring
 from ranger_sim.harness.ranger import Ranger
@@ -123,3 +125,34 @@ def test_a_board_that_announces_when_it_speaks_gives_the_trace_of_one_that_does_
         board.scheduler.announces = False
     robot.run(StopRule(time_s=RUN_S), 1.0)
     assert robot.trace_digest() == expected[0]
+
+
+class IdleBoard(Board):
+    """Takes in what comes, and never has anything to do."""
+
+    def advance(self, until):
+        self.inbox.clear()
+        self.horizon = until
+        self.next_time = NEVER
+        return NEVER
+
+    def listen_to_edges(self, buffer, pin, partner_pin):
+        """Nobody looks at them."""
+
+
+def test_any_kind_of_board_may_take_the_place_of_an_emulated_one():
+    robot = Ranger(Scenario())
+    idle = IdleBoard("MCSI")
+    idle.inbox = robot.boards["MCSI"].inbox
+    robot.loop.replace(idle)
+    robot.run(StopRule(time_s=0.01), 1.0)
+    assert robot.boards["MCSI"].scheduler.slot_count == 0
+    assert robot.boards["MCFI"].scheduler.slot_count >= 16
+
+
+def test_a_board_with_another_inbox_or_of_another_name_takes_no_place():
+    robot = Ranger(Scenario())
+    with pytest.raises(UserError, match="the inbox of the new MCH is not that of the one whose place it takes"):
+        robot.loop.replace(IdleBoard("MCH"))
+    with pytest.raises(UserError, match="no board is called NOPE"):
+        robot.loop.replace(IdleBoard("NOPE"))
