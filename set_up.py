@@ -131,8 +131,9 @@ class Steps:
             elif text.startswith("Installing"):
                 self.line.show("packages", f"installing {of} packages")
 
-        # bytecode is written when a module is first imported: most of them never are
-        options = ["--disable-pip-version-check", "--progress-bar", "off", "--no-compile", "--require-hashes"]
+        options = ["--disable-pip-version-check", "--progress-bar", "off", "--require-hashes"]
+        if not sys.dont_write_bytecode:  # a module's bytecode is then written when it is first imported; most never are
+            options.append("--no-compile")
         self.run([self.python, "-m", "pip", "install", *options, "-r", wanted], seen)
         self.line.show("packages", f"{of} packages ({what})", end=True)
         wanted.replace(kept)
