@@ -7,7 +7,8 @@ from ranger_sim.boards.modules.encoder_capture cimport EncoderCapture, WrapCount
 from ranger_sim.boards.modules.motor_limits cimport MotorLimits
 from ranger_sim.boards.modules.motor_output cimport MotorOutput
 from ranger_sim.boards.modules.quadrature_decoder cimport QuadratureDecoder
-from ranger_sim.firmware_sim.microcontroller cimport Alarm, Peripheral
+from ranger_sim.firmware_sim.alarm cimport Alarm
+from ranger_sim.firmware_sim.peripheral cimport Peripheral
 from ranger_sim.firmware_sim.peripherals.adc_external cimport Ads7871
 from ranger_sim.firmware_sim.peripherals.adc_internal cimport AdcInternal
 from ranger_sim.firmware_sim.peripherals.pwm cimport Pwm

@@ -32,7 +32,7 @@ from ranger_sim.boards.modules.motor_output import PERIOD_COUNTS, MotorOutput
 from ranger_sim.boards.modules.motor_output import PINS as MOTOR_PINS
 from ranger_sim.boards.modules.quadrature_decoder import QuadratureDecoder
 from ranger_sim.datatable.generated import errors as codes
-from ranger_sim.firmware_sim.microcontroller import Peripheral
+from ranger_sim.firmware_sim.peripheral import Peripheral
 from ranger_sim.firmware_sim.peripherals.adc_external import Ads7871
 from ranger_sim.firmware_sim.peripherals.adc_internal import AdcInternal
 from ranger_sim.firmware_sim.peripherals.gpio import p0

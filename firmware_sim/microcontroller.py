@@ -16,186 +16,31 @@ Each busy time is rounded down to whole ns; cycle counts are exact integers.
 
 import cython
 
-from ranger_sim.firmware_sim.board import Board
-from ranger_sim.firmware_sim.clock import Crystal, TickTrain
+from ranger_sim.firmware_sim.alarm import Alarm, SlotTimer
+from ranger_sim.firmware_sim.chip import Chip
+from ranger_sim.firmware_sim.clock import TickTrain
 from ranger_sim.firmware_sim.counters import BoardCounters
+from ranger_sim.firmware_sim.edge_line import EdgeLine
+from ranger_sim.firmware_sim.peripheral import Peripheral, Unclaimed
 from ranger_sim.firmware_sim.scheduler import Occasional, Schedule, SlotScheduler, Task, Wait
 from ranger_sim.firmware_sim.vic import SLOT_TIMER, InterruptController, InterruptSource
 from ranger_sim.foundation.edge_buffer import EdgeBuffer
 from ranger_sim.foundation.events import EventQueue
-from ranger_sim.foundation.numbers import integers
 from ranger_sim.foundation.user_error import UserError
 
 if not cython.compiled:
     from ranger_sim.firmware_sim.calls import call, handle, run
+    from ranger_sim.firmware_sim.chip import ALARMS, PINS
     from ranger_sim.firmware_sim.scheduler import ENTRY, ENTRY_CALLS, ENTRY_NS, OCCASIONAL_TASK, WAIT_TASK
     from ranger_sim.firmware_sim.vic import FIRST_FIQ
     from ranger_sim.foundation.events import CAN_TX_DONE, NEVER, PIN_EDGE
 
-    PINS = 64  # P0.0 ... P0.31 are 0 ... 31, P1.0 ... P1.31 are 32 ... 63
-    ALARMS = 16  # of peripherals
-    ALARM_PLACES = 18  # with the slot timer's, and one that never comes
     MESSAGE_KINDS = 32  # to a board
     INDICES_PER_KIND = 16
 
 
-class Peripheral:
-    """What all peripherals share: the chip, and the three ways in which the outside reaches them."""
-
-    def __init__(self, chip) -> None:
-        self.chip = chip
-
-    def on_message(self, queue: EventQueue) -> InterruptSource | None:
-        """A message of a kind claimed by this peripheral; it is in the fields of `queue`.
-
-        Returns the interrupt source that shall be served because of it, if any.
-        """
-        return None
-
-    def on_pin(self, channel: cython.longlong, level: cython.longlong, time: cython.longlong) -> cython.longlong:
-        """The pin of `channel` changed to `level` at `time`; returns 1 to ask for the pin's interrupt, else 0."""
-        return 0
-
-    def on_alarm(self, alarm: cython.longlong, time: cython.longlong) -> InterruptSource | None:
-        """The alarm that this peripheral numbered `alarm` is due; returns what `on_message` does."""
-        return None
-
-    def transmit_ends(self) -> object:
-        """Where a bus writes the ends of a CAN controller's transmissions; None: they come as messages."""
-        return None
-
-
-class Unclaimed(Peripheral):
-    """Where messages end that no peripheral has claimed."""
-
-    def on_message(self, queue: EventQueue) -> InterruptSource | None:
-        """The interrupt source of its kind and index keeps it, if anybody listens there."""
-        source: InterruptSource = self.chip.vic.sources.get((queue.kind, queue.a))
-        if source is not None and source.bit != 0:
-            source.keep_message(queue)
-            return source
-        if queue.kind != PIN_EDGE:
-            self.chip.unclaimed += 1
-        return None
-
-
-class Alarm:
-    """An alarm of a chip: when it is due, `owner.on_alarm(number, time)` runs.
-
-    The chip keeps those that are set in the order of their instants, the first one last; of two at one instant the
-    one that was made first comes first.
-    """
-
-    def __init__(self, chip, owner: Peripheral, number, place) -> None:
-        self.chip = chip
-        self.owner = owner
-        self.number = number
-        self.place = place  # in the order of making
-        self.time = NEVER
-
-    def set(self, time: cython.longlong) -> cython.longlong:
-        """It is due at `time` (ns); NEVER takes it back. Returns the instant of the chip's first alarm."""
-        at: cython.longlong = self.chip.alarms_set
-        if self.time < NEVER:
-            return self._set_again(time)
-        self.time = time
-        if time < NEVER:
-            self.chip.alarms_set = at + 1
-            while self.chip.alarm_times[at - 1] <= time and (
-                self.chip.alarm_times[at - 1] < time or self.chip.alarm_places[at - 1] < self.place
-            ):
-                self._move(at - 1, at)
-                at -= 1
-            self.chip.alarm_times[at] = time
-            self.chip.alarm_places[at] = self.place
-            if time < self.chip.alarm_time:
-                self.chip.alarm_time = time
-                if time < self.chip.next_time:
-                    self.chip.next_time = time
-                if time < self.chip.stop_time:
-                    self.chip.stop_time = time
-        return self.chip.alarm_time
-
-    @cython.final
-    def _set_again(self, time: cython.longlong) -> cython.longlong:
-        """It is set already: take it out, and set it."""
-        at: cython.longlong = 1
-        while self.chip.alarm_places[at] != self.place:
-            at += 1
-        self.chip.alarms_set -= 1
-        while at < self.chip.alarms_set:
-            self._move(at + 1, at)
-            at += 1
-        self.chip.alarm_time = self.chip.alarm_times[at - 1]
-        self.time = NEVER
-        return self.set(time)
-
-    @cython.final
-    def _move(self, a: cython.longlong, b: cython.longlong) -> cython.void:
-        """What stands at `a` in the chip's order goes to `b`."""
-        self.chip.alarm_times[b] = self.chip.alarm_times[a]
-        self.chip.alarm_places[b] = self.chip.alarm_places[a]
-
-    @cython.final
-    def _ring(self, time: cython.longlong) -> InterruptSource | None:
-        """It is the chip's first one, and due. Returns what its owner does."""
-        self.chip.now = time
-        self.chip.alarms_set -= 1
-        self.chip.alarm_time = self.chip.alarm_times[self.chip.alarms_set - 1]
-        self.time = NEVER
-        if self.chip.waiting:
-            self.chip.check_wait = True
-            if self.chip.code_time < time:
-                self.chip.code_time = time
-        return self.owner.on_alarm(self.number, time)
-
-
-class SlotTimer(Peripheral):
-    """The timer whose match interrupt steps the scheduler; its alarm is the last of those at one instant."""
-
-    def __init__(self, chip) -> None:
-        Peripheral.__init__(self, chip)
-        self.alarm = Alarm(chip, self, 0, ALARMS)
-
-    def on_alarm(self, alarm: cython.longlong, time: cython.longlong) -> InterruptSource | None:
-        """The timer matches and restarts."""
-        self.chip.match_time = time
-        self.chip.tick_time = self.chip.ticks.next()
-        self.alarm.set(self.chip.tick_time)
-        return self.chip.tick_source
-
-
-class EdgeLine:
-    """An encoder on two pins: its edges are read where its sensor writes them, each at its stamp.
-
-    Channel A changes on `pin`; channel B, whose level each edge brings along, hangs on `partner_pin`.
-    """
-
-    def __init__(self, buffer: EdgeBuffer, pin=0, partner_pin=0, peripheral=None, channel=0, source=None) -> None:
-        self.buffer = buffer
-        self.pin = pin
-        self.partner_pin = partner_pin
-        self.peripheral = peripheral
-        self.channel = channel
-        self.source = source
-        self.next_time = NEVER
-        self.levels = 0
-
-    @cython.final
-    def find_next(self) -> cython.longlong:
-        """Look at the first edge of the buffer that has not been taken: its instant, NEVER for none, and its levels."""
-        edge: cython.longlong
-        if self.buffer.read < self.buffer.count:
-            edge = self.buffer.packed[self.buffer.read]
-            self.next_time = edge >> 2
-            self.levels = edge & 3  # of A x 2 + of B
-        else:
-            self.next_time = NEVER
-        return self.next_time
-
-
-class Microcontroller(Board):
-    """A chip of `hz` core clock on `crystal`, with schedule, interrupts, pins and queues.
+class Microcontroller(Chip):
+    """A chip of `hz` core clock on `crystal`, and what its processor does: messages, interrupts, the schedule.
 
     Hooks (None or a callable): `on_overrun()` when a tick finds the row unfinished, `on_limit(task)` when a
     task exceeds its limit, `on_near_limit()` when a finished slot took more than 90 % of its length,
@@ -207,17 +52,8 @@ class Microcontroller(Board):
     """
 
     def __init__(self, name="chip", hz=60_000_000, crystal=None) -> None:
-        if hz <= 0:
-            raise UserError(f"{name}: hz {hz} must be above 0")
-        Board.__init__(self, name)
-        self.hz = hz
-        self.crystal = crystal if crystal is not None else Crystal()
-        self.now = 0
-        self.ns_per_cycle = self.crystal.ns_per_cycle(hz)
-        self.cycles_per_ns = self.crystal.cycles_per_ns(hz)
+        Chip.__init__(self, name, hz, crystal)
         self.scheduler = SlotScheduler(Schedule(), 1)
-        self.vic = InterruptController(self.ns_per_cycle)
-        self.pins = integers(PINS)
         self.on_overrun = None
         self.on_limit = None
         self.on_near_limit = None
@@ -225,28 +61,14 @@ class Microcontroller(Board):
         self.background = None
         self.background_wanted = True
         self.extra_cycles = 0
-        self.tick_time = NEVER
-        self.ticks = TickTrain(self.crystal, 1, 0)
-        self.match_time = 0
-        self.tick_source = self.vic.source(SLOT_TIMER, 0)
-        self.instant = 0
-        self.code_time = 0
-        self.stop_time = 0
         self.irq_free = 0  # from when on an IRQ may be served, never before
         self.fiq_free = 0  # a FIQ
-        self.waiting = False
-        self.check_wait = False
         self.wait_task = None
         self.wait_start = 0
         self.wait_stolen = 0
         self.stolen_cycles = 0
-        self.alarm_time = NEVER
         self.slot_timer = SlotTimer(self)
         self.alarms = [None] * ALARMS + [self.slot_timer.alarm]
-        # those that are set: instants and places in `alarms`, the first to come last; at 0 stands one that never comes
-        self.alarm_times = [NEVER] * 18  # ALARM_PLACES
-        self.alarm_places = [0] * 18
-        self.alarms_set = 1  # where the next one would stand
         self.others = Unclaimed(self)
         self.message_table = [self.others] * (MESSAGE_KINDS * INDICES_PER_KIND)
         self.pin_owners = [None] * PINS
@@ -254,7 +76,6 @@ class Microcontroller(Board):
         self.pin_sources = [None] * PINS
         self.first_line = EdgeLine(EdgeBuffer(1))  # no encoder: never an edge
         self.second_line = self.first_line
-        self.unclaimed = 0
 
     # --- set-up -------------------------------------------------------------------------------------------
 
@@ -467,7 +288,7 @@ class Microcontroller(Board):
                 inbox.take()
                 asking = self._input(inbox)
             else:
-                asking = cython.cast(Alarm, self.alarms[self.alarm_places[self.alarms_set - 1]])._ring(first)
+                asking = cython.cast(Alarm, self.alarms[self.alarm_places[self.alarms_set - 1]]).ring(first)
             if asking is not None:
                 # mostly the processor is free for it, and nothing else comes at this instant
                 if (

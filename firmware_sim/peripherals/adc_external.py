@@ -13,7 +13,7 @@ The SSP transfers (16 bits at 10 MHz) are part of the cost of the code that does
 
 import cython
 
-from ranger_sim.firmware_sim.microcontroller import Peripheral
+from ranger_sim.firmware_sim.peripheral import Peripheral
 from ranger_sim.firmware_sim.vic import EXTERNAL_INTERRUPT, InterruptSource
 from ranger_sim.foundation.events import NEVER
 from ranger_sim.foundation.user_error import UserError

@@ -11,7 +11,7 @@ V / VDDA * 1024; scale and offset are those of a board's own divider and convert
 
 import cython
 
-from ranger_sim.firmware_sim.microcontroller import Peripheral
+from ranger_sim.firmware_sim.peripheral import Peripheral
 from ranger_sim.firmware_sim.vic import ADC_DONE, InterruptSource
 from ranger_sim.foundation.user_error import UserError
 

@@ -1,5 +1,5 @@
 from ranger_sim.can_bus.transmit_ends cimport TransmitEnds
-from ranger_sim.firmware_sim.microcontroller cimport Microcontroller, Peripheral
+from ranger_sim.firmware_sim.peripheral cimport Peripheral
 from ranger_sim.firmware_sim.vic cimport InterruptSource
 from ranger_sim.foundation.events cimport CAN_RX, CAN_STATUS, CAN_TX_DONE, NEVER
 

@@ -19,7 +19,7 @@ RFS, TFI: DLC in bits 16-19, RTR bit 30, extended identifier bit 31.
 import cython
 
 from ranger_sim.can_bus.transmit_ends import TransmitEnds
-from ranger_sim.firmware_sim.microcontroller import Peripheral
+from ranger_sim.firmware_sim.peripheral import Peripheral
 from ranger_sim.firmware_sim.vic import InterruptSource
 from ranger_sim.foundation.user_error import UserError
 

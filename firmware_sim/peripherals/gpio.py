@@ -9,7 +9,7 @@ the last edge that reported it.
 
 import cython
 
-from ranger_sim.firmware_sim.microcontroller import Peripheral
+from ranger_sim.firmware_sim.peripheral import Peripheral
 
 
 def p0(bit) -> int:

@@ -9,7 +9,7 @@ of the period that first has the new values: at most one period after `now`.
 
 import cython
 
-from ranger_sim.firmware_sim.microcontroller import Peripheral
+from ranger_sim.firmware_sim.peripheral import Peripheral
 from ranger_sim.foundation.user_error import UserError
 
 LONGEST_PERIOD_S = 2  # so that products of times and rates stay within 64 bits

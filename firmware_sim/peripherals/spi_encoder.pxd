@@ -1,6 +1,7 @@
 cimport cython
 
-from ranger_sim.firmware_sim.microcontroller cimport Alarm, Peripheral
+from ranger_sim.firmware_sim.alarm cimport Alarm
+from ranger_sim.firmware_sim.peripheral cimport Peripheral
 from ranger_sim.firmware_sim.vic cimport InterruptSource
 
 @cython.final

@@ -8,7 +8,7 @@ after which (SPI_DONE, number) is raised. The value is the low 13 bits, 0 ... 81
 
 import cython
 
-from ranger_sim.firmware_sim.microcontroller import Peripheral
+from ranger_sim.firmware_sim.peripheral import Peripheral
 from ranger_sim.firmware_sim.vic import SPI_DONE, InterruptSource
 from ranger_sim.foundation.user_error import UserError
 

@@ -1,4 +1,4 @@
-from ranger_sim.firmware_sim.microcontroller cimport Peripheral
+from ranger_sim.firmware_sim.peripheral cimport Peripheral
 from ranger_sim.firmware_sim.vic cimport InterruptSource
 from ranger_sim.foundation.events cimport EventQueue
 

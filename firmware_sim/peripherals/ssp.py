@@ -11,7 +11,7 @@ handler, which returns the number of half-words.
 
 import cython
 
-from ranger_sim.firmware_sim.microcontroller import Peripheral
+from ranger_sim.firmware_sim.peripheral import Peripheral
 from ranger_sim.firmware_sim.vic import InterruptSource
 from ranger_sim.foundation.events import SSP_SEGMENT
 

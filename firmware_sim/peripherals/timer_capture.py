@@ -14,7 +14,7 @@ IR: bit 0 match 0, bits 4-7 capture 0-3. CCR: per channel three bits, rising, fa
 import cython
 
 from ranger_sim.firmware_sim.clock import TickTrain
-from ranger_sim.firmware_sim.microcontroller import Peripheral
+from ranger_sim.firmware_sim.peripheral import Peripheral
 from ranger_sim.firmware_sim.vic import TIMER_MATCH, InterruptSource
 from ranger_sim.foundation.user_error import UserError
 

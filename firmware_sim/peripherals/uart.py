@@ -13,7 +13,7 @@ the FIFO has become empty, (UART_TRANSMIT, number) is raised.
 
 import cython
 
-from ranger_sim.firmware_sim.microcontroller import Peripheral
+from ranger_sim.firmware_sim.peripheral import Peripheral
 from ranger_sim.firmware_sim.vic import UART_TRANSMIT, InterruptSource
 from ranger_sim.foundation.events import NEVER, UART_BYTE
 from ranger_sim.foundation.user_error import UserError

@@ -1,4 +1,5 @@
-from ranger_sim.firmware_sim.microcontroller cimport Alarm, Peripheral
+from ranger_sim.firmware_sim.alarm cimport Alarm
+from ranger_sim.firmware_sim.peripheral cimport Peripheral
 from ranger_sim.firmware_sim.vic cimport InterruptSource
 
 cdef class HsUart(Peripheral):

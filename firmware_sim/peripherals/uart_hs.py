@@ -15,7 +15,7 @@ import array
 
 import cython
 
-from ranger_sim.firmware_sim.microcontroller import Peripheral
+from ranger_sim.firmware_sim.peripheral import Peripheral
 from ranger_sim.firmware_sim.vic import DMA_DONE, InterruptSource
 from ranger_sim.foundation.events import UART_BYTE
 from ranger_sim.foundation.user_error import UserError

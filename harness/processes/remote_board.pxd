@@ -1,5 +1,5 @@
 from ranger_sim.firmware_sim.board cimport Board
-from ranger_sim.firmware_sim.microcontroller cimport EdgeLine
+from ranger_sim.firmware_sim.edge_line cimport EdgeLine
 from ranger_sim.foundation.edge_buffer cimport EdgeBuffer
 from ranger_sim.foundation.events cimport NEVER, ORDER_PINS, PIN_EDGE, ROW, ROW_KIND, EventQueue
 from ranger_sim.harness.processes.channel cimport FIRST_OWN_KIND, LONGEST, Bell, Mailbox, load

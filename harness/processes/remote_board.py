@@ -16,7 +16,7 @@ import cython
 
 from ranger_sim.boards.counters import from_dict
 from ranger_sim.firmware_sim.board import EVERY_KIND, Board
-from ranger_sim.firmware_sim.microcontroller import EdgeLine
+from ranger_sim.firmware_sim.edge_line import EdgeLine
 from ranger_sim.foundation.edge_buffer import EdgeBuffer
 from ranger_sim.foundation.events import EventQueue
 from ranger_sim.foundation.user_error import UserError

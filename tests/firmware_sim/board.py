@@ -1,6 +1,7 @@
 """What the tests of this package share: a chip whose tasks write down when they ran."""
 
-from ranger_sim.firmware_sim.microcontroller import Microcontroller, Peripheral
+from ranger_sim.firmware_sim.microcontroller import Microcontroller
+from ranger_sim.firmware_sim.peripheral import Peripheral
 from ranger_sim.firmware_sim.scheduler import Schedule, Task
 
 FULL_SPEED_HZ = 60_000_000

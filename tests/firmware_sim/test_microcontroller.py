@@ -3,7 +3,8 @@
 import pytest
 
 from ranger_sim.firmware_sim.clock import Crystal
-from ranger_sim.firmware_sim.microcontroller import Microcontroller, Peripheral
+from ranger_sim.firmware_sim.microcontroller import Microcontroller
+from ranger_sim.firmware_sim.peripheral import Peripheral
 from ranger_sim.firmware_sim.scheduler import Schedule
 from ranger_sim.firmware_sim.vic import FIQ, SOFTWARE
 from ranger_sim.foundation.events import NEVER, PIN_OUTPUT, UART_BYTE

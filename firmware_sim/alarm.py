@@ -1,0 +1,98 @@
+# cython: boundscheck=False, wraparound=False
+# (places in a chip's order of alarms lie between the one that never comes and the last one set)
+"""Alarms of a chip: a peripheral's own instants, and those of the timer that steps the scheduler."""
+
+import cython
+
+from ranger_sim.firmware_sim.peripheral import Peripheral
+from ranger_sim.firmware_sim.vic import InterruptSource
+
+if not cython.compiled:
+    from ranger_sim.firmware_sim.chip import ALARMS
+    from ranger_sim.foundation.events import NEVER
+
+
+class Alarm:
+    """An alarm of a chip: when it is due, `owner.on_alarm(number, time)` runs.
+
+    The chip keeps those that are set in the order of their instants, the first one last; of two at one instant the
+    one that was made first comes first.
+    """
+
+    def __init__(self, chip, owner: Peripheral, number, place) -> None:
+        self.chip = chip
+        self.owner = owner
+        self.number = number
+        self.place = place  # in the order of making
+        self.time = NEVER
+
+    def set(self, time: cython.longlong) -> cython.longlong:
+        """It is due at `time` (ns); NEVER takes it back. Returns the instant of the chip's first alarm."""
+        at: cython.longlong = self.chip.alarms_set
+        if self.time < NEVER:
+            return self._set_again(time)
+        self.time = time
+        if time < NEVER:
+            self.chip.alarms_set = at + 1
+            while self.chip.alarm_times[at - 1] <= time and (
+                self.chip.alarm_times[at - 1] < time or self.chip.alarm_places[at - 1] < self.place
+            ):
+                self._move(at - 1, at)
+                at -= 1
+            self.chip.alarm_times[at] = time
+            self.chip.alarm_places[at] = self.place
+            if time < self.chip.alarm_time:
+                self.chip.alarm_time = time
+                if time < self.chip.next_time:
+                    self.chip.next_time = time
+                if time < self.chip.stop_time:
+                    self.chip.stop_time = time
+        return self.chip.alarm_time
+
+    @cython.final
+    def _set_again(self, time: cython.longlong) -> cython.longlong:
+        """It is set already: take it out, and set it."""
+        at: cython.longlong = 1
+        while self.chip.alarm_places[at] != self.place:
+            at += 1
+        self.chip.alarms_set -= 1
+        while at < self.chip.alarms_set:
+            self._move(at + 1, at)
+            at += 1
+        self.chip.alarm_time = self.chip.alarm_times[at - 1]
+        self.time = NEVER
+        return self.set(time)
+
+    @cython.final
+    def _move(self, a: cython.longlong, b: cython.longlong) -> cython.void:
+        """What stands at `a` in the chip's order goes to `b`."""
+        self.chip.alarm_times[b] = self.chip.alarm_times[a]
+        self.chip.alarm_places[b] = self.chip.alarm_places[a]
+
+    @cython.final
+    def ring(self, time: cython.longlong) -> InterruptSource | None:
+        """It is the chip's first one, and due. Returns what its owner does."""
+        self.chip.now = time
+        self.chip.alarms_set -= 1
+        self.chip.alarm_time = self.chip.alarm_times[self.chip.alarms_set - 1]
+        self.time = NEVER
+        if self.chip.waiting:
+            self.chip.check_wait = True
+            if self.chip.code_time < time:
+                self.chip.code_time = time
+        return self.owner.on_alarm(self.number, time)
+
+
+class SlotTimer(Peripheral):
+    """The timer whose match interrupt steps the scheduler; its alarm is the last of those at one instant."""
+
+    def __init__(self, chip) -> None:
+        Peripheral.__init__(self, chip)
+        self.alarm = Alarm(chip, self, 0, ALARMS)
+
+    def on_alarm(self, alarm: cython.longlong, time: cython.longlong) -> InterruptSource | None:
+        """The timer matches and restarts."""
+        self.chip.match_time = time
+        self.chip.tick_time = self.chip.ticks.next()
+        self.alarm.set(self.chip.tick_time)
+        return self.chip.tick_source

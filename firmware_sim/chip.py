@@ -1,0 +1,53 @@
+"""What a chip's peripherals and its processor share: time, interrupts, pins, and the order of the alarms."""
+
+import cython
+
+from ranger_sim.firmware_sim.board import Board
+from ranger_sim.firmware_sim.clock import Crystal, TickTrain
+from ranger_sim.firmware_sim.vic import SLOT_TIMER, InterruptController
+from ranger_sim.foundation.numbers import integers
+from ranger_sim.foundation.user_error import UserError
+
+# C constants when compiled: the same numbers stand in the .pxd, and a test holds them together.
+if not cython.compiled:
+    from ranger_sim.foundation.events import NEVER
+
+    PINS = 64  # P0.0 ... P0.31 are 0 ... 31, P1.0 ... P1.31 are 32 ... 63
+    ALARMS = 16  # of peripherals
+    ALARM_PLACES = 18  # with the slot timer's, and one that never comes
+
+
+class Chip(Board):
+    """The hardware of a microcontroller of `hz` core clock on `crystal`, as its peripherals see it.
+
+    `now`: the instant (ns) at which the present input, handler or task takes effect. `pins`: levels 0/1. `unclaimed`:
+    messages that nobody listened to. The slot timer matched at `match_time` and will match at `tick_time`.
+    """
+
+    def __init__(self, name, hz, crystal=None) -> None:
+        if hz <= 0:
+            raise UserError(f"{name}: hz {hz} must be above 0")
+        Board.__init__(self, name)
+        self.hz = hz
+        self.crystal = crystal if crystal is not None else Crystal()
+        self.ns_per_cycle = self.crystal.ns_per_cycle(hz)
+        self.cycles_per_ns = self.crystal.cycles_per_ns(hz)
+        self.vic = InterruptController(self.ns_per_cycle)
+        self.pins = integers(PINS)
+        self.now = 0
+        self.instant = 0  # up to which inputs have been taken in
+        self.code_time = 0  # when the processor goes on with its code
+        self.stop_time = 0  # how far the processor may run before it looks at the inputs again
+        self.waiting = False  # a task waits for a condition
+        self.check_wait = False  # which may hold now
+        # alarms that are set: instants and places in the order of making, the first to come last; at 0 stands one
+        # that never comes
+        self.alarm_times = [NEVER] * 18  # ALARM_PLACES
+        self.alarm_places = [0] * 18
+        self.alarms_set = 1  # where the next one would stand
+        self.alarm_time = NEVER  # of the first to come
+        self.ticks = TickTrain(self.crystal, 1, 0)
+        self.tick_source = self.vic.source(SLOT_TIMER, 0)
+        self.tick_time = NEVER
+        self.match_time = 0
+        self.unclaimed = 0

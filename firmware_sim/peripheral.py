@@ -1,0 +1,49 @@
+"""What all peripherals of a chip share, and where messages end that none of them has claimed."""
+
+import cython
+
+from ranger_sim.firmware_sim.vic import InterruptSource
+from ranger_sim.foundation.events import EventQueue
+
+if not cython.compiled:
+    from ranger_sim.foundation.events import PIN_EDGE
+
+
+class Peripheral:
+    """What all peripherals share: the chip, and the three ways in which the outside reaches them."""
+
+    def __init__(self, chip) -> None:
+        self.chip = chip
+
+    def on_message(self, queue: EventQueue) -> InterruptSource | None:
+        """A message of a kind claimed by this peripheral; it is in the fields of `queue`.
+
+        Returns the interrupt source that shall be served because of it, if any.
+        """
+        return None
+
+    def on_pin(self, channel: cython.longlong, level: cython.longlong, time: cython.longlong) -> cython.longlong:
+        """The pin of `channel` changed to `level` at `time`; returns 1 to ask for the pin's interrupt, else 0."""
+        return 0
+
+    def on_alarm(self, alarm: cython.longlong, time: cython.longlong) -> InterruptSource | None:
+        """The alarm that this peripheral numbered `alarm` is due; returns what `on_message` does."""
+        return None
+
+    def transmit_ends(self) -> object:
+        """Where a bus writes the ends of a CAN controller's transmissions; None: they come as messages."""
+        return None
+
+
+class Unclaimed(Peripheral):
+    """Where messages end that no peripheral has claimed."""
+
+    def on_message(self, queue: EventQueue) -> InterruptSource | None:
+        """The interrupt source of its kind and index keeps it, if anybody listens there."""
+        source: InterruptSource = self.chip.vic.sources.get((queue.kind, queue.a))
+        if source is not None and source.bit != 0:
+            source.keep_message(queue)
+            return source
+        if queue.kind != PIN_EDGE:
+            self.chip.unclaimed += 1
+        return None
