@@ -291,7 +291,8 @@ class SlotScheduler:
     `slot_count` ticks that began a slot, `overruns`, `dropped_tasks`, `max_slot_cycles` (from the tick to the
     end of the row, interrupts included), `histogram` of that in 21 bins of 5 % of a slot (the last: more
     than the slot), `near_limits` (more than 90 % but finished). `listed_tasks` = run_tasks + dropped_tasks +
-    what the present row still has to run.
+    what the present row still has to run. More than 40 fields, because a task's end touches position and records alike:
+    apart they would cost every task a second look-up.
     """
 
     def __init__(self, schedule, slot_cycles, ns_per_cycle=0.0) -> None:

@@ -18,7 +18,8 @@ def in_air(body, h: cython.double, stages: cython.longlong) -> cython.void:
     """One step as `on_feet` makes it, of `h` seconds in flight or held (EQUATIONS 7); stages 4, or 1 to look.
 
     Inside, o is the outer leg with foot F, leg th and motor p, i the inner one with foot G, leg tw and motor n; neither
-    has a role, but a standing foot in the operator's hands. One long function for the reason that `on_feet` gives.
+    has a role, but a standing foot in the operator's hands. One long function,
+    because its stages share their numbers as those of `on_feet` do.
     """
     o: Leg = body.outer
     i: Leg = body.inner

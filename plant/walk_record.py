@@ -15,6 +15,8 @@ class WalkRecord:
     (a foot touched out of turn), `brushes` and `scuffs` (the swing foot's sole touched the floor before, after it
     passed the stance foot), `flights` (no foot on the floor), `lead_lifts`, `tensile_strikes` (the rule of the strike
     asked the trailing foot to be pulled; `tensile_impulse_Ns` the last, `_min_Ns` the worst).
+
+    More than 40 fields, because each of them is one figure of the summary and they are counted by the same few events.
     """
 
     def __init__(self) -> None:

@@ -271,3 +271,33 @@ def test_constants_are_the_same_numbers_interpreted_and_compiled():
             check=True,
         )
         assert json.loads(done.stdout) == wanted
+
+
+def test_what_is_long_or_wide_says_why():
+    """A function above 150 lines, a class above 40 fields: its docstring tells why it is better so."""
+    silent = []
+    for path in sources():
+        if "generated" in path.parts:
+            continue
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.FunctionDef):
+                size, limit = node.end_lineno - node.lineno + 1, 150
+            elif isinstance(node, ast.ClassDef):
+                size, limit = len(fields_set(node)), 40
+            else:
+                continue
+            if size > limit and "because" not in (ast.get_docstring(node) or ""):
+                silent.append(f"{path.relative_to(ROOT)}: {node.name}, {size}")
+    assert not silent, "\n".join(silent)
+
+
+def fields_set(node):
+    """Names of the fields that the methods of a class set on `self`."""
+    return {
+        each.attr
+        for each in ast.walk(node)
+        if isinstance(each, ast.Attribute)
+        and isinstance(each.ctx, ast.Store)
+        and isinstance(each.value, ast.Name)
+        and each.value.id == "self"
+    }

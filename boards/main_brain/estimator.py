@@ -139,8 +139,8 @@ class HeelSensor:
 class Estimator:
     """update() once per slot. report(code): callable told of an error that was noticed.
 
-    More than 40 fields: half are the numbers of its variables in the data table, which compiled code then finds without
-    a look into a dictionary.
+    More than 40 fields, because half are the numbers of its variables in the data table, which compiled code then finds
+    without a look into a dictionary.
     """
 
     def __init__(self, store, quirks, report) -> None:
