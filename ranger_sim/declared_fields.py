@@ -5,12 +5,11 @@ faster interpreted), and one that is not declared raises an AttributeError, as i
 """
 
 import builtins
+import importlib.machinery
 import pathlib
 import re
 from types import ModuleType
 from typing import Any
-
-from ranger_sim.compile_time import CompileTimeLoader
 
 CLASS = re.compile(r"cdef class (\w+)")
 FIELDS = re.compile(r"\s+cdef (?:public |readonly )?(?:unsigned )?(?:long long|[\w.]+)(?:\[[^\]]*\]|\*)? ([\w ,]+)$")
@@ -44,12 +43,12 @@ class DeclaredFields:
         return type(name, bases, namespace)
 
 
-class DeclaredFieldsLoader(CompileTimeLoader):
+class DeclaredFieldsLoader(importlib.machinery.SourceFileLoader):
     """Runs a .py file; its classes that the .pxd beside it declares are made with the fields declared there."""
 
     def exec_module(self, module: ModuleType) -> None:
         """Run the file in the namespace of `module`, with a way of making classes that holds for this module alone."""
-        fields = declared_fields(self.declaration)
+        fields = declared_fields(pathlib.Path(self.path).with_suffix(".pxd"))
 
         def make_class(body: Any, name: str, *bases: Any, **options: Any) -> Any:
             if name in fields and body.__qualname__ == name:
