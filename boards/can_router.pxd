@@ -1,6 +1,6 @@
 from ranger_sim.boards.firmware_board cimport FirmwareBoard
 from ranger_sim.boards.modules.can_load cimport CanLoad
-from ranger_sim.boards.modules.can_link cimport EIGHT_BYTES, FIRST_BUFFER, RFS_EIGHT_BYTES, SECOND_BUFFER
+from ranger_sim.boards.modules.can_link cimport FIRST_BUFFER, SECOND_BUFFER
 from ranger_sim.boards.modules.mcu_led cimport Heartbeat
 from ranger_sim.boards.modules.network_clock cimport NetworkClock
 from ranger_sim.boards.modules.network_time cimport NetworkTime
@@ -8,18 +8,16 @@ from ranger_sim.boards.modules.routing cimport TO_SEND, TRANSMIT_MASK, TRANSMIT_
 from ranger_sim.boards.modules.sender cimport Sender
 from ranger_sim.boards.modules.ssp_link cimport SEGMENT_HALF_WORDS, RouterSspLink
 from ranger_sim.firmware_sim.peripherals.adc_internal cimport AdcInternal
-from ranger_sim.firmware_sim.peripherals.can_controller cimport CanController
+from ranger_sim.firmware_sim.peripherals.can_controller cimport EIGHT_BYTES, MOD_RESET, RFS_EIGHT_BYTES, CanController
 from ranger_sim.firmware_sim.peripherals.gpio cimport Gpio
 from ranger_sim.firmware_sim.peripherals.ssp cimport SspPort, SspSegment
-from ranger_sim.firmware_sim.peripherals.timer_capture cimport TimerCapture
+from ranger_sim.firmware_sim.peripherals.timer_capture cimport IR_MR0, TimerCapture
 from ranger_sim.foundation.numbers cimport float32
 
 cimport cython
 
 cpdef enum:
     BUSES = 4
-    MOD_RESET = 1
-    IR_MR0 = 1
     LED_OFF = 0
     LED_TRAFFIC = 1
     LED_WARNING = 2

@@ -33,14 +33,14 @@ from ranger_sim.firmware_sim.vic import FIQ, TIMER_MATCH
 from ranger_sim.foundation.events import CAN_RX, CAN_STATUS, CAN_TX_DONE, SSP_SEGMENT
 
 if not cython.compiled:
-    from ranger_sim.boards.modules.can_link import EIGHT_BYTES, FIRST_BUFFER, RFS_EIGHT_BYTES, SECOND_BUFFER
+    from ranger_sim.boards.modules.can_link import FIRST_BUFFER, SECOND_BUFFER
     from ranger_sim.boards.modules.routing import TO_SEND, TRANSMIT_MASK, TRANSMIT_RING
     from ranger_sim.boards.modules.ssp_link import SEGMENT_HALF_WORDS
+    from ranger_sim.firmware_sim.peripherals.can_controller import EIGHT_BYTES, MOD_RESET, RFS_EIGHT_BYTES
+    from ranger_sim.firmware_sim.peripherals.timer_capture import IR_MR0
     from ranger_sim.foundation.numbers import float32
 
     BUSES = 4
-    MOD_RESET = 1  # CxMOD: in reset mode
-    IR_MR0 = 1  # T1IR: the match that restarts the timer
     # lights of a bus, and from how many frames per ms on they show it (robot.md N1.10)
     LED_OFF = 0
     LED_TRAFFIC = 1

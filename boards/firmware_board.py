@@ -15,10 +15,10 @@ from ranger_sim.boards.quirks import Quirks
 from ranger_sim.datatable.generated import errors as codes
 from ranger_sim.firmware_sim.microcontroller import Microcontroller
 from ranger_sim.firmware_sim.peripherals.can_controller import (
-    ICR_BEI,
+    ICR_BUS_ERROR,
     ICR_DOI,
-    ICR_EI,
-    ICR_EPI,
+    ICR_ERROR_PASSIVE,
+    ICR_ERROR_WARNING,
     ICR_RI,
     CanController,
 )
@@ -26,7 +26,7 @@ from ranger_sim.firmware_sim.peripherals.gpio import Gpio
 from ranger_sim.firmware_sim.scheduler import Schedule, Task
 from ranger_sim.foundation.user_error import UserError
 
-ALL_CAN_INTERRUPTS = ICR_RI | ICR_EI | ICR_DOI | ICR_EPI | ICR_BEI
+ALL_CAN_INTERRUPTS = ICR_RI | ICR_ERROR_WARNING | ICR_DOI | ICR_ERROR_PASSIVE | ICR_BUS_ERROR
 CAN_RECEIVE_SLOT = 0  # of the VIC, on every satellite (robot.md N4.16)
 
 

@@ -10,10 +10,10 @@ from ranger_sim.boards.modules.joint_safety import HipSafety
 from ranger_sim.boards.modules.publishing import Send, laid_out
 from ranger_sim.boards.motor_board import MotorBoard
 from ranger_sim.datatable.generated import mch as table
-from ranger_sim.firmware_sim.peripherals.can_controller import ICR_BEI, ICR_EI, ICR_RI, ICR_TI1
+from ranger_sim.firmware_sim.peripherals.can_controller import ICR_BUS_ERROR, ICR_ERROR_WARNING, ICR_RI, ICR_TI1
 from ranger_sim.firmware_sim.scheduler import Schedule, Task, Wait
 
-CAN_INTERRUPTS = ICR_RI | ICR_TI1 | ICR_EI | ICR_BEI  # its TX1 bit reaches no handler
+CAN_INTERRUPTS = ICR_RI | ICR_TI1 | ICR_ERROR_WARNING | ICR_BUS_ERROR  # its TX1 bit reaches no handler
 
 # (place, multiplexer code, gain code): motor current on 4-5, battery current on 2-3, both times 2
 SEQUENCE = (("motor_current", 2, 1), ("battery_current", 1, 1))

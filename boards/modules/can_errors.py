@@ -5,15 +5,15 @@ from collections.abc import Callable
 from ranger_sim.datatable.generated import errors as codes
 from ranger_sim.firmware_sim.peripherals.can_controller import (
     CMR_CDO,
-    ICR_BEI,
+    ICR_BUS_ERROR,
     ICR_DOI,
-    ICR_EI,
-    ICR_EPI,
+    ICR_ERROR_PASSIVE,
+    ICR_ERROR_WARNING,
+    ICR_RECEIVING,
     CanController,
 )
 
 OPERATING = 0  # CxMOD: not in reset
-ICR_ERRDIR = 1 << 21  # of the capture bits of a bus error: 1 while receiving, 0 while sending
 
 
 class CanErrors:
@@ -37,12 +37,12 @@ class CanErrors:
             self.report(self.bus_off)
             self.controller.write_MOD(OPERATING)
             return
-        if cause & ICR_EI:
+        if cause & ICR_ERROR_WARNING:
             self.report(self.warning)
         if cause & ICR_DOI:
             self.report(self.overrun)
             self.controller.write_CMR(CMR_CDO)
-        if cause & ICR_EPI:
+        if cause & ICR_ERROR_PASSIVE:
             self.report(self.passive)
-        if cause & ICR_BEI:
-            self.report(self.while_receiving if cause & ICR_ERRDIR else self.while_sending)
+        if cause & ICR_BUS_ERROR:
+            self.report(self.while_receiving if cause & ICR_RECEIVING else self.while_sending)

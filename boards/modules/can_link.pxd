@@ -3,14 +3,12 @@ from ranger_sim.boards.modules.network_time cimport NetworkTime
 from ranger_sim.boards.modules.receiver cimport Receiver
 from ranger_sim.boards.modules.sender cimport Sender
 from ranger_sim.firmware_sim.microcontroller cimport Microcontroller
-from ranger_sim.firmware_sim.peripherals.can_controller cimport CanController
+from ranger_sim.firmware_sim.peripherals.can_controller cimport EIGHT_BYTES, RFS_EIGHT_BYTES, CanController
 
 cimport cython
 
 cpdef enum:
     IDENTIFIERS = 2048
-    RFS_EIGHT_BYTES = 0x80000
-    EIGHT_BYTES = 8
     RECEIVE_RING = 64
     RECEIVE_MASK = 63
     RECEIVED = 4

@@ -22,9 +22,9 @@ from ranger_sim.foundation.events import CAN_RX, CAN_STATUS, EventQueue
 from ranger_sim.foundation.user_error import UserError
 
 if not cython.compiled:
+    from ranger_sim.firmware_sim.peripherals.can_controller import EIGHT_BYTES, RFS_EIGHT_BYTES
+
     IDENTIFIERS = 2048
-    RFS_EIGHT_BYTES = 0x80000  # CxRFS of a frame of DLC 8, neither remote nor extended
-    EIGHT_BYTES = 8  # DLC of what is sent
     # rings: places are masked; one place stays empty
     RECEIVE_RING = 64
     RECEIVE_MASK = 63

@@ -1,8 +1,7 @@
-from ranger_sim.boards.modules.can_link cimport EIGHT_BYTES
 from ranger_sim.foundation.events cimport FLAG_SINGLE_SHOT
 from ranger_sim.boards.modules.can_load cimport CanLoad
 from ranger_sim.boards.modules.network_time cimport NetworkTime
-from ranger_sim.firmware_sim.peripherals.can_controller cimport CanController
+from ranger_sim.firmware_sim.peripherals.can_controller cimport EIGHT_BYTES, CanController
 
 cimport cython
 

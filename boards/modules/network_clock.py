@@ -14,7 +14,7 @@ from ranger_sim.boards.modules.network_time import NetworkTime
 from ranger_sim.firmware_sim.peripherals.can_controller import CanController
 
 if not cython.compiled:
-    from ranger_sim.boards.modules.can_link import EIGHT_BYTES
+    from ranger_sim.firmware_sim.peripherals.can_controller import EIGHT_BYTES
     from ranger_sim.foundation.events import FLAG_SINGLE_SHOT
 
     TICKS_PER_MS = 5

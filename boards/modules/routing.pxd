@@ -1,5 +1,5 @@
+from ranger_sim.firmware_sim.peripherals.can_controller cimport EIGHT_BYTES
 from ranger_sim.boards.modules.can_load cimport CanLoad
-from ranger_sim.boards.modules.can_link cimport EIGHT_BYTES
 from ranger_sim.boards.modules.ssp_link cimport RouterSspLink
 from ranger_sim.foundation.events cimport FLAG_REMOTE
 

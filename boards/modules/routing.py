@@ -14,7 +14,7 @@ from ranger_sim.boards.modules.ssp_link import RouterSspLink
 from ranger_sim.datatable.generated import errors
 
 if not cython.compiled:
-    from ranger_sim.boards.modules.can_link import EIGHT_BYTES
+    from ranger_sim.firmware_sim.peripherals.can_controller import EIGHT_BYTES
     from ranger_sim.foundation.events import FLAG_REMOTE
 
     IDENTIFIERS = 2032  # 2032-2047 would begin with seven recessive bits, which CAN forbids

@@ -1,4 +1,4 @@
-from ranger_sim.boards.modules.can_link cimport EIGHT_BYTES
+from ranger_sim.firmware_sim.peripherals.can_controller cimport EIGHT_BYTES
 from ranger_sim.firmware_sim.peripherals.ssp cimport SspSegment
 from ranger_sim.foundation.events cimport FLAG_REMOTE
 

@@ -22,7 +22,7 @@ from ranger_sim.datatable.generated import errors
 from ranger_sim.firmware_sim.peripherals.ssp import SspSegment
 
 if not cython.compiled:
-    from ranger_sim.boards.modules.can_link import EIGHT_BYTES
+    from ranger_sim.firmware_sim.peripherals.can_controller import EIGHT_BYTES
     from ranger_sim.foundation.events import FLAG_REMOTE
 
     SEGMENT_HALF_WORDS = 31

@@ -1,9 +1,46 @@
+from ranger_sim.can_bus.node cimport WARNING_LIMIT
 from ranger_sim.can_bus.transmit_ends cimport TransmitEnds
 from ranger_sim.firmware_sim.peripheral cimport Peripheral
 from ranger_sim.firmware_sim.vic cimport InterruptSource
-from ranger_sim.foundation.events cimport CAN_RX, CAN_STATUS, CAN_TX_DONE, NEVER
+from ranger_sim.foundation.events cimport CAN_ABORT, CAN_MODE, CAN_RX, CAN_STATUS, CAN_TX_DONE, FLAG_EXTENDED, FLAG_REMOTE, FLAG_SINGLE_SHOT, NEVER, TX_ABORTED, TX_SENT
 
 cimport cython
+
+cpdef enum:
+    MOD_RESET = 0x1
+    CMR_TR = 0x1
+    CMR_AT = 0x2
+    CMR_RRB = 0x4
+    CMR_CDO = 0x8
+    CMR_SRR = 0x10
+    CMR_STB1 = 0x20
+    CMR_STB2 = 0x40
+    CMR_STB3 = 0x80
+    ICR_RI = 0x1
+    ICR_TI1 = 0x2
+    ICR_DOI = 0x8
+    ICR_ALI = 0x40
+    ICR_TI2 = 0x200
+    ICR_TI3 = 0x400
+    ENDED_1 = 0x2
+    ENDED_2_3 = 0xC
+    TI2_SHIFT = 7
+    SR_RBS = 0x1
+    SR_DOS = 0x2
+    SR_TBS = 0x4
+    SR_TCS = 0x8
+    SR_ES = 0x40
+    SR_BS = 0x80
+    SR_BUFFER_BITS = 8
+    GSR_RX_ERRORS_SHIFT = 16
+    GSR_TX_ERRORS_SHIFT = 24
+    ERROR_COUNTER_MASK = 0xFF
+    DLC_MASK = 0xF
+    DLC_SHIFT = 16
+    RTR_SHIFT = 26
+    FF_SHIFT = 25
+    EIGHT_BYTES = 8
+    RFS_EIGHT_BYTES = 0x80000
 
 @cython.final
 cdef class CanController(Peripheral):

@@ -9,25 +9,82 @@ only where somebody waits for it, an interrupt or who asked for it (`tell_end`).
 single shot. Receive: two hardware buffers, the older in RFS ... RDB; a third frame is a data overrun and lost.
 Interrupts: (CAN_RX, n) while a frame waits, (CAN_TX_DONE, n), and (CAN_STATUS, n) for errors, each if CxIER allows it.
 Bus-off puts the controller into reset mode; writing MOD = 0 begins the recovery.
-
-CMR: TR 1, AT 2, RRB 4, CDO 8, SRR 16, STB1-3 32, 64, 128.
-ICR, IER: RI 1, TI1 2, EI 4, DOI 8, EPI 32, ALI 64, BEI 128, TI2 512, TI3 1024.
-SR, per transmit buffer 8 bits apart: RBS 1, DOS 2, TBS 4, TCS 8, ES 64, BS 128.
-RFS, TFI: DLC in bits 16-19, RTR bit 30, extended identifier bit 31.
 """
 
 import cython
 
+# handed on to the boards, which see the controller and not the bus
+from ranger_sim.can_bus.node import ICR_BUS_ERROR as ICR_BUS_ERROR  # noqa: PLC0414
+from ranger_sim.can_bus.node import ICR_ERROR_PASSIVE as ICR_ERROR_PASSIVE  # noqa: PLC0414
+from ranger_sim.can_bus.node import ICR_ERROR_WARNING as ICR_ERROR_WARNING  # noqa: PLC0414
+from ranger_sim.can_bus.node import ICR_RECEIVING as ICR_RECEIVING  # noqa: PLC0414
 from ranger_sim.can_bus.transmit_ends import TransmitEnds
 from ranger_sim.firmware_sim.peripheral import Peripheral
 from ranger_sim.firmware_sim.vic import InterruptSource
 from ranger_sim.foundation.user_error import UserError
 
+# C constants when compiled: the same numbers stand in the .pxd, and a test holds them together.
 if not cython.compiled:
-    from ranger_sim.foundation.events import CAN_RX, CAN_STATUS, CAN_TX_DONE, NEVER
+    from ranger_sim.can_bus.node import WARNING_LIMIT
+    from ranger_sim.foundation.events import (
+        CAN_ABORT,
+        CAN_MODE,
+        CAN_RX,
+        CAN_STATUS,
+        CAN_TX_DONE,
+        FLAG_EXTENDED,
+        FLAG_REMOTE,
+        FLAG_SINGLE_SHOT,
+        NEVER,
+        TX_ABORTED,
+        TX_SENT,
+    )
 
-CMR_TR, CMR_AT, CMR_RRB, CMR_CDO, CMR_SRR, CMR_STB1, CMR_STB2, CMR_STB3 = 1, 2, 4, 8, 16, 32, 64, 128
-ICR_RI, ICR_TI1, ICR_EI, ICR_DOI, ICR_EPI, ICR_ALI, ICR_BEI, ICR_TI2, ICR_TI3 = 1, 2, 4, 8, 32, 64, 128, 512, 1024
+    MOD_RESET = 0x1  # CxMOD: reset mode
+
+    # CxCMR
+    CMR_TR = 0x1  # transmission request
+    CMR_AT = 0x2  # abort transmission
+    CMR_RRB = 0x4  # release receive buffer
+    CMR_CDO = 0x8  # clear data overrun
+    CMR_SRR = 0x10  # self reception request: not modelled
+    CMR_STB1 = 0x20  # select transmit buffer
+    CMR_STB2 = 0x40
+    CMR_STB3 = 0x80
+
+    # CxICR and CxIER: the bits of the controller itself; those that the bus tells, ICR_*, are in can_bus/node.py.
+    ICR_RI = 0x1  # a frame waits
+    ICR_TI1 = 0x2  # transmit buffer 1 has ended
+    ICR_DOI = 0x8  # data overrun
+    ICR_ALI = 0x40  # arbitration lost
+    ICR_TI2 = 0x200
+    ICR_TI3 = 0x400
+    # ends of transmissions as bits 1 ... 3; those of buffers 2 and 3 stand higher up in CxICR
+    ENDED_1 = 0x2
+    ENDED_2_3 = 0xC
+    TI2_SHIFT = 7
+
+    # CxSR, once per transmit buffer
+    SR_RBS = 0x1  # a frame waits
+    SR_DOS = 0x2  # data overrun
+    SR_TBS = 0x4  # the transmit buffer is free
+    SR_TCS = 0x8  # its last transmission was completed
+    SR_ES = 0x40  # an error counter is at the warning limit
+    SR_BS = 0x80  # bus-off
+    SR_BUFFER_BITS = 8
+
+    # CxGSR: as CxSR below, TBS and TCS of all three buffers together, and the error counters
+    GSR_RX_ERRORS_SHIFT = 16
+    GSR_TX_ERRORS_SHIFT = 24
+    ERROR_COUNTER_MASK = 0xFF
+
+    # CxRFS and CxTFI: DLC in bits 16-19, RTR bit 30, FF (extended identifier) bit 31; from a message's flags by shifts
+    DLC_MASK = 0xF
+    DLC_SHIFT = 16
+    RTR_SHIFT = 26  # of FLAG_REMOTE
+    FF_SHIFT = 25  # of FLAG_EXTENDED
+    EIGHT_BYTES = 8  # flags of nearly every frame: DLC 8, neither remote nor extended
+    RFS_EIGHT_BYTES = 0x80000  # the same in CxRFS
 
 
 def btr_value(brp, sjw, tseg1, tseg2, sam=0) -> int:
@@ -56,13 +113,15 @@ def sample_point_of(btr) -> float:
 
 
 def frame_word(flags: cython.longlong) -> cython.longlong:
-    """CxRFS and CxTFI of a frame with these flags (foundation/events.py); 524288 for 8, nearly every frame."""
-    return (flags & 15) << 16 | (flags >> 4 & 1) << 30 | (flags >> 6 & 1) << 31
+    """CxRFS and CxTFI of a frame with these flags (foundation/events.py)."""
+    if flags == EIGHT_BYTES:
+        return RFS_EIGHT_BYTES
+    return (flags & DLC_MASK) << DLC_SHIFT | (flags & FLAG_REMOTE) << RTR_SHIFT | (flags & FLAG_EXTENDED) << FF_SHIFT
 
 
 def buffers_of(word: cython.longlong) -> cython.longlong:
     """TI1 ... TI3 of a CxICR or CxIER value, as bits 1 ... 3."""
-    return word & 2 | word >> 7 & 12
+    return word & ENDED_1 | word >> TI2_SHIFT & ENDED_2_3
 
 
 class CanController(Peripheral):
@@ -97,7 +156,7 @@ class CanController(Peripheral):
         self.TID = [0] * 4
         self.TDA = [0] * 4
         self.TDB = [0] * 4
-        self.tx_status = [12] * 4  # TBS 4 and TCS 8 of a buffer; 0 while it transmits
+        self.tx_status = [SR_TBS | SR_TCS] * 4  # of a buffer; 0 while it transmits
         self.overrun = False
         self.bus_off = False
         self.error_warning = False
@@ -178,12 +237,12 @@ class CanController(Peripheral):
         """The transmission from a buffer has ended."""
         self.ends.times[buffer] = NEVER
         self.ended |= 1 << buffer
-        if status == 0:
+        if status == TX_SENT:
             self.sent += 1
-            self.tx_status[buffer] = 12
+            self.tx_status[buffer] = SR_TBS | SR_TCS
             return
-        self.tx_status[buffer] |= 4
-        if status == 1:
+        self.tx_status[buffer] |= SR_TBS
+        if status == TX_ABORTED:
             self.aborted += 1
         else:
             self.lost += 1
@@ -218,9 +277,9 @@ class CanController(Peripheral):
             raise IndexError(f"{self.chip.name}: CAN controller {self.number}: transmit buffer {buffer} is not 1 ... 3")
         if self.ends.times[buffer] <= self.chip.now:
             self._end(buffer, self.ends.statuses[buffer])
-        if self.tx_status[buffer] == 0 or self.MOD & 1:
+        if self.tx_status[buffer] == 0 or self.MOD & MOD_RESET:
             return False
-        self.TFI[buffer] = 524288 if flags == 8 else frame_word(flags)
+        self.TFI[buffer] = frame_word(flags)
         self.TID[buffer] = identifier
         self.TDA[buffer] = lo
         self.TDB[buffer] = hi
@@ -236,23 +295,27 @@ class CanController(Peripheral):
         buffer: cython.longlong
         flags: cython.longlong
         frame: cython.longlong
-        if command & 4:
+        if command & CMR_RRB:
             self.release()
-        if command & 8:
+        if command & CMR_CDO:
             self.overrun = False
-        if command & 3 == 0 or self.MOD & 1:
+        if command & (CMR_TR | CMR_AT) == 0 or self.MOD & MOD_RESET:
             return command
         for buffer in range(1, 4):
-            if command & 16 << buffer:
-                if command & 1:
+            if command >> (buffer - 1) & CMR_STB1:
+                if command & CMR_TR:
                     frame = self.TFI[buffer]
-                    flags = frame >> 16 & 15 | (frame >> 30 & 1) << 4 | (frame >> 31 & 1) << 6
-                    if command & 2:
-                        flags |= 32
+                    flags = (
+                        frame >> DLC_SHIFT & DLC_MASK
+                        | frame >> RTR_SHIFT & FLAG_REMOTE
+                        | frame >> FF_SHIFT & FLAG_EXTENDED
+                    )
+                    if command & CMR_AT:
+                        flags |= FLAG_SINGLE_SHOT
                     self.transmit(buffer, self.TID[buffer], flags, self.TDA[buffer], self.TDB[buffer])
                     self.TFI[buffer] = frame  # with the bits that do not travel
                 elif not self.buffer_free(buffer):
-                    self.chip.outbox.push(self.chip.now, 0, 33, self.number, buffer)  # CAN_ABORT
+                    self.chip.outbox.push(self.chip.now, 0, CAN_ABORT, self.number, buffer)
         return command
 
     # --- receive ----------------------------------------------------------------------------------------
@@ -260,32 +323,32 @@ class CanController(Peripheral):
     def on_message(self, queue) -> InterruptSource | None:
         """What the bus tells: a frame received, the end of a transmission, a change of the error state."""
         buffer: cython.longlong
-        if queue.kind == 2:  # CAN_RX
-            if self.MOD & 1:
+        if queue.kind == CAN_RX:
+            if self.MOD & MOD_RESET:
                 return None
             if self.rx_count == 0:
                 self.rx_count = 1
-                self.RFS = 524288 if queue.c == 8 else frame_word(queue.c)
+                self.RFS = frame_word(queue.c)
                 self.RID = queue.b
                 self.RDA = queue.d
                 self.RDB = queue.e
             elif self.rx_count == 1:
                 self.rx_count = 2
-                self.second_RFS = 524288 if queue.c == 8 else frame_word(queue.c)
+                self.second_RFS = frame_word(queue.c)
                 self.second_RID = queue.b
                 self.second_RDA = queue.d
                 self.second_RDB = queue.e
             else:
                 self.data_overruns += 1
                 self.overrun = True
-                self.noted |= 8
-                if self.IER & 8:
+                self.noted |= ICR_DOI
+                if self.IER & ICR_DOI:
                     return self.error_source
                 return None
             self.received += 1
-            if self.IER & 1:
+            if self.IER & ICR_RI:
                 return self.rx_source
-        elif queue.kind == 3:  # CAN_TX_DONE
+        elif queue.kind == CAN_TX_DONE:
             buffer = queue.b & 3
             self._end(buffer, queue.c)
             if self.end_interrupts >> buffer & 1:
@@ -293,7 +356,7 @@ class CanController(Peripheral):
         else:  # CAN_STATUS
             self.tx_errors = queue.c
             self.rx_errors = queue.d
-            self.error_warning = queue.c >= 96 or queue.d >= 96
+            self.error_warning = queue.c >= WARNING_LIMIT or queue.d >= WARNING_LIMIT
             self.noted |= queue.b
             if queue.e and not self.bus_off:
                 self._bus_off()
@@ -307,9 +370,9 @@ class CanController(Peripheral):
         """Too many transmit errors: reset mode, nothing is sent or received until software restarts it."""
         buffer: cython.longlong
         self.bus_off = True
-        self.MOD |= 1
+        self.MOD |= MOD_RESET
         for buffer in range(1, 4):
-            self.tx_status[buffer] |= 4
+            self.tx_status[buffer] |= SR_TBS
 
     def release(self) -> cython.void:
         """CMR.RRB: free the older receive buffer; the newer moves up and asks for the interrupt again."""
@@ -321,7 +384,7 @@ class CanController(Peripheral):
         self.RID = self.second_RID
         self.RDA = self.second_RDA
         self.RDB = self.second_RDB
-        if self.IER & 1:
+        if self.IER & ICR_RI:
             self.chip.vic.raise_source(self.rx_source)
 
     # --- status -----------------------------------------------------------------------------------------
@@ -330,11 +393,11 @@ class CanController(Peripheral):
         """Bit 0: 1 reset mode, 0 operating (after bus-off: begin the recovery)."""
         buffer: cython.longlong
         self.MOD = mode
-        if mode & 1:
+        if mode & MOD_RESET:
             self.rx_count = 0
             for buffer in range(1, 4):
-                self.tx_status[buffer] |= 4
-        self.chip.outbox.push(self.chip.now, 0, 34, self.number, mode & 1)  # CAN_MODE
+                self.tx_status[buffer] |= SR_TBS
+        self.chip.outbox.push(self.chip.now, 0, CAN_MODE, self.number, mode & MOD_RESET)
 
     def read_ICR(self) -> cython.longlong:
         """Interrupt and capture register; the read clears all but the receive bit."""
@@ -348,7 +411,7 @@ class CanController(Peripheral):
     @property
     def ICR(self) -> cython.longlong:
         """The same by the ends taken in so far, without clearing anything."""
-        return self.noted | self.ended & 2 | (self.ended & 12) << 7 | (self.rx_count > 0)
+        return self.noted | self.ended & ENDED_1 | (self.ended & ENDED_2_3) << TI2_SHIFT | (self.rx_count > 0) * ICR_RI
 
     def SR(self) -> cython.longlong:
         """Status of the three buffers, 8 bits each."""
@@ -357,24 +420,22 @@ class CanController(Peripheral):
         common: cython.longlong = 0
         self._look()
         if self.rx_count > 0:
-            common |= 1
+            common |= SR_RBS
         if self.overrun:
-            common |= 2
+            common |= SR_DOS
         if self.error_warning:
-            common |= 64
+            common |= SR_ES
         if self.bus_off:
-            common |= 128
+            common |= SR_BS
         for buffer in range(1, 4):
-            word |= (common | self.tx_status[buffer]) << 8 * (buffer - 1)
+            word |= (common | self.tx_status[buffer]) << SR_BUFFER_BITS * (buffer - 1)
         return word
 
     def GSR(self) -> cython.longlong:
         """Global status: bit 0 RBS, 1 DOS, 2 all buffers free, 3 all complete, 6 ES, 7 BS, 16-23 receive errors,
         24-31 transmit errors."""
         status: cython.longlong = self.SR()
-        word: cython.longlong = status & 195
-        if status >> 2 & status >> 10 & status >> 18 & 1:
-            word |= 4
-        if status >> 3 & status >> 11 & status >> 19 & 1:
-            word |= 8
-        return word | (self.rx_errors & 255) << 16 | (self.tx_errors & 255) << 24
+        all_three: cython.longlong = status & status >> SR_BUFFER_BITS & status >> 2 * SR_BUFFER_BITS
+        word: cython.longlong = status & (SR_RBS | SR_DOS | SR_ES | SR_BS) | all_three & (SR_TBS | SR_TCS)
+        word |= (self.rx_errors & ERROR_COUNTER_MASK) << GSR_RX_ERRORS_SHIFT
+        return word | (self.tx_errors & ERROR_COUNTER_MASK) << GSR_TX_ERRORS_SHIFT

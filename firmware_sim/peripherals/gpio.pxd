@@ -1,4 +1,5 @@
 from ranger_sim.firmware_sim.peripheral cimport Peripheral
+from ranger_sim.foundation.events cimport PIN_OUTPUT
 
 cimport cython
 

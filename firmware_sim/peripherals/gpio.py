@@ -11,6 +11,9 @@ import cython
 
 from ranger_sim.firmware_sim.peripheral import Peripheral
 
+if not cython.compiled:
+    from ranger_sim.foundation.events import PIN_OUTPUT
+
 
 def p0(bit) -> int:
     """Pin number of P0.`bit`."""
@@ -38,14 +41,14 @@ class Gpio(Peripheral):
         if self.chip.pins[pin] != level or self.outputs[pin] == 0:
             self.outputs[pin] = 1
             self.chip.pins[pin] = level
-            self.chip.outbox.push(self.chip.now, 0, 36, pin, level)  # PIN_OUTPUT
+            self.chip.outbox.push(self.chip.now, 0, PIN_OUTPUT, pin, level)
 
     def toggle(self, pin: cython.longlong) -> None:
         """Invert an output."""
         level: cython.longlong = 1 - self.chip.pins[pin]
         self.outputs[pin] = 1
         self.chip.pins[pin] = level
-        self.chip.outbox.push(self.chip.now, 0, 36, pin, level)  # PIN_OUTPUT
+        self.chip.outbox.push(self.chip.now, 0, PIN_OUTPUT, pin, level)
 
     def IOSET(self, port: cython.longlong, mask: cython.longlong) -> None:
         """Set the pins of `mask` (bit 0 = Px.0) of port 0 or 1."""

@@ -1,6 +1,16 @@
 from ranger_sim.firmware_sim.peripheral cimport Peripheral
+from ranger_sim.foundation.events cimport PWM_UPDATE
 
 cimport cython
+
+cpdef enum:
+    LER_MR0 = 0x1
+    LER_MR1 = 0x2
+    LER_MR2 = 0x4
+    LER_MR3 = 0x8
+    LER_MR4 = 0x10
+    LER_MR5 = 0x20
+    LER_MR6 = 0x40
 
 @cython.final
 cdef class Pwm(Peripheral):

@@ -12,6 +12,18 @@ import cython
 from ranger_sim.firmware_sim.peripheral import Peripheral
 from ranger_sim.foundation.user_error import UserError
 
+if not cython.compiled:
+    from ranger_sim.foundation.events import PWM_UPDATE
+
+    # PWMLER, latch enable
+    LER_MR0 = 0x1
+    LER_MR1 = 0x2
+    LER_MR2 = 0x4
+    LER_MR3 = 0x8
+    LER_MR4 = 0x10
+    LER_MR5 = 0x20
+    LER_MR6 = 0x40
+
 LONGEST_PERIOD_S = 2  # so that products of times and rates stay within 64 bits
 
 
@@ -50,35 +62,35 @@ class Pwm(Peripheral):
         """Write the two bridge leads (counts) and enable their latches."""
         self.MR2 = MR2
         self.MR6 = MR6
-        self.LER = (1 << 2) | (1 << 6)
+        self.LER = LER_MR2 | LER_MR6
         self._find_period()
         self.latched_MR2 = MR2
         self.latched_MR6 = MR6
-        self.chip.outbox.push(self.period_start, 0, 35, MR2, MR6, self.latched_MR0)  # PWM_UPDATE
+        self.chip.outbox.push(self.period_start, 0, PWM_UPDATE, MR2, MR6, self.latched_MR0)
 
     def latch(self, mask: cython.longlong) -> None:
         """Write PWMLER: the match values whose bits are set take effect at the next period."""
         self.LER = mask
         self._find_period()
-        if mask & 1:
+        if mask & LER_MR0:
             self.latched_MR0 = self.MR0
-        if mask & 2:
+        if mask & LER_MR1:
             self.latched_MR1 = self.MR1
-        if mask & 4:
+        if mask & LER_MR2:
             self.latched_MR2 = self.MR2
-        if mask & 8:
+        if mask & LER_MR3:
             self.latched_MR3 = self.MR3
-        if mask & 16:
+        if mask & LER_MR4:
             self.latched_MR4 = self.MR4
-        if mask & 32:
+        if mask & LER_MR5:
             self.latched_MR5 = self.MR5
-        if mask & 64:
+        if mask & LER_MR6:
             self.latched_MR6 = self.MR6
-        if mask & 69:  # MR0, MR2 or MR6
+        if mask & (LER_MR0 | LER_MR2 | LER_MR6):
             self.chip.outbox.push(
-                self.period_start, 0, 35, self.latched_MR2, self.latched_MR6, self.latched_MR0
-            )  # PWM_UPDATE
-        if mask & 1:
+                self.period_start, 0, PWM_UPDATE, self.latched_MR2, self.latched_MR6, self.latched_MR0
+            )
+        if mask & LER_MR0:
             self._count_periods()
 
     def _count_periods(self) -> None:

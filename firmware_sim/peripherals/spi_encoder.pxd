@@ -4,6 +4,9 @@ from ranger_sim.firmware_sim.alarm cimport Alarm
 from ranger_sim.firmware_sim.peripheral cimport Peripheral
 from ranger_sim.firmware_sim.vic cimport InterruptSource
 
+cpdef enum:
+    SPSR_SPIF = 0x80
+
 @cython.final
 cdef class SpiEncoder(Peripheral):
     # what a transfer touches

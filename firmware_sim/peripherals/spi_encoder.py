@@ -12,6 +12,9 @@ from ranger_sim.firmware_sim.peripheral import Peripheral
 from ranger_sim.firmware_sim.vic import SPI_DONE, InterruptSource
 from ranger_sim.foundation.user_error import UserError
 
+if not cython.compiled:
+    SPSR_SPIF = 0x80  # S0SPSR: the transfer is complete
+
 
 class SpiEncoder(Peripheral):
     """SPI `number` with the encoder that holds out `chip.words[word]`."""
@@ -50,9 +53,9 @@ class SpiEncoder(Peripheral):
         return True
 
     def on_alarm(self, alarm: cython.longlong, time: cython.longlong) -> InterruptSource | None:
-        """The transfer is complete: SPIF (bit 7 of S0SPSR) is set."""
+        """The transfer is complete: SPIF is set."""
         self.SPDR = self.latched
-        self.SPSR = 128
+        self.SPSR = SPSR_SPIF
         self.busy = False
         return self.source
 

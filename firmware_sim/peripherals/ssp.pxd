@@ -1,6 +1,6 @@
 from ranger_sim.firmware_sim.peripheral cimport Peripheral
 from ranger_sim.firmware_sim.vic cimport InterruptSource
-from ranger_sim.foundation.events cimport EventQueue
+from ranger_sim.foundation.events cimport SSP_LOAD, SSP_START, EventQueue
 
 cimport cython
 

@@ -15,6 +15,9 @@ from ranger_sim.firmware_sim.peripheral import Peripheral
 from ranger_sim.firmware_sim.vic import InterruptSource
 from ranger_sim.foundation.events import SSP_SEGMENT
 
+if not cython.compiled:
+    from ranger_sim.foundation.events import SSP_LOAD, SSP_START
+
 SEGMENT_WORDS = 31
 BIT_RATE = 3_000_000  # 60 MHz / 20
 WORD_BITS = 16
@@ -87,14 +90,14 @@ class SspPort(Peripheral):
 
     def start(self, segment: SspSegment) -> cython.void:
         """Master: exchange `segment` from `now` on. It must not be changed until it is through."""
-        self.chip.outbox.push(self.chip.now, 0, 37, self.number, 0, 0, 0, 0, 0, segment)  # SSP_START
+        self.chip.outbox.push(self.chip.now, 0, SSP_START, self.number, 0, 0, 0, 0, 0, segment)
 
     def load(self, segment: SspSegment) -> cython.void:
         """Slave: send `segment` from the next exchange on. It must not be changed until something else is loaded."""
         if segment is self.loaded:
             return
         self.loaded = segment
-        self.chip.outbox.push(self.chip.now, 0, 38, self.number, 0, 0, 0, 0, 0, segment)  # SSP_LOAD
+        self.chip.outbox.push(self.chip.now, 0, SSP_LOAD, self.number, 0, 0, 0, 0, 0, segment)
 
     def on_message(self, queue) -> InterruptSource | None:
         """The other side's segment is in."""

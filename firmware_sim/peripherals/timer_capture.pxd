@@ -5,6 +5,15 @@ from ranger_sim.firmware_sim.alarm cimport Alarm
 from ranger_sim.firmware_sim.peripheral cimport Peripheral
 from ranger_sim.firmware_sim.vic cimport InterruptSource
 
+cpdef enum:
+    IR_MR0 = 0x1
+    IR_CR0 = 0x10
+    CCR_RISING = 0x1
+    CCR_FALLING = 0x2
+    CCR_INTERRUPT = 0x4
+    CCR_MASK = 0x7
+    CCR_BITS = 3
+
 @cython.final
 cdef class TimerCapture(Peripheral):
     # what an edge touches

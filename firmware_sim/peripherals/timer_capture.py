@@ -7,8 +7,6 @@ capture register, sets the channel's bit in T0IR and raises the interrupt of the
 channel holds ONE capture: a second edge before the firmware clears the bit overwrites it. An edge of the
 direction that is not armed is not captured at all. Both are counted in `lost`, ground truth for tests; those
 captured are counted by their interrupt's source.
-
-IR: bit 0 match 0, bits 4-7 capture 0-3. CCR: per channel three bits, rising, falling, interrupt.
 """
 
 import cython
@@ -17,6 +15,17 @@ from ranger_sim.firmware_sim.clock import TickTrain
 from ranger_sim.firmware_sim.peripheral import Peripheral
 from ranger_sim.firmware_sim.vic import TIMER_MATCH, InterruptSource
 from ranger_sim.foundation.user_error import UserError
+
+# C constants when compiled: the same numbers stand in the .pxd, and a test holds them together.
+if not cython.compiled:
+    IR_MR0 = 0x1  # TxIR: the match that restarts the timer
+    IR_CR0 = 0x10  # capture 0; those of channels 1 ... 3 follow
+    # TxCCR, per channel CCR_BITS apart
+    CCR_RISING = 0x1
+    CCR_FALLING = 0x2
+    CCR_INTERRUPT = 0x4
+    CCR_MASK = 0x7
+    CCR_BITS = 3
 
 
 class TimerCapture(Peripheral):
@@ -65,12 +74,13 @@ class TimerCapture(Peripheral):
 
     def arm(self, channel: cython.longlong, rising: cython.bint, falling: cython.bint) -> None:
         """Choose the edges that channel captures (its three bits of T0CCR, interrupt on)."""
-        bits: cython.longlong = 4
+        bits: cython.longlong = CCR_INTERRUPT
+        mask: cython.longlong = CCR_MASK
         if rising:
-            bits += 1
+            bits |= CCR_RISING
         if falling:
-            bits += 2
-        self.CCR = self.CCR & ~(7 << (3 * channel)) | bits << (3 * channel)
+            bits |= CCR_FALLING
+        self.CCR = self.CCR & ~(mask << CCR_BITS * channel) | bits << CCR_BITS * channel
 
     def clear(self, mask: cython.longlong) -> cython.longlong:
         """Write T0IR: the bits of `mask` are cleared, the channels may capture again. Returns what is left."""
@@ -138,12 +148,12 @@ class TimerCapture(Peripheral):
 
     def on_pin(self, channel: cython.longlong, level: cython.longlong, time: cython.longlong) -> cython.longlong:
         """An edge at a capture pin; 1 when it asks for the interrupt."""
-        asked: cython.longlong = self.CCR >> 3 * channel
-        flag: cython.longlong = 16
+        asked: cython.longlong = self.CCR >> CCR_BITS * channel
+        flag: cython.longlong = IR_CR0
         count: cython.longlong
         if time >= self.next_wrap_time:
             return self._late_pin(channel, level, time)
-        if asked & 2 - level == 0:
+        if asked & (CCR_RISING if level else CCR_FALLING) == 0:
             self.lost[channel] += 1
             return 0
         count = int((time - self.wrap_time) * self.counts_per_ns)
@@ -153,7 +163,7 @@ class TimerCapture(Peripheral):
             self.lost[channel] += 1
             return 0
         self.IR |= flag
-        return asked >> 2 & 1
+        return 1 if asked & CCR_INTERRUPT else 0
 
     def _late_pin(self, channel: cython.longlong, level: cython.longlong, time: cython.longlong) -> cython.longlong:
         """An edge after a wrap that has not been looked at."""
@@ -165,5 +175,5 @@ class TimerCapture(Peripheral):
         if time >= self.next_wrap_time:
             self._wrap_to(time)
         self.alarm.set(self.next_wrap_time)
-        self.IR |= 1
+        self.IR |= IR_MR0
         return self.match_source

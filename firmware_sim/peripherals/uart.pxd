@@ -1,8 +1,25 @@
 from ranger_sim.firmware_sim.alarm cimport Alarm
 from ranger_sim.firmware_sim.peripheral cimport Peripheral
 from ranger_sim.firmware_sim.vic cimport InterruptSource
+from ranger_sim.foundation.events cimport UART_OUTPUT
 
 cimport cython
+
+cpdef enum:
+    FIFO_BYTES = 16
+    BITS_PER_BYTE = 10
+    CLOCKS_PER_BIT = 16
+    TIMEOUT_BYTES = 4
+    TIMEOUT_ALARM = 0
+    TRANSMIT_ALARM = 1
+    IIR_NONE = 1
+    IIR_TRANSMIT = 2
+    IIR_RECEIVED = 4
+    IIR_TIMEOUT = 12
+    LSR_RDR = 0x1
+    LSR_OE = 0x2
+    LSR_THRE = 0x20
+    LSR_TEMT = 0x40
 
 @cython.final
 cdef class Uart(Peripheral):

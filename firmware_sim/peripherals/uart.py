@@ -18,8 +18,27 @@ from ranger_sim.firmware_sim.vic import UART_TRANSMIT, InterruptSource
 from ranger_sim.foundation.events import NEVER, UART_BYTE
 from ranger_sim.foundation.user_error import UserError
 
-FIFO_BYTES = 16
-BITS_PER_BYTE = 10  # start, 8 data, stop
+if not cython.compiled:
+    from ranger_sim.foundation.events import UART_OUTPUT
+
+    FIFO_BYTES = 16
+    BITS_PER_BYTE = 10  # start, 8 data, stop
+    CLOCKS_PER_BIT = 16
+    TIMEOUT_BYTES = 4  # of silence, while bytes wait below the trigger level
+    TIMEOUT_ALARM = 0
+    TRANSMIT_ALARM = 1
+
+    # UnIIR
+    IIR_NONE = 1
+    IIR_TRANSMIT = 2  # THRE: the transmit FIFO is empty
+    IIR_RECEIVED = 4  # RDA: the trigger level is reached
+    IIR_TIMEOUT = 12  # CTI: bytes wait below it
+
+    # UnLSR
+    LSR_RDR = 0x1  # a received byte waits
+    LSR_OE = 0x2  # overrun
+    LSR_THRE = 0x20  # the transmit FIFO is empty
+    LSR_TEMT = 0x40  # and the last byte is out
 
 
 class Uart(Peripheral):
@@ -35,11 +54,11 @@ class Uart(Peripheral):
         self.set_divisor(divisor, divaddval, mulval)
         self.source = chip.vic.source(UART_BYTE, number)
         self.transmit_source = chip.vic.source(UART_TRANSMIT, number)
-        self.timeout_alarm = chip.new_alarm(self, 0)
-        self.transmit_alarm = chip.new_alarm(self, 1)
-        self.fifo = [0] * 16  # the oldest byte first
+        self.timeout_alarm = chip.new_alarm(self, TIMEOUT_ALARM)
+        self.transmit_alarm = chip.new_alarm(self, TRANSMIT_ALARM)
+        self.fifo = [0] * 16  # FIFO_BYTES; the oldest byte first
         self.fifo_count = 0
-        self.IIR = 1
+        self.IIR = IIR_NONE
         self.errors = 0
         self.received = 0
         self.overruns = 0
@@ -58,7 +77,9 @@ class Uart(Peripheral):
         self.DIVADDVAL = DIVADDVAL
         self.MULVAL = MULVAL
         self.baud = self.hz * MULVAL / (16.0 * DL * (MULVAL + DIVADDVAL))
-        self.byte_ns = self.chip.crystal.true_ns(10 * 16 * DL * (MULVAL + DIVADDVAL) * 1000000000 // (self.hz * MULVAL))
+        self.byte_ns = self.chip.crystal.true_ns(
+            BITS_PER_BYTE * CLOCKS_PER_BIT * DL * (MULVAL + DIVADDVAL) * 1000000000 // (self.hz * MULVAL)
+        )
 
     def waiting(self) -> cython.longlong:
         """Received bytes that wait in the FIFO."""
@@ -78,29 +99,29 @@ class Uart(Peripheral):
             behind = first + queue.c
             bytes_left = queue.e << 32 | queue.d
         self.received += behind - first
-        if behind > 16:  # the last ones are lost
-            self.overruns += behind - 16
-            self.errors |= 2
-            behind = 16
+        if behind > FIFO_BYTES:  # the last ones are lost
+            self.overruns += behind - FIFO_BYTES
+            self.errors |= LSR_OE
+            behind = FIFO_BYTES
         for place in range(first, behind):
             self.fifo[place] = bytes_left & 255
             bytes_left >>= 8
         self.fifo_count = behind
         if behind >= self.trigger:
             self.timeout_alarm.set(NEVER)
-            self.IIR = 4
+            self.IIR = IIR_RECEIVED
             return self.source
-        self.timeout_alarm.set(queue.time + 4 * self.byte_ns)
+        self.timeout_alarm.set(queue.time + TIMEOUT_BYTES * self.byte_ns)
         return None
 
     def on_alarm(self, alarm: cython.longlong, time: cython.longlong) -> InterruptSource | None:
         """Character time-out (0) or transmit FIFO empty (1)."""
-        if alarm == 0:
+        if alarm == TIMEOUT_ALARM:
             if self.fifo_count == 0:
                 return None
-            self.IIR = 12
+            self.IIR = IIR_TIMEOUT
             return self.source
-        self.IIR = 2
+        self.IIR = IIR_TRANSMIT
         return self.transmit_source
 
     def RBR(self) -> cython.longlong:
@@ -120,22 +141,22 @@ class Uart(Peripheral):
             for i in range(self.fifo_count):
                 self.fifo[i] = self.fifo[count + i]
             if self.fifo_count == 0:
-                self.IIR = 1
+                self.IIR = IIR_NONE
                 self.timeout_alarm.set(NEVER)
             else:
-                self.timeout_alarm.set(self.chip.now + 4 * self.byte_ns)
+                self.timeout_alarm.set(self.chip.now + TIMEOUT_BYTES * self.byte_ns)
 
     def THR(self, byte: cython.longlong) -> cython.bint:
         """Send a byte; False (and `refused` counts) when the FIFO is full."""
         now: cython.longlong = self.chip.now
-        if self.transmit_free - now > 16 * self.byte_ns:
+        if self.transmit_free - now > FIFO_BYTES * self.byte_ns:
             self.refused += 1
             return False
         if self.transmit_free < now:
             self.transmit_free = now
         self.transmit_free += self.byte_ns
         self.sent += 1
-        self.chip.outbox.push(self.transmit_free, 0, 39, self.number, byte & 255)  # UART_OUTPUT
+        self.chip.outbox.push(self.transmit_free, 0, UART_OUTPUT, self.number, byte & 255)
         if self.transmit_source.attached:
             self.transmit_alarm.set(max(now, self.transmit_free - self.byte_ns))
         return True
@@ -145,11 +166,11 @@ class Uart(Peripheral):
         status: cython.longlong = self.errors
         self.errors = 0
         if self.fifo_count > 0:
-            status |= 1
+            status |= LSR_RDR
         if self.transmit_free - self.byte_ns <= self.chip.now:
-            status |= 32
+            status |= LSR_THRE
         if self.transmit_free <= self.chip.now:
-            status |= 64
+            status |= LSR_TEMT
         return status
 
     def unplug(self) -> None:

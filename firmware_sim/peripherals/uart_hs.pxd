@@ -1,6 +1,7 @@
 from ranger_sim.firmware_sim.alarm cimport Alarm
 from ranger_sim.firmware_sim.peripheral cimport Peripheral
 from ranger_sim.firmware_sim.vic cimport InterruptSource
+from ranger_sim.foundation.events cimport UART_OUTPUT
 
 cdef class HsUart(Peripheral):
     cdef public long long number, rate, byte_ns

@@ -20,6 +20,9 @@ from ranger_sim.firmware_sim.vic import DMA_DONE, InterruptSource
 from ranger_sim.foundation.events import UART_BYTE
 from ranger_sim.foundation.user_error import UserError
 
+if not cython.compiled:
+    from ranger_sim.foundation.events import UART_OUTPUT
+
 BITS_PER_BYTE = 10  # start, 8 data, stop
 SAMPLES_PER_BIT = 14
 
@@ -74,7 +77,7 @@ class HsUart(Peripheral):
         count: cython.longlong = len(data)
         end: cython.longlong = time + count * self.byte_ns
         self.sent += count
-        self.chip.outbox.push(end, 0, 39, self.number, 0, count, 0, 0, 0, data)  # UART_OUTPUT
+        self.chip.outbox.push(end, 0, UART_OUTPUT, self.number, 0, count, 0, 0, 0, data)
         self.done_alarm.set(end)
 
     def on_pin(self, channel: cython.longlong, level: cython.longlong, time: cython.longlong) -> cython.longlong:

@@ -10,9 +10,9 @@ from ranger_sim.firmware_sim.peripherals.can_controller import (
     CMR_STB3,
     CMR_TR,
     ICR_ALI,
-    ICR_BEI,
+    ICR_BUS_ERROR,
     ICR_DOI,
-    ICR_EI,
+    ICR_ERROR_WARNING,
     ICR_RI,
     ICR_TI1,
     ICR_TI2,
@@ -203,20 +203,20 @@ def test_transmit_interrupts_come_only_when_enabled():
 
 
 def test_error_counters_and_warning_stand_in_the_global_status():
-    node = Node(IER=ICR_EI | ICR_BEI)
+    node = Node(IER=ICR_ERROR_WARNING | ICR_BUS_ERROR)
     served = []
     node.chip.vic.attach(CAN_STATUS, 1, lambda queue: served.append(node.can.read_ICR()), cost=50, slot=8)
-    node.tell(CAN_STATUS, ICR_BEI, 8, 3, 0)
-    node.tell(CAN_STATUS, ICR_EI, 96, 3, 0)
+    node.tell(CAN_STATUS, ICR_BUS_ERROR, 8, 3, 0)
+    node.tell(CAN_STATUS, ICR_ERROR_WARNING, 96, 3, 0)
     node.tell(CAN_STATUS, ICR_ALI, 96, 3, 0)  # not enabled
-    assert served == [ICR_BEI, ICR_EI]
+    assert served == [ICR_BUS_ERROR, ICR_ERROR_WARNING]
     assert node.can.GSR() >> 24 == 96
     assert node.can.GSR() >> 16 & 255 == 3
     assert node.can.GSR() >> 6 & 1
 
 
 def test_bus_off_means_reset_mode_until_software_restarts_the_controller():
-    node = Node(IER=ICR_EI)
+    node = Node(IER=ICR_ERROR_WARNING)
     restarted = []
 
     def handler(queue):
@@ -226,7 +226,7 @@ def test_bus_off_means_reset_mode_until_software_restarts_the_controller():
 
     node.can.transmit(1, 5, 8, 0, 0)
     node.requests()
-    node.tell(CAN_STATUS, ICR_EI, 256, 0, 1)
+    node.tell(CAN_STATUS, ICR_ERROR_WARNING, 256, 0, 1)
     assert node.can.bus_off
     assert not node.can.transmit(1, 5, 8, 0, 0)
     node.tell(CAN_RX, 5, 8, 0, 0)
@@ -234,7 +234,7 @@ def test_bus_off_means_reset_mode_until_software_restarts_the_controller():
     node.chip.vic.attach(CAN_STATUS, 1, handler, cost=50, slot=8)
     node.chip.request(node.can.error_source)
     node.chip.advance(node.time + 10_000)
-    assert restarted == [ICR_EI]
+    assert restarted == [ICR_ERROR_WARNING]
     assert node.requests() == [(CAN_MODE, 1, 0, 0, 0, 0, 0)]
     node.tell(CAN_STATUS, 0, 0, 0, 0)
     assert not node.can.bus_off
