@@ -131,12 +131,17 @@ class Steps:
             elif text.startswith("Installing"):
                 self.line.show("packages", f"installing {of} packages")
 
-        options = ["--disable-pip-version-check", "--progress-bar", "off", "--require-hashes"]
-        if not sys.dont_write_bytecode:  # a module's bytecode is then written when it is first imported; most never are
-            options.append("--no-compile")
+        # bytecode is written when a module is first imported: most of them never are
+        options = ["--disable-pip-version-check", "--progress-bar", "off", "--no-compile", "--require-hashes"]
         self.run([self.python, "-m", "pip", "install", *options, "-r", wanted], seen)
         self.line.show("packages", f"{of} packages ({what})", end=True)
         wanted.replace(kept)
+
+    def bytecode(self):
+        """Bytecode of all packages where Python is told to write none later: tests start many programs."""
+        [packages] = (self.venv / "lib").glob("python*/site-packages")
+        if sys.dont_write_bytecode:
+            self.run([self.python, "-m", "compileall", "-q", "-j", "0", packages])
 
     def library(self):
         """Compile what changed. Without a compiler the sources run interpreted, and that is told."""
@@ -189,6 +194,8 @@ def set_up(what, venv):
         beside.start()
         try:
             steps.packages(what, part_of_lock(lock, None if what == "all" else walk))
+            if what == "all":
+                steps.bytecode()
         finally:
             beside.join()
         if failed:
