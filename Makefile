@@ -20,6 +20,8 @@ test-vm: $(VENV)/.all
 lint: $(VENV)/.all
 	$(RUN) -m ruff check .
 	$(RUN) -m ruff format --check --quiet .
+	$(RUN) -m ranger_sim.tools.stubs --check
+	$(RUN) setup.py -q lay_types
 	$(RUN) -m mypy
 
 bench: $(VENV)/.walk

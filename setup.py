@@ -19,13 +19,15 @@ import json
 import os
 import pathlib
 import re
+import shutil
 import sys
 import tempfile
 import threading
 from concurrent.futures import ThreadPoolExecutor
 
-from setuptools import Extension, find_namespace_packages, setup
+from setuptools import Command, Extension, find_namespace_packages, setup
 from setuptools.command.build_ext import build_ext
+from setuptools.command.build_py import build_py
 from setuptools.modified import newer_group
 
 HERE = pathlib.Path(__file__).resolve().parent
@@ -42,6 +44,7 @@ ROOMS = (
 DATA_FOLDERS = ("profiles",)  # shipped like a room, no Python in them
 LIBRARY = "ranger_sim._compiled"
 SHARED = "ranger_sim._shared"  # Cython's helpers (memoryviews above all), once instead of in every module
+STUBS = HERE / "stubs"  # types of the compiled modules, in folders named like the rooms (tools/stubs.py)
 LOG = HERE / "build" / "setup.log"
 RECORD = "build_record.json"  # in the package ranger_sim
 # no fused multiply-add, no fast-math: both change the last bit of a trajectory
@@ -165,6 +168,7 @@ class OptionalBuild(build_ext):
     """Translates and compiles; a failure is told, recorded and survived: the interpreted run needs no compiler."""
 
     def run(self):
+        tree_of_types()
         if self.editable_mode and os.environ.get("RANGER_SIM_BUILT", "") not in ("", "0"):
             return
         in_place, reason = self.inplace, ""
@@ -293,6 +297,18 @@ class OptionalBuild(build_ext):
         (folder / RECORD).write_text(json.dumps(record) + "\n", encoding="utf-8")
 
 
+class BuildWithStubs(build_py):
+    """Lays the stub of each compiled module beside it."""
+
+    def run(self):
+        super().run()
+        if not self.editable_mode:
+            for stub in STUBS.rglob("*.pyi"):
+                target = pathlib.Path(self.build_lib, "ranger_sim", stub.relative_to(STUBS))
+                target.parent.mkdir(parents=True, exist_ok=True)
+                shutil.copyfile(stub, target)
+
+
 class Progress:
     """How far the build is: on a terminal one line that is rewritten, elsewhere a few lines."""
 
@@ -406,6 +422,43 @@ def tree_of_links():
     return package.parent
 
 
+def tree_of_types():
+    """The folder in which mypy finds `ranger_sim` as it will be installed: links to modules, stubs of compiled ones."""
+    tree = HERE / "build" / "typed" / "ranger_sim"
+    wanted = {}
+    for room in ("ranger_sim", *ROOMS):
+        for path in (HERE / room).rglob("*.py"):
+            inside = path.relative_to(HERE / "ranger_sim" if room == "ranger_sim" else HERE)
+            wanted[tree / inside] = path
+    wanted[tree / "py.typed"] = HERE / "ranger_sim" / "py.typed"
+    for stub in STUBS.rglob("*.pyi"):
+        wanted[tree / stub.relative_to(STUBS)] = stub
+        wanted.pop(tree / stub.relative_to(STUBS).with_suffix(".py"), None)
+    for there in list(tree.rglob("*")):
+        if there.is_symlink() and there not in wanted:
+            there.unlink()
+    for link, target in wanted.items():
+        if not link.is_symlink():
+            link.parent.mkdir(parents=True, exist_ok=True)
+            link.symlink_to(os.path.relpath(target, link.parent))
+
+
+class LayTypes(Command):
+    """`setup.py lay_types`: makes that folder anew, for what has been added or removed since the last build."""
+
+    description = "lay modules and stubs where mypy reads them"
+    user_options = []
+
+    def initialize_options(self):
+        """No options."""
+
+    def finalize_options(self):
+        """No options."""
+
+    def run(self):
+        tree_of_types()
+
+
 def packages():
     """{package: its folder} of the wheel, whose only top level is `ranger_sim`; folders of data files are packages."""
     found = {"ranger_sim": "ranger_sim"}
@@ -425,5 +478,5 @@ if __name__ == "__main__":
         packages=list(packages()),
         package_dir=packages(),
         ext_modules=[Extension(LIBRARY, [], libraries=mathematics)],
-        cmdclass={"build_ext": OptionalBuild},
+        cmdclass={"build_ext": OptionalBuild, "build_py": BuildWithStubs, "lay_types": LayTypes},
     )

@@ -6,12 +6,16 @@ appendix, then what is known of the firmware. `Quirks()` is the robot as the app
 `Quirks.firmware_2016()` sets every switch to what the firmware of 2016 does.
 """
 
+from collections.abc import Container
 from dataclasses import dataclass, field, fields
+from typing import Any, Self, TypeVar
 
 from ranger_sim.foundation.user_error import UserError
 
+Value = TypeVar("Value", bool, int, str)
 
-def switch(default, firmware, allowed):
+
+def switch(default: Value, firmware: Value, allowed: Container[Value]) -> Value:
     """A field of `Quirks`: our default, the value that gives the firmware of 2016, what is allowed.
 
     `allowed` is a tuple of values, or a `range` for whole numbers.
@@ -159,12 +163,12 @@ class Quirks:
                 raise UserError(f"quirk {each.name}: {value!r} is not allowed (allowed: {shown})")
 
     @classmethod
-    def firmware_2016(cls):
+    def firmware_2016(cls) -> Self:
         """Every switch set to what the firmware of 2016 does."""
         return cls(**{each.name: each.metadata["firmware"] for each in fields(cls)})
 
     @classmethod
-    def named(cls, **changes):
+    def named(cls, **changes: Any) -> Self:
         """The defaults with the given switches changed; an unknown name is a user's mistake."""
         known = {each.name for each in fields(cls)}
         for name in changes:

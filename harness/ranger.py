@@ -40,6 +40,7 @@ BUS_BIT_RATE = 3_000_000  # bit/s, appendix 3.11
 POWER_UP_SPREAD_NS = 2_000_000
 GRID_NS = 20_000_000  # the operator acts on this grid, so that a run does not depend on how it is sliced
 
+BoardName = Literal["MCH", "MCFO", "MCFI", "MCSI", "UI", "CSR", "MB"]
 BOARD_CLASSES: dict[str, Any] = {
     "MCH": HipBoard,
     "MCFO": OuterFeetBoard,
@@ -248,8 +249,6 @@ class Ranger:
     def board(self, name: Literal["CSR"]) -> CanRouterBoard: ...
     @overload
     def board(self, name: Literal["MB"]) -> MainBrainBoard: ...
-    @overload
-    def board(self, name: str) -> Any: ...
     def board(self, name: str) -> Any:
         """The board MCH, MCFO, MCFI, MCSI, UI, CSR or MB. UserError for any other name."""
         if name not in self.boards:
@@ -271,7 +270,7 @@ class Ranger:
         return value_of_word(all_variables.TYPES[number], self.loop.board("MB").memory[number])
 
     def replace(
-        self, board: str, task: str, function: Callable[[], int | None], cost: int, limit: int | None = None
+        self, board: BoardName, task: str, function: Callable[[], int | None], cost: int, limit: int | None = None
     ) -> None:
         """Put your own function in a schedule entry; it declares its cost in cycles."""
         self.board(board).scheduler.replace(task, function, cost=cost, limit=limit)

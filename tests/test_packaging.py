@@ -10,6 +10,7 @@ import subprocess
 import sys
 import sysconfig
 import tomllib
+import venv
 
 import pytest
 
@@ -133,7 +134,9 @@ def test_every_file_of_the_packages_is_shipped_and_nothing_else(shipped):
     in_tree = {
         name for name in kept(ROOT) if not name.endswith(".c") or name.startswith("datatable/generated/")
     }  # earlier builds left C files beside the sources
-    assert kept(shipped / "ranger_sim") == in_tree
+    types = {path.relative_to(ROOT / "stubs").as_posix() for path in (ROOT / "stubs").rglob("*.pyi")}
+    assert types == {name.partition(".")[2].replace(".", "/") + ".pyi" for name in declared_modules()}
+    assert kept(shipped / "ranger_sim") == in_tree | types
     assert [path.name for path in shipped.iterdir()] == ["ranger_sim"]
 
 
@@ -367,7 +370,113 @@ def test_rooms_are_listed_alike_everywhere():
         assert tuple(re.findall(r'"(\w+)"', in_setup)) == names
 
 
-def test_only_compiled_modules_are_left_out_of_type_checking():
-    left_out = [each for each in PROJECT["tool"]["mypy"]["overrides"] if each.get("ignore_errors")]
-    assert len(left_out) == 1
-    assert left_out[0]["module"] == list(declared_modules())
+def test_type_checking_leaves_no_module_out():
+    settings = [PROJECT["tool"]["mypy"], *PROJECT["tool"]["mypy"]["overrides"]]
+    assert PROJECT["tool"]["mypy"]["strict"] and not any(each.get("ignore_errors") for each in settings)
+    assert not [each for each in settings if "ranger_sim" in str(each.get("module"))]
+
+
+# --- types ------------------------------------------------------------------------------------------------
+
+
+def test_mypy_reads_the_stub_of_a_compiled_module_and_the_source_of_every_other(small_house):
+    shutil.copytree(ROOT / "stubs" / "foundation", small_house / "stubs" / "foundation")
+    typed = small_house / "build" / "typed" / "ranger_sim"
+    for _ in range(2):
+        done = run(["setup.py", "-q", "lay_types"], small_house, CC="/bin/false")
+        assert done.returncode == 0, done.stderr
+        assert (typed / "py.typed").exists() and (typed / "loading.py").exists()
+        assert {path.name for path in (typed / "foundation").glob("events.py*")} == {"events.pyi"}
+        assert "def push(" in (typed / "foundation" / "events.pyi").read_text(encoding="utf-8")
+        assert {path.name for path in (typed / "foundation").glob("user_error.py*")} == {"user_error.py"}
+    # what has gone from the house goes from there
+    (small_house / "foundation" / "user_error.py").unlink()
+    (small_house / "stubs" / "foundation" / "events.pyi").unlink()
+    assert run(["setup.py", "-q", "lay_types"], small_house).returncode == 0
+    assert not (typed / "foundation" / "user_error.py").is_symlink()
+    assert {path.name for path in (typed / "foundation").glob("events.py*")} == {"events.py"}
+
+
+def test_a_build_lays_the_types_without_a_compiler_too(small_house):
+    build_in(small_house, CC="/bin/false")
+    assert (small_house / "build" / "typed" / "ranger_sim" / "foundation" / "wallclock.py").exists()
+
+
+USERS_SCRIPT = """\
+from typing import assert_type
+
+from ranger_sim import Profile, Quirks, Ranger, Scenario, StopRule, load_profile
+from ranger_sim.boards.hip import HipBoard
+from ranger_sim.firmware_sim.scheduler import SlotScheduler, Task
+
+
+def mine() -> int | None:
+    return None
+
+
+quirks = Quirks.named(hip_rezero=False)
+assert_type(quirks, Quirks)
+assert_type(quirks.hip_rezero, bool)
+profile = load_profile("hil-1mbit")
+assert_type(profile, Profile)
+robot = Ranger(Scenario(seed=3), quirks=quirks)
+board = robot.board("MCH")
+assert_type(board, HipBoard)
+robot.replace("MCH", "mc_compliant_control", mine, cost=4200, limit=6000)
+robot.run(StopRule(time_s=0.05))
+assert_type(robot.steps, int)
+assert_type(robot.variable("MCH_ANGLE"), float)
+assert_type(board.scheduler, SlotScheduler)
+assert_type(board.scheduler.max_slot_cycles, int)
+assert_type(board.scheduler.ns_per_cycle, float)
+task = Task(mine, cost=100, limit=200)
+assert_type(task.calls, int)
+assert_type(task.name, str)
+assert_type(board.joint.position, int)
+for other in ("MB", "CSR"):
+    assert robot.boards[other].scheduler.slot_count > 0
+robot.close()
+"""
+
+
+def user_errors(shipped, folder, script):
+    """What `mypy --strict` says to a script in an environment into which the shipped packages are installed."""
+    environment = folder / "environment"
+    if not environment.exists():
+        venv.create(environment, with_pip=False, symlinks=os.name == "posix")
+        [packages] = environment.glob("lib/python*/site-packages")
+        (packages / "ranger_sim").symlink_to(shipped / "ranger_sim")
+    (folder / "script.py").write_text(script, encoding="utf-8")
+    (folder / "mypy.ini").write_text("[mypy]\n", encoding="ascii")
+    done = run(
+        ["-m", "mypy", "--strict", "--python-executable", environment / "bin" / "python", "script.py"],
+        folder,
+    )
+    assert done.returncode in (0, 1), done.stderr
+    return re.findall(r"^script\.py:(\d+): error: .*\[([\w-]+)\]$", done.stdout, re.MULTILINE)
+
+
+def test_a_users_script_is_checked_strictly_against_the_shipped_types_and_runs(shipped, tmp_path):
+    pytest.importorskip("mypy")
+    assert user_errors(shipped, tmp_path, USERS_SCRIPT) == []
+    done = run([tmp_path / "script.py"], tmp_path, PYTHONPATH=str(shipped))
+    assert done.returncode == 0, done.stderr
+    wrong = """\
+from ranger_sim import Ranger, Scenario, StopRule
+robot = Ranger(Scenario(seed="3"))
+robot.board("NOPE")
+robot.run(StopRule(steps="3"))
+robot.board("MCH").scheduler.no_such_field
+robot.board("MCH").scheduler.max_slot_cycles = "many"
+robot.board("MCH").scheduler.find()
+robot.replace("NOPE", "mc_compliant_control", lambda: None, cost=1)
+"""
+    assert user_errors(shipped, tmp_path, wrong) == [
+        ("2", "arg-type"),
+        ("3", "call-overload"),
+        ("4", "arg-type"),
+        ("5", "attr-defined"),
+        ("6", "assignment"),
+        ("7", "call-arg"),
+        ("8", "arg-type"),
+    ]

@@ -9,6 +9,7 @@ import os
 import pathlib
 import re
 import subprocess
+from collections.abc import Callable
 
 from ranger_sim.foundation.user_error import UserError
 
@@ -32,7 +33,7 @@ MODULES = (
     "kvaser_pci",
 )
 # Compressions of module files and what takes them off.
-UNPACK = {
+UNPACK: dict[str, Callable[[bytes], bytes]] = {
     ".ko": lambda data: data,
     ".ko.xz": lzma.decompress,
     ".ko.gz": gzip.decompress,

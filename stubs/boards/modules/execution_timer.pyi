@@ -1,0 +1,23 @@
+# Generated from boards/modules/execution_timer.py and boards/modules/execution_timer.pxd (python -m ranger_sim.tools.stubs); do not edit.
+
+from ranger_sim.boards.modules.network_time import NetworkTime
+from ranger_sim.firmware_sim.microcontroller import Microcontroller
+from typing import final
+
+ANEW_MASK: int
+
+@final
+class ExecutionTimer:
+    chip: Microcontroller
+    time: NetworkTime
+    longest_ns: int
+    longest_ever_ns: int
+    def __init__(self, chip: Microcontroller, time: NetworkTime) -> None: ...
+    def record(self) -> None: ...
+    @property
+    def longest(self) -> int: ...
+    @property
+    def longest_ever(self) -> int: ...
+    def cycles(self, time_ns: int) -> int: ...
+    def seconds(self) -> float: ...
+    def longest_seconds(self) -> float: ...

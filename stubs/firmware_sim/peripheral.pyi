@@ -1,0 +1,19 @@
+# Generated from firmware_sim/peripheral.py and firmware_sim/peripheral.pxd (python -m ranger_sim.tools.stubs); do not edit.
+
+from ranger_sim.firmware_sim.chip import Chip
+from ranger_sim.firmware_sim.vic import InterruptSource
+from ranger_sim.foundation.events import EventQueue
+from typing import Any
+from typing import final
+
+class Peripheral:
+    chip: Chip
+    def __init__(self, chip: Chip) -> None: ...
+    def on_message(self, queue: EventQueue) -> InterruptSource | None: ...
+    def on_pin(self, channel: int, level: int, time: int) -> int: ...
+    def on_alarm(self, alarm: int, time: int) -> InterruptSource | None: ...
+    def transmit_ends(self) -> Any: ...
+
+@final
+class Unclaimed(Peripheral):
+    def on_message(self, queue: EventQueue) -> InterruptSource | None: ...

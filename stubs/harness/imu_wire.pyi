@@ -1,0 +1,22 @@
+# Generated from harness/imu_wire.py and harness/imu_wire.pxd (python -m ranger_sim.tools.stubs); do not edit.
+
+from ranger_sim.foundation.events import EventQueue
+from ranger_sim.plant.imu import Imu
+from typing import Any
+from typing import final
+
+MESSAGE_BYTES: int
+WORD_BYTES: int
+PAUSE_NS: int
+
+@final
+class ImuWire:
+    imu: Imu
+    inbox: EventQueue
+    uart: int
+    tap: Any
+    plugged: bool
+    def __init__(self, imu: Imu, board: Any, uart: int) -> None: ...
+    def unplug(self) -> None: ...
+    def from_board(self, time: Any, byte: Any, count: Any, data: Any) -> None: ...
+    def deliver(self) -> None: ...

@@ -1,0 +1,54 @@
+# Generated from harness/lockstep.py and harness/lockstep.pxd (python -m ranger_sim.tools.stubs); do not edit.
+
+from collections.abc import MutableSequence
+from ranger_sim.firmware_sim.board import Board
+from ranger_sim.harness.imu_wire import ImuWire
+from ranger_sim.harness.sampler import Sampler
+from ranger_sim.harness.strike_watch import StrikeWatch
+from ranger_sim.plant.ranger import RangerPlant
+from typing import Any
+from typing import final
+
+REACHED_TIME: int
+REACHED_STEPS: int
+REACHED_DISTANCE: int
+FELL: int
+WINDOW_NS: int
+ANY_DISTANCE_M: float
+
+@final
+class Lockstep:
+    plant: RangerPlant
+    boards: list[Any]
+    buses: list[Any]
+    wires: list[Any]
+    word_wires: list[Any]
+    encoder_wires: list[Any]
+    time: int
+    window_ns: int
+    stop_steps: int
+    stop_distance_m: float
+    sampler: Sampler
+    strikes: StrikeWatch | None
+    imu_wire: ImuWire | None
+    encoder_boards: MutableSequence[int]
+    due: MutableSequence[int]
+    came: MutableSequence[int]
+    prompt: MutableSequence[int]
+    step_times: MutableSequence[int]
+    side_by_side: bool
+    def __init__(self, plant: RangerPlant, boards: Any, buses: list[Any], sampler: Sampler, start_ns: int) -> None: ...
+    def _put(self, place: Any, board: Any) -> None: ...
+    def place(self, name: Any) -> int: ...
+    def board(self, name: Any) -> Board: ...
+    def replace(self, board: Any) -> None: ...
+    def hears_in_its_slots(self, board: Any) -> None: ...
+    def connect_encoder(self, encoder: Any, board: Any, pin_a: Any, pin_b: Any) -> None: ...
+    def connect_voltage(self, source: Any, board: Any, channel: Any) -> None: ...
+    def connect_word(self, source: Any, board: Any, word: Any) -> None: ...
+    def connect_link(self, master: Any, slave: Any, exchange_ns: Any, idle_segment: Any) -> None: ...
+    def connect_imu(self, imu: Any, board: Any, uart: Any) -> None: ...
+    def connect_serial_line(self, board: Any, uart: Any, line: Any) -> None: ...
+    def watch_strikes(self, main_brain: Any) -> None: ...
+    def stop_at(self, steps: Any, distance_m: Any) -> None: ...
+    def run(self, until: int) -> int: ...

@@ -1,0 +1,11 @@
+# Generated from plant/motion.py and plant/motion.pxd (python -m ranger_sim.tools.stubs); do not edit.
+
+from ranger_sim.plant.body import Body
+
+NO_EVENT: int
+TOUCH: int
+LIFT_OFF: int
+MOST_EVENTS: int
+MOST_TRIES: int
+
+def advance(body: Body, h: float) -> None: ...

@@ -1,0 +1,40 @@
+# Generated from plant/parts.py and plant/parts.pxd (python -m ranger_sim.tools.stubs); do not edit.
+
+from typing import Any
+from typing import final
+
+@final
+class HipJoint:
+    drive: float
+    coulomb: float
+    viscous: float
+    k: float
+    J: float
+    exact: bool
+    exact_k: float
+    l0: float
+    ab: float
+    aabb: float
+    def __init__(self, parameters: Any) -> None: ...
+    def spring_torque(self, angle: float) -> float: ...
+    def spring_energy(self, angle: float) -> float: ...
+
+@final
+class Ankle:
+    k: float
+    J: float
+    inverse_J: float
+    low: float
+    high: float
+    stop_k: float
+    stop_c: float
+    def __init__(self, parameters: Any) -> None: ...
+    def stop_torque(self, angle: float, rate: float) -> float: ...
+
+@final
+class Sole:
+    k: float
+    c: float
+    per_m_s: float
+    mu: float
+    def __init__(self, parameters: Any) -> None: ...
