@@ -5,6 +5,15 @@ from ranger_sim.firmware_sim.alarm cimport Alarm
 from ranger_sim.firmware_sim.peripheral cimport Peripheral
 from ranger_sim.firmware_sim.vic cimport InterruptSource
 
+cpdef enum:
+    START = 0x80
+    GAIN_SHIFT = 4
+    GAIN_MASK = 7
+    CHANNEL_MASK = 15
+    COUNTS = 8192
+    LEAST_COUNT = -8192
+    LAST_COUNT = 8191
+
 @cython.final
 cdef class Ads7871(Peripheral):
     # what a conversion touches

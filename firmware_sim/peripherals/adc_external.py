@@ -21,6 +21,16 @@ from ranger_sim.foundation.user_error import UserError
 if not cython.compiled:
     from math import copysign
 
+    # register 4
+    START = 0x80
+    GAIN_SHIFT = 4
+    GAIN_MASK = 7
+    CHANNEL_MASK = 15
+
+    COUNTS = 8192  # of full scale at gain 1; results have 14 bits with the sign
+    LEAST_COUNT = -8192
+    LAST_COUNT = 8191
+
 CONVERSION_NS = 20_833  # 48 kSamples/s, SLAS370C
 GAINS = (1, 2, 4, 5, 8, 10, 16, 20)  # by gain code 0 ... 7, SLAS370C
 REFERENCE_V = 2.5  # full scale at gain 1; external reference of the usual 2.5 V (chosen by us, as the internal one)
@@ -32,7 +42,7 @@ def register4(channel_code, gain_code) -> int:
         raise UserError(f"ADS7871: channel code {channel_code} is not 0 ... 15")
     if not 0 <= gain_code <= 7:
         raise UserError(f"ADS7871: gain code {gain_code} is not 0 ... 7")
-    return 0x80 | gain_code << 4 | channel_code
+    return START | gain_code << GAIN_SHIFT | channel_code
 
 
 class Ads7871(Peripheral):
@@ -51,7 +61,7 @@ class Ads7871(Peripheral):
         self.eint = eint
         self.conversion_ns = conversion_ns
         self.alarm = chip.new_alarm(self, 0)
-        self.count_V = reference_V / 8192.0
+        self.count_V = reference_V / COUNTS
         self.gains = [scale * gain for gain in GAINS]
         self.offset_counts = offset_counts
         self.source = chip.vic.source(EXTERNAL_INTERRUPT, eint)
@@ -79,30 +89,32 @@ class Ads7871(Peripheral):
         """Counts for a voltage at the input."""
         scaled: cython.double = self.gains[gain_code] * volts / self.count_V
         counts: cython.longlong
-        if not -16384.0 <= scaled <= 16384.0:
+        if not 2.0 * LEAST_COUNT <= scaled <= 2.0 * COUNTS:
             if scaled != scaled:
                 return 0
-            scaled = copysign(16384.0, scaled)
+            scaled = copysign(2.0 * COUNTS, scaled)
         counts = int(scaled + copysign(0.5, scaled))
         counts += self.offset_counts
-        if -8192 <= counts <= 8191:
+        if LEAST_COUNT <= counts <= LAST_COUNT:
             return counts
-        return 8191 if counts > 0 else -8192
+        return LAST_COUNT if counts > 0 else LEAST_COUNT
 
     def start(self, register4: cython.longlong) -> cython.bint:
         """Write register 4; False when a conversion is under way (the write is lost)."""
         if self.busy:
             return False
         self.register4 = register4
-        if register4 & 128:
+        if register4 & START:
             self.busy = True
             self.alarm.set(self.chip.now + self.conversion_ns)
         return True
 
     def on_alarm(self, alarm: cython.longlong, time: cython.longlong) -> InterruptSource | None:
         """The conversion is over: result registers 1 and 0 are loaded, BUSY falls."""
-        volts: cython.double = self.chip.analog.volts(self.inputs[self.register4 & 15], time - self.conversion_ns)
-        self.result = self.convert(volts, self.register4 >> 4 & 7)
+        volts: cython.double = self.chip.analog.volts(
+            self.inputs[self.register4 & CHANNEL_MASK], time - self.conversion_ns
+        )
+        self.result = self.convert(volts, self.register4 >> GAIN_SHIFT & GAIN_MASK)
         self.busy = False
         return self.source
 

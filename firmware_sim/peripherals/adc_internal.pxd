@@ -4,6 +4,18 @@ from ranger_sim.firmware_sim.alarm cimport Alarm
 from ranger_sim.firmware_sim.peripheral cimport Peripheral
 from ranger_sim.firmware_sim.vic cimport InterruptSource
 
+cpdef enum:
+    CONVERSION_CLOCKS = 11
+    COUNTS = 1024
+    LAST_COUNT = 1023
+    CR_CLKDIV_SHIFT = 8
+    CR_BURST = 0x10000
+    CR_PDN = 0x200000
+    CR_START = 0x1000000
+    GDR_RESULT_SHIFT = 6
+    GDR_CHN_SHIFT = 24
+    GDR_DONE_ABOVE_CHN = 0x80
+
 @cython.final
 cdef class AdcInternal(Peripheral):
     # what a conversion touches

@@ -15,6 +15,23 @@ from ranger_sim.firmware_sim.peripheral import Peripheral
 from ranger_sim.firmware_sim.vic import ADC_DONE, InterruptSource
 from ranger_sim.foundation.user_error import UserError
 
+# C constants when compiled: the same numbers stand in the .pxd, and a test holds them together.
+if not cython.compiled:
+    CONVERSION_CLOCKS = 11
+    COUNTS = 1024  # of the reference
+    LAST_COUNT = 1023
+
+    # ADCR; bits 0-7 select the channels
+    CR_CLKDIV_SHIFT = 8
+    CR_BURST = 0x10000
+    CR_PDN = 0x200000  # power on
+    CR_START = 0x1000000  # now
+
+    # ADGDR
+    GDR_RESULT_SHIFT = 6
+    GDR_CHN_SHIFT = 24
+    GDR_DONE_ABOVE_CHN = 0x80  # bit 31, counted from where the channel stands
+
 
 class AdcInternal(Peripheral):
     """One converter. `inputs[channel]`: the analog pin of the chip behind AIN0 ... AIN7."""
@@ -25,14 +42,14 @@ class AdcInternal(Peripheral):
             raise UserError(f"{chip.name}: ADC: clkdiv {clkdiv} and reference_V {reference_V} must be above 0")
         self.clkdiv = clkdiv
         self.hz = hz if hz else chip.hz
-        self.conversion_ns = 11 * clkdiv * 1_000_000_000 // self.hz
-        self.count_V = reference_V / 1024.0
+        self.conversion_ns = CONVERSION_CLOCKS * clkdiv * 1_000_000_000 // self.hz
+        self.count_V = reference_V / COUNTS
         self.scale = scale
         self.offset_counts = offset_counts
         self.alarm = chip.new_alarm(self, 0)
         self.source = chip.vic.source(ADC_DONE, 0)
         self.inputs = list(range(8))
-        self.single = (clkdiv - 1) << 8 | 1 << 21 | 1 << 24  # ADCR without the channel: power on, start now
+        self.single = (clkdiv - 1) << CR_CLKDIV_SHIFT | CR_PDN | CR_START  # ADCR without the channel
         self.CR = 0
         self.GDR = 0
         self.result = 0
@@ -50,13 +67,13 @@ class AdcInternal(Peripheral):
         counts: cython.longlong
         if not scaled > 0.0:
             scaled = 0.0
-        if scaled > 2048.0:
-            scaled = 2048.0
+        if scaled > 2.0 * COUNTS:
+            scaled = 2.0 * COUNTS
         counts = int(scaled)
         counts += self.offset_counts
-        if 0 <= counts <= 1023:
+        if 0 <= counts <= LAST_COUNT:
             return counts
-        return 1023 if counts > 0 else 0
+        return LAST_COUNT if counts > 0 else 0
 
     def start(self, channel: cython.longlong) -> cython.bint:
         """Start one conversion; False (and `not_finished` counts) while one is under way."""
@@ -71,9 +88,9 @@ class AdcInternal(Peripheral):
 
     def on_alarm(self, alarm: cython.longlong, time: cython.longlong) -> InterruptSource | None:
         """The conversion is over: ADGDR holds result, channel and the DONE bit."""
-        done: cython.longlong = 128  # bit 31 of ADGDR, above the channel
+        done: cython.longlong = GDR_DONE_ABOVE_CHN
         self.result = self.convert(self.chip.analog.volts(self.inputs[self.channel], time - self.conversion_ns))
-        self.GDR = self.result << 6 | (done | self.channel) << 24
+        self.GDR = self.result << GDR_RESULT_SHIFT | (done | self.channel) << GDR_CHN_SHIFT
         self.busy = False
         return self.source
 
@@ -85,7 +102,8 @@ class AdcInternal(Peripheral):
             self.channels[place] = channel
         self.burst_count = len(channels)
         self.burst_start = self.chip.now
-        self.CR = sum(1 << channel for channel in channels) | (self.clkdiv - 1) << 8 | 1 << 16 | 1 << 21
+        self.CR = sum(1 << channel for channel in channels)
+        self.CR |= (self.clkdiv - 1) << CR_CLKDIV_SHIFT | CR_BURST | CR_PDN
 
     def DR(self, channel: cython.longlong) -> cython.longlong:
         """Newest finished burst result of a channel, 0 ... 1023; 0 before the first."""

@@ -7,6 +7,13 @@ from ranger_sim.firmware_sim.vic import InterruptSource
 from typing import Any
 from typing import final
 
+START: int
+GAIN_SHIFT: int
+GAIN_MASK: int
+CHANNEL_MASK: int
+COUNTS: int
+LEAST_COUNT: int
+LAST_COUNT: int
 CONVERSION_NS: int
 GAINS: tuple[int, ...]
 REFERENCE_V: float

@@ -7,6 +7,17 @@ from ranger_sim.firmware_sim.vic import InterruptSource
 from typing import Any
 from typing import final
 
+CONVERSION_CLOCKS: int
+COUNTS: int
+LAST_COUNT: int
+CR_CLKDIV_SHIFT: int
+CR_BURST: int
+CR_PDN: int
+CR_START: int
+GDR_RESULT_SHIFT: int
+GDR_CHN_SHIFT: int
+GDR_DONE_ABOVE_CHN: int
+
 @final
 class AdcInternal(Peripheral):
     busy: bool
