@@ -3,9 +3,11 @@
 import json
 import os
 import pathlib
+import shutil
 import site
 import subprocess
 import sys
+import tarfile
 import zipfile
 
 import pytest
@@ -74,12 +76,12 @@ def built_wheel(folder):
     return distribution
 
 
-def environment_with(source, folder, **options):
-    """(Python, folder of packages) of an empty environment with `source` installed; the rest is lent to it."""
+def environment_with(wheel, folder):
+    """(Python, folder of packages) of an empty environment with `wheel` installed; the rest is lent to it."""
     run([sys.executable, "-m", "venv", "--without-pip", folder], folder.parent)
     python = folder / "bin" / "python"
     here = ["--no-deps", "--no-index", "--no-build-isolation", "--no-compile", "--disable-pip-version-check"]
-    run([sys.executable, "-m", "pip", "--python", python, "install", "-q", *here, source], folder.parent, **options)
+    run([sys.executable, "-m", "pip", "--python", python, "install", "-q", *here, wheel], folder.parent)
     packages = pathlib.Path(
         run([python, "-c", "import sysconfig; print(sysconfig.get_path('purelib'))"], folder).strip()
     )
@@ -138,3 +140,30 @@ def test_a_program_of_that_project_uses_the_robot_and_the_can_interface(installe
     assert true.startswith("True ") and frame == "ranger"
     assert places.endswith(" project project project")
     assert pathlib.Path(places.split()[0]).is_relative_to(python.parent.parent)
+
+
+def files_of_the_package(names):
+    """The files of the package, without what only a build with a compiler leaves."""
+    return {
+        name for name in names if name.startswith("ranger_sim/") and not name.endswith((".so", "build_record.json"))
+    }
+
+
+def test_a_source_distribution_installs_the_files_of_the_wheel_and_without_a_compiler_it_runs(wheel, tmp_path):
+    tree = tmp_path / "tree"  # as a checkout: what was built here is not looked at
+    left = shutil.ignore_patterns(
+        ".git", ".venv", "build", "dist", "runs", "*.so", "*.egg-info", "__pycache__", ".*_cache"
+    )
+    shutil.copytree(ROOT, tree, ignore=left)
+    run([sys.executable, "setup.py", "-q", "sdist", "--dist-dir", tmp_path / "dist"], tree)
+    [archive] = (tmp_path / "dist").iterdir()
+    with tarfile.open(archive) as files:
+        files.extractall(tmp_path / "unpacked", filter="data")
+    [source] = (tmp_path / "unpacked").iterdir()
+    made = [sys.executable, "setup.py", "-q", "bdist_wheel", "--dist-dir", tmp_path / "made"]
+    run(made, source, RANGER_SIM_INTERPRETED="1")
+    [of_source] = (tmp_path / "made").iterdir()
+    python, packages = environment_with(of_source, tmp_path / "venv")
+    found = {path.relative_to(packages).as_posix() for path in (packages / "ranger_sim").rglob("*") if path.is_file()}
+    assert files_of_the_package(found) == files_of_the_package(zipfile.ZipFile(wheel).namelist())
+    assert json.loads(run([python, "-m", "ranger_sim", "info", "--json"], tmp_path))["compiled"] is False
