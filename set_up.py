@@ -1,11 +1,11 @@
 """Sets up everything that `make walk` or `make test` needs: environment, packages, compiled library, command.
 
     python3 set_up.py walk      # what a walk needs
-    python3 set_up.py all       # that, and every extra of pyproject.toml: what tests, reads DBC files, fits
+    python3 set_up.py all       # all of pyproject.toml: what reads DBC files, fits and tests besides
 
-Packages come from requirements.lock, by hash; for a walk only the part of it that a walk's dependencies ask for. The
-sources are compiled (setup.py) while packages are still being installed: Cython and setuptools come first. What was
-done before is not done again. One line tells how far it is; what the tools say is in build/setup.log.
+Packages come from requirements.lock, by hash; for a walk without those in LATER. The sources are compiled (setup.py)
+while packages are still being installed: Cython and setuptools come first. What was done before is not done again. One
+line tells how far it is; what the tools say is in build/setup.log.
 
 Runs before anything is installed: only Python's own library here.
 """
@@ -21,6 +21,7 @@ import tomllib
 
 HERE = pathlib.Path(__file__).resolve().parent
 LOG = HERE / "build" / "setup.log"
+LATER = {"cantools", "scipy"}  # what reads users' DBC files and what fits: a first walk need not wait for them
 
 
 class SetUpError(Exception):
@@ -30,6 +31,11 @@ class SetUpError(Exception):
 def name_of(requirement):
     """The normalised name of a requirement such as `python-can>=4.6`."""
     return re.sub(r"[-_.]+", "-", re.match(r"[\w.-]+", requirement)[0]).lower()
+
+
+def for_a_walk(project):
+    """Names of the packages that a walk needs; `project`: the content of pyproject.toml."""
+    return {name_of(each) for each in project["project"]["dependencies"]} - LATER
 
 
 def part_of_lock(lock, wanted):
@@ -174,7 +180,7 @@ def set_up(what, venv):
     project = tomllib.loads((HERE / "pyproject.toml").read_text(encoding="utf-8"))
     lock = (HERE / "requirements.lock").read_text(encoding="utf-8")
     builders = {name_of(each) for each in project["build-system"]["requires"]}
-    walk = builders | {name_of(each) for each in project["project"]["dependencies"]}
+    walk = builders | for_a_walk(project)
     LOG.parent.mkdir(exist_ok=True)
     LOG.write_text("", encoding="utf-8")
     line = Line()

@@ -15,7 +15,7 @@ import venv
 import pytest
 
 from ranger_sim import loading
-from set_up import SetUpError, name_of, part_of_lock
+from set_up import SetUpError, for_a_walk, name_of, part_of_lock
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
@@ -266,7 +266,7 @@ def test_a_build_can_be_told_not_to_compile(small_house):
 
 
 def wanted_packages():
-    """(what a walk needs, what the extras add), as pyproject.toml has them."""
+    """(dependencies, what the extras add), as pyproject.toml has them."""
     extras = PROJECT["project"]["optional-dependencies"].values()
     return PROJECT["project"]["dependencies"], [each for extra in extras for each in extra]
 
@@ -284,8 +284,8 @@ def locked():
 
 def test_the_lock_has_every_direct_dependency_with_hashes_and_names_no_index():
     entries = locked()
-    walk, more = wanted_packages()
-    direct = walk + more + PROJECT["build-system"]["requires"]
+    dependencies, more = wanted_packages()
+    direct = dependencies + more + PROJECT["build-system"]["requires"]
     assert [text for text in direct if name_of(text) not in entries] == []
     assert [name for name, lines in entries.items() if not any("--hash=sha256:" in line for line in lines)] == []
     text = (ROOT / "requirements.lock").read_text(encoding="utf-8")
@@ -332,21 +332,20 @@ def test_a_part_of_the_lock_has_what_is_wanted_and_what_that_needs_with_all_hash
 
 def test_a_walk_is_set_up_without_what_fits_tests_or_reads_dbc_files():
     lock = (ROOT / "requirements.lock").read_text(encoding="utf-8")
-    walk, more = wanted_packages()
-    builders = PROJECT["build-system"]["requires"]
-    names = names_in(part_of_lock(lock, {name_of(each) for each in walk + builders}))
-    assert {name_of(each) for each in walk + builders} | {"pandas", "packaging"} <= set(names)
+    dependencies, more = wanted_packages()
+    names = names_in(part_of_lock(lock, for_a_walk(PROJECT)))
+    assert {"cython", "python-can", "numpy", "pyserial", "pandas", "packaging"} <= set(names)
     assert not {"scipy", "cantools", "pytest", "hypothesis", "mypy", "ruff", "pluggy"} & set(names)
-    assert {name_of(each) for each in more} <= set(names_in(part_of_lock(lock, None)))
+    assert {name_of(each) for each in dependencies + more} <= set(names_in(part_of_lock(lock, None)))
 
 
-def test_a_missing_extra_is_named_in_one_line():
+def test_a_library_that_comes_later_is_named_in_one_line():
     hidden = "import sys; sys.modules['cantools'] = None\n"  # what an environment without it looks like
     done = run(
         ["-c", hidden + "from ranger_sim.tools.cli import main; sys.exit(main(['can-bounds', '--dbc', 'x.dbc']))"], ROOT
     )
     assert done.returncode == 2 and "Traceback" not in done.stderr
-    assert "this needs cantools, which comes with the extra 'dbc'" in " ".join(done.stderr.split())
+    assert "this needs cantools, which is missing: in a checkout `make setup`" in " ".join(done.stderr.split())
 
 
 def test_modules_that_are_optimised_most_exist():
@@ -358,8 +357,8 @@ def test_modules_that_are_optimised_most_exist():
 def test_every_dependency_has_its_reason_beside_it():
     text = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
     listed = re.findall(r'^  "[A-Za-z][\w.-]*>=[^"]*",(.*)$', text, re.MULTILINE)
-    walk, more = wanted_packages()
-    assert len(listed) == len(walk + more) + len(PROJECT["build-system"]["requires"])
+    dependencies, more = wanted_packages()
+    assert len(listed) == len(dependencies + more) + len(PROJECT["build-system"]["requires"])
     assert all(re.fullmatch(r"\s+# \w.{10,}", rest) for rest in listed)
 
 

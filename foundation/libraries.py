@@ -1,0 +1,18 @@
+"""Libraries that a checkout gets later than the rest: a first `make walk` does without them (set_up.py)."""
+
+import importlib
+from types import ModuleType
+
+from ranger_sim.foundation.user_error import UserError
+
+
+def imported(module: str) -> ModuleType:
+    """The library `module`. UserError that says how to get it, when it is not installed."""
+    try:
+        return importlib.import_module(module)
+    except ModuleNotFoundError as error:
+        if error.name != module.partition(".")[0]:
+            raise
+        raise UserError(
+            f"this needs {error.name}, which is missing: in a checkout `make setup`, else pip install {error.name}"
+        ) from None
