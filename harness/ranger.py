@@ -75,6 +75,7 @@ class Ranger:
             floor_roughness_m=self.scenario.floor_roughness_m,
             model_file=self.scenario.model_file,
             start_ns=self.start_ns,
+            electrics=self.scenario.electrics(),
         )
         # interrupts and slots: each board on its own crystal, powered up in its own moment
         self.boards: dict[str, Any] = {
@@ -172,7 +173,7 @@ class Ranger:
         self.cpu_s += wallclock.process_cpu_s() - cpu
         self.wall_s += wallclock.monotonic_s() - wall
         if reason == lockstep.FELL:
-            self.ended = "fell"
+            self.ended = self.plant.fall_cause or "fell"
         elif reason != lockstep.REACHED_TIME or loop.time >= limit:
             return True
         return bool(self.ended)
@@ -204,6 +205,11 @@ class Ranger:
         return (self.loop.time - self.start_ns) * 1e-9
 
     @property
+    def walked_s(self) -> float:
+        """Virtual time since the robot was let go, s."""
+        return max(0.0, self.time_s - self.controller.operator.release_time_s)
+
+    @property
     def steps(self) -> int:
         """Steps walked so far."""
         return self.plant.steps
@@ -215,8 +221,7 @@ class Ranger:
 
     def mean_speed_m_per_s(self) -> float:
         """Distance over the time since the robot was let go."""
-        walked = self.time_s - self.controller.operator.release_time_s
-        return self.distance_m / walked if walked > 0.0 else 0.0
+        return self.distance_m / self.walked_s if self.walked_s > 0.0 else 0.0
 
     def realtime_factor(self) -> float:
         """Virtual seconds per wall-clock second of the stepping loop."""

@@ -4,6 +4,9 @@ import dataclasses
 import math
 
 from ranger_sim.foundation.user_error import UserError
+from ranger_sim.plant.battery import BatteryParameters
+from ranger_sim.plant.electrics import ElectricsParameters
+from ranger_sim.plant.electronics import SWITCHES
 
 DAY_MS = 24 * 3600 * 1000
 
@@ -16,6 +19,8 @@ class Scenario:
     seed: any integer; chooses every crystal, phase, noise and foothold.
     slope_rad: positive downhill. floor_roughness_m: standard deviation of the height per foothold.
     start_uptime_ms: network time at power-up, so that wraps and long runs can be tested.
+    battery_charge: of the packs at power-up, 1 is full. battery_capacity_Wh: of all of them together.
+    electronics_off: names of `plant.electronics.SWITCHES`, parts that draw no power in this walk.
     """
 
     controller: str = "robust"
@@ -24,6 +29,9 @@ class Scenario:
     floor_roughness_m: float = 0.0
     start_uptime_ms: int = 0
     model_file: str | None = None  # additional named terms of motors, joints and sensors
+    battery_charge: float = 1.0  # packs are charged before a walk, and checked for it by voltmeter [A 3.10]
+    battery_capacity_Wh: float = 469.0  # seven packs of 67 Wh nominal [A 3.10]; the 65 km walk used 493 Wh
+    electronics_off: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         limits = {
@@ -31,11 +39,22 @@ class Scenario:
             "slope_rad": (-0.5, 0.5, "rad"),
             "floor_roughness_m": (0.0, 0.1, "m"),
             "start_uptime_ms": (0, 2**32 - 1, "ms"),
+            "battery_charge": (1e-6, 1.0, "(full)"),
+            "battery_capacity_Wh": (1e-3, 1e6, "Wh"),
         }
         for name, (low, high, unit) in limits.items():
             value = getattr(self, name)
             if not (isinstance(value, int | float) and math.isfinite(value) and low <= value <= high):
                 raise UserError(f"scenario: {name} is {value!r}, allowed are {low} to {high} {unit}")
+        for name in self.electronics_off:
+            if name not in SWITCHES:
+                raise UserError(f"scenario: electronics_off {name!r}: what can be off is {', '.join(SWITCHES)}")
+
+    def electrics(self) -> ElectricsParameters:
+        """Motors, sensors and electronics of the robot with this walk's batteries."""
+        packs = BatteryParameters().packs
+        battery = BatteryParameters(charge=self.battery_charge, pack_energy_Wh=self.battery_capacity_Wh / packs)
+        return ElectricsParameters(battery=battery, electronics_off=self.electronics_off)
 
 
 @dataclasses.dataclass(frozen=True)

@@ -8,6 +8,7 @@ from ranger_sim.boards.counters import RangerCounters
 from ranger_sim.datatable.generated import errors as error_table
 from ranger_sim.harness import wiring
 
+JOULES_PER_WH = 3600.0
 MASS_KG, GRAVITY = 9.91, 9.81  # total cost of transport: appendix 1, table of the walk
 SKIPPED_STEPS = 5  # the start is left out of means
 
@@ -30,6 +31,7 @@ def of(robot: Any) -> dict:
         "failed_boards": failed,
         "distance_m": plant.distance_m,
         "time_s": robot.time_s,
+        "walked_h": robot.walked_s / 3600.0,
         "mean_step_length_m": record.mean_step_length_m(),
         "std_step_length_m": record.step_length_deviation_m(),
         "mean_step_time_s": record.mean_step_time_s(),
@@ -41,6 +43,8 @@ def of(robot: Any) -> dict:
         "electronics_power_W": electronics_power,
         "total_power_W": total,
         "tcot": total / (MASS_KG * GRAVITY * speed) if speed > 0.0 else None,
+        "energy_Wh": energy(robot),
+        "battery": battery(robot),
         "battery_V": plant.battery_V,
         "heel_strike_delay_ms": robot.loop.strikes.statistics(),
         "oddities": oddities(plant),
@@ -56,6 +60,7 @@ def of(robot: Any) -> dict:
         "seed": robot.scenario.seed,
         "slope_rad": robot.scenario.slope_rad,
         "floor_roughness_m": robot.scenario.floor_roughness_m,
+        "electronics_off": list(robot.scenario.electronics_off),
         "trace_digest": robot.trace_digest(),
     }
 
@@ -67,6 +72,32 @@ def motor_powers(robot: Any) -> dict:
     if walked_s <= 0.0:
         return dict.fromkeys((motor.name for motor in plant.motors), 0.0)
     return {motor.name: (motor.drawn_J - motor.drawn_before_J) / walked_s for motor in plant.motors}
+
+
+def energy(robot: Any) -> dict:
+    """What each consumer took from the battery since the robot was let go, Wh; as for the powers nothing is credited.
+
+    A motor's part has its losses in it: winding, brushes, bridge, friction.
+    """
+    parts = {motor.name: (motor.drawn_J - motor.drawn_before_J) / JOULES_PER_WH for motor in robot.plant.motors}
+    parts["electronics"] = robot.plant.electronics_power_W * robot.walked_s / JOULES_PER_WH
+    return {**parts, "total": sum(parts.values())}
+
+
+def battery(robot: Any) -> dict:
+    """State of the batteries, and what they gave since power-up: at their terminals, and as heat inside.
+
+    Charge is of the capacity, 1 full; what motors gave back has been charged. empty: their protection has opened.
+    """
+    packs = robot.plant.electrics.battery
+    return {
+        "capacity_Wh": robot.scenario.battery_capacity_Wh,
+        "charge_at_start": packs.parameters.charge,
+        "charge": max(0.0, packs.charge),
+        "delivered_Wh": packs.delivered_J / JOULES_PER_WH,
+        "lost_inside_Wh": packs.lost_J / JOULES_PER_WH,
+        "empty": bool(packs.cut_off),
+    }
 
 
 def oddities(plant: Any) -> dict:

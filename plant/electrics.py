@@ -87,7 +87,7 @@ class ElectricsParameters:
     inner_ankle: MotorParameters = ANKLE_MOTOR
     steering: MotorParameters = STEERING_MOTOR
     battery: BatteryParameters = dataclasses.field(default_factory=BatteryParameters)
-    left_outer_ankle_electronics: bool = True  # False: the 65 km walk, 4.7 W instead of 5.15 W [A 3.8]
+    electronics_off: tuple[str, ...] = ()  # ("left-outer-ankle",): the 65 km walk, 4.7 W instead of 5.15 W [A 3.8]
     pwm_offset_A: float = 0.05
     motor_current_noise_A: float = 0.005
     battery_current_noise_A: float = 0.001
@@ -119,7 +119,7 @@ class Electrics:
         p = parameters if parameters is not None else ElectricsParameters()
         self.parameters = p
         self.battery = Battery(p.battery)
-        self.electronics_W = power_W(p.left_outer_ankle_electronics)
+        self.electronics_W = power_W(p.electronics_off)
         # The outer ankle's motor sits mirrored: robot.md N4.1 and N4.2, the signs of MCFO.
         self.hip = MotorUnit("hip", p.hip, 1)
         self.outer_ankle = MotorUnit("outer_ankle", p.outer_ankle, -1)

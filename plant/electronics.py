@@ -35,30 +35,27 @@ ITEMS = (
     ("radio receiver", 0.100, "chosen by us: 20 mA at 5 V, a usual hobby receiver"),
     ("display, lights, buzzer, keys", 0.200, "chosen by us: two of six lights on at 10 mA per colour"),
 )
+# What a walk may do without: parts that no emulated board reads, under the name that a scenario gives them.
 LEFT_OUTER_ANKLE = ("left outer ankle board", "left outer ankle absolute encoder")
+SWITCHES = {"left-outer-ankle": LEFT_OUTER_ANKLE}
 
 
-def itemised_W(left_outer_ankle: bool = True) -> dict[str, float]:
-    """Watts at the battery by item; `left_outer_ankle` False leaves its sensor and board out.
+def itemised_W(off: tuple[str, ...] = ()) -> dict[str, float]:
+    """Watts at the battery by item, those of `off` left out: names of items, or of a group of SWITCHES.
 
     "carrier board and bus, unnamed" is what the measured total has beyond the named items.
     """
     items = {name: watts for name, watts, _ in ITEMS}
     items["carrier board and bus, unnamed"] = TOTAL_W * EFFICIENCY - sum(items.values())
-    if not left_outer_ankle:
-        for name in LEFT_OUTER_ANKLE:
-            del items[name]
+    for name in off:
+        for item in SWITCHES.get(name, (name,)):
+            if item not in items:
+                raise UserError(f"electronics: there is no item {item!r} to switch off; there are: {', '.join(items)}")
+            del items[item]
     items["converter loss"] = sum(items.values()) * (1.0 / EFFICIENCY - 1.0)
     return items
 
 
-def power_W(left_outer_ankle: bool = True, off: tuple[str, ...] = ()) -> float:
-    """Power of the electronics at the battery, W; `off`: names of further items that are switched off."""
-    items = itemised_W(left_outer_ankle)
-    for name in off:
-        if name not in items:
-            raise UserError(f"electronics: there is no item {name!r}; there are: {', '.join(items)}")
-        if name != "converter loss":
-            del items[name]
-    loads = sum(watts for name, watts in items.items() if name != "converter loss")
-    return loads / EFFICIENCY
+def power_W(off: tuple[str, ...] = ()) -> float:
+    """Power of the electronics at the battery, W; `off` as for `itemised_W`."""
+    return sum(itemised_W(off).values())

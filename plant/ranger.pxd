@@ -1,7 +1,7 @@
 cimport cython
 
 from ranger_sim.plant.absolute_encoder cimport AbsoluteEncoder
-from ranger_sim.plant.body cimport Body
+from ranger_sim.plant.body cimport FALLEN, Body
 from ranger_sim.plant.electrics cimport Electrics
 from ranger_sim.plant.imu cimport Imu
 from ranger_sim.plant.incremental_encoder cimport IncrementalEncoder
@@ -9,6 +9,7 @@ from ranger_sim.plant.leg cimport INNER, OUTER, Leg
 from ranger_sim.plant.motion cimport advance
 from ranger_sim.plant.motor_unit cimport MotorUnit
 from ranger_sim.plant.steering cimport Steering
+from ranger_sim.plant.watch cimport fall
 from ranger_sim.plant.wiring_points cimport HIP_WORD, INNER_ANKLE_WORD, OUTER_ANKLE_WORD
 
 @cython.final

@@ -25,8 +25,10 @@ from ranger_sim.plant.steering import Steering
 from ranger_sim.plant.walk_record import RING
 
 if not cython.compiled:
+    from ranger_sim.plant.body import FALLEN
     from ranger_sim.plant.leg import INNER, OUTER
     from ranger_sim.plant.motion import advance
+    from ranger_sim.plant.watch import fall
     from ranger_sim.plant.wiring_points import HIP_WORD, INNER_ANKLE_WORD, OUTER_ANKLE_WORD
 
 STEP_NS = 250_000  # the plant's step; its error is measured in EQUATIONS 15
@@ -249,6 +251,11 @@ class RangerPlant:
         yaw0: cython.double = s.yaw
 
         e.step_motors(t0, t1, h0_rate, p0_rate, n0_rate, s.rate, self.jumped)
+        if e.battery.cut_off and b.mode != FALLEN:
+            # neither motors nor computers have power: the walk ends here, before the robot falls of it
+            b.step_start_ns = t0
+            b.elapsed = 0.0
+            fall(b, "battery empty" if e.battery.charge <= 0.0 else "battery protection opened")
         self.jumped = False
         motor = self.hip
         b.hip.drive = motor.drive_Nm

@@ -1,4 +1,4 @@
-"""Quantities as people type them on a command line: 60s, 1.5km, 1mm."""
+"""Quantities as people type them on a command line: 60s, 1.5km, 1mm, 70%."""
 
 import argparse
 import math
@@ -6,6 +6,8 @@ import re
 from collections.abc import Callable
 
 LENGTHS = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "km": 1e3}
+ENERGIES_WH = {"Wh": 1.0, "kWh": 1e3}
+SHARES = {"%": 1e-2}
 TIMES = {"ms": 1e-3, "s": 1.0, "min": 60.0, "h": 3600.0}
 
 
@@ -13,7 +15,7 @@ def quantity(units: dict, base: str, above: float | None = None) -> Callable[[st
     """An argparse type: a number with an optional unit of `units`, in SI. `above`: exclusive lower limit."""
 
     def parse(text: str) -> float:
-        match = re.fullmatch(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([a-zA-Z]*)\s*", text)
+        match = re.fullmatch(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([a-zA-Z%]*)\s*", text)
         if match is None or match.group(2) not in {"", *units}:
             raise argparse.ArgumentTypeError(
                 f"{text!r} is not a number with one of the units {', '.join(units)} (none means {base})"

@@ -205,7 +205,7 @@ def run(options: argparse.Namespace) -> int:
         elsewhere: list[HardwareInTheLoop] = []
 
         def finish(robot: Ranger, run: PlantRun, interrupted: bool) -> int:
-            summary = robot.summary()
+            summary = {**robot.summary(), "interrupted": interrupted}
             summary["failed_boards"] = [name for name in summary["failed_boards"] if name in settings.boards]
             summary["processes"] = processes_summary(robot, run, servers, ends, outside)
             for each in elsewhere:

@@ -11,7 +11,7 @@ import tempfile
 from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeRemainingColumn
+from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn
 
 from ranger_sim import loading
 from ranger_sim.foundation import wallclock
@@ -19,9 +19,10 @@ from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.profile import Profile
 from ranger_sim.harness.profile import load as load_profile
 from ranger_sim.harness.scenario import Scenario, StopRule
+from ranger_sim.plant.electronics import SWITCHES
 from ranger_sim.tools import serial_options
 from ranger_sim.tools.files import json_target, replace_file, writable_folder
-from ranger_sim.tools.units import LENGTHS, TIMES, quantity, whole_number
+from ranger_sim.tools.units import ENERGIES_WH, LENGTHS, SHARES, TIMES, quantity, whole_number
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
 
 DEFAULT_STEPS = 100
 SLICE_S = 0.05  # virtual seconds between two looks at the screen and at Ctrl-C
+TELL_EVERY_S = 60.0  # of the wall clock: a line of progress where there is no screen to draw it on (chosen by us)
 PACED_SLICE_S = 0.005  # the same when a serial port is connected: so long at most a byte waits
 
 
@@ -50,7 +52,7 @@ def add_run_options(command: Any) -> None:
     command.add_argument("--steps", type=whole_number(1), metavar="N", help="end after so many steps")
     command.add_argument("--time", type=quantity(TIMES, "s", 0.0), metavar="60s", help="end after so much virtual time")
     command.add_argument(
-        "--distance", type=quantity(LENGTHS, "m", 0.0), metavar="1km", help="end after so much distance"
+        "--distance", type=quantity(LENGTHS, "m", 0.0), metavar="65km", help="end after so much distance"
     )
     command.add_argument(
         "--controller",
@@ -70,6 +72,27 @@ def add_run_options(command: Any) -> None:
     )
     command.add_argument(
         "--slope", type=float, default=0.0, metavar="RAD", help="slope of the floor, positive downhill (default 0)"
+    )
+    command.add_argument(
+        "--battery",
+        type=quantity(SHARES, "a share, 1 is full", 0.0),
+        default=Scenario.battery_charge,
+        metavar="70%",
+        help="charge of the batteries at power-up (default full)",
+    )
+    command.add_argument(
+        "--battery-capacity",
+        type=quantity(ENERGIES_WH, "Wh", 0.0),
+        default=Scenario.battery_capacity_Wh,
+        metavar="493Wh",
+        help="of all packs together (default 469 Wh, seven packs of 67 Wh)",
+    )
+    command.add_argument(
+        "--off",
+        choices=tuple(SWITCHES),
+        action="append",
+        default=[],
+        help="electronics that draw no power, as the left outer ankle's in the 65 km walk",
     )
     command.add_argument(
         "--model",
@@ -117,6 +140,9 @@ def scenario_of(options: argparse.Namespace) -> Scenario:
         slope_rad=options.slope,
         floor_roughness_m=options.floor_roughness,
         model_file=options.model,
+        battery_charge=options.battery,
+        battery_capacity_Wh=options.battery_capacity,
+        electronics_off=tuple(options.off),
     )
 
 
@@ -160,7 +186,7 @@ def run_scenario(scenario: Scenario, stop: StopRule, options: argparse.Namespace
         walk(robot, stop, console, interrupted, paced=bool(ends))
         for line in serial_options.report(ends):
             console.print(line, highlight=False, soft_wrap=True)
-        summary = robot.summary()
+        summary = {**robot.summary(), "interrupted": bool(interrupted)}
         finish(robot, summary, options, folder, json_file, console)
     if interrupted:
         return 130
@@ -207,43 +233,56 @@ def ctrl_c_noted() -> Iterator[list[bool]]:
 
 
 def walk(robot: Ranger, stop: StopRule, console: Console, interrupted: list[bool], paced: bool = False) -> None:
-    """Run until the stop rule, a fall, or Ctrl-C (at least one slice, so that there is something to write).
+    """Run until the stop rule, a fall, empty batteries, or Ctrl-C (at least one slice, so that files have something).
 
     paced: not faster than the wall clock, because something outside takes part.
     """
     started = wallclock.monotonic_s()
     with Progress(
         SpinnerColumn(),
-        TextColumn("{task.fields[steps]} steps"),
-        BarColumn(),
-        TextColumn(
-            "{task.fields[distance]:.1f} m  {task.fields[speed]:.2f} m/s  {task.fields[factor]:.1f} x real time"
-        ),
-        TimeRemainingColumn(),
+        BarColumn(bar_width=20),
+        TextColumn("{task.fields[told]}"),
         console=console,
         transient=False,
+        disable=not console.is_terminal,
     ) as progress:
-        task = progress.add_task("walk", total=1.0, steps=0, distance=0.0, speed=0.0, factor=0.0)
-        while not robot.run(stop, PACED_SLICE_S if paced else SLICE_S) and not interrupted:
+        task = progress.add_task("walk", total=1.0, told="")
+        tell_at = started + TELL_EVERY_S
+        done = False
+        while not done:
+            done = robot.run(stop, PACED_SLICE_S if paced else SLICE_S) or bool(interrupted)
             wall = wallclock.monotonic_s() - started
-            if paced and robot.time_s > wall:
+            if paced and not done and robot.time_s > wall:
                 wallclock.sleep_s(robot.time_s - wall)
-            progress.update(
-                task,
-                completed=robot.fraction_done(stop),
-                steps=robot.steps,
-                distance=robot.distance_m,
-                speed=robot.mean_speed_m_per_s(),
-                factor=robot.time_s / wall if wall > 0 else 0.0,
-            )
-        progress.update(
-            task,
-            completed=robot.fraction_done(stop),
-            steps=robot.steps,
-            distance=robot.distance_m,
-            speed=robot.mean_speed_m_per_s(),
-            factor=robot.realtime_factor(),
-        )
+            if console.is_terminal:
+                progress.update(task, completed=robot.fraction_done(stop), told=progress_text(robot, stop, wall))
+            elif started + wall >= tell_at:
+                tell_at += TELL_EVERY_S
+                console.print(progress_text(robot, stop, wall), highlight=False, soft_wrap=True)
+
+
+def progress_text(robot: Ranger, stop: StopRule, wall_s: float) -> str:
+    """Where the walk is after `wall_s` seconds of the wall clock, and how many more it will take at this rate."""
+    speed = robot.mean_speed_m_per_s()
+    share = robot.fraction_done(stop)
+    left = clock_text(wall_s * (1.0 - share) / share) if share > 0.0 else "?"
+    charge = max(0.0, robot.plant.electrics.battery.charge)
+    factor = robot.time_s / wall_s if wall_s > 0.0 else 0.0
+    return (  # what a narrow screen cuts off stands last
+        f"{length_text(robot.distance_m)}, {robot.steps} steps, {left} left; {clock_text(robot.time_s)} "
+        f"at {speed:.2f} m/s, {factor:.1f} x real time, battery {100.0 * charge:.0f} %"
+    )
+
+
+def length_text(length_m: float) -> str:
+    """Metres, from 1 km up kilometres."""
+    return f"{length_m:.2f} m" if length_m < 1000.0 else f"{length_m / 1000.0:.3f} km"
+
+
+def clock_text(seconds: float) -> str:
+    """Hours, minutes and seconds."""
+    whole = round(seconds)
+    return f"{whole // 3600}:{whole // 60 % 60:02d}:{whole % 60:02d}"
 
 
 def write_files(robot: Ranger, summary: dict, folder: pathlib.Path, console: Console) -> None:
@@ -279,16 +318,42 @@ def write_frames(robot: Ranger, folder: pathlib.Path) -> None:
 
 def print_summary(summary: dict, console: Console) -> None:
     """The walk in a few lines."""
-    end = f"fell: {summary['fall_cause']}" if summary["fell"] else "on its feet"
     tcot = "none" if summary["tcot"] is None else f"{summary['tcot']:.3f}"
     console.print(
-        f"{summary['steps']} steps, {summary['distance_m']:.2f} m in {summary['time_s']:.1f} s, {end}; "
+        f"{summary['steps']} steps, {length_text(summary['distance_m'])} in {duration_text(summary['time_s'])}, "
+        f"{end_text(summary)}; "
         f"step {summary['mean_step_length_m']:.3f} m, {summary['mean_step_time_s']:.3f} s; "
         f"{summary['total_power_W']:.1f} W, TCOT {tcot}; "
         f"{summary['realtime_factor']:.1f} x real time {'compiled' if summary['compiled'] else 'interpreted'}; "
         f"trace {summary['trace_digest'][:16]}",
         highlight=False,
     )
+    console.print(energy_text(summary), highlight=False)
     for board, names in summary["errors"].items():
         if names:
             console.print(f"errors of {board}: " + ", ".join(f"{n} x {c}" for n, c in names.items()), highlight=False)
+
+
+def end_text(summary: dict) -> str:
+    """How the walk ended."""
+    if summary["battery"]["empty"]:
+        return f"{summary['fall_cause']}"
+    if summary["fell"]:
+        return f"fell: {summary['fall_cause']}"
+    return "interrupted, on its feet" if summary["interrupted"] else "on its feet"
+
+
+def duration_text(seconds: float) -> str:
+    """Seconds, from an hour up also hours and minutes."""
+    whole = round(seconds / 60.0)
+    return f"{seconds:.1f} s" + (f" ({whole // 60} h {whole % 60:02d} min)" if seconds >= 3600.0 else "")
+
+
+def energy_text(summary: dict) -> str:
+    """Where the energy went, and what is left."""
+    energy, battery = summary["energy_Wh"], summary["battery"]
+    parts = ", ".join(f"{name.replace('_', ' ')} {Wh:.3g}" for name, Wh in energy.items() if name != "total")
+    return (
+        f"{energy['total']:.3g} Wh since it was let go: {parts}; "
+        f"batteries {100.0 * battery['charge']:.1f} % of {battery['capacity_Wh']:.0f} Wh"
+    )

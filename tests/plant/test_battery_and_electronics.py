@@ -87,9 +87,9 @@ def test_impossible_battery_numbers_are_refused_by_name(field, value):
 
 def test_the_electronics_draw_5_15_watts_and_4_7_on_the_long_walk():
     assert electronics.power_W() == pytest.approx(5.15, abs=1e-12)
-    assert electronics.power_W(left_outer_ankle=False) == pytest.approx(4.70, abs=1e-12)
+    assert electronics.power_W(("left-outer-ankle",)) == pytest.approx(4.70, abs=1e-12)
     assert sum(electronics.itemised_W().values()) == pytest.approx(5.15, abs=1e-12)
-    assert sum(electronics.itemised_W(False).values()) == pytest.approx(4.70, abs=1e-12)
+    assert sum(electronics.itemised_W(("left-outer-ankle",)).values()) == pytest.approx(4.70, abs=1e-12)
 
 
 def test_every_item_of_the_electronics_is_positive_and_has_a_source():

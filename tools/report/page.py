@@ -26,6 +26,7 @@ ROBOT = {
     "total": "16 W",
     "tcot": "0.28",
     "delay": "14 ± 3 ms",
+    "energy": "493 Wh in 30.8 h",
 }
 
 
@@ -85,6 +86,13 @@ def tiles(summary: dict) -> list[dict]:
             "none" if delay["mean"] is None else f"{delay['mean']:.1f} ± {delay['std']:.1f} ms",
             ROBOT["delay"],
         ),
+        ("walked", f"{summary['distance_m'] / 1000.0:.3f} km in {summary['walked_h']:.2f} h", "65.2 km in 30.8 h"),
+        ("energy used", f"{summary['energy_Wh']['total']:.3g} Wh", ROBOT["energy"]),
+        (
+            "batteries",
+            "empty" if summary["battery"]["empty"] else f"{100.0 * summary['battery']['charge']:.0f} %",
+            None,
+        ),
     )
     return [{"name": name, "value": value, "real": real} for name, value, real in rows]
 
@@ -129,6 +137,10 @@ def command(summary: dict) -> str:
     ]
     if summary["floor_roughness_m"]:
         parts += ["--floor-roughness", f"{summary['floor_roughness_m']:g}m"]
+    parts += ["--battery", f"{100.0 * summary['battery']['charge_at_start']:.12g}%"]
+    parts += ["--battery-capacity", f"{summary['battery']['capacity_Wh']:.12g}Wh"]
+    for name in summary["electronics_off"]:
+        parts += ["--off", name]
     if summary["model_file"]:
         parts += ["--model", summary["model_file"]]
     if summary["slope_rad"]:
