@@ -1,6 +1,7 @@
 cimport cython
 
 from libc.math cimport cos, sin
+from ranger_sim.plant.contact_equations cimport ContactEquations
 from ranger_sim.plant.leg cimport INNER, OUTER, Leg
 from ranger_sim.plant.observed cimport Observed
 from ranger_sim.plant.parts cimport Ankle, HipJoint, Sole
@@ -33,9 +34,8 @@ cdef class Body:
     cdef public Sole sole
     cdef public long long event
     cdef public Leg event_leg
-    cdef public bint unilateral, lift_leading
-    cdef public double[110] matrix
-    cdef public double[10] solution
+    cdef public bint coulomb, sliding, unilateral, lift_leading
+    cdef public ContactEquations equations
     cdef public object parameters, floor, record
     cdef public str cause
     cpdef void set_slope(self, double slope_rad) noexcept

@@ -20,6 +20,7 @@ The body's fields and geometry stand here. What happens to it, in the order in w
 
 import cython
 
+from ranger_sim.plant.contact_equations import ContactEquations
 from ranger_sim.plant.floor import Floor
 from ranger_sim.plant.leg import LEG_NAMES, Leg
 from ranger_sim.plant.observed import Observed
@@ -46,7 +47,7 @@ class Body:
     """State and motion of the mechanical robot. `parameters`: BodyParameters; `floor`: Floor.
 
     `outer`, `inner`: the legs; `stance`, `swing`: the same two by role. `stance` carries in single stance and is the
-    reference leg in double stance.
+    reference leg in double stance. More than 40 fields, because a step reads most of them at every turn.
     """
 
     def __init__(self, parameters=None, floor=None) -> None:
@@ -78,6 +79,8 @@ class Body:
         self.last_strike = None  # the leg that struck last
         self.brush = False  # the swing foot is near the floor and not ahead: its sole may touch
         self.strike_ahead = p.strike_ahead_m
+        self.coulomb = False  # no foot pulls nor holds beyond friction (EQUATIONS 8, 9)
+        self.sliding = False  # a foot does
         self.unilateral = False  # the trailing foot may leave at a heel-strike (EQUATIONS 8)
         self.lift_leading = True  # the leading foot may leave in double stance
         # the operator's hands, while he holds the robot
@@ -101,9 +104,7 @@ class Body:
         self.event_leg = self.outer
         self.changes = 0  # touches, lift-offs and falls so far
         self.cause = ""  # of a fall
-        # the linear equations of an impact, kept to be filled anew: plant/impact.py
-        self.matrix = [0.0] * 110
-        self.solution = [0.0] * 10
+        self.equations = ContactEquations()  # kept to be filled anew
         # in the operator's hands, upright, the inner legs ahead
         self.inner.angle = -0.3
         self.inner.foot_angle = -0.3

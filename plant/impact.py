@@ -1,24 +1,23 @@
-# cython: boundscheck=False, wraparound=False, cdivision=True
-# (indices are those of `matrix` and `solution`, all written out; no integer is divided)
 """A foot meets the floor (EQUATIONS 8)."""
 
 import cython
 
-# C constants when compiled: the same numbers stand in the .pxd, and a test holds them together.
 if not cython.compiled:
-    from math import cos, fabs, sin
-
     from ranger_sim.plant.body import DOUBLE, FLIGHT, SINGLE
+    from ranger_sim.plant.contact_equations import (
+        APART,
+        ARMS,
+        COLUMN_FOOT,
+        COLUMN_IMPULSE,
+        COLUMN_LEG,
+        COLUMN_VX,
+        COLUMN_VY,
+        SLIDES_BACK,
+        SLIDES_ON,
+        STICKS,
+        ContactEquations,
+    )
     from ranger_sim.plant.leg import Leg
-
-    # Columns of `Body.matrix`, and rows of `Body.solution`: what is unknown, and last the right-hand side.
-    COLUMN_VX = 0  # of the hip
-    COLUMN_VY = 1
-    COLUMN_LEG = 2  # rate of the outer, and next of the inner leg
-    COLUMN_FOOT = 4  # rate of the outer, and next of the inner foot
-    COLUMN_IMPULSE = 6  # x and y of the first foot at rest, and of the second
-    COLUMN_RIGHT = 10
-    COLUMNS = 11
 
 
 def touch(body, leg) -> None:
@@ -32,7 +31,10 @@ def touch(body, leg) -> None:
     set_down(body, leg)
     ahead = body.contact_x(leg) - body.contact_x(other)
     strike = leg is not body.last_strike and ahead > body.strike_ahead
-    if body.mode == FLIGHT:
+    if body.coulomb:
+        collide(body, leg, body.mode != FLIGHT)
+        take_states(body, leg)
+    elif body.mode == FLIGHT:
         land(body, leg)
     else:
         close_linkage(body, leg)
@@ -56,8 +58,8 @@ def touch(body, leg) -> None:
         body.seen.foothold_due = True
         body.seen.released_s = body.time_s
     body.brush = False
-    if body.mode == SINGLE and other.Jf == 0.0:
-        other.limp()
+    if body.mode == SINGLE and body.swing.Jf == 0.0:
+        body.swing.limp()
 
 
 def set_down(body, leg) -> cython.void:
@@ -93,130 +95,92 @@ def close_linkage(body, leg) -> None:
 
 
 def impact(body, outer: cython.bint, inner: cython.bint) -> None:
-    """Rates just after the feet named here are at rest on the floor (EQUATIONS 8).
+    """Rates just after the feet named here are at rest on the floor, by a pull if need be (EQUATIONS 8).
 
     The motors, behind their cables, keep their rates. Each leg keeps the impulse that its foot took, 0 without one.
     """
-    row: cython.longlong = COLUMN_IMPULSE
-    leg: Leg
-    x: cython.p_double = body.solution
+    equations: ContactEquations = body.equations
     write_momentum(body)
+    equations.solve(STICKS if outer else APART, STICKS if inner else APART)
+    take_rates(body)
+
+
+def collide(body, leg, other_stands: cython.bint) -> None:
+    """Rates just after this leg's foot has met the floor, which neither pulls nor holds beyond friction (EQUATIONS 8).
+
+    `other_stands`: the other foot is on the floor too. What the feet do then is left in the equations' `state`.
+    """
+    equations: ContactEquations = body.equations
+    write_momentum(body)
+    if not other_stands:
+        equations.leave_out(body.other(leg).side)
+    equations.settle(leg.side)
+    take_rates(body)
+
+
+def take_states(body, leg) -> None:
+    """The body's mode after `collide`, and which feet slide. `leg` touched: it leads when both stand."""
+    equations: ContactEquations = body.equations
+    other: Leg = body.other(leg)
+    stands: cython.bint = equations.state[leg.side] != APART
+    other_stands: cython.bint = equations.state[other.side] != APART
+    foot: Leg
+    for foot in (leg, other):
+        if equations.state[foot.side] == APART:
+            foot.armed = False
+    take_slides(body)
+    if stands and other_stands:
+        body.mode = DOUBLE
+    elif stands or other_stands:
+        body.mode = SINGLE
+    else:
+        body.mode = FLIGHT
+    body.stand_on(leg if stands else other)
+
+
+def take_slides(body) -> cython.void:
+    """Which feet slide, and which way, out of the equations' `state`."""
+    equations: ContactEquations = body.equations
+    leg: Leg
     for leg in (body.outer, body.inner):
-        if outer if leg is body.outer else inner:
-            write_foot_at_rest(body, leg, row)
-            row += 2
-        elif leg.Jf == 0.0:
-            write_foot_with_motor(body, leg)
-    eliminate(body, row)
-    body.hip_vx = x[COLUMN_VX]
-    body.hip_vy = x[COLUMN_VY]
-    row = COLUMN_IMPULSE
-    for leg in (body.outer, body.inner):
-        leg.rate = x[COLUMN_LEG + leg.side]
-        leg.foot_rate = x[COLUMN_FOOT + leg.side]
-        leg.impulse_x = 0.0
-        leg.impulse_y = 0.0
-        if outer if leg is body.outer else inner:
-            leg.impulse_x = x[row]
-            leg.impulse_y = x[row + 1]
-            row += 2
+        leg.slide = 0
+        if equations.state[leg.side] == SLIDES_ON:
+            leg.slide = 1
+        elif equations.state[leg.side] == SLIDES_BACK:
+            leg.slide = -1
+    body.sliding = body.outer.slide != 0 or body.inner.slide != 0
 
 
 def write_momentum(body) -> None:
-    """Rows 0 ... 5 of `matrix`: what the momentum of hip, legs and feet is, and was before.
-
-    Rows are in the order of the columns: along x, along y, of each leg about the hip, of each foot about its ankle.
-    """
+    """Into the equations: what the momentum of hip, legs and feet was before, and what a massless foot does."""
     row: cython.longlong
     column: cython.longlong
-    on: cython.longlong
     total: cython.double
-    A: cython.double
-    B: cython.double
     leg: Leg
     o: Leg = body.outer
     i: Leg = body.inner
+    equations: ContactEquations = body.equations
     before = (body.hip_vx, body.hip_vy, o.rate, i.rate, o.foot_rate, i.foot_rate)
-    JH: cython.double = body.hip.J
-    a: cython.p_double = body.matrix
-    for row in range(110):
-        a[row] = 0.0
-    a[COLUMN_VX] = body.M
-    a[COLUMNS + COLUMN_VY] = body.M
-    for leg in (o, i):
-        A = leg.mc * cos(leg.angle) + leg.mw * sin(leg.angle)
-        B = leg.mc * sin(leg.angle) - leg.mw * cos(leg.angle)
-        on = COLUMN_LEG + leg.side
-        a[on] = -A
-        a[COLUMNS + on] = B
-        a[COLUMNS * on + COLUMN_VX] = -A
-        a[COLUMNS * on + COLUMN_VY] = B
-        a[COLUMNS * on + COLUMN_LEG] = -JH
-        a[COLUMNS * on + COLUMN_LEG + 1] = -JH
-        a[COLUMNS * on + on] = leg.J + JH
-        on = COLUMN_FOOT + leg.side
-        a[COLUMNS * on + on] = leg.Jf
+    equations.begin(o, i, body.M, body.hip.J, body.sole.mu)
     for row in range(COLUMN_IMPULSE):
         total = 0.0
         for column in range(COLUMN_IMPULSE):
-            total += a[COLUMNS * row + column] * before[column]
-        a[COLUMNS * row + COLUMN_RIGHT] = total
+            total += equations.mass[6 * row + column] * before[column]
+        equations.right[row] = total
+    for leg in (o, i):
+        if leg.Jf == 0.0:
+            equations.follow[leg.side] = leg.motor_rate
+            equations.pressed[leg.side] = -equations.arm[ARMS * leg.side + 3] * body.ankle.k * leg.stretch()
 
 
-def write_foot_at_rest(body, leg, row: cython.longlong) -> cython.void:
-    """Rows `row` and the next: this foot does not move along the floor and upwards, which takes two impulses."""
-    column: cython.longlong
-    angle: cython.double = leg.foot_angle
-    excess: cython.double = leg.excess(angle)
-    a: cython.p_double = body.matrix
-    a[COLUMNS * row + COLUMN_VX] = 1.0
-    a[COLUMNS * row + COLUMN_LEG + leg.side] = -leg.el * cos(leg.angle)
-    a[COLUMNS * row + COLUMN_FOOT + leg.side] = -(leg.r * cos(excess) - leg.d * cos(angle))
-    a[COLUMNS * (row + 1) + COLUMN_VY] = 1.0
-    a[COLUMNS * (row + 1) + COLUMN_LEG + leg.side] = leg.el * sin(leg.angle)
-    a[COLUMNS * (row + 1) + COLUMN_FOOT + leg.side] = -(leg.d * sin(angle) - leg.r * sin(excess))
-    for column in range(COLUMN_IMPULSE):
-        a[COLUMNS * column + row] = -a[COLUMNS * row + column]
-        a[COLUMNS * column + row + 1] = -a[COLUMNS * (row + 1) + column]
-
-
-def write_foot_with_motor(body, leg) -> cython.void:
-    """A massless foot in the air has no momentum of its own: it follows its motor."""
-    row: cython.longlong = COLUMN_FOOT + leg.side
-    a: cython.p_double = body.matrix
-    a[COLUMNS * row + row] = 1.0
-    a[COLUMNS * row + COLUMN_LEG + leg.side] = -1.0
-    a[COLUMNS * row + COLUMN_RIGHT] = leg.motor_rate
-
-
-def eliminate(body, n: cython.longlong) -> cython.void:
-    """Solve the first n equations of `matrix` (rows of 11, right-hand side last) by Gauss with pivots."""
-    i: cython.longlong
-    j: cython.longlong
-    k: cython.longlong
-    best: cython.longlong
-    factor: cython.double
-    held: cython.double
-    a: cython.p_double = body.matrix
-    x: cython.p_double = body.solution
-    for k in range(n):
-        best = k
-        for i in range(k + 1, n):
-            if fabs(a[COLUMNS * i + k]) > fabs(a[COLUMNS * best + k]):
-                best = i
-        if best != k:
-            for j in range(COLUMNS):
-                held = a[COLUMNS * k + j]
-                a[COLUMNS * k + j] = a[COLUMNS * best + j]
-                a[COLUMNS * best + j] = held
-        for i in range(k + 1, n):
-            factor = a[COLUMNS * i + k] / a[COLUMNS * k + k]
-            if factor != 0.0:
-                for j in range(k, n):
-                    a[COLUMNS * i + j] -= factor * a[COLUMNS * k + j]
-                a[COLUMNS * i + COLUMN_RIGHT] -= factor * a[COLUMNS * k + COLUMN_RIGHT]
-    for k in range(n - 1, -1, -1):
-        factor = a[COLUMNS * k + COLUMN_RIGHT]
-        for j in range(k + 1, n):
-            factor -= a[COLUMNS * k + j] * x[j]
-        x[k] = factor / a[COLUMNS * k + k]
+def take_rates(body) -> None:
+    """Out of the equations: rates of hip, legs and feet, and the impulses on the feet."""
+    leg: Leg
+    x: cython.p_double = body.equations.solution
+    body.hip_vx = x[COLUMN_VX]
+    body.hip_vy = x[COLUMN_VY]
+    for leg in (body.outer, body.inner):
+        leg.rate = x[COLUMN_LEG + leg.side]
+        leg.foot_rate = x[COLUMN_FOOT + leg.side]
+        leg.impulse_x = x[COLUMN_IMPULSE + 2 * leg.side]
+        leg.impulse_y = x[COLUMN_IMPULSE + 2 * leg.side + 1]

@@ -17,7 +17,7 @@ cdef class Leg:
     cdef public double hip_sign, el, r, d, heel, toe, Jf, inverse_Jf, C
     cdef public double mc, mw, mt, m22, i33, J
     cdef public double extra_ankle, extra_motor, impulse_x, impulse_y
-    cdef public long long side
+    cdef public long long side, slide
     cdef public bint armed
     cdef public double[6] saved
     cdef void know_leg(self) noexcept
@@ -28,6 +28,7 @@ cdef class Leg:
     cdef double reach(self) noexcept
     cpdef double behind(self) noexcept
     cdef double rise(self) noexcept
+    cpdef double stretch(self) noexcept
     cpdef void limp(self) noexcept
     cpdef void lie(self) noexcept
     cdef void save(self) noexcept

@@ -57,6 +57,7 @@ class Leg:
         self.height = 0.0
         self.gap = 0.0
         self.armed = False  # the foot has been clear of the floor since it left it
+        self.slide = 0  # which way the standing foot slides: 1 forwards, -1 backwards, 0 it sticks or is in the air
         # force of the floor at the start of the last step, N; impulse at the last impact, N s
         self.Fx = 0.0
         self.Fy = 0.0
@@ -166,6 +167,10 @@ class Leg:
         )
 
     # ---- what happens to it ---------------------------------------------------------------------------------
+
+    def stretch(self) -> cython.double:
+        """Of the ankle's cable, rad at the joint (EQUATIONS 1)."""
+        return self.motor_angle - (self.foot_angle - self.angle)
 
     def limp(self) -> cython.void:
         """A massless foot in the air stands where its motor holds it, q4 = q4m (EQUATIONS 5.4)."""

@@ -1,6 +1,7 @@
 # Generated from plant/body.py and plant/body.pxd (python -m ranger_sim.tools.stubs); do not edit.
 
 from collections.abc import MutableSequence
+from ranger_sim.plant.contact_equations import ContactEquations
 from ranger_sim.plant.leg import Leg
 from ranger_sim.plant.observed import Observed
 from ranger_sim.plant.parts import Ankle
@@ -51,10 +52,11 @@ class Body:
     sole: Sole
     event: int
     event_leg: Leg
+    coulomb: bool
+    sliding: bool
     unilateral: bool
     lift_leading: bool
-    matrix: MutableSequence[float]
-    solution: MutableSequence[float]
+    equations: ContactEquations
     parameters: Any
     floor: Any
     record: Any

@@ -1,13 +1,7 @@
 # Generated from plant/impact.py and plant/impact.pxd (python -m ranger_sim.tools.stubs); do not edit.
 
 from ranger_sim.plant.body import Body
-
-COLUMN_VX: int
-COLUMN_VY: int
-COLUMN_LEG: int
-COLUMN_FOOT: int
-COLUMN_IMPULSE: int
-COLUMN_RIGHT: int
-COLUMNS: int
+from ranger_sim.plant.leg import Leg
 
 def impact(body: Body, outer: bool, inner: bool) -> None: ...
+def collide(body: Body, leg: Leg, other_stands: bool) -> None: ...
