@@ -4,7 +4,13 @@ from ranger_sim.boards.main_brain.filters cimport ButterworthFilter
 from ranger_sim.boards.main_brain.geometry cimport FloorGeometry
 from ranger_sim.datatable.store cimport DataStore
 
-cdef long long _MASK
+cpdef enum:
+    SWING_BEHIND = 0
+    AVERAGING = 1
+    ARMED = 2
+    WALKING = 2
+
+cdef long long _MASK, _NEWEST
 
 cdef class EnergyMeter:
     cdef public bint started
@@ -46,12 +52,13 @@ cdef class Estimator:
     cdef public FloorGeometry floor
     cdef public double sweet_spot_m, ankle_zero, foot_offset
     cdef public HeelSensor left, right
-    cdef public long long stage, swing_leg, gyro_stamp, strike_time, steps, violations
+    cdef public long long stage, swing_leg, last_reset, gyro_stamp, strike_time, steps, violations
     cdef public double outer_angle, outer_raw_rate, distance_m, front_foot
     cdef public bint gyro_started, first_step, fallen
     cdef public list meters
     cdef public EnergyMeter hip_energy, outer_energy, inner_energy, steer_energy, mcu_energy
     cpdef int restart(self) except -1
+    cpdef int zero_way(self) except -1
     cpdef int zero_counters(self) except -1
     cpdef void update(self)
     cpdef int update_rates(self) except -1

@@ -19,8 +19,16 @@ from ranger_sim.datatable.store import DataStore
 if not cython.compiled:
     from math import cos
 
-# A C variable when compiled (.pxd): Cython makes a Python object of every literal above 31 bits.
+    # Stages of the strike detector.
+    SWING_BEHIND = 0
+    AVERAGING = 1
+    ARMED = 2
+    # Of FSM_RESET: the machines run.
+    WALKING = 2
+
+# C variables when compiled (.pxd): Cython makes a Python object of every literal above 31 bits.
 _MASK = 0xFFFFFFFF
+_NEWEST = 0x7FFFFFFF  # a stamp further ahead than this is behind
 
 READS = (
     "TIMESTAMP",
@@ -114,7 +122,7 @@ class EnergyMeter:
 
 
 class HeelSensor:
-    """One foot's contact sensor against its own baseline (counts)."""
+    """One foot's contact sensor against its own baseline (counts), the running mean at the moment it flipped down."""
 
     def __init__(self) -> None:
         self.baseline = 0.0
@@ -176,8 +184,9 @@ class Estimator:
         self.foot_offset = 1.75  # published foot angle less geometric one, rad (robot.md C1.1)
         self.left = HeelSensor()
         self.right = HeelSensor()
-        self.stage = 0  # of the strike detector: 0 swing leg behind, 1 averaging, 2 armed
+        self.stage = SWING_BEHIND
         self.swing_leg = 1
+        self.last_reset = 0
         self.outer_angle = 0.0
         self.outer_raw_rate = 0.0
         self.gyro_started = False
@@ -194,26 +203,36 @@ class Estimator:
         store.set_int(self.E_SWING_LEG, 1)
 
     def restart(self) -> None:
-        """What the reset of the machines does to the estimator: inner legs swing, angle 0."""
-        self.stage = 0
+        """The beginning of a walk: inner legs swing, angle 0, steps and distance from zero.
+
+        ROBOT PARITY: the time after heel strike begins here, where the robot's goes on from the last strike of the
+        walk before, or from power-up; nothing of the walk depends on it.
+        """
+        self.stage = SWING_BEHIND
         self.swing_leg = 1
         self.outer_angle = 0.0
+        self.front_foot = 0.0
         self.first_step = True
         self.fallen = False
         self.strike_time = self.store.stamp(self.TIMESTAMP)
         self.store.set_int(self.E_SWING_LEG, 1)
+        self.zero_way()
+
+    def zero_way(self) -> None:
+        """Steps and distance from zero."""
+        self.steps = 0
+        self.distance_m = 0.0
+        self.store.set_int(self.E_STEP_COUNT, 0)
+        self.store.set_float(self.E_DISTANCE, 0.0)
 
     def zero_counters(self) -> None:
         """Steps, distance and energies from zero."""
         meter: EnergyMeter
         i: cython.longlong
-        self.steps = 0
-        self.distance_m = 0.0
         for i in range(5):
             meter = self.meters[i]
             meter.energy_J = 0.0
-        self.store.set_int(self.E_STEP_COUNT, 0)
-        self.store.set_float(self.E_DISTANCE, 0.0)
+        self.zero_way()
 
     def update(self) -> cython.void:
         """One slot."""
@@ -223,8 +242,9 @@ class Estimator:
         outer_ankle: float = store.get_float(self.MCFO_RIGHT_ANKLE_ANGLE) - self.ankle_zero
         inner_ankle: float = store.get_float(self.MCFI_MID_ANKLE_ANGLE) - self.ankle_zero
         rate: float
-        if reset == 1:
+        if reset == WALKING and self.last_reset != WALKING:
             self.restart()
+        self.last_reset = reset
         self.update_rates()
         self.update_outer_angle()
         self.detect_strike(hip, outer_ankle, inner_ankle)
@@ -238,7 +258,7 @@ class Estimator:
         store.set_int(self.E_T_AFTER_HS, (store.stamp(self.TIMESTAMP) - self.strike_time) & _MASK)
         self.update_heights(hip, outer_ankle, inner_ankle)
         self.update_energy()
-        if reset == 2:
+        if reset == WALKING:
             self.judge_fall(hip)
 
     def update_rates(self) -> None:
@@ -275,47 +295,51 @@ class Estimator:
         if gap == 0:
             return
         rate = -(store.get_float(self.UI_ANG_RATE_X) - store.get_float(self.P_E_GYRO_BIAS))
-        if self.gyro_started and gap <= 100:
+        if self.gyro_started and gap <= _NEWEST:
             self.outer_angle += 0.0005 * (self.outer_raw_rate + rate) * gap
         self.gyro_started = True
         self.gyro_stamp = stamp
         self.outer_raw_rate = rate
 
     def detect_strike(self, hip: float, outer_ankle: float, inner_ankle: float) -> cython.void:
-        """Watch the swing feet; on contact flip the swing flag and reset the angle from the pose."""
+        """Watch the swing feet; on contact flip the swing flag and reset the angle from the pose.
+
+        A slot takes one stage at most. The inner legs' means begin a little ahead of the outer ones, the outer legs'
+        where the legs pass each other (robot.md C3.1).
+        """
         store: DataStore = self.store
-        ahead: float
+        ahead: cython.bint
         ankle: float
         left: float
         right: float
         left_touches: cython.bint
         right_touches: cython.bint
         if self.swing_leg == 1:
-            ahead = hip
+            ahead = hip > store.get_float(self.P_E_HS_H_ANG)
             ankle = inner_ankle
             left = store.get_float(self.MCFI_LEFT_HEEL_SENSE)
             right = store.get_float(self.MCFI_RIGHT_HEEL_SENSE)
         else:
-            ahead = -hip
+            ahead = hip < 0.0
             ankle = outer_ankle
             left = store.get_float(self.MCFO_LEFT_HEEL_SENSE)
             right = store.get_float(self.MCFO_RIGHT_HEEL_SENSE)
         if self.use_filtered_sum:
             self.update_contact_sums()
-        if self.stage == 0:
-            if ahead <= store.get_float(self.P_E_HS_H_ANG):
-                return
-            self.left.restart(left)
-            self.right.restart(right)
-            self.set_stage(1)
-        if self.stage == 1:
-            if ankle + self.ankle_zero <= store.get_float(self.P_E_HS_F_ANG):
-                self.left.average(left)
-                self.right.average(right)
-                return
-            store.set_float(self.E_HEEL_BASE_LEFT, self.left.baseline)
-            store.set_float(self.E_HEEL_BASE_RIGHT, self.right.baseline)
-            self.set_stage(2)
+        if self.stage == SWING_BEHIND:
+            if ahead:
+                self.left.restart(left)
+                self.right.restart(right)
+                self.set_stage(AVERAGING)
+            return
+        if self.stage == AVERAGING:
+            self.left.average(left)
+            self.right.average(right)
+            if ankle + self.ankle_zero > store.get_float(self.P_E_HS_F_ANG):
+                store.set_float(self.E_HEEL_BASE_LEFT, self.left.baseline)
+                store.set_float(self.E_HEEL_BASE_RIGHT, self.right.baseline)
+                self.set_stage(ARMED)
+            return
         if self.use_filtered_sum:
             if self.contact_sum(self.swing_leg == 1) > 850.0:  # counts, robot.md C3.2
                 self.strike(hip, outer_ankle, inner_ankle)
@@ -370,9 +394,7 @@ class Estimator:
             else:
                 self.outer_angle -= store.get_float(self.P_E_RESET) * error
             store.set_float(self.E_LO_ERROR, error)
-            length = self.floor.ankle_distance_m
-            if not self.first_step:
-                length += self.sweet_spot_m * (self.floor.rear_foot - self.front_foot)
+            length = self.floor.ankle_distance_m + self.sweet_spot_m * (self.floor.rear_foot - self.front_foot)
             self.front_foot = self.floor.front_foot
             self.distance_m += length
             store.set_float(self.EST_LAST_STEP_LENGTH, length)
@@ -388,7 +410,7 @@ class Estimator:
         store.set_u32(self.E_HS_TIME, now)
         self.swing_leg = 1 - self.swing_leg
         store.set_int(self.E_SWING_LEG, self.swing_leg)
-        self.set_stage(0)
+        self.set_stage(SWING_BEHIND)
 
     def update_heights(self, hip: float, outer_ankle: float, inner_ankle: float) -> None:
         """Height of the swing ankle over the stance ankle, and of the swing foot over the floor."""

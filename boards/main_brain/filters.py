@@ -10,16 +10,19 @@ import cython
 if not cython.compiled:
     from math import pi, sqrt, tan
 
-# A C variable when compiled (.pxd): Cython makes a Python object of every literal above 31 bits.
+    # ms after which the slowest filter rests to the last bit of a double: its poles lie at radius 0.957
+    SETTLED = 2000
+
+# C variables when compiled (.pxd): Cython makes a Python object of every literal above 31 bits.
 _MASK = 0xFFFFFFFF
+_NEWEST = 0x7FFFFFFF  # a stamp further ahead than this is behind
 
 
 class ButterworthFilter:
     """A filter for data that arrive with ms stamps or once per tick.
 
     cutoff_hz, sample_hz: corner and rate of the design. `output` holds the filtered value; the first
-    datum sets the filter to rest at that value. `violations` counts stamps that ran backwards or leapt
-    by more than `longest_gap` ms; such a datum restarts the filter.
+    datum sets the filter to rest at that value. `violations` counts stamps that ran backwards.
     """
 
     def __init__(self, cutoff_hz: cython.double, sample_hz: cython.double) -> None:
@@ -30,10 +33,10 @@ class ButterworthFilter:
         self.b2 = self.b0
         self.a1 = -2.0 * (c * c - 1.0) * self.b0
         self.a2 = (1.0 - root * c + c * c) * self.b0
-        self.longest_gap = 100  # ms; chosen by us: 30 lost gyro data in a row
         self.violations = 0
         self.started = False
         self.stamp = 0
+        self.held = 0.0
         self.x1 = 0.0
         self.x2 = 0.0
         self.y1 = 0.0
@@ -66,23 +69,28 @@ class ButterworthFilter:
     def push_stamped(self, value: cython.double, stamp_ms: cython.longlong) -> cython.double:
         """A datum with its u32 ms stamp: a stamp n ms later means n - 1 samples of the old, one of the new.
 
-        An unchanged stamp is the datum already used: nothing happens.
+        With an unchanged stamp the datum only takes the old one's place. With an older stamp it does so too, and the
+        output stays (robot.md C3.1); this is a violation.
         """
         gap: cython.longlong
         old: cython.double
         if not self.started:
             self.stamp = stamp_ms
+            self.held = value
             self.rest_at(value)
             return value
         gap = (stamp_ms - self.stamp) & _MASK
+        old = self.held
+        self.stamp = stamp_ms
+        self.held = value
+        if gap > _NEWEST:
+            self.violations += 1
+            return self.output
         if gap == 0:
             return self.output
-        self.stamp = stamp_ms
-        if gap > self.longest_gap:
-            self.violations += 1
-            self.rest_at(value)
-            return value
-        old = self.x1
+        if gap > SETTLED:
+            self.rest_at(old)
+            return self.push(value)
         while gap > 1:
             self.push(old)
             gap -= 1

@@ -114,7 +114,6 @@ class ModeMachine:
             ),
             on_change=self.publish_state,
         )
-        self.store.set_int(self.FSM_RESET, 1)
 
     def update(self) -> None:
         """One slot: keys, then the machines."""
@@ -142,16 +141,19 @@ class ModeMachine:
 
     def enter_calibrate(self) -> None:
         """Power-up mode: motors off, counters to zero."""
+        self.store.set_int(self.FSM_RESET, 0)
         self.estimator.zero_counters()
         self.steering_off()
         self.show_mode("CALIBRAT", PURPLE)
         self.last_song_steps = 0
 
     def enter_standby(self) -> None:
+        self.store.set_int(self.FSM_RESET, 0)
         self.steering_off()
         self.show_mode("STANDBY", GREEN)
 
     def enter_stop(self) -> None:
+        self.store.set_int(self.FSM_RESET, 0)
         self.steering_off()
         self.show_mode("STOP", RED)
 
@@ -186,6 +188,8 @@ class ModeMachine:
         if elapsed >= store.get_float(self.P_UI_LCD_TIME):
             self.page_time = now
             self.show_page()
+        if steps < self.last_song_steps:
+            self.last_song_steps = 0  # the estimator counts each walk's steps from zero
         if song >= 1.0 and steps - self.last_song_steps >= song:
             self.last_song_steps = steps
             store.set_int(self.UI_EMPTY_TX2, 1)

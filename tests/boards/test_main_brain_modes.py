@@ -78,7 +78,7 @@ def test_leaving_walk_puts_every_machine_back_to_its_start():
         machine.put(state)
     bench.press(2)
     assert bench.states() == ("standby", "LO_aftermid", "HI_starthold", "startflipdown", "startstance", "front")
-    assert bench.get("FSM_RESET") == 1
+    assert bench.get("FSM_RESET") == 0  # 1 only while the machines went back
     assert bench.get("E_SWING_LEG") == 1
 
 
@@ -105,6 +105,26 @@ def test_calibrate_zeroes_steps_and_distance_and_standby_keeps_them():
     assert bench.get("E_STEP_COUNT") == 0
     assert bench.get("E_DISTANCE") == 0.0
     assert bench.estimator.steps == 0
+
+
+def test_a_new_walk_counts_steps_distance_and_songs_from_zero_and_energy_on():
+    bench = Bench()
+    bench.tick()
+    bench.press(1)
+    bench.estimator.steps = 3100
+    bench.estimator.distance_m = 1085.0
+    bench.set(E_STEP_COUNT=3100)
+    bench.estimator.hip_energy.energy_J = 5.0
+    bench.tick()
+    bench.press(2)
+    bench.press(1)
+    assert (bench.get("E_STEP_COUNT"), bench.get("E_DISTANCE")) == (0, 0.0)
+    assert bench.estimator.hip_energy.energy_J == 5.0
+    bench.store.mark_read(156, 1)
+    bench.machines_only(E_STEP_COUNT=2999)
+    assert not bench.store.is_unread(156, 1)
+    bench.machines_only(E_STEP_COUNT=3000)
+    assert bench.store.is_unread(156, 1)
 
 
 def test_four_characters_make_a_word_first_character_lowest():

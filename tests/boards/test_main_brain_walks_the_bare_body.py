@@ -65,7 +65,8 @@ def test_the_estimated_leg_angle_stays_within_a_hundredth_of_a_radian(robust_wal
 def test_steps_and_distance_are_counted_right(robust_walk):
     store, record = robust_walk.store, robust_walk.body.record
     assert record.steps - store.get_int(table.E_STEP_COUNT) in (0, 1)  # the last strike may not be seen yet
-    # the first step is counted from different places: ours is the distance of the ankles, see robot.md C3.1
+    # the first step is counted from different places: the brain takes its stance foot for one that began on the sweet
+    # spot, see robot.md C3.1
     assert store.get_float(table.E_DISTANCE) == pytest.approx(record.distance_m, rel=0.02)
 
 

@@ -5,6 +5,10 @@ from ranger_sim.boards.main_brain.geometry import FloorGeometry
 from ranger_sim.datatable.store import DataStore
 from typing import Any
 
+SWING_BEHIND: int
+AVERAGING: int
+ARMED: int
+WALKING: int
 READS: tuple[str, ...]
 WRITES: tuple[str, ...]
 
@@ -108,6 +112,7 @@ class Estimator:
     right: HeelSensor
     stage: int
     swing_leg: int
+    last_reset: int
     gyro_stamp: int
     strike_time: int
     steps: int
@@ -127,6 +132,7 @@ class Estimator:
     mcu_energy: EnergyMeter
     def __init__(self, store: DataStore, quirks: Any, report: Any) -> None: ...
     def restart(self) -> None: ...
+    def zero_way(self) -> None: ...
     def zero_counters(self) -> None: ...
     def update(self) -> None: ...
     def update_rates(self) -> None: ...

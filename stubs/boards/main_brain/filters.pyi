@@ -1,12 +1,13 @@
 # Generated from boards/main_brain/filters.py and boards/main_brain/filters.pxd (python -m ranger_sim.tools.stubs); do not edit.
 
+SETTLED: int
+
 class ButterworthFilter:
     b0: float
     b1: float
     b2: float
     a1: float
     a2: float
-    longest_gap: int
     violations: int
     stamp: int
     started: bool
@@ -15,6 +16,7 @@ class ButterworthFilter:
     y1: float
     y2: float
     output: float
+    held: float
     def __init__(self, cutoff_hz: float, sample_hz: float) -> None: ...
     def rest_at(self, value: float) -> None: ...
     def push(self, value: float) -> float: ...
