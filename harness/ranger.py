@@ -33,6 +33,7 @@ from ranger_sim.harness.profile import Profile
 from ranger_sim.harness.recorder import Recorder
 from ranger_sim.harness.sampler import Sampler
 from ranger_sim.harness.scenario import Scenario, StopRule
+from ranger_sim.plant import body_files
 from ranger_sim.plant.ranger import RangerPlant
 
 BUS_BIT_RATE = 3_000_000  # bit/s, appendix 3.11
@@ -69,13 +70,15 @@ class Ranger:
         seed = self.scenario.seed
 
         # plant -> sensors
+        self.body = body_files.load(self.scenario.body)
         self.plant = RangerPlant(
             seed=seed,
             slope_rad=self.scenario.slope_rad,
             floor_roughness_m=self.scenario.floor_roughness_m,
             model_file=self.scenario.model_file,
             start_ns=self.start_ns,
-            electrics=self.scenario.electrics(),
+            parameters=self.body.parameters,
+            electrics=self.scenario.electrics(self.body.electrics),
         )
         # interrupts and slots: each board on its own crystal, powered up in its own moment
         self.boards: dict[str, Any] = {

@@ -16,6 +16,7 @@ class Scenario:
     """One run of the whole robot. The same scenario gives the same bytes.
 
     controller: name of a parameter set in boards/main_brain/parameters, or the path of a .toml file.
+    body: name of a body in plant/bodies, or the path of a .toml file.
     seed: any integer; chooses every crystal, phase, noise and foothold.
     slope_rad: positive downhill. floor_roughness_m: standard deviation of the height per foothold.
     start_uptime_ms: network time at power-up, so that wraps and long runs can be tested.
@@ -23,7 +24,8 @@ class Scenario:
     electronics_off: names of `plant.electronics.SWITCHES`, parts that draw no power in this walk.
     """
 
-    controller: str = "robust"
+    controller: str = "record-2011"
+    body: str = "ranger"
     seed: int = 1
     slope_rad: float = 0.0
     floor_roughness_m: float = 0.0
@@ -50,11 +52,11 @@ class Scenario:
             if name not in SWITCHES:
                 raise UserError(f"scenario: electronics_off {name!r}: what can be off is {', '.join(SWITCHES)}")
 
-    def electrics(self) -> ElectricsParameters:
-        """Motors, sensors and electronics of the robot with this walk's batteries."""
+    def electrics(self, body: ElectricsParameters) -> ElectricsParameters:
+        """Motors and sensors of the body with this walk's batteries and electronics."""
         packs = BatteryParameters().packs
         battery = BatteryParameters(charge=self.battery_charge, pack_energy_Wh=self.battery_capacity_Wh / packs)
-        return ElectricsParameters(battery=battery, electronics_off=self.electronics_off)
+        return dataclasses.replace(body, battery=battery, electronics_off=self.electronics_off)
 
 
 @dataclasses.dataclass(frozen=True)

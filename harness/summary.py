@@ -9,7 +9,6 @@ from ranger_sim.datatable.generated import errors as error_table
 from ranger_sim.harness import wiring
 
 JOULES_PER_WH = 3600.0
-MASS_KG, GRAVITY = 9.91, 9.81  # total cost of transport: appendix 1, table of the walk
 SKIPPED_STEPS = 5  # the start is left out of means
 
 
@@ -22,6 +21,7 @@ def of(robot: Any) -> dict:
     motor_power = sum(powers.values())
     electronics_power = plant.electronics_power_W
     total = motor_power + electronics_power
+    weight_N = plant.parameters.total_mass_kg * plant.parameters.gravity_m_per_s2
     counters: dict[str, RangerCounters] = robot.counters()
     failed = [name for name, board in counters.items() if not alive(robot, board)]
     return {
@@ -42,7 +42,7 @@ def of(robot: Any) -> dict:
         "motor_powers_W": powers,
         "electronics_power_W": electronics_power,
         "total_power_W": total,
-        "tcot": total / (MASS_KG * GRAVITY * speed) if speed > 0.0 else None,
+        "tcot": total / (weight_N * speed) if speed > 0.0 else None,
         "energy_Wh": energy(robot),
         "battery": battery(robot),
         "battery_V": plant.battery_V,
@@ -55,6 +55,7 @@ def of(robot: Any) -> dict:
         "cpu_factor": robot.time_s / robot.cpu_s if robot.cpu_s > 0.0 else None,
         "compiled": loading.RUNS_COMPILED,
         "controller": robot.scenario.controller,
+        "body": robot.scenario.body,
         "profile": robot.profile.name if robot.profile is not None else None,
         "model_file": robot.scenario.model_file,
         "seed": robot.scenario.seed,

@@ -38,6 +38,7 @@ def in_air(body, h: cython.double, stages: cython.longlong) -> cython.void:
     gy: cython.double = body.gy
     eps: cython.double = body.inverse_smoothing
     ks: cython.double = ankle.k
+    return_k: cython.double = ankle.return_k
     F: cython.double = o.foot_angle
     th: cython.double = o.angle
     tw: cython.double = i.angle
@@ -96,6 +97,18 @@ def in_air(body, h: cython.double, stages: cython.longlong) -> cython.void:
         Tw = pull_w
         mp = o.drive - o.coulomb * smoothed_sign(up * eps) - o.viscous * up - Ts
         mn = i.drive - i.coulomb * smoothed_sign(un * eps) - i.viscous * un - Tw
+        if return_k != 0.0:
+            # EQUATIONS 2.7: springs that return the foot
+            back = return_k * (a_s - ankle.rest)
+            if o.Jf == 0.0 and standing is not o:
+                mp -= back  # the cable hands it on
+            else:
+                Ts -= back
+            back = return_k * (a_w - ankle.rest)
+            if i.Jf == 0.0 and standing is not i:
+                mn -= back
+            else:
+                Tw -= back
         if a_s < ankle.low or a_s > ankle.high:
             stop = ankle.stop_torque(a_s, uF - us)
             Ts += stop

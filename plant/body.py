@@ -81,7 +81,7 @@ class Body:
         self.strike_ahead = p.strike_ahead_m
         self.coulomb = False  # no foot pulls nor holds beyond friction (EQUATIONS 8, 9)
         self.sliding = False  # a foot does
-        self.unilateral = False  # the trailing foot may leave at a heel-strike (EQUATIONS 8)
+        self.unilateral = p.contact == "unilateral"  # the trailing foot may leave at a heel-strike (EQUATIONS 8)
         self.lift_leading = True  # the leading foot may leave in double stance
         # the operator's hands, while he holds the robot
         self.lock_hip = False  # they keep both legs
@@ -231,6 +231,9 @@ class Body:
         # stretch of the two cables
         so: cython.double = o.motor_angle - (o.foot_angle - o.angle)
         si: cython.double = i.motor_angle - (i.foot_angle - i.angle)
+        # of their return springs, from rest
+        ro: cython.double = o.foot_angle - o.angle - self.ankle.rest
+        ri: cython.double = i.foot_angle - i.angle - self.ankle.rest
         self.update_pose()
         self.update_hip_rates()
         return (
@@ -244,6 +247,7 @@ class Body:
             + 0.5 * JA * o.motor_rate * o.motor_rate
             + 0.5 * JA * i.motor_rate * i.motor_rate
             + 0.5 * self.ankle.k * (so * so + si * si)
+            + 0.5 * self.ankle.return_k * (ro * ro + ri * ri)
             + self.hip.spring_energy(o.angle - i.angle)
             - self.gx * (self.M * self.hip_x - Bo - Bi)
             - self.gy * (self.M * self.hip_y - Ao - Ai)

@@ -78,17 +78,19 @@ class Leg:
             self.mw = p.outer_mass_offset_kg_m
             self.J = p.outer_hip_inertia_kg_m2
             self.C = p.outer_rolling_friction_Nms
+            self.r = p.outer_foot_radius_m
+            self.d = p.outer_ankle_offset_m
         else:
             self.mc = p.inner_mass_moment_kg_m
             self.mw = p.inner_mass_offset_kg_m
             self.J = p.inner_hip_inertia_kg_m2
             self.C = p.inner_rolling_friction_Nms
+            self.r = p.inner_foot_radius_m
+            self.d = p.inner_ankle_offset_m
         # The hip angle h = th_outer - th_inner grows with the outer leg and falls with the inner one (EQUATIONS 1):
         # the sign with which torques and angles of the hip, which count from outer to inner, act on this leg.
         self.hip_sign = 1.0 if side == OUTER else -1.0
         self.el = p.leg_length_m
-        self.r = p.foot_radius_m
-        self.d = p.ankle_offset_m
         self.heel = p.arc_heel_rad
         self.toe = p.arc_toe_rad
         self.Jf = p.foot_inertia_kg_m2

@@ -12,7 +12,7 @@ cdef class HipJoint:
 
 @cython.final
 cdef class Ankle:
-    cdef public double k, J, inverse_J, low, high, stop_k, stop_c
+    cdef public double k, J, inverse_J, low, high, stop_k, stop_c, return_k, rest
     cpdef double stop_torque(self, double angle, double rate) noexcept
 
 @cython.final

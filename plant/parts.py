@@ -44,13 +44,16 @@ class HipJoint:
 
 
 class Ankle:
-    """Cable, rotor and stops of an ankle (EQUATIONS 2.2, 2.3, 2.5). `parameters`: BodyParameters."""
+    """Cable, rotor, springs and stops of an ankle (EQUATIONS 2.2, 2.3, 2.5, 2.7); `parameters`: BodyParameters."""
 
     def __init__(self, parameters) -> None:
         p = parameters
         self.k = p.ankle_spring_Nm_per_rad
         self.J = p.ankle_rotor_inertia_kg_m2
         self.inverse_J = 1.0 / self.J
+        # the return springs at the joint, and where they rest (EQUATIONS 2.7)
+        self.return_k = p.ankle_return_Nm_per_rad
+        self.rest = p.ankle_return_rest_rad - p.ankle_zero_rad
         self.low = p.ankle_stop_low_rad - p.ankle_zero_rad
         self.high = p.ankle_stop_high_rad - p.ankle_zero_rad
         self.stop_k = p.ankle_stop_Nm_per_rad

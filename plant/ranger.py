@@ -110,10 +110,10 @@ class RangerPlant:
 
         # Lines, gears and senses of the encoders: robot.md N4.1; the outer feet's are mirrored.
         self.hip_joint = IncrementalEncoder("hip_joint", 2048, seed=seed)
-        self.hip_motor = IncrementalEncoder("hip_motor", 192, 66.0, seed=seed)
-        self.outer_motor = IncrementalEncoder("outer_motor", 512, 34.0, -1, seed=seed)
+        self.hip_motor = IncrementalEncoder("hip_motor", 192, self.parameters.hip_gear, seed=seed)
+        self.outer_motor = IncrementalEncoder("outer_motor", 512, self.parameters.ankle_gear, -1, seed=seed)
         self.outer_joint = IncrementalEncoder("outer_ankle", 2048, 1.0, -1, seed=seed)
-        self.inner_motor = IncrementalEncoder("inner_motor", 512, 34.0, seed=seed)
+        self.inner_motor = IncrementalEncoder("inner_motor", 512, self.parameters.ankle_gear, seed=seed)
         self.inner_joint = IncrementalEncoder("inner_ankle", 2048, seed=seed)
         self.encoders = [
             self.hip_joint,
@@ -388,8 +388,8 @@ class RangerPlant:
         p = self.parameters
         return {
             "leg": p.leg_length_m,
-            "radius": p.foot_radius_m,
-            "eccentricity": p.ankle_offset_m,
+            "radius": {"outer": p.outer_foot_radius_m, "inner": p.inner_foot_radius_m},
+            "eccentricity": {"outer": p.outer_ankle_offset_m, "inner": p.inner_ankle_offset_m},
             "heel": p.arc_heel_rad,
             "toe": p.arc_toe_rad,
             "slope": self.floor.slope_rad,

@@ -40,6 +40,7 @@ def on_feet(body, h: cython.double, stages: cython.longlong) -> cython.void:
     gy: cython.double = body.gy
     JH: cython.double = joint.J
     ks: cython.double = ankle.k
+    return_k: cython.double = ankle.return_k
     iJA: cython.double = ankle.inverse_J
     eps: cython.double = body.inverse_smoothing
     # the legs: lengths, feet, masses
@@ -191,6 +192,14 @@ def on_feet(body, h: cython.double, stages: cython.longlong) -> cython.void:
         mp -= Ts
         mn -= Tw
         Th -= spring
+        if return_k != 0.0:
+            # EQUATIONS 2.7: springs that return the foot
+            Ts -= return_k * (a_s - ankle.rest)
+            back = return_k * (a_w - ankle.rest)
+            if massless:
+                mn -= back  # the cable hands it on
+            else:
+                Tw -= back
         if a_s < ankle.low or a_s > ankle.high:
             Ts += ankle.stop_torque(a_s, uF - us)
         if a_w < ankle.low or a_w > ankle.high:

@@ -25,7 +25,7 @@ class OneLineParser(argparse.ArgumentParser):
 def parser() -> argparse.ArgumentParser:
     """The whole command line."""
     from ranger_sim.datatable import cli as table_command
-    from ranger_sim.tools import bus, can_bounds, check_bus, daq, info, tune, up, walk
+    from ranger_sim.tools import body, bus, can_bounds, check_bus, daq, info, tune, up, walk
     from ranger_sim.tools.bench import command as bench
     from ranger_sim.tools.fuzz import command as fuzz
     from ranger_sim.tools.vm import command as vm
@@ -43,6 +43,7 @@ def parser() -> argparse.ArgumentParser:
     fuzz.register(commands)
     tune.register(commands)
     up.register(commands)
+    body.register(commands)
     bus.register(commands)
     can_bounds.register(commands)
     check_bus.register(commands)

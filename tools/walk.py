@@ -58,7 +58,13 @@ def add_run_options(command: Any) -> None:
         "--controller",
         default=None,
         metavar="NAME",
-        help="parameter set, by name or as a .toml file (default robust)",
+        help="parameter set, by name or as a .toml file (default record-2011)",
+    )
+    command.add_argument(
+        "--body",
+        default=None,
+        metavar="NAME",
+        help="body that walks, by name or as a .toml file (default ranger; `ranger-sim body list`)",
     )
     command.add_argument(
         "--seed", type=int, default=1, help="chooses crystals, phases, noise and footholds (default 1)"
@@ -136,6 +142,7 @@ def scenario_of(options: argparse.Namespace) -> Scenario:
     """The scenario that was asked for."""
     return Scenario(
         **({"controller": options.controller} if options.controller else {}),
+        **({"body": options.body} if options.body else {}),
         seed=options.seed,
         slope_rad=options.slope,
         floor_roughness_m=options.floor_roughness,
@@ -322,6 +329,7 @@ def print_summary(summary: dict, console: Console) -> None:
     console.print(
         f"{summary['steps']} steps, {length_text(summary['distance_m'])} in {duration_text(summary['time_s'])}, "
         f"{end_text(summary)}; "
+        f"controller {summary['controller']}, body {summary['body']}; "
         f"step {summary['mean_step_length_m']:.3f} m, {summary['mean_step_time_s']:.3f} s; "
         f"{summary['total_power_W']:.1f} W, TCOT {tcot}; "
         f"{summary['realtime_factor']:.1f} x real time {'compiled' if summary['compiled'] else 'interpreted'}; "

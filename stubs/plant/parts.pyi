@@ -28,6 +28,8 @@ class Ankle:
     high: float
     stop_k: float
     stop_c: float
+    return_k: float
+    rest: float
     def __init__(self, parameters: Any) -> None: ...
     def stop_torque(self, angle: float, rate: float) -> float: ...
 

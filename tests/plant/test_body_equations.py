@@ -76,8 +76,8 @@ def paper_parameters(p: BodyParameters):
     w = p.outer_mass_offset_kg_m / m
     return pm.PaperParameters(
         el=p.leg_length_m,
-        r=p.foot_radius_m,
-        d=p.ankle_offset_m,
+        r=p.outer_foot_radius_m,
+        d=p.outer_ankle_offset_m,
         c=c,
         w=w,
         kh=p.hip_spring_Nm_per_rad,
@@ -274,16 +274,18 @@ class Lagrange:
     def contact(self, foot):
         """Hip less the chain of a standing foot: constant while it stands and rolls."""
         p = self.p
+        r = (p.outer_foot_radius_m, p.inner_foot_radius_m)[foot]
+        d = (p.outer_ankle_offset_m, p.inner_ankle_offset_m)[foot]
 
         def function(z):
             angle, leg = z[4 + foot], z[2 + foot]
             low, high = p.arc_heel_rad, p.arc_toe_rad
             rolled = low if angle.real < low else high if angle.real > high else angle
-            x = z[0] - p.foot_radius_m * rolled
+            x = z[0] - r * rolled
             y = z[1]
             # from the contact's material point on the arc to its centre, to the ankle, to the hip
-            x -= p.foot_radius_m * cmath.sin(angle - rolled) - p.ankle_offset_m * cmath.sin(angle)
-            y -= p.foot_radius_m * cmath.cos(angle - rolled) - p.ankle_offset_m * cmath.cos(angle)
+            x -= r * cmath.sin(angle - rolled) - d * cmath.sin(angle)
+            y -= r * cmath.cos(angle - rolled) - d * cmath.cos(angle)
             return np.array([x - p.leg_length_m * cmath.sin(leg), y - p.leg_length_m * cmath.cos(leg)])
 
         return function
@@ -294,6 +296,8 @@ class Lagrange:
         total = -sum(m * (g[0] * x + g[1] * y) for m, x, y in self.points(z))
         for foot in range(2):
             total += 0.5 * p.ankle_spring_Nm_per_rad * (z[6 + foot] - (z[4 + foot] - z[2 + foot])) ** 2
+            ankle = z[4 + foot] - z[2 + foot] + p.ankle_zero_rad
+            total += 0.5 * p.ankle_return_Nm_per_rad * (ankle - p.ankle_return_rest_rad) ** 2
         total += 0.5 * p.hip_spring_Nm_per_rad * (z[2] - z[3]) ** 2
         return np.array([total])
 
@@ -339,6 +343,13 @@ INERTIAL = BodyParameters(
     outer_hip_inertia_kg_m2=0.6,
     inner_rolling_friction_Nms=0.08,
     slope_rad=-0.02,
+    # unlike feet, and springs that return them
+    outer_foot_radius_m=0.168,
+    outer_ankle_offset_m=0.114,
+    inner_foot_radius_m=0.23,
+    inner_ankle_offset_m=0.176,
+    ankle_return_Nm_per_rad=2.5,
+    ankle_return_rest_rad=1.2,
 )
 
 
@@ -469,6 +480,8 @@ def test_energy_is_kept_without_friction(mode, foot_inertia, exact_spring):
         exact_hip_spring=exact_spring,
         slope_rad=0.02,
         arc_heel_rad=-0.2,
+        ankle_return_Nm_per_rad=0.3,
+        ankle_return_rest_rad=1.7,
     )
     body = Body(p, Floor(0.02))
     if mode == DOUBLE:

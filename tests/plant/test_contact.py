@@ -60,7 +60,7 @@ def test_a_standing_hold_settles_where_ankle_and_weight_balance(stance):
     p = body.parameters
     cable = p.ankle_spring_Nm_per_rad * (motor - (foot - 0.05))
     # moment of the weight about the contact point: M g d sin F
-    assert cable == pytest.approx(p.total_mass_kg * 9.81 * p.ankle_offset_m * math.sin(foot), abs=2e-3)
+    assert cable == pytest.approx(p.total_mass_kg * 9.81 * p.outer_ankle_offset_m * math.sin(foot), abs=2e-3)
     assert abs(cable) > 0.05
     assert body.stance.side == stance
     assert body.stance.Fy == pytest.approx(p.total_mass_kg * 9.81)

@@ -192,7 +192,7 @@ def test_a_drawing_gets_connected_points():
     p = BodyParameters()
     for side in ("outer", "inner"):
         assert math.dist(picture["hip"], picture[side]["ankle"]) == pytest.approx(p.leg_length_m)
-        assert math.dist(picture[side]["ankle"], picture[side]["foot_centre"]) == pytest.approx(p.ankle_offset_m)
+        assert math.dist(picture[side]["ankle"], picture[side]["foot_centre"]) == pytest.approx(p.outer_ankle_offset_m)
 
 
 def test_a_hold_takes_the_pose_asked_for():

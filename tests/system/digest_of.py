@@ -21,9 +21,10 @@ class Case:
     seconds: float
     seed: int = 1
     uptime_ms: int = 0
-    controller: str = "robust"
+    controller: str = "record-2011"
     floor_roughness_m: float = 0.0
     slope_rad: float = 0.0
+    body: str = "ranger"
     firmware_2016: bool = False
     profile: str = ""
 
@@ -32,6 +33,7 @@ def outcome(case: Case) -> str:
     """BLAKE2b-256 of the run's trace; how many steps and frames it had, and whether the robot is on its feet."""
     scenario = Scenario(
         controller=case.controller,
+        body=case.body,
         seed=case.seed,
         slope_rad=case.slope_rad,
         floor_roughness_m=case.floor_roughness_m,

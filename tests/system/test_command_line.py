@@ -32,6 +32,9 @@ def one_clear_line(done, *words):
     [
         (["walk", "--controller", "moonwalk"], ["moonwalk", "robust", "record-2011"]),
         (["walk", "--controller", "no-such-file.toml"], ["no-such-file.toml", "No such file"]),
+        (["walk", "--body", "unicorn"], ["unicorn", "appendix", "ranger"]),
+        (["walk", "--body", "no-such-file.toml"], ["no-such-file.toml", "No such file"]),
+        (["body", "show", "unicorn"], ["unicorn", "appendix", "ranger"]),
         (["walk", "--steps", "-1"], ["--steps", "-1"]),
         (["walk", "--steps", "many"], ["--steps", "many", "whole number"]),
         (["walk", "--time", "0s"], ["--time", "above 0"]),
@@ -164,7 +167,8 @@ def test_ctrl_c_finishes_the_files_and_leaves_with_130(tmp_path):
 def test_json_on_standard_output_is_json_only(command):
     done = command("walk", "--time", "100ms", "--json", "-")
     assert done.returncode == 0, done.stderr
-    assert json.loads(done.stdout)["controller"] == "robust"
+    assert json.loads(done.stdout)["controller"] == "record-2011"
+    assert json.loads(done.stdout)["body"] == "ranger"
     assert done.stderr == ""
 
 
@@ -183,6 +187,6 @@ def test_every_command_says_what_it_does(capsys):
         return capsys.readouterr().out
 
     names = re.findall(r"^    ([a-z][a-z-]*)\b", told(), re.MULTILINE)
-    assert {"walk", "up", "ctl", "daq", "bench", "fuzz", "can-bounds", "check-bus", "table", "vm"} <= set(names)
+    assert {"walk", "up", "ctl", "body", "daq", "bench", "fuzz", "can-bounds", "check-bus", "table", "vm"} <= set(names)
     for name in names:
         assert told(name).startswith(f"usage: ranger-sim {name} ")

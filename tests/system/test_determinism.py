@@ -79,6 +79,7 @@ STEPS = {
         for seed, name in enumerate(controllers.available(), 2)
     },
     "the firmware of 2016, downhill": Case(ONE_STEP_S, 5, firmware_2016=True, slope_rad=0.01),
+    "the appendix's body": Case(ONE_STEP_S, 7, body="appendix"),
     "buses at 1 Mbit per s": Case(ONE_STEP_S, 6, profile="hil-1mbit"),
 }
 

@@ -132,6 +132,8 @@ def command(summary: dict) -> str:
         str(max(1, summary["steps"])),
         "--controller",
         summary["controller"],
+        "--body",
+        summary["body"],
         "--seed",
         str(summary["seed"]),
     ]

@@ -1,4 +1,5 @@
-// Draws the recorded walk. WALK: geometry {leg, radius, eccentricity, heel, toe, slope} in m and rad,
+// Draws the recorded walk. WALK: geometry {leg, radius {outer, inner}, eccentricity {outer, inner},
+// heel, toe, slope} in m and rad,
 // arrays t [s], state [lines of text], hip_x, hip_y [m], foot_outer, leg_outer, leg_inner, foot_inner [rad, absolute, positive
 // leaning forward], currents [A] and the footholds {x, height}.
 (function () {
@@ -22,8 +23,9 @@
     return low;
   }
 
-  function leg(i, legAngle, footAngle, colour, scale, x0, ground) {
+  function leg(i, side, legAngle, footAngle, colour, scale, x0, ground) {
     const g = WALK.geometry;
+    const radius = g.radius[side], eccentricity = g.eccentricity[side];
     const toX = (x) => (x - x0) * scale + canvas.width * 0.5;
     const toY = (y) => ground - y * scale;
     const hx = WALK.hip_x[i], hy = WALK.hip_y[i];
@@ -36,21 +38,21 @@
     context.lineTo(toX(ax), toY(ay));
     context.stroke();
     // the sole: an arc about the centre that lies `eccentricity` beyond the ankle
-    const cx = ax + g.eccentricity * Math.sin(footAngle), cy = ay + g.eccentricity * Math.cos(footAngle);
+    const cx = ax + eccentricity * Math.sin(footAngle), cy = ay + eccentricity * Math.cos(footAngle);
     context.lineWidth = 5;
     context.beginPath();
     for (let k = 0; k <= 24; k++) {
       // point of the sole that touches level ground when the foot has rolled by `roll`
       const roll = g.heel + (g.toe - g.heel) * k / 24;
       const direction = footAngle - roll;
-      const px = cx - g.radius * Math.sin(direction), py = cy - g.radius * Math.cos(direction);
+      const px = cx - radius * Math.sin(direction), py = cy - radius * Math.cos(direction);
       if (k === 0) context.moveTo(toX(px), toY(py)); else context.lineTo(toX(px), toY(py));
     }
     context.stroke();
     context.lineWidth = 2;
     context.beginPath();
     context.moveTo(toX(ax), toY(ay));
-    context.lineTo(toX(cx - g.radius * Math.sin(footAngle)), toY(cy - g.radius * Math.cos(footAngle)));
+    context.lineTo(toX(cx - radius * Math.sin(footAngle)), toY(cy - radius * Math.cos(footAngle)));
     context.stroke();
     context.fillStyle = "#ffffff";
     context.beginPath();
@@ -87,8 +89,8 @@
       context.fillRect(px, ground + 4, 1, 8);
       context.fillText(x.toFixed(1) + " m", px + 4, ground + 22);
     }
-    leg(i, WALK.leg_inner[i], WALK.foot_inner[i], INNER, scale, x0, ground);
-    leg(i, WALK.leg_outer[i], WALK.foot_outer[i], OUTER, scale, x0, ground);
+    leg(i, "inner", WALK.leg_inner[i], WALK.foot_inner[i], INNER, scale, x0, ground);
+    leg(i, "outer", WALK.leg_outer[i], WALK.foot_outer[i], OUTER, scale, x0, ground);
     context.fillStyle = "#1d2733";
     context.beginPath();
     context.arc(canvas.width / 2, ground - WALK.hip_y[i] * scale, 9, 0, 2 * Math.PI);

@@ -1,0 +1,70 @@
+"""`ranger-sim body`: which bodies there are, and every number of one with unit, limits and source."""
+
+import argparse
+import json
+from typing import Any
+
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from ranger_sim.plant import body_files
+
+
+def register(commands: Any) -> None:
+    """Add the subcommand to the command line."""
+    command = commands.add_parser(
+        "body",
+        help="list the bodies, or show every number of one",
+        description="A body is a .toml file: title, description, base, [parameters] and [sources].",
+    )
+    parts = command.add_subparsers(dest="part", required=True, metavar="list|show")
+    parts.add_parser("list", help="names and titles").set_defaults(run=run_list)
+    show = parts.add_parser("show", help="values, units, limits and sources of a body")
+    show.add_argument("name", metavar="NAME", help="body, by name or as a .toml file")
+    show.add_argument("--changes", action="store_true", help="only what differs from its base")
+    show.add_argument("--json", action="store_true", help="print JSON instead of a table")
+    show.set_defaults(run=run_show)
+
+
+def run_list(options: argparse.Namespace) -> int:
+    """Print name, base and description of every body that comes with the project."""
+    for name in body_files.available():
+        body = body_files.load(name)
+        base = f", on {body.base}" if body.base else ""
+        print(f"{name:12}{body.title}{base}: {body.description}")
+    return 0
+
+
+def rows(body: body_files.BodyFile, changes_only: bool = False) -> list[dict[str, Any]]:
+    """Key, value, unit, limits and source of each number, in the order of the tables."""
+    return [
+        {
+            "key": key.name,
+            "value": body.values[key.name],
+            "unit": key.metadata["unit"],
+            "limits": key.limits,
+            "source": body.sources[key.name],
+        }
+        for key in body_files.keys().values()
+        if not changes_only or key.name in body.changes
+    ]
+
+
+def run_show(options: argparse.Namespace) -> int:
+    """Print one body."""
+    body = body_files.load(options.name)
+    found = rows(body, options.changes)
+    if options.json:
+        print(json.dumps({"name": body.name, "title": body.title, "base": body.base, "parameters": found}, indent=2))
+        return 0
+    table = Table(box=None, pad_edge=False)
+    for title in ("key", "value", "unit", "limits", "source"):
+        table.add_column(title, overflow="fold", no_wrap=title == "key")
+    for row in found:
+        value = f"{row['value']:g}" if isinstance(row["value"], float) else str(row["value"])
+        table.add_row(*(escape(text) for text in (row["key"], value, row["unit"], row["limits"], row["source"])))
+    console = Console(highlight=False)
+    console.print(f"{body.title}: {body.description}")
+    console.print(table)
+    return 0
