@@ -20,7 +20,7 @@ import tempfile
 
 from rich.console import Console
 
-from ranger_sim.boards.main_brain import controllers
+from ranger_sim.boards.main_brain import controllers, programs
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.scenario import Scenario, StopRule
 from ranger_sim.tools.units import LENGTHS, quantity, whole_number
@@ -107,7 +107,7 @@ def register(commands: argparse._SubParsersAction) -> None:
 def parameter_step(text: str) -> tuple[str, float]:
     """An argparse type: NAME=STEP."""
     name, sign, step = text.partition("=")
-    known = controllers.parameter_rows()
+    known = programs.parameter_rows()
     if name not in known:
         raise argparse.ArgumentTypeError(f"{name!r}: no such parameter (`ranger-sim table list --board PC`)")
     try:
@@ -201,7 +201,7 @@ def search(
     judge: Judge, values: dict, changes: dict, steps: dict, rounds: int, worth: float
 ) -> tuple[dict, float, int]:
     """The pattern search: (changes, cost, falls). `values`: those of the base; `steps`: name -> first step."""
-    rows = controllers.parameter_rows()
+    rows = programs.parameter_rows()
     steps = dict(steps)
     cost, falls = judge(changes)
     for _ in range(rounds):

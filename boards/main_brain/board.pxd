@@ -17,6 +17,7 @@ cpdef enum:
 
 cdef class MainBrainBoard(FirmwareBoard):
     cdef public object distribution, controller
+    cdef public str program
     cdef public DataStore store
     cdef public SspPort ssp
     cdef public MainBrainSspLink link

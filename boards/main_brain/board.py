@@ -30,6 +30,7 @@ from ranger_sim.firmware_sim.peripherals.uart_hs import HsUart
 from ranger_sim.firmware_sim.scheduler import Schedule, Task
 from ranger_sim.firmware_sim.vic import DMA_DONE, FIQ, SOFTWARE
 from ranger_sim.foundation.events import SSP_SEGMENT, EventQueue
+from ranger_sim.foundation.user_error import UserError
 
 if not cython.compiled:
     EXECUTION_TIMER_HZ = 13_000_000  # Timer0 counts the peripheral clock (robot.md N3.8)
@@ -90,7 +91,10 @@ class MainBrainBoard(FirmwareBoard):
             dma_off_at_start=quirks.serial_dma_off_at_start,
         )
         self.estimator = Estimator(self.store, quirks, board.report)
-        self.modes = ModeMachine(self.store, quirks, self.estimator)
+        if not isinstance(controller, controllers.Controller):
+            controller = controllers.load(controller)
+        self.program = controller.program
+        self.modes = ModeMachine(self.store, quirks, self.estimator, self.program)
         self.distribution = ErrorDistribution(self.store, self.errors, quirks.error_distribution_inverted)
         self.controller = None
         self.load_controller(controller)
@@ -113,9 +117,16 @@ class MainBrainBoard(FirmwareBoard):
         self.start(self.schedule(), phase_ns)
 
     def load_controller(self, controller) -> None:
-        """Take over a parameter set; also while walking, as the computer's parameter page could."""
+        """Take over a parameter set; also while walking, as the computer's parameter page could.
+
+        UserError for a set of another program: that one is chosen at power-up, as code would be loaded.
+        """
         if not isinstance(controller, controllers.Controller):
             controller = controllers.load(controller)
+        if controller.program != self.program:
+            raise UserError(
+                f"controller {controller.name}: for program {controller.program!r}, this board runs {self.program!r}"
+            )
         self.controller = controller
         controller.apply(self.store)
 

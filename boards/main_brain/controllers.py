@@ -1,24 +1,25 @@
 """Controller parameter sets: what the computer would load into the main brain, and the operator's script.
 
-A set is a TOML file: `title`, `description`, [parameters] name = value, [reasons] name = "why", and
-[operator]. A set with `base = "other set"` holds only what differs, and each difference has a reason.
-Every parameter that the main brain's machines read has to have a value; units and ranges are those of
-the data table. Whatever is wrong is a UserError of one line: file, key, value, limit.
+A set is a TOML file: `title`, `description`, `program` (programs.py; `record` if not given), [parameters] name = value,
+[reasons] name = "why", and [operator]. A set with `base = "other set"` holds only what differs, and each difference has
+a reason. A base may be of another program: what both read is taken from it. Every parameter that the program's machines
+read has to have a value, and no other may be given; units and ranges are those of the data table. Whatever is wrong is
+a UserError of one line: file, key, value, limit.
 """
 
-import functools
 import math
 import pathlib
 import tomllib
 from dataclasses import dataclass, fields
 from typing import Any
 
+from ranger_sim.boards.main_brain import programs
+from ranger_sim.boards.main_brain.programs import parameter_rows
 from ranger_sim.datatable.generated import mb as table_ids
-from ranger_sim.datatable.loader import load_table
 from ranger_sim.foundation.user_error import UserError
 
 FOLDER = pathlib.Path(__file__).parent / "parameters"
-FIRST_OWN_ID = 314  # ids below are the robot's of 2016; its CTRL_ parameters belong to another controller
+DEFAULT_PROGRAM = "record"
 
 
 @dataclass(frozen=True)
@@ -67,12 +68,13 @@ KEY_LIMITS = {"key": (0, 5), "time_s": (0.0, 60.0), "hold_s": (0.05, 60.0)}
 
 @dataclass(frozen=True)
 class Controller:
-    """One parameter set: `values` by name, `changes` against its base, `reasons` by name."""
+    """One parameter set for `program`: `values` by name, `changes` against its base, `reasons` by name."""
 
     name: str
     path: str
     title: str
     description: str
+    program: str
     base: str | None
     values: dict
     changes: dict
@@ -83,16 +85,6 @@ class Controller:
         """Write every parameter into the data table, as the computer's link would."""
         for name, value in self.values.items():
             store.set_float(getattr(table_ids, name), value)
-
-
-@functools.cache
-def parameter_rows() -> dict:
-    """Rows of the master table that are parameters of this controller, by name."""
-    return {
-        row.name: row
-        for row in load_table().variables
-        if row.id >= FIRST_OWN_ID and row.publisher == "PC" and "MB" in row.subscribers
-    }
 
 
 def available() -> tuple:
@@ -111,7 +103,7 @@ def _load(name: str, users: tuple) -> Controller:
         raise UserError(f"controller {name!r}: unknown; there are {', '.join(available())}, or give a .toml file")
     data = _read(path)
     place = str(path)
-    _only(data, ("title", "description", "base", "parameters", "reasons", "operator"), place)
+    _only(data, ("title", "description", "program", "base", "parameters", "reasons", "operator"), place)
     title = _text(data, "title", place, path.stem)
     description = _text(data, "description", place, "")
     base_name = _text(data, "base", place, None)
@@ -120,10 +112,18 @@ def _load(name: str, users: tuple) -> Controller:
         if base_name in users or base_name == path.stem:
             raise UserError(f"{place}: base {base_name!r} leads back to this set")
         base = _load(base_name, (*users, path.stem))
+    program = _text(data, "program", place, base.program if base is not None else DEFAULT_PROGRAM)
+    if program not in programs.PROGRAMS:
+        raise UserError(f"{place}: program = {program!r}: unknown; there are {', '.join(programs.PROGRAMS)}")
+    needed = programs.program(program).parameters()
     changes = _parameters(_table(data, "parameters", place), place)
-    values = dict(base.values) if base is not None else {}
+    for each in changes:
+        if each not in needed:
+            raise UserError(f"{place}: [parameters] {each}: the program {program!r} does not read it")
+    values = {each: value for each, value in base.values.items() if each in needed} if base is not None else {}
+    differences = [each for each in changes if each in values]
     values.update(changes)
-    missing = [each for each in parameter_rows() if each not in values]
+    missing = [each for each in parameter_rows() if each in needed and each not in values]
     if missing:
         raise UserError(f"{place}: [parameters] lacks {', '.join(missing)}; give them or a base")
     reasons = _table(data, "reasons", place)
@@ -132,17 +132,16 @@ def _load(name: str, users: tuple) -> Controller:
             raise UserError(f"{place}: [reasons] {each}: no such entry in [parameters]")
         if not isinstance(reason, str) or not reason.strip():
             raise UserError(f"{place}: [reasons] {each} = {reason!r}: a sentence is expected")
-    if base is not None:
-        unexplained = [each for each in changes if each not in reasons]
-        if unexplained:
-            raise UserError(f"{place}: [reasons] lacks {', '.join(unexplained)}: each difference needs a reason")
+    unexplained = [each for each in differences if each not in reasons]
+    if unexplained:
+        raise UserError(f"{place}: [reasons] lacks {', '.join(unexplained)}: each difference needs a reason")
     if "operator" in data:
         operator = _operator(_table(data, "operator", place), place)
     elif base is not None:
         operator = base.operator
     else:
         raise UserError(f"{place}: [operator] is missing; give it or a base")
-    return Controller(path.stem, place, title, description, base_name, values, changes, reasons, operator)
+    return Controller(path.stem, place, title, description, program, base_name, values, changes, reasons, operator)
 
 
 def _read(path: pathlib.Path) -> dict:

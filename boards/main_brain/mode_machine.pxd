@@ -1,7 +1,4 @@
 from ranger_sim.boards.main_brain.estimator cimport Estimator
-from ranger_sim.boards.main_brain.foot_machines cimport FootMachine
-from ranger_sim.boards.main_brain.hip_machine cimport HipMachine
-from ranger_sim.boards.main_brain.leg_machine cimport LegMachine
 from ranger_sim.boards.main_brain.state_machine cimport State, StateMachine
 from ranger_sim.boards.main_brain.steering_machine cimport SteeringMachine
 from ranger_sim.datatable.store cimport DataStore
@@ -23,9 +20,7 @@ cdef class ModeMachine:
     cdef public long long FSM_UI, FSM_RESET, EST_UI_FSM_MODE, UI_SET_LED_1, UI_SET_LED_3
     cdef public long long UI_EMPTY_TX2, MCSI_COMMAND_CURRENT, MCSI_STIFFNESS, MCSI_DAMPNESS
     cdef public list lcd_ids
-    cdef public LegMachine leg
-    cdef public HipMachine hip
-    cdef public FootMachine inner_foot, outer_foot
+    cdef public object leg, hip, inner_foot, outer_foot  # of whichever program
     cdef public SteeringMachine steering
     cdef public long long buttons, pressed, last_song_steps, page, page_time, late_push_light
     cdef public StateMachine machine

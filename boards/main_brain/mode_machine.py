@@ -8,10 +8,8 @@ light 1 as in 2016 (robot.md N6.4) where the mode exists there.
 
 import cython
 
+from ranger_sim.boards.main_brain import programs
 from ranger_sim.boards.main_brain.command import table_id
-from ranger_sim.boards.main_brain.foot_machines import FootMachine
-from ranger_sim.boards.main_brain.hip_machine import HipMachine
-from ranger_sim.boards.main_brain.leg_machine import LegMachine
 from ranger_sim.boards.main_brain.state_machine import State, StateMachine
 from ranger_sim.boards.main_brain.steering_machine import SteeringMachine
 from ranger_sim.datatable.store import DataStore
@@ -67,20 +65,18 @@ def lcd_words(upper, lower):
 
 
 class ModeMachine:
-    """update() once per slot, after the estimator. Holds every machine of the walk.
+    """update() once per slot, after the estimator. Holds every machine of the walk: those of `program` (programs.py)
+    and steering.
 
     More than 40 fields: half are the numbers of its variables in the data table, as in the estimator.
     """
 
-    def __init__(self, store, quirks, estimator) -> None:
+    def __init__(self, store, quirks, estimator, program="record") -> None:
         self.store = store
         self.estimator = estimator
         for name in READS + WRITES:
             setattr(self, name, table_id(name))
-        self.leg = LegMachine(store, quirks)
-        self.hip = HipMachine(store)
-        self.inner_foot = FootMachine(store, quirks, True)
-        self.outer_foot = FootMachine(store, quirks, False)
+        self.leg, self.hip, self.inner_foot, self.outer_foot = programs.program(program).build(store, quirks)
         self.steering = SteeringMachine(store)
         walk_machines = (
             self.leg.machine,  # first: the others see its figures in the same tick

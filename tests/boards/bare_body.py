@@ -69,7 +69,7 @@ class BareRobot:
         self.controller.apply(self.store)
         self.errors = []
         self.estimator = Estimator(self.store, quirks, self.errors.append)
-        self.modes = ModeMachine(self.store, quirks, self.estimator)
+        self.modes = ModeMachine(self.store, quirks, self.estimator, self.controller.program)
         self.body = Body(body_parameters, floor)
         self.gyro_bias = gyro_bias
         self.hip = Joint(66.0, -4.0, 4.0, 0.417)

@@ -15,10 +15,11 @@ class Bench:
     def __init__(self, controller="record-2011", quirks=None) -> None:
         quirks = quirks if quirks is not None else Quirks()
         self.store = DataStore(TABLE_SIZE)
-        controllers.load(controller).apply(self.store)
+        chosen = controllers.load(controller)
+        chosen.apply(self.store)
         self.errors = []
         self.estimator = Estimator(self.store, quirks, self.errors.append)
-        self.modes = ModeMachine(self.store, quirks, self.estimator)
+        self.modes = ModeMachine(self.store, quirks, self.estimator, chosen.program)
         self.ms = 0
         self.set(MCFI_MID_ANKLE_ANGLE=1.68, MCFO_RIGHT_ANKLE_ANGLE=1.68)
 

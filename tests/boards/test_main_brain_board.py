@@ -5,7 +5,7 @@ import re
 
 import pytest
 
-from ranger_sim.boards.main_brain import controllers
+from ranger_sim.boards.main_brain import controllers, programs
 from ranger_sim.boards.main_brain.board import MainBrainBoard
 from ranger_sim.boards.main_brain.error_distribution import ErrorDistribution, ErrorRing
 from ranger_sim.boards.modules.error_module import ErrorModule, error_word
@@ -357,6 +357,7 @@ def test_by_quirk_each_report_carries_the_error_before():
 def test_every_table_number_that_a_compiled_class_declares_is_filled_in(board):
     folder = pathlib.Path(controllers.__file__).parent
     modes = board.modes
+    reflex = programs.program("reflex").build(board.store, Quirks())
     owners = {
         "estimator": board.estimator,
         "mode_machine": modes,
@@ -364,6 +365,9 @@ def test_every_table_number_that_a_compiled_class_declares_is_filled_in(board):
         "hip_machine": modes.hip,
         "foot_machines": modes.inner_foot,
         "steering_machine": modes.steering,
+        "reflex_leg": reflex.leg,
+        "reflex_hip": reflex.hip,
+        "reflex_feet": reflex.inner_foot,
     }
     for name, owner in owners.items():
         declared = set()

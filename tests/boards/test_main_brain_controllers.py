@@ -4,23 +4,70 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from ranger_sim.boards.main_brain import controllers
+from ranger_sim.boards.main_brain import controllers, programs
+from ranger_sim.boards.main_brain.board import MainBrainBoard
+from ranger_sim.boards.quirks import Quirks
 from ranger_sim.datatable.generated import mb as table
 from ranger_sim.datatable.generated.all_variables import TABLE_SIZE
 from ranger_sim.datatable.store import DataStore
+from ranger_sim.firmware_sim.clock import Crystal
 from ranger_sim.foundation.user_error import UserError
 
 
-def test_both_sets_load_and_give_every_parameter():
-    assert {"record-2011", "robust"} <= set(controllers.available())
+def test_every_set_loads_and_gives_the_parameters_of_its_program_and_no_others():
+    assert {"record-2011", "robust", "reflex"} <= set(controllers.available())
     for name in controllers.available():
         controller = controllers.load(name)
-        assert set(controller.values) == set(controllers.parameter_rows())
+        assert set(controller.values) == programs.program(controller.program).parameters()
         assert controller.name == name
+    assert controllers.load("robust").program == "record" and controllers.load("reflex").program == "reflex"
 
 
-def test_the_record_set_is_what_the_table_starts_with():
-    for name, value in controllers.load("record-2011").values.items():
+def test_every_parameter_of_the_table_is_read_by_a_program():
+    read = set().union(*(each.parameters() for each in programs.PROGRAMS.values()))
+    assert read == set(programs.parameter_rows())
+
+
+def test_a_base_of_another_program_gives_what_both_read(tmp_path):
+    reflex, record = controllers.load("reflex"), controllers.load("record-2011")
+    assert reflex.base == "record-2011"
+    shared = set(reflex.values) & set(record.values)
+    assert {"P_E_GYRO_BIAS", "P_S_MAX_CUR", "P_HI_SH_H_TANG", "P_UI_LCD_TIME", "D_UI_STOP_ON_FALL"} <= shared
+    assert all(reflex.values[name] == record.values[name] for name in shared - set(reflex.changes))
+    # what differs from the base needs a reason, what the base does not have needs none
+    assert set(reflex.reasons) == set(reflex.changes) & shared
+    path = write(tmp_path, 'base = "reflex"\n')
+    assert controllers.load(path).program == "reflex"
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ('program = "dance"\n', ("dance", "record", "reflex")),
+        ("program = 3\n", ("program", "3", "text")),
+        ('base = "reflex"\n[parameters]\nC_H_PM_H_RATE = 3.0\n', ("C_H_PM_H_RATE", "'reflex' does not read it")),
+        ('base = "record-2011"\n[parameters]\nR_W_REF = -0.5\n', ("R_W_REF", "'record' does not read it")),
+        ('base = "record-2011"\nprogram = "reflex"\n', ("lacks", "R_W_REF", "R_F_FD_KV")),
+    ],
+)
+def test_a_set_that_does_not_fit_its_program_gets_one_clear_line(tmp_path, text, words):
+    with pytest.raises(UserError) as caught:
+        controllers.load(write(tmp_path, text))
+    assert "\n" not in str(caught.value)
+    for word in words:
+        assert word in str(caught.value)
+
+
+def test_a_board_does_not_take_the_set_of_another_program():
+    board = MainBrainBoard(Crystal(), Quirks(), 0, "reflex")
+    board.load_controller("reflex")
+    with pytest.raises(UserError, match="robust.*'record'.*'reflex'"):
+        board.load_controller("robust")
+    assert board.controller.name == "reflex"
+
+
+def test_the_first_set_of_each_program_is_what_the_table_starts_with():
+    for name, value in {**controllers.load("reflex").values, **controllers.load("record-2011").values}.items():
         assert value == pytest.approx(table.INITIAL[getattr(table, name)], rel=1e-7)  # single precision
 
 

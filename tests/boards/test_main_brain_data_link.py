@@ -299,7 +299,9 @@ def test_a_packet_cut_in_two_waits_for_its_rest(desk):
     assert desk.board.store.get_float(table.C_F_ST_F_ANG) == 4.5 and desk.errors() == {}
 
 
-@pytest.mark.parametrize("number", [table.MCH_ANGLE, table.TIMESTAMP, table.MCH_COMMAND_CURRENT, 433, 0xFFFF])
+@pytest.mark.parametrize(
+    "number", [table.MCH_ANGLE, table.TIMESTAMP, table.MCH_COMMAND_CURRENT, ID_OF_LAST + 1, 0xFFFF]
+)
 def test_a_packet_that_writes_no_parameter_is_an_error_and_changes_nothing(desk, number):
     desk.send(packet(number, 0x12345678))
     desk.run_ms(44)
@@ -310,7 +312,7 @@ def test_a_packet_that_writes_no_parameter_is_an_error_and_changes_nothing(desk,
 
 def test_the_firmware_of_2016_writes_whatever_it_is_told():
     desk = Desk(Quirks(parameter_writes_checked=False))
-    desk.send(packet(table.MCFO_SHUTDOWN, 7) + packet(433, 1))
+    desk.send(packet(table.MCFO_SHUTDOWN, 7) + packet(ID_OF_LAST + 1, 1))
     desk.run_ms(44)
     assert desk.board.store.get_word(table.MCFO_SHUTDOWN) == 7
     assert desk.errors() == {"MB_IO_ID_OOR": 1}

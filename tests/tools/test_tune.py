@@ -2,7 +2,7 @@
 
 import pytest
 
-from ranger_sim.boards.main_brain import controllers
+from ranger_sim.boards.main_brain import controllers, programs
 from ranger_sim.tools import cli, tune
 
 BASE = controllers.load("record-2011").values
@@ -70,7 +70,7 @@ def test_values_stay_within_the_ranges_of_the_data_table():
         return -seen[-1], 0  # the higher the better
 
     tune.search(judge, BASE, {}, {"P_F_FU_H_ANG": 0.4}, rounds=4, worth=0.001)
-    limit = controllers.parameter_rows()["P_F_FU_H_ANG"].maximum
+    limit = programs.parameter_rows()["P_F_FU_H_ANG"].maximum
     assert max(seen) == limit
 
 

@@ -446,6 +446,36 @@
 #define FSM_FI 430
 #define FSM_FO 431
 #define FSM_STEER 432
+#define R_W_REF 433
+#define R_DW_MAX 434
+#define R_H_SW_I0 435
+#define R_H_SW_DW 436
+#define R_H_PL_PHI 437
+#define R_H_PL_I0 438
+#define R_H_PL_DW 439
+#define R_H_PL_KP 440
+#define R_H_PL_KV 441
+#define R_F_ST_I0 442
+#define R_F_ST_KP 443
+#define R_F_ST_KV 444
+#define R_F_PP_PHI 445
+#define R_F_PP_I0 446
+#define R_F_PP_DW 447
+#define R_F_PP_KV 448
+#define R_F_PU_I0 449
+#define R_F_PU_DW 450
+#define R_F_PU_KV 451
+#define R_F_PU_ANG 452
+#define R_F_PU_TIME 453
+#define R_F_FU_I0 454
+#define R_F_FU_KP 455
+#define R_F_FU_KV 456
+#define R_F_FD_PHI 457
+#define R_F_FD_Q3 458
+#define R_F_FD_I0 459
+#define R_F_FD_KP 460
+#define R_F_FD_KV 461
+#define E_R_DW 462
 
 /* the board's copy of the values */
 struct mb_data {
@@ -882,6 +912,36 @@ struct mb_data {
     int32_t fsm_fi; /* 430 state of the inner foot machine */
     int32_t fsm_fo; /* 431 state of the outer foot machine */
     int32_t fsm_steer; /* 432 state of the steering machine */
+    float r_w_ref; /* 433 [rad/s] reflex: stance leg rate aimed at in mid-stance, as of phi */
+    float r_dw_max; /* 434 [rad/s] reflex: largest deviation from it that is answered */
+    float r_h_sw_i0; /* 435 [A] reflex: hip, swing: current */
+    float r_h_sw_dw; /* 436 [A s/rad] reflex: hip, swing: current per deviation dw */
+    float r_h_pl_phi; /* 437 [rad] reflex: hip, place: begins below this angle of the stance leg */
+    float r_h_pl_i0; /* 438 [A] reflex: hip, place: current */
+    float r_h_pl_dw; /* 439 [A s/rad] reflex: hip, place: current per deviation dw */
+    float r_h_pl_kp; /* 440 [A/rad] reflex: hip, place: current per q3 */
+    float r_h_pl_kv; /* 441 [A s/rad] reflex: hip, place: current per rate of q3 */
+    float r_f_st_i0; /* 442 [A] reflex: ankle, stance: current */
+    float r_f_st_kp; /* 443 [A/rad] reflex: ankle, stance: current per motor angle */
+    float r_f_st_kv; /* 444 [A s/rad] reflex: ankle, stance: current per motor rate */
+    float r_f_pp_phi; /* 445 [rad] reflex: ankle, prepush: begins below this angle of its leg */
+    float r_f_pp_i0; /* 446 [A] reflex: ankle, prepush: current */
+    float r_f_pp_dw; /* 447 [A s/rad] reflex: ankle, prepush: current per deviation dw */
+    float r_f_pp_kv; /* 448 [A s/rad] reflex: ankle, prepush: current per motor rate */
+    float r_f_pu_i0; /* 449 [A] reflex: ankle, push: current */
+    float r_f_pu_dw; /* 450 [A s/rad] reflex: ankle, push: current per deviation dw */
+    float r_f_pu_kv; /* 451 [A s/rad] reflex: ankle, push: current per motor rate */
+    float r_f_pu_ang; /* 452 [rad] reflex: ankle, push: ends beyond this motor angle */
+    float r_f_pu_time; /* 453 [ms] reflex: ankle, push: ends after this time */
+    float r_f_fu_i0; /* 454 [A] reflex: ankle, flip-up: current */
+    float r_f_fu_kp; /* 455 [A/rad] reflex: ankle, flip-up: current per motor angle */
+    float r_f_fu_kv; /* 456 [A s/rad] reflex: ankle, flip-up: current per motor rate */
+    float r_f_fd_phi; /* 457 [rad] reflex: ankle, flip-down: begins below this angle of the stance leg and ... */
+    float r_f_fd_q3; /* 458 [rad] reflex: ankle, flip-down: ... below this q3 */
+    float r_f_fd_i0; /* 459 [A] reflex: ankle, flip-down: current */
+    float r_f_fd_kp; /* 460 [A/rad] reflex: ankle, flip-down: current per motor angle */
+    float r_f_fd_kv; /* 461 [A s/rad] reflex: ankle, flip-down: current per motor rate */
+    float e_r_dw; /* 462 [rad/s] reflex: deviation of the last mid-stance, of the stance leg's rate as of phi */
 };
 
 extern const struct mb_data mb_initial;

@@ -34,6 +34,7 @@ class ComputerPort(NamedTuple):
 class MainBrainBoard(FirmwareBoard):
     distribution: Any
     controller: Any
+    program: str
     store: DataStore
     ssp: SspPort
     link: MainBrainSspLink

@@ -6,6 +6,7 @@ from ranger_sim.datatable.store import DataStore
 from typing import Any
 
 COMMON: tuple[str, ...]
+OF_ONE_PAIR: tuple[str, ...]
 
 class FootMachine:
     store: DataStore

@@ -1,9 +1,6 @@
 # Generated from boards/main_brain/mode_machine.py and boards/main_brain/mode_machine.pxd (python -m ranger_sim.tools.stubs); do not edit.
 
 from ranger_sim.boards.main_brain.estimator import Estimator
-from ranger_sim.boards.main_brain.foot_machines import FootMachine
-from ranger_sim.boards.main_brain.hip_machine import HipMachine
-from ranger_sim.boards.main_brain.leg_machine import LegMachine
 from ranger_sim.boards.main_brain.state_machine import StateMachine
 from ranger_sim.boards.main_brain.steering_machine import SteeringMachine
 from ranger_sim.datatable.store import DataStore
@@ -49,10 +46,10 @@ class ModeMachine:
     MCSI_STIFFNESS: int
     MCSI_DAMPNESS: int
     lcd_ids: list[Any]
-    leg: LegMachine
-    hip: HipMachine
-    inner_foot: FootMachine
-    outer_foot: FootMachine
+    leg: Any
+    hip: Any
+    inner_foot: Any
+    outer_foot: Any
     steering: SteeringMachine
     buttons: int
     pressed: int
@@ -61,7 +58,7 @@ class ModeMachine:
     page_time: int
     late_push_light: int
     machine: StateMachine
-    def __init__(self, store: DataStore, quirks: Any, estimator: Estimator) -> None: ...
+    def __init__(self, store: DataStore, quirks: Any, estimator: Estimator, program: Any = 'record') -> None: ...
     def update(self) -> None: ...
     def publish_state(self, number: Any) -> None: ...
     def motors_off(self) -> None: ...

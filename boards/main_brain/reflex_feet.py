@@ -1,0 +1,198 @@
+"""The machines of the two ankle motors in the program "reflex", from one description.
+
+Source: robot.md P4. In each state the current is I0 + Kp q_m + Kv q_m', with q_m the motor's angle from the ankle's
+zero, 1.68 rad (robot.md C1.1). The board's law is I = I0 - K p - D p' with p = q_m + 1.68 (robot.md C1.2), so K = -Kp,
+D = -Kv, and I0 less Kp times 1.68 is sent. phi and q3 as in reflex_leg.py and reflex_hip.py.
+
+A state's dw shifts I0 per rad/s. The start is the record walk's: the outer feet stand stiff and skip their first push,
+the inner ones come down as in a flip-down.
+"""
+
+import cython
+
+from ranger_sim.boards.main_brain.command import MotorCommand, table_id
+from ranger_sim.boards.main_brain.state_machine import ANY, State, StateMachine
+from ranger_sim.datatable.store import DataStore
+
+READS = (
+    "MCH_ANGLE",
+    "E_SWING_LEG",
+    "E_R_DW",
+    "FSM_RESET",
+    "C_F_SST_F_ANG",
+    "C_F_SST_F_RATE",
+    "P_F_SST_F_TANG",
+    "R_F_ST_I0",
+    "R_F_ST_KP",
+    "R_F_ST_KV",
+    "R_F_PP_PHI",
+    "R_F_PP_I0",
+    "R_F_PP_DW",
+    "R_F_PP_KV",
+    "R_F_PU_I0",
+    "R_F_PU_DW",
+    "R_F_PU_KV",
+    "R_F_PU_ANG",
+    "R_F_PU_TIME",
+    "R_F_FU_I0",
+    "R_F_FU_KP",
+    "R_F_FU_KV",
+    "R_F_FD_PHI",
+    "R_F_FD_Q3",
+    "R_F_FD_I0",
+    "R_F_FD_KP",
+    "R_F_FD_KV",
+)
+
+
+class ReflexFootMachine:
+    """inner: True for the inner ankles. `machine` is stepped after the hip machine, inner feet first.
+
+    States 0 start ... 5 flipdown.
+    """
+
+    def __init__(self, store, inner: cython.bint) -> None:
+        own, board = ("FI", "MCFI") if inner else ("FO", "MCFO")
+        self.store = store
+        self.inner = inner
+        self.hip_sign = 1.0 if inner else -1.0  # of the hip angle, positive while the own legs are ahead
+        self.own_swing = 1 if inner else 0  # value of E_SWING_LEG while the own legs swing
+        self.zero = 1.68  # rad (robot.md C1.1)
+        for name in READS:
+            setattr(self, name, table_id(name))
+        self.motor_position = table_id(f"{board}_MOTOR_POSITION")
+        self.own_angle = table_id("E_LI_ANGLE" if inner else "E_LO_ANGLE")
+        self.other_angle = table_id("E_LO_ANGLE" if inner else "E_LI_ANGLE")
+        self.push_to_strike = table_id(f"E_{own}_PP2HS_TIME")
+        self.missed_pushes = table_id(f"E_{own}_PP_MISSED")
+        self.state_number = table_id(f"FSM_{own}")
+        motor: object = MotorCommand(store, board)  # untyped, so that its methods are plain ones
+        self.motor = motor
+        self.prepush_ms = 0
+        self.push_ms = 0
+        self.machine = StateMachine(
+            "inner foot" if inner else "outer foot",
+            states=(
+                #     no. name        entry               main
+                State(0, "start", None, self.flip_down if inner else self.hold_standing),
+                State(1, "stance", None, self.stand),
+                State(2, "prepush", self.enter_prepush, self.prepare_push),
+                State(3, "push", self.enter_push, self.push),
+                State(4, "flipup", None, self.flip_up),
+                State(5, "flipdown", None, self.flip_down),
+            ),
+            transitions=(
+                # from                           to         when
+                (ANY, "start", self.reset_wanted),
+                ("start", "stance", self.own_foot_struck) if inner else ("start", "flipup", self.other_foot_struck),
+                (("stance", "prepush"), "push", self.other_foot_struck),
+                ("stance", "prepush", self.leg_leans_far_enough),
+                ("push", "flipup", self.push_is_done),
+                (("flipup", "flipdown"), "stance", self.own_foot_struck),
+                ("flipup", "flipdown", self.leg_swung_far_enough),
+            ),
+            on_change=self.publish_state,
+        )
+
+    def publish_state(self, number) -> None:
+        self.store.set_int(self.state_number, number)
+
+    # -- actions ---------------------------------------------------------------------------------
+
+    def send(self, I0: float, Kp: float, Kv: float) -> None:
+        """I = I0 + Kp q_m + Kv q_m', in A, A/rad, A s/rad."""
+        self.motor.send(I0 - Kp * self.zero, -Kp, -Kv)
+
+    def hold_standing(self) -> None:
+        """Outer start: stiff, by the hip angle alone."""
+        store: DataStore = self.store
+        stiffness: float = store.get_float(self.C_F_SST_F_ANG)
+        self.motor.send(
+            stiffness * (store.get_float(self.P_F_SST_F_TANG) - 0.5 * store.get_float(self.MCH_ANGLE)),
+            stiffness,
+            store.get_float(self.C_F_SST_F_RATE),
+        )
+
+    def stand(self) -> None:
+        store: DataStore = self.store
+        self.send(
+            store.get_float(self.R_F_ST_I0),
+            store.get_float(self.R_F_ST_KP),
+            store.get_float(self.R_F_ST_KV),
+        )
+
+    def enter_prepush(self) -> None:
+        self.prepush_ms = 0
+
+    def prepare_push(self) -> None:
+        """The ankle pushes while the other foot comes down."""
+        store: DataStore = self.store
+        self.prepush_ms += 2
+        self.send(
+            store.get_float(self.R_F_PP_I0) + store.get_float(self.R_F_PP_DW) * store.get_float(self.E_R_DW),
+            0.0,
+            store.get_float(self.R_F_PP_KV),
+        )
+
+    def enter_push(self) -> None:
+        """The other foot has landed; a push that was not prepared is counted as missed, as in the record walk."""
+        store: DataStore = self.store
+        self.push_ms = 0
+        if self.prepush_ms == 0:
+            store.set_int(self.missed_pushes, store.get_int(self.missed_pushes) + 1)
+        store.set_int(self.push_to_strike, self.prepush_ms)
+        self.prepush_ms = 0
+
+    def push(self) -> None:
+        store: DataStore = self.store
+        self.push_ms += 2
+        self.send(
+            store.get_float(self.R_F_PU_I0) + store.get_float(self.R_F_PU_DW) * store.get_float(self.E_R_DW),
+            0.0,
+            store.get_float(self.R_F_PU_KV),
+        )
+
+    def flip_up(self) -> None:
+        store: DataStore = self.store
+        self.send(
+            store.get_float(self.R_F_FU_I0),
+            store.get_float(self.R_F_FU_KP),
+            store.get_float(self.R_F_FU_KV),
+        )
+
+    def flip_down(self) -> None:
+        store: DataStore = self.store
+        self.send(
+            store.get_float(self.R_F_FD_I0),
+            store.get_float(self.R_F_FD_KP),
+            store.get_float(self.R_F_FD_KV),
+        )
+
+    # -- conditions ------------------------------------------------------------------------------
+
+    def reset_wanted(self) -> cython.bint:
+        return self.store.get_int(self.FSM_RESET) == 1
+
+    def own_foot_struck(self) -> cython.bint:
+        return self.store.get_int(self.E_SWING_LEG) != self.own_swing
+
+    def other_foot_struck(self) -> cython.bint:
+        return self.store.get_int(self.E_SWING_LEG) == self.own_swing
+
+    def leg_leans_far_enough(self) -> cython.bint:
+        """phi < b."""
+        return -self.store.get_float(self.own_angle) < self.store.get_float(self.R_F_PP_PHI)
+
+    def push_is_done(self) -> cython.bint:
+        """The motor has turned far enough, or for long enough."""
+        store: DataStore = self.store
+        return store.get_float(self.motor_position) - self.zero > store.get_float(
+            self.R_F_PU_ANG
+        ) or self.push_ms >= store.get_float(self.R_F_PU_TIME)
+
+    def leg_swung_far_enough(self) -> cython.bint:
+        """phi < c and q3 < e, of the leg that stands now."""
+        store: DataStore = self.store
+        return -store.get_float(self.other_angle) < store.get_float(self.R_F_FD_PHI) and (
+            -self.hip_sign * store.get_float(self.MCH_ANGLE) < store.get_float(self.R_F_FD_Q3)
+        )
