@@ -1,6 +1,7 @@
 """The tuner: its search by a known valley, its cost by known walks, its file by loading it."""
 
 import pytest
+from rich.console import Console
 
 from ranger_sim.boards.main_brain import controllers, programs
 from ranger_sim.tools import cli, tune
@@ -89,6 +90,70 @@ def test_any_fall_costs_more_than_a_walk_at_all_limits_and_an_early_one_most():
     assert early > late > tune.cost_of({**GOOD, **at_limits}, 100)
 
 
+def test_for_energy_a_walk_costs_its_cost_of_transport_and_never_as_much_as_a_fall():
+    assert tune.cost_of(GOOD, 100, "energy") == pytest.approx(28.0)
+    latest_fall = tune.cost_of({**GOOD, "fell": True, "steps": 99}, 100, "energy")
+    assert tune.cost_of({**GOOD, "tcot": 5.0}, 100, "energy") < latest_fall
+
+
+class Valley:
+    """`valley` as a judge; remembers what it was asked."""
+
+    def __init__(self):
+        self.asked = []
+
+    def __call__(self, changes):
+        self.asked.append(changes)
+        return valley(changes)
+
+    def all(self, candidates):
+        return [self(changes) for changes in candidates]
+
+
+def test_the_evolution_finds_the_bottom_of_the_valley_and_never_loses_its_best():
+    steps = {"P_H_PM_H_TRATE": 0.4, "C_H_OUTER_STIFFNESS": 1.0}
+    costs = [cost for _, cost, _ in tune.evolve(Valley(), BASE, {}, steps, 30, 8, 1)]
+    assert costs == sorted(costs, reverse=True) and len(costs) == 31
+    assert costs[0] == pytest.approx(0.65) and costs[-1] < 1e-3  # begins at 2 rad/s and 2 A/rad
+
+
+def test_the_evolution_keeps_to_the_tables_ranges_and_moves_twins_together():
+    judge = Valley()
+    list(tune.evolve(judge, BASE, {}, {"P_FO_PP_THEIGHT": 1.0, "P_FI_PP_THEIGHT": 1.0}, 2, 8, 1))
+    limit = programs.parameter_rows()["P_FO_PP_THEIGHT"].maximum
+    tried = [changes for changes in judge.asked if changes]
+    assert {changes["P_FO_PP_THEIGHT"] for changes in tried} >= {0.0, limit}  # both ends: 1 m is far beyond 0 and 0.1
+    assert all(changes["P_FO_PP_THEIGHT"] == changes["P_FI_PP_THEIGHT"] for changes in tried)
+    assert all(0.0 <= changes["P_FO_PP_THEIGHT"] <= limit for changes in tried)
+
+
+def test_the_same_seed_gives_the_same_evolution_and_another_one_another():
+    steps = {"P_H_PM_H_TRATE": 0.4, "C_H_OUTER_STIFFNESS": 1.0}
+    asked = []
+    for seed in (1, 1, 2):
+        judge = Valley()
+        list(tune.evolve(judge, BASE, {}, steps, 2, 6, seed))
+        asked.append(judge.asked)
+    assert asked[0] == asked[1] != asked[2]
+
+
+def test_default_steps_are_of_parameters_that_the_program_reads():
+    for name, steps in tune.DEFAULT_STEPS.items():
+        assert set(steps) <= programs.program(name).parameters()
+    assert set(tune.DEFAULT_STEPS) == set(programs.PROGRAMS)
+
+
+def test_candidates_walk_the_same_in_processes_of_their_own(tmp_path):
+    task = tune.Task("robust", 6, (1, 2), (0.0,), aim="energy")
+    candidates = [{}, {"P_F_PP_F_TANG": 0.22}, {}]
+    found = []
+    for jobs in (1, 2):
+        with tune.workers(jobs) as each:
+            found.append(tune.Judge(task, tmp_path, Console(quiet=True), each).all(candidates))
+    assert found[0] == found[1] and found[0][0] == found[0][2]
+    assert not list(tmp_path.iterdir())
+
+
 def test_the_written_file_is_a_parameter_set(tmp_path):
     path = tmp_path / "found.toml"
     path.write_text(tune.as_toml("record-2011", "found", {"P_F_FU_H_ANG": 0.13}, {"P_F_FU_H_ANG": "clearance"}))
@@ -105,6 +170,15 @@ def test_the_command_walks_the_whole_robot_and_writes_what_it_found(tmp_path):
     assert controllers.load(str(path)).values == controllers.load("robust").values
 
 
+def test_the_evolution_as_a_command_writes_its_best(tmp_path):
+    path = tmp_path / "found.toml"
+    options = ["--base", "reflex", "--method", "evolution", "--aim", "energy", "--steps", "6", "--seeds", "1"]
+    options += ["--floor-roughness", "0", "--generations", "1", "--population", "4", "--spread", "0.1", "--jobs", "2"]
+    assert cli.main(["tune", *options, "--out", str(path)]) == 0
+    found = controllers.load(str(path))
+    assert found.program == "reflex" and set(found.changes) <= set(tune.REFLEX_STEPS)
+
+
 @pytest.mark.parametrize(
     "options",
     [
@@ -112,6 +186,10 @@ def test_the_command_walks_the_whole_robot_and_writes_what_it_found(tmp_path):
         ["--out", "no/such/folder/found.toml"],
         ["--start", "nobody", "--out", "found.toml"],
         ["--vary", "P_NO_SUCH=1", "--out", "found.toml"],
+        ["--vary", "R_W_REF=0.1", "--out", "found.toml"],
+        ["--start", "reflex", "--out", "found.toml"],
+        ["--body", "snowman", "--out", "found.toml"],
+        ["--aim", "fame", "--out", "found.toml"],
         ["--vary", "P_F_FU_H_ANG=0", "--out", "found.toml"],
         ["--floor-roughness", "far", "--out", "found.toml"],
     ],
