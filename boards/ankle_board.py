@@ -10,7 +10,7 @@ import cython
 from ranger_sim.boards.modules.foot_contact import FootContact
 from ranger_sim.boards.modules.joint_safety import AnkleSafety
 from ranger_sim.boards.modules.limit_switch import LimitSwitch
-from ranger_sim.boards.motor_board import PINS, MotorBoard
+from ranger_sim.boards.motor_board import CONVERSION_NS, PINS, MotorBoard
 from ranger_sim.datatable.generated import errors as codes
 
 if not cython.compiled:
@@ -41,6 +41,8 @@ FOOT_ON_LEVEL = 2000  # counts
 FOOT_OFF_LEVEL = 1000
 REZERO_ANGLE_RAD = 0.3
 REZERO_RATE_RAD_S = 0.01
+# Setting the motor's angle costs this beside the look (robot.md T2): the hip's whole re-zeroing, less its look.
+SET_CYCLES = 2 * (3610 - 161)
 
 
 class AnkleBoard(MotorBoard):
@@ -72,6 +74,7 @@ class AnkleBoard(MotorBoard):
             sign=sign,
             largest_duty=300,
             gear=GEAR,
+            conversion_ns=CONVERSION_NS,
         )
         self.add_encoders(phase_ns, cap01=motor_encoder, cap23=joint_encoder)
         self.motor = self.cap01
@@ -117,6 +120,7 @@ class AnkleBoard(MotorBoard):
         rate: cython.longlong = self.joint.rate
         if self.encoder.angle < self.rezero_angle and -self.rezero_rate < rate < self.rezero_rate:
             self.rezero_motor(self.rezero_share)
+            self.spend(SET_CYCLES)
 
     # --- what is published ------------------------------------------------------------------------------
 

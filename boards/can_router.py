@@ -29,7 +29,7 @@ from ranger_sim.firmware_sim.peripherals.gpio import Gpio
 from ranger_sim.firmware_sim.peripherals.ssp import SspPort, SspSegment
 from ranger_sim.firmware_sim.peripherals.timer_capture import TimerCapture
 from ranger_sim.firmware_sim.scheduler import Schedule, Task
-from ranger_sim.firmware_sim.vic import FIQ, TIMER_MATCH
+from ranger_sim.firmware_sim.vic import FIQ, FIQ_LATENCY, TIMER_MATCH
 from ranger_sim.foundation.events import CAN_RX, CAN_STATUS, CAN_TX_DONE, SSP_SEGMENT
 
 if not cython.compiled:
@@ -51,7 +51,7 @@ if not cython.compiled:
 
 # Cycles of the interrupts and of the main loop, chosen by us, because no cycle count of this firmware is
 # known; each is an estimate of instructions and of accesses over the slow peripheral bus.
-RECEIVE_CYCLES = 90  # assembler: four registers of the controller into the ring, release
+RECEIVE_CYCLES = 2 * 27 - FIQ_LATENCY  # as counted on the motor boards (robot.md T2)
 SEGMENT_TIMER_CYCLES = 140  # counters, segment bookkeeping, transmit interrupt on
 # 31 half-words pass a FIFO of eight: about eight entries of 30 cycles, and 14 cycles per half-word both ways
 SEGMENT_CYCLES = 240
@@ -189,7 +189,12 @@ class CanRouterBoard(FirmwareBoard):
         return counters.of_board(self, can, self.link, router)
 
     def schedule(self) -> Schedule:
-        """Source: robot.md N3.7. Costs and limits are chosen by us: no execution times of this board are known."""
+        """Source: robot.md N3.7.
+
+        No execution times of this board are known: functions that the motor boards have cost what was counted there
+        (robot.md T2), lines that send a variable what theirs cost, the rest is chosen by us. A limit is a third above
+        the most that a call was counted to take, or is thought to.
+        """
         board: object = self  # a compiled class would hand out wrappers of its parts' methods
         load: object = self.load
         return Schedule(
@@ -197,23 +202,23 @@ class CanRouterBoard(FirmwareBoard):
             tick_slot=0,
             every=(
                 #    function              cost (cycles)  limit
-                Task(self.send_time,       cost=120,      limit=300),
-                Task(self.update_errors,   cost=60,       limit=4000, per_item=150, item="error"),
+                Task(self.send_time,       cost=2 * 60,   limit=300),
+                Task(self.update_errors,   cost=2 * 39,   limit=5500, per_item=2 * 213, item="error"),
                 Task(self.count_load,      cost=110,      limit=200),
-                Task(board.heartbeat.update, cost=50,     limit=150),
+                Task(board.heartbeat.update, cost=2 * 31, limit=130),
                 Task(self.show_load,       cost=100,      limit=200),
-                Task(board.heartbeat.beat, cost=40,       limit=150),
+                Task(board.heartbeat.beat, cost=2 * 21,   limit=90),
             ),
             **laid_out(table, self.own, (
                 #    variable           value                         cost limit
-                Send("ERROR_CSR",       board.errors,                  150,  400),
-                Send("CSR_MCU_POWER",   board.power_W,                 700, 1000),  # two readings, soft-float product
-                Send("CSR_MCU_CURRENT", board.current_A,               350,  600),
-                Send("CSR_MCU_VOLTAGE", board.voltage_V,               350,  600),
-                Send("CSR_CAN1_LOAD",   lambda: load.report_peak(1),   200,  400),
-                Send("CSR_CAN2_LOAD",   lambda: load.report_peak(2),   200,  400),
-                Send("CSR_CAN3_LOAD",   lambda: load.report_peak(3),   200,  400),
-                Send("CSR_CAN4_LOAD",   lambda: load.report_peak(4),   200,  400),
+                Send("ERROR_CSR",       board.errors,                  2 * 8, 2 * 300, 2 * 196),
+                Send("CSR_MCU_POWER",   board.power_W,                 2 * 265, 2 * 360),
+                Send("CSR_MCU_CURRENT", board.current_A,               2 * 322, 2 * 440),
+                Send("CSR_MCU_VOLTAGE", board.voltage_V,               2 * 310, 2 * 420),
+                Send("CSR_CAN1_LOAD",   lambda: load.report_peak(1),   2 * 174, 2 * 240),
+                Send("CSR_CAN2_LOAD",   lambda: load.report_peak(2),   2 * 174, 2 * 240),
+                Send("CSR_CAN3_LOAD",   lambda: load.report_peak(3),   2 * 174, 2 * 240),
+                Send("CSR_CAN4_LOAD",   lambda: load.report_peak(4),   2 * 174, 2 * 240),
             )),
             extra_idle_call=self.quirks.occasional_idle_call,
         )  # fmt: skip

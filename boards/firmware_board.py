@@ -24,9 +24,13 @@ from ranger_sim.firmware_sim.peripherals.can_controller import (
 )
 from ranger_sim.firmware_sim.peripherals.gpio import Gpio
 from ranger_sim.firmware_sim.scheduler import Schedule, Task
+from ranger_sim.firmware_sim.vic import IRQ_LATENCY
 from ranger_sim.foundation.user_error import UserError
 
 ALL_CAN_INTERRUPTS = ICR_RI | ICR_ERROR_WARNING | ICR_DOI | ICR_ERROR_PASSIVE | ICR_BUS_ERROR
+# From the tick to the first function of its row, 3 us (robot.md T2): the interrupt's 27 instructions, two cycles each,
+# and the main loop's way to the row; latency included.
+TICK_CYCLES = 180 - IRQ_LATENCY
 CAN_RECEIVE_SLOT = 0  # of the VIC, on every satellite (robot.md N4.16)
 
 

@@ -6,6 +6,8 @@ Positive hip angle: inner legs swung forward.
 
 import cython
 
+from ranger_sim.boards.firmware_board import TICK_CYCLES
+from ranger_sim.boards.modules.can_link import TRANSMIT_CYCLES
 from ranger_sim.boards.modules.joint_safety import HipSafety
 from ranger_sim.boards.modules.publishing import Send, laid_out
 from ranger_sim.boards.motor_board import MotorBoard
@@ -68,45 +70,47 @@ class HipBoard(MotorBoard):
         board: object = self
         return Schedule(
             slot_us=table.SLOT_US,
+            tick_cost=TICK_CYCLES,
             every=(
-                #    function                         cost limit  per item      name
-                Task(board.start_external_adc,         200,  300,   0, "",      "adcx_convert_all"),
-                Task(board.start_internal_adc,          60,  100,   0, "",      "adci_convert_all"),
-                Task(board.joint.update_angle,         120,  160,   0, "",      "qdc_cap01_angle"),
-                Task(board.joint.update_rate,          850, 3600,  30, "edge",  "qdc_cap01_rate"),
-                Task(board.motor.update_angle,         120,  160,   0, "",      "qdc_cap23_angle"),
-                Task(board.motor.update_rate,          850, 3600,  30, "edge",  "qdc_cap23_rate"),
-                Task(board.start_absolute_encoder,      80,  110,   0, "",      "ae_update"),
-                Task(board.can.receive_all,            120, 4000, 220, "frame", "can_rx_dispatch_all"),
-                Task(board.heartbeat.beat,              40,   60,   0, "",      "hb_beat"),
-                Task(board.heartbeat.update,            60,   80,   0, "",      "mcu_led_update"),
-                Task(board.safety.check,                80,  110,   0, "",      "dn_safety"),
-                Task(board.errors.update,               90, 2700, 120, "error", "error_update"),
-                Task(board.can.feed,                    50,  300,  80, "frame", "can_tx1"),
-                Wait(board.adc_external.sequence_done,  20, 4500,              "adcx_conversion_wait"),
-                Task(board.compliant_control,         3900, 5200,   0, "",      "mc_compliant_control"),
+                #    function                            cost limit per item          name
+                Task(board.start_external_adc,             2 * 37,   110,       0, "",      "adcx_convert_all"),
+                Task(board.start_internal_adc,             2 * 31,    90,       0, "",      "adci_convert_all"),
+                Task(board.joint.update_angle,             2 * 23,    70,       0, "",      "qdc_cap01_angle"),
+                Task(board.joint.update_rate,             2 * 633,  6000,  2 * 24, "edge",  "qdc_cap01_rate"),
+                Task(board.motor.update_angle,             2 * 23,    70,       0, "",      "qdc_cap23_angle"),
+                Task(board.motor.update_rate,             2 * 614,  6000,  2 * 24, "edge",  "qdc_cap23_rate"),
+                Task(board.start_absolute_encoder,         2 * 21,    60,       0, "",      "ae_update"),
+                Task(board.can.receive_all,                2 * 15,  7500, 2 * 115, "frame", "can_rx_dispatch_all"),
+                Task(board.heartbeat.beat,                 2 * 21,    90,       0, "",      "hb_beat"),
+                Task(board.heartbeat.update,               2 * 31,   130,       0, "",      "mcu_led_update"),
+                Task(board.safety.check,                   2 * 34,   140,       0, "",      "dn_safety"),
+                Task(board.errors.update,                  2 * 39,  5500, 2 * 213, "error", "error_update"),
+                Task(board.can.feed,                        2 * 5,   600,  2 * 35, "frame", "can_tx1"),
+                Wait(board.adc_external.sequence_done,      2 * 6,  6500,                   "adcx_conversion_wait"),
+                Task(board.compliant_control,             2 * 735,  2100,       0, "",      "mc_compliant_control"),
             ),
             **laid_out(table, self.can, (
-                #    variable                   value                              cost limit
-                Send("MCH_ANGLE",               board.encoder.angle_rad,            420,  560),
-                Send("MCH_ANG_RATE",            board.joint.rate_rad_s,             380,  510),
-                Send("MCH_BATT_POWER",          board.readings.battery_power,       900, 1200),
+                #    variable                   value                              cost      limit      more
+                Send("MCH_ANGLE",               board.encoder.angle_rad,            2 * 187, 2 * 450, 2 * 140),
+                Send("MCH_ANG_RATE",            board.joint.rate_rad_s,             2 * 165, 2 * 320, 2 * 70),
+                Send("MCH_BATT_POWER",          board.readings.battery_power,       2 * 262, 2 * 350),
                 # the occasional list, as far as not above
-                Send("ERROR_MCH",               board.errors,                       200,  270),
-                Send("MCH_MOTOR_POSITION",      board.motor.position_rad,           380,  510),
-                Send("MCH_MOTOR_CURRENT",       board.readings.motor_current,       480,  640),
-                Send("MCH_STATUS",              1.0,                                260,  350),
-                Send("MCH_BATT_CURRENT",        board.readings.battery_current,     480,  640),
-                Send("MCH_BATT_VOLTAGE",        board.readings.battery_voltage,     420,  560),
-                Send("MCH_MOTOR_VELOCITY",      board.motor.rate_rad_s,             380,  510),
-                Task(board.motor_encoder_rezero,                                    700,  940),
-                Send("MCH_EXECUTION_TIME",      board.execution.seconds,            420,  560),
-                Send("MCH_MAX_EXECUTION_TIME",  board.execution.longest_seconds,    420,  560),
+                Send("ERROR_MCH",               board.errors,                       2 * 8,   2 * 300, 2 * 196),
+                Send("MCH_MOTOR_POSITION",      board.motor.position_rad,           2 * 165, 2 * 350, 2 * 90),
+                Send("MCH_MOTOR_CURRENT",       board.readings.motor_current,       2 * 320, 2 * 440),
+                Send("MCH_STATUS",              1.0,                                2 * 154, 2 * 210),
+                Send("MCH_BATT_CURRENT",        board.readings.battery_current,     2 * 320, 2 * 440),
+                Send("MCH_BATT_VOLTAGE",        board.readings.battery_voltage,     2 * 308, 2 * 410),
+                Send("MCH_MOTOR_VELOCITY",      board.motor.rate_rad_s,             2 * 155, 2 * 320, 2 * 70),
+                Task(board.motor_encoder_rezero,                                    2 * 3610, 2 * 4800),
+                Send("MCH_EXECUTION_TIME",      board.execution.seconds,            2 * 276, 2 * 370),
+                Send("MCH_MAX_EXECUTION_TIME",  board.execution.longest_seconds,    2 * 276, 2 * 370),
             )),
             extra_idle_call=self.quirks.occasional_idle_call,
-            speakers=("can_tx1",),
+            speakers=("can_tx1", "can_transmit"),
             last=(
-                Task(board.execution.record,            60,   80,   0, "",      "execution_time_record"),
+                Task(board.can.transmit,             TRANSMIT_CYCLES, 100, 0, "", "can_transmit"),
+                Task(board.execution.record,         2 * 22,           60, 0, "", "execution_time_record"),
             ),
         )  # fmt: skip
 

@@ -5,6 +5,8 @@ Ankle angle: 0 with the foot flipped up, growing as the foot is pushed down.
 """
 
 from ranger_sim.boards.ankle_board import AnkleBoard
+from ranger_sim.boards.firmware_board import TICK_CYCLES
+from ranger_sim.boards.modules.can_link import TRANSMIT_CYCLES
 from ranger_sim.boards.modules.publishing import Send, laid_out
 from ranger_sim.boards.motor_board import NOT_CONVERTED
 from ranger_sim.boards.quirks import Quirks
@@ -51,52 +53,54 @@ class InnerFeetBoard(AnkleBoard):
         board: object = self
         return Schedule(
             slot_us=table.SLOT_US,
+            tick_cost=TICK_CYCLES,
             every=(
-                #    function                         cost limit  per item      name
-                Task(board.start_external_adc,         200,  300,   0, "",      "adcx_convert_all"),
-                Task(board.start_internal_adc,          60,  100,   0, "",      "adci_convert_all"),
-                Task(board.motor.update_angle,         120,  160,   0, "",      "qdc_cap01_angle"),
-                Task(board.motor.update_rate,          850, 3600,  30, "edge",  "qdc_cap01_rate"),
-                Task(board.joint.update_angle,         120,  160,   0, "",      "qdc_cap23_angle"),
-                Task(board.joint.update_rate,          850, 3600,  30, "edge",  "qdc_cap23_rate"),
-                Task(board.can.receive_all,            120, 4000, 220, "frame", "can_rx_dispatch_all"),
-                Task(board.heartbeat.beat,              40,   60,   0, "",      "hb_beat"),
-                Task(board.heartbeat.update,            60,   80,   0, "",      "mcu_led_update"),
-                Task(board.start_absolute_encoder,      80,  110,   0, "",      "ae_update"),
-                Task(board.update_switches,            180,  240,   0, "",      "ls_update"),
-                Task(board.safety.check,               140,  190,   0, "",      "dn_safety"),
-                Task(board.errors.update,               90, 2700, 120, "error", "error_update"),
-                Task(board.can.feed,                    50,  300,  80, "frame", "can_tx2"),
-                Wait(board.adc_external.sequence_done,  20, 6500,              "adcx_conversion_wait"),
-                Task(board.compliant_control,         3900, 5200,   0, "",      "mc_compliant_control"),
+                #    function                            cost limit per item          name
+                Task(board.start_external_adc,             2 * 37,   110,       0, "",      "adcx_convert_all"),
+                Task(board.start_internal_adc,             2 * 31,    90,       0, "",      "adci_convert_all"),
+                Task(board.motor.update_angle,             2 * 23,    70,       0, "",      "qdc_cap01_angle"),
+                Task(board.motor.update_rate,             2 * 617,  6000,  2 * 24, "edge",  "qdc_cap01_rate"),
+                Task(board.joint.update_angle,             2 * 23,    70,       0, "",      "qdc_cap23_angle"),
+                Task(board.joint.update_rate,             2 * 617,  6000,  2 * 24, "edge",  "qdc_cap23_rate"),
+                Task(board.can.receive_all,                2 * 15,  7500, 2 * 115, "frame", "can_rx_dispatch_all"),
+                Task(board.heartbeat.beat,                 2 * 21,    90,       0, "",      "hb_beat"),
+                Task(board.heartbeat.update,               2 * 31,   130,       0, "",      "mcu_led_update"),
+                Task(board.start_absolute_encoder,         2 * 26,    80,       0, "",      "ae_update"),
+                Task(board.update_switches,               2 * 140,   390,       0, "",      "ls_update"),
+                Task(board.safety.check,                  2 * 413,  1300,       0, "",      "dn_safety"),
+                Task(board.errors.update,                  2 * 39,  5500, 2 * 213, "error", "error_update"),
+                Task(board.can.feed,                        2 * 5,   600,  2 * 35, "frame", "can_tx2"),
+                Wait(board.adc_external.sequence_done,      2 * 6, 10500,                   "adcx_conversion_wait"),
+                Task(board.compliant_control,             2 * 613,  2100,       0, "",      "mc_compliant_control"),
             ),
             **laid_out(table, self.can, (
-                #    variable                    value                              cost limit
-                Send("MCFI_MID_ANKLE_ANGLE",     board.encoder.angle_rad,            420,  560),
-                Send("MCFI_ANKLE_RATE",          board.joint.rate_rad_s,             380,  510),
-                Send("MCFI_LEFT_HEEL_SENSE",     board.left_heel_sense,              330,  440),
-                Send("MCFI_MOTOR_POSITION",      board.motor.position_rad,           380,  510),
-                Send("MCFI_RIGHT_HS",            board.right_foot.contact,           300,  400),
-                Send("MCFI_BATT_POWER",          board.readings.battery_power,       900, 1200),
-                Send("MCFI_RIGHT_HEEL_SENSE",    board.right_heel_sense,             330,  440),
+                #    variable                    value                              cost      limit      more
+                Send("MCFI_MID_ANKLE_ANGLE",     board.encoder.angle_rad,            2 * 172, 2 * 420, 2 * 140),
+                Send("MCFI_ANKLE_RATE",          board.joint.rate_rad_s,             2 * 165, 2 * 350, 2 * 96),
+                Send("MCFI_LEFT_HEEL_SENSE",     board.left_heel_sense,              2 * 174, 2 * 350, 2 * 87),
+                Send("MCFI_MOTOR_POSITION",      board.motor.position_rad,           2 * 165, 2 * 320, 2 * 70),
+                Send("MCFI_RIGHT_HS",            board.right_foot.contact,           2 * 176, 2 * 440, 2 * 154),
+                Send("MCFI_BATT_POWER",          board.readings.battery_power,       2 * 265, 2 * 360),
+                Send("MCFI_RIGHT_HEEL_SENSE",    board.right_heel_sense,             2 * 174, 2 * 350, 2 * 87),
                 # the occasional list, as far as not above
-                Send("ERROR_MCFI",               board.errors,                       200,  270),
-                Send("MCFI_MOTOR_VELOCITY",      board.motor.rate_rad_s,             380,  510),
-                Send("MCFI_MOTOR_CURRENT",       board.readings.motor_current,       480,  640),
-                Send("MCFI_LEFT_HS",             board.left_foot.contact,            300,  400),
-                Send("MCFI_STATUS",              1.0,                                260,  350),
-                Send("MCFI_BATT_CURRENT",        board.readings.battery_current,     480,  640),
-                Send("MCFI_BATT_VOLTAGE",        board.readings.battery_voltage,     420,  560),
-                Send("MCFI_HBRIDGE_TEMP",        NOT_CONVERTED,                      260,  350),
-                Send("MCFI_RIGHT_LS",            board.right_switch.contact,         300,  400),
-                Send("MCFI_LEFT_LS",             board.left_switch.contact,          300,  400),
-                Send("MCFI_EXECUTION_TIME",      board.execution.seconds,            420,  560),
-                Send("MCFI_MAX_EXECUTION_TIME",  board.execution.longest_seconds,    420,  560),
-                Task(board.motor_encoder_rezero,                                     700,  940),
+                Send("ERROR_MCFI",              board.errors,                       2 * 8,   2 * 300, 2 * 196),
+                Send("MCFI_MOTOR_VELOCITY",      board.motor.rate_rad_s,             2 * 155, 2 * 320, 2 * 70),
+                Send("MCFI_MOTOR_CURRENT",       board.readings.motor_current,       2 * 322, 2 * 440),
+                Send("MCFI_LEFT_HS",             board.left_foot.contact,            2 * 176, 2 * 440, 2 * 154),
+                Send("MCFI_STATUS",              1.0,                                2 * 156, 2 * 210),
+                Send("MCFI_BATT_CURRENT",        board.readings.battery_current,     2 * 322, 2 * 440),
+                Send("MCFI_BATT_VOLTAGE",        board.readings.battery_voltage,     2 * 310, 2 * 420),
+                Send("MCFI_HBRIDGE_TEMP",        NOT_CONVERTED,                      2 * 174, 2 * 240),
+                Send("MCFI_RIGHT_LS",            board.right_switch.contact,         2 * 170, 2 * 230, 2 * 154),
+                Send("MCFI_LEFT_LS",             board.left_switch.contact,          2 * 170, 2 * 230, 2 * 154),
+                Send("MCFI_EXECUTION_TIME",      board.execution.seconds,            2 * 276, 2 * 370),
+                Send("MCFI_MAX_EXECUTION_TIME",  board.execution.longest_seconds,    2 * 276, 2 * 370),
+                Task(board.motor_encoder_rezero,                                     2 * 161, 2 * 4800),
             )),
             extra_idle_call=self.quirks.occasional_idle_call,
-            speakers=("can_tx2",),
+            speakers=("can_tx2", "can_transmit"),
             last=(
-                Task(board.execution.record,            60,   80,   0, "",      "execution_time_record"),
+                Task(board.can.transmit,             TRANSMIT_CYCLES, 100, 0, "", "can_transmit"),
+                Task(board.execution.record,         2 * 22,           60, 0, "", "execution_time_record"),
             ),
         )  # fmt: skip

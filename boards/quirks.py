@@ -110,6 +110,9 @@ class Quirks:
     """Firmware: with the ring never empty a frame may lie across two segments of the link."""
 
     # --- main brain ---------------------------------------------------------------------------------
+    lights_in_every_slot: bool = switch(False, True, YES_OR_NO)
+    """The six lights go out in every slot of the main brain (firmware), or when their colour changes (ours)."""
+
     main_brain_overrun_check: bool = switch(True, False, YES_OR_NO)
     """Appendix 4.4: a slot exceeded is an error. Firmware of the main brain: no flag, no error."""
 

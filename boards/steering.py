@@ -9,8 +9,10 @@ quirks.py for what the firmware of 2016 made of it.
 
 import cython
 
+from ranger_sim.boards.firmware_board import TICK_CYCLES
+from ranger_sim.boards.modules.can_link import TRANSMIT_CYCLES
 from ranger_sim.boards.modules.publishing import Send, laid_out
-from ranger_sim.boards.motor_board import MotorBoard
+from ranger_sim.boards.motor_board import CONVERSION_NS, MotorBoard
 from ranger_sim.datatable.generated import errors as codes
 from ranger_sim.datatable.generated import mcsi as table
 from ranger_sim.firmware_sim.scheduler import Schedule, Task, Wait
@@ -35,6 +37,9 @@ LIMITS = dict(
 )
 CENTRE_COUNTS = 4803  # of the limit check
 LIMIT_COUNTS = 200
+# mc_compliant_control was counted at 465 instructions, all values 0; with others it takes up to 764 on the other boards
+# (robot.md T2). With 765 the slot is as long as the logs' 142-145 us (T1).
+CONTROL_CYCLES = 2 * 765
 SENSOR = 0  # place in SEQUENCE
 
 
@@ -59,6 +64,7 @@ class SteeringBoard(MotorBoard):
             sign=1,
             largest_duty=200,
             gear=0,
+            conversion_ns=CONVERSION_NS,
         )
         self.zero = 0
         self.direct = self.quirks.steering_output in ("duty", "duty_then_current")
@@ -67,38 +73,44 @@ class SteeringBoard(MotorBoard):
         self.begin(phase_ns)
 
     def schedule(self) -> Schedule:
-        """One pass takes 2 ms; each row's variable goes out at 500 Hz, the occasional ones at 100 Hz."""
+        """One pass takes 2 ms; each row's variable goes out at 500 Hz, the occasional ones at 100 Hz.
+
+        What was not counted here costs what its like does on MCFI; the lines of a row cost the most that one was
+        counted to (robot.md T2: 154 to 284).
+        """
         board: object = self
         return Schedule(
             slot_us=table.SLOT_US,
+            tick_cost=TICK_CYCLES,
             every=(
-                #    function                         cost limit  per item      name
-                Task(board.start_external_adc,         200,  300,   0, "",      "adcx_convert_all"),
-                Task(board.start_internal_adc,          60,  100,   0, "",      "adci_convert_all"),
-                Task(board.can.receive_all,            120, 4000, 220, "frame", "can_rx_dispatch_all"),
-                Task(board.heartbeat.beat,              40,   60,   0, "",      "hb_beat"),
-                Task(board.heartbeat.update,            60,   80,   0, "",      "mcu_led_update"),
-                Task(board.errors.update,               90, 2700, 120, "error", "error_update"),
-                Task(board.can.feed,                    50,  300,  80, "frame", "can_tx2"),
-                Wait(board.adc_external.sequence_done,  20, 6500,              "adcx_conversion_wait"),
-                Task(board.update_pwm,                 250,  340,   0, "",      "dn_update_pwm"),
-                Task(board.steering_control,          3900, 5200,   0, "",      "mc_compliant_control"),
+                #    function                            cost limit per item          name
+                Task(board.start_external_adc,             2 * 37,   110,       0, "",      "adcx_convert_all"),
+                Task(board.start_internal_adc,             2 * 31,    90,       0, "",      "adci_convert_all"),
+                Task(board.can.receive_all,                2 * 15,  7500, 2 * 115, "frame", "can_rx_dispatch_all"),
+                Task(board.heartbeat.beat,                 2 * 21,    90,       0, "",      "hb_beat"),
+                Task(board.heartbeat.update,               2 * 31,   130,       0, "",      "mcu_led_update"),
+                Task(board.errors.update,                  2 * 39,  5500, 2 * 213, "error", "error_update"),
+                Task(board.can.feed,                        2 * 5,   600,  2 * 35, "frame", "can_tx2"),
+                Wait(board.adc_external.sequence_done,      2 * 6,  8500,                   "adcx_conversion_wait"),
+                Task(board.update_pwm,                     2 * 88,   240,       0, "",      "dn_update_pwm"),
+                Task(board.steering_control,         CONTROL_CYCLES,  2100,       0, "",      "mc_compliant_control"),
             ),
             **laid_out(table, self.can, (
-                #    variable                    value                                 cost limit
-                Send("MCSI_STEER_ANGLE",         board.steer_angle_counts,              330,  440),
-                Send("MCSI_MOTOR_CURRENT",       board.readings.motor_current,          480,  640),
-                Send("MCSI_BATT_POWER",          board.readings.battery_power_fixed,    600,  800),
+                #    variable                    value                                 cost      limit      more
+                Send("MCSI_STEER_ANGLE",         board.steer_angle_counts,           2 * 280, 2 * 380),
+                Send("MCSI_MOTOR_CURRENT",       board.readings.motor_current,       2 * 284, 2 * 380),
+                Send("MCSI_BATT_POWER",          board.readings.battery_power_fixed, 2 * 284, 2 * 380),
                 # the occasional list, as far as not above
-                Send("ERROR_MCSI",               board.errors,                          200,  270),
-                Send("MCSI_STATUS",              1.0,                                   260,  350),
-                Send("MCSI_EXECUTION_TIME",      board.execution.seconds,               420,  560),
-                Send("MCSI_MAX_EXECUTION_TIME",  board.execution.longest_seconds,       420,  560),
+                Send("ERROR_MCSI",              board.errors,                       2 * 8,   2 * 300, 2 * 196),
+                Send("MCSI_STATUS",              1.0,                                2 * 156, 2 * 210),
+                Send("MCSI_EXECUTION_TIME",      board.execution.seconds,            2 * 276, 2 * 370),
+                Send("MCSI_MAX_EXECUTION_TIME",  board.execution.longest_seconds,    2 * 276, 2 * 370),
             )),
             extra_idle_call=self.quirks.occasional_idle_call,
-            speakers=("can_tx2",),
+            speakers=("can_tx2", "can_transmit"),
             last=(
-                Task(board.execution.record,            60,   80,   0, "",      "execution_time_record"),
+                Task(board.can.transmit,             TRANSMIT_CYCLES, 100, 0, "", "can_transmit"),
+                Task(board.execution.record,         2 * 22,           60, 0, "", "execution_time_record"),
             ),
         )  # fmt: skip
 

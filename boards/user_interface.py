@@ -6,8 +6,9 @@ Source: robot.md N3.6, N4.10-N4.12, N4.16; appendix 3.7, 3.8. What a person sees
 
 import cython
 
-from ranger_sim.boards.firmware_board import SatelliteBoard
+from ranger_sim.boards.firmware_board import TICK_CYCLES, SatelliteBoard
 from ranger_sim.boards.modules.buzzer import Buzzer, BuzzerFrequency, ErrorSound, TuneStart
+from ranger_sim.boards.modules.can_link import TRANSMIT_CYCLES
 from ranger_sim.boards.modules.colour_leds import CYCLES_PER_WRITE, ColourLeds, LedReceiver
 from ranger_sim.boards.modules.imu_parser import (
     HEADER_ANGLES_AND_RATES,
@@ -49,11 +50,15 @@ CAN_ERROR_SLOT = 9
 # packets; here the board's slots begin at power-up and the request goes out after 20 of them (chosen by us,
 # because that delay only waits for the IMU to wake, and every run would begin with it).
 IMU_START_SLOTS = 20
-RC_CYCLES = 130  # four flags tested, one width filtered: chosen by us, no measurement is known
-UART_CYCLES = 90  # read of U1IIR and the loop: chosen by us, as above
-UART_BYTE_CYCLES = 25  # U1LSR, U1RBR, store: chosen by us, as above
-LCD_IDLE_CYCLES = 25  # chosen by us, as above
-LCD_BYTE_CYCLES = 110  # eight data pins, three control pins, each a read-modify-write: chosen by us, as above
+# Cycles of what the motor boards do not have, two per instruction; the instructions are estimated by us along the
+# listed work, because none were counted.
+RC_CYCLES = 2 * 66  # four flags tested, one width filtered
+UART_CYCLES = 2 * 35  # entry, U1IIR, the loop, exit
+UART_BYTE_CYCLES = 2 * 25  # U1LSR, U1RBR, the ring and its test for full
+LCD_IDLE_CYCLES = 2 * 10
+LCD_BYTE_CYCLES = 2 * 60  # eight data pins, three control pins, each a read-modify-write
+IMU_CYCLES = 2 * 60  # both indices, the search for a header
+IMU_BYTE_CYCLES = 2 * 32  # a byte is taken from the ring twice, for the sum and for its word
 
 
 class UserInterfaceBoard(SatelliteBoard):
@@ -96,7 +101,7 @@ class UserInterfaceBoard(SatelliteBoard):
         for quarter in range(4):
             listen(getattr(table, f"UI_SET_LCD_QUAD_{quarter + 1}"), LcdQuarter(self.lcd, quarter))
         for led in range(6):
-            listen(getattr(table, f"UI_SET_LED_{led + 1}"), LedReceiver(self.leds, led, self))
+            listen(getattr(table, f"UI_SET_LED_{led + 1}"), LedReceiver(self.leds, led))
         listen(table.UI_SET_BUZZER_FREQ, BuzzerFrequency(self.buzzer))
         listen(table.UI_SET_BUZZER_AMPL, TuneStart(self.buzzer))
         listen(table.UI_EMPTY_TX2, TuneStart(self.buzzer))
@@ -104,7 +109,13 @@ class UserInterfaceBoard(SatelliteBoard):
             listen(table.ERROR_LCD, ErrorSound(self.buzzer))
 
     def schedule(self) -> Schedule:
-        """Source: robot.md N3.6. Costs and limits are chosen by us; robot.md T1 has the board's measured slots.
+        """Source: robot.md N3.6.
+
+        Costs: no instructions of this board were counted. Functions and lines that the motor boards have too cost what
+        was counted there (robot.md T2), keys and lights what their like costs (a look at a bit 21 instructions, three
+        timers 31). The logs' slot of 155 to 178 us (T1) is then 65 us and the six lights that the main brain of 2016
+        sends in every slot. A limit is a third above the most that a call can take: twelve lights for the frames, a
+        ring full of bytes for the sensor.
 
         UI_ROLL, UI_PITCH and UI_YAW are 0 while the IMU sends rates alone. If the IMU falls silent, the last values are
         sent on.
@@ -114,42 +125,46 @@ class UserInterfaceBoard(SatelliteBoard):
         rc: object = self.rc
         return Schedule(
             slot_us=table.SLOT_US,
+            tick_cost=TICK_CYCLES,
             tick_slot=TIMER_SLOT,
             every=(
                 #    function                   cost (cycles)  limit
-                Task(board.can.receive_all,     cost=80,       limit=9000, per_item=90, item="frame"),
-                Task(board.heartbeat.beat,      cost=40,       limit=150),
-                Task(board.heartbeat.update,    cost=50,       limit=150),
-                Task(self.update_imu,           cost=60,       limit=2800, per_item=16, item="byte"),
-                Task(self.update_errors,        cost=60,       limit=4000, per_item=150, item="error"),
-                Task(board.can.feed,            cost=50,       limit=1000, per_item=110, item="frame"),
-                Task(self.watch_sync_key,       cost=30,       limit=100),
-                Task(self.update_sync_light,    cost=40,       limit=900,
+                Task(board.can.receive_all,     cost=2 * 15,   limit=14000, per_item=2 * 115, item="frame"),
+                Task(board.heartbeat.beat,      cost=2 * 21,   limit=90),
+                Task(board.heartbeat.update,    cost=2 * 31,   limit=130),
+                Task(self.update_imu,           cost=IMU_CYCLES, limit=12000, per_item=IMU_BYTE_CYCLES, item="byte"),
+                Task(self.update_errors,        cost=2 * 39,   limit=5500, per_item=2 * 213, item="error"),
+                Task(board.can.feed,            cost=2 * 5,    limit=600, per_item=2 * 35, item="frame"),
+                Task(self.watch_sync_key,       cost=2 * 21,   limit=90),
+                Task(self.update_sync_light,    cost=2 * 31,   limit=900,
                      per_item=CYCLES_PER_WRITE, item="transfer"),
-                Task(self.update_buzzer,        cost=60,       limit=200),
+                Task(self.update_buzzer,        cost=2 * 31,   limit=200),
             ),
             **laid_out(table, self.can, (
                 #    variable                 value                              cost limit
-                Send("UI_ROLL",               lambda: imu.roll,                   260,  500),
-                Send("UI_ANG_RATE_X",         lambda: imu.rate_x,                 260,  500),
+                Send("UI_ROLL",               lambda: imu.roll,                   2 * 160, 2 * 240),
+                Send("UI_ANG_RATE_X",         lambda: imu.rate_x,                 2 * 160, 2 * 240),
                 # the occasional list, as far as not above; RC channel 2's pin drives the sync light, so it is 0
-                Send("ERROR_UI",              board.errors,                       150,  500),
-                Send("UI_BUTTONS",            board.keypad.buttons,               280,  500),
-                Send("UI_RC_0",               lambda: rc.width(0),                260,  500),
-                Send("UI_RC_1",               lambda: rc.width(1),                260,  500),
-                Send("UI_STATUS",             1.0,                                230,  500),
-                Send("UI_EXECUTION_TIME",     board.execution.seconds,            300,  500),
-                Send("UI_MAX_EXECUTION_TIME", board.execution.longest_seconds,    300,  500),
-                Send("UI_PITCH",              lambda: imu.pitch,                  260,  500),
-                Send("UI_YAW",                lambda: imu.yaw,                    260,  500),
-                Send("UI_ANG_RATE_Y",         lambda: imu.rate_y,                 260,  500),
-                Send("UI_ANG_RATE_Z",         lambda: imu.rate_z,                 260,  500),
-                Send("UI_RC_2",               lambda: rc.width(2),                260,  500),
-                Send("UI_RC_3",               lambda: rc.width(3),                260,  500),
+                Send("ERROR_UI",              board.errors,                       2 * 8,   2 * 300, 2 * 196),
+                Send("UI_BUTTONS",            board.keypad.buttons,               2 * 174, 2 * 240),
+                Send("UI_RC_0",               lambda: rc.width(0),                2 * 261, 2 * 400),
+                Send("UI_RC_1",               lambda: rc.width(1),                2 * 261, 2 * 400),
+                Send("UI_STATUS",             1.0,                                2 * 156, 2 * 210),
+                Send("UI_EXECUTION_TIME",     board.execution.seconds,            2 * 276, 2 * 370),
+                Send("UI_MAX_EXECUTION_TIME", board.execution.longest_seconds,    2 * 276, 2 * 370),
+                Send("UI_PITCH",              lambda: imu.pitch,                  2 * 160, 2 * 240),
+                Send("UI_YAW",                lambda: imu.yaw,                    2 * 160, 2 * 240),
+                Send("UI_ANG_RATE_Y",         lambda: imu.rate_y,                 2 * 160, 2 * 240),
+                Send("UI_ANG_RATE_Z",         lambda: imu.rate_z,                 2 * 160, 2 * 240),
+                Send("UI_RC_2",               lambda: rc.width(2),                2 * 261, 2 * 400),
+                Send("UI_RC_3",               lambda: rc.width(3),                2 * 261, 2 * 400),
             )),
             extra_idle_call=self.quirks.occasional_idle_call,
-            speakers=("feed",),
-            last=(Task(board.execution.record,       cost=40,       limit=80, name="record_execution_time"),),
+            speakers=("feed", "can_transmit"),
+            last=(
+                Task(board.can.transmit,        cost=TRANSMIT_CYCLES, limit=100, name="can_transmit"),
+                Task(board.execution.record,    cost=2 * 22,   limit=60, name="record_execution_time"),
+            ),
         )  # fmt: skip
 
     # --- interrupts -------------------------------------------------------------------------------------

@@ -51,6 +51,7 @@ class ComputerPort(NamedTuple):
 
 
 COMPUTER_PORTS = {"wired": ComputerPort(1, 0, -1), "bluetooth": ComputerPort(2, 1, 0)}
+LIGHTS = [getattr(table, f"UI_SET_LED_{light}") for light in range(1, 7)]
 TRANSMIT_CHANNEL = 3  # GPDMA (robot.md N4.15)
 RESTART_SLOT, DMA_SLOT = 1, 2  # after the timer; tested in this order (robot.md N4.16)
 # Acknowledge, find the next segment, write four registers of the channel: about as many instructions as an exchange
@@ -157,6 +158,10 @@ class MainBrainBoard(FirmwareBoard):
         modes: object = self.modes
         errors_of_all: object = self.distribution.distribute
         execution_time: object = self.store_execution_time
+        refresh: tuple = ()
+        if self.quirks.lights_in_every_slot:
+            lights: object = self.refresh_lights
+            refresh = (Task(lights, name="refresh_lights", cost=180, limit=300),)
         return Schedule(
             slot_us=2000,
             divider=2,  # Timer0 ticks every 1 ms
@@ -169,6 +174,7 @@ class MainBrainBoard(FirmwareBoard):
                 Task(io.receive,         name="parse_ssp",         cost=2500,  limit=30000, per_item=220, item="frame"),
                 Task(estimator.update,   name="estimator",         cost=38000, limit=60000),
                 Task(modes.update,       name="controller",        cost=16000, limit=30000),
+                *refresh,
                 Task(io.send,            name="send_ssp",          cost=2000,  limit=12000, per_item=160, item="frame"),
                 Task(computer.send_data, name="send_data",         cost=300,   limit=4000,  per_item=250, item="step"),
             ),
@@ -203,6 +209,12 @@ class MainBrainBoard(FirmwareBoard):
         elif self.heartbeat_on and (self.time.ms - self.heartbeat_until) >> 31 & 1 == 0:
             self.heartbeat_on = False
         self.heartbeat_bit = bit
+
+    def refresh_lights(self) -> None:
+        """The six lights are new in every slot, as in 2016 (robot.md N2.5)."""
+        number: cython.longlong
+        for number in LIGHTS:
+            self.store.set_int(number, self.store.get_int(number))
 
     def store_execution_time(self) -> None:
         """Seconds since the slot began, by Timer0; with the firmware's quirk since the latest tick of 1 ms."""

@@ -22,7 +22,7 @@ cpdef enum:
 cdef class CanLink(Sender):
     # what a frame touches
     cdef public CanController controller
-    cdef public long long time_identifier
+    cdef public long long time_identifier, search_cycles
     cdef public list receivers
     cdef public long long rx_write, rx_read, tx_write, tx_read
     cdef public long long received, delivered, queued, ignored, most_waiting
@@ -35,4 +35,7 @@ cdef class CanLink(Sender):
     cdef public bint report_full
     cdef public long long receive_lost, send_lost
     cdef public long long code_receive_full, code_send_full
+    cdef public bint built
+    cdef public long long built_identifier, built_value, built_time
     cpdef object feed(self)
+    cpdef int transmit(self) except -1

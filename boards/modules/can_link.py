@@ -18,6 +18,7 @@ from ranger_sim.boards.modules.sender import Sender
 from ranger_sim.datatable.generated import errors as codes
 from ranger_sim.firmware_sim.microcontroller import Microcontroller
 from ranger_sim.firmware_sim.peripherals.can_controller import CanController
+from ranger_sim.firmware_sim.vic import IRQ_LATENCY
 from ranger_sim.foundation.events import CAN_RX, CAN_STATUS, EventQueue
 from ranger_sim.foundation.user_error import UserError
 
@@ -36,10 +37,17 @@ if not cython.compiled:
     FIRST_BUFFER = 1
     SECOND_BUFFER = 2
 
-# Chosen by us, no measurement is known: about 25 instructions with 4 register reads over the slow bus, and for an
-# error the read of CxICR and a chain of tests.
-RECEIVE_CYCLES = 110
-ERROR_CYCLES = 150
+# Two cycles per instruction (robot.md T2), latency included: 10 + 17 instructions for a frame received.
+RECEIVE_CYCLES = 2 * 27
+# Derived from it, because no error interrupt was counted: four registers are read in both, and the chain of tests is
+# as long again.
+ERROR_CYCLES = 2 * 50
+# What follows in a line of the schedule when its frame is put into the ring: the ring, a transmit buffer and the way
+# back. Fitted by us to the times at which the images' frames are asked for (test_original_images.py).
+TRANSMIT_CYCLES = 2 * 30
+# Of the receive list's search, per place (robot.md T2: the time is the second of MCH's list and the first of MCFI's,
+# and there 127 - 115 instructions cheaper).
+PLACE_CYCLES = 2 * 12
 
 
 class CanLink(Sender):
@@ -57,7 +65,7 @@ class CanLink(Sender):
         errors: ErrorModule,
         report_full=True,
     ) -> None:
-        Sender.__init__(self, time)
+        Sender.__init__(self, time, TRANSMIT_CYCLES)
         self.chip = chip
         self.controller = controller
         self.errors = errors
@@ -66,6 +74,7 @@ class CanLink(Sender):
         self.code_receive_full = getattr(codes, f"CAN{controller.number}_RX_BUF_OF")
         self.code_send_full = codes.CAN_TX_QUEUE_FULL
         self.receivers = [None] * IDENTIFIERS
+        self.search_cycles = 0  # of the whole receive list
         self.time_identifier = -1  # whose frames bring `time`: every third frame
         self.rx_rows = [0] * 256  # RECEIVED x RECEIVE_RING
         self.rx_write = 0
@@ -73,6 +82,10 @@ class CanLink(Sender):
         self.tx_rows = [0] * 24  # QUEUED x SEND_RING
         self.tx_write = 0
         self.tx_read = 0
+        self.built = False
+        self.built_identifier = 0
+        self.built_value = 0
+        self.built_time = 0
         self.received = 0
         self.delivered = 0
         self.ignored = 0
@@ -85,17 +98,24 @@ class CanLink(Sender):
         """Take the controller's receive and error interrupts (VIC slots)."""
         number = self.controller.number
         self.chip.vic.attach(
-            CAN_RX, number, self.on_receive, cost=RECEIVE_CYCLES, slot=receive_slot, name="can_receive"
+            CAN_RX, number, self.on_receive, cost=RECEIVE_CYCLES - IRQ_LATENCY, slot=receive_slot, name="can_receive"
         )
-        self.chip.vic.attach(CAN_STATUS, number, self.on_error, cost=ERROR_CYCLES, slot=error_slot, name="can_error")
+        self.chip.vic.attach(
+            CAN_STATUS, number, self.on_error, cost=ERROR_CYCLES - IRQ_LATENCY, slot=error_slot, name="can_error"
+        )
 
     def listen(self, identifier, receiver: Receiver) -> None:
-        """Frames of `identifier` go to `receiver` from now on; one receiver per identifier."""
+        """Frames of `identifier` go to `receiver` from now on; one receiver per identifier and the reverse.
+
+        The list is searched from its first entry, so later ones cost more.
+        """
         if not 0 <= identifier < IDENTIFIERS:
             raise UserError(f"{self.chip.name}: identifier {identifier} is not 0 ... {IDENTIFIERS - 1}")
         if self.receivers[identifier] is not None:
             raise UserError(f"{self.chip.name}: identifier {identifier} has two receivers")
         self.receivers[identifier] = receiver
+        receiver.cycles += self.search_cycles
+        self.search_cycles += PLACE_CYCLES
         if receiver is self.time:
             self.time_identifier = identifier
 
@@ -130,6 +150,7 @@ class CanLink(Sender):
         write: cython.longlong = self.rx_write
         frames: cython.longlong = (write - read) & RECEIVE_MASK
         ignored: cython.longlong = 0
+        cycles: cython.longlong = 0
         row: cython.longlong
         identifier: cython.longlong
         if frames == 0:
@@ -140,18 +161,41 @@ class CanLink(Sender):
             if self.rx_rows[row] != RFS_EIGHT_BYTES or identifier >= IDENTIFIERS:
                 ignored += 1
             elif identifier == self.time_identifier:
+                cycles += self.time.cycles
                 self.time.deliver(self.rx_rows[row + 2], self.rx_rows[row + 3])
             elif self.receivers[identifier] is None:
                 ignored += 1
+                cycles += self.search_cycles
             else:
+                cycles += cython.cast(Receiver, self.receivers[identifier]).cycles
                 cython.cast(Receiver, self.receivers[identifier]).deliver(self.rx_rows[row + 2], self.rx_rows[row + 3])
             read = (read + 1) & RECEIVE_MASK
+        if cycles > 0:
+            self.chip.spend(cycles)
         self.rx_read = read
         self.ignored += ignored
         self.delivered += frames - ignored
         return frames
 
     # --- sending ----------------------------------------------------------------------------------------
+
+    def build(self, identifier: cython.longlong, value_word: cython.longlong, time_word: cython.longlong) -> None:
+        """A line of the schedule has begun to make a frame, which `transmit` sends when the line's cycles are over.
+
+        A second one in the same row sends the first.
+        """
+        if self.built:
+            self.transmit()
+        self.built = True
+        self.built_identifier = identifier
+        self.built_value = value_word
+        self.built_time = time_word
+
+    def transmit(self) -> None:
+        """Slot task, the end of can_transmit: put the frame that the row made, if it made one, into the ring."""
+        if self.built:
+            self.built = False
+            self.send_words(self.built_identifier, self.built_value, self.built_time)
 
     def send_words(
         self, identifier: cython.longlong, value_word: cython.longlong, time_word: cython.longlong

@@ -1,5 +1,4 @@
 from ranger_sim.boards.modules.receiver cimport Receiver
-from ranger_sim.firmware_sim.microcontroller cimport Microcontroller
 
 cdef class ColourLeds:
     cdef public long long[::1] ports
@@ -13,5 +12,4 @@ cdef class ColourLeds:
 
 cdef class LedReceiver(Receiver):
     cdef public ColourLeds leds
-    cdef public long long led, cycles
-    cdef public Microcontroller chip
+    cdef public long long led

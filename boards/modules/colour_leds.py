@@ -77,17 +77,14 @@ class ColourLeds:
 
 
 class LedReceiver(Receiver):
-    """Takes UI_SET_LED_n: the colour of light `led` 0-5. The transfers' cycles are spent on `chip`."""
+    """Takes UI_SET_LED_n: the colour of light `led` 0-5. Its cycles are those of the transfers."""
 
-    def __init__(self, leds: ColourLeds, led, chip) -> None:
-        Receiver.__init__(self)
+    def __init__(self, leds: ColourLeds, led) -> None:
+        Receiver.__init__(self, TRANSFERS_PER_LED * CYCLES_PER_WRITE)
         self.leds = leds
         self.led = led
-        self.chip = chip
-        self.cycles = TRANSFERS_PER_LED * CYCLES_PER_WRITE
 
     def deliver(self, value_word: cython.longlong, time_word: cython.longlong) -> None:
         """A frame came; the time word is not looked at."""
         self.frames += 1
         self.leds.set_led(self.led, value_word)
-        self.chip.spend(self.cycles)

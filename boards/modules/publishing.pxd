@@ -1,6 +1,7 @@
 from ranger_sim.boards.modules.error_module cimport ErrorModule
 from ranger_sim.boards.modules.sender cimport Sender
 from ranger_sim.firmware_sim.scheduler cimport call
+from ranger_sim.foundation.numbers cimport word_of_float, word_of_i32
 
 cimport cython
 

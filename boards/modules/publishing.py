@@ -14,6 +14,7 @@ from ranger_sim.foundation.user_error import UserError
 
 if not cython.compiled:
     from ranger_sim.firmware_sim.calls import call
+    from ranger_sim.foundation.numbers import word_of_float, word_of_i32
 
 
 class Publication:
@@ -26,14 +27,17 @@ class Publication:
         self.constant = constant
         self.whole = whole
 
-    def send(self) -> None:
-        """A line of the schedule: take the value, send it as the table's type."""
+    def send(self) -> object:
+        """A line of the schedule: take the value, make a frame of it as the table's type. Returns 1, or 0 for 0."""
+        word: cython.longlong
         if self.function is None:
-            self.sender.send_float(self.identifier, self.constant)
+            word = word_of_float(self.constant)
         elif self.whole:
-            self.sender.send_int(self.identifier, call(self.function))
+            word = word_of_i32(call(self.function))
         else:
-            self.sender.send_float(self.identifier, call(self.function))
+            word = word_of_float(call(self.function))
+        self.sender.build(self.identifier, word, self.sender.time.ms)
+        return 1 if word != 0 else 0
 
 
 class ErrorPublication:
@@ -44,24 +48,29 @@ class ErrorPublication:
         self.identifier = identifier
         self.errors = errors
 
-    def send(self) -> None:
-        """A line of the schedule."""
+    def send(self) -> object:
+        """A line of the schedule; returns how many errors it took, 0 or 1."""
         if self.errors.take():
-            self.sender.send_words(self.identifier, self.errors.word, self.errors.stamp)
+            self.sender.build(self.identifier, self.errors.word, self.errors.stamp)
+            return 1
+        return 0
 
 
 class Send:
     """One published variable in a board's table: its name, its value, modelled cycles, and the limit on them.
 
     `value`: a function without arguments, a number that never changes, or the board's ErrorModule. Units are those of
-    the master table.
+    the master table. `cost` is that of the whole line; what the sender does of it later (`Sender.late_cycles`) is taken
+    off. `more`: cycles that it costs beside that when the value is not 0, or when an error waits: the library's
+    conversion of a whole number has next to nothing to do with a 0.
     """
 
-    def __init__(self, variable, value, cost, limit) -> None:
+    def __init__(self, variable, value, cost, limit, more=0) -> None:
         self.variable = variable
         self.value = value
         self.cost = cost
         self.limit = limit
+        self.more = more
 
     def task(self, table, sender: Sender) -> Task:
         """The line as a task that sends by `sender`; `table`: the board's generated module."""
@@ -72,7 +81,8 @@ class Send:
             line = Publication(sender, identifier, self.value, 0.0, table.TYPES[identifier] != "f32")
         else:
             line = Publication(sender, identifier, None, self.value, False)
-        return Task(line.send, self.cost, self.limit, 0, "", self.variable)
+        cost = max(1, self.cost - sender.late_cycles)
+        return Task(line.send, cost, self.limit, self.more, "value" if self.more else "", self.variable)
 
 
 def laid_out(table, sender: Sender, lines) -> dict:

@@ -3,7 +3,7 @@ from ranger_sim.foundation.numbers cimport fixed_of_float, float_of_word, wrap_i
 cimport cython
 
 cdef class Receiver:
-    cdef public long long frames
+    cdef public long long frames, cycles
     cpdef int deliver(self, long long value_word, long long time_word) except -1
 
 @cython.final

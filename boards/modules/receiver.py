@@ -7,10 +7,14 @@ if not cython.compiled:
 
 
 class Receiver:
-    """Base of everything that takes the two words of a frame (0 ... 2^32-1 each). `frames`: how many came."""
+    """Base of everything that takes the two words of a frame (0 ... 2^32-1 each). `frames`: how many came.
 
-    def __init__(self) -> None:
+    `cycles`: what it takes more than the time frame's.
+    """
+
+    def __init__(self, cycles=0) -> None:
         self.frames = 0
+        self.cycles = cycles
 
     def deliver(self, value_word: cython.longlong, time_word: cython.longlong) -> None:
         """A frame of this identifier was received. Satellites ignore the time word of commands."""

@@ -11,17 +11,23 @@ if not cython.compiled:
 class Sender:
     """Base of what takes frames from a board's program: a CAN bus's end, the router's own ring.
 
-    `time`: the network time that stamps them.
+    `time`: the network time that stamps them. `late_cycles`: cycles of a line of the schedule that come after its frame
+    is asked for, in a task of their own.
     """
 
-    def __init__(self, time: NetworkTime) -> None:
+    def __init__(self, time: NetworkTime, late_cycles=0) -> None:
         self.time = time
+        self.late_cycles = late_cycles
 
     def send_words(
         self, identifier: cython.longlong, value_word: cython.longlong, time_word: cython.longlong
     ) -> cython.bint:
         """Queue a frame of two words (0 ... 2^32-1 each); False when there is no room and it is lost."""
         return False
+
+    def build(self, identifier: cython.longlong, value_word: cython.longlong, time_word: cython.longlong) -> None:
+        """A line of the schedule has made a frame; here it is sent at once."""
+        self.send_words(identifier, value_word, time_word)
 
     def send_float(self, identifier: cython.longlong, value: cython.double) -> cython.bint:
         """Queue `value` as a single float, stamped with the network time of now."""

@@ -16,6 +16,7 @@ FOOT_ON_LEVEL: int
 FOOT_OFF_LEVEL: int
 REZERO_ANGLE_RAD: float
 REZERO_RATE_RAD_S: float
+SET_CYCLES: int
 
 class AnkleBoard(MotorBoard):
     joint: QuadratureDecoder

@@ -13,6 +13,7 @@ from ranger_sim.firmware_sim.scheduler import Task
 from typing import Any
 
 ALL_CAN_INTERRUPTS: Any
+TICK_CYCLES: Any
 CAN_RECEIVE_SLOT: int
 
 class FirmwareBoard(Microcontroller):

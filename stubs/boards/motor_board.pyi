@@ -30,6 +30,9 @@ START_VALUES_NS: int
 SLOTS_BEGIN_NS: int
 START_VALUES: int
 SLOTS_BEGIN: int
+CONVERSION_NS: int
+RECEIVE_LIST: dict[str, tuple[str, ...]]
+USUAL_RECEIVE_LIST: tuple[str, ...]
 EXTERNAL_ADC_SLOT: int
 INTERNAL_ADC_SLOT: int
 TIMER_SLOT: int
@@ -64,7 +67,7 @@ class MotorBoard(SatelliteBoard):
     timer0: TimerCapture
     encoder_select: int
     power_up: PowerUp
-    def __init__(self, table: Any, crystal: Any, quirks: Any, phase_ns: Any, sequence: Any, readings: Any, limits: Any, sign: Any, largest_duty: Any, gear: Any, interrupts: Any = ...) -> None: ...
+    def __init__(self, table: Any, crystal: Any, quirks: Any, phase_ns: Any, sequence: Any, readings: Any, limits: Any, sign: Any, largest_duty: Any, gear: Any, interrupts: Any = ..., conversion_ns: Any = ...) -> None: ...
     def listen(self) -> None: ...
     def add_encoders(self, phase_ns: Any, cap01: Any, cap23: Any) -> None: ...
     def add_absolute_encoder(self, second_connector: Any, zero: Any, sign: Any, rpm: Any) -> None: ...

@@ -7,6 +7,7 @@ from typing import Any
 SEQUENCE: tuple[tuple[Any, ...], ...]
 READINGS: Any
 LIMITS: Any
+CONTROL_CYCLES: int
 
 def whole(value: int) -> int: ...
 

@@ -27,6 +27,8 @@ UART_CYCLES: int
 UART_BYTE_CYCLES: int
 LCD_IDLE_CYCLES: int
 LCD_BYTE_CYCLES: int
+IMU_CYCLES: int
+IMU_BYTE_CYCLES: int
 
 @final
 class UserInterfaceBoard(SatelliteBoard):

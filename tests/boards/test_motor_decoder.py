@@ -189,7 +189,7 @@ def test_a_rising_edge_with_b_low_counts_up_and_a_falling_edge_inverts(earlier, 
     assert joint.ring[len(earlier)] * step > 0
 
 
-def test_full_speed_at_107520_edges_a_second_loses_nothing_with_the_150_cycle_handler():
+def test_full_speed_at_107520_edges_a_second_loses_nothing_and_leaves_half_the_slot():
     bench = Bench("MCFI").run(ms=1)
     bench.board.motor.set_position(0)
     for i in range(2150):
@@ -205,7 +205,8 @@ def test_full_speed_at_107520_edges_a_second_loses_nothing_with_the_150_cycle_ha
     # 6300 rpm / 34 is 19.4 rad/s
     assert bench.board.motor.rate / 65536 == pytest.approx(19.4, rel=0.15)
     assert bench.board.scheduler.overruns == 0
-    assert 0.5 < bench.board.scheduler.max_slot_cycles / 30000 < 0.75
+    # 54 edges a slot at 47 instructions in the interrupt and 24 in the task are 128 us of it
+    assert 0.4 < bench.board.scheduler.max_slot_cycles / 30000 < 0.5
 
 
 def newest(decoder, count):

@@ -96,7 +96,8 @@ def task_name(board, entry):
 def test_the_every_slot_list_is_the_firmwares_in_its_order(name):
     schedule = Bench(name).board.scheduler.schedule
     assert [task.name for task in schedule.every] == EVERY[name]
-    assert [task.name for task in schedule.last] == ["execution_time_record"]
+    # can_transmit is the end of the row's line, from where its frame is asked for
+    assert [task.name for task in schedule.last] == ["can_transmit", "execution_time_record"]
     assert schedule.slot_ns == 500_000
 
 
@@ -143,14 +144,88 @@ def test_every_variable_goes_out_at_its_rate(name):
     assert bench.board.can.send_lost == lost == 0
 
 
+# us from the tick: the mean of all slots, and the longest one, standing still with a clock on the bus (robot.md T1).
+# MCH: 97 us usually, 102 with the time frame, 207 to 226 with the re-zeroing in it. MCFI: 172, as it waits for four
+# conversions of 31 us; MCFO is its like. MCSI: 142 to 145.
+AT_REST = {"MCH": ((92, 104), (207, 226)), "MCFO": ((160, 175), (167, 181)), "MCFI": ((160, 175), (167, 181)),
+           "MCSI": ((134, 145), (142, 145))}  # fmt: skip
+
+
 @pytest.mark.parametrize("name", list(BOARDS))
-def test_slots_take_a_third_of_their_length_standing_still(name):
+def test_slots_at_rest_are_as_long_as_the_robots(name):
     bench = Bench(name).run(ms=200)
     scheduler = bench.board.scheduler
     assert scheduler.overruns == 0 and scheduler.near_limits == 0
-    mean = scheduler.total_slot_cycles / scheduler.slot_count
-    assert 0.25 < mean / 30000 < 0.4
-    assert scheduler.max_slot_cycles < 15000
+    mean, longest = AT_REST[name]
+    assert mean[0] < scheduler.total_slot_cycles / scheduler.slot_count / 60 < mean[1]
+    assert longest[0] < scheduler.max_slot_cycles / 60 < longest[1]
+
+
+# Starts of the tasks of a usual slot of MCH at rest, us after the tick (robot.md T2, last line).
+USUAL_SLOT_OF_MCH = {
+    "adcx_convert_all": 3, "qdc_cap01_rate": 7, "qdc_cap23_rate": 31, "can_rx_dispatch_all": 56, "dn_safety": 58,
+    "error_update": 59, "adcx_conversion_wait": 61, "mc_compliant_control": 61, "MCH_ANGLE": 85, "end": 97,
+}  # fmt: skip
+
+
+def test_the_usual_slot_of_the_hip_at_rest_runs_as_the_images():
+    bench = Bench("MCH", Quirks.firmware_2016(), sync=False)
+    bench.board.words[0] = 4600
+    bench.run(ms=100)
+    starts = {}
+
+    def noting(task):
+        function = task.function
+
+        def run():
+            starts[task.name] = (bench.board.now - bench.board.match_time) / 1000.0
+            return function()
+
+        return run
+
+    scheduler = bench.board.scheduler
+    for task in scheduler.schedule.row_tasks(0):
+        task.function = noting(task)
+    while "MCH_ANGLE" not in starts:
+        bench.run(slots=1)
+    starts["end"] = starts["execution_time_record"] + scheduler.find("execution_time_record").cost / 60.0
+    # the list has whole us, and parts of one are lost in the loop between two functions
+    assert {name: starts[name] for name in USUAL_SLOT_OF_MCH} == pytest.approx(USUAL_SLOT_OF_MCH, abs=1.5)
+
+
+# Instructions counted in the images (robot.md T2): what a call costs at two cycles each, within least and most.
+COUNTED = {
+    "MCH": {"adcx_convert_all": (37, 37), "qdc_cap01_rate": (614, 691), "qdc_cap23_rate": (614, 989),
+            "dn_safety": (34, 34), "error_update": (39, 39), "mc_compliant_control": (707, 762),
+            "motor_encoder_rezero": (3540, 3760)},
+    "MCFI": {"adcx_convert_all": (37, 37), "qdc_cap01_rate": (617, 1290), "ls_update": (135, 145),
+             "dn_safety": (413, 485), "mc_compliant_control": (600, 764), "motor_encoder_rezero": (158, 164)},
+    "MCSI": {"dn_update_pwm": (88, 88), "can_rx_dispatch_all": (15, 15)},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", list(COUNTED))
+def test_a_call_costs_two_cycles_for_each_instruction_counted(name):
+    scheduler = Bench(name).board.scheduler
+    for task, (least, most) in COUNTED[name].items():
+        assert 2 * least <= scheduler.find(task).cost <= 2 * most, task
+
+
+def test_a_frame_costs_by_what_it_is_and_by_its_place_in_the_receive_list():
+    # 142 instructions for the time alone, 716 with three gains on MCH; 130 and 632 on MCFI (robot.md T2)
+    for name, time, all_four in (("MCH", 142, 716), ("MCFI", 130, 632)):
+        bench = Bench(name, sync=False).run(ms=3)
+        task = bench.board.scheduler.find("can_rx_dispatch_all")
+        bench.receive(bench.table.TIMESTAMP, 1, 1)
+        bench.run(slots=2)
+        assert task.max_cycles == 2 * time
+        bench.receive(bench.table.TIMESTAMP, 2, 2)
+        for suffix in ("COMMAND_CURRENT", "STIFFNESS", "DAMPNESS"):
+            bench.now += 1000
+            bench.command(suffix, 1.0)
+        bench.run(slots=2)
+        # places in the lists of the other boards are ours, by this very figure
+        assert task.max_cycles == pytest.approx(2 * all_four, rel=0.06)
 
 
 @pytest.mark.parametrize("name", list(BOARDS))
@@ -161,7 +236,7 @@ def test_every_task_has_a_limit_above_what_it_usually_costs_and_typical_costs_fi
             assert 0 < task.cost < task.limit, task.name
     fixed = sum(task.cost for task in schedule.every + schedule.last)
     rarest = max(task.cost for task in schedule.all_tasks() if task not in schedule.every)
-    assert fixed + rarest < 30000 * 0.4
+    assert fixed + rarest < 30000 * 0.45  # the rarest is the hip's re-zeroing, a quarter of a slot
 
 
 @pytest.mark.parametrize("name", list(BOARDS))

@@ -98,9 +98,9 @@ def test_a_full_queue_and_a_wrong_place_are_errors(said):
 
 
 @pytest.mark.parametrize("led", range(6))
-def test_a_colour_command_is_red_green_blue_from_the_low_byte_up(led, chip):
+def test_a_colour_command_is_red_green_blue_from_the_low_byte_up(led):
     leds = ColourLeds()
-    LedReceiver(leds, led, chip).deliver(0xE22B8A, 0)
+    LedReceiver(leds, led).deliver(0xE22B8A, 0)
     assert (leds.level(led, 2), leds.level(led, 1), leds.level(led, 0)) == (0x8A, 0x2B, 0xE2)
     assert [leds.colour(i) for i in range(6)] == [0xE22B8A if i == led else 0 for i in range(6)]
 

@@ -2,7 +2,6 @@
 
 from collections.abc import MutableSequence
 from ranger_sim.boards.modules.receiver import Receiver
-from ranger_sim.firmware_sim.microcontroller import Microcontroller
 
 BLUE: int
 GREEN: int
@@ -34,7 +33,5 @@ class ColourLeds:
 class LedReceiver(Receiver):
     leds: ColourLeds
     led: int
-    cycles: int
-    chip: Microcontroller
-    def __init__(self, leds: ColourLeds, led: int, chip: Microcontroller) -> None: ...
+    def __init__(self, leds: ColourLeds, led: int) -> None: ...
     def deliver(self, value_word: int, time_word: int) -> None: ...

@@ -7,6 +7,7 @@ COMMAND: int
 STIFFNESS: int
 DAMPNESS: int
 TARGET: int
+GAIN_CYCLES: int
 
 @final
 class CompliantControl:

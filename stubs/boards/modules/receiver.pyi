@@ -4,7 +4,8 @@ from typing import final
 
 class Receiver:
     frames: int
-    def __init__(self) -> None: ...
+    cycles: int
+    def __init__(self, cycles: int = 0) -> None: ...
     def deliver(self, value_word: int, time_word: int) -> None: ...
 
 @final

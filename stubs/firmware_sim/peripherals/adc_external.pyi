@@ -15,6 +15,7 @@ COUNTS: int
 LEAST_COUNT: int
 LAST_COUNT: int
 CONVERSION_NS: int
+RESTART_NS: int
 GAINS: tuple[int, ...]
 REFERENCE_V: float
 
