@@ -149,8 +149,9 @@ class Quirks:
     push_correction_after_strike: bool = switch(False, False, YES_OR_NO)
     """An option found in a neighbouring version of the record controller: push gain after the strike only."""
 
-    estimator_feet: str = switch("appendix", "robot", ("appendix", "robot"))
-    """Foot radii in the estimator: 0.2/0.11 m as the plant has them, or 0.23/0.168 and 0.176/0.114 m."""
+    estimator_feet: str = switch("ranger", "robot", ("ranger", "appendix", "robot"))
+    """Feet in the estimator, radius and ankle to centre: 0.2/0.146 m as our body `ranger` has them, 0.2/0.11 m as the
+    appendix prints them, or 0.23/0.176 m inner and 0.168/0.114 m outer, the firmware's own."""
 
     def __post_init__(self) -> None:
         for each in fields(self):

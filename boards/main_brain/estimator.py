@@ -174,12 +174,13 @@ class Estimator:
         self.inner_left_sense = ButterworthFilter(10.0, 500.0)
         self.inner_right_sense = ButterworthFilter(10.0, 500.0)
         self.floor = FloorGeometry()
-        if quirks.estimator_feet == "appendix":
+        self.sweet_spot_m = 0.054  # radius less ankle-to-centre distance: robot.md C3.1, both feet
+        if quirks.estimator_feet != "robot":
             self.floor.inner_radius_m = self.floor.outer_radius_m = 0.2  # appendix table of the plant
+            self.floor.inner_ankle_m = self.floor.outer_ankle_m = 0.146
+        if quirks.estimator_feet == "appendix":
             self.floor.inner_ankle_m = self.floor.outer_ankle_m = 0.11
-            self.sweet_spot_m = 0.09  # radius less ankle-to-centre distance
-        else:
-            self.sweet_spot_m = 0.054  # robot.md C3.1, both feet
+            self.sweet_spot_m = 0.09
         self.ankle_zero = 1.68  # ankle angle with the sweet spot under a vertical leg, rad (robot.md C1.1)
         self.foot_offset = 1.75  # published foot angle less geometric one, rad (robot.md C1.1)
         self.left = HeelSensor()

@@ -64,7 +64,8 @@ class BareRobot:
 
     def __init__(self, controller="robust", body_parameters=None, floor=None, gyro_bias=-0.004, quirks=None) -> None:
         self.controller = controllers.load(controller)
-        quirks = quirks if quirks is not None else Quirks()
+        # the feet of the body that stands here unless another is given
+        quirks = quirks if quirks is not None else Quirks(estimator_feet="appendix")
         self.store = DataStore(TABLE_SIZE)
         self.controller.apply(self.store)
         self.errors = []

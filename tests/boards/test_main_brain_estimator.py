@@ -260,11 +260,11 @@ def test_the_first_reset_is_a_tenth_as_well_when_the_switch_says_so():
 
 
 def rear_foot_of_equal_feet(hip, ankle):
-    """Angle to the floor at which both feet (d 0.11 m, legs of 0.96 m) touch it, both ankles alike; by bisection."""
+    """Angle to the floor at which both feet (d 0.146 m, legs of 0.96 m) touch it, both ankles alike; by bisection."""
 
     def rise(front_leg):  # hip above the floor by the rear leg less that by the front leg
         rear_leg = front_leg + hip
-        return 0.96 * (math.cos(rear_leg) - math.cos(front_leg)) - 0.11 * (
+        return 0.96 * (math.cos(rear_leg) - math.cos(front_leg)) - 0.146 * (
             math.cos(rear_leg + ankle) - math.cos(front_leg + ankle)
         )
 
@@ -280,22 +280,43 @@ def test_distance_adds_the_ankle_distance_and_the_rolling_of_the_foot():
     bench = walking()
     swing_inner_and_strike(bench)
     # the first step takes the rear foot for one that began on its sweet spot
-    first = 1.92 * math.sin(0.2) + 0.09 * rear_foot_of_equal_feet(0.4, 0.2)
+    first = 1.92 * math.sin(0.2) + 0.054 * rear_foot_of_equal_feet(0.4, 0.2)
     assert bench.get("E_DISTANCE") == pytest.approx(first, abs=1e-4)
     rolled_from = bench.estimator.front_foot
     bench.tick(MCH_ANGLE=-0.1, MCFO_RIGHT_ANKLE_ANGLE=0.3)
     bench.tick(MCH_ANGLE=-0.3, MCFO_RIGHT_ANKLE_ANGLE=1.9, MCFI_MID_ANKLE_ANGLE=2.2)
     for _ in range(2):
         bench.tick(MCFO_RIGHT_HEEL_SENSE=2500.0)
-    second = 1.92 * math.sin(0.15) + 0.09 * (bench.estimator.floor.rear_foot - rolled_from)
+    second = 1.92 * math.sin(0.15) + 0.054 * (bench.estimator.floor.rear_foot - rolled_from)
     assert bench.get("EST_LAST_STEP_LENGTH") == pytest.approx(second, abs=1e-4)
     assert bench.get("E_DISTANCE") == pytest.approx(first + second, abs=1e-4)
 
 
-def test_the_feet_of_the_robot_can_be_chosen_for_the_geometry():
-    floor = Bench(quirks=Quirks(estimator_feet="robot")).estimator.floor
-    assert (floor.inner_radius_m, floor.inner_ankle_m) == (0.23, 0.176)
-    assert (floor.outer_radius_m, floor.outer_ankle_m) == (0.168, 0.114)
+@pytest.mark.parametrize(
+    ("feet", "inner", "outer"),
+    [
+        ("ranger", (0.2, 0.146), (0.2, 0.146)),
+        ("appendix", (0.2, 0.11), (0.2, 0.11)),
+        ("robot", (0.23, 0.176), (0.168, 0.114)),
+    ],
+)
+def test_the_feet_that_the_estimator_knows_can_be_chosen(feet, inner, outer):
+    estimator = Bench(quirks=Quirks(estimator_feet=feet)).estimator
+    floor = estimator.floor
+    assert (floor.inner_radius_m, floor.inner_ankle_m) == inner
+    assert (floor.outer_radius_m, floor.outer_ankle_m) == outer
+    for radius, ankle in (inner, outer):
+        assert estimator.sweet_spot_m == pytest.approx(radius - ankle)
+
+
+def test_the_estimator_knows_the_feet_of_the_default_body_unless_told_otherwise():
+    floor = Bench().estimator.floor
+    assert (floor.inner_radius_m, floor.inner_ankle_m, floor.outer_radius_m, floor.outer_ankle_m) == (
+        0.2,
+        0.146,
+        0.2,
+        0.146,
+    )
 
 
 def test_time_after_heel_strike_counts_across_the_wrap_of_the_network_time():

@@ -10,6 +10,7 @@ from ranger_sim.boards.main_brain.geometry import FloorGeometry
 
 ROBOT = (0.23, 0.176, 0.168, 0.114)  # inner radius, ankle to centre; outer
 APPENDIX = (0.2, 0.11, 0.2, 0.11)
+RANGER = (0.2, 0.146, 0.2, 0.146)
 
 
 def geometry(feet):
@@ -27,7 +28,7 @@ def height_difference(feet, outer_leg, hip, outer_ankle, inner_ankle):
     return over_outer - over_inner
 
 
-@pytest.mark.parametrize("feet", [ROBOT, APPENDIX])
+@pytest.mark.parametrize("feet", [ROBOT, APPENDIX, RANGER])
 @given(
     hip=st.floats(0.1, 0.6),
     inner_ahead=st.booleans(),
