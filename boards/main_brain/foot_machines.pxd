@@ -5,7 +5,7 @@ from ranger_sim.datatable.store cimport DataStore
 cdef class FootMachine:
     cdef public DataStore store
     cdef public bint inner, wait_for_strike, strike_logged
-    cdef public double hip_sign, hip_margin, push_gain, push_angle, push_start
+    cdef public double hip_sign, hip_margin, push_gain, push_base, push_angle, push_start, turned
     cdef public long long own_swing, push_ms, passive_ms
     # variables of the data table
     cdef public long long MCH_ANGLE, E_SWING_LEG, E_ANKLE_HEIGHT, E_AM_L_ABSRATE, FSM_RESET

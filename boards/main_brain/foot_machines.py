@@ -76,8 +76,10 @@ class FootMachine:
         self.motor = motor
         self.hip_margin = 0.05  # rad, a literal of the original: own legs this far behind before a push
         self.push_gain = 0.0  # A/rad added at prepush entry
+        self.push_base = 0.0  # rad beyond the stance angle, read at prepush entry
         self.push_angle = 0.0  # rad added at prepush entry
         self.push_start = 0.0  # published angle at prepush entry, rad
+        self.turned = 0.0  # since then, rad, by the last main action
         self.push_ms = 0
         self.strike_logged = False
         self.passive_ms = 0
@@ -96,13 +98,13 @@ class FootMachine:
             ),
             transitions=(
                 # from         to           when
-                (ANY, start, self.reset_wanted),
                 ("stance", "prepush", self.push_is_due),
                 ("prepush", "afterpush", self.push_is_done),
                 ("afterpush", "flipup", self.cable_is_slack_enough),
                 ("flipup", "flipdown", self.own_leg_is_ahead),
                 ("flipdown", "stance", self.own_foot_struck),
                 (start, "stance", self.own_foot_struck) if inner else (start, "flipup", self.other_foot_struck),
+                (ANY, start, self.reset_wanted),
             ),
             on_change=self.publish_state,
         )
@@ -165,7 +167,9 @@ class FootMachine:
             deficit = store.get_float(self.DP_H_AM_L_ABSRATE) - v
             self.push_gain = store.get_float(self.DC_F_PP_L_ABSRATE) * deficit
             self.push_angle = store.get_float(self.DC_F_PP_L_ABSRATE2) * deficit
+        self.push_base = store.get_float(self.P_F_PP_F_TANG)
         self.push_start = store.get_float(self.own_absolute)
+        self.turned = 0.0
         self.push_ms = 0
         self.strike_logged = False
         if self.other_foot_struck():
@@ -173,10 +177,11 @@ class FootMachine:
 
     def push(self) -> None:
         store: DataStore = self.store
-        self.push_ms += 2
         if not self.strike_logged and self.other_foot_struck():
             self.strike_logged = True
             store.set_int(self.push_to_strike, self.push_ms)
+        self.push_ms += 2
+        self.turned = store.get_float(self.own_absolute) - self.push_start
         self.track_absolute(
             store.get_float(self.P_F_ST_F_TANG) + self.push_target(),
             store.get_float(self.C_F_PP_F_ANG) + (self.push_gain if self.correction_applies() else 0.0),
@@ -189,10 +194,9 @@ class FootMachine:
 
     def push_target(self) -> float:
         """How far beyond the stance angle the foot is to turn, rad."""
-        angle: float = self.store.get_float(self.P_F_PP_F_TANG)
         if self.correction_applies():
-            angle = angle + self.push_angle
-        return angle
+            return self.push_base + self.push_angle
+        return self.push_base
 
     def enter_afterpush(self) -> None:
         self.passive_ms = 0
@@ -240,9 +244,14 @@ class FootMachine:
         ) > store.get_float(self.P_F_PP_F_ABSANG)
 
     def push_is_done(self) -> cython.bint:
-        store: DataStore = self.store
-        turned: float = store.get_float(self.own_absolute) - self.push_start
-        return self.other_foot_struck() and turned > store.get_float(self.P_F_PP_FRAC_ANG) * self.push_target()
+        """Struck, and turned by a part of the push when last looked at.
+
+        The variant that waits for the strike counts its correction twice here, as the robot's did.
+        """
+        whole: float = self.push_base + self.push_angle
+        if self.wait_for_strike and self.strike_logged:
+            whole = whole + self.push_angle
+        return self.other_foot_struck() and self.turned > self.store.get_float(self.P_F_PP_FRAC_ANG) * whole
 
     def cable_is_slack_enough(self) -> cython.bint:
         store: DataStore = self.store

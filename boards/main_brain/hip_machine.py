@@ -94,7 +94,6 @@ class HipMachine:
             ),
             transitions=(
                 # from                            to             when
-                (NOT_STOP, "HI_starthold", self.reset_wanted),
                 ("HI_starthold", "HO_preswing", self.inner_struck),
                 ("HO_preswing", "HO_premid", self.outer_foot_flips_up),
                 ("HO_premid", "HO_aftermid", self.inner_stance_past_mid),
@@ -104,6 +103,7 @@ class HipMachine:
                 (("HI_aftermid", "HI_ehold"), "HO_preswing", self.inner_struck),
                 (("HI_premid", "HI_aftermid"), "HI_ehold", self.inner_leg_hangs),
                 (("HO_premid", "HO_aftermid"), "HO_ehold", self.outer_leg_hangs),
+                (NOT_STOP, "HI_starthold", self.reset_wanted),
             ),
             on_change=self.publish_state,
         )

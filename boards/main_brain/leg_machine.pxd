@@ -5,12 +5,10 @@ cdef class StanceLeg:
     cdef public LegMachine owner
     cdef public DataStore store
     cdef public StanceLeg other
-    cdef public long long angle_id, preswing_ms, ss0_time
+    cdef public long long angle_id, preswing_ms
     cdef public double hip_sign
-    cdef public bint ss0_known
-    cdef public double strike_angle, ss0_angle, ss0_rate, ss0_hip
+    cdef public double strike_angle, ss0_angle, ss0_rate
     cdef public double mid_rate, mid_hip, mid_hip_rate, mid_time
-    cpdef int forget(self) except -1
     cpdef double angle_before_vertical(self) except? -1
     cpdef double hip_ahead(self) except? -1
     cpdef int enter_preswing(self) except -1
@@ -28,8 +26,9 @@ cdef class LegMachine:
     cdef public long long E_AM_L_ABSRATE, E_AM_H_ANG, E_AM_H_RATE, E_AM_TIME, E_AM_TIMER
     cdef public long long E_PS_TIME, E_SS_L_ANG, E_SS_L_ABSRATE, FSM_LEG
     cdef public StanceLeg outer, inner
-    cdef public long long aftermid_ms
-    cdef public bint rate_of_previous_step
+    cdef public double ss0_angle, ss0_hip
+    cdef public long long ss0_time, aftermid_ms
+    cdef public bint ss0_known, rate_of_previous_step
     cdef public StateMachine machine
     cpdef int preset(self) except -1
     cpdef int publish_state(self, number) except -1

@@ -45,7 +45,7 @@ class StanceLeg:
     """What is remembered of the steps in which one leg pair stands, and the actions that gather it.
 
     angle_id: the pair's absolute angle in the table; hip_sign: +1 for the outer pair, so that
-    hip_sign * h is positive while the swing leg is ahead of the standing one.
+    hip_sign * h is positive while the swing leg is ahead of the standing one. The figures outlive a walk.
     """
 
     def __init__(self, owner, angle_id, hip_sign: float) -> None:
@@ -54,17 +54,10 @@ class StanceLeg:
         self.other = None
         self.angle_id = angle_id
         self.hip_sign = hip_sign
-        self.forget()
-
-    def forget(self) -> None:
-        """The state before the first step."""
         self.strike_angle = 0.0
         self.preswing_ms = 0
-        self.ss0_known = False
         self.ss0_angle = 0.0
         self.ss0_rate = 0.0
-        self.ss0_time = 0
-        self.ss0_hip = 0.0
         self.mid_rate = 0.0
         self.mid_hip = 0.0
         self.mid_hip_rate = 0.0
@@ -90,10 +83,11 @@ class StanceLeg:
 
     def enter_premid(self) -> None:
         """Single stance begins (SS0): remember the pose, publish the means over both legs."""
-        self.ss0_known = True
         self.ss0_angle = self.angle_before_vertical()
-        self.ss0_time = self.store.get_int(self.owner.E_T_AFTER_HS)
-        self.ss0_hip = self.hip_ahead()
+        self.owner.ss0_known = True
+        self.owner.ss0_angle = self.ss0_angle
+        self.owner.ss0_time = self.store.get_int(self.owner.E_T_AFTER_HS)
+        self.owner.ss0_hip = self.hip_ahead()
         if self.preswing_ms > 0:
             self.ss0_rate = (self.strike_angle - self.ss0_angle) * 1000.0 / self.preswing_ms
         self.store.set_float(self.owner.E_SS_L_ANG, 0.5 * (self.ss0_angle + self.other.ss0_angle))
@@ -102,22 +96,23 @@ class StanceLeg:
     def enter_aftermid(self) -> cython.void:
         """Mid-stance: rates by finite differences since SS0, averaged with the other leg's last ones.
 
-        Without an SS0 before (the start state) the presets stay; no source gives a rule, chosen by us.
+        The span is negative when a strike came in between; the published rate then is the lowest. Before the first SS0
+        the presets stay (see LegMachine.preset).
+        ROBOT PARITY: a span of 0 is taken for 2 ms, where the robot divides by zero.
         """
         store: DataStore = self.store
-        span_ms: float
-        hip: float
+        owner: LegMachine = self.owner
+        span_ms: float = store.get_int(owner.E_T_AFTER_HS) - owner.ss0_time
+        hip: float = self.hip_ahead()
         rate: float
-        if not self.ss0_known:
+        if not owner.ss0_known:
             return
-        hip = self.hip_ahead()
-        span_ms = store.get_int(self.owner.E_T_AFTER_HS) - self.ss0_time
-        if span_ms < 2.0:
-            span_ms = 2.0  # a stopped or restarted step clock must not divide by zero (chosen by us)
-        self.mid_rate = 1000.0 * self.ss0_angle / span_ms
-        if not self.owner.rate_of_previous_step:
+        if span_ms == 0.0:
+            span_ms = 2.0
+        self.mid_rate = 1000.0 * owner.ss0_angle / span_ms
+        if not owner.rate_of_previous_step:
             self.mid_hip = hip
-        self.mid_hip_rate = (self.mid_hip - self.ss0_hip) * 1000.0 / span_ms
+        self.mid_hip_rate = (self.mid_hip - owner.ss0_hip) * 1000.0 / span_ms
         self.mid_hip = hip
         self.mid_time = span_ms
         rate = 0.5 * (self.mid_rate + self.other.mid_rate)
@@ -125,10 +120,10 @@ class StanceLeg:
             rate = 1.5
         elif rate <= 0.0:
             rate = 0.01
-        store.set_float(self.owner.E_AM_L_ABSRATE, rate)
-        store.set_float(self.owner.E_AM_H_ANG, 0.5 * (self.mid_hip + self.other.mid_hip))
-        store.set_float(self.owner.E_AM_H_RATE, 0.5 * (self.mid_hip_rate + self.other.mid_hip_rate))
-        store.set_float(self.owner.E_AM_TIME, 0.5 * (self.mid_time + self.other.mid_time))
+        store.set_float(owner.E_AM_L_ABSRATE, rate)
+        store.set_float(owner.E_AM_H_ANG, 0.5 * (self.mid_hip + self.other.mid_hip))
+        store.set_float(owner.E_AM_H_RATE, 0.5 * (self.mid_hip_rate + self.other.mid_hip_rate))
+        store.set_float(owner.E_AM_TIME, 0.5 * (self.mid_time + self.other.mid_time))
 
 
 class LegMachine:
@@ -144,6 +139,11 @@ class LegMachine:
         self.inner = inner
         outer.other = inner
         inner.other = outer
+        # pose at the last SS0, whichever leg stood
+        self.ss0_known = False
+        self.ss0_angle = 0.0
+        self.ss0_time = 0
+        self.ss0_hip = 0.0
         self.aftermid_ms = 0
         self.rate_of_previous_step = quirks.hip_mid_rate_of_previous_step
         self.machine = StateMachine(
@@ -160,31 +160,33 @@ class LegMachine:
             ),
             transitions=(
                 # from           to              when
-                (ANY, "LO_aftermid", self.reset_wanted),
                 ("LO_preswing", "LO_premid", self.inner_foot_flips_up),
                 ("LO_premid", "LO_aftermid", self.outer_leg_past_vertical),
                 ("LO_aftermid", "LI_preswing", self.inner_struck),
                 ("LI_preswing", "LI_premid", self.outer_foot_flips_up),
                 ("LI_premid", "LI_aftermid", self.inner_leg_past_vertical),
                 ("LI_aftermid", "LO_preswing", self.outer_struck),
+                (ANY, "LO_aftermid", self.reset_wanted),
             ),
             on_change=self.publish_state,
         )
 
     def preset(self) -> None:
-        """Before the first step: both legs' figures at the presets (v 0.5 rad/s, omega 1.66 rad/s)."""
+        """A walk begins: the published rate; in the first walk also what both legs remember.
+
+        ROBOT PARITY: the robot's legs remember zeros in the first walk after power-up and figures of the walk before in
+        any other (robot.md C1.3). Our first walk begins like one of the others, with the presets remembered, because
+        which of the two the record walk was is not known.
+        """
         rate: float = self.store.get_float(self.P_L_START_ABSRATE)
         hip_rate: float = self.store.get_float(self.P_L_START_H_RATE)
-        self.outer.forget()
-        self.inner.forget()
-        self.outer.mid_rate = rate
-        self.inner.mid_rate = rate
-        self.outer.mid_hip_rate = hip_rate
-        self.inner.mid_hip_rate = hip_rate
         self.store.set_float(self.E_AM_L_ABSRATE, rate)
-        self.store.set_float(self.E_AM_H_ANG, 0.0)
-        self.store.set_float(self.E_AM_H_RATE, hip_rate)
-        self.store.set_float(self.E_AM_TIME, 0.0)
+        if not self.ss0_known:
+            self.outer.mid_rate = rate
+            self.inner.mid_rate = rate
+            self.outer.mid_hip_rate = hip_rate
+            self.inner.mid_hip_rate = hip_rate
+            self.store.set_float(self.E_AM_H_RATE, hip_rate)
 
     def publish_state(self, number) -> None:
         self.store.set_int(self.FSM_LEG, number)

@@ -21,7 +21,7 @@ cdef class StateMachine:
     cdef public list states
     cdef public object on_change
     cdef public long long changes
-    cdef public State start, current
+    cdef public State start, current, told
     cdef public bint entered
     cpdef object put(self, name)
     cpdef object _tell(self)

@@ -5,6 +5,7 @@ the first one whose condition holds is taken; with none, the state's main action
 action, the first time). A transition is complete within its tick: the old state's exit action, then both entry
 and main action of the new state; an old state that was entered but never ran gets its entry and main
 first. A machine takes no second transition in the same tick, and a transition to the present state is no change.
+It tells its state at the beginning of a tick, so that others that look at the number see a change one tick later.
 
 A state may hold machines of its own. They are stepped after its main action, in their written order,
 so a state of an outer machine (walking) contains machines that run concurrently (one per motor).
@@ -51,7 +52,8 @@ class StateMachine:
 
     states: State objects, the first is the start state. transitions: rows (from, to, condition) of state
     names; `from` may be one name, a tuple of names or ANY. For each state the order of the rows is the
-    order of precedence. on_change: callable told the new state's number, or None.
+    order of precedence. on_change: callable told the present state's number at the beginning of the first tick and of
+    each tick after a change, or None.
     """
 
     def __init__(self, name, states, transitions, on_change=None) -> None:
@@ -80,6 +82,7 @@ class StateMachine:
                     by_name[origin].transitions.append(Transition(by_name[target], condition))
         self.start = self.states[0]
         self.current = self.start
+        self.told = None
         self.entered = False
 
     def put(self, name) -> object:
@@ -93,6 +96,7 @@ class StateMachine:
         raise ValueError(f"machine {self.name}: no state {name!r}")
 
     def _tell(self) -> object:
+        self.told = self.current
         if self.on_change is not None:
             self.on_change(self.current.number)
 
@@ -100,6 +104,8 @@ class StateMachine:
         """One tick."""
         state: State = self.current
         transition: Transition
+        if self.told is not state:
+            self._tell()
         for transition in state.transitions:
             if call(transition.condition):
                 if not self.entered:
@@ -112,7 +118,6 @@ class StateMachine:
                 state = transition.target
                 self.current = state
                 self.entered = False
-                self._tell()
                 break
         if not self.entered:
             self.entered = True

@@ -48,11 +48,11 @@ class SteeringMachine:
             ),
             transitions=(
                 # from      to        when
-                (ANY, "front", self.reset_wanted),
                 ("front", "stance", self.inner_struck),
                 ("stance", "back", self.inner_falls_behind),
                 ("back", "swing", self.outer_struck),
                 ("swing", "front", self.inner_comes_forward),
+                (ANY, "front", self.reset_wanted),
             ),
             on_change=self.publish_state,
         )
@@ -97,11 +97,13 @@ class SteeringMachine:
         command: float = self.radio_command()
         dead: float = self.store.get_float(self.P_S_RC_DEADBAND)
         self.store.set_float(self.E_RC_STEER, command)
-        if -dead <= command <= dead:
-            self.off()
-        else:
-            self.twist = self.store.get_float(self.P_S_MAX_CUR) * command
+        self.twist = self.store.get_float(self.P_S_MAX_CUR) * command
+        if not -dead < command < dead:
             self.switch(0)
+        elif self.store.get_float(self.D_S_SHUT_DOWN) != 0.0:
+            self.switch(1)  # the count goes on being sent
+        else:
+            self.off()
 
     def send_twist(self) -> None:
         self.send(self.twist)

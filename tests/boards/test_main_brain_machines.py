@@ -42,6 +42,7 @@ def inner_stance_premid(bench):
 def inner_stance_aftermid(bench, **values):
     inner_stance_premid(bench)
     bench.machines_only(E_T_AFTER_HS=340, E_LI_ANGLE=0.001, E_LO_ANGLE=-0.099, MCH_ANGLE=-0.10, **values)
+    bench.machines_only()  # the hip machine sees the leg machine's new state one slot later
 
 
 # --- leg machine --------------------------------------------------------------------------------------
@@ -88,6 +89,7 @@ def test_a_flip_rate_of_exactly_the_limit_does_not_end_double_stance(bench):
 
 def test_mid_stance_figures_are_differences_averaged_over_both_legs(bench):
     inner_stance_aftermid(bench)
+    # the outer legs' share are the presets:
     # v = (1000 * 0.15 / 300 + 0.5) / 2; alpha = (-h + 0) / 2; omega = ((0 - (-0.30)) * 1000 / 300 + 1.66) / 2
     assert bench.get("E_AM_L_ABSRATE") == pytest.approx(0.5 * (0.5 + 0.5), rel=1e-6)
     assert bench.get("E_AM_H_ANG") == pytest.approx(0.5 * (0.10 + 0.0), rel=1e-6)
@@ -137,6 +139,16 @@ def test_after_an_early_strike_leg_and_hip_machine_stay_in_premid(bench):
     assert bench.states()[1:3] == ("LI_premid", "HO_premid")
 
 
+def test_mid_stance_soon_after_an_early_strike_is_taken_for_the_slowest(bench):
+    inner_stance_premid(bench)  # single stance since 40 ms after the last strike
+    bench.machines_only(E_SWING_LEG=1, E_T_AFTER_HS=0, E_LI_ANGLE=-0.02, MCH_ANGLE=-0.1)
+    bench.machines_only(E_T_AFTER_HS=20, E_LI_ANGLE=0.001)
+    assert bench.states()[1] == "LI_aftermid"
+    # -20 ms: 0.15 rad in front of vertical give -7.5 rad/s
+    assert bench.modes.leg.inner.mid_rate == pytest.approx(-7.5, rel=1e-6)
+    assert bench.get("E_AM_L_ABSRATE") == pytest.approx(0.01)
+
+
 def test_mid_stance_in_a_stopped_clock_does_not_divide_by_zero(bench):
     inner_strike(bench)
     bench.machines_only(E_T_AFTER_HS=40, E_LI_ANGLE=-0.15, MCFO_RIGHT_ANKLE_RATE=-6.0)
@@ -176,6 +188,7 @@ def test_the_drive_of_the_swing_ends_300_ms_after_single_stance_began(bench):
 def test_the_inner_swing_is_the_mirror_without_the_outer_stiffness(bench):
     inner_stance_aftermid(bench, E_MCH_ANG_RATE=-1.0)
     bench.machines_only(E_SWING_LEG=1, E_T_AFTER_HS=0, E_LO_ANGLE=-0.2, E_LI_ANGLE=0.2, MCH_ANGLE=-0.4)
+    assert bench.states()[2] == "HI_preswing"
     assert bench.command("MCH") == OFF
     bench.machines_only(E_T_AFTER_HS=40, MCFI_ANKLE_RATE=-6.0, E_MCH_ANG_RATE=0.5)
     assert bench.states()[2] == "HI_premid"
@@ -194,10 +207,10 @@ def test_a_slow_mid_stance_corrects_by_the_slow_set_in_two_windows(bench):
     for _ in range(160):
         bench.machines_only()
         currents.append(bench.command("MCH")[0])
-    # the timer reads 2 ms in the slot of entry: 74 slots below 150 ms, 75 below 300 ms
-    assert currents[:74] == close([-first] * 74)
-    assert currents[74:149] == close([-second] * 75)
-    assert currents[149:] == [0.0] * 12
+    # the leg machine's timer reads 4 ms in the slot in which the hip follows: 73 slots below 150 ms, 75 below 300 ms
+    assert currents[:73] == close([-first] * 73)
+    assert currents[73:148] == close([-second] * 75)
+    assert currents[148:] == [0.0] * 13
 
 
 @pytest.mark.parametrize("mode", [0.0, 1.0, 2.0, 3.0])
@@ -251,12 +264,23 @@ def test_the_emergency_hold_of_the_inner_legs_is_the_mirror(bench):
     assert bench.command("MCH") == close((30.0 * 0.35, 30.0, 4.0))
 
 
-def test_mid_stance_comes_before_the_emergency_hold(bench):
+def test_mid_stance_comes_before_the_emergency_hold_once_the_leg_machine_has_told_it(bench):
     inner_stance_premid(bench)
-    bench.machines_only(E_T_AFTER_HS=340, E_LI_ANGLE=0.001, MCH_ANGLE=-0.25, E_MCH_ANG_RATE=0.1)
+    bench.machines_only(E_T_AFTER_HS=340, E_LI_ANGLE=0.001, MCH_ANGLE=-0.15, E_MCH_ANG_RATE=-0.1)
+    assert bench.states()[1:3] == ("LI_aftermid", "HO_premid")  # one slot behind
+    bench.machines_only(E_MCH_ANG_RATE=0.1)
     assert bench.states()[2] == "HO_aftermid"
     bench.machines_only()
     assert bench.states()[2] == "HO_ehold"
+
+
+def test_the_hip_follows_the_leg_machine_to_mid_stance_one_slot_later(bench):
+    inner_stance_premid(bench)
+    seen = []
+    for _ in range(2):
+        bench.machines_only(E_T_AFTER_HS=340, E_LI_ANGLE=0.001, MCH_ANGLE=-0.10, E_MCH_ANG_RATE=-1.0)
+        seen.append((*bench.states()[1:3], bench.get("FSM_LEG")))
+    assert seen == [("LI_aftermid", "HO_premid", 1), ("LI_aftermid", "HO_aftermid", 2)]
 
 
 # --- foot machines --------------------------------------------------------------------------------------
@@ -354,15 +378,40 @@ def test_the_push_ends_after_the_strike_and_half_its_angle(bench):
         bench.machines_only(E_FI_ABSANG=2.05)
     bench.machines_only(E_SWING_LEG=1)
     assert bench.states()[3] == "prepush"  # struck, but turned by 0.05 of 0.1 rad only
-    assert bench.get("E_FI_PP2HS_TIME") == 34
+    assert bench.get("E_FI_PP2HS_TIME") == 32  # 16 slots from the entry to that of the strike
     bench.machines_only(E_FI_ABSANG=2.11)
+    assert bench.states()[3] == "prepush"  # the turn is that of the last main action
+    bench.machines_only()
     assert bench.states()[3] == "afterpush"
     assert bench.command("MCFI") == OFF
+
+
+def test_how_far_to_push_is_fixed_when_the_push_begins(bench):
+    pushing(bench)
+    bench.machines_only(P_F_PP_F_TANG=0.5, E_FI_ABSANG=2.11, MCFI_MOTOR_POSITION=1.9)
+    assert bench.command("MCFI") == close((10.0 * (2.0 + 0.2 + 1.9 - 2.11), 10.0, 0.0))
+    bench.machines_only(E_SWING_LEG=1)
+    assert bench.states()[3] == "afterpush"
+
+
+@pytest.mark.parametrize("variant, turned, ends", [(False, 0.151, True), (True, 0.151, False), (True, 0.201, True)])
+def test_the_variant_of_april_2011_counts_the_correction_twice_when_it_ends_a_push(variant, turned, ends):
+    bench = in_walk(Bench(quirks=Quirks(push_correction_after_strike=variant)))
+    inner_stance_ready_to_push(bench)
+    bench.machines_only(E_ANKLE_HEIGHT=0.01, E_AM_L_ABSRATE=0.52)  # 0.1 rad more
+    # half of 0.2 + 0.1 rad, or of 0.2 + 0.1 + 0.1 rad
+    for _ in range(3):
+        bench.machines_only(E_SWING_LEG=1, E_FI_ABSANG=2.0)
+    bench.machines_only(E_FI_ABSANG=2.0 + turned)
+    assert bench.states()[3] == "prepush"
+    bench.machines_only()
+    assert (bench.states()[3] == "afterpush") is ends
 
 
 def limp(bench):
     pushing(bench)
     bench.machines_only(E_SWING_LEG=1, E_FI_ABSANG=2.2, MCFI_MOTOR_POSITION=2.1, MCFI_MID_ANKLE_ANGLE=2.0)
+    bench.machines_only()
     assert bench.states()[3] == "afterpush"
 
 
@@ -405,6 +454,7 @@ def test_the_outer_foot_is_the_mirror_of_the_inner_one(bench):
     assert bench.states()[4] == "prepush"
     assert bench.command("MCFO") == close((10.0 * (2.2 + 1.9 - 2.0), 10.0, 0.0))
     bench.machines_only(E_SWING_LEG=0, E_FO_ABSANG=2.2, MCFO_RIGHT_ANKLE_ANGLE=1.9)
+    bench.machines_only()
     assert bench.states()[4] == "afterpush"
     bench.machines_only()
     assert bench.states()[4] == "flipup"
@@ -466,4 +516,18 @@ def test_in_the_record_walks_set_the_dead_band_shuts_the_motor_down_as_on_the_ro
     steer_through_a_stride(bench, 85_000.0)
     assert bench.get("MCSI_SHUTDOWN") == 1
     steer_through_a_stride(bench, 97_500.0)
+    assert bench.get("MCSI_SHUTDOWN") == 0
+
+
+def test_within_the_dead_band_the_count_goes_on_being_sent_to_a_motor_that_is_shut_down(bench):
+    sent = steer_through_a_stride(bench, 85_250.0)  # 0.01 of 75 counts
+    assert [counts for state, counts in sent if state == "swing"] == [pytest.approx(0.75, abs=1e-4)]
+    assert sent[-1][1] == pytest.approx(-0.75, abs=1e-4)
+    assert bench.get("MCSI_SHUTDOWN") == 1
+
+
+def test_the_dead_band_ends_where_its_limit_is_reached(bench):
+    bench.set(P_S_RC_DEADBAND=0.5)
+    steer_through_a_stride(bench, 97_500.0)  # 0.5
+    assert bench.get("E_RC_STEER") == 0.5
     assert bench.get("MCSI_SHUTDOWN") == 0

@@ -64,32 +64,53 @@ def test_motors_are_off_outside_walking(keys):
     assert bench.store.is_unread(18, 1)
 
 
+def put_machines(bench, leg, hip, inner, outer, steering):
+    modes = bench.modes
+    modes.leg.machine.put(leg)
+    modes.hip.machine.put(hip)
+    modes.inner_foot.machine.put(inner)
+    modes.outer_foot.machine.put(outer)
+    modes.steering.machine.put(steering)
+
+
 def test_leaving_walk_puts_every_machine_back_to_its_start():
     bench = Bench()
     bench.tick()
     bench.press(1)
-    for machine, state in (
-        (bench.modes.leg.machine, "LI_premid"),
-        (bench.modes.hip.machine, "HO_ehold"),
-        (bench.modes.inner_foot.machine, "prepush"),
-        (bench.modes.outer_foot.machine, "flipup"),
-        (bench.modes.steering.machine, "back"),
-    ):
-        machine.put(state)
+    put_machines(bench, "LI_premid", "HO_premid", "prepush", "flipup", "stance")
+    bench.set(MCH_ANGLE=0.15)  # no other transition is due
     bench.press(2)
     assert bench.states() == ("standby", "LO_aftermid", "HI_starthold", "startflipdown", "startstance", "front")
     assert bench.get("FSM_RESET") == 0  # 1 only while the machines went back
     assert bench.get("E_SWING_LEG") == 1
 
 
-def test_walk_begins_with_the_preset_figures_every_time():
+def test_a_machine_with_another_transition_due_takes_that_one_and_misses_the_reset():
     bench = Bench()
     bench.tick()
     bench.press(1)
+    # swing leg 1: the outer legs have struck; hip behind -0.1 rad
+    put_machines(bench, "LI_aftermid", "HO_ehold", "prepush", "flipup", "back")
+    bench.set(MCH_ANGLE=-0.2)
+    bench.press(2)
+    assert bench.states() == ("standby", "LO_preswing", "HI_preswing", "startflipdown", "flipdown", "swing")
+
+
+def test_every_walk_begins_with_the_preset_rate_and_the_first_one_remembers_it():
+    bench = Bench()
+    bench.tick()
+    bench.press(1)
+    assert bench.get("E_AM_L_ABSRATE") == pytest.approx(0.5)
+    assert (bench.modes.leg.outer.mid_rate, bench.modes.leg.inner.mid_rate) == (0.5, 0.5)
+    bench.modes.leg.outer.enter_premid()
+    bench.modes.leg.outer.mid_rate = 0.8
+    bench.modes.leg.inner.mid_rate = 0.7
     bench.set(E_AM_L_ABSRATE=1.2)
     bench.press(2)
     bench.press(1)
     assert bench.get("E_AM_L_ABSRATE") == pytest.approx(0.5)
+    # the legs remember the walk before
+    assert (bench.modes.leg.outer.mid_rate, bench.modes.leg.inner.mid_rate) == (0.8, 0.7)
 
 
 def test_calibrate_zeroes_steps_and_distance_and_standby_keeps_them():

@@ -135,18 +135,23 @@ def test_a_machine_can_nest_three_deep(script):
     assert [line for line in script.took() if line.endswith("main")] == ["top main", "middle main", "low main"]
 
 
-def test_changes_are_told_by_number(script):
-    told = []
+def test_a_state_is_told_by_number_at_the_beginning_of_the_next_tick(script):
     machine = StateMachine(
         "told",
         (script.state(3, "a"), script.state(8, "b")),
         (("a", "b", script.when("go")),),
-        on_change=told.append,
+        on_change=lambda number: script.log.append(number),
     )
+    machine.step()
+    assert script.took() == [3, "a entry", "a main"]
     script.flags = {"go"}
     machine.step()
+    assert script.took() == ["a exit", "b entry", "b main"]
+    machine.step()
+    machine.step()
+    assert script.took() == [8, "b main", "b main"]
     machine.put("a")
-    assert told == [8, 3]
+    assert script.took() == [3]
 
 
 @pytest.mark.parametrize(

@@ -16,8 +16,10 @@ class FootMachine:
     hip_sign: float
     hip_margin: float
     push_gain: float
+    push_base: float
     push_angle: float
     push_start: float
+    turned: float
     own_swing: int
     push_ms: int
     passive_ms: int

@@ -13,19 +13,15 @@ class StanceLeg:
     other: StanceLeg
     angle_id: int
     preswing_ms: int
-    ss0_time: int
     hip_sign: float
-    ss0_known: bool
     strike_angle: float
     ss0_angle: float
     ss0_rate: float
-    ss0_hip: float
     mid_rate: float
     mid_hip: float
     mid_hip_rate: float
     mid_time: float
     def __init__(self, owner: LegMachine, angle_id: int, hip_sign: float) -> None: ...
-    def forget(self) -> None: ...
     def angle_before_vertical(self) -> float: ...
     def hip_ahead(self) -> float: ...
     def enter_preswing(self) -> None: ...
@@ -58,7 +54,11 @@ class LegMachine:
     FSM_LEG: int
     outer: StanceLeg
     inner: StanceLeg
+    ss0_angle: float
+    ss0_hip: float
+    ss0_time: int
     aftermid_ms: int
+    ss0_known: bool
     rate_of_previous_step: bool
     machine: StateMachine
     def __init__(self, store: DataStore, quirks: Any) -> None: ...

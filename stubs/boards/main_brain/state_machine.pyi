@@ -31,6 +31,7 @@ class StateMachine:
     changes: int
     start: State
     current: State
+    told: State
     entered: bool
     def __init__(self, name: str, states: Any, transitions: Any, on_change: Any = None) -> None: ...
     def put(self, name: Any) -> Any: ...
