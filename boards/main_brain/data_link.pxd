@@ -41,7 +41,7 @@ cdef class DataLink:
     cdef public unsigned char[::1] segments
     cdef public long long filling, sending, used, in_segment, checksum
     cdef public long long fast_count, medium_count, phase, fast_place, medium_place, slow_id
-    cdef public long long rate_sum, calls_without_step, points, segments_sent, steps
+    cdef public long long rate_sum, calls_to_wait, points, segments_sent, steps
     cdef public long long ring_write, ring_read, packets, bad_packets, refused, ring_full
     cpdef int build_lists(self) except -1
     cpdef long long allowed_steps(self) except? -1

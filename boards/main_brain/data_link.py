@@ -5,11 +5,12 @@ and a checksum, the sum of the 90 bytes before it plus 1; everything big-endian,
 a ring that DMA empties. From the computer come packets of 8 bytes: identifier, value, and the sum of these six bytes
 plus 1. After a wrong sum the reader goes on one byte later.
 
-What is sent: in each cycle every variable of the fast list that is new, the next one of the medium list if it is new,
-and the next of all variables whether new or not. 48 variables of the table, LV_CH_0 ... LV_CH_47, choose: identifier
+What is sent: in each cycle every variable of the fast list that is new, the next one of the medium list that is new
+(the look for it ends at the list's end and begins anew in the next cycle), and the next of all variables whether new or
+not. 48 variables of the table, LV_CH_0 ... LV_CH_47, choose: identifier
 plus 65536 for the medium list, plus 131072 for the fast one. How many steps of this a slot may take follows from how
 full the ring is: an integral controller keeps it half filled. A step is one look at a list entry, sent or skipped, or
-the return to the start of the cycle. The end of the fast list costs no step (chosen by us).
+the return to the start of the cycle. The end of the fast or the medium list costs no step.
 """
 
 import array
@@ -97,7 +98,7 @@ class DataLink:
         self.medium_place = 0
         self.slow_id = 0
         self.rate_sum = 0
-        self.calls_without_step = 0
+        self.calls_to_wait = 0
         self.points = 0
         self.segments_sent = 0
         self.steps = 0
@@ -137,21 +138,18 @@ class DataLink:
                 self.fast_count += 1
 
     def allowed_steps(self) -> cython.longlong:
-        """The rate controller: steps of this call, 0 ... 10."""
-        calls: cython.longlong
+        """The rate controller: steps of this call, 0 ... 10; with a sum not above 0 one, and then calls without."""
         self.rate_sum += MOST_FULL - self.used - HALF_FULL
         if self.rate_sum > LARGEST_SUM:
             self.rate_sum = LARGEST_SUM
         elif self.rate_sum < -LARGEST_SUM:
             self.rate_sum = -LARGEST_SUM
         if self.rate_sum > 0:
-            self.calls_without_step = 0
             return self.rate_sum >> STEP_SHIFT
-        calls = (-self.rate_sum >> STEP_SHIFT) + 1
-        self.calls_without_step += 1
-        if self.calls_without_step < calls:
+        if self.calls_to_wait > 0:
+            self.calls_to_wait -= 1
             return 0
-        self.calls_without_step = 0
+        self.calls_to_wait = -(self.rate_sum >> STEP_SHIFT)  # a shift rounds down: -1 is one call
         return 1
 
     def send_data(self) -> object:
@@ -175,15 +173,15 @@ class DataLink:
                 return
             self.phase = MEDIUM_LIST
         if self.phase == MEDIUM_LIST:
-            self.phase = ALL_VARIABLES
-            if self.medium_count > 0:
-                if self.medium_place >= self.medium_count:
-                    self.medium_place = 0
+            if self.medium_place < self.medium_count:
                 number = self.medium[self.medium_place]
                 self.medium_place += 1
                 if self.store.unread[number] & NEW_FOR_COMPUTER:
                     self._put(number)
-        elif self.phase == ALL_VARIABLES:
+                    self.phase = ALL_VARIABLES
+                return
+            self.phase = ALL_VARIABLES
+        if self.phase == ALL_VARIABLES:
             self.phase = RETURN
             self._put(self.slow_id)
             self.slow_id += 1
@@ -192,6 +190,8 @@ class DataLink:
         else:
             self.phase = FAST_LIST
             self.fast_place = 0
+            if self.medium_place >= self.medium_count:
+                self.medium_place = 0
 
     def _put(self, number: cython.longlong) -> None:
         """One point into the segment being filled; the computer has now read that variable."""

@@ -119,11 +119,11 @@ def test_with_no_channels_the_slow_list_goes_round_by_itself(desk):
 
 
 def test_ten_steps_a_slot_are_ten_places_of_the_cycle(desk):
-    """Cycle without channels: medium, slow, restart. So 10 steps a slot bring 10/3 points, 500 slots a second 1667."""
+    """Cycle without channels: slow, restart. So 10 steps a slot bring 5 points, 500 slots a second 2500."""
     desk.full_speed()
     desk.run_ms(3000)
     assert desk.link.steps == pytest.approx(15_000, rel=0.01)
-    assert len(desk.points()) == pytest.approx(5000, rel=0.01)
+    assert len(desk.points()) == pytest.approx(7500, rel=0.01)
 
 
 def test_fast_comes_in_every_cycle_when_new_medium_in_turn_and_slow_always(desk):
@@ -181,6 +181,30 @@ def test_a_fast_variable_that_is_not_new_costs_a_step_and_sends_nothing(desk):
     assert desk.link.points == 0
 
 
+def test_the_medium_list_is_searched_for_a_new_variable_until_its_end_and_anew_in_the_next_cycle(desk):
+    store, link = desk.board.store, desk.link
+    for place, number in enumerate((20, 21, 22)):
+        store.set_float(table.LV_CH_0 + place, number + MEDIUM)
+    link.build_lists()
+    link.slow_id, link.phase, link.fast_place = 400, 0, 0
+    told = []
+    for new in ({22}, {20, 21, 22}, {20, 21}, set()):
+        for number in (20, 21, 22):
+            store.set_word(number, 1, 1)
+            if number not in new:
+                store.mark_read(number, 0)
+        steps, before = 0, link.points
+        while True:
+            link.rate_sum, link.used = 4096 + 8, 0
+            link.send_data()
+            steps += 1
+            if link.phase == 0:
+                break
+        told.append((steps, link.points - before))
+    # looks at 20, 21, 22, slow, restart; at 20, slow, restart; at 21, ...; at 22 in vain, slow, restart
+    assert told == [(5, 2), (3, 2), (3, 2), (3, 1)]
+
+
 def test_both_flags_put_a_variable_on_both_lists_and_strange_values_on_none(desk):
     values = (3 + MEDIUM + FAST, float("nan"), float("inf"), -1.0, 65535.0, 262144.0, 1e30)
     for place, value in enumerate(values):
@@ -216,22 +240,32 @@ def test_all_48_channels_can_be_fast(desk):
         (40_952, 0, 10, 40_960),  # free 18
         (40_960, 0, 10, 40_960),  # its limit
         (40_960, 18, 9, 40_950),  # free 0
-        (-40_960, 18, 0, -40_960),
-        (-4096, 8, 0, -4096),  # every second call
+        (-40_960, 18, 1, -40_960),  # then ten calls without
+        (-4096, 8, 1, -4096),  # every second call
     ],
 )
 def test_the_rate_controller_step_by_step(desk, total, used, steps, after):
-    desk.link.rate_sum, desk.link.used = total, used
+    desk.link.rate_sum, desk.link.used, desk.link.calls_to_wait = total, used, 0
     assert desk.link.allowed_steps() == steps
     assert desk.link.rate_sum == after
 
 
-@pytest.mark.parametrize(("total", "period"), [(0, 1), (-4096, 2), (-8192, 3), (-40_960, 11)])
+@pytest.mark.parametrize(("total", "period"), [(0, 1), (-1, 2), (-4096, 2), (-4097, 3), (-40_960, 11)])
 def test_below_zero_a_step_comes_only_every_nth_call(desk, total, period):
     desk.link.used = 8  # half full: the sum stays
     desk.link.rate_sum = total
+    desk.link.calls_to_wait = 0
     steps = [desk.link.allowed_steps() for _ in range(44)]
-    assert steps == [int((call + 1) % period == 0) for call in range(44)]
+    assert steps == [int(call % period == 0) for call in range(44)]
+
+
+def test_how_many_calls_go_without_a_step_is_settled_at_the_step_before(desk):
+    desk.link.rate_sum, desk.link.used, desk.link.calls_to_wait = -40_960, 8, 0
+    assert desk.link.allowed_steps() == 1
+    desk.link.rate_sum = 4096  # meanwhile there is room: steps come, and the ten calls stay owed
+    assert [desk.link.allowed_steps() for _ in range(3)] == [1, 1, 1]
+    desk.link.rate_sum = 0
+    assert [desk.link.allowed_steps() for _ in range(11)] == [0] * 10 + [1]
 
 
 def test_the_ring_settles_half_full_when_the_line_is_slower_than_the_steps():

@@ -209,7 +209,7 @@ def test_drop_outs_leave_gaps_in_the_log_that_are_counted_and_no_bad_checksum(mo
 def test_a_robot_that_does_not_answer_is_said_so(robot):
     robot.board.computer.rate_sum = -(1 << 40)  # it never sends
     robot.before_look.append(lambda: setattr(robot.board.computer, "rate_sum", -(1 << 40)))
-    robot.board.computer.calls_without_step = -(1 << 40)
+    robot.board.computer.calls_to_wait = 1 << 40
     code, out, err = robot.daq("--read", "MCH_ANGLE", "--timeout", "0.5s")
     assert (code, out) == (1, "")
     assert "no answer for MCH_ANGLE" in err

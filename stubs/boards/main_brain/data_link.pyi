@@ -65,7 +65,7 @@ class DataLink:
     medium_place: int
     slow_id: int
     rate_sum: int
-    calls_without_step: int
+    calls_to_wait: int
     points: int
     segments_sent: int
     steps: int
