@@ -109,6 +109,8 @@ def oddities(plant: Any) -> dict:
         "recontacts": record.recontacts,
         "scuffs": record.scuffs,
         "flights": record.flights,
+        "slides": record.slides,
+        "jams": record.jams,
         "lead_lifts": record.lead_lifts,
         "tensile_strikes": record.tensile_strikes,
         "tensile_impulse_min_Ns": record.tensile_impulse_min_Ns,

@@ -34,7 +34,7 @@ cdef class Body:
     cdef public Sole sole
     cdef public long long event
     cdef public Leg event_leg
-    cdef public bint coulomb, sliding, unilateral, lift_leading
+    cdef public bint coulomb, sliding, watched, unilateral, lift_leading
     cdef public ContactEquations equations
     cdef public object parameters, floor, record
     cdef public str cause
@@ -45,6 +45,7 @@ cdef class Body:
     cpdef double ahead(self) noexcept
     cpdef void anchor_foot(self, Leg leg) noexcept
     cpdef double contact_x(self, Leg leg) noexcept
+    cpdef double slip_m_per_s(self, Leg leg) noexcept
     cpdef double hip_angle(self) noexcept
     cpdef double hip_rate(self) noexcept
     cpdef bint stands(self, Leg leg) noexcept

@@ -79,8 +79,9 @@ class Body:
         self.last_strike = None  # the leg that struck last
         self.brush = False  # the swing foot is near the floor and not ahead: its sole may touch
         self.strike_ahead = p.strike_ahead_m
-        self.coulomb = False  # no foot pulls nor holds beyond friction (EQUATIONS 8, 9)
-        self.sliding = False  # a foot does
+        self.coulomb = p.contact == "coulomb"  # no foot pulls nor holds beyond friction (EQUATIONS 8, 9)
+        self.sliding = False  # a foot slides
+        self.watched = False  # a foot is near the bounds of its grip in this step
         self.unilateral = p.contact == "unilateral"  # the trailing foot may leave at a heel-strike (EQUATIONS 8)
         self.lift_leading = True  # the leading foot may leave in double stance
         # the operator's hands, while he holds the robot
@@ -152,7 +153,7 @@ class Body:
         return self.hip_x - leg.behind()
 
     def update_pose(self) -> cython.void:
-        """Hip position and the two gaps from the angles (in flight and held: the gaps only)."""
+        """Hip position and the two gaps from the angles (in flight and held: the gaps only; sliding: not along x)."""
         outer: Leg = self.outer
         inner: Leg = self.inner
         s: Leg = self.stance
@@ -165,22 +166,31 @@ class Body:
         inner_reach = inner.reach()
         if self.mode == SINGLE or self.mode == DOUBLE or self.standing:
             self.hip_y = s.height + (outer_reach if s is outer else inner_reach)
-            self.hip_x = s.anchor + s.el * s.sin_leg - s.d * s.sin_foot + s.r * foot
-            if foot < s.heel or foot > s.toe:
-                self.hip_x += s.r * (sin(s.excess(foot)) - s.excess(foot))
+            if s.slide == 0:
+                self.hip_x = s.anchor + s.el * s.sin_leg - s.d * s.sin_foot + s.r * foot
+                if foot < s.heel or foot > s.toe:
+                    self.hip_x += s.r * (sin(s.excess(foot)) - s.excess(foot))
         outer.gap = self.hip_y - outer_reach - outer.height
         inner.gap = self.hip_y - inner_reach - inner.height
 
     def update_hip_rates(self) -> cython.void:
-        """Hip velocity from the standing foot (EQUATIONS 4)."""
+        """Hip velocity from the standing foot, of one that slides only normal to the floor (EQUATIONS 4)."""
         s: Leg = self.stance
         excess: cython.double
         if self.mode != SINGLE and self.mode != DOUBLE:
             return
         self.know_angles()
         excess = s.excess(s.foot_angle)
-        self.hip_vx = (s.r * cos(excess) - s.d * s.cos_foot) * s.foot_rate + s.el * s.cos_leg * s.rate
+        if s.slide == 0:
+            self.hip_vx = (s.r * cos(excess) - s.d * s.cos_foot) * s.foot_rate + s.el * s.cos_leg * s.rate
         self.hip_vy = (s.d * s.sin_foot - s.r * sin(excess)) * s.foot_rate - s.el * s.sin_leg * s.rate
+
+    def slip_m_per_s(self, leg) -> cython.double:
+        """How fast the lowest point of a foot moves along the floor, m/s (EQUATIONS 8)."""
+        leg.know_leg()
+        leg.know_foot()
+        along: cython.double = leg.r * cos(leg.excess(leg.foot_angle)) - leg.d * leg.cos_foot
+        return self.hip_vx - leg.el * leg.cos_leg * leg.rate - along * leg.foot_rate
 
     def hip_angle(self) -> cython.double:
         """h of the firmware: inner legs ahead of the outer ones, rad."""

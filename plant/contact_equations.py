@@ -70,9 +70,8 @@ class ContactEquations:
 
     Filled by `begin` and its caller: `mass`, 6 x 6; `right`, momenta or forces of the first six rows; `target`, what
     the contact's rate along and normal to the floor shall be when the foot holds; `rolling`, torque on a foot while it
-    is on the floor. Of a massless foot, which apart from the floor follows its motor: `follow`, the motor's rate
-    relative to the leg; `loose`, the torque that its leg is then rid of; `pressed`, above zero when its cable presses
-    it into the floor, so that it cannot leave. `moving`: the foot slides already, its direction is known.
+    is on the floor; `follow`, of a massless foot, what its motor's rate is, which it follows when apart. `moving`: the
+    foot slides already, its direction is known.
     """
 
     def __init__(self) -> None:
@@ -85,9 +84,18 @@ class ContactEquations:
         ] * 8  # rates of the contact by those of leg and foot: leg along, foot along, leg and foot normal
         self.target = [0.0] * 4
         self.follow = [0.0] * 2
-        self.loose = [0.0] * 2
         self.rolling = [0.0] * 2
-        self.pressed = [0.0] * 2
+        # of a step (plant/sliding.py), in the order of the columns and then both motors: accelerations of the motors,
+        # force on a brushing sole, state of a stage and of the start, sums of accelerations
+        self.motor = [0.0] * 2
+        self.brush = [0.0] * 2
+        self.place = [0.0] * 8
+        self.rate = [0.0] * 8
+        self.acceleration = [0.0] * 8
+        self.first_place = [0.0] * 8
+        self.first_rate = [0.0] * 8
+        self.place_sum = [0.0] * 8
+        self.rate_sum = [0.0] * 8
         self.massless = [False] * 2
         self.at_floor = [False] * 2
         self.moving = [False] * 2
@@ -145,9 +153,7 @@ class ContactEquations:
             self.arm[n + 3] = -(leg.d * sin(leg.foot_angle) - leg.r * sin(excess))
             self.massless[leg.side] = leg.Jf == 0.0
             self.follow[leg.side] = 0.0
-            self.loose[leg.side] = 0.0
             self.rolling[leg.side] = 0.0
-            self.pressed[leg.side] = 0.0
             self.moving[leg.side] = False
             self.allow_all(leg.side)
 
@@ -204,7 +210,6 @@ class ContactEquations:
                 a[COLUMNS * foot + foot] = 1.0
                 a[COLUMNS * foot + leg] = -1.0
                 a[COLUMNS * foot + COLUMN_RIGHT] = self.follow[side]
-                a[COLUMNS * leg + COLUMN_RIGHT] += self.loose[side]
             return
         a[COLUMNS * foot + COLUMN_RIGHT] += self.rolling[side]
         a[COLUMNS * COLUMN_VX + along] = -1.0
@@ -245,8 +250,6 @@ class ContactEquations:
         if not self.at_floor[side]:
             return 1e300  # ample: no inequality is about it
         if state == APART:
-            if self.massless[side] and self.pressed[side] > 0.0:
-                return -self.pressed[side]
             return self.contact_rate(side, 0)
         rest = push
         if state == STICKS:

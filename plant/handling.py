@@ -36,11 +36,13 @@ def hold(body, outer_leg_rad: cython.double) -> None:
     body.lift()
     body.lock_hip = False
     body.standing = False
+    body.sliding = False
     body.cause = ""
     body.last_strike = None
     for leg in (body.outer, body.inner):
         leg.Fx = 0.0
         leg.Fy = 0.0
+        leg.slide = 0
         if leg.Jf == 0.0:
             leg.limp()
     body.update_pose()
@@ -95,9 +97,11 @@ def begin_walk(body) -> None:
     leg: Leg
     body.mode = SINGLE
     body.standing = False
+    body.sliding = False
     for leg in (body.outer, body.inner):
         leg.height = first
         leg.anchor = 0.0
+        leg.slide = 0
     body.last_strike = body.stance
     body.anchor_foot(body.stance)
     if body.swing.Jf == 0.0:

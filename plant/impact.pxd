@@ -1,6 +1,6 @@
 from ranger_sim.plant.body cimport DOUBLE, FLIGHT, SINGLE, Body
 from ranger_sim.plant.contact_equations cimport (
-    APART, ARMS, COLUMN_FOOT, COLUMN_IMPULSE, COLUMN_LEG, COLUMN_VX, COLUMN_VY, SLIDES_BACK, SLIDES_ON, STICKS,
+    APART, COLUMN_FOOT, COLUMN_IMPULSE, COLUMN_LEG, COLUMN_VX, COLUMN_VY, SLIDES_BACK, SLIDES_ON, STICKS,
     ContactEquations,
 )
 from ranger_sim.plant.leg cimport Leg

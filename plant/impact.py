@@ -6,7 +6,6 @@ if not cython.compiled:
     from ranger_sim.plant.body import DOUBLE, FLIGHT, SINGLE
     from ranger_sim.plant.contact_equations import (
         APART,
-        ARMS,
         COLUMN_FOOT,
         COLUMN_IMPULSE,
         COLUMN_LEG,
@@ -170,7 +169,6 @@ def write_momentum(body) -> None:
     for leg in (o, i):
         if leg.Jf == 0.0:
             equations.follow[leg.side] = leg.motor_rate
-            equations.pressed[leg.side] = -equations.arm[ARMS * leg.side + 3] * body.ankle.k * leg.stretch()
 
 
 def take_rates(body) -> None:

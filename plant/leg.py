@@ -19,6 +19,13 @@ if not cython.compiled:
     OUTER = 0
     INNER = 1
 
+# kg m^2. A massless foot that slides has no equation for its angle where its contact is below its ankle (f = 0 in
+# EQUATIONS 4). Where feet may slide they have this at least; chosen by us: a tenth of a real foot's, and against its
+# cable it swings at 60 Hz, which steps of 250 us follow.
+# ROBOT PARITY: appendix 5 has massless feet; contact "sticking" keeps them.
+LEAST_FOOT_INERTIA = 1e-4
+RIGID = ("sticking", "unilateral")  # contacts in which a foot on the floor never slides
+
 LEG_NAMES = ("outer", "inner")
 
 
@@ -94,6 +101,8 @@ class Leg:
         self.heel = p.arc_heel_rad
         self.toe = p.arc_toe_rad
         self.Jf = p.foot_inertia_kg_m2
+        if p.contact not in RIGID and self.Jf < LEAST_FOOT_INERTIA:
+            self.Jf = LEAST_FOOT_INERTIA
         self.inverse_Jf = 1.0 / self.Jf if self.Jf > 0.0 else 0.0
         # of these alone: what of the mass matrix is constant, as stance leg (m22, mt) and as the other one (1 / m33)
         M = p.total_mass_kg

@@ -83,6 +83,8 @@ def leave(body, leg) -> None:
         body.seen.brushing = True  # it leaves: only a later touch counts as one
     else:
         body.mode = FLIGHT
+    leg.slide = 0
+    body.sliding = body.mode == SINGLE and other.slide != 0
     if leg.Jf == 0.0:
         leg.limp()
     if body.mode == FLIGHT and other.Jf == 0.0:

@@ -1,24 +1,27 @@
 from ranger_sim.plant.air cimport in_air
 from ranger_sim.plant.body cimport DOUBLE, FALLEN, HELD, SINGLE, Body
+from ranger_sim.plant.grip cimport (
+    LIFT_OFF, NO_EVENT, SLIDE, STICK, TOUCH, asks_too_much, grip_witness, near_the_bounds, regrip,
+)
 from ranger_sim.plant.impact cimport touch
 from ranger_sim.plant.leg cimport Leg
 from ranger_sim.plant.lift_off cimport leave, lets_go, may_leave, sole_ready
+from ranger_sim.plant.sliding cimport slide
 from ranger_sim.plant.stance cimport on_feet
 from ranger_sim.plant.watch cimport watch
 
 cpdef enum:
-    NO_EVENT = 0
-    TOUCH = 1
-    LIFT_OFF = 2
     MOST_EVENTS = 20
     MOST_TRIES = 60
 
 cpdef int advance(Body body, double h) except -1
 cdef int move(Body body, double h) except -1
+cdef bint change_grip(Body body, double h) except? -1
 cdef bint let_pulled_foot_go(Body body, double h) except? -1
 cdef double clearance(Leg leg) noexcept
 cdef bint free_to_leave(Body body, Leg leg) except? -1
 cdef double witness(Body body) except? -1
+cdef double touch_witness(Body body) noexcept
 cdef double try_piece(Body body, double h) except? -1
 cdef double locate(Body body, double h) except? -1
 cdef int act(Body body) except -1

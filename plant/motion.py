@@ -2,9 +2,9 @@
 # (only by a difference of witnesses of opposite sign)
 """A step of the body with the events inside it: located, and acted on where they happen (EQUATIONS 9, 15).
 
-There are two events, each of a leg: its foot touches the floor, or lifts off. Each has a witness, a number that is
-above zero before and falls through zero as it happens: the clearance of a foot in the air (m), the normal force on a
-standing one (N).
+Events are of a leg: its foot touches the floor, lifts off, begins to slide, or sticks again. Each has a witness, a
+number that is above zero before and falls through zero as it happens: the clearance of a foot in the air (m), the
+normal force on a standing one (N), what is left of its friction (N), its speed (m/s).
 """
 
 import cython
@@ -12,19 +12,26 @@ import cython
 if not cython.compiled:
     from ranger_sim.plant.air import in_air
     from ranger_sim.plant.body import DOUBLE, FALLEN, HELD, SINGLE
+    from ranger_sim.plant.grip import (
+        LIFT_OFF,
+        NO_EVENT,
+        SLIDE,
+        STICK,
+        TOUCH,
+        asks_too_much,
+        grip_witness,
+        near_the_bounds,
+        regrip,
+    )
     from ranger_sim.plant.impact import touch
     from ranger_sim.plant.leg import Leg
     from ranger_sim.plant.lift_off import leave, lets_go, may_leave, sole_ready
+    from ranger_sim.plant.sliding import slide
     from ranger_sim.plant.stance import on_feet
     from ranger_sim.plant.watch import watch
 
 # C constants when compiled: the same numbers stand in the .pxd, and a test holds them together.
 if not cython.compiled:
-    # what `Body.event` says of `Body.event_leg`
-    NO_EVENT = 0
-    TOUCH = 1
-    LIFT_OFF = 2
-
     MOST_EVENTS = 20  # in one step; what comes after is left for the next step
     MOST_TRIES = 60  # to locate an event; a bisection needs 22
 
@@ -33,7 +40,7 @@ def advance(body, h: cython.double) -> None:
     """Move on by `h` seconds under constant laws of the motors' torques, events located inside (EQUATIONS 15)."""
     remaining: cython.double = h
     used: cython.double
-    pulled: cython.bint
+    again: cython.bint
     pieces: cython.longlong = 0
     body.elapsed = 0.0
     while remaining > 0.0 and body.mode != FALLEN:
@@ -41,9 +48,14 @@ def advance(body, h: cython.double) -> None:
         if body.mode != HELD:  # nothing happens in the operator's hands that a step would be taken back for
             body.save()
         move(body, remaining)
-        pulled = body.outer.Fy < 0.0 or body.inner.Fy < 0.0
-        if pulled and pieces < MOST_EVENTS and let_pulled_foot_go(body, remaining):
-            continue  # a foot left the floor at the start of this piece: nothing has moved yet
+        if body.coulomb:
+            again = asks_too_much(body) and pieces < MOST_EVENTS and change_grip(body, remaining)
+            body.watched = near_the_bounds(body)
+        else:
+            again = body.outer.Fy < 0.0 or body.inner.Fy < 0.0
+            again = again and pieces < MOST_EVENTS and let_pulled_foot_go(body, remaining)
+        if again:
+            continue  # a foot left the floor or lost its grip at the start of this piece: nothing has moved yet
         used = remaining
         if pieces < MOST_EVENTS and body.mode != HELD and witness(body) < 0.0:
             used = locate(body, remaining)
@@ -61,11 +73,26 @@ def advance(body, h: cython.double) -> None:
 
 def move(body, h: cython.double) -> None:
     """One step of the equations of motion, in whatever mode the body is."""
-    if body.mode == SINGLE or body.mode == DOUBLE:
+    if body.sliding:
+        slide(body, h, 4)
+    elif body.mode == SINGLE or body.mode == DOUBLE:
         on_feet(body, h, 4)
     else:
         in_air(body, h, 4)
         body.update_pose()
+
+
+def change_grip(body, h: cython.double) -> cython.bint:
+    """A foot would be pulled, or held beyond friction, at the start of this piece of `h` seconds: find what it does.
+
+    True when it does something new: then the state is that of the start.
+    """
+    body.restore()
+    body.event = NO_EVENT
+    if regrip(body):
+        return True
+    move(body, h)
+    return False
 
 
 def let_pulled_foot_go(body, h: cython.double) -> cython.bint:
@@ -113,6 +140,10 @@ def witness(body) -> cython.double:
     """The witness of the event that is next; below 0 when it lies behind. `event` and `event_leg` name it."""
     value: cython.double = 1.0  # of no event: far from one
     body.event = NO_EVENT
+    if body.coulomb:
+        if body.mode != DOUBLE:
+            value = touch_witness(body)
+        return grip_witness(body, value) if body.watched else value
     if body.mode == DOUBLE:
         on_feet(body, 0.0, 1)
         if free_to_leave(body, body.outer):
@@ -124,6 +155,12 @@ def witness(body) -> cython.double:
             body.event = LIFT_OFF
             body.event_leg = body.inner
         return value
+    return touch_witness(body)
+
+
+def touch_witness(body) -> cython.double:
+    """The witness of a foot in the air: its clearance, m."""
+    value: cython.double
     if body.mode == SINGLE:
         value = clearance(body.swing)
         # only a foot ahead can strike; beside and behind it brushes with its sole
@@ -191,3 +228,5 @@ def act(body) -> None:
         touch(body, body.event_leg)
     elif body.event == LIFT_OFF:
         leave(body, body.event_leg)
+    elif body.event == SLIDE or body.event == STICK:
+        regrip(body)

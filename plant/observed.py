@@ -13,7 +13,7 @@ class Observed:
         self.scuff_time_s = -1.0
         self.passing_gap = 1.0  # m, lowest clearance while the swing foot passes
         self.friction_ratio_max = 0.0  # worst |F_x| / F_y of the walk
-        self.slip_s = 0.0  # s with more than the floor's friction asked for
+        self.slip_s = 0.0  # s that a foot slides, or asks for more than the floor's friction
         self.normal_force_min = 0.0  # N, worst pull that lift-off could not answer
         self.pull_s = 0.0  # s with a pull of more than 1 N
         self.released_s = 0.0  # when the robot was let go, or made its last step

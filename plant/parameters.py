@@ -12,9 +12,10 @@ from typing import Any
 
 from ranger_sim.foundation.user_error import UserError
 
-# How a foot meets the floor. "sticking": the strike of the appendix, which holds both feet, by a pull if need be;
-# "unilateral": a trailing foot that the strike would pull lets go (EQUATIONS 8).
-CONTACTS = ("sticking", "unilateral")
+# How a foot meets the floor (EQUATIONS 8, 9). "sticking": the strike of the appendix, which holds both feet, by a pull
+# if need be; "unilateral": a trailing foot that the strike would pull lets go; "coulomb": no foot ever pulls nor holds
+# beyond friction, in a strike and between strikes.
+CONTACTS = ("sticking", "unilateral", "coulomb")
 
 
 def number(default: float, unit: str, low: float, high: float, source: str) -> Any:

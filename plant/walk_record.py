@@ -13,8 +13,9 @@ class WalkRecord:
     gained by it: the distance of this foot's contact point from the previous strike's. The first step counts from
     where the robot was put down. Oddities: `bounces` (the leading foot left the floor and came back), `recontacts`
     (a foot touched out of turn), `brushes` and `scuffs` (the swing foot's sole touched the floor before, after it
-    passed the stance foot), `flights` (no foot on the floor), `lead_lifts`, `tensile_strikes` (the rule of the strike
-    asked the trailing foot to be pulled; `tensile_impulse_Ns` the last, `_min_Ns` the worst).
+    passed the stance foot), `flights` (no foot on the floor), `slides` (a standing foot began to slide), `jams` (it
+    could not: impulses stopped it), `lead_lifts`, `tensile_strikes` (the rule of the strike asked the trailing foot to
+    be pulled; `tensile_impulse_Ns` the last, `_min_Ns` the worst).
 
     More than 40 fields, because each of them is one figure of the summary and they are counted by the same few events.
     """
@@ -56,6 +57,8 @@ class WalkRecord:
         self.brushes = 0
         self.scuffs = 0
         self.flights = 0
+        self.slides = 0
+        self.jams = 0
         self.lead_lifts = 0
         self.fell = False
         self.fall_cause = ""

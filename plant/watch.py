@@ -72,8 +72,11 @@ def keep_forces(body, h: cython.double) -> cython.void:
 
 
 def slips(body, leg) -> cython.bint:
-    """Whether this foot asks for more than the floor's friction; its friction ratio is kept if it is the worst."""
+    """Whether this foot slides or asks for more than the floor's friction; the worst friction ratio is kept."""
     along: cython.double = fabs(leg.Fx)
+    if leg.slide != 0:
+        body.seen.friction_ratio_max = max(body.seen.friction_ratio_max, body.sole.mu)
+        return True
     if leg.Fy <= 5.0:  # N; below that the ratio says nothing: chosen by us
         return False
     if along > body.seen.friction_ratio_max * leg.Fy:

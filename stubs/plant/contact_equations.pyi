@@ -29,9 +29,16 @@ class ContactEquations:
     arm: MutableSequence[float]
     target: MutableSequence[float]
     follow: MutableSequence[float]
-    loose: MutableSequence[float]
     rolling: MutableSequence[float]
-    pressed: MutableSequence[float]
+    motor: MutableSequence[float]
+    brush: MutableSequence[float]
+    place: MutableSequence[float]
+    rate: MutableSequence[float]
+    acceleration: MutableSequence[float]
+    first_place: MutableSequence[float]
+    first_rate: MutableSequence[float]
+    place_sum: MutableSequence[float]
+    rate_sum: MutableSequence[float]
     massless: Any
     moving: Any
     at_floor: Any

@@ -6,6 +6,8 @@ from typing import final
 
 OUTER: int
 INNER: int
+LEAST_FOOT_INERTIA: float
+RIGID: tuple[str, ...]
 LEG_NAMES: tuple[str, ...]
 
 @final

@@ -2,9 +2,6 @@
 
 from ranger_sim.plant.body import Body
 
-NO_EVENT: int
-TOUCH: int
-LIFT_OFF: int
 MOST_EVENTS: int
 MOST_TRIES: int
 

@@ -5,7 +5,6 @@ complex steps, no formula of the body), and the impulses from the linear complem
 Trinkle (1996), solved by Lemke's pivots. It shares no code with `plant/contact_equations.py`, which tries all states.
 """
 
-import functools
 import math
 
 import numpy as np
@@ -23,20 +22,27 @@ from tests.plant.test_body_equations import Lagrange, closed_posture, set_random
 
 
 def frame(mu=0.9, inertia=0.5):
-    """Two upright legs without mass moment on point feet: each has its inertia about the hip; nothing couples them."""
+    """Two upright legs without mass moment on point feet: each has its inertia about the hip; nothing couples
+    them, no springs either."""
     body = Body(
         BodyParameters(
             outer_mass_moment_kg_m=0.0,
             inner_mass_moment_kg_m=0.0,
-            outer_hip_inertia_kg_m2=inertia,
-            inner_hip_inertia_kg_m2=inertia,
             hip_rotor=False,
-            foot_radius_m=0.0,
-            ankle_offset_m=0.0,
+            outer_foot_radius_m=0.0,
+            inner_foot_radius_m=0.0,
+            outer_ankle_offset_m=0.0,
+            inner_ankle_offset_m=0.0,
             floor_friction=mu,
+            contact="coulomb",
         )
     )
+    body.hip.k = body.ankle.k = 0.0
     body.inner.angle = body.inner.foot_angle = 0.0
+    for leg in (body.outer, body.inner):  # beyond the limits of parameters too
+        leg.J = inertia
+        leg.m22 = body.M * leg.el * leg.el + inertia
+        leg.i33 = 1.0 / inertia
     return body
 
 
@@ -160,11 +166,8 @@ class Strike:
         J = other.jacobian(other.coordinates, z)
         self.mass = J.T @ (other.weights(z)[:, None] * J)
         self.J = np.vstack([other.jacobian(other.contact(foot), z) for foot in (OUTER, INNER)])
-
-    @functools.cached_property
-    def W(self):
-        """Rates of the contacts by impulses on them; not for massless feet, which have no mass to divide by."""
-        return self.J @ np.linalg.solve(self.mass, self.J.T)
+        # rates of the contacts by impulses on them; the motors turn relative to their legs and take no part
+        self.W = self.J @ np.linalg.solve(self.mass, self.J.T)
 
     def energy(self, rates):
         return 0.5 * rates @ self.mass @ rates
@@ -215,15 +218,17 @@ class Strike:
         return found
 
 
-def random_strike(seed, stream, foot_inertia=None):
+def random_strike(seed, stream):
     """A body with one foot standing and the other about to meet the floor, with random parameters and rates."""
     parameters = BodyParameters(
         outer_mass_offset_kg_m=0.06 * stream.normal(),
         inner_mass_offset_kg_m=0.06 * stream.normal(),
         inner_mass_moment_kg_m=0.5 + 0.4 * stream.uniform(),
-        foot_inertia_kg_m2=0.0005 + 0.004 * stream.uniform() if foot_inertia is None else foot_inertia,
-        ankle_offset_m=0.10 + 0.06 * stream.uniform(),
+        foot_inertia_kg_m2=0.0001 + 0.004 * stream.uniform(),
+        outer_ankle_offset_m=0.13 + 0.01 * stream.uniform(),
+        inner_ankle_offset_m=0.13 + 0.01 * stream.uniform(),
         floor_friction=0.1 + 1.1 * stream.uniform(),
+        contact="coulomb",
     )
     body = Body(parameters)
     closed_posture(body, stream, seed % 2)
@@ -241,14 +246,11 @@ def random_strike(seed, stream, foot_inertia=None):
     return body, trailing, leading
 
 
-@pytest.mark.parametrize("foot_inertia", [None, 0.0], ids=["feet with inertia", "massless feet"])
-@pytest.mark.parametrize("seed", range(4))
-def test_a_strike_obeys_coulomb_and_complementarity_in_another_derivation(seed, foot_inertia):
-    stream = RandomStream(seed, "coulomb strike")
+def test_a_strike_obeys_coulomb_and_complementarity_in_another_derivation():
+    stream = RandomStream(0, "coulomb strike")
     kinds = set()
-    for _ in range(60):
-        body, trailing, leading = random_strike(seed, stream, foot_inertia)
-        leading.motor_angle = leading.foot_angle - leading.angle  # its cable is slack
+    for trial in range(240):
+        body, trailing, leading = random_strike(trial, stream)
         one = Strike(body)
         mu = body.parameters.floor_friction
         collide(body, leading, True)
@@ -266,9 +268,6 @@ def test_a_strike_obeys_coulomb_and_complementarity_in_another_derivation(seed, 
             assert abs(vx) < 1e-9 * size or Px * math.copysign(1.0, vx) == pytest.approx(-mu * Py, abs=1e-10 * size)
         # never gains; both derivations' rounding
         assert one.energy(after) <= one.energy(one.before) * (1.0 + 1e-10)
-        if foot_inertia == 0.0 and body.equations.state[trailing.side] == APART:
-            # a massless foot that leaves is not one that its cable presses on to the floor
-            assert trailing.stretch() * one.J[2 * trailing.side + 1, 4 + trailing.side] >= 0.0
     assert len(kinds) >= 3 and {STICKS, SLIDES_ON, SLIDES_BACK} <= {state for pair in kinds for state in pair}
 
 
