@@ -863,7 +863,7 @@ struct mb_data {
     float p_e_hs_threshold; /* 381 [counts] heel strike: rise above the baseline */
     float p_e_hs_base_limit; /* 382 [counts] heel strike: a baseline above this marks a faulty sensor */
     float p_e_hs_ticks; /* 383 [ticks] heel strike: consecutive ticks above the threshold */
-    float p_e_hs_h_ang; /* 384 [rad] heel strike: baseline starts when the swing leg is ahead by this */
+    float p_e_hs_h_ang; /* 384 [rad] heel strike: baseline of the inner feet starts when their legs are ahead by this (outer: 0) */
     float p_e_hs_f_ang; /* 385 [rad] heel strike: baseline freezes when the swing ankle opens beyond this */
     float p_e_min_step_time; /* 386 [ms] shorter steps are reported as stutter */
     float p_e_fall_ang; /* 387 [rad] leg angle that counts as a fall */
