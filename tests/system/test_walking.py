@@ -35,6 +35,18 @@ def test_ranger_walks_a_hundred_steps_like_the_real_one(hundred_steps):
     assert summary["heel_strike_delay_ms"]["mean"] == pytest.approx(14.0, abs=6.0)
 
 
+def test_the_record_walks_controller_unchanged_makes_the_robots_steps_on_the_robots_body(hundred_steps):
+    summary = hundred_steps.summary()
+    assert (summary["controller"], summary["body"]) == ("record-2011", "ranger")
+    # appendix 1 and 4.3: 0.35 m, 0.60 s, 14 +/- 3 ms; seeds differ by up to 0.02 m and 0.03 s (docs/record-walk.md)
+    assert summary["mean_step_length_m"] == pytest.approx(0.35, abs=0.02)
+    assert summary["mean_step_time_s"] == pytest.approx(0.60, abs=0.03)
+    assert summary["heel_strike_delay_ms"]["mean"] == pytest.approx(14.0, abs=2.0)
+    # a floor neither pulls nor holds beyond friction
+    assert summary["oddities"]["tensile_strikes"] == 0
+    assert summary["oddities"]["friction_ratio_max"] <= 0.9 + 1e-9
+
+
 def test_nothing_is_lost_and_every_slot_is_kept(hundred_steps):
     summary = hundred_steps.summary()
     assert {bus: summary["can"][bus]["lost"] for bus in BUSES} == dict.fromkeys(BUSES, 0)

@@ -13,9 +13,11 @@ WALKS = (
     ("robust", range(1, 4), 1000, 0.0),
     ("robust", range(1, 4), 200, 0.001),
     ("record-2011", range(1, 21), 1000, 0.0),
+    ("record-2011", range(1, 21), 500, 0.001),
 )
 KEPT = (
     "controller",
+    "body",
     "seed",
     "floor_roughness_m",
     "steps",
