@@ -2,14 +2,19 @@ from ranger_sim.foundation.events cimport (
     CAN_RX, CAN_TX_DONE, FLAG_ERROR, FLAG_EXTENDED, FLAG_REMOTE, FLAG_SINGLE_SHOT, NEVER, TX_ABORTED, TX_LOST, TX_SENT,
     EventQueue,
 )
+from ranger_sim.can_bus.bit_level cimport BitLevel
 from ranger_sim.can_bus.bus_counters cimport BusCounters
 from ranger_sim.can_bus.disturbance cimport Disturbance
 from ranger_sim.can_bus.frame cimport (
-    ACK_SLOT_FROM_END, EIGHT_BYTES, HIGHEST_EXTENDED, HIGHEST_STANDARD, INTERMISSION_BITS, LENGTH_CODE, MEASURED_BITS,
+    ACK_DELIMITER_FROM_END, EIGHT_BYTES, HIGHEST_EXTENDED, HIGHEST_STANDARD, INTERMISSION_BITS, LENGTH_CODE, MEASURED_BITS,
     RECEIVERS_SEE, SENDABLE, arbitration_key, measure,
 )
 from ranger_sim.can_bus.frame_log cimport FrameLog
 from ranger_sim.can_bus.load_meter cimport LoadMeter
+from ranger_sim.can_bus.medium_access cimport (
+    MAC_JOINING, MAC_SUSPENDED, MET_COUNTER, MET_FAILURE, MET_JOIN, MET_LOSS, MET_RECEIVED, MET_SENT, MET_SETTLED,
+    MET_START, MediumAccess,
+)
 from ranger_sim.can_bus.node cimport BUS_OFF, ICR_ERROR_WARNING, JOINING, OPERATING, RESET, SUSPEND_BITS, Node
 from ranger_sim.can_bus.transmit_buffers cimport (
     ASKED, BUFFER_MASK, BUFFER_SHIFT, BUFFERS, FLAGS, FREE_AT, HIGH, IDENTIFIER, LOW, NEXT, NODE_SHIFT, READY, ROW,
@@ -30,7 +35,8 @@ cdef class Bus:
     cdef public TransmitBuffers buffers
     cdef public long long bitrate, node_count, acknowledging, wake_place
     cdef long long* due
-    cdef public long long next_strike, second_bit, second_ns
+    cdef public long long next_strike, strike_bit, second_bit, second_ns
+    cdef public bint disturbed
     cdef public long long bit_ns, bit_rest, intermission_ns, intermission_rest
     cdef public list nodes
     cdef public BusCounters counters
@@ -41,7 +47,8 @@ cdef class Bus:
     cdef public str name
     cdef public Disturbance disturbance
     cdef public EventQueue commands
-    cdef public long long joining, suspended_until
+    cdef public BitLevel bit_level
+    cdef public long long joining, suspended_until, rivals
 
     cpdef long long bit_of(self, long long time) noexcept
     cpdef long long edge_ns(self, long long bit) noexcept
@@ -64,9 +71,12 @@ cdef class Bus:
     cdef long long _attempt(self, long long k) except? <long long>-1
     cdef long long _key(self, long long row) noexcept
     cdef long long _arbitrate(self, long long k) except? <long long>-1
-    cdef bint _contend(self, long long k, long long best, long long best_key) except? -1
+    cdef int _contend(self, long long k, long long best) except -1
     cdef bint _is_offered(self, long long row, long long key, long long k) noexcept
-    cdef bint _disturbed(self, long long k, long long best, long long bits, bint merged) except? -1
+    cdef bint _is_disturbed(self, long long k, long long best, long long end, bint merged) except? -1
+    cdef int _join(self, Node node, long long bit) except -1
+    cdef int _decided(self, long long bit) except -1
+    cdef int _sent(self, Node node, long long row, long long bit) except -1
     cdef int _after_success(self, Node node, long long end, long long done) except -1
     cdef int _confine(self, Node node, long long time, long long interrupts) except -1
     cdef int _note_result(self, long long time) except -1

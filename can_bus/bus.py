@@ -1,9 +1,10 @@
 # cython: boundscheck=False, wraparound=False, initializedcheck=False
 # (every index below is made of a node and a buffer, which `request` has checked, or is a row that waits)
-"""One CAN bus to the bit: arbitration, timing, acknowledgement, and what an error means for everybody.
+"""One CAN bus to the bit: arbitration, timing, acknowledgement, and what came of every frame.
 
 Beside it: `node.py`, a controller with its error confinement; `transmit_buffers.py`, the frames that wait;
-`disturbance.py`, wrong bits; `error_frame.py`, what follows them; `load_meter.py`, `bus_counters.py`, `frame_log.py`.
+`disturbance.py`, wrong bits; `bit_level.py` and `medium_access.py`, bit by bit what follows them;
+`load_meter.py`, `bus_counters.py`, `frame_log.py`.
 
 Time. Inside, the bus counts absolute bits since power-up; an instant in ns is made from such a count only
 when a result leaves. Bit k begins at the first whole nanosecond at or after k / bitrate
@@ -18,18 +19,20 @@ Order. The lowest arbitration field among the controllers ready wins; a controll
 three buffers, ties by buffer number (LPC2194 with TPM = 0). Nothing is pre-empted.
 
 A frame is decided at its start: its results are pushed, stamped in the future, into the nodes' inboxes; its end is
-written where the sender looks for it (`Node.connect`).
+written where the sender looks for it (`Node.connect`). That is so while nothing disturbs it; all else passes bit by bit
+(`bit_level.py`), with the same stamps.
 Receivers have the frame at the end of the sixth bit of EOF, its sender is done at the end of the seventh.
 """
 
 import cython
 
+from ranger_sim.can_bus.bit_level import BitLevel
 from ranger_sim.can_bus.bus_counters import BusCounters
 from ranger_sim.can_bus.disturbance import HIGHEST_RATE, Disturbance
-from ranger_sim.can_bus.error_frame import collision, error_frame
-from ranger_sim.can_bus.frame import arbitration_end, arbitration_key, measure
+from ranger_sim.can_bus.frame import arbitration_key, first_difference, measure
 from ranger_sim.can_bus.frame_log import FrameLog
 from ranger_sim.can_bus.load_meter import LoadMeter
+from ranger_sim.can_bus.medium_access import MediumAccess
 from ranger_sim.can_bus.node import Node
 from ranger_sim.can_bus.transmit_buffers import TransmitBuffers
 from ranger_sim.foundation.events import EventQueue
@@ -39,7 +42,7 @@ from ranger_sim.foundation.random_stream import RandomStream
 # C constants when compiled: the same numbers stand in the .pxd, and a test holds them together.
 if not cython.compiled:
     from ranger_sim.can_bus.frame import (
-        ACK_SLOT_FROM_END,
+        ACK_DELIMITER_FROM_END,
         EIGHT_BYTES,
         HIGHEST_EXTENDED,
         HIGHEST_STANDARD,
@@ -48,6 +51,18 @@ if not cython.compiled:
         MEASURED_BITS,
         RECEIVERS_SEE,
         SENDABLE,
+    )
+    from ranger_sim.can_bus.medium_access import (
+        MAC_JOINING,
+        MAC_SUSPENDED,
+        MET_COUNTER,
+        MET_FAILURE,
+        MET_JOIN,
+        MET_LOSS,
+        MET_RECEIVED,
+        MET_SENT,
+        MET_SETTLED,
+        MET_START,
     )
     from ranger_sim.can_bus.node import BUS_OFF, ICR_ERROR_WARNING, JOINING, OPERATING, RESET, SUSPEND_BITS
     from ranger_sim.can_bus.transmit_buffers import (
@@ -68,7 +83,6 @@ if not cython.compiled:
     from ranger_sim.foundation.events import (
         CAN_RX,
         CAN_TX_DONE,
-        FLAG_ERROR,
         FLAG_EXTENDED,
         FLAG_REMOTE,
         FLAG_SINGLE_SHOT,
@@ -106,11 +120,13 @@ class Bus:
         self.commands = EventQueue(16)
         self.next_change = NEVER  # the instant of the first command; -1 while a node is joining
         self.advanced = -1
+        self.disturbed = False  # the bus passes bit by bit
         self.next_bit = NEVER  # where the next frame starts, as far as known
         self.next_time = NEVER
         self.wake(integers(1), 0)
-        self.next_strike = -1  # the next bit that is hit; -1 when the next frame fails wherever that lies
-        self.free_bit = 0  # after the intermission of the last frame; its instant:
+        self.strike_bit = NEVER  # the next bit that is inverted, as far as known
+        self.next_strike = -1  # the same; -1 when the next frame is no plain one wherever that lies
+        self.free_bit = 0  # after the intermission of the last frame: the first bit not yet decided; its instant:
         self.free_time = 0
         # the second in which the last frame began: its first bit and its instant
         self.second_bit = 0
@@ -119,6 +135,8 @@ class Bus:
         self.intermission_ns, self.intermission_rest = divmod(INTERMISSION_BITS * second, bitrate)
         self.buffers = TransmitBuffers()
         self.disturbance = Disturbance(RandomStream(seed, f"can_bus/{name}/bit errors"))
+        self.bit_level = BitLevel(self.buffers, self.disturbance)
+        self.rivals = 0  # frames that were ready beside the one that won the last arbitration
         self.counters = BusCounters()
         self.load = LoadMeter(bitrate)
         self.log = FrameLog(log_capacity)
@@ -130,12 +148,15 @@ class Bus:
 
     @property
     def operating(self) -> int:
-        """Nodes that take part and acknowledge; an observer that only listens takes itself off."""
+        """Nodes that take part and acknowledge."""
         return self.acknowledging
 
-    @operating.setter
-    def operating(self, count: int) -> None:
-        self.acknowledging = count
+    def set_silent(self, node, silent) -> None:
+        """A node only listens from now on, and drives no acknowledgement and no error flag; or it does again."""
+        controller: Node = self.nodes[node]
+        if controller.mode == OPERATING and controller.silent != bool(silent):
+            self.acknowledging += -1 if silent else 1
+        controller.silent = bool(silent)
         self._note_changes()
 
     @property
@@ -189,9 +210,16 @@ class Bus:
             self.nodes[index - 1].following = node
         self.nodes.append(node)
         self.node_count += 1
-        self.acknowledging += 1
         self.buffers.add_node()
-        self._aim()
+        self.bit_level.add_node(node)
+        if self.disturbed:  # as if out of reset: the bus is not at rest
+            node.leave()
+            node.start_joining(self.free_bit)
+            self.bit_level.join(node, self.free_bit)
+            self.joining += 1
+        else:
+            self.acknowledging += 1
+        self._note_changes()
         return index
 
     @cython.cdivision(True)  # instants are not negative
@@ -345,41 +373,48 @@ class Bus:
     # ---- disturbances
 
     def inject_errors(self, count, position=-1) -> None:
-        """Corrupt the next `count` frames at bit `position` (from the start of frame, stuff bits counted).
+        """Invert one bit of each of the next `count` frames for everybody, at `position` from the start of frame.
 
-        The bus level of that bit is inverted for everybody. Negative: the middle of the frame. Positions
-        are held between the first bit after the arbitration field (17, extended 41: inside it a false
-        bit reads as a lost arbitration) and the sixth of EOF (after which receivers keep the frame).
+        Stuff bits count. It acts where it is: in the arbitration field a false dominant bit reads as a lost
+        arbitration; in the last bit of EOF it makes the sender repeat a frame that receivers have; behind the frame it
+        hits what is there. Negative: the middle of the frame, or the first bit that is behind every arbitration field
+        (17, extended 41) where that is later.
         """
         self.disturbance.hit_frames(count, position)
         self._aim()
 
     def inject_error_at(self, time) -> None:
-        """Invert the bus level during the bit at `time` (ns); an idle bit feels nothing.
+        """Invert the bus level during the bit at `time` (ns); on an idle bus that is a false start of frame.
 
-        ValueError for an instant that is decided already.
+        ValueError for an instant that is decided already: a frame is at its start, with its intermission.
         """
         bit = self.bit_of(time)
-        if bit <= self.bit_of(self.advanced):
-            raise ValueError(f"bus {self.name}: {time} ns is decided already (up to {self.advanced} ns)")
+        if bit <= self.bit_of(self.advanced) or bit < self.free_bit:
+            decided = max(self.advanced, self.edge_ns(self.free_bit) - 1)
+            raise ValueError(f"bus {self.name}: {time} ns is decided already (up to {decided} ns)")
         self.disturbance.hit_bit(bit)
         self._aim()
 
     def set_bit_error_rate(self, rate) -> None:
-        """Invert each bit with probability `rate` (0 ... 0.1) from now on, from a stream of its own."""
+        """Invert each bit not yet decided with probability `rate` (0 ... 0.1), from a stream of its own."""
         if not 0.0 <= rate <= HIGHEST_RATE:
             raise ValueError(f"bus {self.name}: bit error rate {rate} is outside 0 ... {HIGHEST_RATE}")
-        self.disturbance.set_rate(rate, max(self.bit_of(self.advanced), 0))
+        self.disturbance.set_rate(rate, max(self.bit_of(self.advanced), self.free_bit - 1))
         self._aim()
 
     def _aim(self) -> None:
-        """Set `next_strike` after anything that decides on it; a lone node fails because nobody acknowledges."""
-        self.next_strike = -1 if self.acknowledging < 2 else self.disturbance.next_bit
+        """Set what tells a plain frame, after anything that decides on it; nobody acknowledges a lone node's."""
+        strike: cython.longlong = self.disturbance.next_bit
+        self.next_strike = -1 if self.acknowledging < 2 or self.disturbance.frames_left > 0 else strike
+        if strike != self.strike_bit:
+            self.strike_bit = strike
+            self._look_ahead()
+            self.wakes[self.wake_place] = min(self.wakes[self.wake_place], self.next_time)
 
     # ---- passing of time
 
     def advance(self, until: cython.longlong) -> cython.longlong:
-        """Decide every start of frame up to and including `until` (ns); returns the next instant of interest.
+        """Decide every bit that begins up to and including `until` (ns); returns the next instant of interest.
 
         Every request, abort and mode change stamped before `until` must have been made. The answer
         (also in the field `next_time`) is the start of the next frame as far as known, or NEVER; a
@@ -388,9 +423,14 @@ class Bus:
         if until > self.advanced:
             self.advanced = until  # decided, also where nothing starts
         while self.next_time <= until:
-            if self.next_change > until or not self._change(until):
-                self._attempt(self.next_bit)
-            if self.buffers.first < 0 and self.next_change == NEVER:
+            if self.disturbed:
+                self._pass_bits(until)
+            elif self.next_change > until or not self._change(until):
+                if self.strike_bit < self.next_bit:
+                    self._begin_bits(self.strike_bit)
+                else:
+                    self._attempt(self.next_bit)
+            if self.buffers.first < 0 and self.next_change == NEVER and self.strike_bit == NEVER and not self.disturbed:
                 self.next_bit = NEVER
                 self.next_time = NEVER
             else:
@@ -398,17 +438,21 @@ class Bus:
         return self.next_time
 
     def _look_ahead(self) -> cython.void:
-        """Set `next_bit` and `next_time` from what waits."""
+        """Set `next_bit` and `next_time` from what waits; bit by bit, the next bit that waits for programs."""
         first: cython.longlong = self.buffers.first_ready()
-        if first <= self.free_bit:
+        if first <= self.free_bit or self.disturbed:
             self.next_bit = self.free_bit
             self.next_time = self.free_time
         else:
             self.next_bit = first
             self.next_time = self.edge_ns(first) if first < NEVER else NEVER
+        if self.disturbed:
+            return
+        if self.strike_bit < self.next_bit:
+            self.next_time = self.edge_ns(self.strike_bit)
         if self.next_change < NEVER:
             first = self._next_join()
-            if first < self.next_bit:
+            if first < self.next_bit and first < self.strike_bit:
                 self.next_time = self.edge_ns(first)
             if self.commands.head_time < self.next_time:
                 self.next_time = self.commands.head_time
@@ -426,16 +470,19 @@ class Bus:
         node: Node
         last: cython.longlong = self.bit_of(until)
         join: cython.longlong = self._next_join()
-        first: cython.longlong = self.edge_ns(min(self.next_bit, join, last + 1))
+        start: cython.longlong = min(self.next_bit, self.strike_bit)
+        first: cython.longlong = self.edge_ns(min(start, join, last + 1))
         if self.commands.head_time <= until and self.commands.head_time < first:
             self._execute()
             return True
-        if join <= last and join <= self.next_bit:
-            self._join(join)
+        if join <= last and join <= start:
+            for node in self.nodes:
+                if node.mode == JOINING and node.joins_at(self.free_bit) <= join:
+                    self._join(node, join)
             return True
         for node in self.nodes:
             if node.mode == JOINING:
-                node.count_sequences(self.free_bit, self.next_bit)
+                node.count_sequences(self.free_bit, start)
         return False
 
     def _next_join(self) -> cython.longlong:
@@ -458,9 +505,11 @@ class Bus:
             self._abort(node, commands.b, commands.time)
         elif commands.b == RESET:
             self._reset(node, commands.time)
-        elif node.mode == RESET or node.mode == BUS_OFF:
+        elif (node.mode == RESET or node.mode == BUS_OFF) and commands.time >= node.off_ns:
             node.start_joining(self.bit_of(commands.time) + 1)
             self.joining += 1
+            if self.disturbed and self.bit_level.join(node, node.join_from) & MET_JOIN:
+                self._join(node, self.bit_level.bit)
         self._note_changes()
 
     def _abort(self, node, buffer, time) -> None:
@@ -468,47 +517,57 @@ class Bus:
         row = node.index << NODE_SHIFT | buffer << BUFFER_SHIFT
         if not 1 <= buffer <= BUFFERS or not self.buffers.is_full(row):
             return
-        self.counters.aborted += 1
-        node.aborted += 1
+        if self.disturbed and self.bit_level.is_sending(row):
+            self.bit_level.aborting.append(row)
+            return
         if node.mode == OPERATING:
             time = max(time, self.edge_ns(self.buffers.rows[row + READY]))
-        self._drop(node, row, time, TX_ABORTED)
+        self._drop_aborted(node, row, time)
 
     def _reset(self, node, time) -> None:
         """Take a node off the bus, with what waits there."""
         if node.mode == OPERATING:
-            self.acknowledging -= 1
+            self.acknowledging -= not node.silent
             node.leave()
         elif node.mode == JOINING:
             self.joining -= 1
             node.leave()
+        if self.disturbed:
+            self.bit_level.leave(node)
         for row in self.buffers.waiting_of(node.index):
-            self.counters.aborted += 1
-            node.aborted += 1
-            self._drop(node, row, time, TX_ABORTED)
+            self._drop_aborted(node, row, time)
 
-    def _join(self, bit) -> None:
-        """Let every node whose sequences are complete at `bit` take part."""
-        node: Node
-        for node in self.nodes:
-            if node.mode != JOINING or node.joins_at(self.free_bit) > bit:
-                continue
-            self.joining -= 1
-            self.acknowledging += 1
-            if node.join():
-                node.tell(self.edge_ns(bit), ICR_ERROR_WARNING)
-                self._note_result(self.edge_ns(bit))
-            for row in self.buffers.waiting_of(node.index):
-                self.buffers.rows[row + READY] = max(self.buffers.rows[row + READY] - NEVER, bit)
+    def _drop_aborted(self, node, row, time) -> None:
+        """End a request that its program took back."""
+        self.counters.aborted += 1
+        node.aborted += 1
+        self._drop(node, row, time, TX_ABORTED)
+
+    def _join(self, node: Node, bit: cython.longlong) -> None:
+        """Let a node whose sequences are complete at `bit` take part."""
+        self.joining -= 1
+        self.acknowledging += not node.silent
+        if node.join():
+            node.tell(self.edge_ns(bit), ICR_ERROR_WARNING)
+            self._note_result(self.edge_ns(bit))
+        for row in self.buffers.waiting_of(node.index):
+            self.buffers.rows[row + READY] = max(self.buffers.rows[row + READY] - NEVER, bit)
         self._note_changes()
 
     # ---- for a bus that passes its own time
 
     def alone_and_passive(self) -> bool:
         """True while what waits cannot be acknowledged, by nobody, and only repeats."""
-        if self.buffers.waiting_count == 0 or self.acknowledging >= 2 or self.joining or self.commands.count:
+        if self.buffers.waiting_count == 0 or self.acknowledging >= 2 or self.disturbed:
+            return False
+        if self.joining or self.commands.count or self.next_strike != -1 or self.strike_bit < NEVER:
             return False
         return all(self.nodes[row >> NODE_SHIFT].passive for row in self.buffers.waiting())
+
+    def is_quiet(self) -> bool:
+        """True while nothing happens but for noise."""
+        waiting = self.buffers.waiting_count or self.joining or self.commands.count
+        return not waiting and not self.disturbed and not self.disturbance.planned_bits
 
     def hold_off(self, bit) -> None:
         """No attempt before `bit`: what waits is not ready before."""
@@ -521,9 +580,9 @@ class Bus:
 
     @cython.cdivision(True)  # bits are not negative
     def _attempt(self, k: cython.longlong) -> cython.longlong:
-        """The frame that starts at bit k: arbitration; then an error frame, or a whole one and results to everybody.
+        """The frame that starts at bit k: arbitration; then its results to everybody, when nothing disturbs it.
 
-        Returns the bit at which the bus is free again.
+        Returns the first bit that is not decided: of a plain frame where the bus is free again, else k.
         """
         row: cython.longlong = self.buffers.first
         merged: cython.bint = False
@@ -557,8 +616,12 @@ class Bus:
             _, _, asked, _, identifier, flags, lo, hi = slots[row : row + ROW]
         bits = measure(identifier, flags, lo, hi) & MEASURED_BITS
         end = k + bits
-        if (merged or self.next_strike < end - 1) and self._disturbed(k, row, bits, merged):
-            return self.free_bit
+        if (merged or self.next_strike < end + INTERMISSION_BITS) and self._is_disturbed(k, row, end, merged):
+            self._begin_bits(k)
+            return k
+        if self.rivals > 0:
+            self._contend(k, row)
+            self.rivals = 0
         # edge_ns of `end`; from it those of end - 1 (the end of the sixth bit of EOF) and of the intermission's end
         if k - self.second_bit >= rate:
             self.second_ns = k // rate * SECOND_NS
@@ -591,7 +654,7 @@ class Bus:
             if node.mode == OPERATING and not (merged and node.sending_end == end):
                 if node.receive_errors > 0:
                     node.count_reception()
-                    self._confine(node, received, 0)
+                    self._confine(node, self.edge_ns(end - ACK_DELIMITER_FROM_END), 0)  # behind the ACK slot
                 if node.listening:
                     node.inbox.put(received, node.order, CAN_RX, node.controller, identifier, flags, lo, hi, 0)
                     node.received += 1
@@ -605,12 +668,16 @@ class Bus:
         return self.free_bit
 
     def _after_success(self, node: Node, end: cython.longlong, done: cython.longlong) -> None:
-        """A sender that has had errors has sent a frame whole: to bit `end`, at `done` (ns)."""
-        if node.passive:
-            self._suspend(node, end + INTERMISSION_BITS)
+        """A sender that has had errors has sent a frame whole: to bit `end`, at `done` (ns).
+
+        Whether it suspends transmission is decided at the end of the intermission, so by the counter that has moved
+        (see `MediumAccess._sample_intermission`); a good frame moves no counter in between.
+        """
         if node.transmit_errors > 0:
             node.count_success()
             self._confine(node, done, 0)
+        if node.passive:
+            self._suspend(node, end + INTERMISSION_BITS + SUSPEND_BITS)
 
     # ---- arbitration
 
@@ -623,6 +690,7 @@ class Bus:
         best: cython.longlong = -1
         best_key: cython.longlong = 0
         ready: cython.longlong = 0
+        merged: cython.bint = False
         slots: cython.p_longlong = self.buffers.slots
         row: cython.longlong = self.buffers.first
         key: cython.longlong
@@ -630,28 +698,31 @@ class Bus:
             if slots[row + READY] <= k:
                 ready += 1
                 key = self._key(row)
-                if best < 0 or key < best_key or (key == best_key and row < best):
+                if best < 0 or key < best_key:
+                    merged = False
                     best = row
                     best_key = key
+                elif key == best_key:
+                    if row >> NODE_SHIFT != best >> NODE_SHIFT:
+                        merged = True
+                    if row < best:
+                        best = row
             row = slots[row + NEXT]
-        return -best if ready > 1 and self._contend(k, best, best_key) else best
+        self.rivals = ready - 1
+        return -best if merged else best
 
-    def _contend(self, k: cython.longlong, best: cython.longlong, best_key: cython.longlong) -> cython.bint:
-        """Note who loses the arbitration; True when another node offers the very same field."""
+    def _contend(self, k: cython.longlong, best: cython.longlong) -> None:
+        """Note who loses the arbitration against the row `best`."""
         slots: cython.p_longlong = self.buffers.slots
         row: cython.longlong = self.buffers.first
         key: cython.longlong
-        offered: cython.bint
-        merged: cython.bint = False
+        best_key: cython.longlong = self._key(best)
         loser: Node
         skipped = None
         while row >= 0:
             if row >> NODE_SHIFT != best >> NODE_SHIFT and slots[row + READY] <= k:  # another node's
                 key = self._key(row)
-                offered = self._is_offered(row, key, k)
-                if offered and key == best_key:
-                    merged = True
-                elif offered:
+                if key != best_key and self._is_offered(row, key, k):
                     loser = self.nodes[row >> NODE_SHIFT]
                     loser.arbitrations_lost += 1
                     self.counters.arbitrations_lost += 1
@@ -663,7 +734,6 @@ class Bus:
         if skipped is not None:
             for lost in sorted(skipped):
                 self._skip(lost, self.edge_ns(k + self._bits_until_loss(lost, best)))
-        return merged
 
     def _is_offered(self, row: cython.longlong, key: cython.longlong, k: cython.longlong) -> cython.bint:
         """True when this is what its node puts on the bus at bit k: of its frames that are ready, the lowest."""
@@ -680,7 +750,7 @@ class Bus:
 
     def _bits_until_loss(self, row, best) -> int:
         """Bits from the start of frame to the end of the bit at which the sender of `row` saw that `best` wins."""
-        return collision([self.buffers.wire(row), self.buffers.wire(best)]) + 1
+        return first_difference(self.buffers.wire(row)[0], self.buffers.wire(best)[0]) + 1
 
     def _skip(self, row, time) -> None:
         """End a single shot that did not get through."""
@@ -692,35 +762,34 @@ class Bus:
 
     def _drop(self, node, row, time, status) -> None:
         """End a waiting request without success, answered at `time`."""
+        if self.disturbed:
+            self.bit_level.forget(row)
         self.buffers.remove(row)
         self.buffers.rows[row + FREE_AT] = time
         self._note_result(time)
         node.end_unsent(row >> BUFFER_SHIFT & BUFFER_MASK, time, status)
 
-    # ---- frames that fail, and several senders of one frame
+    # ---- several senders of one frame
 
-    def _disturbed(
-        self, k: cython.longlong, best: cython.longlong, bits: cython.longlong, merged: cython.bint
+    def _is_disturbed(
+        self, k: cython.longlong, best: cython.longlong, end: cython.longlong, merged: cython.bint
     ) -> cython.bint:
-        """Decide the frame on bits k ... k + bits - 1, in which something may be wrong; True when it fails."""
+        """True when the frame on bits k ... end - 1, or its intermission, does not take its plain course.
+
+        When it does, the other senders of a frame that is `merged` are done here.
+        """
+        if self.strike_bit < end + INTERMISSION_BITS or self.disturbance.frames_left > 0:
+            return True
         senders = self._senders(k, best) if merged else [best]
-        position = -1
-        if merged:
-            position = collision([self.buffers.wire(row) for row in senders])
-        acknowledged = self.acknowledging > len(senders)
-        if position < 0:
-            position = self.disturbance.strike(k, k + bits - 1, arbitration_end(self.buffers.rows[best + FLAGS]))
-            self._aim()
-        ack_slot = bits - ACK_SLOT_FROM_END
-        if not acknowledged and (position < 0 or position > ack_slot):
-            position = ack_slot  # it stays recessive
-        if position >= 0:
-            self._fail(k, senders, position, acknowledged)
+        if sum(not self.nodes[row >> NODE_SHIFT].silent for row in senders) >= self.acknowledging:
+            return True  # nobody is left to acknowledge
+        wire = self.buffers.wire(best)[0]
+        if any(self.buffers.wire(row)[0] != wire for row in senders):
             return True
         for row in senders:
             if row != best:
                 self.counters.merged += 1
-                self._finish_merged(self.nodes[row >> NODE_SHIFT], row, k + bits)
+                self._finish_merged(self.nodes[row >> NODE_SHIFT], row, end)
         return False
 
     def _senders(self, k, best) -> list:
@@ -744,67 +813,162 @@ class Bus:
             node.inbox.put(done, node.order, CAN_TX_DONE, node.controller, buffer, TX_SENT, 0, 0, 0)
         self._after_success(node, end, done)
 
-    def _fail(self, k, senders, position, acknowledged) -> None:
-        """An error frame because of the bit at `position` of the frame that started at bit k.
+    # ---- bit by bit
 
-        `senders`: the rows whose frames it was; all of them count as failed (chosen by us).
-        """
-        node: Node
-        owners = [self.nodes[row >> NODE_SHIFT] for row in senders]
-        error = error_frame(
-            [self.buffers.wire(row) for row in senders], position, all(owner.passive for owner in owners), acknowledged
-        )
-        self.free_bit = k + error.end + INTERMISSION_BITS
-        self.free_time = self.edge_ns(self.free_bit)
-        self.load.take(k, self.free_bit)
-        self.counters.errors += 1
-        for node in self.nodes:
-            if node.mode != OPERATING:
-                continue
-            if node in owners:
-                if node.passive:
-                    self._suspend(node, self.free_bit)
-                node.count_failure(acknowledged)
-                self._confine(node, self.edge_ns(k + error.sender_notices), error.sender_capture)
+    def _begin_bits(self, bit) -> None:
+        """From `bit` on, up to which the bus is idle, it passes bit by bit."""
+        self.disturbed = True
+        self.rivals = 0
+        self.bit_level.begin(bit, self.free_bit)
+        self.free_bit = bit
+        self.free_time = self.edge_ns(bit)
+
+    def _pass_bits(self, until: cython.longlong) -> None:
+        """Pass bits until the bus is at rest, or up to one that begins after `until` and waits for programs."""
+        level: BitLevel = self.bit_level
+        machine: MediumAccess
+        last: cython.longlong = self.bit_of(until)
+        while True:
+            level.look()
+            if level.at_rest and level.bit > level.first_bit and not level.away:
+                break
+            if level.open or level.at_rest:
+                while self.commands.head_time <= until and self.commands.head_time < self.edge_ns(level.bit):
+                    self._execute()
+                if level.bit > last:
+                    self._decided(level.bit)
+                    return
+                level.levels.clear()
+                level.look()
+                if level.at_rest and level.bit > level.first_bit:
+                    break
+                level.start_frames()
+            level.pass_bit()
+            for machine in level.machines:
+                if machine.met:
+                    self._follow(machine, level.bit)
+            if level.in_error:
+                self._follow_error_frame()
+        self._decided(level.bit)
+        self.disturbed = False
+        for machine in level.machines:
+            if machine.state == MAC_SUSPENDED:
+                self._suspend(machine.node, level.bit + SUSPEND_BITS - machine.count)
+            elif machine.state == MAC_JOINING:
+                machine.node.join_from = level.bit - machine.count
+        self._note_changes()
+
+    def _decided(self, bit: cython.longlong) -> None:
+        """All bits before `bit` are."""
+        self.load.take(self.free_bit, bit)
+        self.free_bit = bit
+        self.free_time = self.edge_ns(bit)
+
+    def _follow(self, machine: MediumAccess, bit: cython.longlong) -> None:
+        """What came of the bit before `bit` for a node."""
+        node: Node = machine.node
+        met: cython.longlong = machine.met
+        row: cython.longlong = machine.row
+        time: cython.longlong = self.edge_ns(bit)
+        if met & MET_RECEIVED and node.listening:
+            flags = machine.flags
+            node.inbox.put(
+                time, node.order, CAN_RX, node.controller, machine.identifier, flags, machine.lo, machine.hi, 0
+            )
+            node.received += 1
+            self.bit_level.heard_bit = bit
+            self._note_result(time)
+        if met & MET_SENT:
+            self._sent(node, row, bit)
+        if met & MET_LOSS:
+            node.arbitrations_lost += 1
+            self.counters.arbitrations_lost += 1
+            if row in self.bit_level.aborting:
+                self._drop_aborted(node, row, time)
+            elif self.buffers.rows[row + FLAGS] & FLAG_SINGLE_SHOT:
+                self._skip(row, time)
+        if met & MET_COUNTER:
+            self._confine(node, time, machine.capture)
+            if node.mode == BUS_OFF:
+                self._flush(node, time)
+                return
+        if met & MET_FAILURE and row not in self.bit_level.aborting:
+            if not self.buffers.rows[row + FLAGS] & FLAG_SINGLE_SHOT:
+                self.counters.retries += 1
+                node.retries += 1
+        if met & MET_SETTLED and row >= 0:
+            if row in self.bit_level.aborting:
+                self._drop_aborted(node, row, time)
+            elif self.buffers.rows[row + FLAGS] & FLAG_SINGLE_SHOT:
+                self._skip(row, time)
             else:
-                node.receive_errors += 1
-                self._confine(node, self.edge_ns(k + error.receivers_notice), error.receiver_capture)
-        end = self.edge_ns(k + error.end)
-        for row in senders:
-            self._repeat_or_drop(row, end)
-        row = senders[0]
-        flags = self.buffers.rows[row + FLAGS] & RECEIVERS_SEE | FLAG_ERROR
-        self.log.add(end, self.buffers.rows[row + IDENTIFIER], flags, error.field, position, row >> NODE_SHIFT)
+                self.buffers.hold(row, bit + INTERMISSION_BITS - 1)  # its last bit may be a start
+        if met & MET_JOIN:
+            self._join(node, bit)
+        if met & MET_START:
+            self.bit_level.start_late(machine)
+            self._aim()
 
-    def _repeat_or_drop(self, row, end) -> None:
-        """What becomes of the frame in a row after an error frame that ended at `end` (ns)."""
-        node: Node = self.nodes[row >> NODE_SHIFT]
-        if self.buffers.rows[row + FLAGS] & FLAG_SINGLE_SHOT:
-            self._skip(row, end)
-        elif node.mode == OPERATING:
-            # offered again as soon as the bus is free (a passive sender: 8 bits later)
-            self.buffers.hold(row, self.free_bit)
-            self.counters.retries += 1
-            node.retries += 1
-        if node.mode == BUS_OFF:
-            for waiting in self.buffers.waiting_of(node.index):
-                self.counters.flushed += 1
-                node.flushed += 1
+    def _sent(self, node: Node, row: cython.longlong, bit: cython.longlong) -> None:
+        """A node's frame is through: its last bit was the one before `bit`."""
+        slots: cython.p_longlong = self.buffers.slots
+        time: cython.longlong = self.edge_ns(bit)
+        identifier: cython.longlong = slots[row + IDENTIFIER]
+        flags: cython.longlong = slots[row + FLAGS] & RECEIVERS_SEE
+        if self.bit_level.sent_bit == bit:  # another node sent the same
+            self.counters.merged += 1
+        else:
+            self.bit_level.sent_bit = bit
+            self.counters.frames += 1
+            if self.bit_level.heard_bit != bit - 1:
                 self.counters.lost += 1
-                self._drop(node, waiting, end, TX_ABORTED)
+            if not flags & FLAG_EXTENDED:
+                self.counters.note_answer(identifier, time - slots[row + ASKED])
+            self.log.add(self.edge_ns(bit - 1), identifier, flags, slots[row + LOW], slots[row + HIGH], node.index)
+        self.bit_level.forget(row)
+        self.buffers.remove(row)
+        slots[row + FREE_AT] = time
+        node.sent += 1
+        self._note_result(time)
+        buffer = row >> BUFFER_SHIFT & BUFFER_MASK
+        if not node.ends.write(buffer, time, TX_SENT):
+            node.inbox.put(time, node.order, CAN_TX_DONE, node.controller, buffer, TX_SENT, 0, 0, 0)
 
-    def _suspend(self, node, free) -> None:
-        """Suspend transmission: an error-passive sender waits eight bits more after the intermission (ISO 11898-1)."""
-        node.suspend_bit = free + SUSPEND_BITS
-        self.suspended_until = node.suspend_bit
-        self.hindered_until = max(self.hindered_until, node.suspend_bit)
+    def _follow_error_frame(self) -> None:
+        """Count an error frame when it begins, log it when it is over."""
+        level: BitLevel = self.bit_level
+        if not level.counted:
+            level.counted = True
+            self.counters.errors += 1
+        if level.error_is_over():
+            level.in_error = level.counted = False
+            end = self.edge_ns(level.bit)
+            self.log.add(end, level.identifier, level.flags, level.error_field, level.error_position, level.sender)
+
+    def _flush(self, node, time) -> None:
+        """A node is bus-off: what waited there is lost."""
+        self.bit_level.leave(node)
+        for waiting in self.buffers.waiting_of(node.index):
+            self.counters.flushed += 1
+            node.flushed += 1
+            self.counters.lost += 1
+            self._drop(node, waiting, time, TX_ABORTED)
+
+    # ---- error confinement
+
+    def _suspend(self, node, bit) -> None:
+        """Suspend transmission: an error-passive sender sends nothing before `bit` (ISO 11898-1)."""
+        node.suspend_bit = bit
+        self.suspended_until = max(self.suspended_until, bit)
+        self.hindered_until = max(self.hindered_until, bit)
         for row in self.buffers.waiting_of(node.index):
-            self.buffers.hold(row, node.suspend_bit)
+            self.buffers.hold(row, bit)
 
     def _confine(self, node: Node, time: cython.longlong, interrupts: cython.longlong) -> None:
         """Error confinement of a node of which a counter has moved."""
         if node.confine(time, interrupts):
-            self.acknowledging -= 1
+            self.acknowledging -= not node.silent
+            node.off_ns = time
             self._note_changes()
         self._note_result(time)
 

@@ -1,6 +1,7 @@
 from libc.math cimport log
 
-from ranger_sim.foundation.events cimport NEVER
+from ranger_sim.can_bus.frame cimport ARBITRATION_END, EXTENDED_ARBITRATION_END
+from ranger_sim.foundation.events cimport FLAG_EXTENDED, NEVER
 from ranger_sim.foundation.random_stream cimport RandomStream
 
 cimport cython
@@ -16,4 +17,5 @@ cdef class Disturbance:
 
     cdef int _aim(self) except -1
     cdef int _draw_noise(self) except -1
-    cdef long long strike(self, long long first, long long last, long long vulnerable) except? <long long>-2
+    cdef int meet_frame(self, long long start, long long bits, long long flags) except -1
+    cdef int strike(self, long long bit) except -1

@@ -1,11 +1,12 @@
-"""Bits of a bus whose level is inverted for everybody: chosen frames, chosen bits, and noise."""
+"""Bits of a bus whose level is inverted for everybody: of chosen frames, chosen ones, and noise."""
 
 import cython
 
 if not cython.compiled:
     from math import log
 
-    from ranger_sim.foundation.events import NEVER
+    from ranger_sim.can_bus.frame import ARBITRATION_END, EXTENDED_ARBITRATION_END
+    from ranger_sim.foundation.events import FLAG_EXTENDED, NEVER
 
 HIGHEST_RATE = 0.1  # bit error rate; chosen by us: beyond it no frame gets through
 
@@ -13,8 +14,8 @@ HIGHEST_RATE = 0.1  # bit error rate; chosen by us: beyond it no frame gets thro
 class Disturbance:
     """What disturbs a bus. Bits are counted since power-up.
 
-    `next_bit`: the next bit that is hit; NEVER when none is, -1 when the next frame is hit wherever it lies.
-    `noise`: the RandomStream of the bit error rate.
+    `next_bit`: the next bit that is hit as far as known, NEVER when none is. `frames_left`: so many frames to come are
+    hit, at `position` each, negative: in their middle. `noise`: the RandomStream of the bit error rate.
     """
 
     def __init__(self, noise) -> None:
@@ -30,7 +31,6 @@ class Disturbance:
         """Hit the next `count` frames at bit `position`, negative: in their middle."""
         self.frames_left = count
         self.position = position
-        self._aim()
 
     def hit_bit(self, bit) -> None:
         """Hit one bit, which nobody has decided yet."""
@@ -47,7 +47,7 @@ class Disturbance:
 
     def _aim(self) -> None:
         planned: cython.longlong = self.planned_bits[0] if self.planned_bits else NEVER
-        self.next_bit = -1 if self.frames_left > 0 else min(planned, self.next_noise_bit)
+        self.next_bit = min(planned, self.next_noise_bit)
 
     def _draw_noise(self) -> None:
         """The next disturbed bit: distances between them are exponential with mean 1 / rate."""
@@ -60,25 +60,20 @@ class Disturbance:
         else:
             self.next_noise_bit = NEVER
 
-    def strike(self, first: cython.longlong, last: cython.longlong, vulnerable: cython.longlong) -> cython.longlong:
-        """Position in the frame on bits `first` ... `last` of the bit that is hit, or -1.
-
-        `vulnerable`: the first position behind the arbitration field. What falls on bits before the frame is
-        forgotten; what falls into its arbitration field is moved behind it.
-        """
-        position: cython.longlong = -1
-        following: cython.longlong
+    def meet_frame(self, start: cython.longlong, bits: cython.longlong, flags: cython.longlong) -> None:
+        """A frame of so many bits begins at bit `start`: if it is one of those to be hit, its bit is planned."""
+        middle: cython.longlong = (bits - 1) // 2
         if self.frames_left > 0:
             self.frames_left -= 1
-            position = self.position if self.position >= 0 else (last - first) // 2
-        while self.planned_bits and self.planned_bits[0] < first:
+            if self.position < 0:  # behind the arbitration field, so that it is an error of the sender's
+                middle = max(middle, EXTENDED_ARBITRATION_END if flags & FLAG_EXTENDED else ARBITRATION_END)
+            self.hit_bit(start + (middle if self.position < 0 else self.position))
+
+    def strike(self, bit: cython.longlong) -> None:
+        """`bit`, which is hit, passes."""
+        while self.planned_bits and self.planned_bits[0] <= bit:
             self.planned_bits.pop(0)
-        if self.next_noise_bit < first:
-            # what fell on idle bits is forgotten; the distance to the next one has no memory
-            self.next_noise_bit = first - 1
+        if self.next_noise_bit <= bit:
+            self.next_noise_bit = bit
             self._draw_noise()
-        following = min(self.planned_bits[0] if self.planned_bits else NEVER, self.next_noise_bit)
-        if following < last and position < 0:
-            position = following - first
         self._aim()
-        return -1 if position < 0 else min(max(position, vulnerable), last - first - 1)

@@ -27,7 +27,7 @@ if not cython.compiled:
 
     INTERMISSION_BITS = 3  # ISO 11898-1: recessive bits between two frames
     TAIL_BITS = 10  # CRC delimiter, ACK slot, ACK delimiter, 7 bits end of frame
-    ACK_SLOT_FROM_END = 9  # the ACK slot is the ninth bit from the end
+    ACK_DELIMITER_FROM_END = 8  # the ACK delimiter is the eighth bit from the end
     STANDARD_BITS = 44  # a frame without data and without stuff bits
     EXTENDED_BITS = 64
     ARBITRATION_END = 17  # bits up to RTR and IDE, with the most stuff bits that they can have: 14 + 3
@@ -63,6 +63,13 @@ if not cython.compiled:
     FIELD_ACK_SLOT = 25
     FIELD_END = 26
     FIELD_ACK_DELIMITER = 27
+    # the same, outside frames
+    FIELD_ACTIVE_FLAG = 17  # active error flag
+    FIELD_INTERMISSION = 18
+    FIELD_TOLERATED = 19  # dominant bits behind a flag
+    FIELD_PASSIVE_FLAG = 22  # passive error flag
+    FIELD_DELIMITER = 23  # of an error or overload frame
+    FIELD_OVERLOAD_FLAG = 28
 
     # Both chains in one number, as `_feed` takes and returns it: bits 0-14 the CRC register; bits 15-17 the state of
     # the stuffing, level * 4 + run - 1 with run 1 ... 4 equal bits seen last; from bit 18 the stuff bits so far.
@@ -304,11 +311,6 @@ def unstuffed_bits(flags: int) -> int:
     return (EXTENDED_BITS if flags & FLAG_EXTENDED else STANDARD_BITS) + 8 * data_length(flags)
 
 
-def arbitration_end(flags: int) -> int:
-    """Bits of a frame up to the end of its arbitration field, with the most stuff bits that it can have."""
-    return EXTENDED_ARBITRATION_END if flags & FLAG_EXTENDED else ARBITRATION_END
-
-
 def worst_case_bits(flags: int) -> int:
     """Longest possible length with stuffing, without intermission: 132 for 8 bytes, standard.
 
@@ -366,6 +368,13 @@ def wire(identifier: int, flags: int, lo: int, hi: int) -> tuple[list[int], list
     bits += [RECESSIVE] * TAIL_BITS
     fields += [FIELD_CRC_DELIMITER, FIELD_ACK_SLOT, FIELD_ACK_DELIMITER] + [FIELD_END] * 7
     return bits, fields
+
+
+def first_difference(one: list[int], other: list[int]) -> int:
+    """First bit in which two frames differ on the wire, or -1 when they are equal."""
+    if one == other:
+        return -1
+    return next(place for place, levels in enumerate(zip(one, other, strict=False)) if levels[0] != levels[1])
 
 
 if cython.compiled:

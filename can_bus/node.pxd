@@ -12,6 +12,7 @@ cpdef enum:
     ICR_ERROR_PASSIVE = 0x20
     ICR_BUS_ERROR = 0x80
     ICR_FIELD_SHIFT = 16
+    ICR_FIELD_MASK = 31
     ICR_RECEIVING = 0x200000
     ICR_KIND_SHIFT = 22
     KIND_BIT = 0
@@ -36,11 +37,11 @@ cdef class Node:
     cdef public TransmitEnds ends
     cdef public long long index, order
     cdef public long long controller, mode, transmit_errors, receive_errors
-    cdef public bint listening, passive
+    cdef public bint listening, passive, silent
     cdef public long long sent, received
     cdef public bint warning
     cdef public str name
-    cdef public long long sequences_left, join_from, suspend_bit, sending_end
+    cdef public long long sequences_left, join_from, suspend_bit, off_ns, sending_end
     cdef public long long refused, aborted, single_shot_skipped, flushed
     cdef public long long arbitrations_lost, retries
 

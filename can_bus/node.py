@@ -25,6 +25,7 @@ if not cython.compiled:
     ICR_ERROR_PASSIVE = 0x20  # bit 5, EPI: error passive entered or left
     ICR_BUS_ERROR = 0x80  # bit 7, BEI: an error frame; the capture fields below are valid
     ICR_FIELD_SHIFT = 16  # bits 16-20: FIELD_* of can_bus.frame
+    ICR_FIELD_MASK = 31
     ICR_RECEIVING = 0x200000  # bit 21, ERRDIR: the error was met while receiving
     ICR_KIND_SHIFT = 22  # bits 22-23: KIND_*
     KIND_BIT = 0
@@ -37,7 +38,7 @@ if not cython.compiled:
     PASSIVE_LIMIT = 128  # error passive from here
     BUS_OFF_LIMIT = 256  # bus-off from here (transmit errors)
     RECEIVER_CALMED = 119  # an error-passive receiver after a good frame; the standard allows 119 ... 127
-    SENDER_PENALTY = 8  # transmit errors that an error costs the sender
+    SENDER_PENALTY = 8  # transmit errors that an error costs the sender; the heavier ones cost a receiver as much
     SUSPEND_BITS = 8  # suspend transmission: how long an error-passive sender waits after the intermission
     SEQUENCE_BITS = 11  # a recessive sequence, as it stands between two frames
     RECOVERY_SEQUENCES = 128  # of which a bus-off node waits for so many before it returns
@@ -48,11 +49,12 @@ class Node:
     """A controller on a bus, with its error counters and what it did so far.
 
     `following`: the next one of the bus; behind the last comes the first. `listening`: it wants what it receives (a
-    node that does not still acknowledges). `flushed`: frames that waited when it went bus-off. `refused`: requests
-    into an occupied buffer or while off the bus. `ends`: where the ends of its transmissions are written, unless they
-    shall be messages. `suspend_bit`: before that it sends nothing. `sending_end`: the last bit of a frame that it sent
-    together with another node. While it is joining, `sequences_left` recessive sequences, of which the first begins at
-    bit `join_from` or later, are missing.
+    node that does not still acknowledges). `silent`: it drives nothing, not even an acknowledgement (`Bus.set_silent`).
+    `flushed`: frames that waited when it went bus-off. `refused`: requests into an occupied buffer or while off the
+    bus. `ends`: where the ends of its transmissions are written, unless they shall be messages. `suspend_bit`: before
+    that it sends nothing. `off_ns`: when it went bus-off last; what its program asked for earlier does not bring it
+    back. `sending_end`: the last bit of a frame that it sent together with another node. While it is joining,
+    `sequences_left` recessive sequences, of which the first begins at bit `join_from` or later, are missing.
     """
 
     def __init__(self, name, index, inbox, controller, order) -> None:
@@ -63,6 +65,7 @@ class Node:
         self.controller = controller
         self.mode = OPERATING
         self.listening = True
+        self.silent = False
         self.sent = 0
         self.received = 0
         self.index = index
@@ -81,6 +84,7 @@ class Node:
         """Error confinement as of a new controller, called `name`."""
         self.name = name
         self.suspend_bit = 0
+        self.off_ns = 0
         self.forgive()
 
     def connect(self, ends) -> None:
@@ -101,14 +105,6 @@ class Node:
         self.receive_errors = 0
         self.passive = False
         self.warning = False
-
-    def count_failure(self, acknowledged) -> None:
-        """A frame of its own failed; `acknowledged`: there was somebody to acknowledge it.
-
-        An error-passive sender that nobody acknowledges stays where it is: alone on a bus it never goes bus-off.
-        """
-        if acknowledged or not self.passive:
-            self.transmit_errors += SENDER_PENALTY
 
     def count_success(self) -> None:
         """A frame of its own, sent when it had transmit errors, is through."""

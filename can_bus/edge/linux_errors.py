@@ -5,6 +5,7 @@ from ranger_sim.can_bus.node import (
     ICR_BUS_ERROR,
     ICR_ERROR_PASSIVE,
     ICR_ERROR_WARNING,
+    ICR_FIELD_MASK,
     ICR_FIELD_SHIFT,
     ICR_KIND_SHIFT,
     ICR_RECEIVING,
@@ -32,7 +33,6 @@ CRTL_RX_WARNING, CRTL_TX_WARNING, CRTL_RX_PASSIVE, CRTL_TX_PASSIVE, CRTL_ACTIVE 
 PROT_OF_KIND = {KIND_BIT: 0x01, KIND_FORM: 0x02, KIND_STUFF: 0x04, KIND_OTHER: 0x00}
 PROT_TX = 0x80
 
-FIELD_MASK = 31
 KIND_MASK = 3
 COUNTER_LIMIT = 255
 
@@ -47,7 +47,7 @@ def frame_of_status(interrupts: int, counters: tuple[int, int], was_off: bool, o
     data[TRANSMIT_ERRORS] = min(transmit_errors, COUNTER_LIMIT)
     data[RECEIVE_ERRORS] = min(receive_errors, COUNTER_LIMIT)
     if interrupts & ICR_BUS_ERROR:
-        field, kind = interrupts >> ICR_FIELD_SHIFT & FIELD_MASK, interrupts >> ICR_KIND_SHIFT & KIND_MASK
+        field, kind = interrupts >> ICR_FIELD_SHIFT & ICR_FIELD_MASK, interrupts >> ICR_KIND_SHIFT & KIND_MASK
         classes |= CAN_ERR_BUSERROR
         if kind == KIND_OTHER and field == FIELD_ACK_SLOT:
             classes |= CAN_ERR_ACK

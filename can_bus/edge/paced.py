@@ -84,7 +84,8 @@ class PacedBus:
         bit_ns = 1_000_000_000 // self.bitrate
         for _ in range(BURST):
             hears = taps.poll(self.time)
-            due = min(bus.next_time, hears)
+            # at full speed an idle bus waits for its clients, whatever noise may hit it meanwhile
+            due = hears if self.speed == 0.0 and bus.is_quiet() else min(bus.next_time, hears)
             waits = bus.operating < 2 and due <= until and bus.alone_and_passive()
             if waits:
                 due = hears  # what happened before is still told
@@ -104,7 +105,8 @@ class PacedBus:
         if self.speed != 0.0:
             bus.advance(self.time)
             hears = taps.poll(self.time)
-        return hears if alone else min(bus.next_time, hears)
+        rests = alone or (self.speed == 0.0 and bus.is_quiet())
+        return hears if rests else min(bus.next_time, hears)
 
     def held(self) -> bool:
         """True when time waits: at full speed the bus waits for its slowest reader; by the clock it does not."""

@@ -222,16 +222,16 @@ class Tap:
 
     def listen(self, now: int) -> None:
         """Receive without acknowledging and without sending. What was queued is dropped."""
-        if self.silent or self.controller.mode != OPERATING:
+        if self.silent or self.controller.mode == BUS_OFF:
             return
         self.flush(now)
         self.silent = True
-        self.bus.operating -= 1  # the bus counts who would acknowledge
+        self.bus.set_silent(self.node, True)
         self.tell_state(now)
 
     def _unmute(self) -> None:
         self.silent = False
-        self.bus.operating += 1
+        self.bus.set_silent(self.node, False)
 
     def flush(self, now: int) -> None:
         """Drop what waits; a frame under way is completed."""

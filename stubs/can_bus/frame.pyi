@@ -10,7 +10,7 @@ HIGHEST_STANDARD: int
 HIGHEST_EXTENDED: int
 INTERMISSION_BITS: int
 TAIL_BITS: int
-ACK_SLOT_FROM_END: int
+ACK_DELIMITER_FROM_END: int
 STANDARD_BITS: int
 EXTENDED_BITS: int
 ARBITRATION_END: int
@@ -40,6 +40,12 @@ FIELD_CRC_DELIMITER: int
 FIELD_ACK_SLOT: int
 FIELD_END: int
 FIELD_ACK_DELIMITER: int
+FIELD_ACTIVE_FLAG: int
+FIELD_INTERMISSION: int
+FIELD_TOLERATED: int
+FIELD_PASSIVE_FLAG: int
+FIELD_DELIMITER: int
+FIELD_OVERLOAD_FLAG: int
 STATE_SHIFT: int
 STATE_MASK: int
 RUN_MASK: int
@@ -74,6 +80,6 @@ def frame_bits(identifier: int, flags: int, lo: int, hi: int) -> int: ...
 def arbitration_key(identifier: int, flags: int) -> int: ...
 def data_length(flags: int) -> int: ...
 def unstuffed_bits(flags: int) -> int: ...
-def arbitration_end(flags: int) -> int: ...
 def worst_case_bits(flags: int) -> int: ...
 def wire(identifier: int, flags: int, lo: int, hi: int) -> tuple[list[int], list[int]]: ...
+def first_difference(one: list[int], other: list[int]) -> int: ...

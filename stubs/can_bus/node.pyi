@@ -13,6 +13,7 @@ ICR_ERROR_WARNING: int
 ICR_ERROR_PASSIVE: int
 ICR_BUS_ERROR: int
 ICR_FIELD_SHIFT: int
+ICR_FIELD_MASK: int
 ICR_RECEIVING: int
 ICR_KIND_SHIFT: int
 KIND_BIT: int
@@ -42,6 +43,7 @@ class Node:
     receive_errors: int
     listening: bool
     passive: bool
+    silent: bool
     sent: int
     received: int
     warning: bool
@@ -49,6 +51,7 @@ class Node:
     sequences_left: int
     join_from: int
     suspend_bit: int
+    off_ns: int
     sending_end: int
     refused: int
     aborted: int
@@ -61,7 +64,6 @@ class Node:
     def connect(self, ends: Any) -> None: ...
     def end_unsent(self, buffer: Any, time: Any, status: Any) -> None: ...
     def forgive(self) -> None: ...
-    def count_failure(self, acknowledged: Any) -> None: ...
     def confine(self, time: int, interrupts: int) -> bool: ...
     def leave(self) -> None: ...
     def unplug(self) -> None: ...

@@ -25,7 +25,10 @@ SUSPEND = "suspend transmission"
 
 @dataclasses.dataclass(frozen=True)
 class Frame:
-    """What a node wants to send. `data`: bytes; a remote frame has a length and no data."""
+    """What a node wants to send. `data`: bytes; a remote frame has a length and no data.
+
+    `buffer`: of frames with one identifier in one node the lower one goes first.
+    """
 
     identifier: int
     data: bytes = b""
@@ -33,6 +36,7 @@ class Frame:
     remote: bool = False
     length: int | None = None
     single_shot: bool = False
+    buffer: int = 0
 
     @property
     def dlc(self) -> int:
@@ -182,12 +186,20 @@ class Node:
         self.rec = 0
         self.passive = False
         self.sending = None  # the Frame under way
+        self.transmitter = False  # it began the last frame, and has not lost its arbitration
         self.sent = []  # bits of it
         self.drive = RECESSIVE
         self.events = []  # (bit, what, ...)
         self.recessive = 0
         self.sequences = 0
         self.count = 0
+
+    def leave(self):
+        """The program takes it off the bus, with what waits; that does not spare it the recovery from bus-off."""
+        self.state = BUS_OFF if self.tec > 255 else OFF
+        self.sending = None
+        self.transmitter = False
+        self.waiting.clear()
 
     def join(self):
         """The program asks to take part: after 11 recessive bits, out of bus-off after 128 times 11."""
@@ -214,19 +226,20 @@ class Node:
             self.drive = RECESSIVE if self.flag_passive else DOMINANT
 
     def offered(self, bit):
-        ready = [(arbitration_key(f), i, f) for i, (when, f) in enumerate(self.waiting) if when <= bit]
-        return min(ready, default=None, key=lambda each: each[:2])
+        ready = [(arbitration_key(f), f.buffer, i, f) for i, (when, f) in enumerate(self.waiting) if when <= bit]
+        return min(ready, default=None, key=lambda each: each[:3])
 
     def try_start(self, bit):
         offer = self.offered(bit)
         if offer is not None:
-            self.begin(offer[2])
+            self.begin(offer[3])
             self.drive = DOMINANT
 
     def begin(self, frame, at=0):
         self.state = FRAME
         self.reception = Reception()
         self.sending = frame
+        self.transmitter = frame is not None
         if frame is not None:
             stuffed_bits, self.stuff_places, self.arbitration = stuffed(frame)
             self.bits = stuffed_bits
@@ -287,12 +300,7 @@ class Node:
                 if tail == 1:  # ACK slot: somebody acknowledges
                     reception.take(level)
                     return
-                if tail == 9:  # the last bit of EOF
-                    reception.take(level)
-                    self.complete(bit)
-                    self.overload(bit)
-                    return
-                self.error(bit, "form")
+                self.error(bit, "form")  # in the last bit of EOF too: a frame is sent when that is over without error
                 return
             reception.take(level)
             if place - len(self.bits) == 1:  # the ACK slot stayed recessive
@@ -306,6 +314,8 @@ class Node:
         if sent == DOMINANT and level == RECESSIVE:
             self.error(bit, "bit")  # its own acknowledgement did not show
             return
+        if sent == DOMINANT:
+            self.acknowledge(bit)
         if wrong:
             self.error(bit, wrong)
             return
@@ -323,6 +333,7 @@ class Node:
         self.events.append((bit, "lost arbitration"))
         frame = self.sending
         self.sending = None
+        self.transmitter = False
         if frame.single_shot:
             self.drop(frame)
             self.events.append((bit, "single shot dropped", frame))
@@ -335,6 +346,9 @@ class Node:
 
     def receive(self, bit):
         self.events.append((bit, "received", self.reception.message()))
+
+    def acknowledge(self, bit):
+        """A reception counts as good once its ACK bit is sent, whatever becomes of the end of frame."""
         if self.rec > 127:
             self.rec = 119
         elif self.rec > 0:
@@ -345,14 +359,12 @@ class Node:
         self.events.append((bit, "sent", self.sending))
         self.drop(self.sending)
         self.tec = max(self.tec - 1, 0)
-        was_passive = self.passive
         self.confine(bit)
-        self.to_intermission(sender=True, passive=was_passive)
+        self.to_intermission()
 
-    def to_intermission(self, sender=False, passive=False):
+    def to_intermission(self):
         self.state = INTERMISSION
         self.count = 0
-        self.suspends = sender and passive
         self.sending = None
 
     def in_intermission(self, bit, level):
@@ -361,25 +373,24 @@ class Node:
             if self.count < 3:
                 self.overload(bit)
             else:  # a start of frame in the third bit: a node with a frame goes on with its identifier
-                offer = None if self.suspends else self.offered(bit)
-                self.begin(offer[2] if offer else None, at=0)
+                offer = None if self.transmitter and self.passive else self.offered(bit)
+                self.begin(offer[3] if offer else None, at=0)
                 if offer:
                     self.drive = DOMINANT
                 self.in_frame(bit, level)
             return
         if self.count == 3:
-            if self.suspends:
+            if self.transmitter and self.passive:
                 self.state = SUSPEND
                 self.count = 0
             else:
                 self.state = IDLE
 
     # errors
-    def error(self, bit, kind, exempt=False):
-        sender = self.sending is not None
-        frame = self.sending
+    def error(self, bit, kind, exempt=False, in_flag=False):
+        sender = self.transmitter
+        frame = self.sending if self.state == FRAME else None
         self.flag_passive = self.passive
-        self.flag_sender = sender
         self.flag_kind = kind
         self.events.append((bit, "error", kind, "sending" if sender else "receiving"))
         self.pending_ack = sender and kind == "ack" and self.passive  # TEC rises only if a dominant bit shows
@@ -387,12 +398,12 @@ class Node:
             if not exempt and not self.pending_ack:
                 self.tec += 8
         else:
-            self.rec += 1
+            self.rec += 8 if in_flag else 1
         self.state = FLAG
         self.count = 0
         self.flag_level = None
         self.after_dominant = 0
-        if sender and frame.single_shot:
+        if frame is not None and frame.single_shot:
             self.drop(frame)
             self.events.append((bit, "single shot dropped", frame))
         self.confine(bit)
@@ -400,7 +411,6 @@ class Node:
     def overload(self, bit):
         self.events.append((bit, "overload"))
         self.flag_passive = False
-        self.flag_sender = False
         self.flag_kind = "overload"
         self.pending_ack = False
         self.state = FLAG
@@ -419,13 +429,7 @@ class Node:
             self.flag_level = level
         else:
             if level == RECESSIVE:
-                # bit error in its own flag
-                if self.flag_sender:
-                    self.tec += 8
-                else:
-                    self.rec += 8
-                self.count = 0
-                self.confine(bit)
+                self.error(bit, "bit", in_flag=True)  # in its own flag, which begins anew
                 return
             self.count += 1
         if self.count == 6 and self.state == FLAG:
@@ -436,11 +440,11 @@ class Node:
     def in_after_the_flag(self, bit, level):
         if level == DOMINANT:
             self.dominant_after += 1
-            if self.first_after and not self.flag_sender and self.flag_kind != "overload":
+            if self.first_after and not self.transmitter and self.flag_kind != "overload":
                 self.rec += 8
                 self.confine(bit)
             if self.dominant_after % 8 == 0:
-                if self.flag_sender:
+                if self.transmitter:
                     self.tec += 8
                 else:
                     self.rec += 8
@@ -460,7 +464,7 @@ class Node:
                 self.error(bit, "form")
             return
         if self.count == 8:
-            self.to_intermission(sender=self.flag_sender, passive=self.passive)
+            self.to_intermission()
 
     def confine(self, bit):
         self.passive = self.tec > 127 or self.rec > 127

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
 
-from ranger_sim.can_bus.frame import arbitration_key, frame_bits
+from ranger_sim.can_bus.frame import FIELD_END, arbitration_key, frame_bits
 from ranger_sim.can_bus.node import BUS_OFF
 from ranger_sim.foundation.events import FLAG_ERROR, FLAG_EXTENDED, FLAG_SINGLE_SHOT, TX_ABORTED, TX_LOST, TX_SENT
 
@@ -47,7 +47,7 @@ class BusMachine(RuleBasedStateMachine):
         self.finished = {}  # number -> status
         self.heard = {n: [] for n in range(4)}
         self.free_bit = 0
-        self.error_bits = 0
+        self.late_errors = {}  # identifier -> errors in its end of frame
 
     @rule(
         node=st.integers(0, 2),
@@ -102,13 +102,16 @@ class BusMachine(RuleBasedStateMachine):
         """Compare what came out since the last time with the model."""
         for time, identifier, flags, lo, _hi, node in self.wired.log():
             if flags & FLAG_ERROR:
+                if lo == FIELD_END:
+                    self.late_errors[identifier] = self.late_errors.get(identifier, 0) + 1
                 continue
             record = self.accepted[lo]
             assert (record["identifier"], record["flags"] & ~FLAG_SINGLE_SHOT) == (identifier, flags)
             assert record["node"] == node and not record["sent"]
             bits = frame_bits(identifier, flags, lo, 0)
             start = time * self.rate // SECOND - (bits - 1)
-            assert start >= self.free_bit  # never on top of another frame
+            # never on top of another frame; but a false bit may make the last one of intermission a start of frame
+            assert start >= self.free_bit - self.noisy
             self.free_bit = start + bits + 3
             assert record["time"] * self.rate < start * SECOND  # asked strictly before
             for other in self.accepted.values():
@@ -131,8 +134,8 @@ class BusMachine(RuleBasedStateMachine):
                     self.answer(n, time, buffer, status)
 
     def calm(self, node):
-        """Not suspended: a passive sender may have to wait."""
-        return self.wired.bus.nodes[node].transmit_errors < 100
+        """Not suspended: a passive sender may have to wait. (At most nine frames have passed since the last look.)"""
+        return max(self.wired.bus.nodes[node].transmit_errors, self.wired.bus.nodes[node].receive_errors) < 100
 
     def answer(self, node, time, buffer, status):
         record = self.open.pop((node, buffer))
@@ -168,7 +171,12 @@ class BusMachine(RuleBasedStateMachine):
         sent = [number for number, status in self.finished.items() if status == TX_SENT]
         for n in range(4):
             due = sorted(number for number in sent if self.accepted[number]["node"] != n)
-            assert sorted(self.heard[n]) == due  # nothing lost, nothing twice
+            assert set(self.heard[n]) >= set(due)  # nothing lost
+            # nothing twice and nothing that was not sent, unless the last bit of EOF was hit: then receivers have what
+            # its sender repeats, or, a single shot or an aborted one, gives up
+            for number in set(self.heard[n]):
+                often = self.late_errors.get(self.accepted[number]["identifier"], 0)
+                assert self.heard[n].count(number) <= (number in due) + often
             by_identifier = {}
             for number in self.heard[n]:
                 by_identifier.setdefault(self.accepted[number]["key"], []).append(number)
@@ -252,10 +260,11 @@ def test_a_request_from_the_past_takes_part_from_now_on_and_is_counted():
 def digest_of_a_busy_second() -> str:
     """SHA-256 over everything that a noisy, crowded bus did."""
     wired = Wired(4, RATE, seed=7)
-    wired.bus.set_bit_error_rate(5e-4)
     digest = hashlib.sha256()
     time = 31 * 3600 * SECOND
     wired.bus.reset_statistics(time)
+    wired.bus.advance(time)
+    wired.bus.set_bit_error_rate(5e-4)
     for i in range(1500):
         node = i * 7 % 4
         flags = (8, 8 | FLAG_SINGLE_SHOT, 3, 8 | FLAG_EXTENDED)[i % 4]

@@ -56,17 +56,6 @@ def test_the_error_state_is_that_of_the_higher_counter_and_only_transmit_errors_
         assert told(node)[0] == 0
 
 
-def test_an_error_costs_a_sender_eight_but_a_passive_one_nothing_while_nobody_is_there():
-    node = node_with(120)
-    node.count_failure(False)
-    assert node.transmit_errors == 128
-    node.confine(5, 0)
-    node.count_failure(False)
-    assert node.transmit_errors == 128
-    node.count_failure(True)
-    assert node.transmit_errors == 136
-
-
 def test_reset_does_not_spare_a_node_that_was_thrown_off_its_recovery():
     node = node_with(256)
     node.confine(5, 0)

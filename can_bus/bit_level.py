@@ -1,0 +1,253 @@
+"""A bus bit by bit, while something on it is not plain: every controller drives, all sample what comes of it.
+
+Frames of which nothing disturbs the course are decided at their start, in one piece (`bus.py`). This is for the rest:
+nodes that send one arbitration field with different data, inverted bits (of frames, of error frames, of an idle
+bus), frames that nobody acknowledges. The bus comes here at a bit at which every node saw it idle, and leaves at the
+next such bit.
+
+Lookahead. A bit is `open` when something that a program does now could change it: a node may begin a frame, or one out
+of reset may have seen its recessive sequence. Such a bit waits until all that was stamped before it is known; those
+between are decided at once. So nothing depends on how time is cut, and mostly a frame with its error frame is decided
+at its start, as a plain one is.
+"""
+
+import cython
+
+from ranger_sim.can_bus.medium_access import MediumAccess
+
+# C constants when compiled: the same numbers stand in the .pxd, and a test holds them together.
+if not cython.compiled:
+    from ranger_sim.can_bus.frame import (
+        FIELD_RTR,
+        FIELD_SRTR,
+        MEASURED_BITS,
+        RECEIVERS_SEE,
+        RECESSIVE,
+        arbitration_key,
+        measure,
+    )
+    from ranger_sim.can_bus.medium_access import MAC_FRAME, MAC_IDLE, MET_ERROR, MET_FAILURE
+    from ranger_sim.can_bus.node import BUS_OFF, ICR_FIELD_MASK, ICR_FIELD_SHIFT, RESET, SEQUENCE_BITS
+    from ranger_sim.can_bus.transmit_buffers import FLAGS, HIGH, IDENTIFIER, LOW, NEXT, NODE_SHIFT, READY
+    from ranger_sim.foundation.events import FLAG_ERROR, FLAG_EXTENDED
+
+
+class BitLevel:
+    """The medium access of all nodes (`machines`, by node number) and the bus between them.
+
+    `bit`: the next one to pass; `first_bit`: where this stretch began. `quiet`: recessive bits passed last; `levels`:
+    of the bits passed since the last open one. `at_rest`: no node is in a frame, and the bus has been recessive as long
+    as that takes; `away`: some are in reset or bus-off. `aborting`: rows whose frame shall not be repeated.
+    `heard_bit`: behind it a listening node had a frame, `sent_bit`: a transmitter was done. `in_error`: an error frame
+    goes on, which began in the frame of `error_begun`; `counted`: so the bus has noted.
+    """
+
+    def __init__(self, buffers, disturbance) -> None:
+        self.buffers = buffers
+        self.disturbance = disturbance
+        self.machines = []
+        self.levels = []
+        self.aborting = []
+        self.first_bit = 0
+        self.bit = 0
+        self.quiet = 0
+        self.heard_bit = -1
+        self.sent_bit = -1
+        self.open = False
+        self.at_rest = False
+        self.away = False
+        self._forget_frame()
+        self.in_error = False
+        self.counted = False
+        self.error_field = 0
+        self.error_begun = 0
+        self.error_position = 0
+
+    def _forget_frame(self) -> None:
+        self.identifier = 0
+        self.flags = FLAG_ERROR
+        self.sender = -1
+
+    def add_node(self, node) -> None:
+        """One more node."""
+        machine = MediumAccess(node)
+        self.machines.append(machine)
+        machine.place(self.bit, self.bit)
+
+    def begin(self, bit: cython.longlong, free_bit: cython.longlong) -> None:
+        """The bus is idle up to `bit` and has been since `free_bit`."""
+        self.first_bit = bit
+        self.bit = bit
+        self.quiet = bit - free_bit + SEQUENCE_BITS
+        self.levels.clear()
+        self.aborting.clear()
+        self._forget_frame()
+        for machine in self.machines:
+            cython.cast(MediumAccess, machine).place(bit, free_bit)
+
+    def look(self) -> None:
+        """Set `open`, `at_rest` and `away` for the next bit."""
+        machine: MediumAccess
+        quiet: cython.bint = self.quiet >= SEQUENCE_BITS
+        self.open = False
+        self.at_rest = quiet
+        self.away = False
+        for machine in self.machines:
+            if machine.may_start():
+                self.open = True
+            if not machine.is_at_rest():
+                self.at_rest = False
+            elif machine.node.mode == RESET or machine.node.mode == BUS_OFF:
+                self.away = True
+                if quiet and machine.node.mode == RESET:
+                    self.open = True
+
+    # ---- frames that begin
+
+    def start_frames(self) -> None:
+        """In an open bit: who may and has a frame for it begins it."""
+        machine: MediumAccess
+        best: cython.longlong = -1
+        key: cython.longlong
+        best_key: cython.longlong = 0
+        for machine in self.machines:
+            machine.offered = self._offer(machine) if machine.may_start() else -1
+            if machine.offered >= 0 and machine.state == MAC_IDLE:
+                key = arbitration_key(
+                    self.buffers.slots[machine.offered + IDENTIFIER], self.buffers.slots[machine.offered + FLAGS]
+                )
+                if best < 0 or key < best_key:
+                    best = machine.offered
+                    best_key = key
+                self._load(machine)
+                machine.start(self.bit)
+        if best >= 0:
+            self._note_start(best, self.bit)
+
+    def start_late(self, machine: MediumAccess) -> None:
+        """The dominant last bit of intermission stands for the start of frame of what the node offers."""
+        self._load(machine)
+        self._note_start(machine.offered, machine.begun)
+
+    def _load(self, machine: MediumAccess) -> None:
+        bits, fields = self.buffers.wire(machine.offered)
+        extended = self.buffers.rows[machine.offered + FLAGS] & FLAG_EXTENDED
+        # a stuff bit behind RTR belongs to the control field: rule (c) speaks of those before it
+        machine.send(machine.offered, bits, fields.index(FIELD_RTR if extended else FIELD_SRTR) + 1)
+
+    def _note_start(self, row: cython.longlong, bit: cython.longlong) -> None:
+        """The frame in `row` begins at `bit`, perhaps beside others."""
+        slots: cython.p_longlong = self.buffers.slots
+        length: cython.longlong = (
+            measure(slots[row + IDENTIFIER], slots[row + FLAGS], slots[row + LOW], slots[row + HIGH]) & MEASURED_BITS
+        )
+        if self.disturbance.frames_left > 0:
+            self.disturbance.meet_frame(bit, length, slots[row + FLAGS])
+        self.identifier = slots[row + IDENTIFIER]
+        self.flags = slots[row + FLAGS] & RECEIVERS_SEE | FLAG_ERROR
+        self.sender = row >> NODE_SHIFT
+
+    def _offer(self, machine: MediumAccess) -> cython.longlong:
+        """The row of the lowest frame of a node that is ready for the next bit, -1 for none."""
+        slots: cython.p_longlong = self.buffers.slots
+        row: cython.longlong = self.buffers.first
+        best: cython.longlong = -1
+        best_key: cython.longlong = 0
+        key: cython.longlong
+        while row >= 0:
+            if row >> NODE_SHIFT == machine.node.index and slots[row + READY] <= self.bit:
+                key = arbitration_key(slots[row + IDENTIFIER], slots[row + FLAGS])
+                if best < 0 or key < best_key or (key == best_key and row < best):
+                    best = row
+                    best_key = key
+            row = slots[row + NEXT]
+        return best
+
+    # ---- a bit
+
+    def pass_bit(self) -> None:
+        """The next bit: what every node drives, what they sample, and what came of it (`MediumAccess.met`)."""
+        machine: MediumAccess
+        level: cython.longlong = RECESSIVE
+        driven: cython.longlong
+        wrong: cython.bint = False
+        for machine in self.machines:
+            driven = machine.drive()
+            if not machine.node.silent:
+                level &= driven
+        if self.disturbance.next_bit <= self.bit:
+            self.disturbance.strike(self.bit)
+            level = 1 - level
+        for machine in self.machines:
+            machine.met = machine.sample(level, self.bit)
+            if machine.met & MET_ERROR:
+                wrong = True
+        if wrong and not self.in_error:
+            self._note_error()
+        self.levels.append(level)
+        self.quiet = self.quiet + 1 if level == RECESSIVE else 0
+        self.bit += 1
+
+    def _note_error(self) -> None:
+        """An error frame begins: of the first transmitter that saw why, else of the first node."""
+        machine: MediumAccess
+        found: MediumAccess = None
+        for machine in self.machines:
+            if machine.met & MET_FAILURE or (machine.met & MET_ERROR and found is None):
+                found = machine
+                if machine.met & MET_FAILURE:
+                    self.identifier = self.buffers.slots[machine.row + IDENTIFIER]
+                    self.flags = self.buffers.slots[machine.row + FLAGS] & RECEIVERS_SEE | FLAG_ERROR
+                    self.sender = machine.node.index
+                    break
+        self.in_error = True
+        self.error_field = found.capture >> ICR_FIELD_SHIFT & ICR_FIELD_MASK
+        self.error_begun = found.begun
+        self.error_position = self.bit - found.begun
+
+    def error_is_over(self) -> cython.bint:
+        """True when no node is in an error frame any more, and none still listens to what nobody sends any more.
+
+        The latter when the transmitter has gone bus-off: its receivers have yet to see that something is wrong.
+        """
+        machine: MediumAccess
+        carried: cython.bint = False
+        heard: cython.bint = False
+        for machine in self.machines:
+            if machine.signals_error():
+                return False
+            if machine.state == MAC_FRAME and machine.begun == self.error_begun:
+                if machine.sending:
+                    carried = True
+                else:
+                    heard = True
+        return carried or not heard
+
+    # ---- nodes that leave and join
+
+    def leave(self, node) -> None:
+        """A node takes no part any more."""
+        self.machines[node.index].place(self.bit, self.bit)
+
+    def join(self, node, since) -> int:
+        """A node waits for its sequences, and has from bit `since` on: what came of the last bit passed (MET_*)."""
+        machine: MediumAccess = self.machines[node.index]
+        met = 0
+        machine.place(self.bit, self.bit)
+        machine.count = 0
+        for level in self.levels[max(since - self.bit + len(self.levels), 0) :]:
+            met = machine.sample(level, self.bit)
+        return met
+
+    def is_sending(self, row) -> bool:
+        """True while the frame in `row` is on the bus."""
+        machine = self.machines[row >> NODE_SHIFT]
+        return machine.row == row and machine.sending and machine.state == MAC_FRAME
+
+    def forget(self, row) -> None:
+        """The frame in `row` is over, in whatever way."""
+        machine = self.machines[row >> NODE_SHIFT]
+        if machine.row == row:
+            machine.row = -1
+        if row in self.aborting:
+            self.aborting.remove(row)

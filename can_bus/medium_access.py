@@ -1,0 +1,559 @@
+"""One controller's medium access, bit by bit: frames, error and overload frames, intermission (ISO 11898-1).
+
+The standard's medium access control sublayer and its fault confinement entity as one state machine. In every bit the
+controller drives a level, samples the one that is on the bus, and decides from that alone what it does in the next bit.
+Nothing here knows another controller: that all of them together do what the standard wants is what comes out.
+
+The rules of fault confinement are cited by their letters, in the order in which ISO 11898-1 and, before it, the CAN
+Specification 2.0 give them:
+(a) a receiver that detects an error: receive errors + 1, unless (e) holds.
+(b) a receiver that samples a dominant bit as the first one after its error flag: receive errors + 8.
+(c) a transmitter that sends an error flag: transmit errors + 8. Exception 1: it is error passive, nobody acknowledged,
+    and no bit was dominant while it sent its passive flag. Exception 2: a stuff error in the arbitration field, the
+    stuff bit having been sent recessive and sampled dominant.
+(d), (e) a bit error in an active error flag or an overload flag: + 8, of a transmitter (d) or a receiver (e).
+(f) up to seven dominant bits after any flag are tolerated: the eighth, and each eighth more, + 8.
+(g) a frame sent (acknowledged, and without error to its last bit): transmit errors - 1.
+(h) a frame received (without error to the ACK slot, and the ACK bit sent): receive errors - 1, or to 119 from above
+    127.
+"""
+
+import cython
+
+from ranger_sim.can_bus.node import Node
+
+# C constants when compiled: the same numbers stand in the .pxd, and a test holds them together.
+if not cython.compiled:
+    from ranger_sim.can_bus.frame import (
+        CRC_BITS,
+        CRC_MASK,
+        CRC_POLYNOMIAL,
+        DATA_BITS,
+        DOMINANT,
+        FIELD_ACK_DELIMITER,
+        FIELD_ACK_SLOT,
+        FIELD_ACTIVE_FLAG,
+        FIELD_CRC,
+        FIELD_CRC_DELIMITER,
+        FIELD_DATA,
+        FIELD_DELIMITER,
+        FIELD_DLC,
+        FIELD_END,
+        FIELD_ID_4_0,
+        FIELD_ID_12_5,
+        FIELD_ID_17_13,
+        FIELD_ID_20_18,
+        FIELD_ID_28_21,
+        FIELD_IDE,
+        FIELD_INTERMISSION,
+        FIELD_OVERLOAD_FLAG,
+        FIELD_PASSIVE_FLAG,
+        FIELD_R0,
+        FIELD_R1,
+        FIELD_RTR,
+        FIELD_SRTR,
+        FIELD_START,
+        FIELD_TOLERATED,
+        INTERMISSION_BITS,
+        LENGTH_CODE,
+        RECESSIVE,
+        STUFF_AFTER,
+    )
+    from ranger_sim.can_bus.node import (
+        ICR_BUS_ERROR,
+        ICR_FIELD_SHIFT,
+        ICR_KIND_SHIFT,
+        ICR_RECEIVING,
+        JOINING,
+        KIND_BIT,
+        KIND_FORM,
+        KIND_OTHER,
+        KIND_STUFF,
+        OPERATING,
+        SENDER_PENALTY,
+        SEQUENCE_BITS,
+        SUSPEND_BITS,
+    )
+    from ranger_sim.foundation.events import FLAG_EXTENDED, FLAG_REMOTE
+
+    # States.
+    MAC_AWAY = 0  # in reset or bus-off
+    MAC_JOINING = 1  # waits for recessive sequences
+    MAC_IDLE = 2
+    MAC_FRAME = 3
+    MAC_ACTIVE_FLAG = 4
+    MAC_PASSIVE_FLAG = 5
+    MAC_OVERLOAD_FLAG = 6
+    MAC_TOLERATING = 7  # behind a flag, until a bit is recessive: the first one of the delimiter
+    MAC_DELIMITER = 8  # of an error frame or an overload frame
+    MAC_INTERMISSION = 9
+    MAC_SUSPENDED = 10  # suspend transmission
+
+    # What came of a bit, as `sample` tells it.
+    MET_RECEIVED = 1  # the sixth bit of EOF: a receiver has the frame
+    MET_SENT = 2  # the last bit of EOF: a transmitter is done
+    MET_LOSS = 4  # arbitration lost
+    MET_ERROR = 8  # an error detected: an error flag begins with the next bit
+    MET_FAILURE = 16  # with it: that was an attempt to send a frame
+    MET_COUNTER = 32  # something of error confinement to tell; `capture` is its ICR_*
+    MET_SETTLED = 64  # the error frame after a failure is over
+    MET_START = 128  # the dominant last bit of intermission stands for the start of frame of `offered`
+    MET_JOIN = 256  # all recessive sequences seen
+
+    RECEIVER_PENALTY = 1  # rule (a)
+    FLAG_BITS = 6  # of an error or overload flag
+    DELIMITER_BITS = 8  # recessive, behind the last flag
+    TOLERATED_BITS = 8  # rule (f)
+
+
+class MediumAccess:
+    """What `node` does on the bus. Counts its errors in the node; the bus has the node take its error state from them.
+
+    `count`: bits of the present state. `sending`: it is the transmitter, which it stays until the bus is idle or
+    another frame begins. `begun`: bit at which its frame began; `position`: bits since. `field` (FIELD_*) is where it
+    stands, with `left` bits still to come. `row`: the frame that it sends; `offered`: the one that it may begin in this
+    bit, -1 for none. `failed`: since then an error frame has gone on. `after_error`: the flag before was an error
+    flag, no overload flag. `unacknowledged`: exception 1 of rule (c) may hold. `unheeded`: its frame is not for it.
+    `met`: what came of the last bit. `stuff_run`, `stuff_level`: equal bits
+    seen last.
+    """
+
+    def __init__(self, node) -> None:
+        self.node = node
+        self.state = MAC_AWAY
+        self.count = 0
+        self.driven = RECESSIVE
+        self.sending = False
+        self.failed = False
+        self.after_error = False
+        self.unacknowledged = False
+        self.unheeded = False
+        self.begun = 0
+        self.position = 0
+        self.field = FIELD_INTERMISSION
+        self.left = 0
+        self.stuff_run = 0
+        self.stuff_level = RECESSIVE
+        self.register = 0
+        self.identifier = 0
+        self.flags = 0
+        self.lo = 0
+        self.hi = 0
+        self.row = -1
+        self.offered = -1
+        self.arbitration_bits = 0
+        self.bits = []
+        self.run_level = RECESSIVE
+        self.capture = 0
+        self.met = 0
+
+    def place(self, bit: cython.longlong, free_bit: cython.longlong) -> cython.void:
+        """Where the node stands at `bit`, when nothing has been on the bus since `free_bit`."""
+        node: Node = self.node
+        self.sending = False
+        self.failed = False
+        self.row = -1
+        self.offered = -1
+        self.count = 0
+        self.field = FIELD_INTERMISSION
+        if node.mode == OPERATING:
+            self.state = MAC_IDLE
+            if node.suspend_bit > bit:
+                self.state = MAC_SUSPENDED
+                self.count = SUSPEND_BITS - (node.suspend_bit - bit)
+        elif node.mode == JOINING:
+            self.state = MAC_JOINING
+            self.count = max(bit - max(free_bit - SEQUENCE_BITS, node.join_from), 0) % SEQUENCE_BITS
+        else:
+            self.state = MAC_AWAY
+
+    def may_start(self) -> cython.bint:
+        """True when a request could make it begin a frame in this bit."""
+        return self.state == MAC_IDLE or (self.state == MAC_INTERMISSION and self.count == INTERMISSION_BITS - 1)
+
+    def is_at_rest(self) -> cython.bint:
+        """True when it sees an idle bus, or takes no part."""
+        return self.state <= MAC_IDLE or self.state == MAC_SUSPENDED
+
+    def signals_error(self) -> cython.bint:
+        """True in an error frame."""
+        if self.state == MAC_ACTIVE_FLAG or self.state == MAC_PASSIVE_FLAG:
+            return True
+        return self.after_error and (self.state == MAC_TOLERATING or self.state == MAC_DELIMITER)
+
+    # ---- sending
+
+    def send(self, row: cython.longlong, bits: list, arbitration_bits: cython.longlong) -> cython.void:
+        """The frame in `row` is what it sends: `bits` on the wire, of which so many to the end of arbitration."""
+        self.row = row
+        self.bits = bits
+        self.arbitration_bits = arbitration_bits
+        self.sending = True
+
+    def start(self, bit: cython.longlong) -> cython.void:
+        """A frame begins at `bit`: its start of frame is what comes next."""
+        self.state = MAC_FRAME
+        self.begun = bit
+        self.position = 0
+        self.field = FIELD_START
+        self.left = 1
+        self.stuff_run = 0
+        self.stuff_level = RECESSIVE
+        self.register = 0
+        self.identifier = 0
+        self.flags = 0
+        self.lo = 0
+        self.hi = 0
+        self.unheeded = False
+
+    def drive(self) -> cython.longlong:
+        """The level that it drives in this bit."""
+        level: cython.longlong = RECESSIVE
+        if self.state == MAC_FRAME:
+            if self.sending:
+                level = self.bits[self.position]
+            elif self.field == FIELD_CRC_DELIMITER and self.left == 0 and self.register == 0:
+                level = DOMINANT  # the ACK slot, after a right CRC
+        elif self.state == MAC_ACTIVE_FLAG or self.state == MAC_OVERLOAD_FLAG:
+            level = DOMINANT
+        self.driven = level
+        return level
+
+    # ---- sampling
+
+    def sample(self, wire_level: cython.longlong, bit: cython.longlong) -> cython.longlong:
+        """The bus was at `wire_level` during `bit`: what came of that (MET_*).
+
+        A silent node drives nothing on the bus; what it would drive is looped back to it (bus monitoring mode).
+        """
+        level: cython.longlong = wire_level & self.driven if self.node.silent else wire_level
+        met: cython.longlong
+        if self.state == MAC_AWAY:
+            return 0
+        if self.state == MAC_JOINING:
+            return self._sample_joining(level)
+        if self.state == MAC_IDLE or self.state == MAC_SUSPENDED:
+            return self._sample_idle(level, bit)
+        if self.state == MAC_FRAME:
+            met = self._sample_frame(level, wire_level)
+        elif self.state == MAC_ACTIVE_FLAG or self.state == MAC_OVERLOAD_FLAG:
+            met = self._sample_dominant_flag(level)
+        elif self.state == MAC_PASSIVE_FLAG:
+            met = self._sample_passive_flag(level)
+        elif self.state == MAC_TOLERATING:
+            met = self._tolerate(level)
+        elif self.state == MAC_DELIMITER:
+            met = self._sample_delimiter(level)
+        else:
+            met = self._sample_intermission(level, bit)
+        self.position = bit + 1 - self.begun
+        return met
+
+    def _sample_joining(self, level: cython.longlong) -> cython.longlong:
+        """Recessive sequences are counted; the last one lets it take part."""
+        self.count = self.count + 1 if level == RECESSIVE else 0
+        if self.count == SEQUENCE_BITS:
+            self.count = 0
+            self.node.sequences_left -= 1
+            if self.node.sequences_left <= 0:
+                self.state = MAC_IDLE
+                return MET_JOIN
+        return 0
+
+    def _sample_idle(self, level: cython.longlong, bit: cython.longlong) -> cython.longlong:
+        """On an idle bus, and while transmission is suspended, a dominant bit is a start of frame."""
+        if level == DOMINANT:
+            self.sending = False
+            self.start(bit)
+            self._receive(level)
+            self.position = 1
+        elif self.state == MAC_SUSPENDED:
+            self.count += 1
+            if self.count == SUSPEND_BITS:
+                self.state = MAC_IDLE
+        return 0
+
+    # ---- a frame
+
+    def _sample_frame(self, level: cython.longlong, wire_level: cython.longlong) -> cython.longlong:
+        """A bit of a frame, which its transmitter compares with what it sent."""
+        stuffed: cython.bint = self.stuff_run == STUFF_AFTER
+        met: cython.longlong = 0
+        if not stuffed and self.left == 0:
+            self._next_field()
+        if not self.sending:
+            if self.field == FIELD_ACK_SLOT and self.node.silent and wire_level == RECESSIVE:
+                # ROBOT PARITY: a real silent controller takes a frame that nobody acknowledged, once per repetition;
+                # ours does not, so that a bus on which nobody else listens may rest (`Bus.alone_and_passive`).
+                self.unheeded = True
+            return self._receive(level)
+        if level != self.driven:
+            if self.driven == RECESSIVE and self.position < self.arbitration_bits:
+                if stuffed:  # rule (c), exception 2
+                    return self._error(KIND_STUFF, 0, 0)
+                self.sending = False
+                met = MET_LOSS
+            elif self.field != FIELD_ACK_SLOT:
+                return self._error(KIND_BIT, SENDER_PENALTY, 0)
+        elif self.field == FIELD_ACK_SLOT:
+            if self.node.passive:  # rule (c), exception 1, unless its passive flag meets a dominant bit
+                self._error(KIND_OTHER, 0, 0)
+                self.unacknowledged = True
+                return MET_ERROR | MET_FAILURE | MET_COUNTER
+            return self._error(KIND_OTHER, SENDER_PENALTY, 0)
+        return met | self._receive(level)
+
+    def _receive(self, level: cython.longlong) -> cython.longlong:
+        """The next bit of a frame, as every node reads it."""
+        if self.stuff_run == STUFF_AFTER:
+            if level == self.stuff_level:
+                return self._error(KIND_STUFF, SENDER_PENALTY, RECEIVER_PENALTY)
+            self.stuff_run = 1
+            self.stuff_level = level
+            return 0
+        self.left -= 1
+        if self.field >= FIELD_CRC_DELIMITER:
+            return self._fixed_form(level)
+        self.stuff_run = self.stuff_run + 1 if level == self.stuff_level else 1
+        self.stuff_level = level
+        self._take(level)
+        return 0
+
+    def _next_field(self) -> cython.void:
+        """A field is over: the one that follows it, and its length in bits."""
+        field: cython.longlong = self.field
+        self.left = 1
+        if field == FIELD_START:
+            self.field = FIELD_ID_28_21
+            self.left = 8
+        elif field == FIELD_ID_28_21:
+            self.field = FIELD_ID_20_18
+            self.left = 3
+        elif field == FIELD_ID_20_18:
+            self.field = FIELD_SRTR
+        elif field == FIELD_SRTR:
+            self.field = FIELD_IDE
+        elif field == FIELD_IDE and self.flags & FLAG_EXTENDED:
+            self.flags &= ~FLAG_REMOTE  # that was SRR
+            self.field = FIELD_ID_17_13
+            self.left = 5
+        elif field == FIELD_ID_17_13:
+            self.field = FIELD_ID_12_5
+            self.left = 8
+        elif field == FIELD_ID_12_5:
+            self.field = FIELD_ID_4_0
+            self.left = 5
+        elif field == FIELD_ID_4_0:
+            self.field = FIELD_RTR
+        elif field == FIELD_RTR:
+            self.field = FIELD_R1
+        elif field == FIELD_IDE or field == FIELD_R1:
+            self.field = FIELD_R0
+        elif field == FIELD_R0:
+            self.field = FIELD_DLC
+            self.left = 4
+        elif field == FIELD_DLC and not self.flags & FLAG_REMOTE and self.flags & LENGTH_CODE:
+            self.field = FIELD_DATA
+            self.left = min(8 * (self.flags & LENGTH_CODE), DATA_BITS)
+            self.count = 0
+        elif field == FIELD_DLC or field == FIELD_DATA:
+            self.field = FIELD_CRC
+            self.left = CRC_BITS
+        elif field == FIELD_CRC:
+            self.field = FIELD_CRC_DELIMITER
+        elif field == FIELD_CRC_DELIMITER:
+            self.field = FIELD_ACK_SLOT
+        elif field == FIELD_ACK_SLOT:
+            self.field = FIELD_ACK_DELIMITER
+        else:
+            self.field = FIELD_END
+            self.left = 7
+
+    def _take(self, level: cython.longlong) -> cython.void:
+        """A bit that is neither stuffed nor of fixed form: to the CRC register, and to the field where it belongs."""
+        field: cython.longlong = self.field
+        place: cython.longlong
+        feedback: cython.longlong = level ^ self.register >> (CRC_BITS - 1)
+        self.register = self.register << 1 & CRC_MASK
+        if feedback:
+            self.register ^= CRC_POLYNOMIAL
+        if field == FIELD_DATA:
+            place = (self.count & 24) + 7 - (self.count & 7)  # bytes little-endian, their bits not
+            if self.count < 32:
+                self.lo |= level << place
+            else:
+                self.hi |= level << place
+            self.count += 1
+        elif field == FIELD_CRC or field == FIELD_START or field == FIELD_R0 or field == FIELD_R1:
+            return
+        elif field == FIELD_DLC:
+            self.flags |= level << self.left
+        elif field == FIELD_SRTR or field == FIELD_RTR:
+            self.flags |= FLAG_REMOTE if level else 0
+        elif field == FIELD_IDE:
+            self.flags |= FLAG_EXTENDED if level else 0
+        else:
+            self.identifier = self.identifier << 1 | level
+
+    def _fixed_form(self, level: cython.longlong) -> cython.longlong:
+        """A bit behind the CRC: recessive, but for the ACK slot. `register` is 0 when the CRC was right."""
+        if self.field == FIELD_ACK_SLOT:
+            if not self.sending and self.driven == DOMINANT:
+                if level == RECESSIVE:
+                    return self._error(KIND_BIT, 0, RECEIVER_PENALTY)
+                if self.node.receive_errors > 0 and not self.unheeded:  # rule (h)
+                    self.node.count_reception()
+                    self.capture = 0
+                    return MET_COUNTER
+            return 0
+        if level == DOMINANT:
+            if self.field == FIELD_END and self.left == 0:  # a receiver has the frame already
+                return self._overload()
+            return self._error(KIND_FORM, SENDER_PENALTY, RECEIVER_PENALTY)
+        if self.field == FIELD_ACK_DELIMITER and self.register != 0:  # a CRC error is signalled behind it
+            return self._error(KIND_OTHER, SENDER_PENALTY, RECEIVER_PENALTY)
+        if self.field == FIELD_END and self.left == 1 and not self.sending:
+            return 0 if self.unheeded else MET_RECEIVED
+        if self.field == FIELD_END and self.left == 0:
+            self._intermission()
+            if self.sending:
+                self.capture = 0
+                if self.node.transmit_errors > 0:  # rule (g)
+                    self.node.count_success()
+                    return MET_SENT | MET_COUNTER
+                return MET_SENT
+        return 0
+
+    # ---- error and overload frames
+
+    def _sample_dominant_flag(self, level: cython.longlong) -> cython.longlong:
+        """An active error flag or an overload flag: six dominant bits."""
+        if level == RECESSIVE:  # rules (d) and (e)
+            return self._error(KIND_BIT, SENDER_PENALTY, SENDER_PENALTY)
+        self.count += 1
+        if self.count == FLAG_BITS:
+            self._end_flag()
+        return 0
+
+    def _sample_passive_flag(self, level: cython.longlong) -> cython.longlong:
+        """A passive error flag is complete when six equal bits, whatever their level, have been seen."""
+        met: cython.longlong = 0
+        self.count = self.count + 1 if level == self.run_level else 1
+        self.run_level = level
+        if level == DOMINANT and self.unacknowledged:  # so exception 1 of rule (c) does not hold
+            self.unacknowledged = False
+            met = self._count_domination(KIND_BIT)
+        if self.count == FLAG_BITS:
+            self._end_flag()
+        return met
+
+    def _end_flag(self) -> cython.void:
+        """A flag is complete."""
+        self.state = MAC_TOLERATING
+        self.field = FIELD_TOLERATED
+        self.count = 0
+
+    def _tolerate(self, level: cython.longlong) -> cython.longlong:
+        """Dominant bits behind a flag are other nodes'; the first recessive one begins the delimiter."""
+        self.unacknowledged = False
+        if level == RECESSIVE:
+            self.state = MAC_DELIMITER
+            self.field = FIELD_DELIMITER
+            self.count = 1
+            return 0
+        self.count += 1
+        if self.count % TOLERATED_BITS == 0:  # rule (f)
+            return self._count_domination(KIND_OTHER)
+        if self.count == 1 and self.after_error and not self.sending:  # rule (b)
+            return self._count_domination(KIND_OTHER)
+        return 0
+
+    def _sample_delimiter(self, level: cython.longlong) -> cython.longlong:
+        """Eight recessive bits; the last one may be dominant where another node is a bit ahead."""
+        self.count += 1
+        if level == DOMINANT:
+            if self.count == DELIMITER_BITS:
+                return self._overload()
+            return self._error(KIND_FORM, SENDER_PENALTY, RECEIVER_PENALTY)
+        return self._intermission() if self.count == DELIMITER_BITS else 0
+
+    def _error(
+        self, kind: cython.longlong, sender_penalty: cython.longlong, receiver_penalty: cython.longlong
+    ) -> cython.longlong:
+        """An error of `kind` (KIND_*) in this bit: the error flag begins with the next one, whatever was going on.
+
+        Which flag is decided before the counters move: the error that makes a node passive is signalled actively.
+        """
+        met: cython.longlong = MET_ERROR | MET_COUNTER
+        node: Node = self.node
+        if self.state == MAC_FRAME and self.sending:
+            met |= MET_FAILURE
+            self.failed = True
+        self._note_error(kind)
+        if self.sending:
+            node.transmit_errors += sender_penalty
+        else:
+            node.receive_errors += receiver_penalty
+        self.state = MAC_PASSIVE_FLAG if node.passive else MAC_ACTIVE_FLAG
+        self.field = FIELD_PASSIVE_FLAG if node.passive else FIELD_ACTIVE_FLAG
+        self.count = 0
+        self.after_error = True
+        self.unacknowledged = False
+        return met
+
+    def _count_domination(self, kind: cython.longlong) -> cython.longlong:
+        """Dominant bits where none should be cost eight: rules (b) and (f), and (c) without its exception 1."""
+        self._note_error(kind)
+        if self.sending:
+            self.node.transmit_errors += SENDER_PENALTY
+        else:
+            self.node.receive_errors += SENDER_PENALTY
+        return MET_COUNTER
+
+    def _note_error(self, kind: cython.longlong) -> cython.void:
+        self.capture = ICR_BUS_ERROR | self.field << ICR_FIELD_SHIFT | kind << ICR_KIND_SHIFT
+        if not self.sending:
+            self.capture |= ICR_RECEIVING
+
+    def _overload(self) -> cython.longlong:
+        """An overload condition, which is no error: the overload flag begins with the next bit."""
+        settled: cython.longlong = MET_SETTLED if self.failed else 0
+        self.state = MAC_OVERLOAD_FLAG
+        self.field = FIELD_OVERLOAD_FLAG
+        self.count = 0
+        self.after_error = False
+        self.failed = False
+        return settled
+
+    # ---- between frames
+
+    def _intermission(self) -> cython.longlong:
+        """Intermission begins with the next bit."""
+        settled: cython.longlong = MET_SETTLED if self.failed else 0
+        self.state = MAC_INTERMISSION
+        self.field = FIELD_INTERMISSION
+        self.count = 0
+        self.failed = False
+        return settled
+
+    def _sample_intermission(self, level: cython.longlong, bit: cython.longlong) -> cython.longlong:
+        """Three recessive bits. A dominant one is an overload condition, but the third a start of frame.
+
+        Suspend transmission: a transmitter that is error passive when intermission ends waits eight bits more, and
+        begins no frame in its last bit. What counts is the state then, after the counters of its frame have moved:
+        a transmitter at 128 whose frame got through is error active again and does not wait (ISO 11898-1 speaks of an
+        error-passive node that has been the transmitter, not of one that was error passive while it sent).
+        """
+        suspended: cython.bint = self.sending and self.node.passive
+        self.count += 1
+        if level == DOMINANT:
+            if self.count < INTERMISSION_BITS:
+                return self._overload()
+            self.sending = False
+            self.start(bit)
+            self._receive(level)
+            return MET_START if self.offered >= 0 and not suspended else 0
+        if self.count == INTERMISSION_BITS:
+            self.state = MAC_SUSPENDED if suspended else MAC_IDLE
+            self.count = 0
+        return 0
