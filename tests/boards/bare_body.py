@@ -63,7 +63,8 @@ class BareRobot:
     """`step()` is one slot of the main brain (2 ms). `store`, `estimator`, `modes`, `body` are open to tests."""
 
     def __init__(self, controller="robust", body_parameters=None, floor=None, gyro_bias=-0.004, quirks=None) -> None:
-        self.controller = controllers.load(controller)
+        loaded = isinstance(controller, controllers.Controller)
+        self.controller = controller if loaded else controllers.load(controller)
         # the feet of the body that stands here unless another is given
         quirks = quirks if quirks is not None else Quirks(estimator_feet="appendix")
         self.store = DataStore(TABLE_SIZE)

@@ -8,7 +8,9 @@ windows here are wide: they are those that the whole robot has to meet.
 
 import pytest
 
+from ranger_sim.boards.quirks import Quirks
 from ranger_sim.datatable.generated import mb as table
+from ranger_sim.plant import body_files
 from ranger_sim.plant.body import FALLEN
 from ranger_sim.plant.floor import Floor
 from ranger_sim.plant.parameters import BodyParameters
@@ -112,6 +114,8 @@ def test_the_wrong_sign_of_the_gyro_is_noticed_by_this_very_test():
 
 
 def test_the_robust_set_walks_100_steps_on_a_floor_rough_by_1_mm():
-    robot = BareRobot("robust", floor=Floor(0.0, 0.001, 2))
+    """In the robot's body, which it is tuned for; on the appendix's, which does for the level, it falls here."""
+    body = body_files.load("ranger").parameters
+    robot = BareRobot("robust", body, Floor(0.0, 0.001, 2), quirks=Quirks())
     robot.start()
     assert robot.walk(100, 80.0), robot.body.record.fall_cause
