@@ -7,8 +7,9 @@ class FrameLog:
     """The first `capacity` frames since the last `take`; `dropped` counts those beyond. A `stream` takes them instead.
 
     A frame is a tuple (time_ns, identifier, flags, lo, hi, sending node), in order of their starts. time_ns is the
-    instant at which receivers have it. An error frame has FLAG_ERROR, the instant of its end, lo = field (FIELD_*) and
-    hi = position of the wrong bit.
+    instant at which receivers have it. An error frame stands where it ended: FLAG_ERROR, the instant of its end,
+    lo = field (FIELD_*) and hi = position of the bit in which a node detected the error, the frame's sender first;
+    identifier 0 and node -1 where nobody had sent, after a false start of frame.
     """
 
     def __init__(self, capacity) -> None:
