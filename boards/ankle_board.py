@@ -13,9 +13,6 @@ from ranger_sim.boards.modules.limit_switch import LimitSwitch
 from ranger_sim.boards.motor_board import CONVERSION_NS, PINS, MotorBoard
 from ranger_sim.datatable.generated import errors as codes
 
-if not cython.compiled:
-    from ranger_sim.foundation.numbers import fixed_of_float
-
 # (place, multiplexer code, gain code): differential 4-5 and 2-3 times 2, single-ended 0 and 1 times 1
 SEQUENCE = (
     ("motor_current", 2, 1),
@@ -41,12 +38,13 @@ FOOT_ON_LEVEL = 2000  # counts
 FOOT_OFF_LEVEL = 1000
 REZERO_ANGLE_RAD = 0.3
 REZERO_RATE_RAD_S = 0.01
-# Setting the motor's angle costs this beside the look (robot.md T2): the hip's whole re-zeroing, less its look.
-SET_CYCLES = 2 * (3610 - 161)
+# Setting the motor's angle costs this beside the look: with it the slot is the 301 us of MCFI's image with the ankle at
+# 0.1 rad, and within the logs' 286 to 313 (robot.md T1).
+SET_CYCLES = 2 * 4010
 
 
 class AnkleBoard(MotorBoard):
-    """Position and velocity of the compliant law: motor encoder / 34. `rezero_share` x 65536."""
+    """Position and velocity of the compliant law: motor encoder / 34. `rezero_share` of the difference per call."""
 
     def __init__(
         self,
@@ -81,8 +79,8 @@ class AnkleBoard(MotorBoard):
         self.joint = self.cap23
         self.add_absolute_encoder(second_connector=1, **absolute_encoder)
         self.rezero_share = rezero_share
-        self.rezero_angle = fixed_of_float(REZERO_ANGLE_RAD)
-        self.rezero_rate = fixed_of_float(REZERO_RATE_RAD_S)
+        self.rezero_angle = REZERO_ANGLE_RAD
+        self.rezero_rate = REZERO_RATE_RAD_S
         samples = self.quirks.contact_equal_samples
         self.left_foot = FootContact(FOOT_ON_LEVEL, FOOT_OFF_LEVEL, samples)
         self.right_foot = FootContact(FOOT_ON_LEVEL, right_off_level, samples)
@@ -117,8 +115,8 @@ class AnkleBoard(MotorBoard):
 
     def motor_encoder_rezero(self) -> None:
         """Motor encoder towards the ankle, only while the foot rests near its upper stop."""
-        rate: cython.longlong = self.joint.rate
-        if self.encoder.angle < self.rezero_angle and -self.rezero_rate < rate < self.rezero_rate:
+        rate: cython.double = self.joint.rate_rad_s()
+        if self.encoder.radians < self.rezero_angle and -self.rezero_rate < rate < self.rezero_rate:
             self.rezero_motor(self.rezero_share)
             self.spend(SET_CYCLES)
 

@@ -97,7 +97,14 @@ class SatelliteBoard(FirmwareBoard):
         self.heartbeat = Heartbeat(self.time, self.gpio, table.SLOT_US)
         self.execution = ExecutionTimer(self, self.time)
         self.can_controller = CanController(self, table.CONTROLLER, IER=interrupts)
-        self.can = CanLink(self, self.can_controller, self.time, self.errors, self.quirks.full_queues_reported)
+        self.can = CanLink(
+            self,
+            self.can_controller,
+            self.time,
+            self.errors,
+            self.quirks.full_queues_reported,
+            self.quirks.full_receive_ring_kills,
+        )
         self.can.attach(receive_slot=CAN_RECEIVE_SLOT, error_slot=error_slot)
 
     def counters(self) -> object:

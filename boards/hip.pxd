@@ -2,7 +2,7 @@ from ranger_sim.boards.modules.joint_safety cimport HipSafety
 from ranger_sim.boards.modules.quadrature_decoder cimport QuadratureDecoder
 from ranger_sim.boards.motor_board cimport MotorBoard
 
-cdef long long REZERO_SHARE
+cdef double REZERO_SHARE
 
 cdef class HipBoard(MotorBoard):
     cdef public QuadratureDecoder joint

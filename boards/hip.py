@@ -37,7 +37,7 @@ LIMITS = dict(
 )
 JOINT_ENCODER = (2048, 1.0)  # pulses, gear
 MOTOR_ENCODER = (192, 66.0)
-REZERO_SHARE = 3276  # 5 %, 0.05 x 65536 truncated
+REZERO_SHARE = 0.05
 
 
 class HipBoard(MotorBoard):
@@ -102,14 +102,14 @@ class HipBoard(MotorBoard):
                 Send("MCH_BATT_CURRENT",        board.readings.battery_current,     2 * 320, 2 * 440),
                 Send("MCH_BATT_VOLTAGE",        board.readings.battery_voltage,     2 * 308, 2 * 410),
                 Send("MCH_MOTOR_VELOCITY",      board.motor.rate_rad_s,             2 * 155, 2 * 320, 2 * 70),
-                Task(board.motor_encoder_rezero,                                    2 * 3610, 2 * 4800),
+                Task(board.motor_encoder_rezero,                                    2 * 3730, 2 * 5000),
                 Send("MCH_EXECUTION_TIME",      board.execution.seconds,            2 * 276, 2 * 370),
                 Send("MCH_MAX_EXECUTION_TIME",  board.execution.longest_seconds,    2 * 276, 2 * 370),
             )),
             extra_idle_call=self.quirks.occasional_idle_call,
             speakers=("can_tx1", "can_transmit"),
             last=(
-                Task(board.can.transmit,             TRANSMIT_CYCLES, 100, 0, "", "can_transmit"),
+                Task(board.end_line,             TRANSMIT_CYCLES, 100, 0, "", "can_transmit"),
                 Task(board.execution.record,         2 * 22,           60, 0, "", "execution_time_record"),
             ),
         )  # fmt: skip

@@ -23,7 +23,7 @@ READINGS = dict(
 MOTOR_ENCODER = (512, 34.0)  # pulses, gear; the sign is the mounting
 JOINT_ENCODER = (2048, 1.0)
 ABSOLUTE_ENCODER = dict(zero=1572, sign=1, rpm=186)
-REZERO_SHARE = 3276  # 5 %, 0.05 x 65536 truncated
+REZERO_SHARE = 0.05
 OPERATION_SIGN = 1
 
 
@@ -100,7 +100,7 @@ class InnerFeetBoard(AnkleBoard):
             extra_idle_call=self.quirks.occasional_idle_call,
             speakers=("can_tx2", "can_transmit"),
             last=(
-                Task(board.can.transmit,             TRANSMIT_CYCLES, 100, 0, "", "can_transmit"),
+                Task(board.end_line,             TRANSMIT_CYCLES, 100, 0, "", "can_transmit"),
                 Task(board.execution.record,         2 * 22,           60, 0, "", "execution_time_record"),
             ),
         )  # fmt: skip

@@ -14,6 +14,7 @@ from ranger_sim.firmware_sim.peripherals.adc_internal cimport AdcInternal
 from ranger_sim.firmware_sim.peripherals.pwm cimport Pwm
 from ranger_sim.firmware_sim.peripherals.spi_encoder cimport SpiEncoder
 from ranger_sim.firmware_sim.peripherals.timer_capture cimport TimerCapture
+from ranger_sim.foundation.numbers cimport fixed_of_float, float32
 
 cpdef enum:
     BATTERY_VOLTAGE_CHANNEL = 1
@@ -41,10 +42,11 @@ cdef class MotorBoard(SatelliteBoard):
     cdef public EncoderCapture capture01, capture23
     cdef public WrapCounter wraps
     cdef public TimerCapture timer0
-    cdef public long long encoder_select
+    cdef public long long encoder_select, rezero_count
+    cdef public bint rezeroing
     cdef public PowerUp power_up
     cpdef int read_sensors_once(self) except -1
     cpdef int set_start_values(self) except -1
     cpdef long long controlled_position(self) noexcept
     cpdef long long controlled_velocity(self) noexcept
-    cpdef int rezero_motor(self, long long share) except -1
+    cpdef int rezero_motor(self, double share) except -1

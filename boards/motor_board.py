@@ -79,6 +79,8 @@ START_VALUES, SLOTS_BEGIN = 0, 1
 CONVERSION_NS = 31_000
 
 if not cython.compiled:
+    from ranger_sim.foundation.numbers import fixed_of_float, float32
+
     BATTERY_VOLTAGE_CHANNEL = 1  # AIN1, P0.28
 
 # Receive lists, which are searched from the first entry: MCH's is told (robot.md N2.4). The others' order is chosen by
@@ -205,6 +207,8 @@ class MotorBoard(SatelliteBoard):
         self.encoder = None
         self.spi = None
         self.encoder_select = 0
+        self.rezeroing = False
+        self.rezero_count = 0
         self.listen()
         self.power_up = PowerUp(self, self)
         self.power_up.begin(phase_ns)
@@ -314,7 +318,20 @@ class MotorBoard(SatelliteBoard):
         self.compliance.target = target
         self.current_control.update(target, self.readings.motor_current_fixed())
 
-    def rezero_motor(self, share: cython.longlong) -> None:
-        """Move the motor's angle towards the joint's by `share` (x 65536) of their difference."""
-        difference: cython.longlong = self.encoder.angle - self.motor.position
-        self.motor.set_position(self.motor.position + ((difference * share) >> 16))
+    def rezero_motor(self, share: cython.double) -> None:
+        """Move the motor's angle towards the joint's by `share` of their difference, in single floats.
+
+        The count is set when the line's cycles are over; edges that came since the slot read the angle are forgotten,
+        on the robot as here.
+        """
+        angle: cython.double = float32(self.motor.position_rad())
+        difference: cython.double = float32(self.encoder.radians - angle)
+        self.rezero_count = self.motor.count_at(fixed_of_float(float32(angle + difference * share)))
+        self.rezeroing = True
+
+    def end_line(self) -> None:
+        """Slot task: what the row's line does at its end, send its frame or set the motor's count."""
+        if self.rezeroing:
+            self.rezeroing = False
+            self.motor.count = self.rezero_count
+        self.can.transmit()

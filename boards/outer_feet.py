@@ -22,7 +22,7 @@ READINGS = dict(
 MOTOR_ENCODER = (512, -34.0)  # pulses, gear; the sign is the mounting
 JOINT_ENCODER = (2048, -1.0)
 ABSOLUTE_ENCODER = dict(zero=6562, sign=-1, rpm=186)
-REZERO_SHARE = 13107  # 20 %, 0.2 x 65536 truncated
+REZERO_SHARE = 0.2
 OPERATION_SIGN = -1  # the motor is mounted the other way round
 
 
@@ -98,7 +98,7 @@ class OuterFeetBoard(AnkleBoard):
             extra_idle_call=self.quirks.occasional_idle_call,
             speakers=("can_tx1", "can_transmit"),
             last=(
-                Task(board.can.transmit,             TRANSMIT_CYCLES, 100, 0, "", "can_transmit"),
+                Task(board.end_line,             TRANSMIT_CYCLES, 100, 0, "", "can_transmit"),
                 Task(board.execution.record,         2 * 22,           60, 0, "", "execution_time_record"),
             ),
         )  # fmt: skip

@@ -89,6 +89,9 @@ class Quirks:
     full_queues_reported: bool = switch(True, False, YES_OR_NO)
     """A frame lost to a full ring raises an error. Firmware: silent."""
 
+    full_receive_ring_kills: bool = switch(True, True, YES_OR_NO)
+    """A satellite whose receive ring is full serves that interrupt for ever. Appendix: nothing."""
+
     errors_reported_one_late: bool = switch(False, True, YES_OR_NO)
     """Router and main brain. Firmware: each report carries the error before it, the first one is 0."""
 

@@ -109,7 +109,7 @@ class SteeringBoard(MotorBoard):
             extra_idle_call=self.quirks.occasional_idle_call,
             speakers=("can_tx2", "can_transmit"),
             last=(
-                Task(board.can.transmit,             TRANSMIT_CYCLES, 100, 0, "", "can_transmit"),
+                Task(board.end_line,             TRANSMIT_CYCLES, 100, 0, "", "can_transmit"),
                 Task(board.execution.record,         2 * 22,           60, 0, "", "execution_time_record"),
             ),
         )  # fmt: skip
@@ -132,9 +132,10 @@ class SteeringBoard(MotorBoard):
         return 0
 
     def update_pwm(self) -> None:
-        """dn_update_pwm: COMMAND_CURRENT, whole counts, straight to the duty.
+        """dn_update_pwm: COMMAND_CURRENT, whole counts, straight to the duty, past every limiter but the largest duty.
 
-        The current monitors act on it as they do in the current loop, and so do blocked directions.
+        The monitors of the current loop can still switch the motor off. A blocked direction, which the robot never has,
+        is blocked here too.
         """
         duty: cython.longlong
         if self.check_limits:
@@ -142,7 +143,8 @@ class SteeringBoard(MotorBoard):
         if not self.direct:
             return
         duty = whole(self.compliance.command)
-        duty = whole(self.limits.limit_duty(duty << 16, self.readings.motor_current_fixed()))
+        if not -self.output.largest <= duty <= self.output.largest:
+            self.errors.report(codes.MC_PWM_LIMIT)
         if (duty > 0 and self.current_control.block_positive) or (duty < 0 and self.current_control.block_negative):
             duty = 0
         self.output.write(duty)

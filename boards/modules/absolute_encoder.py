@@ -4,23 +4,24 @@
 import cython
 
 from ranger_sim.boards.modules.error_module import ErrorModule
+from ranger_sim.foundation.numbers import float_of_word, word_of_float
 
 if not cython.compiled:
-    # RAD_PER_COUNT in 0.32 fixed point, x 2^32, so that the truncation stays below one 16.16 step.
-    RAD_PER_COUNT_SHIFTED = 3294206
+    from ranger_sim.foundation.numbers import fixed_of_float, float32
+
     WORD_MASK = 0x1FFF  # 13 bits
     COUNTS_PER_TURN = 8192
     SLOTS_PER_MINUTE = 120_000
     SPARE_COUNTS = 5  # that a step may be larger than the fastest joint's
 
-RAD_PER_COUNT = 0.0007669922  # as in the firmware; 2 pi / 8192 would be 0.00076699039
+RAD_PER_COUNT = float_of_word(word_of_float(0.0007669922))  # a single float; 2 pi / 8192 would be 0.00076699039
 
 
 class AbsoluteEncoder:
     """Angle of a joint. `zero`: raw count at angle 0; `sign`: of the mounting; `rpm`: fastest joint speed.
 
-    `counts` is sign x (value - zero) without any wrap-around; `angle` the same in rad x 65536. `value` is
-    what the spike limiter let through, 0 before the first reading.
+    `counts` is sign x (value - zero) without any wrap-around; `radians` the same as a single float, `angle` that in rad
+    x 65536, truncated toward zero. `value` is what the spike limiter let through, 0 before the first reading.
     """
 
     def __init__(self, zero, sign, rpm, errors: ErrorModule, spike_code) -> None:
@@ -31,6 +32,8 @@ class AbsoluteEncoder:
         self.spike_code = spike_code
         self.value = 0
         self.counts = 0
+        self.rad_per_count = RAD_PER_COUNT
+        self.radians = 0.0
         self.angle = 0
 
     def accept(self, word: cython.longlong) -> cython.void:
@@ -48,8 +51,9 @@ class AbsoluteEncoder:
                 self.errors.report(self.spike_code)
         self.value = new
         self.counts = self.sign * (new - self.zero)
-        self.angle = (self.counts * RAD_PER_COUNT_SHIFTED) >> 16
+        self.radians = float32(self.counts * self.rad_per_count)
+        self.angle = fixed_of_float(self.radians)
 
     def angle_rad(self) -> cython.double:
         """Angle in rad as it is published."""
-        return self.counts * RAD_PER_COUNT
+        return self.radians

@@ -9,7 +9,8 @@ cdef class AdcReadings:
     cdef public Ads7871 external
     cdef public AdcInternal internal
     cdef public long long motor_entry, motor_offset, motor_gain_fixed, battery_entry, battery_offset
-    cdef public double motor_gain, battery_gain, voltage_gain
+    cdef public long long battery_gain_fixed, voltage_gain_fixed
+    cdef public double motor_gain, battery_gain, voltage_gain, power_gain
     cpdef long long motor_current_fixed(self) noexcept
     cpdef double motor_current(self) noexcept
     cpdef double battery_current(self) noexcept

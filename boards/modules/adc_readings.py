@@ -3,7 +3,7 @@
 """From converter counts to amperes, volts and watts, with the constants of one board
 (robot.md N4 and N5).
 
-Values that are published are single floats of the full constants; inside the control loop the gain is
+Values that are published are products of single floats, rounded as the firmware's; inside the control loop the gain is
 truncated to 16.16 (100 instead of 100.9 for the hip), as in the firmware.
 """
 
@@ -37,13 +37,16 @@ class AdcReadings:
         self.external = external
         self.internal = internal
         self.motor_entry = motor_entry
-        self.motor_gain = motor_gain
+        self.motor_gain = float32(motor_gain)
         self.motor_offset = motor_offset
         self.motor_gain_fixed = fixed_of_float(motor_gain)
         self.battery_entry = battery_entry
-        self.battery_gain = battery_gain
+        self.battery_gain = float32(battery_gain)
+        self.battery_gain_fixed = fixed_of_float(battery_gain)
         self.battery_offset = battery_offset
-        self.voltage_gain = voltage_gain
+        self.voltage_gain = float32(voltage_gain)
+        self.voltage_gain_fixed = fixed_of_float(voltage_gain)
+        self.power_gain = float32(self.voltage_gain * self.battery_gain)
 
     def motor_current_fixed(self) -> cython.longlong:
         """Motor current as the loop sees it, A x 65536."""
@@ -62,11 +65,18 @@ class AdcReadings:
         return float32(self.voltage_gain * self.internal.result)
 
     def battery_power(self) -> cython.double:
-        """Power from the battery, W: product of the two single floats."""
-        return float32(self.battery_voltage() * self.battery_current())
+        """Power from the battery, W: the whole numbers are multiplied first, then once by the product of the gains."""
+        counts: cython.longlong = self.internal.result * (
+            self.external.results[self.battery_entry] - self.battery_offset
+        )
+        return float32(self.power_gain * float32(counts))
 
     def battery_power_fixed(self) -> cython.double:
-        """The same by a 16.16 product, as the steering board does it, W."""
+        """The same by a 16.16 product, as the steering board does it, W.
+
+        Both gains are truncated to 16.16 first: that of the current to 3/65536, a tenth less than it should be.
+        """
+        current: cython.longlong = self.external.results[self.battery_entry] - self.battery_offset
         return float_of_fixed(
-            fixed_multiply(fixed_of_float(self.battery_voltage()), fixed_of_float(self.battery_current()))
+            fixed_multiply(current * self.battery_gain_fixed, self.internal.result * self.voltage_gain_fixed)
         )

@@ -4,7 +4,6 @@ from collections.abc import Callable
 
 from ranger_sim.datatable.generated import errors as codes
 from ranger_sim.firmware_sim.peripherals.can_controller import (
-    CMR_CDO,
     ICR_BUS_ERROR,
     ICR_DOI,
     ICR_ERROR_PASSIVE,
@@ -31,17 +30,15 @@ class CanErrors:
         self.while_sending = getattr(codes, prefix + "BUS_TX")
 
     def look(self) -> None:
-        """Read CxICR, restart after bus-off, report each cause."""
-        cause = self.controller.read_ICR()
+        """Restart after bus-off, then read CxICR and report each cause; a data overrun is not cleared."""
         if self.controller.bus_off:
-            self.report(self.bus_off)
             self.controller.write_MOD(OPERATING)
-            return
+            self.report(self.bus_off)
+        cause = self.controller.read_ICR()
         if cause & ICR_ERROR_WARNING:
             self.report(self.warning)
         if cause & ICR_DOI:
             self.report(self.overrun)
-            self.controller.write_CMR(CMR_CDO)
         if cause & ICR_ERROR_PASSIVE:
             self.report(self.passive)
         if cause & ICR_BUS_ERROR:

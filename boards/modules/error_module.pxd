@@ -5,8 +5,8 @@ cimport cython
 cpdef enum:
     CODES = 1024
     RING_MASK = 31
-    MOST_WAITING = 31
-    MOST_COUNTED = 1023
+    MOST_WAITING = 32
+    COUNT_MASK = 1023
     CODE_MASK = 0xFFFF
     BOARD_MASK = 0x3F
     BOARD_SHIFT = 16

@@ -3,7 +3,7 @@
 """Errors of one board: noted anywhere, collected once per slot, sent one at a time (appendix 4.9).
 
 An error frame's value word holds the code (bits 0-15), the board's number (16-21) and how often it came
-since it was last sent (22-31); its time word is when it first came (robot.md N1.7, N4.12).
+since it was last sent (22-31, modulo 1024); its time word is when it first came (robot.md N1.7, N4.12, T4.2).
 """
 
 import cython
@@ -13,11 +13,11 @@ from ranger_sim.foundation.numbers import integers
 
 if not cython.compiled:
     CODES = 1024  # codes 0 ... CODES-1 can be noted (the table has about 120)
-    # Errors that wait to be sent: a ring of 32, one place stays empty, as in all rings of the firmware.
+    # Errors that wait to be sent: a ring of 32, which knows by a flag of its own whether it is empty.
     RING_MASK = 31
-    MOST_WAITING = 31
+    MOST_WAITING = 32
     # Fields of an error word: code, number of the board, count.
-    MOST_COUNTED = 1023
+    COUNT_MASK = 1023
     CODE_MASK = 0xFFFF
     BOARD_MASK = 0x3F
     BOARD_SHIFT = 16
@@ -25,15 +25,15 @@ if not cython.compiled:
 
 
 def error_word(code, board, count):
-    """Value word of an error frame: 16-bit code, 6-bit board number, 10-bit count (at most 1023)."""
-    return (code & CODE_MASK) | (board & BOARD_MASK) << BOARD_SHIFT | min(count, MOST_COUNTED) << COUNT_SHIFT
+    """Value word of an error frame: 16-bit code, 6-bit board number, 10-bit count (modulo 1024)."""
+    return (code & CODE_MASK) | (board & BOARD_MASK) << BOARD_SHIFT | (count & COUNT_MASK) << COUNT_SHIFT
 
 
 class ErrorModule:
     """The errors of board number `board`. Ground truth for tests and reports: `totals`, events per code.
 
     per_event: every recurrence counts (appendix); otherwise one per slot at most (firmware of 2016).
-    lose_new_after_repeat: the firmware's fault that new errors after a repeated one in a slot are lost.
+    lose_new_after_repeat: the firmware's fault that new errors of higher codes than a repeated one in a slot are lost.
     """
 
     def __init__(self, board, time: NetworkTime, per_event=True, lose_new_after_repeat=False) -> None:
@@ -42,7 +42,7 @@ class ErrorModule:
         self.per_event = per_event
         self.lose_new_after_repeat = lose_new_after_repeat
         self.totals = integers(CODES)
-        # flags of this slot: events per code, and which codes have any, in the order they came
+        # flags of this slot: events per code, and which codes have any, ascending as their flags are looked through
         self.flags = integers(CODES)
         self.flagged = integers(CODES)
         self.flagged_count = 0
@@ -58,16 +58,25 @@ class ErrorModule:
     def report(self, code: cython.longlong) -> cython.void:
         """Note error `code`; it goes into the ring at the end of the slot. Codes above the table are taken
         as 0 (DEFAULT), so a wrong call is visible rather than lost."""
+        place: cython.longlong
         if code < 0 or code >= CODES:
             code = 0
         self.totals[code] += 1
         if self.flags[code] == 0:
-            self.flagged[self.flagged_count] = code
+            place = self.flagged_count
+            while place > 0 and self.flagged[place - 1] > code:
+                self.flagged[place] = self.flagged[place - 1]
+                place -= 1
+            self.flagged[place] = code
             self.flagged_count += 1
         self.flags[code] += 1
 
     def update(self):
-        """Slot task: move the flags of this slot into the ring; returns how many codes there were, None for none."""
+        """Slot task: move the flags of this slot into the ring; returns how many codes there were, None for none.
+
+        A full ring is not searched, because its ends have met: what waits there already is put in once more, in place
+        of the oldest.
+        """
         moved: cython.longlong = self.flagged_count
         repeated: cython.bint = False
         i: cython.longlong
@@ -83,10 +92,10 @@ class ErrorModule:
             events = self.flags[code] if self.per_event else 1
             self.flags[code] = 0
             found = False
-            for j in range(self.waiting):
+            for j in range(self.waiting if self.waiting < MOST_WAITING else 0):
                 place = (self.first + j) & RING_MASK
                 if self.codes[place] == code:
-                    self.counts[place] = min(self.counts[place] + events, MOST_COUNTED)
+                    self.counts[place] += events
                     found = True
                     break
             if found:
@@ -100,7 +109,7 @@ class ErrorModule:
                 self.dropped += 1
             place = (self.first + self.waiting) & RING_MASK
             self.codes[place] = code
-            self.counts[place] = min(events, MOST_COUNTED)
+            self.counts[place] = events
             self.stamps[place] = self.time.ms
             self.waiting += 1
         self.flagged_count = 0
@@ -114,7 +123,7 @@ class ErrorModule:
         self.word = (
             (self.codes[place] & CODE_MASK)
             | (self.board & BOARD_MASK) << BOARD_SHIFT
-            | (self.counts[place] & MOST_COUNTED) << COUNT_SHIFT
+            | (self.counts[place] & COUNT_MASK) << COUNT_SHIFT
         )
         self.stamp = self.stamps[place]
         self.first = (self.first + 1) & RING_MASK

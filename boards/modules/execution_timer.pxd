@@ -1,5 +1,6 @@
 from ranger_sim.boards.modules.network_time cimport NetworkTime
 from ranger_sim.firmware_sim.microcontroller cimport Microcontroller
+from ranger_sim.foundation.numbers cimport float32
 
 cimport cython
 
@@ -10,6 +11,7 @@ cpdef enum:
 cdef class ExecutionTimer:
     cdef public Microcontroller chip
     cdef public NetworkTime time
+    cdef public double seconds_per_cycle
     cdef public long long longest_ns, longest_ever_ns
     cpdef long long cycles(self, long long time_ns) noexcept
     cpdef double seconds(self) noexcept

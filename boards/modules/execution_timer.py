@@ -7,7 +7,11 @@ from ranger_sim.boards.modules.network_time import NetworkTime
 from ranger_sim.firmware_sim.microcontroller import Microcontroller
 
 if not cython.compiled:
+    from ranger_sim.foundation.numbers import float32
+
     ANEW_MASK = 255  # ms of the network time: the longest slot is looked for anew
+
+SECONDS_PER_CYCLE = 0.0000000166667  # of 60 MHz, as the firmware has it
 
 
 class ExecutionTimer:
@@ -22,6 +26,7 @@ class ExecutionTimer:
         self.time = time
         self.longest_ns = 0
         self.longest_ever_ns = 0
+        self.seconds_per_cycle = float32(SECONDS_PER_CYCLE)
 
     def record(self) -> None:
         """Last entry of every row: read the slot timer's count."""
@@ -47,8 +52,8 @@ class ExecutionTimer:
 
     def seconds(self) -> cython.double:
         """EXECUTION_TIME, s."""
-        return self.cycles(self.longest_ns) * (1.0 / self.chip.hz)
+        return float32(self.cycles(self.longest_ns) * self.seconds_per_cycle)
 
     def longest_seconds(self) -> cython.double:
         """MAX_EXECUTION_TIME, s."""
-        return self.cycles(self.longest_ever_ns) * (1.0 / self.chip.hz)
+        return float32(self.cycles(self.longest_ever_ns) * self.seconds_per_cycle)

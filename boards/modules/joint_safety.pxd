@@ -4,7 +4,7 @@ from ranger_sim.boards.modules.error_module cimport ErrorModule
 from ranger_sim.boards.modules.limit_switch cimport LimitSwitch
 from ranger_sim.boards.modules.mcu_led cimport GREEN, RED, McuLed
 from ranger_sim.boards.modules.quadrature_decoder cimport QuadratureDecoder
-from ranger_sim.foundation.numbers cimport fixed_of_float
+from ranger_sim.foundation.numbers cimport float32
 
 cimport cython
 
@@ -26,4 +26,5 @@ cdef class AnkleSafety:
     cdef public CurrentControl control
     cdef public McuLed leds
     cdef public ErrorModule errors
-    cdef public long long low, high, stretch, code_switch, code_stretch, code_low, code_high
+    cdef public double low, high, stretch
+    cdef public long long code_switch, code_stretch, code_low, code_high

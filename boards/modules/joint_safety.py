@@ -11,7 +11,7 @@ from ranger_sim.boards.modules.quadrature_decoder import QuadratureDecoder
 
 if not cython.compiled:
     from ranger_sim.boards.modules.mcu_led import GREEN, RED
-    from ranger_sim.foundation.numbers import fixed_of_float
+    from ranger_sim.foundation.numbers import float32
 
     HIP_LIMIT_COUNTS = 800  # 0.614 rad
     FLASH_MS = 100
@@ -78,19 +78,19 @@ class AnkleSafety:
         self.code_stretch = code_stretch
         self.code_low = code_low
         self.code_high = code_high
-        self.low = fixed_of_float(ANKLE_LOW_RAD)
-        self.high = fixed_of_float(ANKLE_HIGH_RAD)
-        self.stretch = fixed_of_float(CABLE_STRETCH_RAD)
+        self.low = ANKLE_LOW_RAD
+        self.high = ANKLE_HIGH_RAD
+        self.stretch = CABLE_STRETCH_RAD
 
     def check(self) -> None:
         """Slot task."""
-        angle: cython.longlong = self.encoder.angle
+        angle: cython.double = self.encoder.radians
         negative: cython.bint = False
         positive: cython.bint = False
         if self.left.state or self.right.state:
             negative = True
             self.errors.report(self.code_switch)
-        if angle - self.motor.position > self.stretch:
+        if float32(angle - self.motor.position_rad()) > self.stretch:
             negative = True
             self.errors.report(self.code_stretch)
         if angle < self.low:

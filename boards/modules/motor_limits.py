@@ -101,9 +101,8 @@ class MotorLimits:
             self.errors.report(self.code_warm)
         else:
             self.thermal_multiplier = 0
-            if not self.too_hot:
-                self.too_hot = True
-                self.errors.report(self.code_hot)
+            self.too_hot = True
+            self.errors.report(self.code_hot)  # in every slot
         if current > 0:
             excess += current - self.current_max
         elif current < 0:
@@ -117,9 +116,9 @@ class MotorLimits:
             return self.too_hot
         self.excess = excess
         self.excess_multiplier = max(0, ONE - excess // self.excess_fade)
-        if excess >= self.excess_limit and not self.overloaded:
+        if excess >= self.excess_limit:
             self.overloaded = True
-            self.errors.report(self.code_excess)
+            self.errors.report(self.code_excess)  # in every slot
         return self.too_hot or self.overloaded
 
     def limit_target(self, target: cython.longlong, velocity: cython.longlong) -> cython.longlong:

@@ -51,7 +51,7 @@ class MotorOutput:
     `sign`: of the motor's mounting. `largest`: the duty is clipped to +/- this. `offset`: counts that the
     second of the two patterns drives more (14 in the firmware of 2016). `sleep`, `shutdown`: receivers of what the
     main brain asks for. `off`: why the motor may not be driven, 0 when it may. SLEEP: the bridge is open, the watchdog
-    stays fed; SHUTDOWN: no duty, and the watchdog starves; STOPPED, by the limits: the same.
+    stays fed; SHUTDOWN: a duty of 0, and the watchdog starves; STOPPED, by the limits: the same.
     """
 
     def __init__(self, gpio: Gpio, pwm: Pwm, sign, largest, offset) -> None:
@@ -85,7 +85,8 @@ class MotorOutput:
     def write(self, duty: cython.longlong) -> None:
         """Drive the bridge with `duty` counts; the leads take turns at every call.
 
-        Asleep, both leads rest at 0 and the pattern does not advance; so do they when off or shut down.
+        Asleep, both leads rest at 0 and the pattern does not advance. Stopped or shut down, the patterns go on with a
+        duty of 0, the second one with its offset, until the watchdog cuts the bridge off.
         """
         counts: cython.longlong
         MR2: cython.longlong = 0
@@ -93,7 +94,8 @@ class MotorOutput:
         low_side: cython.longlong = 1
         if self.off:
             duty = 0
-            low_side = 0 if self.off & SLEEP else 1
+        if self.off & SLEEP:
+            low_side = 0
         else:
             if duty > self.largest:
                 duty = self.largest

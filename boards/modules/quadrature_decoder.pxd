@@ -16,6 +16,7 @@ cdef class QuadratureDecoder:
     cdef public long long position_shift, filter_exponent, write, read, rate_bits, sign
     cdef public long long rate_gain, mean
     cdef public long long idle, speed, filtered, rate
+    cdef public bint after_glitch
     cdef public long long[64] ring
     # the rest
     cdef public long long glitches, dropped_times
@@ -25,7 +26,9 @@ cdef class QuadratureDecoder:
     cpdef int edge(self, long long step, long long elapsed) except -1
     cpdef int glitch(self) except -1
     cdef void _be_silent(self) noexcept
-    cdef void _filter(self, long long speed, long long mean) noexcept
+    cdef void _note_glitch(self) noexcept
+    cdef void _filter(self, long long times, long long total) noexcept
     cpdef double position_rad(self) noexcept
     cpdef double rate_rad_s(self) noexcept
     cpdef int set_position(self, long long position) except -1
+    cpdef long long count_at(self, long long position) noexcept

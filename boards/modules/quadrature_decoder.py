@@ -51,8 +51,8 @@ class QuadratureDecoder:
         per_count = PI / (pulses * gear)
         self.position_gain, self.position_shift = normalised_gain(per_count * 65536.0, 16384.0, 65535.0)
         self.rate_gain, self.rate_shift = normalised_gain(per_count * TIMER_HZ, 4096.0, 16383.0)
-        # counts/cycle x 2^31 times rad x 60e6/count x 2^shift: 31 - 16 = 15 more bits go for 16.16
-        self.rate_bits = self.rate_shift + 15
+        # counts/cycle x 2^31 x 2^16 of the filter, times rad x 60e6/count x 2^shift: 31 more bits go for 16.16
+        self.rate_bits = self.rate_shift + 31
         self.rad_per_count = per_count
         self.filter_exponent = filter_exponent
         self.count = 0
@@ -65,11 +65,12 @@ class QuadratureDecoder:
         self.glitches = 0
         self.dropped_times = 0
         # the slot's side
-        self.sign = 1
+        self.sign = 0  # of the times that are believed; none before the first two
+        self.after_glitch = False
         self.mean = LARGEST  # cycles between counts; the longest: standing still
         self.idle = 0
         self.speed = 0  # counts per cycle x 2^31, unfiltered
-        self.filtered = 0
+        self.filtered = 0  # the same x 65536, so that the filter's fraction stays
 
     def edge(self, step: cython.longlong, elapsed: cython.longlong) -> None:
         """An edge of channel A as the fast interrupt sees it: `step` 1 or -1, `elapsed` cycles since the edge before.
@@ -100,9 +101,9 @@ class QuadratureDecoder:
     def update_rate(self):
         """Slot task: rate from the edge times that came since the last slot. Returns how many came, None for none.
 
-        A change of direction needs two times in a row to be believed: if the second has not come yet, the
-        first is left for the next slot. A zero or a single time of the other sign is a glitch, and the time
-        that follows it is not used either.
+        A change of direction needs two times in a row to be believed, the first one after power-up as well: if the
+        second has not come yet, the first is left for the next slot. A zero or a single time of the other sign is a
+        glitch, and the time that follows it is not used either, also when it comes in a later slot.
         """
         if self.read == self.write:
             self._be_silent()
@@ -112,66 +113,65 @@ class QuadratureDecoder:
         seen: cython.longlong = 0
         here: cython.longlong = self.read
         write: cython.longlong = self.write
-        sign: cython.longlong = self.sign
         after: cython.longlong
         elapsed: cython.longlong
-        other: cython.longlong
         while here != write:
             elapsed = self.ring[here]
             after = (here + 1) & RING_MASK
-            if elapsed * sign > 0:
-                total += elapsed
-                valid += 1
+            if elapsed * self.sign > 0:
+                if not self.after_glitch:
+                    self.idle = 0
+                    total += elapsed
+                    valid += 1
+                self.after_glitch = False
             elif elapsed == 0:
-                self.errors.report(self.glitch_code)
-                if after != write:
-                    seen += 1
-                    after = (after + 1) & RING_MASK
+                self._note_glitch()
             elif after == write:
                 break  # alone at the end: judged when its successor is here
+            elif (self.ring[after] > 0) if elapsed > 0 else (self.ring[after] < 0):
+                self.sign = 1 if elapsed > 0 else -1
+                total = 0
+                valid = 0
+                continue  # the same time again, which now has the right sign
             else:
-                other = self.ring[after]
-                if other * sign < 0:
-                    sign = -sign
-                    total = elapsed
-                    valid = 1
-                else:
-                    self.errors.report(self.glitch_code)
-                    seen += 1
-                    after = (after + 1) & RING_MASK
+                self._note_glitch()
             seen += 1
             here = after
         if valid == 0:
             self._be_silent()
         else:
-            self.idle = 0
-            self.sign = sign
-            total *= sign  # without the sign
-            self._filter(valid * (LARGEST // total), total // valid)
+            self._filter(valid, total)
         if seen == 0:
             return None
         self.read = here
         return seen
 
+    def _note_glitch(self) -> cython.void:
+        """What was in the ring cannot be: an error, and the next time is not used."""
+        self.errors.report(self.glitch_code)
+        self.after_glitch = True
+
     def _be_silent(self) -> cython.void:
         """A slot without a valid time: the longer the silence, the slower it must be, so the rate falls with the
         inverse of the silence."""
-        mean: cython.longlong = self.mean if self.mean >= 0 else -self.mean
-        idle: cython.longlong = self.idle + SLOT_CYCLES
-        if idle > LARGEST:
-            idle = LARGEST
-        self.idle = idle
-        if idle > mean:
-            mean = idle
-        self._filter(LARGEST // mean, mean)
+        mean: cython.longlong = self.mean
+        if self.idle < LARGEST - SLOT_CYCLES:
+            self.idle += SLOT_CYCLES
+        if mean > 0:
+            self._filter(1, self.idle if self.idle > mean else mean)
+        else:
+            self._filter(1, -self.idle if self.idle > -mean else mean)
 
-    def _filter(self, speed: cython.longlong, mean: cython.longlong) -> cython.void:
-        """Follow a new speed (counts per cycle x 2^31) and mean (cycles), both without the sign."""
+    def _filter(self, times: cython.longlong, total: cython.longlong) -> cython.void:
+        """Follow `times` edge times whose sum is `total` cycles, with the sign of their direction."""
         filtered: cython.longlong = self.filtered
-        speed *= self.sign
-        self.speed = speed
-        self.mean = mean * self.sign
-        filtered += (speed - filtered) >> self.filter_exponent
+        if total > 0:
+            self.speed = times * (LARGEST // total)
+            self.mean = total // times
+        else:
+            self.speed = -times * (LARGEST // -total)
+            self.mean = -(-total // times)
+        filtered += ((self.speed << 16) >> self.filter_exponent) - (filtered >> self.filter_exponent)
         self.filtered = filtered
         self.rate = (self.rate_gain * filtered) >> self.rate_bits
 
@@ -184,6 +184,9 @@ class QuadratureDecoder:
         return float_of_fixed(self.rate)
 
     def set_position(self, position: cython.longlong) -> None:
-        """Set the count so that the position reads `position` (rad x 65536), truncated as in C."""
-        self.count = divide_toward_zero(position << self.position_shift, self.position_gain)
-        self.position = (self.count * self.position_gain) >> self.position_shift
+        """Set the count so that the position reads `position` (rad x 65536) from the next slot on."""
+        self.count = self.count_at(position)
+
+    def count_at(self, position: cython.longlong) -> cython.longlong:
+        """The count at `position` (rad x 65536), truncated as in C."""
+        return divide_toward_zero(position << self.position_shift, self.position_gain)

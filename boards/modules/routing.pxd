@@ -58,5 +58,4 @@ cdef class Router:
     cpdef bint queue(self, long long channel, long long identifier, long long flags, long long word0, long long word1) noexcept
     cdef bint _lose(self, long long channel) except? -1
     cdef long long _spread(self, long long mask, long long identifier, long long flags, long long word0, long long word1, long long now) except? <long long>-1
-    cdef long long _ask(self, long long source, long long identifier, long long flags, long long word0, long long word1) noexcept
     cpdef long long frames_for(self, long long channel) noexcept

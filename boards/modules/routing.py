@@ -225,7 +225,8 @@ class Router:
             return 0
         self.routed += 1
         if flags & FLAG_REMOTE and FIRST_BUS <= source <= LAST_BUS:
-            return self._ask(source, identifier, flags, word0, word1)
+            self.table.subscribe(identifier, source)
+            return 0
         mask = self.table.rows[identifier]
         if mask >> SOURCE_SHIFT != source:
             self.table.learn(identifier, source)
@@ -235,23 +236,6 @@ class Router:
             self.ssp.push(identifier, flags, word0, word1, now)
             return 1
         return self._spread(mask, identifier, flags, word0, word1, now)
-
-    def _ask(
-        self,
-        source: cython.longlong,
-        identifier: cython.longlong,
-        flags: cython.longlong,
-        word0: cython.longlong,
-        word1: cython.longlong,
-    ) -> cython.longlong:
-        """Somebody on bus `source` asks for a value: it goes there from now on, and the frame where it comes from."""
-        channel: cython.longlong = self.table.rows[identifier] >> SOURCE_SHIFT
-        self.table.subscribe(identifier, source)
-        if not FIRST_BUS <= channel <= LAST_BUS or channel == source:
-            return 0
-        self.queue(channel, identifier, flags, word0, word1)
-        self.copies += 1
-        return 1
 
     def _spread(
         self,

@@ -417,8 +417,8 @@ class RouterSspLink:
     def tick(self, now: cython.longlong) -> SspSegment:
         """The 200 us interrupt: judge the exchange that should be over, return the next segment.
 
-        An exchange that did not bring 31 half-words is SSP_LOW_RATE. With all places full the newest
-        segment is overwritten by the next (SSP_RX_BUF_OF).
+        An exchange that did not bring 31 half-words is SSP_LOW_RATE, and so is the first tick, which has none behind
+        it. With all places full the newest segment is overwritten by the next (SSP_RX_BUF_OF).
         """
         following: cython.longlong
         if self.exchange_running:
@@ -427,6 +427,8 @@ class RouterSspLink:
                 self._miss_segment()
             else:
                 self.received_write = following
+        else:  # no exchange has begun yet, so none has brought its half-words
+            self._miss_segment()
         self.exchange_running = True
         self.exchange_done = False
         return self.next_segment(now)

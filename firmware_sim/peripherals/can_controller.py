@@ -340,6 +340,8 @@ class CanController(Peripheral):
                 self.second_RDB = queue.e
             else:
                 self.data_overruns += 1
+                if self.overrun:  # DOI comes when the status bit rises, and CDO was not commanded since
+                    return None
                 self.overrun = True
                 self.noted |= ICR_DOI
                 if self.IER & ICR_DOI:

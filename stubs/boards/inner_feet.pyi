@@ -8,7 +8,7 @@ READINGS: Any
 MOTOR_ENCODER: tuple[float, ...]
 JOINT_ENCODER: tuple[float, ...]
 ABSOLUTE_ENCODER: Any
-REZERO_SHARE: int
+REZERO_SHARE: float
 OPERATION_SIGN: int
 
 class InnerFeetBoard(AnkleBoard):

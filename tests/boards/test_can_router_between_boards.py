@@ -106,7 +106,7 @@ def test_nothing_is_lost_late_or_wrong_but_the_first_segment(robot):
     assert robot.router.link.transmit_lost == 0
     assert robot.ui.can.receive_lost == 0
     assert [board.scheduler.overruns for board in robot.boards] == [0, 0, 0]
-    assert {code for code, n in enumerate(robot.router.errors.totals) if n} == set()
+    assert {code: n for code, n in enumerate(robot.router.errors.totals) if n} == {errors.SSP_LOW_RATE: 1}
     assert {code for code, n in enumerate(robot.ui.errors.totals) if n} == set()
     assert robot.brain.errors.totals[errors.MB_SSP_CHKSUM] == 1
     assert list(robot.router.clock.skipped) == [0] * 5

@@ -162,11 +162,11 @@ def test_the_own_ring_holds_seven():
     assert [router.send(160, i, 0) for i in range(8)] == [True] * 7 + [False]
 
 
-def test_a_remote_frame_subscribes_its_bus_and_is_passed_to_the_source():
+def test_a_remote_frame_subscribes_its_bus_and_is_passed_on_to_nobody():
     router, _ = build()
     router.route(1, 14, 8, 1, 1, 0)  # the router knows that 14 comes from CAN1
     router.route(2, 14, FLAG_REMOTE, 0, 0, 0)
-    assert queued(router, 1) == [(14, 0, 0)]
+    assert queued(router, 1) == []
     router.route(1, 14, 8, 5, 6, 0)
     assert queued(router, 2) == [(14, 5, 6)]
 

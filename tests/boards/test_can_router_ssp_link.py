@@ -246,7 +246,7 @@ def test_the_router_passes_over_a_segment_that_starts_with_zero_unchecked(router
     router.receive(corrupted_copy(empty_segment(), 30, 0x0FF0))
     router.tick(TICK)
     assert not router.take()
-    assert said == []
+    assert said == [errors.SSP_LOW_RATE]  # of the first tick
 
 
 def test_the_router_drops_a_segment_with_a_bad_checksum(router, brain, said):
@@ -256,13 +256,18 @@ def test_the_router_drops_a_segment_with_a_bad_checksum(router, brain, said):
     router.receive(corrupted_copy(brain.next_segment(), 3, 1))
     router.tick(TICK)
     assert not router.take()
-    assert said == [errors.SSP_BAD_CHKSM]
+    assert said == [errors.SSP_LOW_RATE, errors.SSP_BAD_CHKSM]
+
+
+def test_the_first_tick_finds_no_half_words_which_is_a_low_rate(router, said):
+    router.tick(0)
+    assert said == [errors.SSP_LOW_RATE] and router.low_rate == 1
 
 
 def test_an_exchange_that_did_not_finish_in_its_period_is_a_low_rate(router, said):
     router.tick(0)
     router.tick(TICK)
-    assert said == [errors.SSP_LOW_RATE]
+    assert said == [errors.SSP_LOW_RATE] * 2
 
 
 def test_eight_unread_segments_overwrite_the_newest(router, brain, said):
@@ -271,7 +276,7 @@ def test_eight_unread_segments_overwrite_the_newest(router, brain, said):
         brain.flush()
         exchange(router, brain, i * TICK)
     router.tick(10 * TICK)
-    assert said == [errors.SSP_RX_BUF_OF] * 3
+    assert said == [errors.SSP_LOW_RATE] + [errors.SSP_RX_BUF_OF] * 3
     got = []
     while router.take():
         got.append(router.rx_word0)

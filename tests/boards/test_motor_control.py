@@ -203,7 +203,8 @@ def test_the_integral_of_the_excess_fades_the_duty_and_switches_off():
         motor.monitor(6 * ONE)
     assert motor.overloaded
     assert motor.errors.totals[codes.MC_MECH_OFF] == 1
-    motor.monitor(0)
+    motor.monitor(0)  # and in every further slot at the limit
+    assert motor.errors.totals[codes.MC_MECH_OFF] == 2
     assert motor.excess == 20 * ONE  # exactly zero current changes nothing
     for _ in range(5):
         motor.monitor(65)  # 1 mA: 5 A less each time
@@ -311,7 +312,8 @@ def test_a_steering_board_that_is_shut_down_notes_one_error_in_every_slot(output
     before = bench.errors()["MC_NOT_RUNNING"]
     bench.run(slots=20)
     assert bench.errors()["MC_NOT_RUNNING"] - before == 20
-    assert bench.pwm == (0, 0)
+    # a duty of 0 in either pattern; with two writes in a slot the second pattern always stays
+    assert bench.pwm == (600, 600) if output == "duty_then_current" else bench.pwm in ((0, 0), (600, 600))
 
 
 def test_sleep_opens_the_bridge_and_feeds_the_watchdog():
@@ -477,6 +479,65 @@ def test_steering_as_a_current_loop_follows_its_amperes():
     bench.command("COMMAND_CURRENT", 0.2)
     bench.run(ms=80)
     assert bench.motor.current == pytest.approx(0.2, abs=0.01)
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_the_direct_duty_of_steering_goes_past_every_limiter_but_the_largest_duty(sign):
+    bench = Bench("MCSI").run(ms=3)
+    limits = bench.board.limits
+    bench.counts("motor_current", 25 - sign * 2600)  # 0.4 A where 0.3 is the most, so the duty of a loop would fade
+    bench.command("COMMAND_CURRENT", sign * 75.0)
+    bench.run(ms=3)
+    assert limits.excess_multiplier < ONE
+    assert bench.board.output.duty == sign * 75
+    assert "MC_PWM_LIMIT" not in bench.errors()
+    bench.command("COMMAND_CURRENT", sign * 300.0)
+    bench.run(ms=2)
+    assert bench.board.output.duty == sign * 200
+    assert bench.errors()["MC_PWM_LIMIT"] > 0
+
+
+@pytest.mark.parametrize("offset", [0, 14])
+def test_a_motor_that_is_shut_down_goes_on_with_both_patterns_until_the_watchdog_bites(offset):
+    bench = Bench("MCH", Quirks(alternating_offset_counts=offset)).run(ms=5)
+    bench.command("COMMAND_CURRENT", 1.0)
+    bench.run(ms=3)
+    bench.command("SHUTDOWN", 1)
+    bench.run(ms=1)
+    bench.pwm_log.clear()
+    bench.pin_log.clear()
+    bench.run(slots=8)
+    # robot.md T4.3: 600 and 586, then 0 and 0 in turn; nobody feeds the watchdog meanwhile
+    assert [log[1:] for log in bench.pwm_log[:4]] in (
+        [(600, 600 - offset), (0, 0)] * 2, [(0, 0), (600, 600 - offset)] * 2,
+    )  # fmt: skip
+    assert len(bench.pwm_log) == 8
+    assert [pin for _, pin, _ in bench.pin_log if pin == WATCHDOG] == []
+
+
+@pytest.mark.parametrize(("quirks", "most"), [(Quirks.firmware_2016(), 0), (Quirks(), 2000)])
+def test_the_duty_meets_its_clip_hardly_ever_without_a_proportional_gain(quirks, most):
+    # robot.md T3: with the firmware's Kp of 0 the clip of the integral is that of the duty; with 4 a ramp meets it
+    bench = Bench("MCH", quirks).run(ms=5)
+    for step in range(100):
+        bench.command("COMMAND_CURRENT", -4.0 + 0.08 * step)
+        bench.run(ms=2)
+    assert bench.errors()["MC_INTEG_SATUR"] > 100
+    assert (bench.errors().get("MC_PWM_LIMIT", 0) > 100) is (most > 0)
+
+
+def test_a_steering_loop_saturates_its_integral_in_every_slot_by_a_command_in_counts():
+    # robot.md T3: 75 counts are 75 A to the loop of 2016, clipped to 0.25, which a motor at rest never shows
+    bench = Bench("MCSI", Quirks.firmware_2016()).run(ms=4)
+    bench.counts("motor_current", 25)
+    bench.command("DAMPNESS", 0.0)
+    bench.command("STIFFNESS", 0.0)
+    bench.run(ms=1)
+    bench.command("COMMAND_CURRENT", 75.0)
+    bench.run(ms=50)
+    before = bench.errors()["MC_INTEG_SATUR"]
+    bench.run(slots=40)
+    assert bench.errors()["MC_INTEG_SATUR"] - before == 40
 
 
 @pytest.mark.parametrize(("counts", "duty"), [(4803 + 150, 60), (4803 + 260, 0)])

@@ -70,17 +70,19 @@ def test_a_steady_turn_settles_at_its_rate():
 
 def test_the_filter_moves_by_a_sixteenth_per_slot():
     qdc = decoder(*HIP_JOINT)
+    qdc.sign = 1
     qdc.edge(1, 9204)
     qdc.update_rate()
     assert qdc.speed == 0x7FFFFFFF // 9204
-    assert qdc.filtered == qdc.speed >> 4
+    assert qdc.filtered == (qdc.speed << 16) >> 4
 
 
 def test_another_exponent_filters_less():
     qdc = decoder(*HIP_JOINT, exponent=3)
+    qdc.sign = 1
     qdc.edge(1, 9204)
     qdc.update_rate()
-    assert qdc.filtered == qdc.speed >> 3
+    assert qdc.filtered == (qdc.speed << 16) >> 3
 
 
 def test_the_rate_takes_the_mean_of_all_times_of_a_slot():
@@ -94,6 +96,7 @@ def test_the_rate_takes_the_mean_of_all_times_of_a_slot():
 
 def test_without_edges_the_estimate_decays_as_one_over_time_and_never_stops():
     qdc = decoder()
+    qdc.sign = 1
     qdc.edge(1, 30000)
     qdc.update_rate()
     speeds = []
@@ -122,6 +125,7 @@ def test_one_edge_backwards_waits_and_two_are_believed():
 
 def test_a_lone_change_of_direction_is_a_glitch_and_takes_the_next_time_with_it():
     qdc = decoder()
+    qdc.sign = 1
     qdc.edge(1, 10000)
     qdc.edge(-1, 500)
     qdc.edge(1, 9500)
@@ -130,6 +134,43 @@ def test_a_lone_change_of_direction_is_a_glitch_and_takes_the_next_time_with_it(
     assert qdc.errors.totals[GLITCH] == 1
     assert qdc.sign == 1
     assert qdc.speed == 2 * (0x7FFFFFFF // 20002)
+
+
+def test_after_power_up_no_direction_is_known_so_the_first_time_waits_for_a_second():
+    qdc = decoder()
+    qdc.edge(1, 10000)
+    assert qdc.update_rate() is None
+    assert qdc.sign == 0 and qdc.rate == 0
+    qdc.edge(1, 12000)
+    assert qdc.update_rate() == 2
+    assert qdc.sign == 1 and qdc.speed == 2 * (0x7FFFFFFF // 22000)
+
+
+def test_a_glitch_at_the_rings_end_costs_the_first_time_of_the_next_slot():
+    qdc = decoder()
+    for _ in range(3):
+        qdc.edge(1, 10000)
+    qdc.glitch()
+    assert qdc.update_rate() == 4
+    qdc.edge(1, 77)
+    qdc.update_rate()
+    assert qdc.mean == 30000  # as in a slot of silence, instead of 77 cycles
+    qdc.edge(1, 12000)
+    qdc.update_rate()
+    assert qdc.mean == 12000
+
+
+@pytest.mark.parametrize("direction", [1, -1])
+def test_the_filter_keeps_its_fraction_so_a_slow_rate_has_no_bias(direction):
+    qdc = decoder(*HIP_JOINT)
+    for _ in range(2):
+        qdc.edge(direction, 0x7F000000)
+    for _ in range(2000):
+        qdc.update_rate()
+    # one count in 0x7F000000 cycles is 1.0078 x 2^-31 counts per cycle, whose whole part is 1: one count in 36 s is
+    # 4.3e-5 rad/s, 2.8 in the last place, floored; flooring each step's state would leave a rate of 0 or -20
+    assert qdc.speed == direction
+    assert qdc.rate == (2 if direction > 0 else -3)
 
 
 def test_a_wrong_level_stores_a_zero_that_takes_the_next_time_with_it():

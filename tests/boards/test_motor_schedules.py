@@ -417,12 +417,12 @@ def test_a_board_answers_the_same_whatever_the_size_of_its_steps(name):
 class Link:
     """A CAN link alone on a chip."""
 
-    def __init__(self, report_full=True, number=1):
+    def __init__(self, report_full=True, number=1, full_ring_kills=True):
         self.chip = Microcontroller(name="alone", hz=60_000_000, crystal=Crystal())
         self.controller = CanController(self.chip, number, IER=0xFFF)
         self.time = NetworkTime()
         self.errors = ErrorModule(3, self.time)
-        self.can = CanLink(self.chip, self.controller, self.time, self.errors, report_full)
+        self.can = CanLink(self.chip, self.controller, self.time, self.errors, report_full, full_ring_kills)
         self.can.attach()
         self.now = 0
 
@@ -480,13 +480,48 @@ def test_two_receivers_for_one_identifier_are_a_mistake():
 
 @pytest.mark.parametrize("report", [True, False])
 def test_the_receive_ring_holds_63_frames(report):
-    link = Link(report_full=report)
+    link = Link(report_full=report, full_ring_kills=False)
     for _ in range(70):
         link.push(CAN_RX, 1, 18, 8, 0, 0)
     assert link.can.received == 63
     assert link.can.receive_lost == 7
     assert link.errors.totals[codes.CAN1_RX_BUF_OF] == (7 if report else 0)
     assert link.can.receive_all() == 63
+
+
+def stalled(quirks, frames):
+    """The hip after a task of 4 ms during which `frames` frames came, 50 us apart, and 20 ms more."""
+    bench = Bench("MCH", quirks, sync=False).run(ms=3)
+    task = bench.board.scheduler.find("hb_beat")
+    cost, task.cost = task.cost, 4 * 60_000
+    bench.run(slots=1)
+    task.cost = cost
+    for i in range(frames):
+        bench.board.inbox.push(bench.now + 1000 + i * 50_000, 512, CAN_RX, bench.controller, 900, 8, 0, 0)
+    bench.run(ms=4)
+    bench.frames.clear()
+    served = bench.board.can_controller.rx_source.served
+    bench.run(ms=20)
+    return bench, bench.board.can_controller.rx_source.served - served
+
+
+@pytest.mark.parametrize("quirks", [Quirks(), Quirks.firmware_2016()])
+def test_a_full_receive_ring_kills_the_board(quirks):
+    # robot.md T4.1: 18,800 interrupts in 20 ms, and nothing else ever again
+    bench, interrupts = stalled(quirks, 70)
+    assert interrupts == pytest.approx(18_800, rel=0.01)
+    assert bench.frames == [] and bench.board.can.receive_lost > 18_000
+
+
+def test_a_receive_ring_that_is_nearly_full_does_not():
+    bench, interrupts = stalled(Quirks(), 60)
+    assert interrupts == 0 and bench.frames
+    assert bench.board.can.receive_lost == 0
+
+
+def test_a_board_may_be_spared_that_death():
+    bench, _ = stalled(Quirks(full_receive_ring_kills=False), 70)
+    assert bench.frames and bench.board.can.receive_lost > 0
 
 
 @pytest.mark.parametrize("report", [True, False])
@@ -521,6 +556,22 @@ def test_after_bus_off_the_controller_is_started_again_at_once():
     link.push(CAN_STATUS, 1, 4, 256, 0, 1)
     assert link.errors.totals[codes.CAN1_TX_BUSOFF] == 1
     assert link.controller.MOD == 0
+    # and CxICR is read on: the same interrupt tells the warning
+    assert link.errors.totals[codes.CAN1_ERR_WARN] == 1
+
+
+def test_a_data_overrun_is_told_once_and_never_cleared():
+    link = Link()
+    for _ in range(2):  # nobody takes the frames: two fill the controller's buffers, each further one is lost
+        link.chip.vic.detach(link.controller.rx_source)
+        for _ in range(4):
+            link.push(CAN_RX, 1, 18, 8, 0, 0)
+        assert link.errors.totals[codes.CAN1_DATA_OVRN] == 1
+        assert link.controller.overrun
+    assert link.controller.data_overruns == 6
+    link.controller.write_CMR(0x8)  # as no firmware of a satellite does
+    link.push(CAN_RX, 1, 18, 8, 0, 0)
+    assert link.errors.totals[codes.CAN1_DATA_OVRN] == 2
 
 
 @pytest.mark.parametrize(

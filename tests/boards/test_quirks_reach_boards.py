@@ -73,7 +73,7 @@ def test_the_rate_follows_by_its_share_per_slot(name, exponent):
         decoder.update_rate()
         # unfiltered: two counts, 10 000 cycles each
         assert decoder.speed == 2 * (0x7FFFFFFF // 20_000)
-        assert decoder.filtered == decoder.speed >> exponent
+        assert decoder.filtered == (decoder.speed << 16) >> exponent
 
 
 # --- every board with an error module --------------------------------------------------------------------------

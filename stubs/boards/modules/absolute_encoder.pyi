@@ -4,11 +4,11 @@ from ranger_sim.boards.modules.error_module import ErrorModule
 from typing import Any
 from typing import final
 
-RAD_PER_COUNT_SHIFTED: int
 WORD_MASK: int
 COUNTS_PER_TURN: int
 SLOTS_PER_MINUTE: int
 SPARE_COUNTS: int
+RAD_PER_COUNT: Any
 
 @final
 class AbsoluteEncoder:
@@ -18,6 +18,8 @@ class AbsoluteEncoder:
     largest_step: int
     sign: int
     zero: int
+    radians: float
+    rad_per_count: float
     errors: ErrorModule
     spike_code: int
     def __init__(self, zero: int, sign: int, rpm: Any, errors: ErrorModule, spike_code: int) -> None: ...

@@ -2,6 +2,7 @@
 
 from ranger_sim.firmware_sim.peripherals.adc_external import Ads7871
 from ranger_sim.firmware_sim.peripherals.adc_internal import AdcInternal
+from typing import Any
 from typing import final
 
 @final
@@ -13,10 +14,13 @@ class AdcReadings:
     motor_gain_fixed: int
     battery_entry: int
     battery_offset: int
+    battery_gain_fixed: int
+    voltage_gain_fixed: int
     motor_gain: float
     battery_gain: float
     voltage_gain: float
-    def __init__(self, external: Ads7871, internal: AdcInternal, motor_entry: int, motor_gain: float, motor_offset: int, battery_entry: int, battery_gain: float, battery_offset: int, voltage_gain: float) -> None: ...
+    power_gain: float
+    def __init__(self, external: Ads7871, internal: AdcInternal, motor_entry: int, motor_gain: Any, motor_offset: int, battery_entry: int, battery_gain: Any, battery_offset: int, voltage_gain: Any) -> None: ...
     def motor_current_fixed(self) -> int: ...
     def motor_current(self) -> float: ...
     def battery_current(self) -> float: ...

@@ -22,6 +22,7 @@ FIRST_BUFFER: int
 SECOND_BUFFER: int
 RECEIVE_CYCLES: int
 ERROR_CYCLES: int
+STORM_CYCLES: int
 TRANSMIT_CYCLES: int
 PLACE_CYCLES: int
 
@@ -46,6 +47,7 @@ class CanLink(Sender):
     errors: ErrorModule
     controller_errors: Any
     report_full: bool
+    full_ring_kills: bool
     receive_lost: int
     send_lost: int
     code_receive_full: int
@@ -54,7 +56,7 @@ class CanLink(Sender):
     built_identifier: int
     built_value: int
     built_time: int
-    def __init__(self, chip: Microcontroller, controller: CanController, time: NetworkTime, errors: ErrorModule, report_full: bool = True) -> None: ...
+    def __init__(self, chip: Microcontroller, controller: CanController, time: NetworkTime, errors: ErrorModule, report_full: bool = True, full_ring_kills: bool = True) -> None: ...
     def attach(self, receive_slot: Any = 0, error_slot: Any = 8) -> None: ...
     def listen(self, identifier: Any, receiver: Receiver) -> None: ...
     def on_receive(self, queue: EventQueue) -> None: ...

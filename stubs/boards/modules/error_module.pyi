@@ -8,7 +8,7 @@ from typing import final
 CODES: int
 RING_MASK: int
 MOST_WAITING: int
-MOST_COUNTED: int
+COUNT_MASK: int
 CODE_MASK: int
 BOARD_MASK: int
 BOARD_SHIFT: int

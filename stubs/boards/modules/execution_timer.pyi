@@ -5,11 +5,13 @@ from ranger_sim.firmware_sim.microcontroller import Microcontroller
 from typing import final
 
 ANEW_MASK: int
+SECONDS_PER_CYCLE: float
 
 @final
 class ExecutionTimer:
     chip: Microcontroller
     time: NetworkTime
+    seconds_per_cycle: float
     longest_ns: int
     longest_ever_ns: int
     def __init__(self, chip: Microcontroller, time: NetworkTime) -> None: ...

@@ -31,9 +31,9 @@ class AnkleSafety:
     control: CurrentControl
     leds: McuLed
     errors: ErrorModule
-    low: int
-    high: int
-    stretch: int
+    low: float
+    high: float
+    stretch: float
     code_switch: int
     code_stretch: int
     code_low: int
