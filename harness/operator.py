@@ -6,6 +6,7 @@ What the person does comes from the parameter set's [operator] table; times coun
 from typing import Any
 
 from ranger_sim.foundation.events import PIN_EDGE, STAGE_PINS
+from ranger_sim.foundation.random_stream import RandomStream
 from ranger_sim.harness import wiring
 
 PIN_ORDER = STAGE_PINS * 256 + 128
@@ -14,12 +15,17 @@ PIN_ORDER = STAGE_PINS * 256 + 128
 # steering machine takes 4e-5 * (width in 1/60 us) - 3.4 for the stick (robot.md C1.6), so the
 # centre is 85,000 ticks = 1.4167 ms and one unit is 25,000 ticks = 0.4167 ms; 20 ms is the hobby standard.
 CENTRE_NS, REACH_NS, FRAME_NS = 1_416_667, 416_667, 20_000_000
+# The receiver's wire lies beside the motors' leads, and the robot's board told of RCX_BAD_LVLS (robot.md T3): spikes
+# that end before the interrupt looks at the pin, 0.4 us later, so both of their edges have one stamp here. How often is
+# chosen by us: in one pause of 200, so every 4 s.
+SPIKE_SHARE = 0.005
 
 
 class Operator:
     """Plays a script against the plant and the key pins. `script`: boards.main_brain.controllers.Operator."""
 
-    def __init__(self, script: Any, plant: Any, ui_board: Any, start_ns: int) -> None:
+    def __init__(self, script: Any, plant: Any, ui_board: Any, start_ns: int, seed: int = 0) -> None:
+        self.spikes = RandomStream(seed, "radio spikes")
         self.script = script
         self.plant = plant
         self.inbox = ui_board.inbox
@@ -51,6 +57,11 @@ class Operator:
             width = CENTRE_NS + round(REACH_NS * self.stick)
             self.inbox.push(self.next_radio_ns, PIN_ORDER, PIN_EDGE, pin, 1, -1, 0)
             self.inbox.push(self.next_radio_ns + width, PIN_ORDER, PIN_EDGE, pin, 0, -1, 0)
+            if self.spikes.uniform() < SPIKE_SHARE:
+                # in the pause between two pulses; the board's interrupt finds the level that it knows already
+                spike_ns = self.next_radio_ns + FRAME_NS // 2 + self.spikes.integer(FRAME_NS // 4)
+                self.inbox.push(spike_ns, PIN_ORDER, PIN_EDGE, pin, 1, -1, 0)
+                self.inbox.push(spike_ns, PIN_ORDER, PIN_EDGE, pin, 0, -1, 0)
             self.next_radio_ns += FRAME_NS
         if not self.released and self.release_ns < until_ns:
             self.released = True

@@ -103,7 +103,7 @@ class Ranger:
         if profile is not None:
             for board in self.boards.values():
                 bus_schedule.apply(board, profile.schedules())
-        self.operator = Operator(self.controller.operator, self.plant, self.boards["UI"], self.start_ns)
+        self.operator = Operator(self.controller.operator, self.plant, self.boards["UI"], self.start_ns, seed)
         self.polled: list[Any] = []  # ends of wires that lead out of the simulation
         self.next_poll_ns = self.start_ns
         self.cpu_s = 0.0

@@ -4,6 +4,9 @@ from libc.math cimport cos, sin, sqrt
 from ranger_sim.foundation.random_stream cimport RandomStream
 from ranger_sim.foundation.edge_buffer cimport EdgeBuffer
 
+cpdef enum:
+    BOUNCE_NS = 3000
+
 @cython.final
 cdef class IncrementalEncoder:
     # what every step looks at stands first, beside each other
@@ -15,7 +18,8 @@ cdef class IncrementalEncoder:
     cdef public double u0, du, m0, m1, span_ns
     cdef public long long t0, last_time
     # what describes the encoder
-    cdef public double jitter, scale, offset_rad, shaft_per_rad, edges_per_shaft_rad, gear
+    cdef public long long bounces
+    cdef public double jitter, bounce, scale, offset_rad, shaft_per_rad, edges_per_shaft_rad, gear
     cdef public double eccentricity_1, phase_1, eccentricity_2, phase_2
     cdef public long long lines, sign, table_size
     cdef public RandomStream stream
@@ -31,6 +35,7 @@ cdef class IncrementalEncoder:
     cpdef long long update(
         self, long long t0, long long t1, double angle0, double rate0, double angle1, double rate1
     ) except? <long long>-1
+    cpdef long long add_bounces(self, long long t1) except? <long long>-1
     cdef void _calm(self) noexcept
     cdef long long _one_way(self, long long t0, long long t1, double u0, double u1, double g0, double g1) except? <long long>-1
     cpdef double _value(self, double x) noexcept

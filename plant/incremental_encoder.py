@@ -14,7 +14,8 @@ cubic is cut at its turning points and each edge found by bisection, so a revers
 Errors of the disc, all in edges (1 = half a line): `line_error` (standard deviation per line, seeded, fixed for
 a disc), `duty_error` (falling edges late by this, so that A's high time is longer), `jitter` (standard deviation
 per edge, new every time; it moves the stamp, never past a neighbour or out of the step), and eccentricity of the
-disc (rad of encoder shaft, once and twice per turn).
+disc (rad of encoder shaft, once and twice per turn). `bounce`: share of edges that come three times, over, back and
+over again, as noise at the comparator or in the interpolated position makes them.
 """
 
 import cython
@@ -26,6 +27,8 @@ from ranger_sim.foundation.user_error import UserError
 
 if not cython.compiled:
     from math import cos, sin, sqrt
+
+    BOUNCE_NS = 3_000  # from over to back: chosen by us, longer than the fast interrupt, so that each edge is seen
 
 PI = 3.141592653589793
 
@@ -45,6 +48,7 @@ class IncrementalEncoder:
         line_error=0.0,
         duty_error=0.0,
         jitter=0.0,
+        bounce=0.0,
         seed=0,
     ) -> None:
         if lines < 1 or gear <= 0.0 or sign not in (-1, 1):
@@ -62,6 +66,8 @@ class IncrementalEncoder:
         self.eccentricity_2 = 0.0
         self.phase_2 = 0.0
         self.jitter = jitter
+        self.bounce = bounce
+        self.bounces = 0
         self.stream = RandomStream(seed, f"encoder {name} jitter")
         self.table_size = 2 * lines
         self.errors = reals([0.0] * (2 * lines))
@@ -92,10 +98,15 @@ class IncrementalEncoder:
 
     def set_disc(self, line_error, duty_error) -> None:
         """Draw the disc's errors (edges) from the seed; the encoder then has to be reset."""
-        if not 0.0 <= line_error <= 0.1 or not -0.4 <= duty_error <= 0.4 or self.jitter < 0.0:
+        if (
+            not 0.0 <= line_error <= 0.1
+            or not -0.4 <= duty_error <= 0.4
+            or self.jitter < 0.0
+            or not 0.0 <= self.bounce <= 1.0
+        ):
             raise UserError(
-                f"encoder {self.name}: line_error {line_error} (0 ... 0.1), duty_error {duty_error} (-0.4 ... 0.4) "
-                f"or jitter {self.jitter} (0 or more) is out of range"
+                f"encoder {self.name}: line_error {line_error} (0 ... 0.1), duty_error {duty_error} (-0.4 ... 0.4)"
+                f", jitter {self.jitter} (0 or more) or bounce {self.bounce} (0 ... 1) is out of range"
             )
         self.has_errors = line_error > 0.0 or duty_error != 0.0
         disc = RandomStream(self.seed, f"encoder {self.name} disc")
@@ -335,6 +346,34 @@ class IncrementalEncoder:
         self.calm_rad = 0.0
         buffer.count = count
         self.total += count
+        return count
+
+    def add_bounces(self, t1: cython.longlong) -> cython.longlong:
+        """Let edges of the last `update` bounce, which ended at `t1` (ns); returns how many do.
+
+        An edge with no room for it, before the next one or the step's end, does not.
+        """
+        buffer: EdgeBuffer = self.edges
+        place: cython.longlong = 0
+        at: cython.longlong
+        edge: cython.longlong
+        following: cython.longlong
+        count: cython.longlong = 0
+        while place < buffer.count:
+            edge = buffer.packed[place]
+            following = buffer.packed[place + 1] >> 2 if place + 1 < buffer.count else t1
+            if self.stream.uniform() < self.bounce and following - (edge >> 2) > 3 * BOUNCE_NS:
+                if buffer.capacity < buffer.count + 2:
+                    buffer.grow()
+                for at in range(buffer.count - 1, place, -1):
+                    buffer.packed[at + 2] = buffer.packed[at]
+                buffer.packed[place + 1] = (edge ^ 2) + (BOUNCE_NS << 2)
+                buffer.packed[place + 2] = edge + (BOUNCE_NS << 3)
+                buffer.count += 2
+                place += 2
+                count += 1
+            place += 1
+        self.bounces += count
         return count
 
     def _calm(self) -> cython.void:

@@ -13,6 +13,7 @@ from typing import final
 
 STEP_NS: int
 SAMPLES: dict[str, str]
+HIP_BOUNCE: float
 
 @final
 class RangerPlant:

@@ -332,3 +332,22 @@ def test_an_angle_set_from_outside_gives_every_edge_on_the_way_to_it():
         encoder.update(0, STEP, there, rate, there + sense * 0.01 * edge, rate)
         assert encoder.edges.count == 200
         assert decode(encoder) == sense * 200
+
+
+def test_an_edge_that_bounces_comes_three_times_and_the_count_is_unchanged():
+    still, noisy = IncrementalEncoder("a", 2048), IncrementalEncoder("a", 2048, bounce=0.3, seed=5)
+    came, counted = 0, [0, 0]
+    for step in range(200):
+        for i, each in enumerate((still, noisy)):
+            each.update(step * STEP, (step + 1) * STEP, 0.002 * step, 16.0, 0.002 * step + 0.002, 16.0)
+            if i == 1:
+                before = each.edges.count
+                more = each.add_bounces((step + 1) * STEP)
+                assert each.edges.count == before + 2 * more
+            counted[i] += decode(each)
+        came += still.edges.count
+        times = [time for time, _, _ in edges(noisy)]
+        assert times == sorted(times) and all(step * STEP <= time < (step + 1) * STEP for time in times)
+    # an edge every 96 us: nine tenths of them have the room
+    assert noisy.bounces == pytest.approx(0.3 * came, rel=0.25)
+    assert counted[0] == counted[1] == came

@@ -5,6 +5,7 @@ import contextlib
 import pytest
 
 from ranger_sim.boards.quirks import Quirks
+from ranger_sim.datatable.generated import errors as codes
 from ranger_sim.harness.ranger import Ranger
 from ranger_sim.harness.scenario import Scenario
 
@@ -23,7 +24,7 @@ REZEROING = (286, 313)  # an ankle board whose motor encoder is being set
 
 @pytest.fixture(scope="module")
 def measured():
-    """(held, walking): per board the EXECUTION_TIMEs of every 0.1 s, us."""
+    """(held, walking, noted): per board the EXECUTION_TIMEs of every 0.1 s, us, and its errors in all."""
     quirks = Quirks(lights_in_every_slot=True)
     with contextlib.closing(Ranger(Scenario(), quirks=quirks)) as robot:
         release = robot.controller.operator.release_time_s
@@ -41,8 +42,9 @@ def measured():
         robot.run_for(0.5)
         walking = watch(lambda: robot.steps < 20 and not robot.ended)
         assert robot.steps == 20
+        noted = {name: robot.board(name).errors.totals for name in LOGS}
         assert all(robot.board(name).scheduler.overruns == 0 for name in LOGS)
-        yield held, walking
+        yield held, walking, noted
 
 
 @pytest.mark.parametrize("name", LOGS)
@@ -62,3 +64,11 @@ def test_walking_all_are_within_those_of_the_logs(measured, name):
 def test_walking_an_ankle_takes_no_longer_than_while_its_encoder_is_set(measured, name):
     # the robot's worst was 446 and 497 us; what made it is in no log, and our worst is the re-zeroing
     assert max(measured[1][name]) <= REZEROING[1]
+
+
+def test_a_plain_walk_has_the_errors_that_the_robots_had(measured):
+    # robot.md T3: glitches of the hip joint's encoder in most of the logs' cycles, and bad levels of the radio
+    noted = measured[2]
+    assert 20 < noted["MCH"][codes.QDC_CH01_GLTCH] < 500
+    assert 1 <= noted["UI"][codes.RCX_BAD_LVLS] < 10
+    assert noted["MCFI"][codes.MC_TCURR_OOB] > 100
