@@ -1,5 +1,6 @@
 """The walk in numbers."""
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -102,9 +103,16 @@ def battery(robot: Any) -> dict:
 
 
 def oddities(plant: Any) -> dict:
-    """What the model met that a textbook gait has not; each is a count or a worst value of the walk."""
-    record, body = plant.record, plant.body
+    """What the model met that a textbook gait has not; each is a count or a worst value of the walk.
+
+    None where nothing was measured: no step, or strikes that last (contact "compliant") and have no impulse.
+    """
+    record, seen = plant.record, plant.body.seen
+    struck = record.steps > 0 and not plant.body.compliant
     return {
+        "contact": plant.parameters.contact,
+        "touches": record.touches,
+        "lift_offs": record.lift_offs,
         "bounces": record.bounces,
         "recontacts": record.recontacts,
         "scuffs": record.scuffs,
@@ -112,12 +120,13 @@ def oddities(plant: Any) -> dict:
         "slides": record.slides,
         "jams": record.jams,
         "lead_lifts": record.lead_lifts,
-        "tensile_strikes": record.tensile_strikes,
-        "tensile_impulse_min_Ns": record.tensile_impulse_min_Ns,
-        "friction_ratio_max": body.seen.friction_ratio_max,
-        "slip_s": body.seen.slip_s,
-        "normal_force_min_N": body.seen.normal_force_min,
-        "min_clearance_m": record.min_clearance_m,
+        "tensile_strikes": record.tensile_strikes if struck else None,
+        "tensile_impulse_min_Ns": record.tensile_impulse_min_Ns if struck else None,
+        "friction_ratio_max": seen.friction_ratio_max or None,
+        "slip_s": seen.slip_s,
+        "normal_force_min_N": seen.normal_force_min if math.isfinite(seen.normal_force_min) else None,
+        "pull_s": seen.pull_s,
+        "min_clearance_m": record.min_clearance_m if record.steps > 1 else None,
     }
 
 

@@ -34,7 +34,7 @@ cdef class Body:
     cdef public Sole sole
     cdef public long long event
     cdef public Leg event_leg
-    cdef public bint coulomb, sliding, watched, unilateral, lift_leading
+    cdef public bint coulomb, compliant, floating, sliding, watched, unilateral, lift_leading
     cdef public ContactEquations equations
     cdef public object parameters, floor, record
     cdef public str cause

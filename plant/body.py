@@ -14,6 +14,9 @@ The body's fields and geometry stand here. What happens to it, in the order in w
     impact           a foot meets the floor
     lift_off         a foot leaves it
     watch            what is noticed once per step: footholds, extremes, falls
+    sliding          one step while a foot slides
+    grip             which foot sticks, slides or leaves
+    compliant        a step on a floor that gives
     motion           `advance`: a step with the events inside it
     handling         what the operator does: place, hold, release
 """
@@ -80,7 +83,9 @@ class Body:
         self.brush = False  # the swing foot is near the floor and not ahead: its sole may touch
         self.strike_ahead = p.strike_ahead_m
         self.coulomb = p.contact == "coulomb"  # no foot pulls nor holds beyond friction (EQUATIONS 8, 9)
-        self.sliding = False  # a foot slides
+        self.compliant = p.contact == "compliant"  # feet press into the floor, nothing is rigid (EQUATIONS 9)
+        self.floating = False  # on such a floor, in nobody's hands: the hip hangs on no foot
+        self.sliding = False  # a foot slides, or the hip floats: the steps are those of plant/sliding.py
         self.watched = False  # a foot is near the bounds of its grip in this step
         self.unilateral = p.contact == "unilateral"  # the trailing foot may leave at a heel-strike (EQUATIONS 8)
         self.lift_leading = True  # the leading foot may leave in double stance
@@ -164,7 +169,7 @@ class Body:
         # the hip above its anchors, and ahead of that of the reference leg: EQUATIONS 4
         outer_reach = outer.reach()
         inner_reach = inner.reach()
-        if self.mode == SINGLE or self.mode == DOUBLE or self.standing:
+        if (self.mode == SINGLE or self.mode == DOUBLE or self.standing) and not self.floating:
             self.hip_y = s.height + (outer_reach if s is outer else inner_reach)
             if s.slide == 0:
                 self.hip_x = s.anchor + s.el * s.sin_leg - s.d * s.sin_foot + s.r * foot
@@ -177,7 +182,7 @@ class Body:
         """Hip velocity from the standing foot, of one that slides only normal to the floor (EQUATIONS 4)."""
         s: Leg = self.stance
         excess: cython.double
-        if self.mode != SINGLE and self.mode != DOUBLE:
+        if (self.mode != SINGLE and self.mode != DOUBLE) or self.floating:
             return
         self.know_angles()
         excess = s.excess(s.foot_angle)

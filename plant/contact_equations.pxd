@@ -26,7 +26,8 @@ cdef class ContactEquations:
     cdef public double[6] right
     cdef public double[8] arm
     cdef public double[4] target
-    cdef public double[2] follow, rolling, motor, brush
+    cdef public double[2] follow, rolling, motor
+    cdef public double[4] brush
     cdef public double[8] place, rate, acceleration, first_place, first_rate, place_sum, rate_sum
     cdef public bint[2] massless, moving, at_floor
     cdef public bint[8] allowed

@@ -70,7 +70,7 @@ class ContactEquations:
 
     Filled by `begin` and its caller: `mass`, 6 x 6; `right`, momenta or forces of the first six rows; `target`, what
     the contact's rate along and normal to the floor shall be when the foot holds; `rolling`, torque on a foot while it
-    is on the floor; `follow`, of a massless foot, what its motor's rate is, which it follows when apart. `moving`: the
+    is at the floor; `follow`, of a massless foot, what its motor's rate is, which it follows when apart. `moving`: the
     foot slides already, its direction is known.
     """
 
@@ -86,9 +86,9 @@ class ContactEquations:
         self.follow = [0.0] * 2
         self.rolling = [0.0] * 2
         # of a step (plant/sliding.py), in the order of the columns and then both motors: accelerations of the motors,
-        # force on a brushing sole, state of a stage and of the start, sums of accelerations
+        # forces that are known, state of a stage and of the start, sums of accelerations
         self.motor = [0.0] * 2
-        self.brush = [0.0] * 2
+        self.brush = [0.0] * 4
         self.place = [0.0] * 8
         self.rate = [0.0] * 8
         self.acceleration = [0.0] * 8
@@ -202,6 +202,10 @@ class ContactEquations:
         arm: cython.p_double = self.arm
         n: cython.longlong = ARMS * side
         a: cython.p_double = self.matrix
+        if self.at_floor[side]:
+            # Friction of rolling does not depend on the load. A foot about to leave is asked with it too, because else
+            # none of the states may fit where the load is small.
+            a[COLUMNS * foot + COLUMN_RIGHT] += self.rolling[side]
         if state == APART:
             a[COLUMNS * along + along] = 1.0
             a[COLUMNS * normal + normal] = 1.0
@@ -211,7 +215,6 @@ class ContactEquations:
                 a[COLUMNS * foot + leg] = -1.0
                 a[COLUMNS * foot + COLUMN_RIGHT] = self.follow[side]
             return
-        a[COLUMNS * foot + COLUMN_RIGHT] += self.rolling[side]
         a[COLUMNS * COLUMN_VX + along] = -1.0
         a[COLUMNS * leg + along] = -arm[n]
         a[COLUMNS * foot + along] = -arm[n + 1]

@@ -88,6 +88,7 @@ def regrip(body) -> cython.bint:
     `event` of `event_leg` happens now: SLIDE and STICK say what that foot cannot do any more.
     """
     leg: Leg
+    side: cython.longlong
     broken: cython.double
     x: ContactEquations = body.equations
     body.update_pose()
@@ -100,7 +101,13 @@ def regrip(body) -> cython.bint:
         if body.mode == DOUBLE or leg is body.stance:
             allow(body, leg)
     broken = x.settle(body.stance.side)
-    if broken < -1e-6:  # m/s^2: more than rounding
+    if broken < -1e-6 and body.event == SLIDE:  # m/s^2: more than rounding
+        # it cannot slide on (Painleve): at rest it may do anything, and something always fits
+        side = body.event_leg.side
+        x.allow_all(side)
+        x.moving[side] = False
+        broken = x.settle(body.stance.side)
+    if broken < -1e-6:
         return jam(body)
     return take_grip(body)
 

@@ -37,6 +37,7 @@ def hold(body, outer_leg_rad: cython.double) -> None:
     body.lock_hip = False
     body.standing = False
     body.sliding = False
+    body.floating = False
     body.cause = ""
     body.last_strike = None
     for leg in (body.outer, body.inner):
@@ -98,6 +99,7 @@ def begin_walk(body) -> None:
     body.mode = SINGLE
     body.standing = False
     body.sliding = False
+    body.floating = False
     for leg in (body.outer, body.inner):
         leg.height = first
         leg.anchor = 0.0
@@ -108,6 +110,7 @@ def begin_walk(body) -> None:
         body.swing.limp()
     body.update_pose()
     body.update_hip_rates()
+    body.sliding = body.floating = body.compliant
     for leg in (body.outer, body.inner):
         leg.armed = leg.gap > 1e-6
     body.brush = False

@@ -84,7 +84,7 @@ def leave(body, leg) -> None:
     else:
         body.mode = FLIGHT
     leg.slide = 0
-    body.sliding = body.mode == SINGLE and other.slide != 0
+    body.sliding = body.floating or (body.mode == SINGLE and other.slide != 0)
     if leg.Jf == 0.0:
         leg.limp()
     if body.mode == FLIGHT and other.Jf == 0.0:

@@ -1,5 +1,6 @@
 from ranger_sim.plant.air cimport in_air
 from ranger_sim.plant.body cimport DOUBLE, FALLEN, HELD, SINGLE, Body
+from ranger_sim.plant.compliant cimport press
 from ranger_sim.plant.grip cimport (
     LIFT_OFF, NO_EVENT, SLIDE, STICK, TOUCH, asks_too_much, grip_witness, near_the_bounds, regrip,
 )

@@ -12,6 +12,7 @@ import cython
 if not cython.compiled:
     from ranger_sim.plant.air import in_air
     from ranger_sim.plant.body import DOUBLE, FALLEN, HELD, SINGLE
+    from ranger_sim.plant.compliant import press
     from ranger_sim.plant.grip import (
         LIFT_OFF,
         NO_EVENT,
@@ -43,6 +44,9 @@ def advance(body, h: cython.double) -> None:
     again: cython.bint
     pieces: cython.longlong = 0
     body.elapsed = 0.0
+    if body.floating and body.mode != FALLEN:
+        press(body, h)
+        remaining = 0.0
     while remaining > 0.0 and body.mode != FALLEN:
         pieces += 1
         if body.mode != HELD:  # nothing happens in the operator's hands that a step would be taken back for

@@ -1,5 +1,7 @@
 """What is noticed of a walk beside its events (plant/watch.py): extremes, times, and the limits of a fall."""
 
+import math
+
 import cython
 
 
@@ -14,7 +16,7 @@ class Observed:
         self.passing_gap = 1.0  # m, lowest clearance while the swing foot passes
         self.friction_ratio_max = 0.0  # worst |F_x| / F_y of the walk
         self.slip_s = 0.0  # s that a foot slides, or asks for more than the floor's friction
-        self.normal_force_min = 0.0  # N, worst pull that lift-off could not answer
+        self.normal_force_min = math.inf  # N, lowest of a standing foot; below 0 a pull that lift-off could not answer
         self.pull_s = 0.0  # s with a pull of more than 1 N
         self.released_s = 0.0  # when the robot was let go, or made its last step
         # the fall rules, see EQUATIONS 16
@@ -31,7 +33,7 @@ class Observed:
         self.passing_gap = 1.0
         self.friction_ratio_max = 0.0
         self.slip_s = 0.0
-        self.normal_force_min = 0.0
+        self.normal_force_min = math.inf
         self.pull_s = 0.0
         self.brushing = False
         self.brush_s = 0.0

@@ -14,8 +14,9 @@ from ranger_sim.foundation.user_error import UserError
 
 # How a foot meets the floor (EQUATIONS 8, 9). "sticking": the strike of the appendix, which holds both feet, by a pull
 # if need be; "unilateral": a trailing foot that the strike would pull lets go; "coulomb": no foot ever pulls nor holds
-# beyond friction, in a strike and between strikes.
-CONTACTS = ("sticking", "unilateral", "coulomb")
+# beyond friction, in a strike and between strikes; "compliant": springs and dampers that only push, and friction that
+# grows with the speed, in place of strikes and of sticking.
+CONTACTS = ("sticking", "unilateral", "coulomb", "compliant")
 
 
 def number(default: float, unit: str, low: float, high: float, source: str) -> Any:
@@ -96,6 +97,11 @@ class BodyParameters:
     sole_N_per_m: float = number(2.0e4, "N/m", 0.0, 1e7, "of a brushing sole; chosen by us: 5 mm under the weight")
     sole_Ns_per_m: float = number(130.0, "N s/m", 0.0, 1e5, "chosen by us: a fifth of critical damping of a leg")
     sole_sliding_smoothing_m_s: float = number(0.05, "m/s", 1e-6, 10.0, "of a brushing sole's friction; chosen by us")
+    # Contact "compliant" (Hunt and Crossley 1975). Chosen by us: 1 mm under the weight; dissipation that leaves a
+    # strike of 0.2 m/s hardly a rebound; friction that a creep of some mm/s brings up as far as a foot asks for it.
+    floor_N_per_m: float = number(1e5, "N/m", 1e3, 1e6, "of a compliant floor and sole; chosen by us: 1 mm deep")
+    floor_dissipation_s_per_m: float = number(6.0, "s/m", 0.0, 100.0, "chosen by us: no rebound")
+    floor_sliding_smoothing_m_s: float = number(0.01, "m/s", 1e-3, 1.0, "of its friction; chosen by us")
     # Ahead by more than this a touch is a strike and sticks. Chosen by us: a seventh of a step.
     strike_ahead_m: float = number(0.05, "m", 0.0, 1.0, "a touch so far ahead is a strike; chosen by us: 1/7 of a step")
 

@@ -17,4 +17,4 @@ cdef class Ankle:
 
 @cython.final
 cdef class Sole:
-    cdef public double k, c, per_m_s, mu
+    cdef public double k, c, per_m_s, mu, floor_k, floor_a, floor_per_m_s

@@ -70,7 +70,7 @@ class Ankle:
 
 
 class Sole:
-    """What a foot meets the floor with while it brushes (EQUATIONS 9): N/m, N s/m, 1 over m/s, mu."""
+    """What a foot meets the floor with while it brushes, or on a compliant floor (EQUATIONS 9): N/m, N s/m, s/m, mu."""
 
     def __init__(self, parameters) -> None:
         p = parameters
@@ -78,3 +78,6 @@ class Sole:
         self.c = p.sole_Ns_per_m
         self.per_m_s = 1.0 / p.sole_sliding_smoothing_m_s
         self.mu = p.floor_friction
+        self.floor_k = p.floor_N_per_m
+        self.floor_a = p.floor_dissipation_s_per_m
+        self.floor_per_m_s = 1.0 / p.floor_sliding_smoothing_m_s

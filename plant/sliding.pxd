@@ -18,6 +18,8 @@ cdef void accelerate(Body body) noexcept
 cpdef void write_forces(Body body) noexcept
 cdef void write_leg(Body body, Leg leg) noexcept
 cdef void write_brush(Body body, Leg leg) noexcept
+cdef void write_press(Body body, Leg leg) noexcept
+cdef void push(Body body, Leg leg, double along, double normal) noexcept
 cdef void write_targets(Body body, Leg leg) noexcept
 cdef void take_forces(Body body) noexcept
 cdef long long state_of(Body body, Leg leg) noexcept

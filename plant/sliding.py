@@ -102,7 +102,7 @@ def accelerate(body) -> cython.void:
 
 def state_of(body, leg) -> cython.longlong:
     """APART, STICKS, SLIDES_ON or SLIDES_BACK: what this foot does."""
-    if body.mode != DOUBLE and (body.mode != SINGLE or leg is not body.stance):
+    if body.floating or (body.mode != DOUBLE and (body.mode != SINGLE or leg is not body.stance)):
         return APART
     if leg.slide == 0:
         return STICKS
@@ -111,6 +111,7 @@ def state_of(body, leg) -> cython.longlong:
 
 def write_forces(body) -> cython.void:
     """Into the equations: forces and torques of the present state, and what keeps a standing foot on its foothold."""
+    n: cython.longlong
     hip: cython.double
     x: ContactEquations = body.equations
     o: Leg = body.outer
@@ -128,11 +129,14 @@ def write_forces(body) -> cython.void:
         hip += terms.torque_on_hip(o.angle - i.angle, rate, joint.drive)
     write_leg(body, o)
     write_leg(body, i)
-    x.brush[0] = 0.0
-    x.brush[1] = 0.0
+    for n in range(4):
+        x.brush[n] = 0.0
     x.right[COLUMN_LEG] += hip
     x.right[COLUMN_LEG + 1] -= hip
-    if body.mode == SINGLE and body.brush:
+    if body.floating:
+        write_press(body, o)
+        write_press(body, i)
+    elif body.mode == SINGLE and body.brush:
         write_brush(body, body.swing)
 
 
@@ -206,8 +210,31 @@ def write_brush(body, leg) -> cython.void:
     if gap >= 0.0 or normal <= 0.0:
         return
     along = -body.sole.mu * normal * smoothed_sign(v_x * body.sole.per_m_s)
-    x.brush[0] = along
-    x.brush[1] = normal
+    push(body, leg, along, normal)
+
+
+def write_press(body, leg) -> cython.void:
+    """A foot presses into a floor that gives: Hunt and Crossley's spring and damper, friction (EQUATIONS 9)."""
+    x: ContactEquations = body.equations
+    n: cython.longlong = ARMS * leg.side
+    along: cython.double
+    v_x: cython.double = body.hip_vx + x.arm[n] * leg.rate + x.arm[n + 1] * leg.foot_rate
+    v_y: cython.double = body.hip_vy + x.arm[n + 2] * leg.rate + x.arm[n + 3] * leg.foot_rate
+    deep: cython.double = leg.chain_y(leg.foot_angle, leg.angle) + leg.height - body.hip_y
+    normal: cython.double = body.sole.floor_k * deep * (1.0 - body.sole.floor_a * v_y)
+    if deep <= 0.0 or normal <= 0.0:
+        return
+    along = -body.sole.mu * normal * smoothed_sign(v_x * body.sole.floor_per_m_s)
+    push(body, leg, along, normal)
+    x.right[COLUMN_FOOT + leg.side] += x.rolling[leg.side]
+
+
+def push(body, leg, along: cython.double, normal: cython.double) -> cython.void:
+    """A force on a foot that is known, into the equations."""
+    x: ContactEquations = body.equations
+    n: cython.longlong = ARMS * leg.side
+    x.brush[2 * leg.side] = along
+    x.brush[2 * leg.side + 1] = normal
     x.right[COLUMN_VX] += along
     x.right[COLUMN_VY] += normal
     x.right[COLUMN_LEG + leg.side] += x.arm[n] * along + x.arm[n + 2] * normal
@@ -222,11 +249,8 @@ def take_forces(body) -> cython.void:
         leg.acc = x.acceleration[COLUMN_LEG + leg.side]
         leg.foot_acc = x.acceleration[COLUMN_FOOT + leg.side]
         leg.motor_acc = x.acceleration[MOTOR + leg.side]
-        leg.Fx = x.solution[COLUMN_IMPULSE + 2 * leg.side]
-        leg.Fy = x.solution[COLUMN_IMPULSE + 2 * leg.side + 1]
-    if body.mode == SINGLE:
-        body.swing.Fx = x.brush[0]
-        body.swing.Fy = x.brush[1]
+        leg.Fx = x.solution[COLUMN_IMPULSE + 2 * leg.side] + x.brush[2 * leg.side]
+        leg.Fy = x.solution[COLUMN_IMPULSE + 2 * leg.side + 1] + x.brush[2 * leg.side + 1]
 
 
 def read_state(body) -> cython.void:

@@ -11,11 +11,13 @@ class WalkRecord:
 
     A step is counted when a foot meets the floor ahead of the other one, in turn. `step_length_m` is what the walk
     gained by it: the distance of this foot's contact point from the previous strike's. The first step counts from
-    where the robot was put down. Oddities: `bounces` (the leading foot left the floor and came back), `recontacts`
-    (a foot touched out of turn), `brushes` and `scuffs` (the swing foot's sole touched the floor before, after it
-    passed the stance foot), `flights` (no foot on the floor), `slides` (a standing foot began to slide), `jams` (it
-    could not: impulses stopped it), `lead_lifts`, `tensile_strikes` (the rule of the strike asked the trailing foot to
-    be pulled; `tensile_impulse_Ns` the last, `_min_Ns` the worst).
+    where the robot was put down. `touches` and `lift_offs` count all of them.
+
+    Oddities: `bounces` (the leading foot left the floor and came back), `recontacts` (a foot touched out of turn),
+    `brushes` and `scuffs` (the swing foot's sole touched the floor before, after it passed the stance foot), `flights`
+    (no foot on the floor), `slides` (a standing foot began to slide), `jams` (it could not: impulses stopped it),
+    `lead_lifts`, `tensile_strikes` (the rule of the strike asked the trailing foot to be pulled; `tensile_impulse_Ns`
+    the last, `_min_Ns` the worst).
 
     More than 40 fields, because each of them is one figure of the summary and they are counted by the same few events.
     """
@@ -52,6 +54,8 @@ class WalkRecord:
         self.tensile_impulse_Ns = 0.0
         self.tensile_impulse_min_Ns = 0.0
         self.tensile_strikes = 0
+        self.touches = 0
+        self.lift_offs = 0
         self.bounces = 0
         self.recontacts = 0
         self.brushes = 0
@@ -88,6 +92,7 @@ class WalkRecord:
         """A foot met the floor. `impulses`: stance x, y, swing x, y in N s; `gap`: lowest clearance at passing;
         `height`: of the foothold."""
         self.touch_time_ns = time_ns
+        self.touches += 1
         if not strike:
             if leg == self.strike_leg and ahead > 0.0:
                 self.bounces += 1
@@ -134,7 +139,8 @@ class WalkRecord:
             self.brushes += 1
 
     def leave(self, time_ns: int, leg: int, flight: Any) -> None:
-        """A foot left the floor."""
+        """A foot left the floor, other than by a strike of the other one."""
+        self.lift_offs += 1
         if flight:
             self.flights += 1
         if leg == self.strike_leg:

@@ -1,5 +1,5 @@
 from libc.math cimport fabs
-from ranger_sim.plant.body cimport FALLEN, SINGLE, Body
+from ranger_sim.plant.body cimport DOUBLE, FALLEN, FLIGHT, SINGLE, Body
 from ranger_sim.plant.leg cimport Leg
 from ranger_sim.plant.observed cimport Observed
 

@@ -7,7 +7,7 @@ import cython
 if not cython.compiled:
     from math import fabs
 
-    from ranger_sim.plant.body import FALLEN, SINGLE
+    from ranger_sim.plant.body import DOUBLE, FALLEN, FLIGHT, SINGLE
     from ranger_sim.plant.leg import Leg
     from ranger_sim.plant.observed import Observed
 
@@ -58,14 +58,16 @@ def watch_swing_foot(body, h: cython.double) -> None:
 def keep_forces(body, h: cython.double) -> cython.void:
     """Worst friction ratio and pull of the walk; time with more than the floor's friction."""
     seen: Observed = body.seen
-    outer: cython.double = body.outer.Fy
-    inner: cython.double = body.inner.Fy
-    least: cython.double = outer if outer < inner else inner
+    least: cython.double = body.stance.Fy
     outer_slips: cython.bint = slips(body, body.outer)
     inner_slips: cython.bint = slips(body, body.inner)
     if outer_slips or inner_slips:
         seen.slip_s += h
-    if least < seen.normal_force_min:
+    if body.mode == DOUBLE and body.swing.Fy < least:
+        least = body.swing.Fy
+    if body.mode == FLIGHT:
+        least = 0.0
+    elif least < seen.normal_force_min:
         seen.normal_force_min = least
     if least < -1.0:
         seen.pull_s += h

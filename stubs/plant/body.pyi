@@ -53,6 +53,8 @@ class Body:
     event: int
     event_leg: Leg
     coulomb: bool
+    compliant: bool
+    floating: bool
     sliding: bool
     watched: bool
     unilateral: bool

@@ -39,4 +39,7 @@ class Sole:
     c: float
     per_m_s: float
     mu: float
+    floor_k: float
+    floor_a: float
+    floor_per_m_s: float
     def __init__(self, parameters: Any) -> None: ...

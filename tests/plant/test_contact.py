@@ -222,7 +222,7 @@ def test_a_jump_is_a_flight_that_ends_with_a_touch():
 def test_oddities_are_counted_not_ignored():
     body = Body()
     body.outer.Fx, body.outer.Fy, body.inner.Fy = 60.0, 50.0, -3.0
-    body.mode = SINGLE
+    body.mode = DOUBLE
     keep_forces(body, STEP_S)
     assert body.seen.friction_ratio_max == pytest.approx(1.2)
     assert body.seen.slip_s == STEP_S

@@ -21,7 +21,7 @@ from tests.plant.test_body_equations import Lagrange, closed_posture, set_random
 # ---- known answers: a body whose mass is all at the hip, on point feet ------------------------------------------
 
 
-def frame(mu=0.9, inertia=0.5):
+def frame(mu=0.9, inertia=0.5, contact="coulomb"):
     """Two upright legs without mass moment on point feet: each has its inertia about the hip; nothing couples
     them, no springs either."""
     body = Body(
@@ -34,7 +34,7 @@ def frame(mu=0.9, inertia=0.5):
             outer_ankle_offset_m=0.0,
             inner_ankle_offset_m=0.0,
             floor_friction=mu,
-            contact="coulomb",
+            contact=contact,
         )
     )
     body.hip.k = body.ankle.k = 0.0

@@ -88,6 +88,7 @@ def tiles(summary: dict) -> list[dict]:
         ),
         ("walked", f"{summary['distance_m'] / 1000.0:.3f} km in {summary['walked_h']:.2f} h", "65.2 km in 30.8 h"),
         ("energy used", f"{summary['energy_Wh']['total']:.3g} Wh", ROBOT["energy"]),
+        *odd(summary["oddities"]),
         (
             "batteries",
             "empty" if summary["battery"]["empty"] else f"{100.0 * summary['battery']['charge']:.0f} %",
@@ -95,6 +96,27 @@ def tiles(summary: dict) -> list[dict]:
         ),
     )
     return [{"name": name, "value": value, "real": real} for name, value, real in rows]
+
+
+def odd(oddities: dict) -> tuple:
+    """Tiles of what the contact of feet and floor did that a real floor could not, or that a walk should not need."""
+
+    def told(value: Any, text: str) -> str:
+        return "none" if value is None else text.format(value)
+
+    strikes = oddities["tensile_strikes"]
+    return (
+        ("contact", oddities["contact"], None),
+        (
+            "strikes that pull",
+            told(strikes, "{}") + (f" (to {oddities['tensile_impulse_min_Ns']:.2f} N s)" if strikes else ""),
+            "0",
+        ),
+        ("lowest push of the floor", told(oddities["normal_force_min_N"], "{:.1f} N"), "0 N"),
+        ("worst friction ratio", told(oddities["friction_ratio_max"], "{:.2f}"), None),
+        ("slides", f"{oddities['slides']} in {oddities['slip_s'] * 1e3:.1f} ms", None),
+        ("touches, lift-offs", f"{oddities['touches']}, {oddities['lift_offs']}", None),
+    )
 
 
 def animation(robot: Any, walk: Any) -> dict:
