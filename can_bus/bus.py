@@ -356,7 +356,7 @@ class Bus:
         """Mode register of a node at `time` (ns): OPERATING (0) or RESET (1), as CAN_MODE messages carry.
 
         RESET drops what waits (TX_ABORTED). OPERATING joins after one sequence of 11 recessive bits, or,
-        out of bus-off, after 128 of them with both error counters at zero. A frame under way is completed.
+        out of bus-off, after 128 of them with both error counters at zero. A plain frame under way is completed.
         """
         if mode != OPERATING and mode != RESET:
             raise ValueError(f"bus {self.name}: mode {mode} is neither 0 (operating) nor 1 (reset)")
@@ -560,7 +560,7 @@ class Bus:
         """True while what waits cannot be acknowledged, by nobody, and only repeats."""
         if self.buffers.waiting_count == 0 or self.acknowledging >= 2 or self.disturbed:
             return False
-        if self.joining or self.commands.count or self.next_strike != -1 or self.strike_bit < NEVER:
+        if self.joining or self.commands.count or self.strike_bit < NEVER or self.disturbance.frames_left > 0:
             return False
         return all(self.nodes[row >> NODE_SHIFT].passive for row in self.buffers.waiting())
 
