@@ -58,7 +58,7 @@ UART_BYTE_CYCLES = 2 * 25  # U1LSR, U1RBR, the ring and its test for full
 LCD_IDLE_CYCLES = 2 * 10
 LCD_BYTE_CYCLES = 2 * 60  # eight data pins, three control pins, each a read-modify-write
 IMU_CYCLES = 2 * 60  # both indices, the search for a header
-IMU_BYTE_CYCLES = 2 * 32  # a byte is taken from the ring twice, for the sum and for its word
+IMU_BYTE_CYCLES = 2 * 30  # a byte is taken from the ring twice, for the sum and for its word
 
 
 class UserInterfaceBoard(SatelliteBoard):
