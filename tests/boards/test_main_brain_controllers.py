@@ -17,7 +17,7 @@ from ranger_sim.foundation.user_error import UserError
 
 
 def test_every_set_loads_and_gives_the_parameters_of_its_program_and_no_others():
-    assert {"record-2011", "robust", "reflex"} <= set(controllers.available())
+    assert {"record-2011", "robust", "reflex", "efficient"} <= set(controllers.available())
     for name in controllers.available():
         controller = controllers.load(name)
         assert set(controller.values) == programs.program(controller.program).parameters()
