@@ -111,14 +111,16 @@ def in_air(body, h: cython.double, stages: cython.longlong) -> cython.void:
                 Tw -= back
         if a_s < ankle.low or a_s > ankle.high:
             stop = ankle.stop_torque(a_s, uF - us)
-            Ts += stop
-            if o.Jf == 0.0:
+            if o.Jf == 0.0 and standing is not o:
                 mp += stop
+            else:
+                Ts += stop
         if a_w < ankle.low or a_w > ankle.high:
             stop = ankle.stop_torque(a_w, uG - uw)
-            Tw += stop
-            if i.Jf == 0.0:
+            if i.Jf == 0.0 and standing is not i:
                 mn += stop
+            else:
+                Tw += stop
         hd = us - uw
         Th = 0.0
         if not locked:
@@ -127,14 +129,16 @@ def in_air(body, h: cython.double, stages: cython.longlong) -> cython.void:
             Th += terms.torque_on_hip(th - tw, hd, joint.drive)
             terms.act_on_ankle(o, a_s, uF - us, p, up)
             terms.act_on_ankle(i, a_w, uG - uw, n, un)
-            Ts += o.extra_ankle
-            Tw += i.extra_ankle
             mp += o.extra_motor
             mn += i.extra_motor
-            if o.Jf == 0.0:
+            if o.Jf == 0.0 and standing is not o:
                 mp += o.extra_ankle
-            if i.Jf == 0.0:
+            else:
+                Ts += o.extra_ankle
+            if i.Jf == 0.0 and standing is not i:
                 mn += i.extra_ankle
+            else:
+                Tw += i.extra_ankle
         ap = mp * iJA
         an = mn * iJA
         if not held:

@@ -204,9 +204,10 @@ def on_feet(body, h: cython.double, stages: cython.longlong) -> cython.void:
             Ts += ankle.stop_torque(a_s, uF - us)
         if a_w < ankle.low or a_w > ankle.high:
             stop = ankle.stop_torque(a_w, uG - uw)
-            Tw += stop
             if massless:
-                mn += stop
+                mn += stop  # the cable hands it on
+            else:
+                Tw += stop
         # EQUATIONS 2.6: rolling; TF and TG act on the feet, -Ts and -Tw on the legs
         TF = Ts - s.C * uF
         TG = Tw
@@ -219,10 +220,11 @@ def on_feet(body, h: cython.double, stages: cython.longlong) -> cython.void:
             mn += w.extra_motor
             Ts += s.extra_ankle
             TF += s.extra_ankle
-            Tw += w.extra_ankle
-            TG += w.extra_ankle
             if massless:
                 mn += w.extra_ankle
+            else:
+                Tw += w.extra_ankle
+                TG += w.extra_ankle
         # EQUATIONS 5.3: generalised forces on foot s, leg s, leg w
         Q1 = TF - e * Px - f * Py
         Q2 = Th - Ts - Us * ax + Vs * ay + swing * uw2

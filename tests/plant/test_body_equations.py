@@ -301,8 +301,8 @@ class Lagrange:
         total += 0.5 * p.hip_spring_Nm_per_rad * (z[2] - z[3]) ** 2
         return np.array([total])
 
-    def solve(self, z, zd, laws, feet):
-        """Accelerations and forces on the feet named."""
+    def solve(self, z, zd, laws, feet, limp=()):
+        """Accelerations and forces on the feet named; those in `limp` stand where their motors hold them."""
         p = self.p
         J = self.jacobian(self.coordinates, z)
         W = self.weights(z)
@@ -328,8 +328,14 @@ class Lagrange:
             Q[4 + foot] += stop
             Q[2 + foot] -= stop
         rows = [self.jacobian(self.contact(f), z) for f in feet]
+        curved = [-self.curvature(self.contact(f), z, zd) for f in feet]
+        for foot in limp:  # angle of the foot less those of leg and motor: constant
+            row = np.zeros((1, 8))
+            row[0, [4 + foot, 2 + foot, 6 + foot]] = 1.0, -1.0, -1.0
+            rows.append(row)
+            curved.append(np.zeros(1))
         A = np.vstack(rows) if rows else np.zeros((0, 8))
-        c = -np.concatenate([self.curvature(self.contact(f), z, zd) for f in feet]) if rows else np.zeros(0)
+        c = np.concatenate(curved) if rows else np.zeros(0)
         n = len(c)
         system = np.block([[mass, -A.T], [A, np.zeros((n, n))]])
         x = np.linalg.solve(system, np.concatenate([Q - bias, c]))
@@ -444,6 +450,34 @@ def test_flight_agrees_with_numerical_lagrange():
         # the hip's acceleration shows in a short step: v(h) - v(0) = a h + O(h^2) jerk, 1e4 m/s^3 x 1e-6 s
         in_air(body, 1e-6, 4)
         assert ((body.hip_vx - zd[0]) * 1e6, (body.hip_vy - zd[1]) * 1e6) == pytest.approx(acc[:2], abs=1e-2)
+
+
+@pytest.mark.parametrize("mode", [SINGLE, FLIGHT])
+@pytest.mark.parametrize("ankle", [-1.75, 0.3, 1.6], ids=["low stop", "free", "high stop"])
+def test_a_massless_foot_in_the_air_agrees_with_numerical_lagrange(mode, ankle):
+    """Stop and return spring of a massless foot load its motor and not its leg: only the joint's angle feels them."""
+    massless = dataclasses.replace(INERTIAL, foot_inertia_kg_m2=0.0)
+    stream = RandomStream(mode, f"massless {ankle}")
+    reference = Lagrange(massless)
+    for _ in range(20):
+        body = Body(massless, Floor(massless.slope_rad))
+        laws = set_motors(body, stream)
+        set_state(body, random_posture(stream), [2 * stream.normal() for _ in range(6)])
+        limp = (body.inner,) if mode == SINGLE else (body.outer, body.inner)
+        for leg in limp:
+            leg.motor_angle = ankle
+            leg.limp()
+        body.mode = mode
+        body.stand_on(body.outer)
+        body.update_pose()
+        body.update_hip_rates()
+        standing = (OUTER,) if mode == SINGLE else ()
+        acc, _ = reference.solve(*to_z(body), laws, standing, [leg.side for leg in limp])
+        if mode == SINGLE:
+            on_feet(body, 0.0, 1)
+        else:
+            in_air(body, 0.0, 1)
+        assert accelerations(body) == pytest.approx(to_body(acc), rel=1e-7, abs=2e-6)
 
 
 def test_a_held_robot_swings_its_inner_leg_as_a_pendulum():
