@@ -3,6 +3,7 @@
 import collections
 import contextlib
 import json
+import pathlib
 import subprocess
 
 import cantools
@@ -83,6 +84,7 @@ schedule = "1mbit"
 )
 SPEED = 1 / 64  # as in test_robot_on_vcan.py
 STEPS = 1
+CONTROLLER = pathlib.Path(__file__).with_name("let_go_early.toml")
 
 
 def received(name):
@@ -99,7 +101,7 @@ def test_the_hip_board_on_one_adapter_walks_with_the_rest_of_the_robot_on_the_ot
     before = {name: received(name) for name in adapters}
     watcher = candump("can0", "can1")
     done = command(
-        *("up", "--no-real-time", "--speed", SPEED, "--steps", STEPS, "--profile", profile),
+        *("up", "--no-real-time", "--controller", CONTROLLER, "--speed", SPEED, "--steps", STEPS, "--profile", profile),
         *("--bus", "MCH=socketcan:can0"),
         *("--log", "full", "--out", tmp_path / "out", "--json", tmp_path / "summary.json"),
     )
