@@ -13,6 +13,7 @@ cpdef enum:
     COUNTS = 8192
     LEAST_COUNT = -8192
     LAST_COUNT = 8191
+    RESTART_NS = 2500
 
 @cython.final
 cdef class Ads7871(Peripheral):
@@ -30,6 +31,8 @@ cdef class Ads7871(Peripheral):
     # the rest
     cdef public long long eint, not_finished
     cpdef bint start(self, long long register4) except? -1
+    @cython.final
+    cdef void _take(self, long long register4, long long time) noexcept
     cpdef long long read_result(self) noexcept
     cpdef bint start_sequence(self) except? -1
     cpdef bint sequence_done(self) noexcept

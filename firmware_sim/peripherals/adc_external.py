@@ -32,10 +32,11 @@ if not cython.compiled:
     LEAST_COUNT = -8192
     LAST_COUNT = 8191
 
+    # From a handler's start to its next start word, after two registers were read over the SSP: fitted by us to the
+    # times at which the images' frames are asked for (the handler takes 66 to 70 instructions, robot.md T2)
+    RESTART_NS = 2_500
+
 CONVERSION_NS = 20_833  # 48 kSamples/s, SLAS370C
-# From a handler's start to its next start word, after two registers were read over the SSP: fitted by us to the times
-# at which the images' frames are asked for (the handler takes 66 to 70 instructions, robot.md T2)
-RESTART_NS = 2_500
 GAINS = (1, 2, 4, 5, 8, 10, 16, 20)  # by gain code 0 ... 7, SLAS370C
 REFERENCE_V = 2.5  # full scale at gain 1; external reference of the usual 2.5 V (chosen by us, as the internal one)
 
@@ -107,11 +108,16 @@ class Ads7871(Peripheral):
         """Write register 4; False when a conversion is under way (the write is lost)."""
         if self.busy:
             return False
+        self._take(register4, self.chip.now)
+        return True
+
+    @cython.final
+    def _take(self, register4: cython.longlong, time: cython.longlong) -> cython.void:
+        """The start word is there at `time` (ns)."""
         self.register4 = register4
         if register4 & START:
             self.busy = True
-            self.alarm.set(self.chip.now + self.conversion_ns)
-        return True
+            self.alarm.set(time + self.conversion_ns)
 
     def on_alarm(self, alarm: cython.longlong, time: cython.longlong) -> InterruptSource | None:
         """The conversion is over: result registers 1 and 0 are loaded, BUSY falls."""
@@ -150,8 +156,7 @@ class Ads7871(Peripheral):
         step += 1
         if step < self.length:
             self.step = step
-            self.start(self.sequence[step])
-            self.alarm.set(self.chip.now + RESTART_NS + self.conversion_ns)
+            self._take(self.sequence[step], self.chip.now + RESTART_NS)
         else:
             self.step = 0
             self.done = True

@@ -14,8 +14,8 @@ CHANNEL_MASK: int
 COUNTS: int
 LEAST_COUNT: int
 LAST_COUNT: int
-CONVERSION_NS: int
 RESTART_NS: int
+CONVERSION_NS: int
 GAINS: tuple[int, ...]
 REFERENCE_V: float
 
