@@ -3,6 +3,7 @@
 import functools
 import pathlib
 import re
+import runpy
 
 import pytest
 
@@ -163,3 +164,11 @@ def test_files_that_a_document_names_exist(document):
             if not there and (name not in modules if module else "/" in name):
                 lost.append(name)
     assert lost == []
+
+
+def test_the_figure_of_the_record_walk_is_drawn_out_of_the_walks_that_are_kept():
+    program = runpy.run_path(str(ROOT / "docs" / "record_walk_figure.py"))
+    assert program["FIGURE"].read_text(encoding="utf-8") == program["drawn"]()
+    level = program["walks"](program["NOW"])
+    assert [row["seed"] for row in level] == list(range(1, 21))
+    assert all(row["steps"] == program["STEPS"] and row["body"] == "ranger" for row in level)

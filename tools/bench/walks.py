@@ -11,7 +11,7 @@ from ranger_sim.harness.scenario import Scenario, StopRule
 # parameter set, seeds, steps, roughness in m
 WALKS = (
     ("robust", range(1, 4), 1000, 0.0),
-    ("robust", range(1, 4), 200, 0.001),
+    ("robust", range(1, 4), 5000, 0.001),
     ("record-2011", range(1, 21), 1000, 0.0),
     ("record-2011", range(1, 21), 500, 0.001),
 )
