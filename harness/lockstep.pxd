@@ -6,6 +6,7 @@ from ranger_sim.foundation.events cimport NEVER
 from ranger_sim.harness.board_wires cimport BoardWires, WordWire
 from ranger_sim.harness.imu_wire cimport ImuWire
 from ranger_sim.harness.sampler cimport Sampler
+from ranger_sim.harness.step_watch cimport StepWatch
 from ranger_sim.harness.strike_watch cimport StrikeWatch
 from ranger_sim.plant.ranger cimport RangerPlant
 
@@ -14,6 +15,7 @@ cpdef enum:
     REACHED_STEPS = 1
     REACHED_DISTANCE = 2
     FELL = 3
+    A_WATCHER_STOPPED = 4
 
 @cython.final
 cdef class Lockstep:
@@ -23,9 +25,10 @@ cdef class Lockstep:
     cdef public double stop_distance_m
     cdef public Sampler sampler
     cdef public StrikeWatch strikes
+    cdef public list watchers
     cdef public ImuWire imu_wire
     cdef public long long[::1] encoder_boards, due, came, prompt, step_times
-    cdef public bint side_by_side
+    cdef public bint side_by_side, stop_wanted
     cpdef long long run(self, long long until) except? <long long>-1
     cdef long long _walk_is_over(self) except? <long long>-1
     @cython.final
@@ -36,4 +39,6 @@ cdef class Lockstep:
     cdef long long _advance(self, long long place, long long until) except? <long long>-1
     cdef long long _decide(self, long long until) except? <long long>-1
     cdef int _sense(self) except -1
+    cdef bint _watch_before(self, long long now) except? -1
+    cdef int _watch_after(self, long long start, long long end) except -1
     cdef void _show_words(self) noexcept

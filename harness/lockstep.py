@@ -42,6 +42,7 @@ from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.board_wires import BoardWires, SspWire, WordWire
 from ranger_sim.harness.imu_wire import ImuWire
 from ranger_sim.harness.sampler import Sampler
+from ranger_sim.harness.step_watch import StepWatch
 from ranger_sim.harness.strike_watch import StrikeWatch
 from ranger_sim.plant.ranger import RangerPlant
 
@@ -53,6 +54,7 @@ if not cython.compiled:
     REACHED_STEPS = 1
     REACHED_DISTANCE = 2
     FELL = 3
+    A_WATCHER_STOPPED = 4
 
 WINDOW_NS = 31_000  # the lookahead
 ANY_DISTANCE_M = 1e300
@@ -71,6 +73,8 @@ class Lockstep:
         self.buses = buses
         self.sampler = sampler
         self.strikes = None
+        self.watchers = []  # StepWatch: what looks at every step of the plant, or reaches into it
+        self.stop_wanted = False  # a watcher sets it: `run` returns before the step
         self.time = start_ns
         self.window_ns = WINDOW_NS
         self.side_by_side = False
@@ -211,8 +215,13 @@ class Lockstep:
                 reason = self._walk_is_over()
                 if reason:
                     break
+                if self.watchers and self._watch_before(now):
+                    reason = A_WATCHER_STOPPED
+                    break
                 self._show_words()
                 plant.step()
+                if self.watchers:
+                    self._watch_after(now, plant.time_ns)
                 self._sense()
             end = plant.time_ns if plant.time_ns < until else until
             if self.side_by_side:
@@ -368,6 +377,24 @@ class Lockstep:
                     self.due[place] = first
         if self.imu_wire is not None:
             self.imu_wire.deliver()
+
+    def _watch_before(self, now: cython.longlong) -> cython.bint:
+        """Every watcher once per step, before it; True when one of them wants to stop here."""
+        watch: StepWatch
+        for watch in list(self.watchers):
+            if watch.seen_ns < now:
+                watch.seen_ns = now
+                watch.before_step(now)
+        if self.stop_wanted:
+            self.stop_wanted = False
+            return True
+        return False
+
+    def _watch_after(self, start: cython.longlong, end: cython.longlong) -> None:
+        """Every watcher once per step, when the sensors of that step are known and no board has seen them."""
+        watch: StepWatch
+        for watch in list(self.watchers):
+            watch.after_step(start, end)
 
     def _show_words(self) -> cython.void:
         """What the absolute encoders hold at the start of the step: their words stand until the next one."""

@@ -24,9 +24,13 @@ from ranger_sim.datatable.generated import all_variables
 from ranger_sim.firmware_sim.clock import seeded_crystal
 from ranger_sim.foundation import wallclock
 from ranger_sim.foundation.events import NEVER, STAGE_BUS
+from ranger_sim.foundation.quantities import duration_text, nanoseconds
 from ranger_sim.foundation.random_stream import RandomStream
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness import bus_schedule, lockstep, wiring
+from ranger_sim.harness.conditions import Condition, ConditionNotMetError, Waiting, condition
+from ranger_sim.harness.faults import catalogue
+from ranger_sim.harness.faults.fault import Fault
 from ranger_sim.harness.logbook import Logbook
 from ranger_sim.harness.operator import Operator
 from ranger_sim.harness.profile import Profile
@@ -104,6 +108,7 @@ class Ranger:
             for board in self.boards.values():
                 bus_schedule.apply(board, profile.schedules())
         self.operator = Operator(self.controller.operator, self.plant, self.boards["UI"], self.start_ns, seed)
+        self.faults: list[Fault] = []  # armed so far
         self.polled: list[Any] = []  # ends of wires that lead out of the simulation
         self.next_poll_ns = self.start_ns
         self.cpu_s = 0.0
@@ -180,6 +185,45 @@ class Ranger:
         elif reason != lockstep.REACHED_TIME or loop.time >= limit:
             return True
         return bool(self.ended)
+
+    def until(self, wanted: str | Condition | Callable[[Any], Any], within: str = "60 s") -> float:
+        """Pass time until a condition holds (harness/conditions.py); returns the virtual time since power-up, s.
+
+        ConditionNotMetError, an AssertionError, when it does not hold `within` this time from now, or the robot falls
+        before. It is looked at every 250 us, between two steps of the plant.
+        """
+        waiting = Waiting(self, condition(wanted))
+        begun_ns, patience_ns = self.loop.time, nanoseconds(within, "until: within")
+        stop = StopRule(time_s=(begun_ns + patience_ns - self.start_ns) * 1e-9) if patience_ns else None
+        self.loop.watchers.append(waiting)
+        try:
+            if stop is not None:
+                self.run(stop, patience_ns * 1e-9)
+        finally:
+            self.loop.watchers.remove(waiting)
+        if not waiting.met and not waiting.wanted.met():
+            passed = duration_text(self.loop.time - begun_ns)
+            why = f"the robot fell ({self.ended}) after" if self.ended else "not within"
+            raise ConditionNotMetError(f"{waiting.wanted.text}: {why} {passed}; {waiting.wanted.nearest()}")
+        return self.time_s
+
+    def inject(
+        self,
+        place: str,
+        mode: str,
+        at: str | Condition | Callable[[Any], Any] | None = None,
+        until: str | Condition | Callable[[Any], Any] | None = None,
+        **parameters: float,
+    ) -> Fault:
+        """Arm a fault: `mode` at `place` from the condition `at` on (None: at once) `until` another one (None: stays).
+
+        `ranger-sim faults` lists places, modes and parameters. UserError for what is not in that list. The Fault
+        tells what became of it: `acted`, the stamps, the largest difference at its place.
+        """
+        fault = catalogue.fault(place, mode, at, until, parameters)
+        fault.arm(self)
+        self.faults.append(fault)
+        return fault
 
     def attach(self, end: Any) -> None:
         """From now on `end.poll(now_ns)` is called as often as it asks for; it returns when it wants to be next."""

@@ -9,15 +9,7 @@ import numpy as np
 from ranger_sim import datatable
 from ranger_sim.boards.counters import RangerCounters
 from ranger_sim.datatable.generated import all_variables
-
-# machine: variable of its state in the main brain's table
-STATE_VARIABLES = {
-    "leg": "FSM_LEG",
-    "hip": "FSM_HIP",
-    "inner_foot": "FSM_FI",
-    "outer_foot": "FSM_FO",
-    "steering": "FSM_STEER",
-}
+from ranger_sim.harness.conditions import STATE_VARIABLES
 
 
 @dataclasses.dataclass

@@ -13,6 +13,7 @@ REACHED_TIME: int
 REACHED_STEPS: int
 REACHED_DISTANCE: int
 FELL: int
+A_WATCHER_STOPPED: int
 WINDOW_NS: int
 ANY_DISTANCE_M: float
 
@@ -30,6 +31,7 @@ class Lockstep:
     stop_distance_m: float
     sampler: Sampler
     strikes: StrikeWatch | None
+    watchers: list[Any]
     imu_wire: ImuWire | None
     encoder_boards: MutableSequence[int]
     due: MutableSequence[int]
@@ -37,6 +39,7 @@ class Lockstep:
     prompt: MutableSequence[int]
     step_times: MutableSequence[int]
     side_by_side: bool
+    stop_wanted: bool
     def __init__(self, plant: RangerPlant, boards: Any, buses: list[Any], sampler: Sampler, start_ns: int) -> None: ...
     def _put(self, place: Any, board: Any) -> None: ...
     def place(self, name: Any) -> int: ...

@@ -1,0 +1,39 @@
+"""Quantities as people write them: 60s, 1.5 km, 1mm, 70 %, 450 us."""
+
+import math
+import re
+
+from ranger_sim.foundation.user_error import UserError
+
+LENGTHS = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "km": 1e3}
+ENERGIES_WH = {"Wh": 1.0, "kWh": 1e3}
+SHARES = {"%": 1e-2}
+TIMES = {"ns": 1e-9, "us": 1e-6, "ms": 1e-3, "s": 1.0, "min": 60.0, "h": 3600.0}
+
+NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+
+
+def in_base_units(text: str, units: dict[str, float]) -> float | None:
+    """A number with an optional unit of `units`, in that unit's base; None when `text` is not one."""
+    match = re.fullmatch(rf"\s*({NUMBER})\s*([a-zA-Z%]*)\s*", text)
+    if match is None or match.group(2) not in {"", *units}:
+        return None
+    return float(match.group(1)) * units.get(match.group(2), 1.0)
+
+
+def nanoseconds(duration: str, what: str = "duration") -> int:
+    """`duration` ("450 us", "50 ms", "2 s") in whole ns; the unit must be there. UserError names `what` otherwise."""
+    value = in_base_units(duration, TIMES) if isinstance(duration, str) else None
+    if value is None or not re.search(r"[a-z]\s*$", duration) or not math.isfinite(value):
+        raise UserError(f"{what} {duration!r}: a number with one of the units {', '.join(TIMES)} is needed")
+    if value < 0.0:
+        raise UserError(f"{what} {duration!r}: it must not be below 0")
+    return round(value * 1e9)
+
+
+def duration_text(time_ns: float) -> str:
+    """A duration with the unit that reads best: 12.5 us, 3 ms, 1.25 s."""
+    for unit, size in (("s", 1e9), ("ms", 1e6), ("us", 1e3)):
+        if abs(time_ns) >= size:
+            return f"{time_ns / size:.6g} {unit}"
+    return f"{time_ns:.6g} ns"

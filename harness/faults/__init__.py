@@ -1,0 +1,1 @@
+"""Faults at physical places of the robot, with proof that they acted."""

@@ -1,0 +1,70 @@
+"""Every place and every mode, and which mode a place takes."""
+
+import difflib
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any
+
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.harness.conditions import Condition, condition
+from ranger_sim.harness.faults import text as typed_text
+from ranger_sim.harness.faults.fault import Fault, Place
+
+PLACES: dict[str, Place] = {}
+# by (kind of place, name of the mode)
+MODES: dict[tuple[str, str], type[Fault]] = {}
+
+
+def add_places(places: Iterable[Place]) -> None:
+    """Put places in the catalogue. UserError for a name that is there."""
+    for place in places:
+        if place.name in PLACES:
+            raise UserError(f"fault place {place.name}: it is in the catalogue already")
+        PLACES[place.name] = place
+
+
+def mode(kind: type[Fault]) -> type[Fault]:
+    """A class decorator: the mode is in the catalogue, for each of its kinds of places."""
+    for place_kind in kind.kinds:
+        if (place_kind, kind.mode) in MODES:
+            raise UserError(f"fault mode {kind.mode} at {place_kind}: it is in the catalogue already")
+        MODES[place_kind, kind.mode] = kind
+    return kind
+
+
+def modes_of(place: Place) -> dict[str, type[Fault]]:
+    """The modes that a place takes, by name."""
+    return {name: kind for (place_kind, name), kind in MODES.items() if place_kind == place.kind}
+
+
+def named(name: str, there: Iterable[str], what: str) -> str:
+    """`name`, which must be `there`; otherwise a UserError with the nearest ones."""
+    names = list(there)
+    if name not in names:
+        near = difflib.get_close_matches(name, names, 3)
+        hint = f"meant was perhaps {' or '.join(near)}" if near else f"there are {', '.join(names) or 'none'}"
+        raise UserError(f"{what} {name!r}: {hint}; `ranger-sim faults` lists them")
+    return name
+
+
+def fault(
+    place: str,
+    mode: str,
+    start: str | Condition | Callable[[Any], Any] | None,
+    end: str | Condition | Callable[[Any], Any] | None,
+    parameters: Mapping[str, Any],
+) -> Fault:
+    """A fault, not armed yet. UserError for a place, mode, parameter or value that the catalogue does not have."""
+    where = PLACES[named(place, PLACES, "fault place")]
+    kind = modes_of(where)[named(mode, modes_of(where), f"fault mode at {where.name},")]
+    known = {parameter.name: parameter for parameter in kind.parameters}
+    values = {name: parameter.default for name, parameter in known.items()}
+    for name, value in parameters.items():
+        named(name, known, f"fault {where.name}:{mode}, parameter")
+        values[name] = known[name].checked(value, f"fault {where.name}:{mode}")
+    return kind(where, None if start is None else condition(start), None if end is None else condition(end), values)
+
+
+def typed(text: str) -> Fault:
+    """The fault that somebody typed (harness/faults/text.py)."""
+    parts = typed_text.parse(text)
+    return fault(parts.place, parts.mode, parts.start, parts.end, parts.parameters)

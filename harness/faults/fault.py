@@ -1,0 +1,188 @@
+"""One fault: what every kind of fault has, from being armed until its place is as it should be again.
+
+A fault sits at a physical place: on a wire, in a sensor, a winding, a bus, the floor. It never writes what firmware
+keeps. Its life, each stamp in ns of virtual time, -1 for not yet:
+
+    armed_ns        it waits for its start condition
+    activated_ns    it began to work on its place
+    acted_ns        the value at its place differed for the first time from what it would be without the fault
+    ended_ns        its end condition came true; from here on it does nothing
+    cleared_ns      its place showed again what it shows without a fault
+
+A fault that never acted proves nothing, whatever the robot did.
+"""
+
+import dataclasses
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+from ranger_sim.foundation.random_stream import RandomStream
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.harness.conditions import Condition
+from ranger_sim.harness.step_watch import StepWatch
+
+
+@dataclasses.dataclass(frozen=True)
+class Parameter:
+    """A number that a mode takes. `source`: where default and limits come from, or why we chose them."""
+
+    name: str
+    unit: str
+    default: float
+    low: float
+    high: float
+    meaning: str
+    source: str
+
+    def checked(self, value: Any, where: str) -> float:
+        """`value` as a number within the limits, or a UserError naming `where`."""
+        try:
+            number = float(value)
+        except (TypeError, ValueError):
+            number = float("nan")
+        if not self.low <= number <= self.high:
+            raise UserError(
+                f"{where}: {self.name} is {value!r}, allowed are {self.low:g} to {self.high:g} {self.unit}".rstrip()
+            )
+        return number
+
+
+@dataclasses.dataclass(frozen=True)
+class Place:
+    """Where a fault can sit. `name` as it is typed ("MCH.joint_encoder"); `kind` decides which modes are possible.
+
+    `details`: what the modes of this kind need in order to find it on a robot, from harness/wiring.py.
+    """
+
+    name: str
+    kind: str
+    what: str
+    details: Mapping[str, Any] = dataclasses.field(default_factory=dict)
+
+
+class Fault(StepWatch):
+    """A mode at a place. Subclasses are modes: they name themselves and say what they do.
+
+    `mode`, `kinds` of places, `meaning` (one sentence), `parameters`, `unit` of the difference at the place.
+    `permanent`: what ends its consequence ("a power cycle"), empty when the place is clear as soon as the fault ends.
+    """
+
+    mode: ClassVar[str]
+    kinds: ClassVar[tuple[str, ...]]
+    meaning: ClassVar[str]
+    parameters: ClassVar[tuple[Parameter, ...]] = ()
+    unit: ClassVar[str] = ""
+    permanent: ClassVar[str] = ""
+
+    def __init__(
+        self, place: Place, start: Condition | None, end: Condition | None, values: Mapping[str, float]
+    ) -> None:
+        StepWatch.__init__(self)
+        self.place = place
+        self.start = start
+        self.end = end
+        self.values = dict(values)
+        self.robot: Any = None
+        self.armed_ns = self.activated_ns = self.acted_ns = self.ended_ns = self.cleared_ns = -1
+        self.acted_count = 0
+        self.largest_difference = 0.0
+
+    # --- what a mode says -----------------------------------------------------------------------------------
+
+    def connect(self) -> None:
+        """Once, when it is armed: find the place on `self.robot`. UserError when it cannot act there."""
+
+    def begin(self, now_ns: int) -> None:
+        """It begins to work."""
+
+    def before(self, now_ns: int) -> None:
+        """While it works, before each step of the plant."""
+
+    def after(self, start_ns: int, end_ns: int) -> None:
+        """While it works, when the sensors of a step are there and no board has seen them."""
+
+    def finish(self, now_ns: int) -> None:
+        """It stops working: whatever it changed at its place is put back."""
+
+    def is_clear(self, start_ns: int, end_ns: int) -> bool:
+        """After its end, once per step until it is true: the place shows what it shows without a fault."""
+        return True
+
+    # --- its life -------------------------------------------------------------------------------------------
+
+    @property
+    def acted(self) -> bool:
+        """The value at the place differed at least once from the unfaulted one."""
+        return self.acted_count > 0
+
+    @property
+    def active(self) -> bool:
+        """It works on its place now."""
+        return self.activated_ns >= 0 > self.ended_ns
+
+    def arm(self, robot: Any) -> None:
+        """It waits on `robot` for its start; without a start condition it begins with the next step."""
+        self.robot = robot
+        self.random = RandomStream(robot.scenario.seed, f"fault {len(robot.faults)} {self.place.name} {self.mode}")
+        self.connect()
+        for each in (self.start, self.end):
+            if each is not None:
+                each.begin(robot)
+        self.armed_ns = robot.loop.time
+        robot.loop.watchers.append(self)
+
+    def note(self, time_ns: int, difference: float) -> None:
+        """For modes: at `time_ns` the place differed by `difference` (`unit`) from what it shows without the fault."""
+        if self.acted_count == 0:
+            self.acted_ns = time_ns
+        self.acted_count += 1
+        if abs(difference) > abs(self.largest_difference):
+            self.largest_difference = difference
+
+    def before_step(self, now_ns: int) -> None:
+        if self.activated_ns < 0 and (self.start is None or self.start.met()):
+            self.activated_ns = now_ns
+            self.begin(now_ns)
+        if self.active and self.end is not None and self.end.met():
+            self.ended_ns = now_ns
+            self.finish(now_ns)
+        if self.active:
+            self.before(now_ns)
+
+    def after_step(self, start_ns: int, end_ns: int) -> None:
+        if self.active:
+            self.after(start_ns, end_ns)
+        elif self.ended_ns >= 0 > self.cleared_ns and self.is_clear(start_ns, end_ns):
+            self.cleared_ns = end_ns
+            self.robot.loop.watchers.remove(self)
+
+    def text(self) -> str:
+        """As it is typed after --fault."""
+        values = "".join(f",{name}={value:g}" for name, value in self.values.items() if value != self.default(name))
+        period = f"@{self.start.text if self.start else '0 s'}" if self.start or self.end else ""
+        return f"{self.place.name}:{self.mode}{values}{period}" + (f"..{self.end.text}" if self.end else "")
+
+    @classmethod
+    def default(cls, name: str) -> float:
+        """Default of a parameter."""
+        return next(parameter.default for parameter in cls.parameters if parameter.name == name)
+
+    def summary(self) -> dict[str, Any]:
+        """What became of it; times in s since power-up, None for not yet."""
+
+        def seconds(stamp_ns: int) -> float | None:
+            return None if stamp_ns < 0 else (stamp_ns - self.robot.start_ns) * 1e-9
+
+        return {
+            "fault": self.text(),
+            "armed_s": seconds(self.armed_ns),
+            "activated_s": seconds(self.activated_ns),
+            "acted_s": seconds(self.acted_ns),
+            "ended_s": seconds(self.ended_ns),
+            "cleared_s": seconds(self.cleared_ns),
+            "acted": self.acted,
+            "acted_count": self.acted_count,
+            "largest_difference": self.largest_difference,
+            "unit": self.unit,
+            "permanent": self.permanent or None,
+        }

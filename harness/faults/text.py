@@ -1,0 +1,36 @@
+"""A fault as it is typed: PLACE:MODE[,name=value ...][@START[..END]].
+
+MCH.joint_encoder:stuck@step 12..step 14
+UI.imu:gyro_bias,rate=0.2@3 s
+"""
+
+from typing import NamedTuple
+
+from ranger_sim.foundation.user_error import UserError
+
+
+class Typed(NamedTuple):
+    """The parts of the text; conditions as text, None when they are not there."""
+
+    place: str
+    mode: str
+    parameters: dict[str, str]
+    start: str | None
+    end: str | None
+
+
+def parse(text: str) -> Typed:
+    """The parts of a typed fault. UserError with the form when it does not read like one."""
+    what, _, period = text.partition("@")
+    place, colon, rest = what.partition(":")
+    mode, *pairs = (part.strip() for part in rest.split(","))
+    start, dots, end = (part.strip() for part in period.partition(".."))
+    parameters: dict[str, str] = {}
+    for pair in pairs:
+        name, equals, value = (part.strip() for part in pair.partition("="))
+        if not (name and equals and value) or name in parameters:
+            raise UserError(f"fault {text!r}: {pair!r} is not name=value, once per name")
+        parameters[name] = value
+    if not (colon and place.strip() and mode) or ("@" in text and not start) or (dots and not end):
+        raise UserError(f"fault {text!r}: it reads PLACE:MODE[,name=value][@START[..END]]")
+    return Typed(place.strip(), mode, parameters, start or None, end or None)

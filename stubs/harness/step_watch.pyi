@@ -1,0 +1,9 @@
+# Generated from harness/step_watch.py and harness/step_watch.pxd (python -m ranger_sim.tools.stubs); do not edit.
+
+from typing import Any
+
+class StepWatch:
+    seen_ns: int
+    def __init__(self) -> None: ...
+    def before_step(self, now_ns: int) -> Any: ...
+    def after_step(self, start_ns: int, end_ns: int) -> Any: ...

@@ -1,0 +1,37 @@
+"""Quantities as people write them."""
+
+import pytest
+
+from ranger_sim.foundation.quantities import TIMES, duration_text, in_base_units, nanoseconds
+from ranger_sim.foundation.user_error import UserError
+
+
+@pytest.mark.parametrize(
+    ("text", "ns"),
+    [("450 us", 450_000), ("50ms", 50_000_000), ("2 s", 2_000_000_000), ("0 ns", 0), ("1.5 min", 90_000_000_000)],
+)
+def test_a_duration_is_whole_nanoseconds(text, ns):
+    assert nanoseconds(text) == ns
+
+
+@pytest.mark.parametrize("text", ["450", "us", "1 light-year", "nan s", "inf s", "1 2 s", "", 5, None])
+def test_what_is_no_duration_is_refused_by_name(text):
+    with pytest.raises(UserError, match=r"within .*a number with one of the units ns, us, ms, s, min, h is needed"):
+        nanoseconds(text, "within")
+
+
+def test_a_negative_duration_is_refused():
+    with pytest.raises(UserError, match="must not be below 0"):
+        nanoseconds("-1 ns")
+
+
+def test_a_unit_may_be_left_out_where_a_base_is_known():
+    assert in_base_units("3", TIMES) == 3.0
+    assert in_base_units("3 m", TIMES) is None
+
+
+@pytest.mark.parametrize(
+    ("ns", "text"), [(0, "0 ns"), (999, "999 ns"), (1000, "1 us"), (-12_500, "-12.5 us"), (1.25e9, "1.25 s")]
+)
+def test_a_duration_is_told_in_the_unit_that_reads_best(ns, text):
+    assert duration_text(ns) == text
