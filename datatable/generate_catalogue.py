@@ -56,6 +56,8 @@ def catalogue(table: Table) -> dict[str, object]:
                 "code": error.id,
                 "name": error.name,
                 "boards": list(error.boards),
+                "normal_per_s": error.normal_per_s,
+                "normal_at_start": error.normal_at_start,
                 "description": error.description,
             }
             for error in table.errors

@@ -158,6 +158,16 @@ def all_variables_module(table: Table) -> str:
     return "\n".join(lines) + "\n"
 
 
+def normal_pairs(table: Table, field: str) -> list[tuple[str, str]]:
+    """(code, {board: number}) as text of every error that has such numbers."""
+    found = []
+    for error in table.errors:
+        numbers = getattr(error, field)
+        if numbers:
+            found.append((str(error.id), "{" + ", ".join(f"{quoted(b)}: {n:g}" for b, n in numbers.items()) + "}"))
+    return found
+
+
 def errors_module(table: Table) -> str:
     lines = [
         '"""Error codes of all boards.',
@@ -170,6 +180,10 @@ def errors_module(table: Table) -> str:
         f"LAST = {table.errors[-1].id + 1 if table.errors else 0}  # first code that is free",
         *dict_lines("NAMES", "dict[int, str]", ((str(e.id), quoted(e.name)) for e in table.errors)),
         *dict_lines("DESCRIPTIONS", "dict[int, str]", ((str(e.id), quoted(e.description)) for e in table.errors)),
+        "",
+        "# what a healthy walk raises at most, by board: per second, and once after power-up",
+        *dict_lines("NORMAL_PER_S", "dict[int, dict[str, float]]", normal_pairs(table, "normal_per_s")),
+        *dict_lines("NORMAL_AT_START", "dict[int, dict[str, float]]", normal_pairs(table, "normal_at_start")),
     ]
     return "\n".join(lines) + "\n"
 

@@ -48,13 +48,14 @@ VARIABLE_COLUMNS = (
     "maximum",
     "description",
 )
-ERROR_COLUMNS = ("id", "name", "boards", "description")
+ERROR_COLUMNS = ("id", "name", "boards", "normal_per_s", "normal_at_start", "description")
 
 NAME = re.compile(r"[A-Z][A-Z0-9_]*")
 NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,3})?", re.ASCII)
 WHOLE = re.compile(r"\d{1,9}", re.ASCII)
 TEXT = re.compile(r"[ -~]*")  # printable ASCII: the texts go into C and DBC files
 MOST_ROWS = 65536
+MOST_NORMAL = 1e6  # of errors; no board of the robot counts more than one per slot and cause
 
 # Names that would collide in what is generated: Python module constants, C keywords (structure members are the
 # names in lower case), C macros, sections of a DBC file, and modules beside the boards' own.
@@ -68,7 +69,7 @@ RESERVED_NAMES = frozenset(
 )
 RESERVED_PREFIXES = ("ERR_", "RANGER_")
 RESERVED_SUFFIXES = ("_BOARD_NUMBER", "_SLOT_US", "_ROWS", "_SEND_COUNT", "_RECEIVE_COUNT", "_TABLE_H")
-RESERVED_ERRORS = frozenset(("LAST", "NAMES", "DESCRIPTIONS"))
+RESERVED_ERRORS = frozenset(("LAST", "NAMES", "DESCRIPTIONS", "NORMAL_PER_S", "NORMAL_AT_START"))
 RESERVED_BOARDS = frozenset(("ERRORS", "ROUTES", "RANGER"))
 
 
@@ -551,6 +552,25 @@ def check_schedules(
                     report(field, f"sends {variable}, which {shown(publishers[variable])[1:-1]} publishes")
 
 
+def normal_of(row: dict[str, str], field: str, users: list[str], report: Callable[[str, str], None]) -> dict[str, float]:
+    """{board: how often} of a cell such as MCH:350;MCFO:280; only boards that raise the error, numbers above 0."""
+    normal: dict[str, float] = {}
+    for part in names_of(row[field]):
+        board, colon, text = part.partition(":")
+        board, text = board.strip(), text.strip()
+        if not colon:
+            report(field, f"{shown(part)} is not BOARD:NUMBER")
+        elif board not in users:
+            report(field, f"{shown(board)} is none of its boards")
+        elif board in normal:
+            report(field, f"{shown(board)} is named twice")
+        elif not NUMBER.fullmatch(text) or not 0.0 < float(text) <= MOST_NORMAL:
+            report(field, f"{shown(text)} is not above 0 and up to {MOST_NORMAL:g}")
+        else:
+            normal[board] = float(text)
+    return normal
+
+
 def read_errors(path: pathlib.Path, boards: dict[str, Board], faults: Faults) -> list[ErrorCode]:
     """The error codes; rows with a fault are left out."""
     errors: list[ErrorCode] = []
@@ -575,9 +595,11 @@ def read_errors(path: pathlib.Path, boards: dict[str, Board], faults: Faults) ->
                 report("boards", f"unknown board {shown(user)}")
         for user in repeated(users):
             report("boards", f"{shown(user)} is named twice")
+        per_s = normal_of(row, "normal_per_s", users, report)
+        at_start = normal_of(row, "normal_at_start", users, report)
         description = text_of(row, "description", True, report)
         if number is not None and len(faults.found) == before:
-            errors.append(ErrorCode(number, name, tuple(users), description))
+            errors.append(ErrorCode(number, name, tuple(users), description, per_s, at_start))
     return sorted(errors, key=lambda error: error.id)
 
 

@@ -128,12 +128,14 @@ class Variable:
 
 @dataclasses.dataclass(frozen=True)
 class ErrorCode:
-    """One row of errors.csv."""
+    """One row of errors.csv. `normal_per_s`, `normal_at_start`: what a healthy walk raises at most, by board."""
 
     id: int
     name: str
     boards: tuple[str, ...]
     description: str
+    normal_per_s: dict[str, float] = dataclasses.field(default_factory=dict)
+    normal_at_start: dict[str, float] = dataclasses.field(default_factory=dict)
 
 
 @dataclasses.dataclass(frozen=True)

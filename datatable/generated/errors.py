@@ -366,3 +366,19 @@ DESCRIPTIONS: dict[int, str] = {
     117: "motor: drive reduced to keep the speed within its limit",
     118: "main brain: a parameter was set that the controller does not have",
 }
+
+# what a healthy walk raises at most, by board: per second, and once after power-up
+NORMAL_PER_S: dict[int, dict[str, float]] = {
+    41: {"MCH": 15, "MCFO": 2, "MCFI": 2},
+    42: {"MCH": 2, "MCFO": 2, "MCFI": 2},
+    43: {"MCH": 350, "MCFO": 280, "MCFI": 280},
+    94: {"UI": 2},
+    105: {"MCFO": 20, "MCFI": 20},
+    107: {"MCFO": 20, "MCFI": 20},
+    108: {"MCSI": 2001},
+    109: {"MCFO": 6, "MCFI": 6},
+}
+NORMAL_AT_START: dict[int, dict[str, float]] = {
+    77: {"MB": 1},
+    86: {"CSR": 1},
+}

@@ -69,9 +69,9 @@ id,name,type,unit,initial,publisher,subscribers,bus,period_ms,minimum,maximum,de
 """
 
 ERRORS = """\
-id,name,boards,description
-0,NOTHING,MB;LEG,no error
-1,TOO_HOT,LEG,the leg is hot
+id,name,boards,normal_per_s,normal_at_start,description
+0,NOTHING,MB;LEG,LEG:0.5,,no error
+1,TOO_HOT,LEG,,,the leg is hot
 """
 
 

@@ -139,6 +139,14 @@ ERROR_FAULTS = {
     "board twice": ("TOO_HOT,LEG", "TOO_HOT,LEG;LEG", 3, "TOO_HOT", "boards", "named twice"),
     "reserved name": ("1,TOO_HOT", "1,NAMES", 3, "NAMES", "name", "reserved"),
     "no description": ("the leg is hot", "", 3, "TOO_HOT", "description", "is empty"),
+    "normal without a board": ("LEG:0.5", "0.5", 2, "NOTHING", "normal_per_s", "'0.5' is not BOARD:NUMBER"),
+    "normal on a board without it": ("LEG:0.5", "KEYS:1", 2, "NOTHING", "normal_per_s", "'KEYS' is none of its boards"),
+    "normal twice": ("LEG:0.5", "LEG:1;LEG:2", 2, "NOTHING", "normal_per_s", "'LEG' is named twice"),
+    "normal never": ("LEG:0.5", "LEG:0", 2, "NOTHING", "normal_per_s", "'0' is not above 0"),
+    "normal below zero": ("LEG:0.5", "LEG:-1", 2, "NOTHING", "normal_per_s", "'-1' is not above 0"),
+    "normal in words": ("LEG:0.5", "LEG:often", 2, "NOTHING", "normal_per_s", "'often' is not above 0"),
+    "normal without end": ("LEG:0.5", "LEG:1e99", 2, "NOTHING", "normal_per_s", "up to 1e+06"),
+    "normal at the start in words": ("LEG:0.5,", "LEG:0.5,once", 2, "NOTHING", "normal_at_start", "not BOARD:NUMBER"),
 }
 
 
