@@ -1,5 +1,6 @@
 cimport cython
 
+from ranger_sim.firmware_sim.activity cimport INTERRUPT_RAN, MAIN_LOOP_RAN, TASK_RAN, WAIT_RAN, ActivityLog
 from ranger_sim.firmware_sim.alarm cimport Alarm, SlotTimer
 from ranger_sim.firmware_sim.chip cimport ALARMS, PINS, Chip
 from ranger_sim.firmware_sim.edge_line cimport EdgeLine
@@ -52,6 +53,12 @@ cdef class Microcontroller(Chip):
     @cython.final
     cdef long long _note_service(self, InterruptSource source, long long items) except? <long long>-1
     @cython.final
+    cdef long long _log_service(self, InterruptSource source, long long items, long long time, long long requested) except? <long long>-1
+    @cython.final
+    cdef long long _log_end_of_code(self) except? <long long>-1
+    @cython.final
+    cdef long long _log_task(self, Task task, long long cycles, long long items) except? <long long>-1
+    @cython.final
     cdef bint _resume(self) except? -1
     @cython.final
     cdef long long _end_row(self) except? <long long>-1
@@ -64,6 +71,6 @@ cdef class Microcontroller(Chip):
     @cython.final
     cdef long long _wait_over(self) except? <long long>-1
     @cython.final
-    cdef long long _charge(self, Task task, long long cycles) except? <long long>-1
+    cdef long long _charge(self, Task task, long long cycles, long long items) except? <long long>-1
     @cython.final
     cdef long long _close_slot(self, long long since) except? <long long>-1

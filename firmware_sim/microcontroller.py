@@ -16,19 +16,22 @@ Each busy time is rounded down to whole ns; cycle counts are exact integers.
 
 import cython
 
+from ranger_sim.firmware_sim.activity import ActivityLog
 from ranger_sim.firmware_sim.alarm import Alarm, SlotTimer
 from ranger_sim.firmware_sim.chip import Chip
 from ranger_sim.firmware_sim.clock import TickTrain
 from ranger_sim.firmware_sim.counters import BoardCounters
 from ranger_sim.firmware_sim.edge_line import EdgeLine
+from ranger_sim.firmware_sim.legend import InterruptLegend, Legend, TaskLegend
 from ranger_sim.firmware_sim.peripheral import Peripheral, Unclaimed
 from ranger_sim.firmware_sim.scheduler import Occasional, Schedule, SlotScheduler, Task, Wait
-from ranger_sim.firmware_sim.vic import SLOT_TIMER, InterruptController, InterruptSource
+from ranger_sim.firmware_sim.vic import FIQ, SLOT_TIMER, InterruptController, InterruptSource
 from ranger_sim.foundation.edge_buffer import EdgeBuffer
 from ranger_sim.foundation.events import EventQueue
 from ranger_sim.foundation.user_error import UserError
 
 if not cython.compiled:
+    from ranger_sim.firmware_sim.activity import INTERRUPT_RAN, MAIN_LOOP_RAN, TASK_RAN, WAIT_RAN
     from ranger_sim.firmware_sim.calls import call, handle, run
     from ranger_sim.firmware_sim.chip import ALARMS, PINS
     from ranger_sim.firmware_sim.scheduler import ENTRY, ENTRY_CALLS, ENTRY_NS, OCCASIONAL_TASK, WAIT_TASK
@@ -148,6 +151,40 @@ class Microcontroller(Chip):
         """What the board counted, by name."""
         return BoardCounters(hz=self.hz, unclaimed=self.unclaimed, slots=self.scheduler.counters())
 
+    def keep_activity(self, log: ActivityLog | None) -> None:
+        """From now on write what the processor does into `log`; None: no longer. It changes nothing of what it does."""
+        self.scheduler.attach_log(log)
+
+    def legend(self) -> object:
+        """What the numbers in its activity log stand for."""
+        scheduler = self.scheduler
+        return Legend(
+            board=self.name,
+            hz=self.hz,
+            cycles_per_ns=self.cycles_per_ns,
+            slot_ns=scheduler.slot_ns,
+            slot_cycles=scheduler.slot_cycles,
+            tasks=tuple(
+                TaskLegend(
+                    name=task.name,
+                    cost=task.cost,
+                    limit=task.limit,
+                    per_item=task.per_item,
+                    item=task.item,
+                    spins=isinstance(task, Wait),
+                    entries=tuple(e.number for e in task.tasks) if isinstance(task, Occasional) else (),
+                )
+                for task in scheduler.tasks
+            ),
+            interrupts=tuple(
+                InterruptLegend(source.name, source.cost, source.per_item, source.latency, source.slot == FIQ)
+                for source in self.vic.sources.values()
+            ),
+            rows=tuple(
+                tuple(task.number for task in scheduler.schedule.row_tasks(row)) for row in range(scheduler.row_count)
+            ),
+        )
+
     def new_alarm(self, peripheral, number) -> Alarm:
         """An alarm; when due, `peripheral.on_alarm(number, time)` runs."""
         self._check_peripheral(peripheral)
@@ -188,7 +225,7 @@ class Microcontroller(Chip):
     def request(self, source: InterruptSource) -> cython.longlong:
         """Raise an interrupt line; it is served as soon as its priority allows. 1 if newly pending."""
         self.next_time = self.instant
-        return self.vic.raise_source(source)
+        return self.vic.raise_source(source, self.now)
 
     def stop_at(self, time: cython.longlong) -> cython.longlong:
         """While the chip runs: it shall run no further than to `time` (ns), which is later than now.
@@ -298,9 +335,10 @@ class Microcontroller(Chip):
                     and inbox.head_time > first
                     and asking.bit != 0
                 ):
+                    asking.requested = first
                     self._serve(asking, inbox, first)
                 else:
-                    vic.raise_source(asking)
+                    vic.raise_source(asking, first)
         if self.alarm_time < own:
             own = self.alarm_time
         self.next_time = own
@@ -357,9 +395,10 @@ class Microcontroller(Chip):
                     or time >= self.edge_time
                     or time >= self.stop_time
                 ):
-                    vic.raise_source(line.source)
+                    vic.raise_source(line.source, time)
                     return time
                 # at once: the fast interrupt is free and nobody else waits for it
+                line.source.requested = time
                 self._serve(line.source, inbox, time)
             if vic.pending != 0 or self.edge_time >= self.stop_time:
                 return time
@@ -408,9 +447,14 @@ class Microcontroller(Chip):
             self.code_time = self.instant
         self.now = self.code_time
         done: cython.longlong = self.main_loop()
+        cycles: cython.longlong
         if done <= self.code_time:
             self.background_wanted = False
             return done
+        if self.scheduler.recording:
+            self._log_end_of_code()
+            cycles = int((done - self.code_time) * self.cycles_per_ns)
+            self.scheduler.log.begin_code(MAIN_LOOP_RAN, 0, self.code_time, cycles, self.scheduler.row, 0)
         self.code_time = done
         return done
 
@@ -418,6 +462,7 @@ class Microcontroller(Chip):
     def _serve(self, source, queue, time: cython.longlong) -> None:
         """Run the handler of `source`, which waits no longer, at `time` and let its cycles pass."""
         busy: cython.longlong
+        requested: cython.longlong = source.requested  # the handler may ask for the next service
         source.served += 1
         self.background_wanted = True
         self.now = time + source.latency_ns
@@ -428,6 +473,8 @@ class Microcontroller(Chip):
             busy = source.base_ns
         else:
             busy = self._note_service(source, 0 if items is None else items)
+            if self.scheduler.recording:
+                self._log_service(source, 0 if items is None else items, time, requested)
         if source.bit >= FIRST_FIQ:
             self.fiq_free = time + busy
         self.irq_free = (self.irq_free if self.irq_free > time else time) + busy
@@ -441,9 +488,35 @@ class Microcontroller(Chip):
         busy: cython.longlong = int(cycles * self.ns_per_cycle)
         self.stolen_cycles += cycles
         source.note(cycles)
-        if self.scheduler.recording:
-            self.scheduler.note_interrupt(source.name, cycles)
         return busy
+
+    @cython.final
+    def _log_service(
+        self, source, items: cython.longlong, time: cython.longlong, requested: cython.longlong
+    ) -> cython.longlong:
+        """Write a service of `source` from `time` on into the log; returns its latency (ns)."""
+        log: ActivityLog = self.scheduler.log
+        cycles: cython.longlong = source.base_cycles + source.per_item * items + self.extra_cycles
+        latency: cython.longlong = time + source.latency_ns - requested
+        row: cython.longlong = self.scheduler.row
+        end: cython.longlong
+        if self.irq_free <= time:
+            log.end_irq(self.irq_free)
+        if self.code_time < time:  # the processor was idle: what ran before is through
+            log.end_code(self.code_time)
+        if source.bit >= FIRST_FIQ:
+            end = time + int(cycles * self.ns_per_cycle)
+            log.put(INTERRUPT_RAN, source.number, time, end, cycles, latency, row, items)
+        else:
+            log.begin_irq(source.number, time, cycles, latency, row, items)
+        return latency
+
+    @cython.final
+    def _log_end_of_code(self) -> cython.longlong:
+        """What ran until now is through, and the interrupts in it; returns `code_time`."""
+        self.scheduler.log.end_irq(self.irq_free)
+        self.scheduler.log.end_code(self.code_time)
+        return self.code_time
 
     @cython.final
     def _resume(self) -> cython.bint:
@@ -463,7 +536,6 @@ class Microcontroller(Chip):
         if scheduler.late:
             scheduler.late = False
             self._close_slot(scheduler.late_time)
-            scheduler.late_record = None
         return True
 
     @cython.final
@@ -478,24 +550,26 @@ class Microcontroller(Chip):
     @cython.final
     def _spent(self, task, items: cython.longlong) -> cython.longlong:
         """A task that has just run handled `items`; returns the cycles it took."""
-        items = task.base_cycles + task.per_item * items + self.extra_cycles
+        cycles: cython.longlong = task.base_cycles + task.per_item * items + self.extra_cycles
         self.extra_cycles = 0
-        return self._charge(task, items)
+        return self._charge(task, cycles, items)
 
     @cython.final
     def _special_task(self, task) -> cython.bint:
         """A task of which not every call is alike, or whose calls are recorded. False when it has to spin."""
         entry: Task
         items: cython.longlong = 0
+        if self.scheduler.recording:
+            self._log_end_of_code()
         if task.kind == WAIT_TASK:
             return self._begin_wait(task)
         if task.kind == OCCASIONAL_TASK:
             entry = cython.cast(Occasional, task).next_task()
             if entry is None:
-                self._charge(task, task.base_cycles)
+                self._charge(task, task.base_cycles, 0)
                 return True
             result = call(entry.routine)
-            self._charge(task, task.base_cycles)
+            self._charge(task, task.base_cycles, 0)
             task = entry
         else:
             result = call(task.routine)
@@ -530,24 +604,37 @@ class Microcontroller(Chip):
             spun = 0
         self.waiting = False
         self.extra_cycles = 0
-        self._charge(task, spun + cost)
+        self._charge(task, spun + cost, spun)
         spun = int(cost * self.ns_per_cycle)
         self.code_time = before + spun
         return spun
 
     @cython.final
-    def _charge(self, task, cycles: cython.longlong) -> cython.longlong:
-        """Let the cycles of a task pass and hold them against its limit."""
+    def _charge(self, task, cycles: cython.longlong, items: cython.longlong) -> cython.longlong:
+        """Let the cycles of a task that handled `items` pass and hold them against its limit."""
         busy: cython.longlong = int(cycles * self.ns_per_cycle)
+        if self.scheduler.recording:
+            self._log_task(task, cycles, items)
         self.code_time += busy
         task.note(cycles)
         if cycles > task.most_cycles > 0:
             task.hits += 1
             if self.on_limit is not None:
                 self.on_limit(task)
-        if self.scheduler.recording:
-            self.scheduler.note_task(task.name, cycles)
         return cycles
+
+    @cython.final
+    def _log_task(self, task, cycles: cython.longlong, items: cython.longlong) -> cython.longlong:
+        """Write into the log that a task has the processor; returns since when (ns)."""
+        scheduler: SlotScheduler = self.scheduler
+        kind: cython.longlong = TASK_RAN
+        since: cython.longlong = self.code_time
+        if task.kind == WAIT_TASK:
+            kind = WAIT_RAN
+            since = self.wait_start
+        row: cython.longlong = scheduler.late_row if scheduler.late else scheduler.row
+        scheduler.log.begin_code(kind, task.number, since, cycles, row, items)
+        return since
 
     @cython.final
     def _close_slot(self, since: cython.longlong) -> cython.longlong:
@@ -555,10 +642,8 @@ class Microcontroller(Chip):
         scheduler: SlotScheduler = self.scheduler
         cycles: cython.longlong = int((self.code_time - since) * self.cycles_per_ns)
         if scheduler.recording:
-            if scheduler.late_record is not None:
-                scheduler.late_record.cycles = cycles
-            elif scheduler.record is not None:
-                scheduler.record.cycles = cycles
+            self._log_end_of_code()
+            scheduler.log_end(since, self.code_time, cycles)
         if scheduler.close(cycles) and self.on_near_limit is not None:
             self.on_near_limit()
         return cycles

@@ -1,4 +1,5 @@
 cimport cython
+from ranger_sim.firmware_sim.activity cimport SLOT_BEGAN, SLOT_ENDED, SLOT_OVERRAN, TASK_DROPPED, ActivityLog
 from ranger_sim.foundation.events cimport NEVER
 
 
@@ -91,13 +92,6 @@ cdef class Schedule:
     cdef public list every, rows, last
     cdef public bint completion_flag, announces
 
-@cython.final
-cdef class SlotRecord:
-    cdef public long long time_ns, row, cycles
-    cdef public bint overrun
-    cdef public list tasks
-    cdef public dict interrupts
-
 # Fields that a slot touches come first, close together; a memoryview has its address in its first bytes.
 @cython.final
 cdef class SlotScheduler:
@@ -119,10 +113,12 @@ cdef class SlotScheduler:
     cdef public Schedule schedule
     cdef public double ns_per_cycle
     cdef public long long slot_ns, overruns, dropped_tasks, near_limits
-    cdef public long long late_time
-    cdef public long long record_length
-    cdef public list records
-    cdef public SlotRecord record, late_record
+    cdef public long long late_time, late_count, late_row
+    cdef public ActivityLog log
     cpdef bint tick(self, long long timer_time) except? -1
     cpdef bint close(self, long long cycles) except? -1
+    cpdef int attach_log(self, ActivityLog log) except -1
+    cpdef int log_begin(self) except -1
+    cpdef int log_overrun(self, long long time) except -1
+    cpdef int log_end(self, long long since, long long time, long long cycles) except -1
     cpdef long long speaks_from(self, long long code_time, long long tick_time) except? <long long>-1

@@ -13,11 +13,13 @@ against `limit`. The event loop that spends the time is in microcontroller.py; h
 
 import cython
 
+from ranger_sim.firmware_sim.activity import ActivityLog
 from ranger_sim.firmware_sim.counters import SlotCounters
 from ranger_sim.foundation.numbers import integers
 from ranger_sim.foundation.user_error import UserError
 
 if not cython.compiled:
+    from ranger_sim.firmware_sim.activity import SLOT_BEGAN, SLOT_ENDED, SLOT_OVERRAN, TASK_DROPPED
     from ranger_sim.firmware_sim.calls import code_of, owner_of
     from ranger_sim.foundation.events import NEVER
 
@@ -272,19 +274,6 @@ class Schedule:
         return found
 
 
-class SlotRecord:
-    """One slot as it was: start (ns), row, cycles until its end (interrupts included), whether it overran,
-    `tasks` [(name, cycles), ...] in the order of running, `interrupts` {name: cycles}."""
-
-    def __init__(self, time_ns, row) -> None:
-        self.time_ns = time_ns
-        self.row = row
-        self.cycles = 0
-        self.overrun = False
-        self.tasks = []
-        self.interrupts = {}
-
-
 class SlotScheduler:
     """Row and position of a running schedule, and its records.
 
@@ -327,11 +316,10 @@ class SlotScheduler:
         self.total_slot_cycles = 0
         self.near_limits = 0
         self.late = False
-        self.late_time = 0
-        self.record_length = 0
-        self.records = []
-        self.record = None
-        self.late_record = None
+        self.late_time = 0  # of the slot whose last task still runs: its start, number and row
+        self.late_count = 0
+        self.late_row = 0
+        self.log = None
 
     def layout(self) -> None:
         """The schedule as flat lists; row r has the places from row_starts[r] on, and one more that is its end.
@@ -433,13 +421,14 @@ class SlotScheduler:
         if not self.done:
             overrun = True
             self.overruns += 1
+            if self.recording:
+                self.log_overrun(timer_time)
             self.dropped_tasks += self.end - self.position
             if not self.late:
                 self.late = True
                 self.late_time = self.slot_time
-                self.late_record = self.record
-            if self.recording and self.record is not None:
-                self.record.overrun = True
+                self.late_count = self.slot_count
+                self.late_row = self.row
         self.row += 1
         if self.row >= self.row_count:
             self.row = 0
@@ -453,7 +442,7 @@ class SlotScheduler:
         self.slot_count += 1
         self.listed_tasks += self.end - self.position
         if self.recording:
-            self.open_record()
+            self.log_begin()
         # ROBOT PARITY: the robot's runner compares start indices of rows, so in a table of one row it
         # would not notice the tick and would finish the old pass instead. Its tables all have several rows.
         return overrun
@@ -476,30 +465,35 @@ class SlotScheduler:
             self.near_limits += 1
         return near
 
-    def record_slots(self, length) -> None:
-        """Keep the last `length` slots in `records` (0: none, the default)."""
-        self.record_length = length
-        self.recording = length > 0
+    def attach_log(self, log: ActivityLog | None) -> None:
+        """Every slot from the next one on is written into `log`; None: into none."""
+        self.log = log
+        self.recording = log is not None
         for task in self.schedule.all_tasks():
             self.lay(task)
-        self.records = []
-        self.record = None
 
-    def open_record(self) -> None:
-        self.record = SlotRecord(self.slot_time, self.row)
-        self.records.append(self.record)
-        if len(self.records) > self.record_length:
-            del self.records[0]
+    def log_begin(self) -> None:
+        """Write that the slot of the present row began."""
+        log: ActivityLog = self.log
+        listed: cython.longlong = self.end - self.position
+        log.put(SLOT_BEGAN, self.slot_count, self.slot_time, self.slot_time, 0, 0, self.row, listed)
 
-    def note_task(self, name, cycles) -> None:
-        """Add a task's cycles to the record of the slot that runs."""
-        if self.record is not None:
-            self.record.tasks.append((name, cycles))
+    def log_overrun(self, time: cython.longlong) -> None:
+        """Write what the tick of `time` (ns) found unfinished, before it steps on."""
+        log: ActivityLog = self.log
+        place: cython.longlong
+        for place in range(self.position, self.end):
+            log.put(TASK_DROPPED, self.numbers[place], time, time, 0, 0, self.row, 0)
+        place = self.end - self.position
+        log.put(SLOT_OVERRAN, self.slot_count, self.slot_time, time, 0, 0, self.row, place)
 
-    def note_interrupt(self, name, cycles) -> None:
-        """Add stolen cycles to the record of the slot that runs."""
-        if self.record is not None:
-            self.record.interrupts[name] = self.record.interrupts.get(name, 0) + cycles
+    def log_end(self, since: cython.longlong, time: cython.longlong, cycles: cython.longlong) -> None:
+        """Write that the slot that began at `since` ended at `time` (ns): the present one, or one that overran."""
+        log: ActivityLog = self.log
+        if since < self.slot_time:
+            log.put(SLOT_ENDED, self.late_count, since, time, cycles, 0, self.late_row, 1)
+        else:
+            log.put(SLOT_ENDED, self.slot_count, since, time, cycles, 0, self.row, 0)
 
     def find(self, name):
         """The one task of this name (or the Task itself), wherever it stands in the table."""

@@ -16,10 +16,10 @@ cdef inline object handle(InterruptSource source, EventQueue queue):
 @cython.final
 cdef class InterruptSource:
     cdef public long long bit, code, owner, latency_ns, base_ns, base_cycles, served, per_item
-    cdef public long long noted, noted_cycles, noted_most, merged, forgotten
+    cdef public long long requested, noted, noted_cycles, noted_most, merged, forgotten
     cdef public object handler, service
     cdef public InterruptController controller
-    cdef public long long kind, index, cost, latency, slot
+    cdef public long long kind, index, number, cost, latency, slot
     cdef public str name
     cdef public long long time, order, a, b, c, d, e, f
     cdef public object ref
@@ -37,4 +37,4 @@ cdef class InterruptController:
     cdef public dict sources
     cpdef InterruptSource source(self, long long kind, long long index)
     cpdef InterruptSource take_first(self)
-    cpdef bint raise_source(self, InterruptSource source) noexcept
+    cpdef bint raise_source(self, InterruptSource source, long long time) noexcept

@@ -49,6 +49,8 @@ class InterruptSource:
         self.controller = controller
         self.kind = kind
         self.index = index
+        self.number = 0  # in the order in which the controller's sources were made
+        self.requested = 0  # instant (ns) of the request that is or was served
         self.name = f"{kind}/{index}"
         self.handler = None
         self.service = None  # what is called: the handler, or before it what gives it the message
@@ -174,6 +176,7 @@ class InterruptController:
         found = self.sources.get((kind, index))
         if found is None:
             found = InterruptSource(kind, index, self)
+            found.number = len(self.sources)
             self.sources[(kind, index)] = found
         return found
 
@@ -226,8 +229,8 @@ class InterruptController:
             self.irq_list[source.slot] = None
         source.bit = 0
 
-    def raise_source(self, source: InterruptSource) -> cython.bint:
-        """Request service; False when nobody listens or the request merged with a pending one."""
+    def raise_source(self, source: InterruptSource, time: cython.longlong) -> cython.bint:
+        """Request service at `time` (ns); False when nobody listens or the request merged with a pending one."""
         if self.pending & source.bit:
             source.merged += 1
             return False
@@ -235,6 +238,7 @@ class InterruptController:
             return False
         self.pending |= source.bit
         self.newest = source
+        source.requested = time
         return True
 
     @cython.boundscheck(False)

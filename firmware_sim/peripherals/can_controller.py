@@ -387,7 +387,7 @@ class CanController(Peripheral):
         self.RDA = self.second_RDA
         self.RDB = self.second_RDB
         if self.IER & ICR_RI:
-            self.chip.vic.raise_source(self.rx_source)
+            self.chip.vic.raise_source(self.rx_source, self.chip.now)
 
     # --- status -----------------------------------------------------------------------------------------
 

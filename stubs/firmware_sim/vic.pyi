@@ -29,6 +29,7 @@ class InterruptSource:
     base_cycles: int
     served: int
     per_item: int
+    requested: int
     noted: int
     noted_cycles: int
     noted_most: int
@@ -39,6 +40,7 @@ class InterruptSource:
     controller: InterruptController | None
     kind: int
     index: int
+    number: int
     cost: int
     latency: int
     slot: int
@@ -81,5 +83,5 @@ class InterruptController:
     def source(self, kind: int, index: int) -> InterruptSource: ...
     def attach(self, kind: Any, index: Any, handler: Any, cost: Any, per_item: Any = 0, slot: Any = 0, latency: Any = None, name: Any = None) -> Any: ...
     def detach(self, source: Any) -> None: ...
-    def raise_source(self, source: InterruptSource) -> bool: ...
+    def raise_source(self, source: InterruptSource, time: int) -> bool: ...
     def take_first(self) -> InterruptSource: ...

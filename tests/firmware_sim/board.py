@@ -1,5 +1,8 @@
 """What the tests of this package share: a chip whose tasks write down when they ran."""
 
+from typing import NamedTuple
+
+from ranger_sim.firmware_sim.activity import ACTIVITY_COLUMNS, ActivityLog
 from ranger_sim.firmware_sim.microcontroller import Microcontroller
 from ranger_sim.firmware_sim.peripheral import Peripheral
 from ranger_sim.firmware_sim.scheduler import Schedule, Task
@@ -35,6 +38,32 @@ class Log:
 
     def times(self, name):
         return [time for what, time in self.entries if what == name]
+
+
+class Row(NamedTuple):
+    """A row of an activity log."""
+
+    kind: int
+    number: int
+    start: int
+    end: int
+    cycles: int
+    latency: int
+    row: int
+    items: int
+
+
+def kept(chip, rows=4096):
+    """A new activity log of `chip`."""
+    log = ActivityLog(rows)
+    chip.keep_activity(log)
+    return log
+
+
+def rows_of(log):
+    """The rows that `log` keeps, as tuples with names."""
+    numbers = log.newest()
+    return [Row(*numbers[at : at + ACTIVITY_COLUMNS]) for at in range(0, len(numbers), ACTIVITY_COLUMNS)]
 
 
 class Raiser(Peripheral):

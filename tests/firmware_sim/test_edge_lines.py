@@ -12,6 +12,7 @@ from ranger_sim.firmware_sim.vic import FIQ
 from ranger_sim.foundation.edge_buffer import EdgeBuffer
 from ranger_sim.foundation.events import CAN_RX, NEVER, PIN_EDGE
 from ranger_sim.foundation.user_error import UserError
+from tests.firmware_sim.board import kept, rows_of
 
 PINS = ((22, 27), (16, 29))  # channels A and B of two encoders
 PINS_ORDER = 256  # stage pins
@@ -33,7 +34,7 @@ class Note(Peripheral):
 class Bench:
     """A chip with two encoders on a timer, slots of two tasks and a frame interrupt; it writes down what happens.
 
-    `second_slot`: where the second encoder's interrupt goes, None for nowhere. `recording`: with records of slots.
+    `second_slot`: where the second encoder's interrupt goes, None for nowhere. `recording`: with an activity log.
     `delay_ns`: after every edge of the first encoder an alarm rings, 0 for none.
     """
 
@@ -51,8 +52,7 @@ class Bench:
         chip.vic.attach(CAN_RX, 1, lambda queue: self.notes.append(("frame", chip.now, queue.b)), cost=700, slot=3)
         tasks = (Task(self.task("first"), cost=3_000), Task(self.task("second"), cost=2_000))
         chip.start(Schedule(slot_us=500, every=tasks), 7_000)  # so that ticks fall between the ends of steps
-        if recording:
-            chip.scheduler.record_slots(3)
+        self.activity = kept(chip) if recording else None
 
     def edge(self, channel, pin, partner):
         def served(queue):
@@ -75,7 +75,7 @@ class Bench:
             list(timer.lost),
             [(each.served, each.merged, each.total_cycles) for each in self.chip.vic.sources.values()],
             self.chip.scheduler.total_slot_cycles,
-            [(record.cycles, record.tasks, record.interrupts) for record in self.chip.scheduler.records],
+            rows_of(self.activity) if self.activity is not None else None,
         )
 
 

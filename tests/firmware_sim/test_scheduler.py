@@ -2,12 +2,13 @@
 
 import pytest
 
+from ranger_sim.firmware_sim.activity import INTERRUPT_RAN, SLOT_ENDED, TASK_RAN
 from ranger_sim.firmware_sim.clock import Crystal
 from ranger_sim.firmware_sim.scheduler import Occasional, Schedule, Task, Wait
 from ranger_sim.firmware_sim.vic import EXTERNAL_INTERRUPT
 from ranger_sim.foundation.events import NEVER
 from ranger_sim.foundation.user_error import UserError
-from tests.firmware_sim.board import TICK_CYCLES, TICK_NS, Log, raise_at
+from tests.firmware_sim.board import TICK_CYCLES, TICK_NS, Log, kept, raise_at, rows_of
 
 
 def test_before_its_first_tick_a_board_is_idle():
@@ -309,17 +310,26 @@ def test_records_show_each_slot_with_its_tasks_and_interrupts():
     scheduler = log.start(
         rows=((log.task("a", 600),), (log.task("b", 36_000), log.task("c", 60)), (log.task("d", 60),))
     )
-    scheduler.record_slots(2)
+    activity = kept(log.chip)
+    names = [task.name for task in log.chip.legend().tasks]
+
+    def ran(row):
+        return [
+            (names[each.number], each.cycles) for each in rows_of(activity) if each[0] == TASK_RAN if each[6] == row
+        ]
+
     log.chip.advance(500_000)
-    (record,) = scheduler.records
-    assert (record.time_ns, record.row, record.overrun) == (0, 0, False)
-    assert record.tasks == [("a", 600)]
+    (record,) = (each for each in rows_of(activity) if each.kind == SLOT_ENDED)
+    assert (record.start, record.row, record.items) == (0, 0, 0)
+    assert ran(0) == [("a", 600)]
     log.chip.advance(1_500_000)
-    b, d = scheduler.records
-    assert (b.row, b.overrun, b.tasks) == (1, True, [("b", 36_000)])
+    a, b, d = (each for each in rows_of(activity) if each.kind == SLOT_ENDED)
+    assert (b.row, b.items, ran(1)) == (1, 1, [("b", 36_000)])
     assert b.cycles == 2 * TICK_CYCLES + 36_000 - 1
-    assert (d.row, d.overrun, d.tasks) == (2, False, [("d", 60)])
-    assert d.interrupts == {"slot timer": TICK_CYCLES}
+    assert (d.row, d.items, ran(2)) == (2, 0, [("d", 60)])
+    interrupts = [each for each in rows_of(activity) if each.kind == INTERRUPT_RAN and each.start >= d.start]
+    assert [log.chip.legend().interrupts[each.number].name for each in interrupts] == ["slot timer"]
+    assert interrupts[0].cycles == TICK_CYCLES
     assert scheduler.task_cycles() == {"a": 600, "b": 36_000, "c": 0, "d": 60}
 
 

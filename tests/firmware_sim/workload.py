@@ -6,6 +6,7 @@ The digest covers every instant of every task and handler, every message sent, a
 import hashlib
 
 from ranger_sim.firmware_sim import microcontroller
+from ranger_sim.firmware_sim.activity import ActivityLog
 from ranger_sim.firmware_sim.clock import seeded_crystal
 from ranger_sim.firmware_sim.microcontroller import Microcontroller
 from ranger_sim.firmware_sim.peripherals.adc_external import Ads7871
@@ -110,9 +111,10 @@ class BusyBoard(Microcontroller):
         self.can1.transmit(1, 21, 8, self.adcx.results[1] & 0xFFFFFFFF, self.now // 1_000_000)
 
 
-def run(seed, duration_ns=200_000_000):
-    """Digest (hex) and the board after `duration_ns` of random load."""
+def run(seed, duration_ns=200_000_000, log=None):
+    """Digest (hex) and the board after `duration_ns` of random load; what it does is written into `log`."""
     board = BusyBoard(seed)
+    board.keep_activity(log)
     inputs = RandomStream(seed, "inputs")
     level = 0
     for start in range(0, duration_ns, QUANTUM_NS):
@@ -149,6 +151,15 @@ def run(seed, duration_ns=200_000_000):
     return board.trace.hexdigest(), board
 
 
+def activity_digest(seed, duration_ns=50_000_000):
+    """Digest (hex) of everything that an activity log gets."""
+    log, rows = ActivityLog(1000), hashlib.sha256()
+    log.add_sink(lambda time, block: rows.update(block))
+    run(seed, duration_ns, log)
+    log.flush()
+    return rows.hexdigest()
+
+
 if __name__ == "__main__":
     kind = "interpreted" if microcontroller.__file__.endswith(".py") else "compiled"
-    print(kind, *[run(seed)[0] for seed in (1, 2)])
+    print(kind, *[run(seed)[0] for seed in (1, 2)], activity_digest(1))
