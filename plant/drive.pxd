@@ -7,6 +7,10 @@ cpdef enum:
     WATCHDOG_EDGE = 1
     LOW_SIDE_WRITE = 2
     ROW = 5
+    DRIVEN = 0
+    HELD_OPEN = 1
+    HELD_LOW = 2
+    HELD_HIGH = 3
 
 @cython.final
 cdef class Drive:
@@ -19,9 +23,14 @@ cdef class Drive:
     cdef public long long mr2, mr6, mr0, watchdog_ns
     cdef public long long[::1] changes
     cdef public long long capacity, power_losses
+    cdef public long long held2, held6
+    cdef public double healthy_duty
+    cdef public bint healthy_open
     cpdef void write_pwm(self, long long time, long long mr2, long long mr6, long long mr0) noexcept
     cpdef void watchdog_edge(self, long long time) noexcept
     cpdef void low_side(self, long long time, bint enable2, bint enable6) noexcept
+    cpdef void hold_leg(self, long long leg, long long state) noexcept
     cpdef void _queue(self, long long time, long long kind, long long a, long long b, long long c) noexcept
     cpdef void apply(self, long long time) noexcept
     cpdef void _update(self) noexcept
+    cdef void _switch(self, bint conducts, long long high2, long long high6) noexcept

@@ -23,6 +23,12 @@ if not cython.compiled:
 
     ROW = 5  # numbers of a change in the queue
 
+    # what holds a leg (`hold_leg`)
+    DRIVEN = 0  # its PWM
+    HELD_OPEN = 1
+    HELD_LOW = 2
+    HELD_HIGH = 3
+
 
 class Drive:
     """One bridge. `duty`: net drive (MR2 - MR6) / MR0 of the battery voltage across the motor, -1 ... 1.
@@ -30,7 +36,8 @@ class Drive:
     `is_open`: no transistor conducts (no power, or a low side off), so the winding can only freewheel through the
     diodes. `switching_leads`: leads that toggle with the PWM. `sensed_lead_switches`: lead 2, where the current
     sensor sits (chosen by us, because no source says which), is one of them. `ripple`: (|D| (1 - |D|))^2 of the duty D,
-    to which the loss of the current's ripple is proportional.
+    to which the loss of the current's ripple is proportional. `healthy_duty`, `healthy_open`: what duty and openness
+    would be if no leg were held.
     """
 
     def __init__(self, watchdog_ns=10_000_000) -> None:
@@ -47,6 +54,10 @@ class Drive:
         self.is_open = True
         self.switching_leads = 0
         self.sensed_lead_switches = False
+        self.held2 = DRIVEN
+        self.held6 = DRIVEN
+        self.healthy_duty = 0.0
+        self.healthy_open = True
         self.power_losses = 0  # times the watchdog ran out
         # the queue, a row of numbers per change: time (ns), kind, what it writes
         self.changes = integers(ROW * 16)
@@ -78,6 +89,14 @@ class Drive:
     def low_side(self, time: cython.longlong, enable2: cython.bint, enable6: cython.bint) -> cython.void:
         """The two low-side enables from `time` on."""
         self._queue(time, LOW_SIDE_WRITE, enable2, enable6, 0)
+
+    def hold_leg(self, leg: cython.longlong, state: cython.longlong) -> cython.void:
+        """From now on leg 2 or 6 is held in this state; DRIVEN: it follows its PWM again."""
+        if leg == 2:
+            self.held2 = state
+        else:
+            self.held6 = state
+        self._update()
 
     def _queue(
         self,
@@ -151,14 +170,29 @@ class Drive:
         self._update()
 
     def _update(self) -> cython.void:
-        """Duty and switching leads from the registers; a match value at or above MR0 is always on."""
+        """Duty and switching leads from the registers, and from what holds a leg."""
         high2: cython.longlong = self.mr2
         high6: cython.longlong = self.mr6
+        conducts: cython.bint = self.powered and self.enable2 and self.enable6
+        self._switch(conducts, high2, high6)
+        self.healthy_duty = self.duty
+        self.healthy_open = self.is_open
+        if self.held2 != DRIVEN or self.held6 != DRIVEN:
+            if self.held2 == HELD_OPEN or self.held6 == HELD_OPEN:
+                conducts = False
+            if self.held2 != DRIVEN:
+                high2 = self.mr0 if self.held2 == HELD_HIGH else 0
+            if self.held6 != DRIVEN:
+                high6 = self.mr0 if self.held6 == HELD_HIGH else 0
+            self._switch(conducts, high2, high6)
+
+    def _switch(self, conducts: cython.bint, high2: cython.longlong, high6: cython.longlong) -> cython.void:
+        """Duty and switching leads for two match values; one at or above MR0 is always on."""
         period: cython.longlong = self.mr0
         leads: cython.longlong = 0
         duty: cython.double
         self.sensed_lead_switches = False
-        self.is_open = not (self.powered and self.enable2 and self.enable6)
+        self.is_open = not conducts
         if self.is_open or period <= 0:
             self.duty = 0.0
             self.ripple = 0.0

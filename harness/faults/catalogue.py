@@ -1,6 +1,7 @@
 """Every place and every mode, and which mode a place takes."""
 
 import difflib
+import importlib
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
@@ -9,9 +10,18 @@ from ranger_sim.harness.conditions import Condition, condition
 from ranger_sim.harness.faults import text as typed_text
 from ranger_sim.harness.faults.fault import Fault, Place
 
+# Modules of this package that put places and modes here when they are imported, in the order in which they are listed.
+MODULES = ("places", "edges", "words", "voltages", "imu", "converters", "actuators", "world")
+
 PLACES: dict[str, Place] = {}
 # by (kind of place, name of the mode)
 MODES: dict[tuple[str, str], type[Fault]] = {}
+
+
+def load() -> None:
+    """Fill the catalogue: import every module of MODULES. A second call does nothing."""
+    for name in MODULES:
+        importlib.import_module(f"ranger_sim.harness.faults.{name}")
 
 
 def add_places(places: Iterable[Place]) -> None:
@@ -36,6 +46,17 @@ def modes_of(place: Place) -> dict[str, type[Fault]]:
     return {name: kind for (place_kind, name), kind in MODES.items() if place_kind == place.kind}
 
 
+def refusal(place: Place, mode: str) -> str:
+    """Why a place does not take a mode that others take; empty when no place does, or this one does."""
+    if (place.kind, mode) in MODES:
+        return ""
+    others = {kind: fault for (kind, name), fault in MODES.items() if name == mode}
+    needs = next((fault.needs for fault in others.values() if fault.needs), "")
+    if not others:
+        return ""
+    return f"it needs {needs or ' or '.join(sorted(others))}, this is {place.what}"
+
+
 def named(name: str, there: Iterable[str], what: str) -> str:
     """`name`, which must be `there`; otherwise a UserError with the nearest ones."""
     names = list(there)
@@ -54,7 +75,10 @@ def fault(
     parameters: Mapping[str, Any],
 ) -> Fault:
     """A fault, not armed yet. UserError for a place, mode, parameter or value that the catalogue does not have."""
+    load()
     where = PLACES[named(place, PLACES, "fault place")]
+    if reason := refusal(where, mode):
+        raise UserError(f"fault {where.name}:{mode}: it cannot act there; {reason}")
     kind = modes_of(where)[named(mode, modes_of(where), f"fault mode at {where.name},")]
     known = {parameter.name: parameter for parameter in kind.parameters}
     values = {name: parameter.default for name, parameter in known.items()}

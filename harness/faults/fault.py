@@ -13,6 +13,7 @@ A fault that never acted proves nothing, whatever the robot did.
 """
 
 import dataclasses
+import math
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
@@ -24,7 +25,10 @@ from ranger_sim.harness.step_watch import StepWatch
 
 @dataclasses.dataclass(frozen=True)
 class Parameter:
-    """A number that a mode takes. `source`: where default and limits come from, or why we chose them."""
+    """A number that a mode takes. `source`: where default and limits come from, or why we chose them.
+
+    default: NaN where none is given means what `source` says then, as a level that stands as it is.
+    """
 
     name: str
     unit: str
@@ -64,15 +68,17 @@ class Fault(StepWatch):
     """A mode at a place. Subclasses are modes: they name themselves and say what they do.
 
     `mode`, `kinds` of places, `meaning` (one sentence), `parameters`, `unit` of the difference at the place.
+    `needs`: what a place must have for it, told where it is refused ("a serial word").
     `permanent`: what ends its consequence ("a power cycle"), empty when the place is clear as soon as the fault ends.
     """
 
     mode: ClassVar[str]
     kinds: ClassVar[tuple[str, ...]]
     meaning: ClassVar[str]
+    needs: ClassVar[str] = ""
     parameters: ClassVar[tuple[Parameter, ...]] = ()
-    unit: ClassVar[str] = ""
-    permanent: ClassVar[str] = ""
+    unit: str = ""
+    permanent: str = ""
 
     def __init__(
         self, place: Place, start: Condition | None, end: Condition | None, values: Mapping[str, float]
@@ -158,7 +164,11 @@ class Fault(StepWatch):
 
     def text(self) -> str:
         """As it is typed after --fault."""
-        values = "".join(f",{name}={value:g}" for name, value in self.values.items() if value != self.default(name))
+        values = "".join(
+            f",{name}={value:g}"
+            for name, value in self.values.items()
+            if value != self.default(name) and not math.isnan(value)
+        )
         period = f"@{self.start.text if self.start else '0 s'}" if self.start or self.end else ""
         return f"{self.place.name}:{self.mode}{values}{period}" + (f"..{self.end.text}" if self.end else "")
 
