@@ -59,7 +59,7 @@ class MotorFault(PlaceFault):
         self.motor.known_s = 0.0  # what it keeps of a step's exponential is of other numbers
 
     def settled_A(self) -> float:
-        """The current that the winding tends to at the present voltage and rate, in the joint's sense (EQUATIONS 10.2)."""
+        """The current, in the joint's sense, that voltage and rate of now lead to (EQUATIONS 10.2)."""
         motor, drive = self.motor, self.motor.drive
         battery_V = self.robot.plant.electrics.battery.voltage_V
         back_V = motor.mounting * motor.gear * motor.K * self.rate_rad_s()
@@ -124,9 +124,7 @@ class ShortedTurns(WindingFault):
     needs = "a motor"
     meaning = "has a share of its winding's turns shorted"
     fields = ("winding_ohm", "K", "inductance_H")
-    parameters = (
-        Parameter("share", "1", 0.5, 0.0, 0.95, "share of the turns", "chosen by us: every other turn"),
-    )
+    parameters = (Parameter("share", "1", 0.5, 0.0, 0.95, "share of the turns", "chosen by us: every other turn"),)
 
     def change(self) -> None:
         left = 1.0 - self.values["share"]
@@ -277,8 +275,8 @@ def row_with_zeros(row: tuple[int, int, int, tuple[float, ...]]) -> tuple[int, i
 class JammedJoint(TorqueFault):
     """Something is caught in the joint: it is held at the angle at which it was.
 
-    Held as by the ankles' stops (plant/parameters.py): a spring of 400 N m/rad with half of critical damping for a foot;
-    at the hip, where a leg of 0.5 kg m^2 swings, five times as stiff. The steering's is a damper that lets it creep.
+    Held as by the ankles' stops (plant/parameters.py): a spring of 400 N m/rad with half of critical damping for a
+    foot; at the hip, where a leg of 0.5 kg m^2 swings, five times as stiff. The steering's is a damper: it creeps.
     """
 
     mode = "jammed"
@@ -334,8 +332,13 @@ class CableSlip(TorqueFault):
     meaning = "has jumped on its pulley by an angle"
     parameters = (
         Parameter(
-            "angle", "rad", 0.2, -1.0, 1.0, "by which the motor is ahead of an unstretched cable", "chosen by us: below "
-            "the 0.3 rad at which the board sees a stretched cable (robot.md N4.8)"
+            "angle",
+            "rad",
+            0.2,
+            -1.0,
+            1.0,
+            "by which the motor is ahead of an unstretched cable",
+            "chosen by us: below the 0.3 rad at which the board sees a stretched cable (robot.md N4.8)",
         ),
     )
 

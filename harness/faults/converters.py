@@ -111,7 +111,13 @@ class ConverterOffset(TransferFault):
     meaning = "converts with a wrong zero"
     parameters = (
         Parameter(
-            "offset", "counts", 50.0, -8192.0, 8192.0, "added to each result", "chosen by us: 0.08 A of a motor's current"
+            "offset",
+            "counts",
+            50.0,
+            -8192.0,
+            8192.0,
+            "added to each result",
+            "chosen by us: 0.08 A of a motor's current",
         ),
     )
 
@@ -145,7 +151,8 @@ class TimeFault(ConverterFault):
         super().connect()
         if not self.external and self.board.name == "CSR":
             raise UserError(
-                f"fault {self.text()}: it cannot act there; the router's converter runs in burst mode, nobody waits for it"
+                f"fault {self.text()}: it cannot act there; the router's converter runs in burst mode, "
+                f"and nobody waits for it"
             )
 
     def lateness_ns(self) -> int:

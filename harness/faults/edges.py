@@ -1,8 +1,8 @@
 """Faults of incremental encoders: the edges between sensor and board are rewritten before the board sees them.
 
-The wire shows a count of its own, `shown`, beside the sensor's, `true`, both in edges of channel A as
-plant/incremental_encoder.py counts them. Channel A is high at even counts; going up, B is its opposite at an edge, going
-down its equal, and the board counts by that alone. So whatever a fault makes of the count, edges come out that a
+The wire shows a count of its own beside the sensor's, `true`, both in edges of channel A as
+plant/incremental_encoder.py counts them. Channel A is high at even counts; going up, B is its opposite at an edge,
+going down its equal, and the board counts by that alone. So whatever a fault makes of the count, edges come out that a
 sensor could have sent.
 
 Two families. Faults of the value (offset, drift, noise ...) let the wire run after a wrong count: extra edges come
@@ -18,8 +18,6 @@ import math
 from collections import deque
 from typing import Any
 
-from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness import wiring
 from ranger_sim.harness.faults import signals
 from ranger_sim.harness.faults.catalogue import mode
 from ranger_sim.harness.faults.fault import Parameter
@@ -44,7 +42,7 @@ COUNTS = Quantity(
     clip_low=-50.0,
     clip_high=50.0,
     open_value=0.0,
-    source="chosen by us: 100 edges are 0.15 rad of a joint, half of a step's half angle; the limit is five turns of it",
+    source="chosen by us: 100 edges are 0.15 rad of a joint, half of a step's half angle; the limit is five turns",
 )
 
 
@@ -251,9 +249,7 @@ class EdgesDelay(RunsAfter):
     mode = "delay"
     kinds = (EDGES,)
     meaning = "sends every edge late by the same time"
-    parameters = (
-        Parameter("delay_ms", "ms", 5.0, 0.25, 1e4, "how late", "chosen by us: ten slots of a motor board"),
-    )
+    parameters = (Parameter("delay_ms", "ms", 5.0, 0.25, 1e4, "how late", "chosen by us: ten slots of a motor board"),)
 
     def begin_on_wire(self, now_ns: int) -> None:
         self.waiting: deque[int] = deque()
@@ -372,7 +368,7 @@ class EdgesDropOut(OnTheLine):
 
 @mode
 class LostEdges(OnTheLine):
-    """Pulses that the receiver misses: an edge that is lost takes its successor with it, which finds the level there."""
+    """Pulses that the receiver misses: a lost edge takes its successor with it, which finds the level there."""
 
     mode = "lost_edges"
     kinds = (EDGES,)

@@ -142,9 +142,7 @@ class GyroBias(PacketFault):
     kinds = (IMU,)
     needs = "a gyro"
     meaning = "has a constant error of its gyros on top of the usual one"
-    parameters = (
-        Parameter("rate", "rad/s", RATE.typical, -RATE.limit, RATE.limit, "added to the rates", RATE.source),
-    )
+    parameters = (Parameter("rate", "rad/s", RATE.typical, -RATE.limit, RATE.limit, "added to the rates", RATE.source),)
 
     def begin(self, now_ns: int) -> None:
         super().begin(now_ns)

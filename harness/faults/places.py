@@ -32,9 +32,15 @@ FLOOR = "floor"
 ENCODERS = {
     point.HIP_JOINT_EDGES: ("joint_encoder", "the incremental encoder of the hip joint, 4096 edges a turn"),
     point.HIP_MOTOR_EDGES: ("motor_encoder", "the incremental encoder of the hip motor, 384 edges a turn, gear 66"),
-    point.OUTER_MOTOR_EDGES: ("motor_encoder", "the incremental encoder of the outer ankles' motor, 1024 edges, gear 34"),
+    point.OUTER_MOTOR_EDGES: (
+        "motor_encoder",
+        "the incremental encoder of the outer ankles' motor, 1024 edges, gear 34",
+    ),
     point.OUTER_ANKLE_EDGES: ("joint_encoder", "the incremental encoder of the outer ankles, 4096 edges a turn"),
-    point.INNER_MOTOR_EDGES: ("motor_encoder", "the incremental encoder of the inner ankles' motor, 1024 edges, gear 34"),
+    point.INNER_MOTOR_EDGES: (
+        "motor_encoder",
+        "the incremental encoder of the inner ankles' motor, 1024 edges, gear 34",
+    ),
     point.INNER_ANKLE_EDGES: ("joint_encoder", "the incremental encoder of the inner ankles, 4096 edges a turn"),
 }
 WORDS = {
@@ -91,7 +97,9 @@ def converters() -> list[Place]:
         details = {"board": board, "converter": "adc_internal"}
         places.append(Place(f"{board}.adc_internal", INTERNAL_CONVERTER, "the processor's 10-bit converter", details))
     details = {"board": "CSR", "converter": "adc"}
-    places.append(Place("CSR.adc_internal", INTERNAL_CONVERTER, "the router's 10-bit converter, in burst mode", details))
+    places.append(
+        Place("CSR.adc_internal", INTERNAL_CONVERTER, "the router's 10-bit converter, in burst mode", details)
+    )
     return places
 
 

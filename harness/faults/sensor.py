@@ -67,7 +67,9 @@ class Row:
     needs: str = ""
 
 
-def number(q: Quantity, name: str, default: float, low: float, high: float, meaning: str, unit: str | None = None) -> Parameter:
+def number(
+    q: Quantity, name: str, default: float, low: float, high: float, meaning: str, unit: str | None = None
+) -> Parameter:
     """A parameter in the unit of the quantity; default and limits follow from its row, as `source` says."""
     return Parameter(name, q.unit if unit is None else unit, default, low, high, meaning, q.source)
 
@@ -77,7 +79,15 @@ def lasting(meaning: str, length_ms: float, pause_ms: float) -> tuple[Parameter,
     chosen = "chosen by us: some slots of a board, some times per step"
     return (
         Parameter("length_ms", "ms", length_ms, 0.25, 1e6, f"how long {meaning} lasts", chosen),
-        Parameter("pause_ms", "ms", pause_ms, 0.0, 1e6, "mean pause until the next, exponential; the first comes at once", chosen),
+        Parameter(
+            "pause_ms",
+            "ms",
+            pause_ms,
+            0.0,
+            1e6,
+            "mean pause until the next, exponential; the first comes at once",
+            chosen,
+        ),
     )
 
 
@@ -104,12 +114,14 @@ ROWS = (
     Row("offset", signals.Offset, "shows a constant too much",
         lambda q: (number(q, "offset", q.typical, -q.limit, q.limit, "what is added"),)),
     Row("drift", signals.Drift, "shows an error that grows with time from nothing",
-        lambda q: (number(q, "rate", q.typical, -100.0 * q.limit, 100.0 * q.limit, "growth per second", f"{q.unit}/s"),)),
+        lambda q: (number(q, "rate", q.typical, -100.0 * q.limit, 100.0 * q.limit, "growth per second",
+                          f"{q.unit}/s"),)),
     Row("scale", signals.Scale, "shows its value times a factor", scaled),
     Row("noise", signals.Noise, "shows normal noise, new every 250 us",
         lambda q: (number(q, "deviation", q.typical / 5.0, 0.0, q.limit, "standard deviation"),)),
     Row("spike", signals.Spike, "shows a constant too much for a short time, at random",
-        lambda q: (number(q, "height", 3.0 * q.typical, -q.limit, q.limit, "what is added"), *lasting("a spike", 0.5, 50.0))),
+        lambda q: (number(q, "height", 3.0 * q.typical, -q.limit, q.limit, "what is added"),
+                   *lasting("a spike", 0.5, 50.0))),
     Row("drop_out", signals.DropOut, "reads as an open wire for a while, at random",
         lambda q: (number(q, "level", q.open_value, -q.limit, q.limit, "what an open wire reads"),
                    *lasting("a drop-out", 10.0, 100.0))),

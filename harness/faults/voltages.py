@@ -18,7 +18,7 @@ MOST_DEVIATIONS = 3.7  # of NoiseSource's normal numbers (plant/noise.py)
 
 # fmt: off
 QUANTITIES: Mapping[str, Quantity] = {
-    #                              unit  typical limit  clip low, high       open                                          source
+    #                              unit  typical limit  clip low, high       open
     places.MOTOR_CURRENT: Quantity("A",  1.0,    20.0,  -1.0, 1.0,           0.0,
         "chosen by us: a quarter of the hip's largest command (robot.md N4.2); the sensor ends at 12.6 A"),
     places.BATTERY_CURRENT: Quantity("A", 0.5,   10.0,  -0.2, 0.2,           0.0,
@@ -126,9 +126,7 @@ class ContactStuck(VoltageFault):
     meaning = "stays open or closed"
     unit = "V"
     signal_class = signals.Stuck
-    parameters = (
-        Parameter("closed", "1", 1.0, 0.0, 1.0, "1: closed as in stance, 0: open as in swing", LEVELS),
-    )
+    parameters = (Parameter("closed", "1", 1.0, 0.0, 1.0, "1: closed as in stance, 0: open as in swing", LEVELS),)
 
     def new_signal(self) -> signals.Signal:
         return signals.Stuck(self.random, level=STANCE_V if self.values["closed"] >= 0.5 else SWING_V)

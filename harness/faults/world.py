@@ -66,7 +66,9 @@ class Slope(WorldFault):
     meaning = "falls in the walking direction by an angle on top of its slope"
     unit = "rad"
     parameters = (
-        Parameter("angle", "rad", 0.02, -0.5, 0.5, "down positive", "chosen by us: about 1 degree; limits: scenario.py"),
+        Parameter(
+            "angle", "rad", 0.02, -0.5, 0.5, "down positive", "chosen by us: about 1 degree; limits: scenario.py"
+        ),
     )
 
     def begin(self, now_ns: int) -> None:
