@@ -220,7 +220,10 @@ class Ranger:
         `ranger-sim faults` lists places, modes and parameters. UserError for what is not in that list. The Fault
         tells what became of it: `acted`, the stamps, the largest difference at its place.
         """
-        fault = catalogue.fault(place, mode, at, until, parameters)
+        return self.arm(catalogue.fault(place, mode, at, until, parameters))
+
+    def arm(self, fault: Fault) -> Fault:
+        """Arm a fault that has been made already, as by `catalogue.typed`."""
         fault.arm(self)
         self.faults.append(fault)
         return fault

@@ -63,6 +63,7 @@ def of(robot: Any) -> dict:
         "slope_rad": robot.scenario.slope_rad,
         "floor_roughness_m": robot.scenario.floor_roughness_m,
         "electronics_off": list(robot.scenario.electronics_off),
+        "faults": [fault.summary() for fault in robot.faults],
         "trace_digest": robot.trace_digest(),
     }
 

@@ -16,11 +16,12 @@ from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn
 from ranger_sim import loading
 from ranger_sim.foundation import wallclock
 from ranger_sim.foundation.user_error import UserError
+from ranger_sim.harness.faults import catalogue
 from ranger_sim.harness.profile import Profile
 from ranger_sim.harness.profile import load as load_profile
 from ranger_sim.harness.scenario import Scenario, StopRule
 from ranger_sim.plant.electronics import SWITCHES
-from ranger_sim.tools import serial_options
+from ranger_sim.tools import faults, serial_options
 from ranger_sim.tools.files import json_target, replace_file, writable_folder
 from ranger_sim.tools.units import ENERGIES_WH, LENGTHS, SHARES, TIMES, quantity, whole_number
 
@@ -44,6 +45,15 @@ def register(commands: Any) -> None:
         description="All seven boards, four buses and the body in virtual time. Without an end it walks 100 steps.",
     )
     add_run_options(command)
+    command.add_argument(
+        "--fault",
+        action="append",
+        default=[],
+        metavar="TEXT",
+        help='lets something fail: "MCH.joint_encoder:stuck@step 12..step 14"; may be given several times; exit code 3 '
+        "when one did not act; ranger-sim faults lists places and modes",
+    )
+    faults.add_module_option(command)
     command.set_defaults(run=run)
 
 
@@ -125,7 +135,10 @@ def add_run_options(command: Any) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Walk, write the files, print the summary; 0 done, 1 fell or a board failed, 130 interrupted."""
+    """Walk, write the files, print the summary.
+
+    0 done, 1 fell or a board failed, 3 a fault did not act, 130 interrupted.
+    """
     stop = stop_of(options) or StopRule(steps=DEFAULT_STEPS)
     with ctrl_c_noted() as interrupted:
         return run_scenario(scenario_of(options), stop, options, interrupted)
@@ -181,8 +194,12 @@ def run_scenario(scenario: Scenario, stop: StopRule, options: argparse.Namespace
     console = Console(stderr=True, quiet=quiet)
     quirks = serial_options.quirks_of(options)
     profile = profile_of(options, console)
+    faults.load_modules(options)
+    wanted = [catalogue.typed(text) for text in options.fault]
     log = options.log if folder else "none"
     with contextlib.closing(Ranger(scenario, log=log, quirks=quirks, profile=profile)) as robot:
+        for fault in wanted:
+            robot.arm(fault)
         ends, places = serial_options.connect(robot, options)
         for place in places:
             console.print(place, highlight=False, soft_wrap=True)
@@ -197,6 +214,8 @@ def run_scenario(scenario: Scenario, stop: StopRule, options: argparse.Namespace
         finish(robot, summary, options, folder, json_file, console)
     if interrupted:
         return 130
+    if not all(fault["acted"] for fault in summary["faults"]):
+        return faults.EXIT_INVALID
     return 1 if summary["fell"] or summary["failed_boards"] else 0
 
 
@@ -337,6 +356,8 @@ def print_summary(summary: dict, console: Console) -> None:
         highlight=False,
     )
     console.print(energy_text(summary), highlight=False)
+    for fault in summary["faults"]:
+        console.print(faults.fault_text(fault), highlight=False, soft_wrap=True)
     for board, names in summary["errors"].items():
         if names:
             console.print(f"errors of {board}: " + ", ".join(f"{n} x {c}" for n, c in names.items()), highlight=False)

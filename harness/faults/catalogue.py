@@ -2,6 +2,8 @@
 
 import difflib
 import importlib
+import importlib.util
+import pathlib
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
@@ -22,6 +24,23 @@ def load() -> None:
     """Fill the catalogue: import every module of MODULES. A second call does nothing."""
     for name in MODULES:
         importlib.import_module(f"ranger_sim.harness.faults.{name}")
+
+
+def load_file(name: str | pathlib.Path) -> None:
+    """Run a user's .py file, which puts modes and places here. UserError when it cannot be read, or does not run."""
+    path = pathlib.Path(name)
+    if not path.is_file():
+        raise UserError(f"fault module {path}: there is no such file")
+    spec = importlib.util.spec_from_file_location(f"ranger_sim_fault_module_{path.stem}", path)
+    if spec is None or spec.loader is None:
+        raise UserError(f"fault module {path}: it is no Python file (.py)")
+    module = importlib.util.module_from_spec(spec)
+    try:
+        spec.loader.exec_module(module)
+    except UserError:
+        raise
+    except Exception as error:  # whatever a user's program raises
+        raise UserError(f"fault module {path}: {type(error).__name__}: {error}") from error
 
 
 def add_places(places: Iterable[Place]) -> None:
@@ -54,7 +73,7 @@ def refusal(place: Place, mode: str) -> str:
     needs = next((fault.needs for fault in others.values() if fault.needs), "")
     if not others:
         return ""
-    return f"it needs {needs or ' or '.join(sorted(others))}, this is {place.what}"
+    return f"it needs {needs or 'a place that is a ' + ' or a '.join(sorted(others))}"
 
 
 def named(name: str, there: Iterable[str], what: str) -> str:
@@ -67,6 +86,12 @@ def named(name: str, there: Iterable[str], what: str) -> str:
     return name
 
 
+def find(name: str) -> Place:
+    """The place of this name. UserError with the nearest ones for any other."""
+    load()
+    return PLACES[named(name, PLACES, "fault place")]
+
+
 def fault(
     place: str,
     mode: str,
@@ -75,10 +100,9 @@ def fault(
     parameters: Mapping[str, Any],
 ) -> Fault:
     """A fault, not armed yet. UserError for a place, mode, parameter or value that the catalogue does not have."""
-    load()
-    where = PLACES[named(place, PLACES, "fault place")]
+    where = find(place)
     if reason := refusal(where, mode):
-        raise UserError(f"fault {where.name}:{mode}: it cannot act there; {reason}")
+        raise UserError(f"fault {where.name}:{mode}: it cannot act there; {reason}, this is {where.what}")
     kind = modes_of(where)[named(mode, modes_of(where), f"fault mode at {where.name},")]
     known = {parameter.name: parameter for parameter in kind.parameters}
     values = {name: parameter.default for name, parameter in known.items()}

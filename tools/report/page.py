@@ -11,6 +11,7 @@ from markupsafe import Markup
 from plotly.offline import get_plotlyjs
 
 from ranger_sim import datatable
+from ranger_sim.tools.faults import fault_text
 from ranger_sim.tools.report import figures
 
 HERE = pathlib.Path(__file__).parent
@@ -62,6 +63,7 @@ def render(robot: Any, summary: dict) -> str:
             for board, names in summary["errors"].items()
             for name, count in names.items()
         ],
+        fault_lines=[fault_text(fault) for fault in summary["faults"]],
         animation=Markup(json.dumps(animation(robot, walk), allow_nan=False).replace("</", "<\\/")),
         walker_js=Markup((HERE / "walker.js").read_text(encoding="utf-8")),
         plotly_js=Markup(get_plotlyjs()),
@@ -169,4 +171,6 @@ def command(summary: dict) -> str:
         parts += ["--model", summary["model_file"]]
     if summary["slope_rad"]:
         parts += ["--slope", f"{summary['slope_rad']:g}"]
+    for fault in summary["faults"]:
+        parts += ["--fault", fault["fault"]]
     return shlex.join(parts)

@@ -1,0 +1,215 @@
+"""`ranger-sim faults`: every place at which a fault can sit, every mode that it takes, and why it takes no others.
+
+`python -m ranger_sim.tools.faults` writes the tables of docs/faults.md anew; a test compares them.
+"""
+
+import argparse
+import json
+import math
+import pathlib
+from typing import Any
+
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from ranger_sim.harness.faults import catalogue
+from ranger_sim.harness.faults.fault import Fault, Parameter, Place
+
+DOCUMENT = pathlib.Path(__file__).resolve().parent.parent / "docs" / "faults.md"
+EXIT_INVALID = 3  # of a run in which a fault did not act: it shows nothing
+TABLES_BEGIN = "<!-- written by python -m ranger_sim.tools.faults: begin -->\n"
+TABLES_END = "<!-- end -->\n"
+
+
+def register(commands: Any) -> None:
+    """Add the subcommand to the command line."""
+    command = commands.add_parser(
+        "faults",
+        help="list what can be made to fail, where, with which parameters",
+        description="Without PLACE all places and the modes of each; with PLACE what they do, parameter by parameter.",
+        epilog='ranger-sim walk --fault "MCH.joint_encoder:stuck@step 12..step 14" lets one act.',
+    )
+    command.add_argument("place", nargs="?", metavar="PLACE", help="a place, as MCH.joint_encoder")
+    command.add_argument("--json", action="store_true", help="print JSON instead of tables")
+    add_module_option(command)
+    command.set_defaults(run=run)
+
+
+def add_module_option(command: Any) -> None:
+    """The option that brings in a user's own modes and places."""
+    command.add_argument(
+        "--fault-module",
+        action="append",
+        default=[],
+        metavar="FILE",
+        help="a .py file with fault modes or places of your own (docs/faults.md); may be given several times",
+    )
+
+
+def load_modules(options: argparse.Namespace) -> None:
+    """Fill the catalogue, with the user's modules."""
+    catalogue.load()
+    for name in options.fault_module:
+        catalogue.load_file(name)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Print the catalogue, or one place of it."""
+    load_modules(options)
+    places = list(catalogue.PLACES.values())
+    if options.place is not None:
+        places = [catalogue.find(options.place)]
+    if options.json:
+        print(json.dumps([place_json(place) for place in places], indent=2))
+        return 0
+    console = Console(highlight=False)
+    if options.place is None:
+        table = Table(box=None, pad_edge=False)
+        table.add_column("place", no_wrap=True)
+        table.add_column("what it is, and the modes that it takes", overflow="fold")
+        for place in places:
+            table.add_row(place.name, f"{escape(place.what)}\n{', '.join(catalogue.modes_of(place))}")
+        console.print(table)
+        console.print("\nranger-sim faults PLACE tells what they do, and their parameters", soft_wrap=True)
+        return 0
+    print_place(places[0], console)
+    return 0
+
+
+def print_place(place: Place, console: Console) -> None:
+    """Modes of one place with their parameters, where these come from, and what it refuses."""
+
+    def tell(text: str) -> None:
+        console.print(escape(text), soft_wrap=True)
+
+    tell(f"{place.name}: {place.what}")
+    sources: dict[str, list[str]] = {}
+    for name, kind in catalogue.modes_of(place).items():
+        tell(f"\n{name:20}{kind.meaning}")
+        if kind.permanent:
+            tell(f"{'':20}stays until: {kind.permanent}")
+        for p in kind.parameters:
+            unit = "" if p.unit == "1" else f" {p.unit}"
+            tell(f"    {p.name:16}{default_text(p)}{unit} ({p.low:g} to {p.high:g}): {p.meaning}")
+            sources.setdefault(p.source, []).append(f"{name} {p.name}")
+    units = sorted({kind.unit for kind in catalogue.modes_of(place).values() if kind.unit})
+    tell(f"\nThe difference at the place is told in {' or '.join(units)}. Where the numbers come from:")
+    for source, parameters in sources.items():
+        tell(f"    {', '.join(parameters)}: {source}")
+    if reasons := refused(place):
+        tell("\nWhat cannot act there:")
+        for name, reason in reasons.items():
+            tell(f"    {name:20}{reason}")
+
+
+def refused(place: Place) -> dict[str, str]:
+    """Modes that other places take and this one does not, with the reason."""
+    names = sorted({name for _, name in catalogue.MODES})
+    return {name: reason for name in names if (reason := catalogue.refusal(place, name))}
+
+
+def default_text(parameter: Parameter) -> str:
+    """The default as it is shown; none where it means what the parameter says."""
+    return "none" if math.isnan(parameter.default) else f"{parameter.default:g}"
+
+
+def place_json(place: Place) -> dict[str, Any]:
+    """Everything about a place, for programs."""
+    return {
+        "place": place.name,
+        "kind": place.kind,
+        "what": place.what,
+        "modes": [mode_json(name, kind) for name, kind in catalogue.modes_of(place).items()],
+        "refused": refused(place),
+    }
+
+
+def mode_json(name: str, kind: type[Fault]) -> dict[str, Any]:
+    """Everything about a mode."""
+    return {
+        "mode": name,
+        "meaning": kind.meaning,
+        "unit": kind.unit,
+        "permanent": kind.permanent or None,
+        "parameters": [
+            {
+                "name": p.name,
+                "unit": p.unit,
+                "default": None if math.isnan(p.default) else p.default,
+                "low": p.low,
+                "high": p.high,
+                "meaning": p.meaning,
+                "source": p.source,
+            }
+            for p in kind.parameters
+        ],
+    }
+
+
+# --- what became of them --------------------------------------------------------------------------------------
+
+
+def fault_text(fault: dict) -> str:
+    """What became of a fault, in a line; of one that did not act, why the run shows nothing about it."""
+    name = f"fault {fault['fault']}"
+    if fault["activated_s"] is None:
+        return f"{name}: INVALID, it did not begin: its start condition never came true"
+    begun = f"{name}: began at {fault['activated_s']:.6g} s"
+    ended = "" if fault["ended_s"] is None else f", ended at {fault['ended_s']:.6g} s"
+    if not fault["acted"]:
+        return f"{begun}{ended}: INVALID, it did not act: its place never differed from what it shows without it"
+    acted = f", acted from {fault['acted_s']:.6g} s on ({fault['acted_count']} times, up to "
+    acted += f"{fault['largest_difference']:.6g} {fault['unit']})".replace(" )", ")")
+    if fault["ended_s"] is None:
+        cleared = ""
+    elif fault["cleared_s"] is None:
+        cleared = ", its place is not clear yet"
+    else:
+        cleared = f", its place was clear at {fault['cleared_s']:.6g} s"
+    permanent = f"; what stays: {fault['permanent']}" if fault["permanent"] else ""
+    return f"{begun}{acted}{ended}{cleared}{permanent}"
+
+
+# --- the tables of docs/faults.md -----------------------------------------------------------------------------
+
+
+def markdown() -> str:
+    """The tables of docs/faults.md: kinds of places, their modes and parameters."""
+    catalogue.load()
+    kinds: dict[str, list[Place]] = {}
+    for place in catalogue.PLACES.values():
+        kinds.setdefault(place.kind, []).append(place)
+    return "\n".join(line for kind, places in kinds.items() for line in kind_lines(kind, places))
+
+
+def kind_lines(kind: str, places: list[Place]) -> list[str]:
+    """One kind of place: where, what it takes."""
+    unit = next((mode.unit for mode in catalogue.modes_of(places[0]).values() if mode.unit), "")
+    lines = [f"### {kind}{f', in {unit}' if unit else ''}", ""]
+    lines += [f"{', '.join(f'`{place.name}`' for place in places)}", ""]
+    lines += ["| mode | what it does | parameters: default (limits) |", "|---|---|---|"]
+    for name, mode in catalogue.modes_of(places[0]).items():
+        parameters = "; ".join(
+            f"`{p.name}` {default_text(p)} ({p.low:g} to {p.high:g}{f' {p.unit}' if p.unit != '1' else ''})"
+            for p in mode.parameters
+        )
+        lines.append(f"| `{name}` | {mode.meaning} | {parameters} |")
+    return [*lines, ""]
+
+
+def with_tables(text: str) -> str:
+    """The document with the tables of the present catalogue."""
+    before, _, rest = text.partition(TABLES_BEGIN)
+    _, _, after = rest.partition(TABLES_END)
+    return f"{before}{TABLES_BEGIN}\n{markdown()}\n{TABLES_END}{after}"
+
+
+def write_document() -> None:
+    """Write the tables of docs/faults.md anew."""
+    DOCUMENT.write_text(with_tables(DOCUMENT.read_text(encoding="utf-8")), encoding="utf-8")
+    print(f"written: {DOCUMENT.name}")
+
+
+if __name__ == "__main__":
+    write_document()
