@@ -155,6 +155,12 @@ class Microcontroller(Chip):
         """From now on write what the processor does into `log`; None: no longer. It changes nothing of what it does."""
         self.scheduler.attach_log(log)
 
+    def activity(self) -> ActivityLog:
+        """Its activity log; where it has none yet, it gets one now. Several readers can share it by its sinks."""
+        if self.scheduler.log is None:
+            self.keep_activity(ActivityLog())
+        return self.scheduler.log
+
     def legend(self) -> object:
         """What the numbers in its activity log stand for."""
         scheduler = self.scheduler
@@ -224,6 +230,8 @@ class Microcontroller(Chip):
 
     def request(self, source: InterruptSource) -> cython.longlong:
         """Raise an interrupt line; it is served as soon as its priority allows. 1 if newly pending."""
+        if self.now > self.instant:  # a task asks, and it began after others of its row
+            self.instant = self.now
         self.next_time = self.instant
         return self.vic.raise_source(source, self.now)
 

@@ -3,6 +3,7 @@
 import pytest
 
 from ranger_sim.firmware_sim.peripherals.timer_capture import TimerCapture
+from ranger_sim.firmware_sim.scheduler import Task
 from ranger_sim.firmware_sim.vic import ADC_DONE, EXTERNAL_INTERRUPT, FIQ, SOFTWARE, SPI_DONE, InterruptController
 from ranger_sim.foundation.events import CAN_RX, PIN_EDGE, STAGE_BUS, STAGE_PINS, UART_BYTE
 from ranger_sim.foundation.user_error import UserError
@@ -43,6 +44,20 @@ def test_irqs_do_not_nest_and_the_lowest_slot_goes_first():
     raise_at(log.chip, high, 15_000)
     log.chip.advance(400_000)
     assert log.entries == [("slot 3", 10_000), ("slot 0", 20_000), ("slot 10", 21_000)]
+
+
+def test_what_a_task_asks_for_is_served_when_it_asks_and_not_when_its_row_began():
+    log = Log()
+    source = attach(log, EXTERNAL_INTERRUPT, 1, 1, "irq")
+
+    def ask():
+        log.entries.append(("asks", log.chip.now))
+        log.chip.request(source)
+
+    log.start(every=(log.task("a", 6000), log.task("b", 600), Task(ask, cost=60), log.task("after", 60)))
+    log.chip.advance(400_000)
+    asked = TICK_NS + 110_000
+    assert log.entries[2:] == [("asks", asked), ("irq", asked), ("after", asked + 2_000)]
 
 
 def test_requests_of_one_instant_are_served_by_priority():
