@@ -37,6 +37,7 @@ from ranger_sim.harness.profile import Profile
 from ranger_sim.harness.recorder import Recorder
 from ranger_sim.harness.sampler import Sampler
 from ranger_sim.harness.scenario import Scenario, StopRule
+from ranger_sim.harness.timing.robot_slots import RobotSlots, slot_view
 from ranger_sim.plant import body_files
 from ranger_sim.plant.ranger import RangerPlant
 
@@ -109,6 +110,7 @@ class Ranger:
                 bus_schedule.apply(board, profile.schedules())
         self.operator = Operator(self.controller.operator, self.plant, self.boards["UI"], self.start_ns, seed)
         self.faults: list[Fault] = []  # armed so far
+        self.slot_views: dict[str, RobotSlots] = {}  # of boards whose slots are recorded
         self.polled: list[Any] = []  # ends of wires that lead out of the simulation
         self.next_poll_ns = self.start_ns
         self.cpu_s = 0.0
@@ -329,6 +331,12 @@ class Ranger:
     ) -> None:
         """Put your own function in a schedule entry; it declares its cost in cycles."""
         self.board(board).scheduler.replace(task, function, cost=cost, limit=limit)
+
+    def slots(self, board: BoardName) -> RobotSlots:
+        """The slots of a board from now on, or from the first time on that they were asked for (harness/timing)."""
+        if board not in self.slot_views:
+            self.slot_views[board] = slot_view(self, board)
+        return self.slot_views[board]
 
     def counters(self) -> dict[str, RangerCounters]:
         """What every board counted, by its name; also of a board that runs in another process."""

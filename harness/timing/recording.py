@@ -1,0 +1,158 @@
+"""What a board's activity log (firmware_sim/activity.py) has written since a recording began, as arrays."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+
+from ranger_sim.firmware_sim.activity import (
+    ACTIVITY_COLUMNS,
+    COLUMN_CYCLES,
+    COLUMN_END,
+    COLUMN_ITEMS,
+    COLUMN_KIND,
+    COLUMN_NUMBER,
+    COLUMN_ROW,
+    COLUMN_START,
+    SLOT_BEGAN,
+    SLOT_ENDED,
+    SLOT_OVERRAN,
+    TASK_DROPPED,
+)
+from ranger_sim.firmware_sim.legend import Legend
+
+# 256 MiB of one board, a minute of a motor board that walks (chosen by us): what is older is given up, and said
+MOST_ROWS = 4 * 1024 * 1024
+NOT_THROUGH = -1
+
+
+@dataclasses.dataclass(frozen=True)
+class Slots:
+    """The complete slots of a recording, as arrays of equal length in order of time; instants since power-up, ns.
+
+    `cycles` from tick to end, interrupts included; `end` its end. A slot that was dropped as a whole has 0 cycles and
+    ends at its start; where the last task of an overrun slot is not through yet, both stand for the time until the tick
+    that found it. `first` ... `last`: where in `Recording.rows` what ran from its tick to the next one stands.
+    `place`: among all slots that began (`Recording.slot_of`).
+    """
+
+    place: np.ndarray
+    number: np.ndarray
+    row: np.ndarray
+    start: np.ndarray
+    end: np.ndarray
+    cycles: np.ndarray
+    overran: np.ndarray
+    first: np.ndarray
+    last: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.number)
+
+
+class Recording:
+    """Everything that `board` does from now on. `rows`: an array of ACTIVITY_COLUMNS columns, sorted by start.
+
+    `origin_ns`: power-up of the robot; instants are counted from there. `lost`: rows that were given up for newer ones.
+    `slot_of`: to which slot each row belongs, -1 for what ran before the first.
+    """
+
+    def __init__(self, board: Any, origin_ns: int = 0, begun_ns: int = 0, most_rows: int = MOST_ROWS) -> None:
+        self.board = board
+        self.origin_ns = origin_ns
+        self.begun_ns = begun_ns
+        self.most_rows = most_rows
+        self.lost = 0
+        self.blocks: list[bytes] = []
+        self.kept = 0
+        self.rows = np.empty((0, ACTIVITY_COLUMNS), dtype=np.int64)
+        self.slots = self._slots()
+        self.slot_of = np.empty(0, dtype=np.int64)
+        self.decoded = 0
+        self.log = board.activity()
+        self.log.add_sink(self._take)
+
+    def legend(self) -> Legend:
+        """Names, costs and limits as they are now."""
+        legend: Legend = self.board.legend()
+        return legend
+
+    def forget(self) -> None:
+        """Give up what was recorded so far."""
+        self.log.flush()
+        self.blocks.clear()
+        self.kept = 0
+        self.lost = 0
+        self.decoded = -1
+
+    def _take(self, time_ns: int, rows: bytes) -> None:
+        self.blocks.append(rows)
+        self.kept += len(rows) // (8 * ACTIVITY_COLUMNS)
+        while self.kept > self.most_rows and len(self.blocks) > 1:
+            given_up = len(self.blocks.pop(0)) // (8 * ACTIVITY_COLUMNS)
+            self.kept -= given_up
+            self.lost += given_up
+
+    def update(self) -> Slots:
+        """Bring `rows` and `slots` up to now."""
+        self.log.flush()
+        if self.decoded != self.kept + self.lost:
+            self.decoded = self.kept + self.lost
+            rows = np.frombuffer(b"".join(self.blocks), dtype=np.int64).reshape(-1, ACTIVITY_COLUMNS).copy()
+            rows[:, COLUMN_START] -= self.origin_ns
+            rows[:, COLUMN_END] -= self.origin_ns
+            # of two with one start: a slot's begin first, then the outer before the inner
+            began = rows[:, COLUMN_KIND] != SLOT_BEGAN
+            order = np.lexsort((-rows[:, COLUMN_END], began, rows[:, COLUMN_START]))
+            self.rows = rows[order]
+            self.slots = self._slots()
+        return self.slots
+
+    def of_kind(self, *kinds: int) -> np.ndarray:
+        """Places in `rows` of the rows of these kinds."""
+        return np.flatnonzero(np.isin(self.rows[:, COLUMN_KIND], kinds))
+
+    def _slots(self) -> Slots:
+        """Which rows belong to which slot: those of its number, and what ran from its tick to the next one."""
+        rows = self.rows
+        kind, number = rows[:, COLUMN_KIND], rows[:, COLUMN_NUMBER]
+        began = rows[kind == SLOT_BEGAN]
+        numbers = began[:, COLUMN_NUMBER]
+        count = len(numbers)
+        cycles = np.full(count, NOT_THROUGH, dtype=np.int64)
+        end = began[:, COLUMN_START].copy()
+        overran = np.zeros(count, dtype=bool)
+        first_number = int(numbers[0]) if count else 0
+
+        def places(of: np.ndarray) -> np.ndarray:
+            return of[:, COLUMN_NUMBER] - first_number
+
+        late = rows[(kind == SLOT_OVERRAN) & (number >= first_number)]
+        overran[places(late)] = True
+        listed = began[places(late), COLUMN_ITEMS]
+        whole = late[:, COLUMN_ITEMS] == listed
+        ticks_cycles = (late[:, COLUMN_END] - late[:, COLUMN_START]) * self.legend().cycles_per_ns if len(late) else 0
+        cycles[places(late)] = np.where(whole, 0, ticks_cycles)
+        end[places(late)] = np.where(whole, late[:, COLUMN_START], late[:, COLUMN_END])
+        ended = rows[(kind == SLOT_ENDED) & (number >= first_number)]
+        cycles[places(ended)] = ended[:, COLUMN_CYCLES]
+        end[places(ended)] = ended[:, COLUMN_END]
+        self.slot_of = np.searchsorted(began[:, COLUMN_START], rows[:, COLUMN_START], side="right") - 1
+        dropped = kind == TASK_DROPPED  # at the very tick of the next one
+        self.slot_of[dropped] = np.searchsorted(began[:, COLUMN_START], rows[dropped, COLUMN_START], side="left") - 1
+        starts = np.searchsorted(rows[:, COLUMN_START], began[:, COLUMN_START], side="left")
+        lasts = np.append(starts[1:], len(rows)) if count else starts
+        through = cycles != NOT_THROUGH
+        return Slots(
+            place=np.flatnonzero(through),
+            number=numbers[through],
+            row=began[through, COLUMN_ROW],
+            start=began[through, COLUMN_START],
+            end=end[through],
+            cycles=cycles[through],
+            overran=overran[through],
+            first=starts[through],
+            last=lasts[through],
+        )

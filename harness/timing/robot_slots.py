@@ -1,0 +1,59 @@
+"""The slots of a robot's board: where the recording of one begins, and which slots a condition of the robot selects."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.harness.conditions import Condition, condition
+from ranger_sim.harness.step_watch import StepWatch
+from ranger_sim.harness.timing.recording import Recording
+from ranger_sim.harness.timing.slots import SlotView
+
+
+class Held(StepWatch):
+    """When a condition held, as far as it was looked at: once per step of the plant, every 250 us."""
+
+    def __init__(self, robot: Any, wanted: Condition) -> None:
+        StepWatch.__init__(self)
+        self.wanted = wanted
+        self.origin_ns: int = robot.start_ns
+        self.changes = [-1]  # instants since power-up: it did not hold, then it held, then not ...
+        wanted.begin(robot)
+
+    def before_step(self, now_ns: int) -> None:
+        if self.wanted.met() != (len(self.changes) % 2 == 0):
+            self.changes.append(now_ns - self.origin_ns)
+
+    def at(self, instants: np.ndarray) -> np.ndarray:
+        """True where the latest look up to an instant found that it held."""
+        held: np.ndarray = np.searchsorted(self.changes, instants, side="right") % 2 == 0
+        return held
+
+
+class RobotSlots(SlotView):
+    """All slots of a robot's board since the recording began."""
+
+    def __init__(self, recording: Recording, robot: Any) -> None:
+        SlotView.__init__(self, recording)
+        self.robot = robot
+
+    def where(self, wanted: str | Condition | Callable[[Any], Any]) -> SlotView:
+        """Only slots that begin while a condition holds (harness/conditions.py); it is looked at from now on."""
+        held = Held(self.robot, condition(wanted))
+        self.robot.loop.watchers.append(held)
+        return self.during(f"where {held.wanted.text}", held.at)
+
+
+def slot_view(robot: Any, name: str) -> RobotSlots:
+    """Begin to record board `name` of `robot`. UserError for a board that does not run in this process."""
+    board = robot.board(name)
+    if robot.loop.board(name) is not board:
+        raise UserError(
+            f"slots of {name}: the board runs in another process, which keeps its activity to itself; "
+            f"record it in a robot of one process (same results), or read EXECUTION_TIME and counters()"
+        )
+    return RobotSlots(Recording(board, robot.start_ns, robot.loop.time - robot.start_ns), robot)

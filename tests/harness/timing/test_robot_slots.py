@@ -1,0 +1,71 @@
+"""Slots of the whole robot: recorded without a trace of it in the run, selected by what the robot did."""
+
+import contextlib
+import types
+
+import numpy as np
+import pytest
+
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.harness.conditions import condition
+from ranger_sim.harness.ranger import BOARD_CLASSES, Ranger
+from ranger_sim.harness.timing.robot_slots import Held, slot_view
+
+
+def test_recording_every_board_leaves_the_run_byte_for_byte_as_it_is():
+    digests = []
+    for recorded in (False, True):
+        with contextlib.closing(Ranger()) as robot:
+            views = [robot.slots(name) for name in BOARD_CLASSES] if recorded else []
+            robot.run_for(0.25)
+            digests.append(robot.trace_digest())
+            assert all(len(view) > 100 for view in views)
+    assert digests[0] == digests[1]
+
+
+def test_what_is_recorded_is_what_the_board_counted_and_what_it_publishes():
+    with contextlib.closing(Ranger()) as robot:
+        view = robot.slots("MCFI")
+        assert robot.slots("MCFI") is view
+        robot.run_for(0.3)
+        board = robot.board("MCFI")
+        counted = board.counters().slots
+        assert len(view) in (counted.count, counted.count - 1)  # the latest may not be through
+        assert view.worst().cycles == counted.max_cycles and view.overruns == counted.overruns == 0
+        # MAX_EXECUTION_TIME reads the timer in the row's last task, which then takes 44 cycles itself
+        read_s = board.execution.longest_seconds()
+        assert view.worst().taken_ns - 44 * 1000 / 60 == pytest.approx(read_s * 1e9, abs=40)
+
+
+@pytest.mark.parametrize("name", BOARD_CLASSES)
+def test_no_interrupt_is_served_before_it_is_asked_for(name):
+    with contextlib.closing(Ranger()) as robot:
+        view = robot.slots(name)
+        robot.run_for(0.1)
+        latencies = [ran.latency_ns for slot in view for ran in slot.interrupts]
+        assert len(latencies) > 50 and min(latencies) >= 0
+
+
+def test_slots_are_selected_by_what_held_at_their_start():
+    with contextlib.closing(Ranger()) as robot:
+        late = robot.slots("MCH").where(lambda robot: 0.01 <= robot.time_s < 0.02)
+        robot.run_for(0.03)
+        starts = [slot.start_ns for slot in late]
+        assert len(starts) == 20 and min(starts) >= 10_000_000 and max(starts) < 20_250_000
+
+
+def test_before_it_was_looked_at_a_condition_did_not_hold():
+    answers = iter((False, True, True, False))
+    held = Held(types.SimpleNamespace(start_ns=1000), condition(lambda robot: next(answers)))
+    for now_ns in (1100, 1200, 1300, 1400):
+        held.before_step(now_ns)
+    assert held.at(np.array([0, 100, 199, 200, 399, 400, 900])).tolist() == [False] * 3 + [True] * 2 + [False] * 2
+
+
+def test_a_board_in_another_process_is_refused_by_name():
+    with contextlib.closing(Ranger()) as robot:
+        elsewhere = types.SimpleNamespace(board=robot.board, loop=types.SimpleNamespace(board=lambda name: object()))
+        with pytest.raises(UserError, match="slots of MCH: the board runs in another process"):
+            slot_view(elsewhere, "MCH")
+        with pytest.raises(UserError, match="board 'MCX'"):
+            robot.slots("MCX")
