@@ -45,8 +45,9 @@ class Parameter:
         except (TypeError, ValueError):
             number = float("nan")
         if not self.low <= number <= self.high:
+            unit = "" if self.unit == "1" else f" {self.unit}"
             raise UserError(
-                f"{where}: {self.name} is {value!r}, allowed are {self.low:g} to {self.high:g} {self.unit}".rstrip()
+                f"{where}: {self.name} is {value!r}, allowed are {self.low:g} to {self.high:g}{unit}".rstrip()
             )
         return number
 
