@@ -25,7 +25,7 @@ class OneLineParser(argparse.ArgumentParser):
 def parser() -> argparse.ArgumentParser:
     """The whole command line."""
     from ranger_sim.datatable import cli as table_command
-    from ranger_sim.tools import body, bus, can_bounds, check_bus, daq, faults, info, tune, up, walk
+    from ranger_sim.tools import body, bus, can_bounds, check_bus, daq, faults, info, slots, tune, up, walk
     from ranger_sim.tools.bench import command as bench
     from ranger_sim.tools.fuzz import command as fuzz
     from ranger_sim.tools.vm import command as vm
@@ -50,6 +50,7 @@ def parser() -> argparse.ArgumentParser:
     daq.register(commands)
     vm.register(commands)
     faults.register(commands)
+    slots.register(commands)
     return top
 
 

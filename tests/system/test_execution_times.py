@@ -8,18 +8,11 @@ from ranger_sim.boards.quirks import Quirks
 from ranger_sim.datatable.generated import errors as codes
 from ranger_sim.harness.ranger import Ranger
 from ranger_sim.harness.scenario import Scenario
+from ranger_sim.harness.timing import robot_figures
 
-# EXECUTION_TIME in us (robot.md T1): medians while it stands or is held; then what it may be while it walks: from the
-# usual slot up to the highest in the logs. UI: the logs' main brain sends six lights in every slot, so ours does here.
-LOGS = {
-    #         held         walking
-    "MCH":  ((214, 248), (97, 396)),
-    "MCFO": ((167, 181), (167, 446)),
-    "MCFI": ((167, 181), (167, 497)),
-    "MCSI": ((142, 145), (142, 145)),
-    "UI":   ((155, 178), (155, 185)),
-}  # fmt: skip
-REZEROING = (286, 313)  # an ankle board whose motor encoder is being set
+# EXECUTION_TIME in us (robot.md T1). UI: the logs' main brain sends six lights in every slot, so ours does here.
+LOGS = robot_figures.EXECUTION_TIME_US
+REZEROING = robot_figures.REZEROING_US
 
 
 @pytest.fixture(scope="module")
