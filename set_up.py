@@ -21,7 +21,12 @@ import tomllib
 
 HERE = pathlib.Path(__file__).resolve().parent
 LOG = HERE / "build" / "setup.log"
-LATER = {"cantools", "scipy"}  # what reads users' DBC files and what fits: a first walk need not wait for them
+LATER = {
+    "cantools",
+    "scipy",
+    "perfetto",
+    "pyvcd",
+}  # reads users' DBC files, fits, writes timelines: a first walk need not wait
 
 
 class SetUpError(Exception):

@@ -9,7 +9,7 @@ from ranger_sim.can_bus.frame cimport (
     ACK_DELIMITER_FROM_END, EIGHT_BYTES, HIGHEST_EXTENDED, HIGHEST_STANDARD, INTERMISSION_BITS, LENGTH_CODE, MEASURED_BITS,
     RECEIVERS_SEE, SENDABLE, arbitration_key, measure,
 )
-from ranger_sim.can_bus.frame_log cimport FrameLog
+from ranger_sim.can_bus.frame_log cimport SENDER_SHIFT, TIMES_BUFFER_SHIFT, FrameLog
 from ranger_sim.can_bus.load_meter cimport LoadMeter
 from ranger_sim.can_bus.medium_access cimport (
     MAC_JOINING, MAC_SUSPENDED, MET_COUNTER, MET_FAILURE, MET_JOIN, MET_LOSS, MET_RECEIVED, MET_SENT, MET_SETTLED,
@@ -69,6 +69,7 @@ cdef class Bus:
     cdef long long _next_join(self) except? <long long>-1
     cdef void _look_ahead(self) noexcept
     cdef long long _attempt(self, long long k) except? <long long>-1
+    cdef int _note_times(self, long long k, long long asked, long long done, long long row, long long flags) except -1
     cdef long long _key(self, long long row) noexcept
     cdef long long _arbitrate(self, long long k) except? <long long>-1
     cdef int _contend(self, long long k, long long best) except -1

@@ -52,6 +52,7 @@ if not cython.compiled:
         RECEIVERS_SEE,
         SENDABLE,
     )
+    from ranger_sim.can_bus.frame_log import SENDER_SHIFT, TIMES_BUFFER_SHIFT
     from ranger_sim.can_bus.medium_access import (
         MAC_JOINING,
         MAC_SUSPENDED,
@@ -665,7 +666,25 @@ class Bus:
         if not flags & FLAG_EXTENDED:
             self.counters.note_answer(identifier, done - asked)
         self.log.add(received, identifier, flags, lo, hi, row >> NODE_SHIFT)
+        if self.log.times is not None:
+            self._note_times(k, asked, done, row, flags)
         return self.free_bit
+
+    def _note_times(
+        self,
+        k: cython.longlong,
+        asked: cython.longlong,
+        done: cython.longlong,
+        row: cython.longlong,
+        flags: cython.longlong,
+    ) -> None:
+        """The frame in `row`, asked for at `asked`, began at bit `k` and ends at `done` (ns)."""
+        slots: cython.p_longlong = self.buffers.slots
+        sender: cython.longlong = (row >> NODE_SHIFT) + 1 << SENDER_SHIFT
+        sender |= (row >> BUFFER_SHIFT & BUFFER_MASK) << TIMES_BUFFER_SHIFT | flags
+        self.log.times.add(
+            self.edge_ns(k), asked, done, slots[row + IDENTIFIER], sender, slots[row + LOW], slots[row + HIGH]
+        )
 
     def _after_success(self, node: Node, end: cython.longlong, done: cython.longlong) -> None:
         """A sender that has had errors has sent a frame whole: to bit `end`, at `done` (ns).
@@ -925,6 +944,9 @@ class Bus:
             if not flags & FLAG_EXTENDED:
                 self.counters.note_answer(identifier, time - slots[row + ASKED])
             self.log.add(self.edge_ns(bit - 1), identifier, flags, slots[row + LOW], slots[row + HIGH], node.index)
+            if self.log.times is not None:
+                machine: MediumAccess = self.bit_level.machines[node.index]
+                self._note_times(machine.begun, slots[row + ASKED], time, row, flags)
         self.bit_level.forget(row)
         self.buffers.remove(row)
         slots[row + FREE_AT] = time
@@ -944,6 +966,10 @@ class Bus:
             level.in_error = level.counted = False
             end = self.edge_ns(level.bit)
             self.log.add(end, level.identifier, level.flags, level.error_field, level.error_position, level.sender)
+            if self.log.times is not None:
+                begun = self.edge_ns(level.error_begun)
+                sender = level.sender + 1 << SENDER_SHIFT | level.flags
+                self.log.times.add(begun, begun, end, level.identifier, sender, level.error_field, level.error_position)
 
     def _flush(self, node, time) -> None:
         """A node is bus-off: what waited there is lost."""

@@ -1,6 +1,55 @@
+# cython: boundscheck=False, wraparound=False
+# (every index below is a column of a row)
 """What passed on a bus, frame by frame."""
 
 import cython
+
+from ranger_sim.foundation.row_stream import RowStream
+
+# C constants when compiled: the same numbers stand in the .pxd, and a test holds them together.
+if not cython.compiled:
+    TIMES_COLUMNS = 7
+    # numbers of a FrameTimes row
+    TIMES_START = 0  # first bit of the frame, ns
+    TIMES_ASKED = 1  # its program asked for it, ns; TIMES_START where nobody had
+    TIMES_END = 2  # its last bit is over, or its error frame is, ns
+    TIMES_IDENTIFIER = 3
+    TIMES_SENDER = 4  # (node + 1) << SENDER_SHIFT | transmit buffer << TIMES_BUFFER_SHIFT | flags; node -1: nobody
+    TIMES_LOW = 5  # data bytes 0-3, or the field in which an error was detected (FIELD_*)
+    TIMES_HIGH = 6  # data bytes 4-7, or the position of that bit in the frame
+    TIMES_BUFFER_SHIFT = 8
+    SENDER_SHIFT = 16
+
+
+class FrameTimes(RowStream):
+    """When each frame of a bus was asked for, began and ended: whole numbers, TIMES_COLUMNS a row.
+
+    In the order in which the bus decided them, which is that of their ends.
+    """
+
+    def __init__(self) -> None:
+        RowStream.__init__(self, "q", TIMES_COLUMNS, False)
+
+    def add(
+        self,
+        start: cython.longlong,
+        asked: cython.longlong,
+        end: cython.longlong,
+        identifier: cython.longlong,
+        sender: cython.longlong,
+        lo: cython.longlong,
+        hi: cython.longlong,
+    ) -> None:
+        """A frame was on the bus; `sender` as TIMES_SENDER says."""
+        at: cython.longlong = self.used
+        self.numbers[at + TIMES_START] = start
+        self.numbers[at + TIMES_ASKED] = asked
+        self.numbers[at + TIMES_END] = end
+        self.numbers[at + TIMES_IDENTIFIER] = identifier
+        self.numbers[at + TIMES_SENDER] = sender
+        self.numbers[at + TIMES_LOW] = lo
+        self.numbers[at + TIMES_HIGH] = hi
+        self.finish_row(end)
 
 
 class FrameLog:
@@ -10,6 +59,8 @@ class FrameLog:
     instant at which receivers have it. An error frame stands where it ended: FLAG_ERROR, the instant of its end,
     lo = field (FIELD_*) and hi = position of the bit in which a node detected the error, the frame's sender first;
     identifier 0 and node -1 where nobody had sent, after a false start of frame.
+
+    `times`: None, or a FrameTimes that takes requests, starts and ends beside.
     """
 
     def __init__(self, capacity) -> None:
@@ -17,6 +68,7 @@ class FrameLog:
         self.frames = []
         self.dropped = 0
         self.stream = None  # a FrameStream
+        self.times = None
 
     def add(
         self,

@@ -552,7 +552,9 @@ def check_schedules(
                     report(field, f"sends {variable}, which {shown(publishers[variable])[1:-1]} publishes")
 
 
-def normal_of(row: dict[str, str], field: str, users: list[str], report: Callable[[str, str], None]) -> dict[str, float]:
+def normal_of(
+    row: dict[str, str], field: str, users: list[str], report: Callable[[str, str], None]
+) -> dict[str, float]:
     """{board: how often} of a cell such as MCH:350;MCFO:280; only boards that raise the error, numbers above 0."""
     normal: dict[str, float] = {}
     for part in names_of(row[field]):

@@ -2,6 +2,7 @@ cimport cython
 
 from ranger_sim.can_bus.bus cimport Bus
 from ranger_sim.firmware_sim.board cimport Board
+from ranger_sim.firmware_sim.peripherals.ssp cimport SspSegment
 from ranger_sim.foundation.events cimport (
     CAN_ABORT,
     CAN_MODE,
@@ -16,6 +17,7 @@ from ranger_sim.foundation.events cimport (
     EventQueue,
     Outbox,
 )
+from ranger_sim.foundation.row_stream cimport RowStream
 from ranger_sim.plant.drive cimport Drive
 
 @cython.final
@@ -28,8 +30,10 @@ cdef class SspWire:
     cdef public EventQueue master, slave
     cdef public long long exchange_ns, exchanges
     cdef public object loaded
+    cdef public RowStream watch
     cpdef void start(self, long long time_ns, object segment) noexcept
     cpdef void load(self, object segment) noexcept
+    cdef void _note(self, long long time_ns, SspSegment segment, long long from_slave) noexcept
 
 @cython.final
 cdef class BoardWires(Outbox):
@@ -40,4 +44,6 @@ cdef class BoardWires(Outbox):
     cdef public list buses
     cdef public long long[5] nodes
     cdef public SspWire link
+    cdef public RowStream watch
     cdef public dict can_lines, serial_lines
+    cdef int _note(self, long long time, long long kind, long long a, long long b, long long c) except -1

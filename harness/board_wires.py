@@ -9,7 +9,9 @@ board's inbox, is written there by whoever sends it: the bus, the link, the plan
 import cython
 
 from ranger_sim.can_bus.bus import Bus
+from ranger_sim.firmware_sim.peripherals.ssp import SspSegment
 from ranger_sim.foundation.events import Outbox
+from ranger_sim.foundation.row_stream import RowStream
 from ranger_sim.foundation.user_error import UserError
 
 if not cython.compiled:
@@ -47,6 +49,7 @@ class SspWire:
         self.exchange_ns = exchange_ns
         self.loaded = idle_segment
         self.exchanges = 0
+        self.watch = None  # a RowStream that takes what is exchanged (`_note`)
 
     def start(self, time_ns: cython.longlong, segment: object) -> cython.void:
         """The master starts an exchange; both sides have the other's segment at its end."""
@@ -54,6 +57,21 @@ class SspWire:
         self.slave.push(end, ORDER_INTERRUPTS, SSP_SEGMENT, 0, 0, 0, 0, 0, 0, segment)
         self.master.push(end, ORDER_INTERRUPTS, SSP_SEGMENT, 0, 0, 0, 0, 0, 0, self.loaded)
         self.exchanges += 1
+        if self.watch is not None:
+            self._note(time_ns, segment, 0)
+            self._note(time_ns, self.loaded, 1)
+
+    def _note(self, time_ns: cython.longlong, segment: SspSegment, from_slave: cython.longlong) -> cython.void:
+        """A row of `watch` for each frame in a segment: start of the exchange (ns), from_slave, header, both words."""
+        i: cython.longlong
+        watch: RowStream = self.watch
+        for i in range(0, segment.used * 3 // 5, 3):  # five half-words are a frame and three numbers of `rows`
+            watch.integers[watch.used] = time_ns
+            watch.integers[watch.used + 1] = from_slave
+            watch.integers[watch.used + 2] = segment.rows[i]
+            watch.integers[watch.used + 3] = segment.rows[i + 1]
+            watch.integers[watch.used + 4] = segment.rows[i + 2]
+            watch.finish_row(time_ns)
 
     def load(self, segment: object) -> cython.void:
         """The slave puts up what it will send in the next exchange."""
@@ -82,6 +100,7 @@ class BoardWires(Outbox):
         self.low_side_6 = False
         self.silent_until = 0  # ns: before that the board was to put nothing on a bus
         self.link = None
+        self.watch = None  # a RowStream that takes what its pins and its PWM unit show: ns, kind, a, b, c
         self.serial_lines = {}  # {UART: what hears it}
 
     def connect_bus(self, controller, bus, node) -> None:
@@ -130,6 +149,8 @@ class BoardWires(Outbox):
         ref: object = None,
     ) -> None:
         """Carry on what the board puts out at `time` (ns)."""
+        if self.watch is not None and (kind == PIN_OUTPUT or kind == PWM_UPDATE):
+            self._note(time, kind, a, b, c)
         if kind == PIN_OUTPUT:
             if a == self.watchdog_pin:
                 self.drive.watchdog_edge(time)
@@ -158,6 +179,17 @@ class BoardWires(Outbox):
             self.link.load(ref)
         elif kind == UART_OUTPUT:
             self._to_serial_line(time, a, b, c, ref)
+
+    def _note(
+        self, time: cython.longlong, kind: cython.longlong, a: cython.longlong, b: cython.longlong, c: cython.longlong
+    ) -> None:
+        watch: RowStream = self.watch
+        watch.integers[watch.used] = time
+        watch.integers[watch.used + 1] = kind
+        watch.integers[watch.used + 2] = a
+        watch.integers[watch.used + 3] = b
+        watch.integers[watch.used + 4] = c
+        watch.finish_row(time)
 
     def request(
         self,

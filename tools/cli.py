@@ -25,7 +25,7 @@ class OneLineParser(argparse.ArgumentParser):
 def parser() -> argparse.ArgumentParser:
     """The whole command line."""
     from ranger_sim.datatable import cli as table_command
-    from ranger_sim.tools import body, bus, can_bounds, check_bus, daq, faults, info, slots, tune, up, walk
+    from ranger_sim.tools import body, bus, can_bounds, check_bus, daq, faults, info, slots, trace, tune, up, walk
     from ranger_sim.tools.bench import command as bench
     from ranger_sim.tools.fuzz import command as fuzz
     from ranger_sim.tools.vm import command as vm
@@ -41,6 +41,7 @@ def parser() -> argparse.ArgumentParser:
     table_command.register(commands)
     bench.register(commands)
     fuzz.register(commands)
+    trace.register(commands)
     tune.register(commands)
     up.register(commands)
     body.register(commands)

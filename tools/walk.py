@@ -21,7 +21,7 @@ from ranger_sim.harness.profile import Profile
 from ranger_sim.harness.profile import load as load_profile
 from ranger_sim.harness.scenario import Scenario, StopRule
 from ranger_sim.plant.electronics import SWITCHES
-from ranger_sim.tools import faults, serial_options
+from ranger_sim.tools import faults, serial_options, trace
 from ranger_sim.tools.files import json_target, replace_file, writable_folder
 from ranger_sim.tools.units import ENERGIES_WH, LENGTHS, SHARES, TIMES, quantity, whole_number
 
@@ -54,6 +54,7 @@ def register(commands: Any) -> None:
         "when one did not act; ranger-sim faults lists places and modes",
     )
     faults.add_module_option(command)
+    trace.add_options(command)
     command.set_defaults(run=run)
 
 
@@ -200,6 +201,7 @@ def run_scenario(scenario: Scenario, stop: StopRule, options: argparse.Namespace
     with contextlib.closing(Ranger(scenario, log=log, quirks=quirks, profile=profile)) as robot:
         for fault in wanted:
             robot.arm(fault)
+        timeline = trace.attach(robot, options)
         ends, places = serial_options.connect(robot, options)
         for place in places:
             console.print(place, highlight=False, soft_wrap=True)
@@ -212,6 +214,7 @@ def run_scenario(scenario: Scenario, stop: StopRule, options: argparse.Namespace
             console.print(line, highlight=False, soft_wrap=True)
         summary = {**robot.summary(), "interrupted": bool(interrupted)}
         finish(robot, summary, options, folder, json_file, console)
+        trace.write(timeline, options, console)
     if interrupted:
         return 130
     if not all(fault["acted"] for fault in summary["faults"]):

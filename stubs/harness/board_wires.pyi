@@ -4,6 +4,7 @@ from collections.abc import MutableSequence
 from ranger_sim.firmware_sim.board import Board
 from ranger_sim.foundation.events import EventQueue
 from ranger_sim.foundation.events import Outbox
+from ranger_sim.foundation.row_stream import RowStream
 from ranger_sim.plant.drive import Drive
 from typing import Any
 from typing import final
@@ -24,6 +25,7 @@ class SspWire:
     exchange_ns: int
     exchanges: int
     loaded: Any
+    watch: RowStream | None
     def __init__(self, master: Any, slave: Any, exchange_ns: int, idle_segment: Any) -> None: ...
     def start(self, time_ns: int, segment: Any) -> None: ...
     def load(self, segment: Any) -> None: ...
@@ -42,6 +44,7 @@ class BoardWires(Outbox):
     buses: list[Any]
     nodes: MutableSequence[int]
     link: SspWire
+    watch: RowStream | None
     can_lines: dict[Any, Any]
     serial_lines: dict[Any, Any]
     def __init__(self, board: Board, window_ns: int) -> None: ...

@@ -1,0 +1,5 @@
+"""One timeline of a run: slots, interrupts, frames and their ways, signals, states, faults and the body."""
+
+from ranger_sim.harness.timeline.timeline import Timeline
+
+__all__ = ["Timeline"]

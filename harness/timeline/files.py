@@ -1,0 +1,45 @@
+"""Which formats a timeline can be written in, by the suffix of the file."""
+
+import pathlib
+import tempfile
+from collections.abc import Callable
+from typing import IO
+
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.harness.timeline import perfetto_file
+from ranger_sim.harness.timeline.model import Events
+
+FORMATS: dict[str, Callable[[Events, IO[bytes], str], None]] = {
+    ".pftrace": perfetto_file.write,
+    ".perfetto-trace": perfetto_file.write,
+}
+
+
+def format_of(path: pathlib.Path) -> Callable[[Events, IO[bytes], str], None]:
+    """What writes such a file. UserError for a suffix that means nothing here."""
+    if path.suffix not in FORMATS:
+        raise UserError(f"trace {path}: suffix {path.suffix!r} is no format; there are {', '.join(FORMATS)}")
+    return FORMATS[path.suffix]
+
+
+def check_target(path: pathlib.Path) -> None:
+    """Before a run: the suffix is known, and a file can be written there."""
+    format_of(path)
+    if path.is_dir():
+        raise UserError(f"trace {path}: that is a folder, not a file")
+    try:
+        with tempfile.TemporaryFile(dir=path.parent):
+            pass
+    except OSError as error:
+        raise UserError(f"trace {path}: cannot be written: {error.strerror}") from None
+
+
+def write(events: Events, path: pathlib.Path, title: str) -> None:
+    """The timeline into `path`, whole or not at all."""
+    writer = format_of(path)
+    check_target(path)
+    with tempfile.TemporaryDirectory(dir=path.parent, prefix=f".{path.name}-") as folder:
+        partial = pathlib.Path(folder) / path.name
+        with partial.open("wb") as file:
+            writer(events, file, title)
+        partial.replace(path)

@@ -1,0 +1,116 @@
+"""What a board's processor did, as slices: slots with their tasks, interrupts, turns of the main loop."""
+
+from typing import Any
+
+import numpy as np
+
+from ranger_sim.firmware_sim.activity import (
+    ACTIVITY_COLUMNS,
+    COLUMN_CYCLES,
+    COLUMN_END,
+    COLUMN_ITEMS,
+    COLUMN_KIND,
+    COLUMN_LATENCY,
+    COLUMN_NUMBER,
+    COLUMN_ROW,
+    COLUMN_START,
+    INTERRUPT_RAN,
+    MAIN_LOOP_RAN,
+    SLOT_BEGAN,
+    SLOT_ENDED,
+    SLOT_OVERRAN,
+    TASK_DROPPED,
+    TASK_RAN,
+    WAIT_RAN,
+)
+from ranger_sim.harness.timeline.model import Instant, Instants, Slices
+
+__all__ = ["ACTIVITY_COLUMNS", "Processor"]
+
+
+class Processor:
+    """One board's activity. `rows`: of its ActivityLog; `legend`: what their numbers stand for.
+
+    `slots`, with the tasks inside. `services`: the interrupts, the fast ones inside those that they interrupted.
+    `turns` of the main loop. `asked_ns`, by row of `services` and `fast`: when the interrupt was asked for.
+    """
+
+    def __init__(self, legend: Any, rows: np.ndarray, zero_ns: int) -> None:
+        self.name = legend.board
+        self.legend = legend
+        self.zero_ns = zero_ns
+        kind = rows[:, COLUMN_KIND]
+        self.tasks = self._tasks(rows[(kind == TASK_RAN) | (kind == WAIT_RAN)])
+        self.slots = self._slots(rows[kind == SLOT_ENDED], rows[kind == SLOT_BEGAN])
+        self.slots.inside = self.tasks
+        services = rows[kind == INTERRUPT_RAN]
+        fast = np.array([source.fast for source in legend.interrupts] or [False])
+        is_fast = fast[services[:, COLUMN_NUMBER]]
+        self.fast = self._services(services[is_fast])
+        self.services = self._services(services[~is_fast])
+        self.services.inside = self.fast
+        self.turns = self._turns(rows[kind == MAIN_LOOP_RAN])
+        self.overruns = self._overruns(rows[(kind == SLOT_OVERRAN) | (kind == TASK_DROPPED)])
+
+    def tracks(self) -> list[Slices]:
+        """All that has something in it."""
+        found = [self.slots, self.services, self.turns]
+        return [slices for slices in found if len(slices) or (slices.inside is not None and len(slices.inside))]
+
+    def _made(self, track: str, names: list[str], rows: np.ndarray, name: np.ndarray, **notes: np.ndarray) -> Slices:
+        start, end = rows[:, COLUMN_START] - self.zero_ns, rows[:, COLUMN_END] - self.zero_ns
+        return Slices(("Boards", self.name, track), names, start, end, name, dict(notes))
+
+    def _tasks(self, rows: np.ndarray) -> Slices:
+        """Tasks and waits; of an occasional list its entry, which has the list's own row right behind it."""
+        if len(rows) > 1:
+            lists = np.array([bool(task.entries) for task in self.legend.tasks])
+            same = (rows[1:, COLUMN_START] == rows[:-1, COLUMN_START]) & (rows[1:, COLUMN_END] == rows[:-1, COLUMN_END])
+            doubled = np.append(False, same & lists[rows[1:, COLUMN_NUMBER]])
+            rows = rows[~doubled]
+        names = [task.name for task in self.legend.tasks]
+        return self._made("slots", names, rows, rows[:, COLUMN_NUMBER], cycles=rows[:, COLUMN_CYCLES])
+
+    def _slots(self, rows: np.ndarray, begun: np.ndarray) -> Slices:
+        """One slice a slot, called by its row. A slot that waits for the end of an overrun one begins behind that.
+
+        The slot that has not ended yet lasts until the end of its latest task.
+        """
+        names = [f"row {row}" for row in range(len(self.legend.rows))]
+        if len(begun) and (len(rows) == 0 or begun[-1, COLUMN_START] > rows[-1, COLUMN_START]):
+            running = begun[-1:].copy()
+            if len(self.tasks):
+                running[0, COLUMN_END] = max(running[0, COLUMN_START], self.tasks.end_ns[-1] + self.zero_ns)
+            lasts_ns = running[0, COLUMN_END] - running[0, COLUMN_START]
+            running[0, COLUMN_CYCLES] = int(lasts_ns * self.legend.cycles_per_ns)
+            rows = np.concatenate([rows, running])
+        slots = self._made("slots", names, rows, rows[:, COLUMN_ROW], cycles=rows[:, COLUMN_CYCLES])
+        if len(slots):
+            slots.start_ns[1:] = np.maximum(slots.start_ns[1:], slots.end_ns[:-1])
+        return slots
+
+    def _services(self, rows: np.ndarray) -> Slices:
+        names = [source.name for source in self.legend.interrupts]
+        order = np.argsort(rows[:, COLUMN_START], kind="stable")
+        rows = rows[order]
+        latency_us = rows[:, COLUMN_LATENCY] * 1e-3
+        return self._made(
+            "interrupts", names, rows, rows[:, COLUMN_NUMBER], cycles=rows[:, COLUMN_CYCLES], latency_us=latency_us
+        )
+
+    def _turns(self, rows: np.ndarray) -> Slices:
+        return self._made("main loop", ["turn"], rows, np.zeros(len(rows), dtype=np.int64))
+
+    def _overruns(self, rows: np.ndarray) -> Instants:
+        """Each slot that a tick found unfinished, with the names of what was dropped."""
+        dropped: dict[int, list[str]] = {}
+        for row in rows[rows[:, COLUMN_KIND] == TASK_DROPPED]:
+            dropped.setdefault(int(row[COLUMN_END]), []).append(self.legend.tasks[int(row[COLUMN_NUMBER])].name)
+        events = []
+        for row in rows[rows[:, COLUMN_KIND] == SLOT_OVERRAN]:
+            time = int(row[COLUMN_END])
+            notes: dict[str, str | float] = {"slot": float(row[COLUMN_NUMBER]), "dropped": float(row[COLUMN_ITEMS])}
+            if time in dropped:
+                notes["functions"] = ", ".join(dropped[time])
+            events.append(Instant(time - self.zero_ns, f"row {int(row[COLUMN_ROW])} overran", notes))
+        return Instants(("Boards", self.name, "overruns"), events)

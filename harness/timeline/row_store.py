@@ -1,0 +1,63 @@
+"""Keeps the blocks of a row stream: those of the last seconds in memory, or all of them in a file without a name."""
+
+import collections
+import tempfile
+import weakref
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+
+class RowStore:
+    """The sink of one `RowStream`. `columns` of a row; `last_ns`: how much of the past is kept, None: all of it.
+
+    What is kept in full lies in a temporary file, so that nothing is left behind whatever happens to the process.
+    `before`: who took the blocks until now, and goes on getting them.
+    """
+
+    def __init__(self, columns: int, last_ns: int | None, before: Callable[[int, bytes], None] | None = None) -> None:
+        self.columns = columns
+        self.last_ns = last_ns
+        self.before = before
+        self.blocks: collections.deque[tuple[int, bytes]] = collections.deque()
+        self.spool: Any = None
+        if last_ns is None:
+            self.spool = tempfile.TemporaryFile(prefix="ranger-sim-timeline-")  # noqa: SIM115
+            weakref.finalize(self, self.spool.close)  # also of a timeline that nobody closes
+
+    def take(self, last_time_ns: int, block: bytes) -> None:
+        """Keep a block whose last row is of `last_time_ns`, and forget what has become too old."""
+        if self.before is not None:
+            self.before(last_time_ns, block)
+        if self.spool is not None:
+            self.spool.write(block)
+            return
+        assert self.last_ns is not None
+        self.blocks.append((last_time_ns, block))
+        while self.blocks[0][0] < last_time_ns - self.last_ns:
+            self.blocks.popleft()
+
+    def rows(self, kind: type = np.int64) -> np.ndarray:
+        """Everything kept: array (rows, columns)."""
+        if self.spool is not None:
+            self.spool.flush()
+            self.spool.seek(0)
+            data = self.spool.read()
+            self.spool.seek(0, 2)
+        else:
+            data = b"".join(block for _, block in self.blocks)
+        return np.frombuffer(data, dtype=kind).reshape(-1, self.columns)
+
+    @property
+    def size(self) -> int:
+        """Bytes kept."""
+        if self.spool is not None:
+            return int(self.spool.tell())
+        return sum(len(block) for _, block in self.blocks)
+
+    def close(self) -> None:
+        """Give the file back."""
+        if self.spool is not None:
+            self.spool.close()
+        self.blocks.clear()

@@ -1,0 +1,208 @@
+"""`ranger-sim trace`: look at a timeline; and the options `--trace` of the commands that run a robot."""
+
+from __future__ import annotations
+
+import argparse
+import http.server
+import pathlib
+import shutil
+import urllib.parse
+import webbrowser
+from typing import TYPE_CHECKING, Any
+
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.tools.files import replace_file
+from ranger_sim.tools.units import TIMES, quantity
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from ranger_sim.harness.ranger import Ranger
+    from ranger_sim.harness.timeline import Timeline
+
+VIEWER = "https://ui.perfetto.dev"
+# The only port from which Perfetto's viewer may read: its Content-Security-Policy names that of trace_processor.
+PORT = 9001
+SHOWN_S = 0.02  # around the instant: ten slots of the main brain, chosen by us
+KEPT_S = 1.0  # what a page for offline use holds of a long trace: some 10 MB
+
+
+def add_options(command: Any) -> None:
+    """The options of every command that runs a robot and can keep its timeline."""
+    group = command.add_argument_group("timeline", "what happened, to be looked at with `ranger-sim trace open`")
+    group.add_argument(
+        "--trace",
+        action="append",
+        default=[],
+        type=pathlib.Path,
+        metavar="FILE",
+        help="write slots, interrupts, frames, signals, states and faults into FILE; repeatable, format by suffix: "
+        ".pftrace (Perfetto), .vcd (bits), .mcap (body and signals)",
+    )
+    group.add_argument(
+        "--trace-last",
+        type=quantity(TIMES, "s", 0.0),
+        metavar="10s",
+        help="keep only the last so many seconds of virtual time; without it everything, 16 MB of disk a second",
+    )
+
+
+def attach(robot: Ranger, options: argparse.Namespace) -> Timeline | None:
+    """A timeline on `robot` when one was asked for. UserError, before anything runs, for a file that cannot be."""
+    if not options.trace:
+        if options.trace_last:
+            raise UserError("--trace-last needs --trace FILE")
+        return None
+    from ranger_sim.harness.timeline import Timeline, files
+
+    for path in options.trace:
+        files.check_target(path)
+    return Timeline(robot, options.trace_last)
+
+
+def write(timeline: Timeline | None, options: argparse.Namespace, console: Console) -> None:
+    """The files that were asked for."""
+    if timeline is None:
+        return
+    with console.status("writing the timeline ..."):
+        for path in options.trace:
+            timeline.write(path)
+    timeline.close()
+    for path in options.trace:
+        console.print(f"timeline: {path} (ranger-sim trace open {path})", highlight=False, soft_wrap=True)
+
+
+def register(commands: Any) -> None:
+    """Add the subcommand to the command line."""
+    command = commands.add_parser("trace", help="look at a timeline that `walk --trace FILE` has written")
+    actions = command.add_subparsers(dest="action", required=True, metavar="ACTION")
+    opening = actions.add_parser(
+        "open",
+        help="show it in Perfetto's viewer, or offline in a page of its own",
+        description="Serves FILE from this machine, to the browser here only, and opens it in Perfetto's viewer, which "
+        "reads it there; nothing leaves this machine. --offline: a page that needs no network.",
+    )
+    opening.add_argument("file", type=pathlib.Path, help="a .pftrace file")
+    opening.add_argument(
+        "--at",
+        type=quantity(TIMES, "s"),
+        metavar="12.3s",
+        help="the instant to show (default: where a fault first acted, else the fall, else the last step)",
+    )
+    opening.add_argument(
+        "--shown",
+        type=quantity(TIMES, "s", 0.0),
+        default=SHOWN_S,
+        metavar="20ms",
+        help="how much around it is shown at first (default 20 ms)",
+    )
+    opening.add_argument("--offline", action="store_true", help="write a page beside FILE and open that")
+    opening.add_argument("--out", type=pathlib.Path, metavar="PAGE.html", help="where the page is written")
+    opening.add_argument("--no-browser", action="store_true", help="only print the address")
+    opening.set_defaults(run=run_open)
+
+
+def run_open(options: argparse.Namespace) -> int:
+    """Show a timeline; 0 when it was read."""
+    from ranger_sim.harness.timeline import moments
+
+    if options.file.suffix not in (".pftrace", ".perfetto-trace"):
+        raise UserError(f"trace {options.file}: only .pftrace files can be opened; a .vcd opens in GTKWave or Surfer")
+    asked_ns = None if options.at is None else round(options.at * 1e9)
+    moment = moments.find(options.file, asked_ns)
+    if options.offline or options.out:
+        return open_page(options, moment)
+    half_ns = round(options.shown * 0.5e9)
+    return serve(options.file, max(0, moment.time_ns - half_ns), moment.time_ns + half_ns, not options.no_browser)
+
+
+def open_page(options: argparse.Namespace, moment: Any) -> int:
+    """Write the page for offline use and open it."""
+    from ranger_sim.harness.timeline import viewer
+
+    page = options.out or options.file.with_suffix(".html")
+    if page.is_dir() or not page.parent.is_dir():
+        raise UserError(f"page {page}: its folder is missing, or it is one")
+    content = viewer.page(options.file, moment, round(KEPT_S * 1e9), round(options.shown * 1e9))
+    try:
+        replace_file(page, content.encode())
+    except OSError as error:
+        raise UserError(f"page {page}: cannot be written: {error.strerror}") from None
+    print(f"{page}: shows {moment.text}, at {moment.time_ns * 1e-9:.6f} s")
+    if not options.no_browser:
+        webbrowser.open(page.absolute().as_uri())
+    return 0
+
+
+def address(name: str, begin_ns: int, end_ns: int) -> str:
+    """What the browser opens: Perfetto's viewer, told where the trace is and what to show of it."""
+    source = urllib.parse.quote(f"http://127.0.0.1:{PORT}/{urllib.parse.quote(name)}", safe="")
+    return f"{VIEWER}/#!/?url={source}&visStart={begin_ns}&visEnd={end_ns}"
+
+
+class TraceServer(http.server.HTTPServer):
+    """Serves one file, to pages of Perfetto's viewer on this machine. `served`: it has been fetched."""
+
+    allow_reuse_address = True
+
+    def __init__(self, file: pathlib.Path, port: int = PORT) -> None:
+        self.file = file
+        self.served = False
+        super().__init__(("127.0.0.1", port), TraceHandler)
+
+
+class TraceHandler(http.server.BaseHTTPRequestHandler):
+    """GET of the trace; the browser's question beforehand is answered as well."""
+
+    server: TraceServer
+
+    def end_headers(self) -> None:
+        """Every answer says that only Perfetto's viewer may read it, also from a page of the internet."""
+        self.send_header("Access-Control-Allow-Origin", VIEWER)
+        self.send_header("Access-Control-Allow-Private-Network", "true")
+        self.send_header("Cache-Control", "no-cache")
+        super().end_headers()
+
+    def do_OPTIONS(self) -> None:
+        """May a page of the internet ask here? It may GET."""
+        self.send_response(204)
+        self.send_header("Access-Control-Allow-Methods", "GET")
+        self.end_headers()
+
+    def do_GET(self) -> None:
+        """The trace under its name, and nothing else."""
+        if urllib.parse.unquote(self.path) != f"/{self.server.file.name}":
+            self.send_error(404)
+            return
+        with self.server.file.open("rb") as file:
+            self.send_response(200)
+            self.send_header("Content-Type", "application/octet-stream")
+            self.send_header("Content-Length", str(self.server.file.stat().st_size))
+            self.end_headers()
+            shutil.copyfileobj(file, self.wfile)
+        self.server.served = True
+
+    def log_message(self, format: str, *arguments: Any) -> None:
+        """Nothing: the command says what is to be said."""
+
+
+def serve(file: pathlib.Path, begin_ns: int, end_ns: int, with_browser: bool) -> int:
+    """Until the viewer has fetched the trace, or Ctrl-C."""
+    try:
+        server = TraceServer(file)
+    except OSError as error:
+        raise UserError(
+            f"port {PORT} of this machine cannot be used ({error.strerror}), and Perfetto's viewer reads from no "
+            "other: end what holds it (trace_processor?), or use --offline"
+        ) from None
+    with server:
+        shown = address(file.name, begin_ns, end_ns)
+        print(
+            f"{shown}\nserving {file} until it has been fetched; Ctrl-C ends it; without a network: --offline",
+            flush=True,
+        )
+        if with_browser:
+            webbrowser.open(shown)
+        while not server.served:
+            server.handle_request()
+    return 0
