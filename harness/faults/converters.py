@@ -160,15 +160,7 @@ class TimeFault(ConverterFault):
         raise NotImplementedError
 
     def change(self) -> None:
-        self.begun_ns = self.robot.loop.time
         self.converter.conversion_ns = self.converter.conversion_ns + self.lateness_ns()
-
-    def before(self, now_ns: int) -> None:
-        usual_ns = self.usual["conversion_ns"]
-        if self.converter.busy and self.begun_ns + usual_ns < now_ns < self.converter.alarm.time:
-            begun_ns = self.converter.alarm.time - self.converter.conversion_ns
-            if begun_ns >= self.begun_ns and begun_ns + usual_ns < now_ns:
-                self.note(now_ns, (now_ns - begun_ns - usual_ns) * 1e-3)
 
 
 @mode
@@ -185,6 +177,10 @@ class LateConversion(TimeFault):
 
     def lateness_ns(self) -> int:
         return round(self.values["late_us"] * 1e3)
+
+    def before(self, now_ns: int) -> None:
+        if self.board.scheduler.slot_count != self.slots:  # conversions have been begun
+            self.note(now_ns, self.values["late_us"])
 
 
 @mode
@@ -207,6 +203,13 @@ class MissingConversion(TimeFault):
 
     def lateness_ns(self) -> int:
         return NEVER_DONE_NS
+
+    def before(self, now_ns: int) -> None:
+        converter = self.converter
+        begun_ns = converter.alarm.time - converter.conversion_ns  # of one that never ends
+        overdue_ns = now_ns - begun_ns - self.usual["conversion_ns"]
+        if converter.busy and begun_ns >= self.activated_ns and overdue_ns > 0:
+            self.note(now_ns, overdue_ns * 1e-3)
 
     def finish(self, now_ns: int) -> None:
         """The converter is as after its own reset: nothing is under way."""

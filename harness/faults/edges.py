@@ -16,6 +16,7 @@ board.
 
 import math
 from collections import deque
+from itertools import zip_longest
 from typing import Any
 
 from ranger_sim.harness.faults import signals
@@ -166,8 +167,15 @@ class RunsAfter(EdgeFault):
 
     def pass_on(self, sent: list[int], start_ns: int, end_ns: int) -> None:
         self._follow(sent, start_ns, end_ns, self.target)
-        if self.wire.count != self.true:
-            self.note(end_ns, self.sign * (self.wire.count - self.true))
+        self.note_step(sent, end_ns)
+
+    def note_step(self, sent: list[int], end_ns: int) -> None:
+        """Note by how much the wire's count is off at the end, with the first edge of the step that was another one."""
+        if self.wire.count == self.true:
+            return
+        shown = [time_ns << 2 | level_a << 1 | level_b for time_ns, level_a, level_b in self.wire.edges]
+        pairs = zip_longest(sent, shown, fillvalue=end_ns << 2)
+        self.differs(next((min(a, b) >> 2 for a, b in pairs if a != b), end_ns))
 
     def resume(self, sent: list[int], start_ns: int, end_ns: int) -> None:
         self._follow(sent, start_ns, end_ns, lambda _time_ns: self.true)
@@ -262,8 +270,7 @@ class EdgesDelay(RunsAfter):
         while self.waiting and self.waiting[0] >> 2 < end_ns:
             edge = self.waiting.popleft()
             self.wire.step(way_of(edge), edge >> 2)
-        if self.wire.count != self.true:
-            self.note(end_ns, self.sign * (self.wire.count - self.true))
+        self.note_step(sent, end_ns)
 
 
 # --- faults of the line ---------------------------------------------------------------------------------------

@@ -166,7 +166,7 @@ class Fault(StepWatch):
     def text(self) -> str:
         """As it is typed after --fault."""
         values = "".join(
-            f",{name}={value:g}"
+            f",{name}={repr(value).removesuffix('.0')}"  # every digit: it has to give the same run again
             for name, value in self.values.items()
             if value != self.default(name) and not math.isnan(value)
         )

@@ -69,7 +69,7 @@ def test_an_offset_is_exactly_so_many_edges_more_and_they_go_back(motion, offset
     if motion is at_rest:
         assert bench.board.edges - before == abs(offset)
     assert fault.largest_difference == offset
-    assert fault.acted_ns == 10_250_000  # told at the end of its first step
+    assert fault.acted_ns == 10_000_000  # its first edge
     ends_clear(bench, fault)
 
 
@@ -255,6 +255,7 @@ def test_a_delay_shows_every_edge_so_much_later(sign):
             for place in range(buffer.count):
                 time_ns, level_a, level_b = buffer.edge(place)
                 at[bench][time_ns] = (level_a, level_b)
+    assert fault.acted_ns == min(at[prompt])  # the first edge that is not there
     expected = {t + 5_000_000: levels for t, levels in at[prompt].items() if 10_000_000 <= t < 45_000_000}
     assert at[late] == expected
     assert len(expected) > 100
