@@ -61,6 +61,9 @@ BOARD_CLASSES: dict[str, Any] = {
 class Ranger:
     """One robot in one scenario. Same scenario, same bytes. Close it when done (or use contextlib.closing)."""
 
+    backend = "sim"  # what it runs on; harness/testing/backends.py has the others
+    lost = False  # a part of it that runs elsewhere is gone: it can pass no more time
+
     def __init__(
         self,
         scenario: Scenario | None = None,
@@ -111,6 +114,7 @@ class Ranger:
         self.operator = Operator(self.controller.operator, self.plant, self.boards["UI"], self.start_ns, seed)
         self.faults: list[Fault] = []  # armed so far
         self.slot_views: dict[str, RobotSlots] = {}  # of boards whose slots are recorded
+        self.observed: Any = None  # what harness.testing keeps beside it: the last frames, what was measured
         self.polled: list[Any] = []  # ends of wires that lead out of the simulation
         self.next_poll_ns = self.start_ns
         self.cpu_s = 0.0
@@ -194,6 +198,7 @@ class Ranger:
         ConditionNotMetError, an AssertionError, when it does not hold `within` this time from now, or the robot falls
         before. It is looked at every 250 us, between two steps of the plant.
         """
+        __tracebackhide__ = True
         waiting = Waiting(self, condition(wanted))
         begun_ns, patience_ns = self.loop.time, nanoseconds(within, "until: within")
         stop = StopRule(time_s=(begun_ns + patience_ns - self.start_ns) * 1e-9) if patience_ns else None
@@ -341,6 +346,15 @@ class Ranger:
     def counters(self) -> dict[str, RangerCounters]:
         """What every board counted, by its name; also of a board that runs in another process."""
         return {name: self.loop.board(name).counters() for name in self.boards}
+
+    def wire(self, bus: str = "can1", since_s: float = 0.0) -> Any:
+        """Frames on a bus, their periods and latencies, as assertions: a `harness.testing.wire.Wire`.
+
+        Frames are kept from the first call on, or from power-up in a robot that harness.testing made.
+        """
+        from ranger_sim.harness.testing.wire import wire_of
+
+        return wire_of(self, bus, since_s)
 
     def trace_digest(self) -> str:
         """BLAKE2b-256 of the canonical trace so far."""

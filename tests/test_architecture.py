@@ -33,6 +33,8 @@ ONLY_IN = {
     "serial": ("harness/", "tools/"),
     "asammdf": ("tools/", "harness/"),
     "plotly": ("tools/",),
+    "pytest": ("harness/testing/",),
+    "_pytest": ("harness/testing/forking.py",),
     "rich": ("tools/", "datatable/cli.py"),
     "time": ("foundation/wallclock.py",),
     "random": (),

@@ -1,0 +1,138 @@
+"""Frames as tests read them, and what keeps the last of them while a robot or a board runs."""
+
+import collections
+import difflib
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+from ranger_sim.datatable.generated import all_variables
+from ranger_sim.datatable.generated import errors as error_table
+from ranger_sim.datatable.packing import parts_of_error_word, value_of_word
+from ranger_sim.foundation.events import FLAG_ERROR
+from ranger_sim.foundation.user_error import UserError
+
+WINDOW_S = 20.0  # how much is kept: some 30 steps of a walk, 16 MB for all four buses (chosen by us)
+ROW = 3  # numbers per frame in a stream: foundation/row_stream.py says which
+
+
+class Frame(NamedTuple):
+    """A frame that was on a bus; `time_ns` is when receivers had it, counted as the robot counts."""
+
+    time_ns: int
+    bus: str
+    identifier: int
+    flags: int
+    lo: int
+    hi: int
+
+    @property
+    def name(self) -> str:
+        """The variable's name, or the identifier where the table has none."""
+        return all_variables.NAMES.get(self.identifier, f"{self.identifier:03X}")
+
+    @property
+    def time_s(self) -> float:
+        """The same in s."""
+        return self.time_ns * 1e-9
+
+    @property
+    def value(self) -> float:
+        """The value word as the table's type reads it; of an identifier without one, as it is."""
+        kind = all_variables.TYPES.get(self.identifier)
+        return self.lo if kind is None else value_of_word(kind, self.lo)
+
+    @property
+    def stamp_ms(self) -> int:
+        """The time word: network time of the value, ms."""
+        return self.hi
+
+    @property
+    def is_error(self) -> bool:
+        """An error frame of the bus: not a frame of anybody."""
+        return bool(self.flags & FLAG_ERROR)
+
+    def text(self) -> str:
+        """One line for a report."""
+        if self.is_error:
+            return f"{self.time_s:12.6f} s  {self.bus}  error frame"
+        line = f"{self.time_s:12.6f} s  {self.bus}  {self.identifier:03X} {self.name}"
+        if self.name.startswith("ERROR_"):
+            code, board, count = parts_of_error_word(self.lo)
+            of = all_variables.BOARD_NAMES.get(board, str(board))
+            return f"{line} {error_table.NAMES.get(code, code)} x {count} from {of}"
+        return f"{line} {self.value:.6g} (stamp {self.stamp_ms})"
+
+
+def identifier_of(name: str | int) -> int:
+    """The identifier of a variable; a number stands for itself. UserError for a name that the table has not."""
+    if isinstance(name, int):
+        return name
+    number = all_variables.ID_OF.get(name)
+    if number is None:
+        near = difflib.get_close_matches(name, all_variables.ID_OF, 3)
+        instead = f"; meant was perhaps {' or '.join(near)}" if near else ""
+        raise UserError(f"frame {name!r}: no variable of the table has this name{instead}")
+    return number
+
+
+class FrameKeeper:
+    """Keeps the frames of the last `window_s` that pass through `streams`: {bus: its FrameStream}."""
+
+    def __init__(self, streams: dict[str, Any], window_s: float = WINDOW_S) -> None:
+        self.streams = streams
+        self.window_ns = round(window_s * 1e9)
+        self.blocks: dict[str, collections.deque[tuple[int, bytes]]] = {}
+        for name, stream in streams.items():
+            stream.flush()
+            self.blocks[name] = collections.deque()
+            stream.sink = self._keeper(name, stream.sink)
+
+    def _keeper(self, name: str, other: Callable[[int, bytes], None] | None) -> Callable[[int, bytes], None]:
+        blocks = self.blocks[name]
+
+        def keep(last_time_ns: int, block: bytes) -> None:
+            blocks.append((last_time_ns, block))
+            while blocks[0][0] < last_time_ns - self.window_ns:
+                blocks.popleft()
+            if other is not None:
+                other(last_time_ns, block)
+
+        return keep
+
+    def frames(self, bus: str, identifiers: set[int] | None = None, since_ns: int = 0) -> list[Frame]:
+        """Frames of a bus in their order; only those identifiers (None: all), from `since_ns` on."""
+        if bus not in self.streams:
+            raise UserError(f"bus {bus!r}: there is none of this name, but {', '.join(self.streams)}")
+        self.streams[bus].flush()
+        found: list[Frame] = []
+        for last_ns, block in self.blocks[bus]:
+            if last_ns >= since_ns:
+                found += frames_of(block, bus, identifiers, since_ns)
+        return found
+
+    def latest(self, most: int) -> list[Frame]:
+        """The last `most` frames of all buses together, in order of time."""
+        every: list[Frame] = []
+        for bus, stream in self.streams.items():
+            stream.flush()
+            of_bus: list[Frame] = []
+            for _, block in reversed(self.blocks[bus]):
+                of_bus = frames_of(block, bus) + of_bus
+                if len(of_bus) >= most:
+                    break
+            every += of_bus[-most:]
+        return sorted(every)[-most:]
+
+
+def frames_of(block: bytes, bus: str, identifiers: set[int] | None = None, since_ns: int = 0) -> list[Frame]:
+    """The frames of a block of a stream."""
+    rows = memoryview(block).cast("q")
+    found = []
+    for at in range(0, len(rows), ROW):
+        third = rows[at + 2]
+        identifier = third & 0x1FFFFFFF
+        if rows[at] < since_ns or (identifiers is not None and identifier not in identifiers):
+            continue
+        second = rows[at + 1]
+        found.append(Frame(rows[at], bus, identifier, second >> 4 & 0xFF, second >> 12 & 0xFFFFFFFF, third >> 29))
+    return found

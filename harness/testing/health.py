@@ -1,0 +1,208 @@
+"""Looks for what no healthy robot does: overruns, lost frames, bus errors, bus-off, errors beyond the normal, a fall.
+
+Normal is what the columns normal_per_s and normal_at_start of datatable/master/errors.csv say. A test may expect what
+is not normal; what it expects and does not come is a fault as well.
+"""
+
+import dataclasses
+import difflib
+import re
+from collections.abc import Mapping
+from typing import Any
+
+from ranger_sim.boards.counters import RangerCounters
+from ranger_sim.can_bus.node import BUS_OFF
+from ranger_sim.datatable.generated import errors as error_table
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.harness import summary, wiring
+
+# Errors come in bursts: a hip that is held back tells of its clipped current in every slot. So a second more of them is
+# allowed than has passed, and a test of 10 ms may see such a burst as well.
+BURST_S = 1.0
+# What else a board notes when something that the test expects happens.
+OF_OVERRUNS = ("ASCHED_DNF", "SCHED_SLOT_NEAR_LIMIT", "SCHED_TASK_LIMIT")
+OF_BUS_ERRORS = re.compile(r"CAN\d_(BUS_RX|BUS_TX|ERR_WARN|ERR_PASS|TX_BUSOFF)")
+OF_BUS_OFF = re.compile(r"CAN\d_\w+")
+
+Amount = bool | int | str
+
+
+@dataclasses.dataclass(frozen=True)
+class Expected:
+    """What a test expects beyond the normal, and fails without.
+
+    errors: names of the table, or "MCH:AE_SPIKE" for one board. overruns, lost_frames, bus_errors, bus_off, dead: True
+    (at least one), a number (exactly so many), or the name of the board or bus that has them. fall: it falls.
+    """
+
+    errors: tuple[str, ...] = ()
+    overruns: Amount = False
+    lost_frames: Amount = False
+    bus_errors: Amount = False
+    bus_off: Amount = False
+    dead: Amount = False
+    fall: bool = False
+
+    def __post_init__(self) -> None:
+        for text in self.errors:
+            board, _, name = text.rpartition(":")
+            if name not in error_table.NAMES.values():
+                near = difflib.get_close_matches(name, error_table.NAMES.values(), 3)
+                instead = f"; meant was perhaps {' or '.join(near)}" if near else ""
+                raise UserError(f"expected error {text!r}: the table has none of this name{instead}")
+            if board and board not in wiring.BOARDS:
+                raise UserError(f"expected error {text!r}: board {board!r} is none of {', '.join(wiring.BOARDS)}")
+
+
+@dataclasses.dataclass(frozen=True)
+class Seen:
+    """Everything that is counted, at one instant."""
+
+    time_ns: int
+    boards: Mapping[str, RangerCounters]
+    lost: Mapping[str, int]  # by bus: frames that a listening node did not get
+    bus_errors: Mapping[str, int]  # by bus
+    flushed: Mapping[str, int]  # by board: frames that waited when it went bus-off
+    off: tuple[str, ...]  # boards with a controller that is bus-off now
+
+
+def look(robot: Any) -> Seen:
+    """Count."""
+    boards = robot.counters()
+    lost, errors = {}, {}
+    flushed: dict[str, int] = {}
+    off = set()
+    for bus in robot.buses:
+        figures = summary.can(robot, bus, boards)
+        lost[bus.name], errors[bus.name] = figures["lost"] + figures["queue_full"], figures["errors"]
+        for node in bus.nodes:
+            flushed[node.name] = flushed.get(node.name, 0) + node.flushed
+            if node.mode == BUS_OFF:
+                off.add(node.name)
+    for end in robot.polled:
+        if hasattr(end, "overflow"):  # a bus on an interface outside
+            lost[end.name] += end.counters()["overflow"]
+            errors[end.name] += end.errors
+    return Seen(robot.loop.time, boards, lost, errors, flushed, tuple(sorted(off)))
+
+
+class Health:
+    """Watches `robot` from now on; `faults` says what happened since, and begins anew."""
+
+    def __init__(self, robot: Any) -> None:
+        self.robot = robot
+        self.before: Seen | None = look(robot) if robot.loop.time > robot.start_ns else None
+        self.had_fallen = bool(robot.ended)
+
+    def faults(self, expected: Expected | None = None) -> list[str]:
+        """What was not to be expected and happened, or was expected and did not; a line for each."""
+        wanted = expected if expected is not None else Expected()
+        now, before = look(self.robot), self.before
+        off = wanted.bus_off is not False
+        lost = since(now.lost, before.lost if before is not None else {})
+        broken = since(now.bus_errors, before.bus_errors if before is not None else {})
+        found = [
+            *self._errors(wanted, now, before),
+            *amount("slot overruns", wanted.overruns, self._overruns(now, before)),
+            *amount("lost frames", wanted.lost_frames, lost, off),
+            *amount("error frames", wanted.bus_errors, broken, off),
+            *amount("bus-off", wanted.bus_off, self._bus_off(now, before)),
+            *amount("boards that stand still", wanted.dead, self._dead(now)),
+            *self._fall(wanted),
+        ]
+        found += [
+            line
+            for end in self.robot.polled
+            if hasattr(end, "watch") and end.watch.faults
+            for line in end.watch.lines()
+        ]
+        self.before, self.had_fallen = now, bool(self.robot.ended)
+        return found
+
+    def _errors(self, wanted: Expected, now: Seen, before: Seen | None) -> list[str]:
+        start_ns = self.robot.start_ns if before is None else before.time_ns
+        passed_s = (now.time_ns - start_ns) * 1e-9
+        missing = set(wanted.errors)
+        found = []
+        for board, counters in now.boards.items():
+            for code, total in enumerate(counters.errors):
+                events = total - (before.boards[board].errors[code] if before is not None else 0)
+                if not events:
+                    continue
+                name = error_table.NAMES.get(code, str(code))
+                of_test = {name, f"{board}:{name}"} & set(wanted.errors)
+                missing -= of_test
+                if of_test or excused(wanted, board, name):
+                    continue
+                rate = error_table.NORMAL_PER_S.get(code, {}).get(board, 0.0)
+                once = error_table.NORMAL_AT_START.get(code, {}).get(board, 0.0) if before is None else 0.0
+                if events > rate * (passed_s + BURST_S) + once:
+                    normal = f"normal is up to {rate:g} a second" if rate else "normal is none"
+                    meaning = error_table.DESCRIPTIONS.get(code, "")
+                    found.append(f"{board}: {events} x {name} ({meaning}) in {passed_s:.3f} s, {normal}")
+        found += [f"expected and not seen: error {text}" for text in sorted(missing)]
+        return found
+
+    @staticmethod
+    def _overruns(now: Seen, before: Seen | None) -> dict[str, int]:
+        return since(
+            {name: board.slots.overruns for name, board in now.boards.items()},
+            {name: board.slots.overruns for name, board in before.boards.items()} if before is not None else {},
+        )
+
+    @staticmethod
+    def _bus_off(now: Seen, before: Seen | None) -> dict[str, int]:
+        """Boards that are bus-off, or were: their error module tells it, or frames were thrown away."""
+        found = since(now.flushed, before.flushed if before is not None else {})
+        for name, board in now.boards.items():
+            for code in (code for code, text in error_table.NAMES.items() if text.endswith("_TX_BUSOFF")):
+                found[name] = found.get(name, 0) + board.errors[code]
+                found[name] -= before.boards[name].errors[code] if before is not None else 0
+        for name in now.off:
+            found[name] = max(1, found.get(name, 0))
+        return found
+
+    def _dead(self, now: Seen) -> dict[str, int]:
+        return {name: 0 if summary.alive(self.robot, board) else 1 for name, board in now.boards.items()}
+
+    def _fall(self, wanted: Expected) -> list[str]:
+        robot = self.robot
+        fell = bool(robot.ended) and not self.had_fallen
+        if fell and not wanted.fall:
+            return [f"the robot fell ({robot.ended}) at {robot.time_s:.3f} s, in step {robot.steps}"]
+        if wanted.fall and not fell:
+            return ["expected and not seen: a fall"]
+        return []
+
+
+def excused(wanted: Expected, board: str, name: str) -> bool:
+    """Whether an error belongs to something else that the test expects."""
+    if wanted.overruns and name in OF_OVERRUNS:
+        return not isinstance(wanted.overruns, str) or wanted.overruns == board
+    if wanted.bus_off and OF_BUS_OFF.fullmatch(name):
+        return True
+    return bool(wanted.bus_errors) and OF_BUS_ERRORS.fullmatch(name) is not None
+
+
+def since(now: Mapping[str, int], before: Mapping[str, int]) -> dict[str, int]:
+    """How much each has grown."""
+    return {name: count - before.get(name, 0) for name, count in now.items()}
+
+
+def amount(what: str, wanted: Amount, found: Mapping[str, int], may_be: bool = False) -> list[str]:
+    """Lines for what is there and was not wanted, or wanted and is not there; `found`: how many, by board or bus.
+
+    may_be: it follows from something else that the test expects.
+    """
+    there = {name: count for name, count in found.items() if count}
+    told = ", ".join(f"{name} {count}" for name, count in there.items())
+    if wanted is False:
+        return [f"{what}: {told}"] if there and not may_be else []
+    if wanted is True:
+        return [] if there else [f"expected and not seen: {what}"]
+    if isinstance(wanted, str):
+        others = {name: count for name, count in there.items() if name != wanted}
+        lines = [] if wanted in there else [f"expected and not seen: {what} of {wanted}"]
+        return lines + ([f"{what}: {told}, expected only of {wanted}"] if others else [])
+    total = sum(there.values())
+    return [] if total == wanted else [f"{what}: {told or 'none'}, expected are {wanted}"]

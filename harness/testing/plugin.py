@@ -1,0 +1,391 @@
+"""The pytest plugin: fixtures `ranger`, `board` and `can_bus`, markers, options, reports; docs/testing.md tells of it.
+
+Everybody's pytest imports this module, so it imports nothing of the robot before a fixture needs it.
+"""
+
+from __future__ import annotations
+
+import os
+import shlex
+from collections.abc import Generator, Iterator
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+if TYPE_CHECKING:
+    from ranger_sim.harness.ranger import Ranger
+    from ranger_sim.harness.testing.bench import BoardAlone, BusAlone
+    from ranger_sim.harness.testing.health import Expected, Health
+    from ranger_sim.harness.testing.robots import Order
+
+SCOPES = ("function", "class", "module", "package", "session")
+MOST_KEPT = 8  # warmed-up robots that wait to be branched, some 30 MB each; chosen by us
+LAST_FRAMES = 12  # in the report of a failure
+LAST_ERRORS = 8
+
+# option: (environment variable, default, help)
+OPTIONS = {
+    "backend": ("RANGER_SIM_BACKEND", "sim", "sim, processes, vcan or hardware"),
+    "profile": ("RANGER_SIM_PROFILE", "", "profile of boards and buses: a name or a .toml file"),
+    "seed": ("RANGER_SIM_SEED", "", "seed of every robot, instead of the test's own"),
+    "scope": ("RANGER_SIM_SCOPE", "function", f"scope of the fixtures: {', '.join(SCOPES)}"),
+    "speed": ("RANGER_SIM_SPEED", "1.0", "virtual seconds per second, on vcan and hardware"),
+    "fork": ("RANGER_SIM_FORK", "yes", "no: warmed-up robots are not branched, each test warms up its own"),
+    "trace": ("RANGER_SIM_TRACE", "", "folder for a trace of every robot whose test failed"),
+}
+
+MARKERS = (
+    "ranger(seed=1, controller=..., body=..., warmed_up='step 3', backend=..., quirks=..., profile=...): "
+    "the robot of the fixture `ranger`; also any other field of Scenario",
+    "board(name, quirks=..., network_time=True): the board of the fixture `board`",
+    "can_bus(bit_rate=...): the bus of the fixture `can_bus`",
+    "requires(thing, ...): the test is skipped where the backend has not that thing",
+    "expects_errors(name, ...): errors that the robot must show in this test; MCH:AE_SPIKE for one board",
+    "expects(overruns=..., lost_frames=..., bus_errors=..., bus_off=..., dead=..., fall=...): what else must happen",
+)
+
+
+class Watched:
+    """A robot that a fixture has made, with what the report of a test about it needs."""
+
+    def __init__(self, robot: Ranger, order: Order, health: Health) -> None:
+        self.robot = robot
+        self.order = order
+        self.health = health
+
+
+class WarmedUp:
+    """Robots of this process that have been warmed up once, to be branched by forking. None of them ever runs on."""
+
+    def __init__(self) -> None:
+        self.kept: dict[Order, Ranger] = {}
+
+    def prepare(self, order: Order) -> bool:
+        """Have the robot of `order`; False when it cannot be had: the test will say why when it makes its own."""
+        from ranger_sim.foundation.user_error import UserError
+        from ranger_sim.harness.testing.robots import robot_of
+
+        if order not in self.kept:
+            try:
+                robot = robot_of(order)
+            except (UserError, AssertionError):
+                return False
+            while len(self.kept) >= MOST_KEPT:
+                self.kept.pop(next(iter(self.kept))).close()
+            self.kept[order] = robot
+        return True
+
+
+WARMED_UP = pytest.StashKey[WarmedUp]()
+ROBOTS = pytest.StashKey[list[Watched]]()
+BRANCH = pytest.StashKey[bool]()
+
+
+# --- options ----------------------------------------------------------------------------------------------
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Each option has a twin in the environment; the command line comes first."""
+    group = parser.getgroup("ranger-sim", "emulated Ranger robot")
+    for name, (variable, default, text) in OPTIONS.items():
+        group.addoption(
+            f"--ranger-{name}",
+            default=None,
+            metavar=name.upper(),
+            help=f"{text} (default {default or 'none'}; environment: {variable})",
+        )
+
+
+def option(config: pytest.Config, name: str) -> str:
+    """What was asked for: on the command line, in the environment, or the default."""
+    variable, default, _ = OPTIONS[name]
+    given = config.getoption(f"ranger_{name}", None)
+    return given if given is not None else os.environ.get(variable) or default
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Markers, and options that can be wrong."""
+    for marker in MARKERS:
+        config.addinivalue_line("markers", marker)
+    config.stash[WARMED_UP] = WarmedUp()
+    if option(config, "scope") not in SCOPES:
+        raise pytest.UsageError(f"--ranger-scope is {option(config, 'scope')!r}, allowed are {', '.join(SCOPES)}")
+    if option(config, "fork") not in ("yes", "no"):
+        raise pytest.UsageError(f"--ranger-fork is {option(config, 'fork')!r}, allowed are yes, no")
+    for name, kind in (("seed", int), ("speed", float)):
+        try:
+            kind(option(config, name) or "1")
+        except ValueError:
+            raise pytest.UsageError(f"--ranger-{name} is {option(config, name)!r}, a number is expected") from None
+
+
+def pytest_unconfigure(config: pytest.Config) -> None:
+    """Give back what was kept."""
+    for robot in config.stash[WARMED_UP].kept.values() if WARMED_UP in config.stash else ():
+        robot.close()
+
+
+def scope_of(fixture_name: str, config: pytest.Config) -> str:
+    """The scope of the fixtures that make robots and boards."""
+    return option(config, "scope")
+
+
+def order_for(node: Any, config: pytest.Config) -> Order:
+    """The robot that a test (or module, or class) asks for by its marks and the options. UserError for a wrong mark."""
+    from ranger_sim.foundation.user_error import UserError
+    from ranger_sim.harness.testing.robots import order_of
+
+    wanted: dict[str, Any] = {
+        "backend": option(config, "backend"),
+        "profile": option(config, "profile") or None,
+        "speed": float(option(config, "speed")),
+    }
+    for mark in reversed(list(node.iter_markers("ranger"))):
+        if mark.args:
+            raise UserError(f"mark ranger: {mark.args[0]!r} has no name; it reads like ranger(seed=3)")
+        wanted |= mark.kwargs
+    if option(config, "seed"):
+        wanted["seed"] = int(option(config, "seed"))
+    return order_of(wanted)
+
+
+# --- running a test ---------------------------------------------------------------------------------------
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_protocol(item: pytest.Item, nextitem: pytest.Item | None) -> bool | None:
+    """A test of a warmed-up robot runs in a branch of it: a forked process."""
+    if not wants_branch(item):
+        return None
+    from ranger_sim.harness.testing import forking
+
+    if not forking.possible(item.config) or not item.config.stash[WARMED_UP].prepare(order_for(item, item.config)):
+        return None
+    item.stash[BRANCH] = True
+    forking.run(item, nextitem)
+    return True
+
+
+def wants_branch(item: pytest.Item) -> bool:
+    """Whether the robot of a test is a branch of one that others have as well."""
+    if "ranger" not in getattr(item, "fixturenames", ()) or item.get_closest_marker("ranger") is None:
+        return False
+    if option(item.config, "fork") == "no" or option(item.config, "scope") != "function":
+        return False
+    from ranger_sim.foundation.user_error import UserError
+
+    try:
+        order = order_for(item, item.config)
+    except UserError:
+        return False  # the fixture says it
+    return bool(order.warmed_up) and order.backend == "sim" and order.log != "full"
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """Skip what the backend cannot carry; a mark that a robot of a wider scope could not heed is a mistake."""
+    scope = option(item.config, "scope")
+    if scope != "function" and any(mark.name in ("ranger", "board", "can_bus") for mark in item.own_markers):
+        pytest.fail(f"the fixtures have the scope {scope}: their marks belong there (pytestmark = ...)", pytrace=False)
+    things = tuple(thing for mark in item.iter_markers("requires") for thing in mark.args)
+    if things:
+        from ranger_sim.foundation.user_error import UserError
+        from ranger_sim.harness.testing.backends import missing
+
+        wrong = reason = ""
+        try:
+            reason = missing(backend_of(item), things)
+        except UserError as mistake:
+            wrong = str(mistake)
+        if wrong:
+            pytest.fail(wrong, pytrace=False)
+        if reason:
+            pytest.skip(reason)
+
+
+def backend_of(item: pytest.Item) -> str:
+    """The backend of a test: that of its mark, or the option."""
+    for mark in item.iter_markers("ranger"):
+        if "backend" in mark.kwargs:
+            return str(mark.kwargs["backend"])
+    return option(item.config, "backend")
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_call(item: pytest.Item) -> Generator[None, Any, Any]:
+    """After the test's body its robots are looked at: what no healthy robot does fails the test."""
+    try:
+        result = yield
+    except Exception as error:
+        if robots_of(item) and is_missing(error):
+            pytest.skip(str(error))
+        raise
+    unhealthy = []
+    for watched in robots_of(item):
+        unhealthy += watched.health.faults(expected_of(item))
+    if unhealthy:
+        pytest.fail("\n".join(["the robot is not healthy:", *(f"  {line}" for line in unhealthy)]), pytrace=False)
+    return result
+
+
+def robots_of(item: pytest.Item) -> list[Watched]:
+    """The robots that fixtures of any scope have made for a test."""
+    return [watched for node in item.listchain() for watched in node.stash.get(ROBOTS, [])]
+
+
+def is_missing(error: Exception) -> bool:
+    """Whether a test met something that its backend has not."""
+    from ranger_sim.harness.testing.backends import MissingError
+
+    return isinstance(error, MissingError)
+
+
+def expected_of(item: pytest.Item) -> Expected:
+    """What the marks of a test say that must happen."""
+    from ranger_sim.harness.testing.health import Expected
+
+    errors = tuple(name for mark in item.iter_markers("expects_errors") for name in mark.args)
+    others: dict[str, Any] = {}
+    for mark in reversed(list(item.iter_markers("expects"))):
+        others |= mark.kwargs
+    return Expected(errors, **others)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(item: pytest.Item, call: pytest.CallInfo[None]) -> Generator[None, Any, Any]:
+    """A report about a robot says what it ran with; that of a failure also how it comes again, and what came last."""
+    robots = robots_of(item) if call.when == "call" else []
+    item.user_properties += [pair for watched in robots for pair in properties(watched)]
+    report: pytest.TestReport = yield
+    if robots and report.failed:
+        text = "\n\n".join(description(item, watched) for watched in robots)
+        report.sections.append(("ranger-sim", text))
+    return report
+
+
+def properties(watched: Watched) -> list[tuple[str, object]]:
+    """What JUnit XML shows of a robot."""
+    from ranger_sim import __version__, loading
+    from ranger_sim.datatable.generated import all_variables
+
+    found: list[tuple[str, object]] = [
+        ("ranger_sim_version", __version__),
+        ("ranger_sim_runs", "compiled" if loading.RUNS_COMPILED else "interpreted"),
+        ("ranger_sim_table", all_variables.TABLE_HASH),
+        ("ranger_sim_backend", watched.order.backend),
+        ("ranger_sim_seed", watched.order.scenario.seed),
+    ]
+    return found + [(figure.name, figure.text()) for figure in watched.robot.observed.figures]
+
+
+def description(item: pytest.Item, watched: Watched) -> str:
+    """Seed, command, what came last, and the trace, for a person who reads of a failure."""
+    robot, order = watched.robot, watched.order
+    command = ["pytest", item.nodeid, "--ranger-seed", str(order.scenario.seed), "--ranger-backend", order.backend]
+    if order.profile:
+        command += ["--ranger-profile", order.profile]
+    lines = [
+        f"seed {order.scenario.seed}, controller {order.scenario.controller}, body {order.scenario.body}, "
+        f"backend {order.backend}; {robot.time_s:.6f} s since power-up, step {robot.steps}",
+        f"once more: {shlex.join(command)}",
+        *(f"also: {line}" for line in ([] if robot.lost else watched.health.faults(expected_of(item)))),
+        "last errors that boards sent, beyond what is normal in a walk:",
+        *last_errors(robot),
+        "last frames:",
+        *(f"  {frame.text()}" for frame in robot.observed.keeper.latest(LAST_FRAMES)),
+    ]
+    return "\n".join(lines + trace_of(item, watched))
+
+
+def last_errors(robot: Ranger) -> list[str]:
+    """The error frames that came last, those of errors that are normal on their board left out."""
+    from ranger_sim.datatable.generated import all_variables
+    from ranger_sim.datatable.generated import errors as error_table
+    from ranger_sim.datatable.packing import parts_of_error_word
+
+    numbers = {all_variables.ID_OF[f"ERROR_{name}"] for name in robot.boards if name != "MB"}
+    keeper = robot.observed.keeper
+    found = []
+    for frame in sorted(frame for bus in keeper.streams for frame in keeper.frames(bus, numbers)):
+        code, board, _ = parts_of_error_word(frame.lo)
+        if all_variables.BOARD_NAMES.get(board) not in error_table.NORMAL_PER_S.get(code, {}):
+            found.append(f"  {frame.text()}")
+    return found[-LAST_ERRORS:] or ["  none"]
+
+
+def trace_of(item: pytest.Item, watched: Watched) -> list[str]:
+    """A trace of a failed test, where it is asked for: a hook `pytest_ranger_trace(item, robot, folder)` writes it."""
+    folder = option(item.config, "trace")
+    if not folder:
+        return []
+    paths = item.config.hook.pytest_ranger_trace(item=item, robot=watched.robot, folder=folder)
+    return [f"trace: {path}" for path in paths if path] or ["trace: nothing here writes one"]
+
+
+def pytest_addhooks(pluginmanager: pytest.PytestPluginManager) -> None:
+    """The hook that others implement."""
+    from ranger_sim.harness.testing import hooks
+
+    pluginmanager.add_hookspecs(hooks)
+
+
+# --- fixtures ---------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope=scope_of)  # type: ignore[arg-type]
+def ranger(request: pytest.FixtureRequest) -> Iterator[Ranger]:
+    """A robot as the mark `ranger` says: fresh, or warmed up. It is looked at for its health after each test."""
+    from ranger_sim.foundation.user_error import UserError
+    from ranger_sim.harness.testing.backends import MissingError
+    from ranger_sim.harness.testing.health import Health
+    from ranger_sim.harness.testing.robots import robot_of
+
+    node, config = request.node, request.config
+    missing = wrong = ""
+    try:
+        order = order_for(node, config)
+        branch = node.stash.get(BRANCH, False)
+        robot = config.stash[WARMED_UP].kept[order] if branch else robot_of(order)
+    except MissingError as reason:
+        missing = str(reason)
+    except (UserError, AssertionError) as mistake:
+        wrong = str(mistake)
+    if missing:
+        pytest.skip(missing)
+    if wrong:
+        pytest.fail(wrong, pytrace=False)
+    health = Health(robot)
+    if not order.warmed_up:
+        health.before = None  # what comes once after power-up is of this test
+    watched = Watched(robot, order, health)
+    node.stash.setdefault(ROBOTS, []).append(watched)
+    yield robot
+    node.stash[ROBOTS].remove(watched)
+    robot.close()
+
+
+@pytest.fixture(scope=scope_of)  # type: ignore[arg-type]
+def board(request: pytest.FixtureRequest) -> Iterator[BoardAlone]:
+    """One board alone, as the mark `board` says: `@pytest.mark.board("MCH")`."""
+    from ranger_sim.foundation.user_error import UserError
+    from ranger_sim.harness.testing.bench import BoardAlone
+
+    mark = request.node.get_closest_marker("board")
+    wrong = 'fixture board: which one? @pytest.mark.board("MCH")'
+    if mark is not None and mark.args:
+        try:
+            alone, wrong = BoardAlone(*mark.args, **mark.kwargs), ""
+        except (UserError, TypeError) as mistake:
+            wrong = str(mistake)
+    if wrong:
+        pytest.fail(wrong, pytrace=False)
+    yield alone
+
+
+@pytest.fixture(scope=scope_of)  # type: ignore[arg-type]
+def can_bus(request: pytest.FixtureRequest) -> Iterator[BusAlone]:
+    """One bus alone, with nodes of the test's own: `can_bus.node("a")`."""
+    from ranger_sim.harness.testing.bench import BusAlone
+
+    mark = request.node.get_closest_marker("can_bus")
+    yield BusAlone(**(mark.kwargs if mark is not None else {}))

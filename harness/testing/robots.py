@@ -1,0 +1,102 @@
+"""A robot under test by a plain call: `new_robot(seed=3, warmed_up="step 3")`; the fixture `ranger` does the same.
+
+with contextlib.closing(new_robot(seed=3)) as robot:
+    robot.until("step 5")
+    assert_healthy(robot)
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from typing import Any
+
+from ranger_sim.boards.quirks import Quirks
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.harness.profile import Profile
+from ranger_sim.harness.profile import load as load_profile
+from ranger_sim.harness.ranger import Ranger
+from ranger_sim.harness.scenario import Scenario
+from ranger_sim.harness.testing.backends import HARDWARE, PROCESSES, SIM, VCAN, check_backend
+from ranger_sim.harness.testing.health import Expected, Health
+from ranger_sim.harness.testing.wire import observe
+
+SCENARIO_FIELDS = tuple(field.name for field in dataclasses.fields(Scenario))
+OTHERS = ("quirks", "profile", "warmed_up", "backend", "speed", "log")
+WARM_UP_LIMIT = "1 h"  # of virtual time: the warm-up of a test is told to have failed after it
+
+
+@dataclasses.dataclass(frozen=True)
+class Order:
+    """What robot is wanted. Equal orders give equal robots, so one that has been warmed up can serve for another.
+
+    warmed_up: a condition of harness/conditions.py that holds before the test begins; empty for a fresh robot.
+    speed: virtual seconds per second where time is released by the wall clock.
+    """
+
+    scenario: Scenario = Scenario()
+    quirks: Quirks | None = None
+    profile: str | None = None
+    warmed_up: str = ""
+    backend: str = SIM
+    speed: float = 1.0
+    log: str = "none"
+
+
+def order_of(wanted: Mapping[str, Any]) -> Order:
+    """The order in keywords: fields of Scenario, and those above. UserError for a keyword that is none."""
+    unknown = [name for name in wanted if name not in (*SCENARIO_FIELDS, *OTHERS)]
+    if unknown:
+        allowed = ", ".join((*SCENARIO_FIELDS, *OTHERS))
+        raise UserError(f"ranger({', '.join(unknown)}=...): what can be asked for is {allowed}")
+    scenario = Scenario(**{name: value for name, value in wanted.items() if name in SCENARIO_FIELDS})
+    others = {name: value for name, value in wanted.items() if name in OTHERS and value is not None}
+    check_backend(others.get("backend", SIM))
+    return Order(scenario, **others)
+
+
+def new_robot(**wanted: Any) -> Ranger:
+    """A robot: `new_robot(seed=3, controller="robust", backend="processes", warmed_up="step 3")`. Close it when done.
+
+    Its frames are kept from power-up (`robot.wire`). MissingError when this machine cannot carry the backend.
+    """
+    return robot_of(order_of(wanted))
+
+
+def robot_of(order: Order) -> Ranger:
+    """The robot that was ordered, warmed up."""
+    profile = load_profile(order.profile) if order.profile is not None else None
+    robot = fresh(order, profile)
+    observe(robot)
+    if order.warmed_up:
+        try:
+            robot.until(order.warmed_up, within=WARM_UP_LIMIT)
+        except BaseException:
+            robot.close()
+            raise
+    return robot
+
+
+def fresh(order: Order, profile: Profile | None) -> Ranger:
+    """The robot at power-up, on its backend."""
+    if order.backend == PROCESSES:
+        from ranger_sim.harness.testing.process_robot import ProcessRobot
+
+        return ProcessRobot(order.scenario, order.log, order.quirks, profile)
+    if order.backend in (VCAN, HARDWARE):
+        from ranger_sim.harness.testing.outside_robot import OutsideRobot, buses_of_profile, vcan_buses
+
+        if order.backend == VCAN:
+            return OutsideRobot(order.scenario, order.log, order.quirks, profile, vcan_buses(), order.speed)
+        return OutsideRobot(order.scenario, order.log, order.quirks, profile, buses_of_profile(profile), order.speed)
+    return Ranger(order.scenario, order.log, order.quirks, profile)
+
+
+def assert_healthy(robot: Ranger, **expected: Any) -> None:
+    """AssertionError when something happened since power-up that no healthy robot does; `expected` as in `Expected`."""
+    health = Health(robot)
+    health.before = None
+    health.had_fallen = False
+    faults = health.faults(Expected(**expected))
+    if faults:
+        raise AssertionError("\n".join(["the robot is not healthy:", *(f"  {line}" for line in faults)]))
