@@ -11,6 +11,7 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent
 # What each document's examples, run one after the other in one process, must print among other things.
 PRINTED = {
     "README.md": (r"ID: +123 .*'ranger'", r"^BusState\.ERROR$", r"^[1-9]\d* -?0\.\d+ \d{4,5}$"),
+    "docs/slot-timing.md": (r"^3 7460 53% left$",),
     "docs/faults.md": (r"^True 100 counts True$",),
     "firmware_sim/README.md": (r"^5 1 0$",),
 }

@@ -56,8 +56,8 @@ def of_slot(slot: Any, executions: list[Any], limit_ns: int | None = None) -> st
         marks[limit_ns] = f"limit {duration_text(limit_ns)}"
     lines += _marks(marks, cell)
     lines.append("")
-    lines += _list(slot, tasks, task_signs, "function")
-    lines += _list(slot, interrupts, interrupt_signs, "interrupt")
+    lines += _list(slot, tasks, task_signs, "function", "limit")
+    lines += _list(slot, interrupts, interrupt_signs, "interrupt", "waited us")
     return "\n".join(lines)
 
 
@@ -136,12 +136,12 @@ def _marks(marks: dict[int, str], cell: float) -> list[str]:
     return lines
 
 
-def _list(slot: Any, executions: list[Any], signs: dict[str, str], what: str) -> list[str]:
-    """Cycles by name, with their share of the slot."""
+def _list(slot: Any, executions: list[Any], signs: dict[str, str], what: str, last: str) -> list[str]:
+    """Cycles by name, with their share of the slot, and a function's limit or an interrupt's longest wait."""
     legend = slot.legend
     if not executions:
         return []
-    lines = [f"   {what:<26} {'times':>5} {'cycles':>8} {'us':>8} {'% of slot':>9} {'limit':>8}"]
+    lines = [f"   {what:<26} {'times':>5} {'cycles':>8} {'us':>8} {'% of slot':>9} {last:>9}"]
     small: list[int] = []
     for name, sign in signs.items():
         runs = [each for each in executions if each.name == name]
@@ -149,14 +149,23 @@ def _list(slot: Any, executions: list[Any], signs: dict[str, str], what: str) ->
         if cycles < SMALLEST_SHARE * legend.slot_cycles:
             small.append(cycles)
             continue
-        lines.append(_line(sign, name, len(runs), cycles, legend, runs[0].limit, max(each.cycles for each in runs)))
+        lines.append(_line(sign, name, len(runs), cycles, legend) + _against(runs))
     if small:
-        lines.append(_line(" ", f"({len(small)} shorter ones)", len(small), sum(small), legend, 0, 0))
+        called = "(a shorter one)" if len(small) == 1 else f"({len(small)} shorter ones)"
+        lines.append(_line(" ", called, len(small), sum(small), legend))
     return lines
 
 
-def _line(sign: str, name: str, times: int, cycles: int, legend: Any, limit: int, most: int) -> str:
+def _against(runs: list[Any]) -> str:
+    """The last column: a function's limit, and whether it was exceeded, or how long an interrupt waited at most."""
+    if runs[0].interrupt:
+        return f" {max(each.latency_ns for each in runs) / 1000:>9.2f}"
+    limit = runs[0].limit
+    over = "  over!" if max(each.cycles for each in runs) > limit else ""
+    return f" {limit:>9,}{over}" if limit else ""
+
+
+def _line(sign: str, name: str, times: int, cycles: int, legend: Any) -> str:
     us = cycles / legend.cycles_per_ns / 1000.0
     share = 100.0 * cycles / legend.slot_cycles
-    against = f" {limit:>8,}{'  over!' if most > limit else ''}" if limit else ""
-    return f" {sign} {name:<26} {times:>5} {cycles:>8,} {us:>8.1f} {share:>9.1f}{against}"
+    return f" {sign} {name:<26} {times:>5} {cycles:>8,} {us:>8.1f} {share:>9.1f}"

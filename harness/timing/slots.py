@@ -328,10 +328,11 @@ class SlotView:
         place = int(np.searchsorted(slots.start, rows[at, COLUMN_START], side="right")) - 1
         return int(values[at]), Slot(self.recording, place)
 
-    # --- assertions ---------------------------------------------------------------------------------------
+    # --- assertions (pytest shows the line that asserts, not these) -----------------------------------------
 
     def assert_no_overrun(self) -> None:
         """No slot was unfinished when the next tick came."""
+        __tracebackhide__ = True
         count = self.overruns
         if count:
             places = self._places()
@@ -344,6 +345,7 @@ class SlotView:
 
     def assert_within(self, at_most: Limit) -> None:
         """Every slot was through `at_most` after its tick, interrupts included."""
+        __tracebackhide__ = True
         limit_ns = self._limit_ns(at_most)
         places = self._some()
         slots = self.recording.slots
@@ -356,18 +358,21 @@ class SlotView:
 
     def assert_function(self, name: str, at_most: Limit) -> None:
         """No execution of function `name` cost more than `at_most`, interrupts not included."""
+        __tracebackhide__ = True
         self._named("function", name, [task.name for task in self.legend.tasks], self.functions)
         cycles, slot = self._worst_run(name, lambda rows: rows[:, COLUMN_CYCLES], TASK_RAN, WAIT_RAN)
         self._compare(f"{name} cost", cycles, at_most, slot)
 
     def assert_interrupt(self, name: str, at_most: Limit) -> None:
         """No service of interrupt `name` cost more than `at_most`, what interrupted it not included."""
+        __tracebackhide__ = True
         self._named("interrupt", name, [source.name for source in self.legend.interrupts], self.interrupts)
         cycles, slot = self._worst_run(name, lambda rows: rows[:, COLUMN_CYCLES], INTERRUPT_RAN)
         self._compare(f"{name} cost", cycles, at_most, slot)
 
     def assert_latency(self, name: str, at_most: str) -> None:
         """No request of interrupt `name` waited longer than `at_most` for the first instruction of its handler."""
+        __tracebackhide__ = True
         self._named("interrupt", name, [source.name for source in self.legend.interrupts], self.interrupts)
         limit_ns = nanoseconds(at_most, "limit")
         latency_ns, slot = self._worst_run(name, lambda rows: rows[:, COLUMN_LATENCY], INTERRUPT_RAN)
@@ -376,6 +381,7 @@ class SlotView:
             self._fail(told, slot)
 
     def _compare(self, what: str, cycles: int, at_most: Limit, slot: Slot) -> None:
+        __tracebackhide__ = True
         allowed = at_most if isinstance(at_most, int) else self._limit_ns(at_most) * self.legend.cycles_per_ns
         if cycles > allowed:
             took = duration_text(cycles / self.legend.cycles_per_ns)
@@ -387,6 +393,7 @@ class SlotView:
         return nanoseconds(limit, "limit") if isinstance(limit, str) else round(limit / self.legend.cycles_per_ns)
 
     def _fail(self, told: str, slot: Slot, limit_ns: int | None = None) -> None:
+        __tracebackhide__ = True
         raise AssertionError(f"{self}: {told}\n\n{slot.picture(limit_ns)}")
 
 
