@@ -10,7 +10,7 @@ from typing import Any
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.conditions import Condition, condition
 from ranger_sim.harness.faults import text as typed_text
-from ranger_sim.harness.faults.fault import Fault, Place
+from ranger_sim.harness.faults.fault import Fault, Place, end_condition
 
 # Modules of this package that put places and modes here when they are imported, in the order in which they are listed.
 MODULES = ("places", "edges", "words", "voltages", "imu", "converters", "actuators", "world")
@@ -109,7 +109,7 @@ def fault(
     for name, value in parameters.items():
         named(name, known, f"fault {where.name}:{mode}, parameter")
         values[name] = known[name].checked(value, f"fault {where.name}:{mode}")
-    return kind(where, None if start is None else condition(start), None if end is None else condition(end), values)
+    return kind(where, None if start is None else condition(start), end_condition(end), values)
 
 
 def typed(text: str) -> Fault:

@@ -14,12 +14,13 @@ A fault that never acted proves nothing, whatever the robot did.
 
 import dataclasses
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, ClassVar
 
+from ranger_sim.foundation.quantities import nanoseconds
 from ranger_sim.foundation.random_stream import RandomStream
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.conditions import Condition
+from ranger_sim.harness.conditions import Condition, condition
 from ranger_sim.harness.step_watch import StepWatch
 
 
@@ -65,6 +66,28 @@ class Place:
     details: Mapping[str, Any] = dataclasses.field(default_factory=dict)
 
 
+class Lasting(Condition):
+    """The end of a fault so long after its beginning, as "+50 ms"."""
+
+    def __init__(self, text: str) -> None:
+        Condition.__init__(self, text)
+        self.length_ns = nanoseconds(text.removeprefix("+").strip(), "fault: its length")
+        self.since_ns = -1
+
+    def met(self) -> bool:
+        return bool(self.since_ns >= 0 and self.robot.loop.time - self.since_ns >= self.length_ns)
+
+    def nearest(self) -> str:
+        return "it has not begun" if self.since_ns < 0 else "it has not lasted so long"
+
+
+def end_condition(wanted: str | Condition | Callable[[Any], Any] | None) -> Condition | None:
+    """The condition that ends a fault: any, or a length as "+50 ms"; None: none."""
+    if isinstance(wanted, str) and wanted.strip().startswith("+"):
+        return Lasting(" ".join(wanted.split()))
+    return None if wanted is None else condition(wanted)
+
+
 class Fault(StepWatch):
     """A mode at a place. Subclasses are modes: they name themselves and say what they do.
 
@@ -93,6 +116,7 @@ class Fault(StepWatch):
         self.armed_ns = self.activated_ns = self.acted_ns = self.ended_ns = self.cleared_ns = -1
         self.acted_count = 0
         self.largest_difference = 0.0
+        self.stop_wanted = False
 
     # --- what a mode says -----------------------------------------------------------------------------------
 
@@ -138,6 +162,10 @@ class Fault(StepWatch):
         self.armed_ns = robot.loop.time
         robot.loop.watchers.append(self)
 
+    def stop(self) -> None:
+        """End it with the next step of the plant, whatever its end condition says; what has not begun never does."""
+        self.stop_wanted = True
+
     def note(self, time_ns: int, difference: float) -> None:
         """For modes: at `time_ns` the place differed by `difference` (`unit`) from what it shows without the fault."""
         if self.acted_count == 0:
@@ -147,10 +175,16 @@ class Fault(StepWatch):
             self.largest_difference = difference
 
     def before_step(self, now_ns: int) -> None:
-        if self.activated_ns < 0 and (self.start is None or self.start.met()):
-            self.activated_ns = now_ns
-            self.begin(now_ns)
-        if self.active and self.end is not None and self.end.met():
+        if self.activated_ns < 0:
+            if self.stop_wanted:
+                self.robot.loop.watchers.remove(self)
+                return
+            if self.start is None or self.start.met():
+                self.activated_ns = now_ns
+                if isinstance(self.end, Lasting):
+                    self.end.since_ns = now_ns
+                self.begin(now_ns)
+        if self.active and (self.stop_wanted or (self.end is not None and self.end.met())):
             self.ended_ns = now_ns
             self.finish(now_ns)
         if self.active:

@@ -1,6 +1,7 @@
 """A fault as it is typed: PLACE:MODE[,name=value ...][@START[..END]].
 
 MCH.joint_encoder:stuck@step 12..step 14
+MCH.joint_encoder:stuck@step 12..+50 ms
 UI.imu:gyro_bias,rate=0.2@3 s
 """
 

@@ -27,7 +27,7 @@ QUANTITIES: Mapping[str, Quantity] = {
         "chosen by us: the packs go from 29 to 23 V; the converter ends at 33 V"),
     places.FOOT: Quantity("V",           0.5,    5.0,   0.0, 0.5,            0.0,
         "chosen by us: 0.5 V are 1638 counts, a quarter of the way from swing to stance (robot.md C3.2)"),
-    places.STEERING_ANGLE: Quantity("rad", 0.02, 5.0,   -0.005, 0.005,       -STEERING_CENTRE_V / STEERING_V_PER_RAD,
+    places.STEERING_ANGLE: Quantity("rad", 0.02, 5.0,   -0.002, 0.002,       -STEERING_CENTRE_V / STEERING_V_PER_RAD,
         "chosen by us: half of the feet's travel; an open wire reads 0 V"),
     places.SUPPLY_CURRENT: Quantity("A", 0.1,    2.0,   0.0, 0.1,            0.0,
         "chosen by us: half of the electronics' current"),

@@ -109,6 +109,28 @@ def test_levels_that_are_stuck_at_a_pin_raise_no_interrupt(robot):
     assert abs(robot.plant.hip_joint.cell - moved) > 5
 
 
+def test_what_the_hip_motors_count_has_missed_is_drawn_back_by_its_re_zeroing(robot):
+    motor, encoder = robot.board("MCH").motor, robot.plant.hip_motor
+    robot.plant.body.lock_hip = False
+    fault = robot.inject("MCH.motor_encoder", "swapped_sign")
+    robot.run_for(0.06)
+    robot.plant.body.lock_hip = True
+    robot.plant.body.inner.rate = 0.0
+    fault.stop()
+    robot.run_for(0.001)
+    assert fault.cleared_ns > 0
+    assert "5 % at 45 Hz" in fault.permanent
+    off = []
+    for _ in range(2):
+        off.append(motor.position_rad() - robot.board("MCH").encoder.radians)
+        robot.run_for(0.5)
+    assert abs(fault.miscount) > 50
+    assert off[0] == pytest.approx(fault.miscount * math.pi / (192 * 66), rel=0.35)  # it draws in the 60 ms as well
+    # 45.45 calls a second: 22 or 23 of them leave 0.95^22.7 = 0.31; the joint's word has noise of 0.3 counts, 0.2 mrad
+    assert off[1] / off[0] == pytest.approx(0.31, abs=0.03 + 0.001 / abs(off[0]))
+    assert encoder.cell != 0
+
+
 # --- converters -----------------------------------------------------------------------------------------------
 
 
