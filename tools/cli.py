@@ -27,6 +27,7 @@ def parser() -> argparse.ArgumentParser:
     from ranger_sim.datatable import cli as table_command
     from ranger_sim.tools import body, bus, can_bounds, check_bus, daq, faults, info, slots, trace, tune, up, walk
     from ranger_sim.tools.bench import command as bench
+    from ranger_sim.tools.campaign import command as campaign
     from ranger_sim.tools.fuzz import command as fuzz
     from ranger_sim.tools.vm import command as vm
 
@@ -52,6 +53,7 @@ def parser() -> argparse.ArgumentParser:
     vm.register(commands)
     faults.register(commands)
     slots.register(commands)
+    campaign.register(commands)
     return top
 
 

@@ -1,0 +1,105 @@
+"""One run of a campaign: what is set before power-up, and the fault; and the robot that it makes."""
+
+import dataclasses
+import hashlib
+import json
+import pathlib
+import tempfile
+from typing import Any
+
+from ranger_sim import __version__, datatable, loading
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.harness.ranger import Ranger
+from ranger_sim.harness.scenario import Scenario
+
+# What decides the outcome of a run: these rooms' sources and data.
+ROOMS = ("foundation", "datatable", "can_bus", "plant", "firmware_sim", "boards", "harness")
+SOURCES = {".py", ".pxd", ".toml", ".csv"}
+
+
+def version() -> str:
+    """Package version, table hash and digest of the sources: results of another version are not this one's."""
+    total = hashlib.blake2b(digest_size=16)
+    for room in ROOMS:
+        for path in sorted((loading.HOUSE / room).rglob("*")):
+            if path.suffix in SOURCES and "__pycache__" not in path.parts:
+                total.update(path.relative_to(loading.HOUSE).as_posix().encode() + b"\0" + path.read_bytes() + b"\0")
+    return f"{__version__}+{datatable.table_hash()[:12]}.{total.hexdigest()[:16]}"
+
+
+@dataclasses.dataclass(frozen=True)
+class Settings:
+    """What is set before power-up.
+
+    walk: fields of Scenario; controller, body: single values over those of the sets that `walk` names; costs:
+    {"MCH.publish_hip_angle": factor} on the modelled cycles of a task.
+    """
+
+    walk: dict[str, Any] = dataclasses.field(default_factory=dict)
+    controller: dict[str, float] = dataclasses.field(default_factory=dict)
+    body: dict[str, float] = dataclasses.field(default_factory=dict)
+    costs: dict[str, float] = dataclasses.field(default_factory=dict)
+
+    def as_dict(self) -> dict[str, Any]:
+        """As JSON can carry it; the same settings give the same text."""
+        return {name: dict(sorted(value.items())) for name, value in dataclasses.asdict(self).items()}
+
+    def text(self) -> str:
+        """Canonical, for keys and for grouping."""
+        return json.dumps(self.as_dict(), sort_keys=True)
+
+    def robot(self) -> Ranger:
+        """A fresh robot with these settings. UserError for what it does not have."""
+        with tempfile.TemporaryDirectory(prefix="ranger-sim-campaign-") as name:
+            folder = pathlib.Path(name)
+            walk = dict(self.walk)
+            if self.controller:
+                base = walk.get("controller", Scenario.controller)
+                walk["controller"] = written(folder / "controller.toml", base, self.controller, "reasons")
+            if self.body:
+                base = walk.get("body", Scenario.body)
+                walk["body"] = written(folder / "body.toml", base, self.body, "sources")
+            try:
+                robot = Ranger(Scenario(**walk))
+            except TypeError as error:
+                raise UserError(f"campaign: walk: {error}") from None
+        for task, factor in self.costs.items():
+            board, _, entry = task.partition(".")
+            if board not in robot.boards:
+                raise UserError(f"campaign: cost.{task}: there is no board {board!r}, but {', '.join(robot.boards)}")
+            found = robot.boards[board].scheduler.find(entry)
+            found.cost, found.per_item = round(found.cost * factor), round(found.per_item * factor)
+        return robot
+
+
+def written(path: pathlib.Path, base: str, values: dict[str, float], explained: str) -> str:
+    """A parameter file over `base` with these values; returns its name."""
+    lines = [f"base = {json.dumps(str(base))}", "", "[parameters]"]
+    lines += [f"{name} = {value!r}" for name, value in values.items()]
+    lines += ["", f"[{explained}]", *(f'{name} = "set by a campaign"' for name in values)]
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return str(path)
+
+
+@dataclasses.dataclass(frozen=True)
+class Case:
+    """One run. `fault` as it is typed, None for a sweep of settings; `reference`: of the golden run, where other.
+
+    axes: what the plan varied, by name, for the tables; it is not part of the key.
+    """
+
+    settings: Settings
+    fault: str | None = None
+    reference: Settings | None = None
+    axes: dict[str, Any] = dataclasses.field(default_factory=dict, compare=False)
+
+    def key(self, version: str, watch: dict[str, Any]) -> str:
+        """By this a result is known: what was run, by which version, and how it was watched."""
+        whole = {"settings": self.settings.as_dict(), "fault": self.fault, "version": version, "watch": watch}
+        if self.reference is not None:
+            whole["reference"] = self.reference.as_dict()
+        return hashlib.blake2b(json.dumps(whole, sort_keys=True).encode(), digest_size=10).hexdigest()
+
+    def golden(self) -> Settings:
+        """The settings of the golden run."""
+        return self.reference if self.reference is not None else self.settings

@@ -1,0 +1,201 @@
+"""Runs a plan: healthy walks first, then every run that is not on the disk yet, in groups with one golden run each."""
+
+import dataclasses
+import hashlib
+import json
+import math
+import pathlib
+from collections.abc import Callable, Iterator
+from typing import Any
+
+from ranger_sim.foundation.random_stream import RandomStream
+from ranger_sim.harness.campaigns.cases import Case, Settings, version
+from ranger_sim.harness.campaigns.group import request_of
+from ranger_sim.harness.campaigns.outcomes import severity
+from ranger_sim.harness.campaigns.plan import Plan, Range
+from ranger_sim.harness.campaigns.store import Store
+
+# Runs of a group: few enough that a group's results are not long on the way and the workers end together, many enough
+# that its golden run, walked twice (3 s of computing), is shared: chosen by us.
+MOST_IN_A_GROUP = 16
+NARROWER = 0.5  # of a search's box, from round to round
+FIRST_BOX = 0.25  # half its width in the first round, of the whole range
+
+Result = dict[str, Any]
+
+
+def jsonl(folder: pathlib.Path) -> pathlib.Path:
+    """Where a campaign's results are."""
+    return folder / "results.jsonl"
+
+
+class Campaign:
+    """A plan and its results so far, in `folder`. `cases`: the runs decided on, in order; a search adds to them."""
+
+    def __init__(self, plan: Plan, folder: pathlib.Path) -> None:
+        self.plan = plan
+        self.folder = folder
+        self.version = version()
+        self.store = Store(jsonl(folder))
+        self.cases: list[Case] = []
+        self.stopped_at: int | None = None  # look at which a sample had told enough
+
+    def key(self, case: Case) -> str:
+        """By which the result of a case is known."""
+        return case.key(self.version, self.plan.watch_key())
+
+    def result(self, case: Case) -> Result | None:
+        """The result of a case, when it is there."""
+        return self.store.results.get(self.key(case))
+
+    @property
+    def foreseen(self) -> int:
+        """How many runs the plan will come to, at most."""
+        plan = self.plan
+        if plan.sample:
+            return plan.sample.runs
+        cells = math.prod(len(values) for values in plan.axes.values() if not isinstance(values, Range))
+        return cells * (plan.search.first + plan.search.rounds * plan.search.each) if plan.search else cells
+
+    def run(self, pool: Any, tell: Callable[[int, str], None]) -> None:
+        """Do what is missing. `tell(done, what)` after every result; `pool`: of pools.py."""
+        plan = self.plan
+        if plan.search:
+            for cases in self.searching(plan.search):
+                self.cases += cases
+                self.do(cases, pool, tell)
+            return
+        cases = plan.cases()
+        stopping = plan.sample.stopping if plan.sample else None
+        if stopping is None:
+            self.cases = cases
+            self.do(cases, pool, tell)
+            return
+        for look in range(1, stopping.looks + 1):
+            more = cases[len(self.cases) : stopping.look_after(look)]
+            self.cases += more
+            self.do(more, pool, tell)
+            hits = sum((self.result(case) or {}).get("outcome") == stopping.outcome for case in self.cases)
+            self.stopped_at = look
+            if stopping.decides(stopping.interval(hits, len(self.cases), look)):
+                break
+
+    def do(self, cases: list[Case], pool: Any, tell: Callable[[int, str], None]) -> None:
+        """Run those of `cases` whose results are not there."""
+        keys = {self.key(case): case for case in cases if self.result(case) is None}
+        groups: dict[str, list[tuple[str, Case]]] = {}
+        for key, case in keys.items():
+            groups.setdefault(case.golden().text(), []).append((key, case))
+        healthy = self.healthy([members[0][1].golden() for members in groups.values()], pool, tell)
+        requests = []
+        for members in groups.values():
+            golden = members[0][1].golden()
+            size = min(MOST_IN_A_GROUP, max(1, math.ceil(len(members) / (3 * pool.jobs))))
+            for start in range(0, len(members), size):
+                part = members[start : start + size]
+                requests.append(
+                    request_of(
+                        [case for _, case in part],
+                        [key for key, _ in part],
+                        golden,
+                        self.plan.watch,
+                        healthy[self.healthy_key(golden)]["healthy"],
+                        self.version,
+                    )
+                )
+        for result in pool.run(requests):
+            self.store.add(result)
+            tell(self.done, result["outcome"])
+
+    @property
+    def done(self) -> int:
+        """Of the cases decided on, how many have results."""
+        return sum(self.result(case) is not None for case in self.cases)
+
+    def healthy_key(self, golden: Settings) -> str:
+        """By which the healthy walks with these settings (of any seed) are known."""
+        walk = {name: value for name, value in golden.walk.items() if name != "seed"}
+        whole = {**golden.as_dict(), "walk": walk, "version": self.version, "watch": self.plan.watch_key()}
+        return "healthy-" + hashlib.blake2b(json.dumps(whole, sort_keys=True).encode(), digest_size=8).hexdigest()
+
+    def healthy(self, goldens: list[Settings], pool: Any, tell: Callable[[int, str], None]) -> dict[str, Result]:
+        """What healthy walks raise, for each of these settings; walked when it is not there."""
+        wanted = {self.healthy_key(golden): golden for golden in goldens}
+        requests = [
+            {
+                "key": key,
+                "settings": golden.as_dict(),
+                "seeds": list(self.plan.healthy_seeds),
+                "watch": self.plan.watch.as_dict(),
+            }
+            for key, golden in wanted.items()
+            if key not in self.store.results
+        ]
+        for result in pool.run(requests):
+            self.store.add(result)
+            tell(self.done, "healthy walks")
+        return {key: self.store.results[key] for key in wanted}
+
+    def healthy_of(self, case: Case) -> dict[str, Any] | None:
+        """What the healthy walks of a case raise, when they have been walked."""
+        found = self.store.results.get(self.healthy_key(case.golden()))
+        return None if found is None else found["healthy"]
+
+    def healthy_results(self) -> list[Result]:
+        """What there is of healthy walks."""
+        goldens = {self.healthy_key(case.golden()) for case in self.cases}
+        return [self.store.results[key] for key in sorted(goldens) if key in self.store.results]
+
+    def searching(self, search: Any) -> Iterator[list[Case]]:
+        """The runs of a search, round by round: spread over the ranges, then around the worst of each cell."""
+        cells = list(self.cells())
+        ranges = {name: values for name, values in self.plan.axes.items() if isinstance(values, Range)}
+        tried: list[list[tuple[dict[str, float], Case]]] = [[] for _ in cells]
+        for number in range(search.rounds + 1):
+            round_cases = []
+            for place, cell in enumerate(cells):
+                stream = RandomStream(search.seed, f"campaign search {json.dumps(cell, sort_keys=True)} {number}")
+                if number == 0:
+                    points = spread(search.first, list(ranges), stream)
+                else:
+                    worst = max(tried[place], key=lambda each: severity(self.result(each[1]) or {"outcome": "invalid"}))
+                    points = around(worst[0], search.each, FIRST_BOX * NARROWER ** (number - 1), stream)
+                for point in points:
+                    values = {name: ranges[name].at(share) for name, share in point.items()}
+                    case = self.plan.case({name: values.get(name, cell.get(name)) for name in self.plan.axes})
+                    tried[place].append((point, case))
+                    round_cases.append(case)
+            yield round_cases
+
+    def cells(self) -> Iterator[dict[str, Any]]:
+        """Every combination of what a search does not search over."""
+        lists: dict[str, list[Any] | Range] = {
+            name: values for name, values in self.plan.axes.items() if not isinstance(values, Range)
+        }
+        without = dataclasses.replace(self.plan, axes=lists, search=None)
+        for case in without.census():
+            yield case.axes
+
+    def close(self) -> None:
+        """Let another one write the results."""
+        self.store.close()
+
+
+def spread(count: int, names: list[str], stream: Any) -> list[dict[str, float]]:
+    """`count` points in the unit box, one in each `count`-th of every axis (a Latin hypercube)."""
+    columns = {}
+    for name in names:
+        order = list(range(count))
+        for place in range(count - 1, 0, -1):
+            other = stream.integer(place + 1)
+            order[place], order[other] = order[other], order[place]
+        columns[name] = [(place + stream.uniform()) / count for place in order]
+    return [{name: columns[name][number] for name in names} for number in range(count)]
+
+
+def around(centre: dict[str, float], count: int, half: float, stream: Any) -> list[dict[str, float]]:
+    """`count` points in a box around `centre`, inside the unit box."""
+    return [
+        {name: min(1.0, max(0.0, share + half * (2.0 * stream.uniform() - 1.0))) for name, share in centre.items()}
+        for _ in range(count)
+    ]

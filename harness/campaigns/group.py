@@ -1,0 +1,329 @@
+"""A group of runs with one golden run: walked once for its record, and once more to branch the runs off it.
+
+    python -m ranger_sim.harness.campaigns.group     # one request as a line of JSON in, one result a line out
+
+The process has one thread, so it may fork; whatever deals the groups out (threads, Dask's workers) starts one for each
+group. A fault's run branches off `BRANCH_EARLY_NS` before the fault begins in the golden run, so that the walk
+before it is paid for once per group; a sweep of settings differs from power-up on and branches there.
+"""
+
+import dataclasses
+import functools
+import json
+import sys
+from collections.abc import Callable
+from typing import Any
+
+from ranger_sim.foundation import wallclock
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.harness.campaigns.branching import BranchError, branch
+from ranger_sim.harness.campaigns.cases import Case, Settings, version
+from ranger_sim.harness.campaigns.outcomes import Band, classify, deviation
+from ranger_sim.harness.conditions import condition
+from ranger_sim.harness.faults import catalogue
+from ranger_sim.harness.faults import text as typed_text
+from ranger_sim.harness.faults.evidence import Evidence, Record
+from ranger_sim.harness.faults.proof import Difference, Healthy, Proof, Reaction, damage, false_alarms, gait, prove
+from ranger_sim.harness.ranger import GRID_NS, Ranger
+from ranger_sim.harness.scenario import StopRule
+from ranger_sim.harness.step_watch import StepWatch
+
+# Before the fault begins, so that what looks back a little (a delay line, the last edge) has something to look at:
+# chosen by us, a tenth of a step.
+BRANCH_EARLY_NS = 60_000_000
+SLICE_S = 0.25
+
+Result = dict[str, Any]
+
+
+@dataclasses.dataclass(frozen=True)
+class Watch:
+    """How runs are watched: `after_s` from the fault's start on; golden runs look for starts until `patience_s`.
+
+    from_s: where the gait of a run without a fault is judged from. limit_s: of the wall clock, per run.
+    """
+
+    after_s: float = 7.0
+    from_s: float = 5.0
+    patience_s: float = 30.0
+    limit_s: float = 120.0
+    band: Band = dataclasses.field(default_factory=Band)
+
+    def as_dict(self) -> dict[str, Any]:
+        """As JSON can carry it."""
+        return dataclasses.asdict(self)
+
+    @classmethod
+    def from_dict(cls, found: dict[str, Any]) -> "Watch":
+        """The same from what `as_dict` gave."""
+        return cls(**{**found, "band": Band(**found["band"])})
+
+
+class Probe(StepWatch):
+    """When a start condition first holds in a run without the fault, `met_ns`; -1: not yet."""
+
+    def __init__(self, robot: Ranger, text: str) -> None:
+        StepWatch.__init__(self)
+        self.robot = robot
+        self.wanted = condition(text)
+        self.wanted.begin(robot)
+        self.met_ns = -1
+
+    def before_step(self, now_ns: int) -> None:
+        if self.wanted.met():
+            self.met_ns = now_ns
+            self.robot.loop.watchers.remove(self)
+
+
+def start_of(fault: str) -> str:
+    """When a typed fault begins, as a condition; at once, when it does not say."""
+    return typed_text.parse(fault).start or "0 s"
+
+
+class Golden:
+    """The golden run of a group: its record, when each start came, and what its gait is from there on."""
+
+    def __init__(self, settings: Settings, starts: set[str], watch: Watch) -> None:
+        robot = settings.robot()
+        evidence = Evidence(robot)
+        probes = {text: Probe(robot, text) for text in sorted(starts)}
+        robot.loop.watchers.extend(probes.values())
+        self.starts: dict[str, int] = {}
+        end_s = watch.from_s + watch.after_s if not probes else 0.0
+        while not robot.ended:
+            met = [probe.met_ns for probe in probes.values()]
+            if all(each >= 0 for each in met):
+                end_s = max([end_s, *((each - robot.start_ns) * 1e-9 + watch.after_s for each in met)])
+            elif robot.time_s >= watch.patience_s:
+                end_s = max([end_s, watch.patience_s + watch.after_s])
+            if end_s and robot.time_s >= end_s:
+                break
+            target = min(robot.time_s + SLICE_S, end_s) if end_s else robot.time_s + SLICE_S
+            robot.run(StopRule(time_s=target), SLICE_S)
+        self.starts = {text: probe.met_ns for text, probe in probes.items()}
+        self.record: Record = evidence.record()
+        self.digest = robot.trace_digest()
+        self.known: dict[int, Healthy] = {}
+
+    def healthy(self, others: Healthy | None, until_ns: int) -> Healthy:
+        """What is normal for a run that ends at `until_ns`: what other walks raise, and this one until then.
+
+        Not more of this one, so that a result does not depend on which runs were in its group.
+        """
+        if until_ns not in self.known:
+            own = Healthy.of([self.record.until(until_ns)])
+            self.known[until_ns] = own if others is None else own.merged(others)
+        return self.known[until_ns]
+
+
+def run_group(request: dict[str, Any], emit: Callable[[Result], None]) -> None:
+    """Run the cases of a request and `emit` the result of each as soon as it is there.
+
+    request: version, settings of the golden run, watch, healthy (`Healthy.as_dict`), cases: [{key, fault, settings}].
+    UserError when this installation has other sources than the one that asks.
+    """
+    if request["version"] != version():
+        raise UserError(f"campaign: this worker runs {version()}, asked for is {request['version']}")
+    watch = Watch.from_dict(request["watch"])
+    healthy = Healthy.from_dict(request["healthy"]) if request.get("healthy") else None
+    settings = Settings(**request["settings"])
+    cases = request["cases"]
+    golden = Golden(settings, {start_of(each["fault"]) for each in cases if each["fault"]}, watch)
+    for case in cases:
+        if not case["fault"]:
+            emit(finished(case, functools.partial(sweep_run, case, golden, healthy, watch), watch))
+    along = sorted((case for case in cases if case["fault"]), key=lambda case: golden.starts[start_of(case["fault"])])
+    if not along:
+        return
+    robot = settings.robot()
+    evidence = Evidence(robot)
+    for case in along:
+        start_ns = golden.starts[start_of(case["fault"])]
+        if start_ns < 0:
+            why = f"the golden run did not reach {start_of(case['fault'])}"
+            if golden.record.fell_ns >= 0:
+                why += f": it fell ({golden.record.fall_cause})"
+            emit({"key": case["key"], "outcome": "invalid", "why": why})
+            continue
+        branch_ns = max(robot.start_ns, (start_ns - BRANCH_EARLY_NS - robot.start_ns) // GRID_NS * GRID_NS)
+        if branch_ns > robot.loop.time:
+            robot.run(StopRule(time_s=(branch_ns - robot.start_ns) * 1e-9), 3600.0)
+        work = functools.partial(fault_run, case["fault"], robot, evidence, golden, healthy, watch)
+        emit(finished(case, work, watch))
+
+
+def finished(case: dict[str, Any], work: Callable[[], Result], watch: Watch) -> Result:
+    """The result of a case, run in a branch; also when the branch gave none."""
+    begun = wallclock.monotonic_s()
+    try:
+        result = branch(work, watch.limit_s)
+    except BranchError as error:
+        result = {"outcome": error.outcome, "why": str(error)}
+    spent = {"wall_s": round(wallclock.monotonic_s() - begun, 3), "cpu_s": result.pop("cpu_s", None)}
+    return {"key": case["key"], **result, "spent": spent}
+
+
+def fault_run(
+    text: str, robot: Ranger, evidence: Evidence, golden: Golden, healthy: Healthy | None, watch: Watch
+) -> Result:
+    """In the branch: inject, walk on, and hold the record against the golden one."""
+    try:
+        fault = robot.arm(catalogue.typed(text))
+    except UserError as refused:
+        return {"outcome": "invalid", "why": f"refused: {refused}"}
+    start_ns = golden.starts[start_of(text)]
+    end_s = (start_ns - robot.start_ns) * 1e-9 + watch.after_s
+    while robot.time_s < end_s and not robot.ended:
+        robot.run(StopRule(time_s=end_s), end_s)
+    record = evidence.record()
+    began_ns = fault.activated_ns if fault.activated_ns >= 0 else start_ns
+    normal = golden.healthy(healthy, start_ns + round(watch.after_s * 1e9))
+    proof = prove(golden.record, record, began_ns, fault.acted, normal)
+    return {
+        **judged(proof, golden.record, record, began_ns, watch),
+        "fault": {name: rounded(value) for name, value in fault.summary().items()},
+        "digest": robot.trace_digest(),
+        "cpu_s": round(wallclock.process_cpu_s(), 3),
+    }
+
+
+def alone(case: Case, watch: Watch, healthy: dict[str, Any] | None) -> Result:
+    """A case in this process, from power-up, without any branch: the same result as a group gives."""
+    normal = Healthy.from_dict(healthy) if healthy else None
+    starts = {start_of(case.fault)} if case.fault else set()
+    golden = Golden(case.golden(), starts, watch)
+    if case.fault is None:
+        return sweep_run({"settings": case.settings.as_dict()}, golden, normal, watch)
+    robot = case.settings.robot()
+    return fault_run(case.fault, robot, Evidence(robot), golden, normal, watch)
+
+
+def sweep_run(case: dict[str, Any], golden: Golden, healthy: Healthy | None, watch: Watch) -> Result:
+    """In the branch: another robot from power-up, held against the golden one of the plan's own settings."""
+    try:
+        robot = Settings(**case["settings"]).robot()
+    except UserError as refused:
+        return {"outcome": "invalid", "why": f"refused: {refused}"}
+    evidence = Evidence(robot)
+    end_s = watch.from_s + watch.after_s
+    while robot.time_s < end_s and not robot.ended:
+        robot.run(StopRule(time_s=end_s), end_s)
+    record = evidence.record()
+    since_ns = robot.start_ns + round(watch.from_s * 1e9)
+    normal = golden.healthy(healthy, robot.start_ns + round(end_s * 1e9))
+    proof = prove(golden.record, record, robot.start_ns, True, normal)
+    return {
+        **judged(proof, golden.record, record, since_ns, watch),
+        "digest": robot.trace_digest(),
+        "cpu_s": round(wallclock.process_cpu_s(), 3),
+    }
+
+
+def judged(proof: Proof, golden: Record, record: Record, since_ns: int, watch: Watch) -> Result:
+    """Outcome, reason and what the proof has, as JSON can carry it; times in ms from the fault's start."""
+    here = gait(record, since_ns)
+    there = gait(golden, since_ns, record.end_ns)
+    outcome, why = classify(proof, here, there, damage(record, since_ns), watch.band)
+
+    def difference(found: Difference | None) -> Result | None:
+        if found is None:
+            return None
+        return {"where": found.where, "name": found.name, "ms": rounded(proof.after_ms(found))}
+
+    def change(found: Reaction | None) -> Result | None:
+        if found is None:
+            return None
+        words = {"machine": found.machine, "state": found.state, "instead_of": found.instead_of}
+        return {**words, "ms": rounded(proof.after_ms(found))}
+
+    return {
+        "outcome": outcome,
+        "why": why,
+        "first": difference(proof.first),
+        "first_firmware": difference(proof.first_firmware),
+        "detected": [
+            {"board": each.board, "code": each.code, "rate": each.rate, "ms": rounded(proof.after_ms(each))}
+            for each in proof.detections
+        ],
+        "reaction": change(proof.reaction),
+        "unusual": change(proof.unusual),
+        "fall_ms": rounded(proof.fall_ms),
+        "gait": {name: rounded(value) for name, value in dataclasses.asdict(here).items()},
+        "golden_gait": {name: rounded(value) for name, value in dataclasses.asdict(there).items()},
+        "deviation": rounded(deviation(here, there, watch.band)),
+    }
+
+
+def rounded(value: Any) -> Any:
+    """Six digits of a number, for files that people read; anything else as it is."""
+    return float(f"{value:.6g}") if isinstance(value, float) else value
+
+
+def healthy_walks(settings: Settings, seeds: list[int], watch: Watch) -> Result:
+    """What walks of these seeds without a fault raise, and how often the rule for detection would cry wolf at them."""
+    records = []
+    falls = []
+    for seed in seeds:
+        of_seed = dataclasses.replace(settings, walk={**settings.walk, "seed": seed})
+        golden = Golden(of_seed, set(), dataclasses.replace(watch, from_s=max(watch.from_s, 7.0)))
+        if golden.record.fell_ns >= 0:
+            falls.append(seed)
+        else:
+            records.append(golden.record)
+    starts = [round(each * 1e9) for each in (4.0, 5.0, 6.0, 7.0)]
+    count, total, which = false_alarms(records, starts) if len(records) > 1 else (0, 0, [])
+    gaits = [dataclasses.asdict(gait(record, starts[-1])) for record in records]
+    return {
+        "healthy": Healthy.of(records).as_dict(),
+        "seeds": [seed for seed in seeds if seed not in falls],
+        "fell": falls,
+        "false_alarms": [count, total],
+        "false_alarm_codes": sorted({f"{each.code} from {each.board}" for each in which}),
+        "gaits": [{name: rounded(value) for name, value in each.items()} for each in gaits],
+    }
+
+
+def request_of(
+    cases: list[Case], keys: list[str], golden: Settings, watch: Watch, healthy: dict[str, Any] | None, version: str
+) -> dict[str, Any]:
+    """What a worker is asked."""
+    return {
+        "version": version,
+        "settings": golden.as_dict(),
+        "watch": watch.as_dict(),
+        "healthy": healthy,
+        "cases": [
+            {"key": key, "fault": case.fault, "settings": case.settings.as_dict()}
+            for case, key in zip(cases, keys, strict=True)
+        ],
+    }
+
+
+def answer(request: dict[str, Any], emit: Callable[[Result], None]) -> None:
+    """Do what a request asks: runs of a group, or healthy walks."""
+    if "seeds" in request:
+        watch = Watch.from_dict(request["watch"])
+        found = healthy_walks(Settings(**request["settings"]), request["seeds"], watch)
+        emit({"key": request["key"], **found})
+    else:
+        run_group(request, emit)
+
+
+def main() -> int:
+    """One request on standard input; results on standard output."""
+
+    def emit(result: Result) -> None:
+        sys.stdout.write(json.dumps(result) + "\n")
+        sys.stdout.flush()
+
+    try:
+        answer(json.loads(sys.stdin.readline()), emit)
+    except UserError as mistake:
+        emit({"refused": str(mistake)})
+    except BrokenPipeError:  # who asked is gone
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

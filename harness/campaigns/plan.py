@@ -1,0 +1,471 @@
+"""A campaign as a TOML file: what is run, how it is watched, what is asked of the results. README.md here has the form.
+
+Whatever is wrong with a file is a UserError of one line: file, key, value, what is allowed.
+"""
+
+import dataclasses
+import fnmatch
+import itertools
+import math
+import pathlib
+import string
+import tomllib
+from collections.abc import Iterator
+from typing import Any
+
+from ranger_sim.foundation.quantities import LENGTHS, SHARES, in_base_units, nanoseconds
+from ranger_sim.foundation.random_stream import RandomStream
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.harness.campaigns.cases import Case, Settings
+from ranger_sim.harness.campaigns.group import Watch, rounded, start_of
+from ranger_sim.harness.campaigns.outcomes import OUTCOMES, Band
+from ranger_sim.harness.campaigns.statistics import CONFIDENCE, INTERVALS, Stopping
+from ranger_sim.harness.faults import catalogue
+from ranger_sim.harness.scenario import Scenario
+
+TABLES = ("title", "description", "walk", "watch", "band", "healthy", "vary", "faults", "tolerance", "sample", "search")
+# What may stand in [walk] and, with several values, in [vary]: the field of Scenario, and its units.
+WALK: dict[str, tuple[str, dict[str, float] | None]] = {
+    "controller": ("controller", None),
+    "body": ("body", None),
+    "seed": ("seed", None),
+    "slope": ("slope_rad", {"rad": 1.0, "deg": math.pi / 180.0}),
+    "floor_roughness": ("floor_roughness_m", LENGTHS),
+    "model": ("model_file", None),
+    "battery": ("battery_charge", SHARES),
+    "battery_capacity": ("battery_capacity_Wh", {"Wh": 1.0}),
+}
+PREFIXES = ("controller.", "body.", "cost.")
+MOST_RUNS = 1_000_000
+
+
+@dataclasses.dataclass(frozen=True)
+class Range:
+    """Any number from `low` to `high`, each as likely as the next; `log`: each factor as likely as the next."""
+
+    low: float
+    high: float
+    log: bool = False
+
+    def at(self, share: float) -> float:
+        """The value at a share 0-1 of the way, with six digits."""
+        if self.log:
+            value = self.low * (self.high / self.low) ** share
+        else:
+            value = self.low + (self.high - self.low) * share
+        return float(f"{value:.6g}")
+
+    def text(self) -> str:
+        """For people."""
+        return f"{self.low:g} to {self.high:g}" + (", by factors" if self.log else "")
+
+
+@dataclasses.dataclass(frozen=True)
+class Tolerance:
+    """What is asked of a time: `share` of the runs within `limit_ms`, with `confidence` when they are a sample."""
+
+    what: str  # "detection" or "reaction"
+    limit_ms: float
+    share: float = 0.95
+    confidence: float = CONFIDENCE
+
+
+@dataclasses.dataclass(frozen=True)
+class Sample:
+    """A random sample of `runs`. interval: which confidence interval its shares get."""
+
+    runs: int
+    seed: int = 1
+    interval: str = "clopper-pearson"
+    confidence: float = CONFIDENCE
+    stopping: Stopping | None = None
+
+
+@dataclasses.dataclass(frozen=True)
+class Search:
+    """For the worst case: `first` runs spread over the ranges, then `rounds` of `each` around the worst so far."""
+
+    first: int = 12
+    rounds: int = 4
+    each: int = 6
+    seed: int = 1
+
+
+@dataclasses.dataclass(frozen=True)
+class Plan:
+    """A campaign. axes: what is varied, in order: lists and ranges. `sample` or `search`, or neither: a census."""
+
+    path: str
+    title: str
+    description: str
+    walk: dict[str, Any]
+    watch: Watch
+    healthy_seeds: tuple[int, ...]
+    axes: dict[str, list[Any] | Range]
+    tolerances: tuple[Tolerance, ...] = ()
+    sample: Sample | None = None
+    search: Search | None = None
+
+    @property
+    def name(self) -> str:
+        """Of its files."""
+        return pathlib.Path(self.path).stem
+
+    @property
+    def design(self) -> str:
+        """census, sample or search."""
+        return "sample" if self.sample else "search" if self.search else "census"
+
+    def watch_key(self) -> dict[str, Any]:
+        """What of the watching decides results."""
+        found = self.watch.as_dict()
+        del found["limit_s"]
+        return {**found, "healthy_seeds": list(self.healthy_seeds)}
+
+    def population(self) -> str:
+        """What the runs stand for, in a sentence."""
+        parts = []
+        for name, values in self.axes.items():
+            if isinstance(values, Range):
+                parts.append(f"{name} from {values.text()}")
+            else:
+                parts.append(f"{len(values)} of {name}" if len(values) > 1 else f"{name} {values[0]}")
+        return "; ".join(parts) or "one walk"
+
+    def case(self, point: dict[str, Any]) -> Case:
+        """The run at one value per axis. UserError when a fault's text is not in the catalogue."""
+        walk, controller, body, costs = dict(self.walk), {}, {}, {}
+        for name, value in point.items():
+            if name in WALK:
+                walk[WALK[name][0]] = walk_value(name, value, self.path)
+            elif name.startswith("controller."):
+                controller[name.partition(".")[2]] = float(value)
+            elif name.startswith("body."):
+                body[name.partition(".")[2]] = value
+            elif name.startswith("cost."):
+                costs[name.partition(".")[2]] = float(value)
+        walk = {name: value for name, value in walk.items() if name != "seed"} | {"seed": int(walk.get("seed", 1))}
+        settings = Settings(walk, controller, body, costs)
+        fault = point.get("fault")
+        if fault:
+            text = str(fault).format_map({name: shown(value) for name, value in point.items()})
+            return Case(settings, text, None, point)
+        base = Settings({**self.walk, "seed": walk["seed"]})
+        return Case(settings, None, base, point)
+
+    def census(self) -> Iterator[Case]:
+        """Every combination of the axes' values."""
+        names = list(self.axes)
+        for values in itertools.product(*self.axes.values()):  # type: ignore[arg-type]
+            yield self.case(dict(zip(names, values, strict=True)))
+
+    def drawn(self) -> Iterator[Case]:
+        """The runs of a sample, in the order in which they were drawn, with replacement."""
+        assert self.sample is not None
+        stream = RandomStream(self.sample.seed, "campaign sample")
+        for _ in range(self.sample.runs):
+            yield self.case({name: drawn(values, stream) for name, values in self.axes.items()})
+
+    def cases(self) -> list[Case]:
+        """All runs that are known before any has run; those of a search come later."""
+        return list(self.drawn() if self.sample else self.census())
+
+
+def drawn(values: list[Any] | Range, stream: Any) -> Any:
+    """One value of an axis, by chance."""
+    return values.at(stream.uniform()) if isinstance(values, Range) else values[stream.integer(len(values))]
+
+
+def shown(value: Any) -> str:
+    """A value as it stands in a fault's text."""
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
+
+
+def walk_value(name: str, value: Any, path: str) -> Any:
+    """A value of [walk] in the unit of the scenario's field."""
+    units = WALK[name][1]
+    if units is None or not isinstance(value, str):
+        return value
+    number = in_base_units(value, units)
+    if number is None:
+        raise UserError(f"{path}: {name} = {value!r}: a number with one of the units {', '.join(units)} is expected")
+    return number
+
+
+# --- reading --------------------------------------------------------------------------------------------------------
+
+
+def load(name: str | pathlib.Path) -> Plan:
+    """The plan in a file."""
+    path = pathlib.Path(name)
+    try:
+        data = tomllib.loads(path.read_bytes().decode())
+    except OSError as error:
+        raise UserError(f"campaign file {path}: {error.strerror}") from None
+    except UnicodeDecodeError as error:
+        raise UserError(f"campaign file {path}: not UTF-8 text (byte {error.start})") from None
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
+        raise UserError(f"campaign file {path}: not valid TOML: {error}") from None
+    return of_data(data, str(path))
+
+
+def of_data(data: dict[str, Any], path: str) -> Plan:
+    """The plan in a file's content."""
+    only(data, TABLES, path)
+    walk = table(data, "walk", path)
+    only(walk, tuple(WALK), f"{path}: [walk]")
+    fields = {WALK[name][0]: walk_value(name, value, path) for name, value in walk.items()}
+    try:
+        Scenario(**fields)
+    except UserError as error:
+        raise UserError(f"{path}: [walk]: {error}") from None
+    axes = axes_of(data, path)
+    sample = sample_of(data, path)
+    search = search_of(data, path)
+    if sample and search:
+        raise UserError(f"{path}: [sample] and [search]: one of them, or neither for a census")
+    ranges = [name for name, values in axes.items() if isinstance(values, Range)]
+    if ranges and not (sample or search):
+        raise UserError(f"{path}: [vary] {ranges[0]}: a range needs [sample] or [search]; a census takes a list")
+    if search and not ranges:
+        raise UserError(f"{path}: [search]: at least one range in [vary] is expected, for instance start and magnitude")
+    runs = math.prod(len(values) for values in axes.values() if not isinstance(values, Range))
+    if runs > MOST_RUNS or (sample is None and search is None and runs == 0):
+        raise UserError(f"{path}: {runs} runs, allowed are 1 to {MOST_RUNS}")
+    healthy = table(data, "healthy", path)
+    only(healthy, ("seeds",), f"{path}: [healthy]")
+    seeds = healthy.get("seeds", [1, 2, 3, 4, 5, 6])
+    if not (isinstance(seeds, list) and all(isinstance(each, int) for each in seeds) and len(set(seeds)) >= 2):
+        raise UserError(f"{path}: [healthy] seeds = {seeds!r}: a list of two or more whole numbers is expected")
+    plan = Plan(
+        path=path,
+        title=text(data, "title", path, pathlib.Path(path).stem),
+        description=text(data, "description", path, ""),
+        walk=fields,
+        watch=watch_of(data, path),
+        healthy_seeds=tuple(seeds),
+        axes=axes,
+        tolerances=tuple(tolerances_of(data, path)),
+        sample=sample,
+        search=search,
+    )
+    check_cases(plan)
+    return plan
+
+
+def check_cases(plan: Plan) -> None:
+    """UserError for a fault that the catalogue does not have, before anything is run."""
+    seen: set[str] = set()
+    middle = {name: values.at(0.5) if isinstance(values, Range) else values[0] for name, values in plan.axes.items()}
+    for fault in plan.axes.get("fault", []):  # type: ignore[union-attr]
+        try:
+            found = plan.case({**middle, "fault": fault})
+        except (KeyError, ValueError, IndexError) as error:
+            raise UserError(f"{plan.path}: fault {fault!r}: {error} is no name of [vary]") from None
+        if found.fault and found.fault not in seen:
+            seen.add(found.fault)
+            start_of(found.fault)
+            try:
+                catalogue.typed(found.fault)
+            except UserError as error:
+                raise UserError(f"{plan.path}: {error}") from None
+
+
+def axes_of(data: dict[str, Any], path: str) -> dict[str, list[Any] | Range]:
+    """[vary], and the faults of [[faults]] as its axis `fault`."""
+    axes: dict[str, list[Any] | Range] = {}
+    for name, values in flattened(table(data, "vary", path)).items():
+        axes[name] = values_of(name, values, path)
+    groups = data.get("faults", [])
+    if not isinstance(groups, list):
+        raise UserError(f"{path}: faults = {groups!r}: tables [[faults]] are expected")
+    listed = [fault for group in groups for fault in faults_of(group, path)]
+    if listed:
+        if "fault" in axes:
+            raise UserError(f"{path}: [vary] fault and [[faults]]: one of them")
+        axes["fault"] = listed  # last, so that a campaign that is cut short has every fault at the first of the starts
+    used = set()
+    for fault in axes.get("fault", []):  # type: ignore[union-attr]
+        used |= {name for _, name, _, _ in string.Formatter().parse(str(fault)) if name}
+    for name in axes:
+        if name not in WALK and name != "fault" and not name.startswith(PREFIXES) and name not in used:
+            raise UserError(
+                f"{path}: [vary] {name}: it is no setting of a walk ({', '.join(WALK)}, {'..., '.join(PREFIXES)}...) "
+                f"and no fault's text has {{{name}}}"
+            )
+    return axes
+
+
+def flattened(values: dict[str, Any], before: str = "") -> dict[str, Any]:
+    """[vary.body] hip_gear = ... as body.hip_gear = ...; ranges stay whole."""
+    found: dict[str, Any] = {}
+    for name, value in values.items():
+        whole = f"{before}{name}"
+        if isinstance(value, dict) and not {"low", "high"} <= set(value):
+            found.update(flattened(value, f"{whole}."))
+        else:
+            found[whole] = value
+    return found
+
+
+def values_of(name: str, values: Any, path: str) -> list[Any] | Range:
+    """The values of one axis."""
+    if isinstance(values, dict):
+        only(values, ("low", "high", "log"), f"{path}: [vary] {name}")
+        low, high, log = values["low"], values["high"], bool(values.get("log", False))
+        numbers = all(isinstance(each, int | float) and not isinstance(each, bool) for each in (low, high))
+        if not numbers or not low < high or (log and low <= 0.0):
+            raise UserError(
+                f"{path}: [vary] {name} = {low!r} to {high!r}: low below high" + (", above 0" if log else "")
+            )
+        return Range(float(low), float(high), log)
+    listed = values if isinstance(values, list) else [values]
+    if not listed or not all(isinstance(each, str | int | float) for each in listed):
+        raise UserError(f"{path}: [vary] {name} = {values!r}: a list of values, or {{ low, high }}, is expected")
+    return listed
+
+
+def faults_of(group: Any, path: str) -> Iterator[str]:
+    """The faults of one [[faults]]: every mode at every place that takes it, both by patterns with * and ?."""
+    where = f"{path}: [[faults]]"
+    if not isinstance(group, dict):
+        raise UserError(f"{where}: a table is expected")
+    only(group, ("places", "kinds", "modes", "without", "values", "period"), where)
+    places = patterns(group, "places", where)
+    kinds = patterns(group, "kinds", where)
+    modes = patterns(group, "modes", where)
+    without = patterns(group, "without", where, [])
+    period = group.get("period", "")
+    values = "".join(f",{name}={value}" for name, value in table(group, "values", where).items())
+    catalogue.load()
+    count = 0
+    for place in catalogue.PLACES.values():
+        if not matches(place.name, places) or not matches(place.kind, kinds):
+            continue
+        for mode in sorted(catalogue.modes_of(place)):
+            text = f"{place.name}:{mode}"
+            if matches(mode, modes) and not matches(text, without):
+                count += 1
+                yield text + values + (f"@{period}" if period else "")
+    if not count:
+        raise UserError(f"{where}: no place and mode fit {places} and {modes}; `ranger-sim faults` lists them")
+
+
+def patterns(group: dict[str, Any], key: str, where: str, default: Any = ("*",)) -> list[str]:
+    """A list of patterns."""
+    found = group.get(key, list(default))
+    listed = [found] if isinstance(found, str) else found
+    if not isinstance(listed, list) or not all(isinstance(each, str) for each in listed):
+        raise UserError(f"{where}: {key} = {found!r}: a list of texts is expected")
+    return listed
+
+
+def matches(name: str, listed: list[str]) -> bool:
+    """Whether a name fits one of the patterns."""
+    return any(fnmatch.fnmatchcase(name, each) for each in listed)
+
+
+def watch_of(data: dict[str, Any], path: str) -> Watch:
+    """[watch] and [band]."""
+    found = table(data, "watch", path)
+    only(found, ("after", "from", "patience", "limit"), f"{path}: [watch]")
+    times = {f"{name}_s": nanoseconds(value, f"{path}: [watch] {name}") * 1e-9 for name, value in found.items()}
+    band = table(data, "band", path)
+    names = tuple(field.name for field in dataclasses.fields(Band))
+    only(band, names, f"{path}: [band]")
+    shares = {}
+    for name, value in band.items():
+        share = in_base_units(value, SHARES) if isinstance(value, str) else value
+        if not isinstance(share, int | float) or not 0.0 < share < 10.0:
+            raise UserError(f"{path}: [band] {name} = {value!r}: a share such as 0.15 or '15 %' is expected")
+        shares[name] = float(share)
+    return Watch(**times, band=Band(**shares))
+
+
+def tolerances_of(data: dict[str, Any], path: str) -> Iterator[Tolerance]:
+    """[tolerance]: detection = { within = "50 ms", share = 0.95, confidence = 0.95 }."""
+    for name, value in table(data, "tolerance", path).items():
+        where = f"{path}: [tolerance] {name}"
+        if name not in ("detection", "reaction"):
+            raise UserError(f"{where}: allowed are detection, reaction")
+        if not isinstance(value, dict) or "within" not in value:
+            raise UserError(f"{where}: a table with `within` is expected")
+        only(value, ("within", "share", "confidence"), where)
+        share, confidence = value.get("share", 0.95), value.get("confidence", CONFIDENCE)
+        if not (0.0 < share < 1.0 and 0.0 < confidence < 1.0):
+            raise UserError(f"{where}: share {share!r} and confidence {confidence!r} must be above 0 and below 1")
+        yield Tolerance(name, rounded(nanoseconds(value["within"], where) * 1e-6), share, confidence)
+
+
+def sample_of(data: dict[str, Any], path: str) -> Sample | None:
+    """[sample], with [sample.stop] when it may stop early."""
+    if "sample" not in data:
+        return None
+    found = table(data, "sample", path)
+    where = f"{path}: [sample]"
+    only(found, ("runs", "seed", "interval", "confidence", "stop"), where)
+    runs = whole(found, "runs", where, None, 1, MOST_RUNS)
+    interval = found.get("interval", "clopper-pearson")
+    if interval not in INTERVALS:
+        raise UserError(f"{where}: interval = {interval!r}: allowed are {', '.join(INTERVALS)}")
+    confidence = found.get("confidence", CONFIDENCE)
+    if not isinstance(confidence, float) or not 0.5 <= confidence < 1.0:
+        raise UserError(f"{where}: confidence = {confidence!r}: from 0.5 to below 1 is expected")
+    stopping = None
+    if "stop" in found:
+        stop = table(found, "stop", where)
+        only(stop, ("outcome", "limit", "looks", "rule"), f"{where} stop")
+        outcome = stop.get("outcome")
+        if outcome not in OUTCOMES:
+            raise UserError(f"{where} stop: outcome = {outcome!r}: allowed are {', '.join(OUTCOMES)}")
+        try:
+            stopping = Stopping(runs=runs, confidence=confidence, **stop)
+        except (TypeError, UserError) as error:
+            raise UserError(f"{where} stop: {error}") from None
+    return Sample(runs, whole(found, "seed", where, 1, -(2**63), 2**63), interval, confidence, stopping)
+
+
+def search_of(data: dict[str, Any], path: str) -> Search | None:
+    """[search]."""
+    if "search" not in data:
+        return None
+    found = table(data, "search", path)
+    where = f"{path}: [search]"
+    only(found, ("first", "rounds", "each", "seed"), where)
+    return Search(
+        whole(found, "first", where, 12, 1, 100_000),
+        whole(found, "rounds", where, 4, 0, 1000),
+        whole(found, "each", where, 6, 1, 100_000),
+        whole(found, "seed", where, 1, -(2**63), 2**63),
+    )
+
+
+def only(data: dict[str, Any], allowed: tuple[str, ...], where: str) -> None:
+    """UserError for a key that is not allowed."""
+    for key in data:
+        if key not in allowed:
+            raise UserError(f"{where}: unknown key {key!r}; allowed are {', '.join(allowed)}")
+
+
+def table(data: dict[str, Any], key: str, where: str) -> dict[str, Any]:
+    """A table of a file, empty when it is not there."""
+    value = data.get(key, {})
+    if not isinstance(value, dict):
+        raise UserError(f"{where}: {key} = {value!r}: a table is expected")
+    return value
+
+
+def text(data: dict[str, Any], key: str, where: str, default: str) -> str:
+    """A text of a file."""
+    value = data.get(key, default)
+    if not isinstance(value, str):
+        raise UserError(f"{where}: {key} = {value!r}: text is expected")
+    return value
+
+
+def whole(data: dict[str, Any], key: str, where: str, default: int | None, low: int, high: int) -> int:
+    """A whole number of a file."""
+    value = data.get(key, default)
+    if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
+        raise UserError(f"{where}: {key} = {value!r}: a whole number from {low} to {high} is expected")
+    return value

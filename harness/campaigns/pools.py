@@ -1,0 +1,182 @@
+"""Who does the runs: processes of this machine, or the workers of a Dask cluster.
+
+Either way a group of runs has a process of its own (`group`), with one thread, so that it may fork; Dask's workers have
+several threads and start such a process for each group. What a process gave before it died is kept, the rest of its
+group is asked for again; a run at which `ATTEMPTS` processes died is "crashed".
+"""
+
+import contextlib
+import importlib
+import json
+import queue
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from typing import Any
+
+from ranger_sim.foundation.user_error import UserError
+
+ATTEMPTS = 3
+COMMAND = (sys.executable, "-m", "ranger_sim.harness.campaigns.group")
+
+Request = dict[str, Any]
+Result = dict[str, Any]
+
+
+def process_for(request: Request) -> "subprocess.Popen[str]":
+    """A process that works on a request, which has been handed over."""
+    process = subprocess.Popen(COMMAND, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+    assert process.stdin is not None
+    with contextlib.suppress(BrokenPipeError):
+        process.stdin.write(json.dumps(request) + "\n")
+        process.stdin.close()
+    return process
+
+
+def asked(request: Request) -> list[str]:
+    """The keys that a request asks for."""
+    return [case["key"] for case in request["cases"]] if "cases" in request else [request["key"]]
+
+
+def without(request: Request, done: set[str]) -> Request | None:
+    """What is left of a request; None when nothing is."""
+    if not set(asked(request)) - done:
+        return None
+    if "cases" not in request:
+        return request
+    return {**request, "cases": [case for case in request["cases"] if case["key"] not in done]}
+
+
+def results_of(request: Request, started: Any = None) -> Iterator[Result]:
+    """The results of a request, each as it comes, in as many processes as it takes. `started(process)`: of each."""
+    left: Request | None = request
+    deaths = 0
+    while left is not None:
+        process = process_for(left)
+        if started is not None:
+            started(process)
+        done: set[str] = set()
+        assert process.stdout is not None
+        with process.stdout:
+            for line in process.stdout:
+                if not line.endswith("\n"):
+                    break  # it died while it wrote
+                result = json.loads(line)
+                if "refused" in result:
+                    process.wait()
+                    raise UserError(result["refused"])
+                done.add(result["key"])
+                yield result
+        code = process.wait()
+        left = without(left, done)
+        if left is None:
+            return
+        deaths = 1 if done else deaths + 1
+        if deaths == ATTEMPTS:
+            first = asked(left)[0]
+            if "cases" not in left:
+                raise UserError(f"campaign: the process of the healthy walks ended with {code}, {ATTEMPTS} times")
+            yield {"key": first, "outcome": "crashed", "why": f"its process ended with {code}, {ATTEMPTS} times"}
+            left = without(left, {first})
+            deaths = 0
+
+
+class LocalPool:
+    """`jobs` processes of this machine at a time."""
+
+    def __init__(self, jobs: int) -> None:
+        self.jobs = jobs
+        self.told = f"{jobs} process{'es' if jobs > 1 else ''} of this machine"
+        self.running: set[subprocess.Popen[str]] = set()
+        self.closed = False
+
+    def run(self, requests: list[Request]) -> Iterator[Result]:
+        """The results of all requests, each as it comes."""
+        waiting: queue.Queue[Request] = queue.Queue()
+        for request in requests:
+            waiting.put(request)
+        results: queue.Queue[Result | BaseException | None] = queue.Queue()
+
+        def work() -> None:
+            try:
+                while not self.closed:
+                    for result in results_of(waiting.get_nowait(), self.running.add):
+                        results.put(result)
+            except queue.Empty:
+                pass
+            except BaseException as error:  # told to who waits for the results
+                results.put(error)
+            results.put(None)
+
+        workers = [threading.Thread(target=work, daemon=True) for _ in range(min(self.jobs, len(requests)))]
+        for worker in workers:
+            worker.start()
+        left = len(workers)
+        while left:
+            result = results.get()
+            if result is None:
+                left -= 1
+            elif isinstance(result, BaseException):
+                self.close()
+                raise result
+            else:
+                yield result
+
+    def close(self) -> None:
+        """End what still runs."""
+        self.closed = True
+        for process in self.running:
+            if process.poll() is None:
+                process.kill()
+
+
+def work_of(request: Request) -> list[Result]:
+    """What a Dask worker does: all results of a request."""
+    return list(results_of(request))
+
+
+class DaskPool:
+    """The workers of a Dask cluster: the one at `address`, or one of `jobs` workers on this machine.
+
+    A worker that dies gives nothing back; the scheduler gives its groups to another one. UserError when Dask is not
+    installed or the scheduler cannot be reached.
+    """
+
+    def __init__(self, address: str | None, jobs: int) -> None:
+        try:
+            distributed: Any = importlib.import_module("distributed")
+        except ImportError:
+            raise UserError("Dask is not installed: pip install 'ranger-sim[dask]', or --pool local") from None
+        self.distributed = distributed
+        self.cluster: Any = None
+        try:
+            if address is None:
+                self.cluster = distributed.LocalCluster(
+                    n_workers=jobs, threads_per_worker=1, processes=True, dashboard_address=None, silence_logs=50
+                )
+            self.client: Any = distributed.Client(address if address is not None else self.cluster, timeout="10s")
+        except (OSError, TimeoutError, ValueError) as error:
+            raise UserError(f"--scheduler {address}: no Dask scheduler there ({error})") from None
+        workers = len(self.client.scheduler_info(n_workers=-1)["workers"])
+        self.jobs = max(1, workers)
+        self.told = f"{workers} Dask worker{'s' if workers != 1 else ''}" + (f" at {address}" if address else "")
+
+    def run(self, requests: list[Request]) -> Iterator[Result]:
+        """The results of all requests, those of a group together."""
+        futures = [self.client.submit(work_of, request, pure=False) for request in requests]
+        try:
+            for done in self.distributed.as_completed(futures):
+                try:
+                    yield from done.result()
+                except self.distributed.KilledWorker as error:
+                    raise UserError(f"campaign: Dask's workers died again and again: {error}") from None
+                done.release()
+        finally:
+            self.client.cancel([future for future in futures if not future.done()])
+
+    def close(self) -> None:
+        """Leave the cluster; end it when it is ours."""
+        self.client.close()
+        if self.cluster is not None:
+            self.cluster.close()

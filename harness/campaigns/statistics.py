@@ -1,0 +1,207 @@
+"""Intervals that fit a campaign's design, and rules for stopping early.
+
+A census asks every member of its population: its shares are exact, and no interval belongs to them. A random sample of
+a stated population has one: Clopper and Pearson's, which covers at least what it says, or Wilson's, which is shorter
+and covers it on the average. Looking at a growing sample again and again would break both; O'Brien and Fleming's or
+Pocock's bounds repair that: with them the interval may be looked at `looks` times and be believed at each.
+
+Times are held against a tolerance interval of order statistics: it asks nothing of the distribution, and a run in which
+nothing was detected counts as later than any limit.
+
+Sources: Clopper and Pearson, Biometrika 26 (1934); Wilson, JASA 22 (1927); Wilks, Ann. Math. Stat. 12 (1941); Armitage,
+McPherson and Rowe, JRSS A 132 (1969) for the recursion; Jennison and Turnbull, "Group Sequential Methods" (2000),
+chapter 9 for repeated intervals.
+"""
+
+import dataclasses
+import functools
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from scipy import optimize, stats
+
+from ranger_sim.foundation.user_error import UserError
+
+CONFIDENCE = 0.95
+# Points of the grid on which the score statistic's density is carried from look to look: the integrands are smooth, and
+# four times as many change no bound in the fifth decimal.
+GRID_POINTS = 101
+WIDEST_Z = 8.0  # beyond it nothing is left of a standard normal: 1e-15
+
+
+@dataclasses.dataclass(frozen=True)
+class Share:
+    """`count` of `total`; from `low` to `high` with `confidence`, or exactly (None) when all were asked."""
+
+    count: int
+    total: int
+    low: float | None = None
+    high: float | None = None
+    confidence: float | None = None
+
+    @property
+    def value(self) -> float:
+        """The share itself, 0-1; 0 of nothing is not a number."""
+        return self.count / self.total if self.total else math.nan
+
+
+def _check(count: int, total: int, confidence: float) -> None:
+    if not (0 <= count <= total and total > 0):
+        raise UserError(f"share: {count} of {total}: a count from 0 to the total is expected, of at least one")
+    if not 0.0 < confidence < 1.0:
+        raise UserError(f"share: confidence is {confidence!r}, allowed is above 0 and below 1")
+
+
+def clopper_pearson(count: int, total: int, confidence: float = CONFIDENCE) -> Share:
+    """Exact interval: no share outside would give a count so extreme with more than (1 - confidence) / 2."""
+    _check(count, total, confidence)
+    tail = (1.0 - confidence) / 2.0
+    low = 0.0 if count == 0 else float(stats.beta.ppf(tail, count, total - count + 1))
+    high = 1.0 if count == total else float(stats.beta.ppf(1.0 - tail, count + 1, total - count))
+    return Share(count, total, low, high, confidence)
+
+
+def wilson(count: int, total: int, confidence: float = CONFIDENCE) -> Share:
+    """Wilson's score interval."""
+    _check(count, total, confidence)
+    low, high = _score_interval(count, total, float(stats.norm.ppf(0.5 + confidence / 2.0)))
+    return Share(count, total, low, high, confidence)
+
+
+def _score_interval(count: int, total: int, z: float) -> tuple[float, float]:
+    """The shares p of which `count` is not further than z sqrt(p (1 - p) total) away."""
+    share, square = count / total, z * z / total
+    middle = (share + square / 2.0) / (1.0 + square)
+    half = z * math.sqrt(share * (1.0 - share) / total + square / (4.0 * total)) / (1.0 + square)
+    return (0.0 if count == 0 else middle - half), (1.0 if count == total else middle + half)
+
+
+def census(count: int, total: int) -> Share:
+    """The share of a population of which every member was asked."""
+    return Share(count, total)
+
+
+# --- tolerance intervals ------------------------------------------------------------------------------------------
+
+
+def upper_tolerance(values: Sequence[float], share: float, confidence: float) -> float | None:
+    """Limit below which at least `share` of the population lies, with `confidence`; None when there are too few values.
+
+    The limit is the smallest order statistic that serves: value number m with P(Binomial(n, share) < m) >= confidence.
+    """
+    ordered = sorted(values)
+    place = tolerance_place(len(ordered), share, confidence)
+    return None if place is None else ordered[place - 1]
+
+
+def tolerance_place(total: int, share: float, confidence: float) -> int | None:
+    """Which order statistic (1 ... total) of `total` values is the upper tolerance limit; None: none serves."""
+    for name, value in (("share", share), ("confidence", confidence)):
+        if not 0.0 < value < 1.0:
+            raise UserError(f"tolerance: {name} is {value!r}, allowed is above 0 and below 1")
+    if total == 0 or stats.binom.cdf(total - 1, total, share) < confidence:
+        return None
+    return int(stats.binom.ppf(confidence, total, share)) + 1
+
+
+def values_needed(share: float, confidence: float) -> int:
+    """The fewest values of which the largest is an upper tolerance limit (Wilks): 59 for 95 % with 95 %."""
+    return math.ceil(math.log(1.0 - confidence) / math.log(share))
+
+
+# --- looking more than once -------------------------------------------------------------------------------------------
+
+
+def crossing_probability(bounds: Sequence[float]) -> float:
+    """P(|Z_k| >= bounds[k] at one of the looks) of a score statistic without effect, looks after equal shares of data.
+
+    S_k = sqrt(k) Z_k is a sum of k independent standard normals; its density is carried from look to look over what
+    has not crossed yet (Simpson's rule).
+    """
+    inside = 1.0
+    points = density = np.empty(0)
+    for k, bound in enumerate(bounds, start=1):
+        edge = min(bound, WIDEST_Z) * math.sqrt(k)
+        grid = np.linspace(-edge, edge, GRID_POINTS)
+        if k == 1:
+            here = stats.norm.pdf(grid)
+        else:
+            weights = _simpson(points)
+            here = stats.norm.pdf(grid[:, None] - points[None, :]) @ (weights * density)
+        points, density = grid, here
+        inside = float(_simpson(points) @ density)
+    return 1.0 - inside
+
+
+def _simpson(points: np.ndarray) -> np.ndarray:
+    weights = np.ones(len(points))
+    weights[1:-1:2], weights[2:-1:2] = 4.0, 2.0
+    return weights * (points[1] - points[0]) / 3.0
+
+
+def obrien_fleming(looks: int, error: float = 1.0 - CONFIDENCE) -> list[float]:
+    """Two-sided bounds of |Z| at each of `looks` looks: strict at first, C sqrt(looks / k) at look k."""
+    return _bounds([math.sqrt(looks / k) for k in range(1, looks + 1)], error)
+
+
+def pocock(looks: int, error: float = 1.0 - CONFIDENCE) -> list[float]:
+    """Two-sided bounds of |Z|, the same at every one of `looks` looks."""
+    return _bounds([1.0] * looks, error)
+
+
+def _bounds(shape: list[float], error: float) -> list[float]:
+    if not 1 <= len(shape) <= 50:
+        raise UserError(f"stopping rule: {len(shape)} looks, allowed are 1 to 50")
+    if not 0.0 < error < 0.5:
+        raise UserError(f"stopping rule: an error of {error!r}, allowed is above 0 and below 0.5")
+    constant = optimize.brentq(
+        lambda c: crossing_probability([c * each for each in shape]) - error, 0.5, WIDEST_Z, xtol=1e-6
+    )
+    return [float(constant) * each for each in shape]
+
+
+@dataclasses.dataclass(frozen=True)
+class Stopping:
+    """When a sample has told enough: at a look, the repeated interval of a class's share lies on one side of `limit`.
+
+    runs: of the whole sample; looks: after how many equal parts of it one may stop; rule: "obrien-fleming" or "pocock".
+    """
+
+    outcome: str
+    limit: float
+    runs: int
+    looks: int = 5
+    rule: str = "obrien-fleming"
+    confidence: float = CONFIDENCE
+
+    def __post_init__(self) -> None:
+        if self.rule not in RULES:
+            raise UserError(f"stopping rule {self.rule!r}: allowed are {', '.join(RULES)}")
+        if not 0.0 < self.limit < 1.0:
+            raise UserError(f"stopping rule: limit is {self.limit!r}, allowed is above 0 and below 1")
+        if not 1 <= self.looks <= min(50, self.runs):
+            raise UserError(f"stopping rule: {self.looks} looks at {self.runs} runs, allowed are 1 to 50, one run each")
+
+    @functools.cached_property
+    def bounds(self) -> list[float]:
+        """Bounds of |Z|, one per look."""
+        return RULES[self.rule](self.looks, 1.0 - self.confidence)
+
+    def look_after(self, look: int) -> int:
+        """After how many runs look number `look` (from 1) is."""
+        return math.ceil(self.runs * look / self.looks)
+
+    def interval(self, count: int, total: int, look: int) -> Share:
+        """The repeated interval at look number `look` (from 1): Wilson's, with this look's bound as its z."""
+        _check(count, total, self.confidence)
+        low, high = _score_interval(count, total, self.bounds[look - 1])
+        return Share(count, total, low, high, self.confidence)
+
+    def decides(self, share: Share) -> bool:
+        """True when the interval leaves no doubt on which side of the limit the share is."""
+        return bool(share.low is not None and share.high is not None and not share.low <= self.limit <= share.high)
+
+
+RULES = {"obrien-fleming": obrien_fleming, "pocock": pocock}
+INTERVALS = {"clopper-pearson": clopper_pearson, "wilson": wilson}

@@ -1,0 +1,57 @@
+# cython: boundscheck=False, wraparound=False
+# (every index below is a board, a code of the error module, or a column of the stream)
+"""Which error each board noted, and when: the counts are the boards' own, looked at between two steps of the plant."""
+
+import cython
+
+from ranger_sim.boards.modules.error_module import ErrorModule
+from ranger_sim.foundation.numbers import integers
+from ranger_sim.foundation.row_stream import RowStream
+from ranger_sim.harness.step_watch import StepWatch
+
+
+class ErrorWatch(StepWatch):
+    """Fills `rows`: time (ns), place of the board in `boards`, code, how often since it was last looked.
+
+    boards: the list that the loop runs, so that a board that takes another one's place is seen. codes: 0 ... codes - 1
+    are looked at. Times are those of the 250 us step before which the error was noted.
+    """
+
+    def __init__(self, boards, codes) -> None:
+        StepWatch.__init__(self)
+        self.boards = boards
+        self.codes = codes
+        self.before = integers(len(boards) * codes)
+        self.rows = RowStream("q", 4, False)
+        for place, board in enumerate(boards):
+            for code in range(codes):
+                self.before[place * codes + code] = board.errors.totals[code]
+
+    def before_step(self, now_ns: cython.longlong) -> object:
+        """Keep what came since the last step."""
+        place: cython.longlong
+        code: cython.longlong
+        at: cython.longlong
+        more: cython.longlong
+        errors: ErrorModule
+        boards: list = self.boards
+        stream: RowStream = self.rows
+        for place in range(len(boards)):
+            errors = boards[place].errors
+            for code in range(self.codes):
+                at = place * self.codes + code
+                more = errors.totals[code] - self.before[at]
+                if more == 0:
+                    continue
+                self.before[at] = errors.totals[code]
+                if more < 0:  # a board fresh from its reset counts from nothing
+                    more = errors.totals[code]
+                    if more == 0:
+                        continue
+                at = stream.used
+                stream.integers[at] = now_ns
+                stream.integers[at + 1] = place
+                stream.integers[at + 2] = code
+                stream.integers[at + 3] = more
+                stream.finish_row(now_ns)
+        return None

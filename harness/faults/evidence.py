@@ -1,0 +1,126 @@
+"""What a run leaves behind for a comparison: frames, the body, the main brain's variables, the boards' errors.
+
+An `Evidence` listens to a robot from the moment it is made; its `record()` is arrays, the same for the same run, also
+when it was made in a forked process.
+"""
+
+import dataclasses
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from ranger_sim.datatable.generated import all_variables
+from ranger_sim.datatable.generated import errors as error_table
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.harness.conditions import STATE_VARIABLES
+from ranger_sim.harness.faults.error_watch import ErrorWatch
+from ranger_sim.plant.ranger import SAMPLES
+
+CODES = max(error_table.NAMES) + 1
+COLUMN = {name: place for place, name in enumerate(SAMPLES, start=1)}  # of `Record.samples`
+
+
+@dataclasses.dataclass
+class Record:
+    """A run between two instants (ns since the simulation's zero, as all times here).
+
+    frames: {bus: rows of `foundation.row_stream.FrameStream`}. samples: rows of time (s) and the plant's quantities,
+    words: rows of time and the main brain's table, both every 2 ms. errors: rows of `ErrorWatch`, places as in
+    `boards`. states: {machine: {number: name}}. fell_ns: -1 when it stands at the end.
+    """
+
+    begin_ns: int
+    end_ns: int
+    frames: dict[str, np.ndarray]
+    samples: np.ndarray
+    words: np.ndarray
+    errors: np.ndarray
+    boards: list[str]
+    states: dict[str, dict[int, str]]
+    fell_ns: int = -1
+    fall_cause: str = ""
+
+    def until(self, end_ns: int) -> "Record":
+        """The same run as if it had ended at `end_ns`."""
+        return dataclasses.replace(
+            self,
+            end_ns=min(self.end_ns, end_ns),
+            frames={bus: rows[rows[:, 0] <= end_ns] for bus, rows in self.frames.items()},
+            samples=self.samples[self.samples[:, 0] <= end_ns * 1e-9],
+            words=self.words[self.words[:, 0] <= end_ns],
+            errors=self.errors[self.errors[:, 0] <= end_ns],
+            fell_ns=self.fell_ns if self.fell_ns <= end_ns else -1,
+        )
+
+    def sample(self, name: str) -> np.ndarray:
+        """One quantity of the body over the run."""
+        return self.samples[:, COLUMN[name]]
+
+    def machine(self, name: str) -> np.ndarray:
+        """The state numbers of one of the main brain's machines, one per row of `words`."""
+        return self.words[:, 1 + all_variables.ID_OF[STATE_VARIABLES[name]]]
+
+
+class Evidence:
+    """Listens to `robot` (a `harness.ranger.Ranger`) from now on, beside what the robot's log keeps.
+
+    UserError for a robot with boards in other processes: their errors come too late to be timed.
+    """
+
+    def __init__(self, robot: Any) -> None:
+        if any(board.apart for board in robot.loop.boards):
+            raise UserError("proof of a fault: every board must run in this process (backend sim)")
+        self.robot = robot
+        self.begin_ns = robot.loop.time
+        self.blocks: dict[str, list[bytes]] = {}
+        self.streams = robot.recorder.streams()
+        if robot.loop.sampler.words is None:
+            robot.loop.sampler.words = robot.recorder.words
+        self.watch = ErrorWatch(robot.loop.boards, CODES)
+        self.streams["errors"] = self.watch.rows
+        for name, stream in self.streams.items():
+            stream.flush()
+            self.blocks[name] = []
+            stream.sink = self._keeper(self.blocks[name], stream.sink)
+        robot.loop.watchers.append(self.watch)
+
+    @staticmethod
+    def _keeper(blocks: list[bytes], before: Callable[[int, bytes], None] | None) -> Callable[[int, bytes], None]:
+        def keep(last_time_ns: int, block: bytes) -> None:
+            blocks.append(block)
+            if before is not None:
+                before(last_time_ns, block)
+
+        return keep
+
+    def record(self) -> Record:
+        """Everything until now."""
+        robot = self.robot
+        rows = {}
+        for name, stream in self.streams.items():
+            stream.flush()
+            kind = np.float64 if stream.is_real else np.int64
+            rows[name] = np.frombuffer(b"".join(self.blocks[name]), dtype=kind).reshape(-1, stream.columns)
+        fell = robot.plant.record.fall_time_ns if robot.plant.fell else -1
+        return Record(
+            begin_ns=self.begin_ns,
+            end_ns=robot.loop.time,
+            frames={bus.name: rows[bus.name] for bus in robot.buses},
+            samples=rows["samples"],
+            words=rows["words"],
+            errors=rows["errors"],
+            boards=[board.name for board in robot.loop.boards],
+            states=states_of(robot),
+            fell_ns=int(fell),
+            fall_cause=robot.plant.fall_cause,
+        )
+
+
+def states_of(robot: Any) -> dict[str, dict[int, str]]:
+    """The states of the main brain's machines by their numbers."""
+    modes = robot.boards["MB"].modes
+    return {
+        machine: {state.number: state.name for state in getattr(modes, machine).machine.states}
+        for machine in STATE_VARIABLES
+    }

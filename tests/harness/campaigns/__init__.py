@@ -1,0 +1,1 @@
+"""The campaigns' parts, from the intervals to a killed worker."""

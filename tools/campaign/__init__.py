@@ -1,0 +1,1 @@
+"""`ranger-sim campaign`: the command, and the page of its results."""

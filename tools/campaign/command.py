@@ -1,0 +1,38 @@
+"""`ranger-sim campaign FILE.toml`: many runs of one plan, here or on a Dask cluster, resumable at any time."""
+
+import argparse
+from typing import Any
+
+from ranger_sim.tools.units import whole_number
+
+
+def register(commands: Any) -> None:
+    """Add the subcommand to the command line."""
+    command = commands.add_parser(
+        "campaign",
+        help="run every fault of a plan, a grid or sample of settings, or a search for the worst case",
+        description="Runs what the plan asks for and is not on the disk yet, then writes tables and a page. Killed, it "
+        "goes on where it was when it is started again.",
+        epilog="The plan's form: harness/campaigns/README.md; examples: campaigns/.",
+    )
+    command.add_argument("file", metavar="FILE.toml", help="the plan")
+    command.add_argument("--out", metavar="DIR", help="folder for results and page (default runs/campaigns/NAME)")
+    command.add_argument(
+        "--jobs", type=whole_number(1), help="runs at a time on this machine (default: its processors)"
+    )
+    command.add_argument(
+        "--pool",
+        choices=("dask", "local"),
+        help="a Dask cluster of this machine's processes, or plain processes (default: dask where it is installed)",
+    )
+    command.add_argument("--scheduler", metavar="ADDRESS", help="a Dask cluster that runs already, as tcp://host:8786")
+    command.add_argument("--report", action="store_true", help="run nothing, write tables and page of what there is")
+    command.add_argument("--replay", metavar="KEY", help="run one case again, from power-up, and tell what happened")
+    command.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run the plan; 0 done, 1 when a run crashed or timed out, 130 interrupted."""
+    from ranger_sim.tools.campaign import work  # statistics and plots: only when there is a campaign
+
+    return work.run(options)

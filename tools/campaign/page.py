@@ -1,0 +1,204 @@
+"""A campaign's results for people: one self-contained page, and the same as Markdown."""
+
+import pathlib
+from typing import Any
+
+import jinja2
+import plotly.graph_objects as go
+from markupsafe import Markup
+from plotly.offline import get_plotlyjs
+
+from ranger_sim.harness.campaigns.outcomes import CRITERIA
+from ranger_sim.harness.campaigns.summary import worst_of
+
+HERE = pathlib.Path(__file__).parent
+# From harmless to harmful; grey proves nothing.
+COLOURS = {
+    "no effect": "#e3e7eb",
+    "masked": "#cfe3f4",
+    "detected and safe": "#8fc7a3",
+    "degraded gait": "#f6d68b",
+    "undetected wrong": "#e8894a",
+    "fall": "#c8453c",
+    "damage": "#6d1a4e",
+    "invalid": "#ffffff",
+    "timed out": "#9aa5b1",
+    "crashed": "#1d2733",
+}
+ORDER = tuple(COLOURS)
+SHORT = {
+    "no effect": "none",
+    "masked": "mask",
+    "detected and safe": "safe",
+    "degraded gait": "gait",
+    "undetected wrong": "wrong",
+    "fall": "fall",
+    "damage": "dmg",
+    "invalid": "inv",
+    "timed out": "time",
+    "crashed": "crash",
+}
+
+
+def render(told: dict[str, Any]) -> str:
+    """The page as text. `told`: of harness/campaigns/summary.py."""
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(HERE),
+        autoescape=jinja2.select_autoescape(["j2"]),
+        undefined=jinja2.StrictUndefined,
+    )
+    environment.filters["share"] = share_text
+    environment.filters["ms"] = lambda value: "" if value is None else f"{value:.4g} ms"
+    heat = told["heat"]
+    return environment.get_template("template.html.j2").render(
+        told=told,
+        colours=COLOURS,
+        criteria=CRITERIA,
+        heat_html=Markup(heat_map(heat)) if heat["places"] else "",
+        times_html=Markup(times(told["rows"])) if any(row["detection_ms"] is not None for row in told["rows"]) else "",
+        plotly_js=Markup(get_plotlyjs()),
+    )
+
+
+def share_text(share: dict[str, Any]) -> str:
+    """A share in percent, with its interval where it has one."""
+    if share["share"] is None:
+        return "none"
+    text = f"{100.0 * share['share']:.1f} %"
+    return text if share["low"] is None else f"{text} ({100.0 * share['low']:.1f} to {100.0 * share['high']:.1f} %)"
+
+
+def heat_map(heat: dict[str, Any]) -> str:
+    """Places by modes, coloured by the worst outcome of the cell; the text counts the outcomes."""
+    colours, texts, told = [], [], []
+    for place in heat["places"]:
+        cells = [heat["cells"][place].get(mode) for mode in heat["modes"]]
+        worst = [None if cell is None else worst_of(cell) for cell in cells]
+        colours.append([None if name is None else ORDER.index(name) for name in worst])
+        texts.append(["" if name is None else SHORT[name] for name in worst])
+        told.append([counts_text(cell) for cell in cells])
+    steps = len(ORDER)
+    scale = []
+    for place, name in enumerate(ORDER):
+        scale += [[place / steps, COLOURS[name]], [(place + 1) / steps, COLOURS[name]]]
+    figure = go.Figure(
+        go.Heatmap(
+            z=colours,
+            x=heat["modes"],
+            y=heat["places"],
+            text=texts,
+            customdata=told,
+            texttemplate="%{text}",
+            hovertemplate="%{y}: %{x}<br>%{customdata}<extra></extra>",
+            colorscale=scale,
+            zmin=-0.5,
+            zmax=steps - 0.5,
+            showscale=False,
+            xgap=2,
+            ygap=2,
+        )
+    )
+    figure.update_layout(
+        template="plotly_white",
+        height=90 + 24 * len(heat["places"]),
+        margin={"l": 160, "r": 10, "t": 90, "b": 10},
+        xaxis={"side": "top", "tickangle": -40},
+        yaxis={"autorange": "reversed"},
+        font={"size": 11},
+    )
+    return html_of(figure)
+
+
+def counts_text(outcomes: list[str] | None) -> str:
+    """How often each outcome."""
+    listed = outcomes or []
+    return ", ".join(f"{name} x {listed.count(name)}" for name in dict.fromkeys(listed))
+
+
+def times(rows: list[dict[str, Any]]) -> str:
+    """How soon faults were detected: the share of the runs by the time since the fault's start."""
+    figure = go.Figure()
+    for name, column in (
+        ("first error that tells", "detection_ms"),
+        ("first other state", "reaction_ms"),
+        ("fall", "fall_ms"),
+    ):
+        found = sorted(row[column] for row in rows if row.get(column) is not None)
+        shares = [100.0 * number / len(rows) for number in range(1, len(found) + 1)]
+        figure.add_scatter(x=[max(each, 0.1) for each in found], y=shares, name=name, line={"shape": "hv"})
+    figure.update_layout(
+        template="plotly_white",
+        height=340,
+        margin={"l": 60, "r": 20, "t": 30, "b": 45},
+        xaxis={"type": "log", "title": "ms after the fault began"},
+        yaxis={"title": "share of all runs, %", "rangemode": "tozero"},
+        legend={"orientation": "h", "y": 1.15, "x": 0},
+    )
+    return html_of(figure)
+
+
+def html_of(figure: Any) -> str:
+    """A figure without a copy of the library."""
+    config = {"displaylogo": False, "displayModeBar": False}
+    html: str = figure.to_html(full_html=False, include_plotlyjs=False, config=config)
+    return html
+
+
+def markdown(told: dict[str, Any]) -> str:
+    """The same in Markdown, without the plots."""
+    lines = [f"# {told['title']}", "", told["description"], ""] if told["description"] else [f"# {told['title']}", ""]
+    lines += [
+        f"{told['runs']} runs ({told['population']}), version {told['version']}. {told['interval']}",
+        "",
+        "| Outcome | Runs | Share | Criterion |",
+        "|---|---|---|---|",
+    ]
+    for name, share in told["outcomes"].items():
+        lines.append(f"| {name} | {share['count']} | {share_text(share)} | {CRITERIA[name]} |")
+    lines += ["", "| Coverage | Share | Runs |", "|---|---|---|"]
+    for what, share in told["coverage"].items():
+        lines.append(f"| {what} | {share_text(share)} | {share['count']} of {share['of']} |")
+    for each in told["tolerances"]:
+        lines += ["", tolerance_text(each)]
+    for each in told["healthy"]:
+        count, total = each["false_alarms"]
+        codes = ", ".join(each["false_alarm_codes"])
+        lines += [
+            "",
+            f"Healthy walks of seeds {', '.join(map(str, each['seeds']))}, each judged by the others "
+            "from four instants: "
+            f"{count} false alarms of {total}" + (f" ({codes})." if codes else "."),
+        ]
+    heat = told["heat"]
+    if heat["places"]:
+        lines += ["", "## Worst outcome by place and mode", ""]
+        lines += ["| Place | " + " | ".join(heat["modes"]) + " |", "|---" * (len(heat["modes"]) + 1) + "|"]
+        for place in heat["places"]:
+            cells = [heat["cells"][place].get(mode) for mode in heat["modes"]]
+            lines.append(f"| {place} | " + " | ".join(SHORT[worst_of(cell)] if cell else "" for cell in cells) + " |")
+        lines += ["", "; ".join(f"{short}: {name}" for name, short in SHORT.items()) + "."]
+    if told["codes"]:
+        lines += ["", "## What told of the faults first", ""]
+        lines += ["| Error | From | First | Of its own board | Median |", "|---|---|---|---|---|"]
+        for each in told["codes"]:
+            told_first = f"{each['first']} | {each['own_board']} | {each['median_ms']:.4g} ms"
+            lines.append(f"| {each['code']} | {each['board']} | {told_first} |")
+    for title, name in (("Worst cases", "worst"), ("Runs that prove nothing", "unsure")):
+        if told[name]:
+            lines += ["", f"## {title}", "", "| Outcome | Fault | Why | Detected | Again |", "|---|---|---|---|---|"]
+            for each in told[name]:
+                first = each["detected"]
+                detected = f"{first['code']} from {first['board']}, {first['ms']:.4g} ms" if first else "no"
+                why = each["why"] + (f" after {each['fall_ms']:.0f} ms" if each["fall_ms"] is not None else "")
+                fault = each["fault"] or ", ".join(f"{key} {value}" for key, value in each["axes"].items())
+                lines.append(f"| {each['outcome']} | {fault} | {why} | {detected} | `{each['replay']}` |")
+    return "\n".join(lines) + "\n"
+
+
+def tolerance_text(each: dict[str, Any]) -> str:
+    """A tolerance and whether it was met, in a sentence."""
+    upper = f"; upper tolerance limit {each['upper_ms']:.4g} ms" if each.get("upper_ms") is not None else ""
+    return (
+        f"{each['what']} within {each['limit_ms']:g} ms for {100 * each['share']:g} % ({each['by']}): "
+        f"{each['verdict']}; {each['within']} of {each['of']} within{upper}."
+    )

@@ -1,0 +1,162 @@
+"""What `ranger-sim campaign` does once its options are read."""
+
+import argparse
+import csv
+import importlib.util
+import io
+import json
+import os
+import pathlib
+from typing import Any
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.table import Table
+
+from ranger_sim import loading
+from ranger_sim.foundation import wallclock
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.harness.campaigns import engine, group, plan, pools, summary
+from ranger_sim.harness.campaigns.cases import Case
+from ranger_sim.tools.campaign import page
+from ranger_sim.tools.campaign.words import proof_text
+from ranger_sim.tools.files import replace_file, writable_folder
+
+TELL_EVERY_S = 10.0  # where there is no terminal for a progress bar
+EXIT_UNSURE = 1  # a run crashed or timed out: its outcome is not known
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run the plan; 0 done, 1 when a run crashed or timed out, 130 interrupted."""
+    console = Console(stderr=True)
+    wanted = plan.load(options.file)
+    if options.scheduler and options.pool == "local":
+        raise UserError("--scheduler and --pool local: a scheduler is Dask's")
+    folder = writable_folder(options.out or pathlib.Path("runs") / "campaigns" / wanted.name)
+    campaign = engine.Campaign(wanted, folder)
+    try:
+        if options.replay:
+            return replay(campaign, options.replay)
+        if not loading.RUNS_COMPILED:
+            console.print(f"running interpreted, slowly: {loading.RUNS_INTERPRETED_BECAUSE}", soft_wrap=True)
+        if options.report:
+            campaign.cases = decided(campaign)
+        else:
+            work(campaign, options, console)
+        told = summary.of(campaign)
+        write(told, folder)
+        show(told, console)
+        console.print(f"page: {folder / 'index.html'}", soft_wrap=True, highlight=False)
+        return EXIT_UNSURE if any(told["outcomes"][name]["count"] for name in ("crashed", "timed out")) else 0
+    finally:
+        campaign.close()
+
+
+def decided(campaign: engine.Campaign) -> list[Case]:
+    """The runs of the plan that have results, of a search round by round as far as it came."""
+    if campaign.plan.search is None:
+        return [case for case in campaign.plan.cases() if campaign.result(case) is not None]
+    cases: list[Case] = []
+    for round_cases in campaign.searching(campaign.plan.search):
+        cases += [case for case in round_cases if campaign.result(case) is not None]
+        if any(campaign.result(case) is None for case in round_cases):
+            break
+    return cases
+
+
+def pool_of(options: argparse.Namespace) -> Any:
+    """Who does the runs."""
+    jobs = options.jobs or len(os.sched_getaffinity(0))
+    wants_dask = options.scheduler or options.pool == "dask"
+    if wants_dask or (options.pool is None and importlib.util.find_spec("distributed")):
+        return pools.DaskPool(options.scheduler, jobs)
+    return pools.LocalPool(jobs)
+
+
+def work(campaign: engine.Campaign, options: argparse.Namespace, console: Console) -> None:
+    """Run what is missing, with a progress bar, or a line every ten seconds where there is no terminal."""
+    total, before = campaign.foreseen, len(campaign.store.results)
+    pool = pool_of(options)
+    console.print(
+        f"{campaign.plan.title}: {campaign.plan.design} of {total} runs on {pool.told}"
+        + (f"; {before} results are there already" if before else ""),
+        highlight=False,
+        soft_wrap=True,
+    )
+    begun = wallclock.monotonic_s()
+    tell_at = [begun + TELL_EVERY_S]
+    since: list[tuple[int, float]] = []  # (runs done, when) as the first result of a run came: healthy walks go before
+    with Progress(
+        BarColumn(bar_width=20),
+        MofNCompleteColumn(),
+        TextColumn("{task.fields[latest]}"),
+        TimeElapsedColumn(),
+        TextColumn("left"),
+        TimeRemainingColumn(),
+        console=console,
+        disable=not console.is_terminal,
+    ) as progress:
+        task = progress.add_task("runs", total=total, latest="")
+
+        def tell(done: int, latest: str) -> None:
+            if done and not since:
+                since.append((done, wallclock.monotonic_s()))
+            progress.update(task, completed=done, latest=latest)
+            now = wallclock.monotonic_s()
+            if not console.is_terminal and now >= tell_at[0]:
+                tell_at[0] = now + TELL_EVERY_S
+                left = ""
+                if since and done > since[0][0]:
+                    left = f", {(total - done) * (now - since[0][1]) / (done - since[0][0]) / 60.0:.1f} min left"
+                console.print(f"{done} of {total}{left}", highlight=False)
+
+        try:
+            campaign.run(pool, tell)
+        finally:
+            pool.close()
+
+
+def write(told: dict[str, Any], folder: pathlib.Path) -> None:
+    """Summary as JSON and Markdown, the runs as CSV, and the page."""
+    rows = told["rows"]
+    replace_file(folder / "summary.json", (json.dumps(told, indent=1) + "\n").encode())
+    columns: dict[str, None] = {}
+    for row in rows:
+        columns.update(dict.fromkeys(row))
+    text = io.StringIO()
+    table = csv.DictWriter(text, list(columns), lineterminator="\n")
+    table.writeheader()
+    table.writerows(rows)
+    replace_file(folder / "runs.csv", text.getvalue().encode())
+    replace_file(folder / "report.md", page.markdown(told).encode())
+    replace_file(folder / "index.html", page.render(told).encode())
+
+
+def show(told: dict[str, Any], console: Console) -> None:
+    """The outcomes in a table."""
+    table = Table(box=None, pad_edge=False)
+    table.add_column("outcome")
+    table.add_column("runs", justify="right")
+    table.add_column("share", justify="right")
+    for name, share in told["outcomes"].items():
+        if share["count"]:
+            table.add_row(name, str(share["count"]), page.share_text(share))
+    console.print(table)
+    for what, share in told["coverage"].items():
+        console.print(
+            f"{what}: {page.share_text(share)} ({share['count']} of {share['of']})", highlight=False, soft_wrap=True
+        )
+
+
+def replay(campaign: engine.Campaign, key: str) -> int:
+    """One case again, from power-up, and whether it comes out as it is on the disk."""
+    for case in decided(campaign) or campaign.plan.cases():
+        if campaign.key(case).startswith(key):
+            known = campaign.result(case)
+            result = group.alone(case, campaign.plan.watch, campaign.healthy_of(case))
+            print(proof_text(case, result))
+            if known is not None and known.get("digest") != result.get("digest"):
+                print(f"not as on the disk: trace {result.get('digest')}, there {known.get('digest')}")
+                return EXIT_UNSURE
+            return 0
+    raise UserError(f"--replay {key!r}: the plan has no such run of this version, {campaign.version}")
