@@ -8,6 +8,7 @@ from ranger_sim.harness.processes.places cimport (
     ASK_USED,
     BOARD_SLEEPS,
     COMMAND,
+    COMMAND_ACTIVITY,
     COMMAND_ADVANCE,
     COMMAND_COUNTERS,
     COMMAND_STOP,
@@ -43,7 +44,7 @@ from ranger_sim.harness.processes.stage cimport Audience
 
 cdef class Endpoint:
     cdef public Microcontroller board
-    cdef public object totals, clock, shared
+    cdef public object totals, clock, shared, activity
     cdef public long long[::1] block, stage
     cdef public double[::1] stage_doubles
     cdef public Bell ask, answer

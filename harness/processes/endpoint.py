@@ -11,8 +11,18 @@ from ranger_sim.boards.counters import as_dict
 from ranger_sim.firmware_sim.microcontroller import Microcontroller
 from ranger_sim.foundation import wallclock
 from ranger_sim.foundation.events import CAN_RX, CAN_TX_DONE, PIN_EDGE, UART_BYTE, EventQueue
+from ranger_sim.harness.processes.activity import ActivityStore
 from ranger_sim.harness.processes.channel import Bell, Mailbox
-from ranger_sim.harness.processes.kinds import FROM_BOARD, KINDS, NOTE, NOTE_COUNTERS, NOTE_WORDS, SET_WORD, TO_BOARD
+from ranger_sim.harness.processes.kinds import (
+    FROM_BOARD,
+    KINDS,
+    NOTE,
+    NOTE_ACTIVITY,
+    NOTE_COUNTERS,
+    NOTE_WORDS,
+    SET_WORD,
+    TO_BOARD,
+)
 from ranger_sim.harness.processes.lateness import bin_of
 from ranger_sim.harness.wiring import HEAR_IN_SLOTS
 
@@ -25,6 +35,7 @@ if not cython.compiled:
         ASKED,
         BOARD_SLEEPS,
         COMMAND,
+        COMMAND_ACTIVITY,
         COMMAND_ADVANCE,
         COMMAND_COUNTERS,
         COMMAND_STOP,
@@ -87,6 +98,7 @@ class Endpoint:
         self.audience = audience
         errors = getattr(board, "errors", None)
         self.totals: object = None if errors is None else errors.totals
+        self.activity: object = ActivityStore(board)
         self.can_wait = SLOT_KINDS if board.name in HEAR_IN_SLOTS else 0
         self.promised = 0
         self.clock: object = wallclock.monotonic_ns
@@ -107,7 +119,9 @@ class Endpoint:
             if command == COMMAND_ADVANCE:
                 self._advance()
             elif command == COMMAND_COUNTERS:
-                self.tell(NOTE_COUNTERS, as_dict(self.board.counters()))
+                self.tell(NOTE_COUNTERS, json.dumps(as_dict(self.board.counters()), separators=(",", ":")).encode())
+            elif command == COMMAND_ACTIVITY:
+                self.tell(NOTE_ACTIVITY, self.activity.next())
             self.block[RESULT] = RESULT_MORE if self._put_out() else RESULT_DONE
             self._show()
             self.answer.ring()
@@ -219,9 +233,8 @@ class Endpoint:
                 self.board.store.set_word(a, b, self.board.time.ms)
         self.to_board.notes.clear()
 
-    def tell(self, what, content) -> None:
-        """Queue a dictionary for the other side, as JSON in parts."""
-        data = json.dumps(content, separators=(",", ":")).encode()
+    def tell(self, what, data) -> None:
+        """Queue bytes for the other side, in parts."""
         parts = [data[i : i + NOTE_BYTES] for i in range(0, len(data), NOTE_BYTES)] or [b""]
         for number, part in enumerate(parts):
             self.pending.push(self.reached, 0, NOTE, what, number, len(parts), 0, 0, 0, part)

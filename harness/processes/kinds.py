@@ -16,10 +16,11 @@ CONTROLLER, BUFFER, PIN, LEVEL, PORT, BYTE = (1, 4), (1, 3), (0, 63), (0, 1), (0
 IDENTIFIER = (0, 0x1FFFFFFF)
 
 # Kinds between the processes only: no chip sees them.
-NOTE = 64  # a NOTE_*, b part, c parts, ref bytes (UTF-8 of JSON, cut into parts)
+NOTE = 64  # a NOTE_*, b part, c parts, ref bytes (UTF-8 of JSON, or of activity.py here, cut into parts)
 SET_WORD = 65  # a number of the variable, b its word: written into the board's data table
 NOTE_COUNTERS = 1  # what the board counted, for summary and report
 NOTE_FAULT = 2  # why a board process ends
+NOTE_ACTIVITY = 3  # rows of its activity log
 
 
 class Kind(NamedTuple):
@@ -45,7 +46,7 @@ KINDS = {
     events.SSP_START: Kind("SSP_START", FROM_BOARD, (PORT, NONE, NONE, NONE, NONE, NONE)),
     events.SSP_LOAD: Kind("SSP_LOAD", FROM_BOARD, (PORT, NONE, NONE, NONE, NONE, NONE)),
     events.UART_OUTPUT: Kind("UART_OUTPUT", FROM_BOARD, (PORT, BYTE, (0, 2040), NONE, NONE, NONE)),
-    NOTE: Kind("NOTE", FROM_BOARD, ((1, 2), (0, 10_000), (1, 10_001), NONE, NONE, NONE)),
+    NOTE: Kind("NOTE", FROM_BOARD, ((1, 3), (0, 10_000), (1, 10_001), NONE, NONE, NONE)),
     SET_WORD: Kind("SET_WORD", TO_BOARD, ((0, 65535), WORD, NONE, NONE, NONE, NONE)),
 }
 # kind -> most words of its payload; the others carry none

@@ -42,6 +42,7 @@ cpdef enum:
     COMMAND_MORE = 2
     COMMAND_COUNTERS = 3
     COMMAND_STOP = 4
+    COMMAND_ACTIVITY = 5
     RESULT_DONE = 0
     RESULT_MORE = 1
     STAGE_ROWS = 2

@@ -57,6 +57,7 @@ if not cython.compiled:
     COMMAND_MORE = 2
     COMMAND_COUNTERS = 3
     COMMAND_STOP = 4
+    COMMAND_ACTIVITY = 5
     RESULT_DONE = 0
     RESULT_MORE = 1
 

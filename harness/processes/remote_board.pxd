@@ -39,7 +39,7 @@ cdef class RemoteBoard(Board):
     cdef public Mailbox to_board, from_board
     cdef public Stage stage
     cdef public list lines
-    cdef public object counted, uncounted
+    cdef public object counted, uncounted, log
     cdef public bint posted, gone, follows_steps
     cdef public long long place, silent_until, urgent, turns, reached, watched_number, slot_time
     cdef bint _urgent(self, long long until) noexcept

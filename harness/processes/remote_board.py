@@ -20,6 +20,7 @@ from ranger_sim.firmware_sim.edge_line import EdgeLine
 from ranger_sim.foundation.edge_buffer import EdgeBuffer
 from ranger_sim.foundation.events import EventQueue
 from ranger_sim.foundation.user_error import UserError
+from ranger_sim.harness.processes.activity import RemoteActivity
 from ranger_sim.harness.processes.channel import Bell, Mailbox
 from ranger_sim.harness.processes.kinds import FROM_BOARD, NOTE, NOTE_COUNTERS, TO_BOARD
 
@@ -77,6 +78,7 @@ class RemoteBoard(Board):
         self.watched_number = built.watched()
         self.slot_time = built.latest_slot()
         self.counted = None
+        self.log = RemoteActivity(self, built.scheduler.log)
         self.uncounted = built.counters()
         self.block = shared.words
         self.ask = Bell(shared.words, ASKED, BOARD_SLEEPS, shared.ask_descriptor)
@@ -192,13 +194,21 @@ class RemoteBoard(Board):
 
     def fetch_counters(self) -> None:
         """Ask the board for what it counted; `counters` says it from then on."""
+        told = self.notes_of(COMMAND_COUNTERS, NOTE_COUNTERS)
+        if not self.gone:
+            self.counted = from_dict(json.loads(told))
+
+    def notes_of(self, command, what) -> bytes:
+        """One turn with `command`; the bytes that the board's notes of the kind `what` then bring."""
         self.from_board.notes.clear()
-        self.command(COMMAND_COUNTERS)
-        if self.gone:
-            return
-        parts = [note for note in self.from_board.notes if note[0] == NOTE and note[3] == NOTE_COUNTERS]
+        self.command(command)
+        parts = [note for note in self.from_board.notes if note[0] == NOTE and note[3] == what]
         parts.sort(key=lambda note: note[4])
-        self.counted = from_dict(json.loads(b"".join(note[-1] for note in parts)))
+        return b"".join(note[-1] for note in parts)
+
+    def activity(self) -> object:
+        """Its activity log, kept in its own process: rows come when it is flushed."""
+        return self.log
 
     def counters(self) -> object:
         """What the board counted, as it was fetched last; only its last slot where it was gone by then."""

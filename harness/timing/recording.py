@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -55,24 +56,34 @@ class Slots:
 class Recording:
     """Everything that `board` does from now on. `rows`: an array of ACTIVITY_COLUMNS columns, sorted by start.
 
-    `origin_ns`: power-up of the robot; instants are counted from there. `lost`: rows that were given up for newer ones.
+    `find_log` says where its log is now, if not on `board`: a board may move into a process of its own.
+    `origin_ns`: power-up of the robot; instants are counted from there.
     `slot_of`: to which slot each row belongs, -1 for what ran before the first.
     """
 
-    def __init__(self, board: Any, origin_ns: int = 0, begun_ns: int = 0, most_rows: int = MOST_ROWS) -> None:
+    def __init__(
+        self,
+        board: Any,
+        origin_ns: int = 0,
+        begun_ns: int = 0,
+        most_rows: int = MOST_ROWS,
+        find_log: Callable[[], Any] | None = None,
+    ) -> None:
         self.board = board
+        self.find_log = find_log if find_log is not None else board.activity
         self.origin_ns = origin_ns
         self.begun_ns = begun_ns
         self.most_rows = most_rows
-        self.lost = 0
+        self.given_up = 0
+        self.lost_before_us = 0  # rows that a board in a process of its own gave up before we asked
+        self.forgotten = 0  # of them, before `forget`
         self.blocks: list[bytes] = []
         self.kept = 0
         self.rows = np.empty((0, ACTIVITY_COLUMNS), dtype=np.int64)
         self.slots = self._slots()
         self.slot_of = np.empty(0, dtype=np.int64)
         self.decoded = 0
-        self.log = board.activity()
-        self.log.add_sink(self._take)
+        self.find_log().add_sink(self._take)
 
     def legend(self) -> Legend:
         """Names, costs and limits as they are now."""
@@ -81,10 +92,11 @@ class Recording:
 
     def forget(self) -> None:
         """Give up what was recorded so far."""
-        self.log.flush()
+        self.update()
         self.blocks.clear()
         self.kept = 0
-        self.lost = 0
+        self.given_up = 0
+        self.forgotten = self.lost_before_us
         self.decoded = -1
 
     def _take(self, time_ns: int, rows: bytes) -> None:
@@ -93,13 +105,20 @@ class Recording:
         while self.kept > self.most_rows and len(self.blocks) > 1:
             given_up = len(self.blocks.pop(0)) // (8 * ACTIVITY_COLUMNS)
             self.kept -= given_up
-            self.lost += given_up
+            self.given_up += given_up
+
+    @property
+    def lost(self) -> int:
+        """Rows that were given up for newer ones since the beginning, or since `forget`."""
+        return self.given_up + self.lost_before_us - self.forgotten
 
     def update(self) -> Slots:
         """Bring `rows` and `slots` up to now."""
-        self.log.flush()
-        if self.decoded != self.kept + self.lost:
-            self.decoded = self.kept + self.lost
+        log = self.find_log()
+        log.flush()
+        self.lost_before_us = getattr(log, "lost", 0)
+        if self.decoded != self.kept + self.given_up:
+            self.decoded = self.kept + self.given_up
             rows = np.frombuffer(b"".join(self.blocks), dtype=np.int64).reshape(-1, ACTIVITY_COLUMNS).copy()
             rows[:, COLUMN_START] -= self.origin_ns
             rows[:, COLUMN_END] -= self.origin_ns
@@ -117,26 +136,28 @@ class Recording:
     def _slots(self) -> Slots:
         """Which rows belong to which slot: those of its number, and what ran from its tick to the next one."""
         rows = self.rows
-        kind, number = rows[:, COLUMN_KIND], rows[:, COLUMN_NUMBER]
+        kind = rows[:, COLUMN_KIND]
         began = rows[kind == SLOT_BEGAN]
         numbers = began[:, COLUMN_NUMBER]
         count = len(numbers)
         cycles = np.full(count, NOT_THROUGH, dtype=np.int64)
         end = began[:, COLUMN_START].copy()
         overran = np.zeros(count, dtype=bool)
-        first_number = int(numbers[0]) if count else 0
+
+        def of_known(what: int) -> np.ndarray:
+            return rows[(kind == what) & np.isin(rows[:, COLUMN_START], began[:, COLUMN_START])]
 
         def places(of: np.ndarray) -> np.ndarray:
-            return of[:, COLUMN_NUMBER] - first_number
+            return np.searchsorted(began[:, COLUMN_START], of[:, COLUMN_START])
 
-        late = rows[(kind == SLOT_OVERRAN) & (number >= first_number)]
+        late = of_known(SLOT_OVERRAN)
         overran[places(late)] = True
         listed = began[places(late), COLUMN_ITEMS]
         whole = late[:, COLUMN_ITEMS] == listed
         ticks_cycles = (late[:, COLUMN_END] - late[:, COLUMN_START]) * self.legend().cycles_per_ns if len(late) else 0
         cycles[places(late)] = np.where(whole, 0, ticks_cycles)
         end[places(late)] = np.where(whole, late[:, COLUMN_START], late[:, COLUMN_END])
-        ended = rows[(kind == SLOT_ENDED) & (number >= first_number)]
+        ended = of_known(SLOT_ENDED)
         cycles[places(ended)] = ended[:, COLUMN_CYCLES]
         end[places(ended)] = ended[:, COLUMN_END]
         self.slot_of = np.searchsorted(began[:, COLUMN_START], rows[:, COLUMN_START], side="right") - 1

@@ -1,0 +1,98 @@
+"""The activity log of a board in a process of its own: kept there, fetched over the channel when somebody reads.
+
+An answer is a head of two whole numbers (rows given up for newer ones since the last answer, bytes that are left) and
+rows as firmware_sim/activity.py has them.
+"""
+
+from __future__ import annotations
+
+import array
+import collections
+from collections.abc import Callable
+from typing import Any
+
+from ranger_sim.firmware_sim.activity import ACTIVITY_COLUMNS
+from ranger_sim.harness.processes.kinds import NOTE_ACTIVITY
+from ranger_sim.harness.processes.places import COMMAND_ACTIVITY
+
+HEAD_BYTES = 16
+ROW_BYTES = 8 * ACTIVITY_COLUMNS
+MOST_BYTES = 256 * 1024 * 1024  # kept for who has not asked yet (chosen by us: a minute of a motor board that walks)
+ANSWER_BYTES = 4096 * ROW_BYTES  # of one answer: some hundred messages of the channel
+
+Sink = Callable[[int, bytes], None]
+
+
+class ActivityStore:
+    """In the board's process: the rows that nobody has fetched yet. The log is there from the first question on.
+
+    A log that the board had before its process was forked is the plant's to read: its sinks are in another memory now.
+    """
+
+    def __init__(self, board: Any) -> None:
+        self.board = board
+        self.blocks: collections.deque[bytes] = collections.deque()
+        self.kept = 0
+        self.lost = 0
+        self.begun = False
+        if board.scheduler.log is not None:
+            board.scheduler.log.sinks.clear()
+            self._begin()
+
+    def _begin(self) -> None:
+        self.begun = True
+        self.board.activity().add_sink(self.take)
+
+    def take(self, time_ns: int, rows: bytes) -> None:
+        """Keep rows; the oldest go when there are too many."""
+        self.blocks.append(rows)
+        self.kept += len(rows)
+        while self.kept > MOST_BYTES:
+            given_up = len(self.blocks.popleft())
+            self.kept -= given_up
+            self.lost += given_up // ROW_BYTES
+
+    def next(self) -> bytes:
+        """The next answer."""
+        if not self.begun:
+            self._begin()
+        self.board.activity().flush()
+        parts = []
+        room = ANSWER_BYTES
+        while self.blocks and room > 0:
+            block = self.blocks.popleft()
+            if len(block) > room:
+                self.blocks.appendleft(block[room:])
+                block = block[:room]
+            parts.append(block)
+            room -= len(block)
+            self.kept -= len(block)
+        head = array.array("q", [self.lost, self.kept])
+        self.lost = 0
+        return head.tobytes() + b"".join(parts)
+
+
+class RemoteActivity:
+    """In the plant's process: like an ActivityLog of the board, for who reads it. `lost`: rows given up unread."""
+
+    def __init__(self, remote: Any, before: Any) -> None:
+        self.remote = remote
+        self.sinks: list[Sink] = [] if before is None else before.sinks  # who read the board's log before it moved out
+        self.lost = 0
+
+    def add_sink(self, sink: Sink) -> None:
+        """Call `sink(time_ns, rows)` with the rows from here on."""
+        self.flush()
+        self.sinks.append(sink)
+
+    def flush(self) -> None:
+        """Fetch what the board has written, and hand it over; nothing from a board that is gone."""
+        left = 1
+        while left:
+            answer = self.remote.notes_of(COMMAND_ACTIVITY, NOTE_ACTIVITY)
+            if not answer:
+                return
+            lost, left = array.array("q", answer[:HEAD_BYTES])
+            self.lost += lost
+            for sink in self.sinks:
+                sink(self.remote.reached, answer[HEAD_BYTES:])

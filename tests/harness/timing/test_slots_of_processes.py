@@ -1,0 +1,91 @@
+"""A board in a process of its own keeps its activity there, and its slots are what they are in one process."""
+
+import contextlib
+import sys
+
+import pytest
+
+from ranger_sim.harness.processes import activity
+from ranger_sim.harness.ranger import Ranger
+from ranger_sim.harness.scenario import Scenario
+from ranger_sim.harness.testing.process_robot import ProcessRobot
+
+pytestmark = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="needs Linux (eventfd, pidfd)")
+
+
+def slots_of(robot, name, begin_s):
+    """(row, start, cycles, overran, functions by cycles) of the slots that were recorded from `begin_s` on."""
+    if begin_s:
+        robot.run_for(begin_s)
+    view = robot.slots(name)
+    robot.run_for(0.06)
+    robot.run_for(0.06)
+    slots = view.between(begin_s + 0.001, begin_s + 0.118)
+    return [(slot.row, slot.start_ns, slot.cycles, slot.overran, slot.cycles_by_function()) for slot in slots], view
+
+
+@pytest.mark.parametrize("name", ["MCFI", "CSR"])
+@pytest.mark.parametrize("begin_s", [0.0, 0.05])
+def test_recorded_before_or_after_the_processes_begin_the_slots_are_the_same(name, begin_s):
+    with contextlib.closing(Ranger()) as robot:
+        alone, _ = slots_of(robot, name, begin_s)
+        digest = robot.trace_digest()
+    with contextlib.closing(ProcessRobot(Scenario(), "none", None, None)) as robot:
+        apart, view = slots_of(robot, name, begin_s)
+        assert robot.trace_digest() == digest
+        view.assert_no_overrun()
+    assert len(apart) >= 115 and apart == alone
+
+
+class Written:
+    """A board whose log has these blocks."""
+
+    def __init__(self):
+        self.scheduler = type("scheduler", (), {"log": None})
+        self.sinks = []
+
+    def activity(self):
+        return self
+
+    def add_sink(self, sink):
+        self.sinks.append(sink)
+
+    def flush(self):
+        pass
+
+
+def test_who_does_not_ask_for_long_gets_the_newest_and_is_told_what_was_given_up(monkeypatch):
+    monkeypatch.setattr(activity, "MOST_BYTES", 10 * activity.ROW_BYTES)
+    monkeypatch.setattr(activity, "ANSWER_BYTES", 4 * activity.ROW_BYTES)
+    board = Written()
+    store = activity.ActivityStore(board)
+
+    class Remote:
+        reached = 5
+
+        def notes_of(self, command, what):
+            return store.next()
+
+    log = activity.RemoteActivity(Remote(), None)
+    got = []
+    log.add_sink(lambda time_ns, rows: got.append(rows))
+    for block in range(5):
+        board.sinks[0](0, bytes([block]) * 3 * activity.ROW_BYTES)
+    log.flush()
+    assert log.lost == 6  # two blocks of three rows
+    assert b"".join(got) == b"".join(bytes([block]) * 3 * activity.ROW_BYTES for block in (2, 3, 4))
+    assert [len(rows) // activity.ROW_BYTES for rows in got] == [4, 4, 1]
+    log.flush()
+    assert log.lost == 6 and b"".join(got[3:]) == b""
+
+
+def test_of_a_board_that_is_gone_nothing_comes():
+    class Gone:
+        reached = 0
+
+        def notes_of(self, command, what):
+            return b""
+
+    log = activity.RemoteActivity(Gone(), None)
+    log.add_sink(lambda time_ns, rows: pytest.fail("nothing was to come"))
+    log.flush()
