@@ -1,6 +1,7 @@
 """What documents and comments point at exists: paragraphs of docs/robot.md, files, headings."""
 
 import functools
+import json
 import pathlib
 import re
 import runpy
@@ -172,3 +173,11 @@ def test_the_figure_of_the_record_walk_is_drawn_out_of_the_walks_that_are_kept()
     level = program["walks"](program["NOW"])
     assert [row["seed"] for row in level] == list(range(1, 21))
     assert all(row["steps"] == program["STEPS"] and row["body"] == "ranger" for row in level)
+
+
+def test_the_figure_of_the_timeline_is_drawn_out_of_the_step_that_is_kept():
+    program = runpy.run_path(str(ROOT / "docs" / "timeline_figure.py"))
+    assert program["FIGURE"].read_text(encoding="utf-8") == program["drawn"]()
+    kept = json.loads(program["STEP_FILE"].read_text(encoding="utf-8"))
+    order = [kept["stations"][station][0] for station, _, _ in program["WAY"]]
+    assert order == sorted(order) and len(order) == 17  # nothing comes before what it comes of

@@ -13,6 +13,8 @@ PRINTED = {
     "README.md": (r"ID: +123 .*'ranger'", r"^BusState\.ERROR$", r"^[1-9]\d* -?0\.\d+ \d{4,5}$"),
     "docs/slot-timing.md": (r"^3 7460 53% left$",),
     "docs/faults.md": (r"^True 100 counts True$",),
+    # the longest wait of a frame on CAN1, µs
+    "docs/timeline.md": (r"^\d{1,3}\.\d+$",),
     "firmware_sim/README.md": (r"^5 1 0$",),
 }
 

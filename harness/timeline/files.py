@@ -6,12 +6,14 @@ from collections.abc import Callable
 from typing import IO
 
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.timeline import perfetto_file
+from ranger_sim.harness.timeline import mcap_file, perfetto_file, vcd_file
 from ranger_sim.harness.timeline.model import Events
 
 FORMATS: dict[str, Callable[[Events, IO[bytes], str], None]] = {
     ".pftrace": perfetto_file.write,
     ".perfetto-trace": perfetto_file.write,
+    ".vcd": vcd_file.write,
+    ".mcap": mcap_file.write,
 }
 
 

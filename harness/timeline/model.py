@@ -84,6 +84,8 @@ class Events:
     slices: list[Slices] = dataclasses.field(default_factory=list)
     counters: list[Counter] = dataclasses.field(default_factory=list)
     instants: list[Instants] = dataclasses.field(default_factory=list)
+    # {board: {pin: (time_ns, level)}} of the pins that boards drove
+    pins: dict[str, dict[str, tuple[np.ndarray, np.ndarray]]] = dataclasses.field(default_factory=dict)
 
     def track(self, *path: str) -> Slices:
         """The slices of this path. KeyError when there are none."""

@@ -107,7 +107,11 @@ class Timeline:
         found.slices += [link.to_main_brain.slices, link.to_router.slices]
         flows.connect_all(robot, processors, buses, link)
         for board, store in self.outputs.items():
-            found.counters += signals.duties(board, self._since(store.rows(), begin), zero)
+            outputs = self._since(store.rows(), begin)
+            found.counters += signals.duties(board, outputs, zero)
+            pins = signals.pin_levels(board, outputs, zero)
+            if pins:
+                found.pins[board] = pins
         found.counters += signals.variables(words, zero)
         found.counters += signals.body(samples, zero)
         return found
