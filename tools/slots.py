@@ -60,7 +60,9 @@ def run(options: argparse.Namespace) -> int:
     if options.board is not None and options.board not in BOARD_CLASSES:
         raise UserError(f"board {options.board!r}: there is none of this name, but {', '.join(BOARD_CLASSES)}")
     if options.time is not None and not 0.0 < options.time < float("inf"):
-        raise UserError(f"--time {options.time:g}: more than 0 s are needed")
+        raise UserError(f"--time {options.time:g}: a number of seconds is needed")
+    if options.time is not None and options.time <= FIRST_SECONDS:
+        raise UserError(f"--time {options.time:g}: the first {FIRST_SECONDS:g} s do not count, so more are needed")
     json_file = json_target(options.json)
     with contextlib.closing(Ranger(Scenario(seed=options.seed))) as robot:
         bounds = {name: static_check.check(robot.boards[name], options.edge_rate, options.full_bus) for name in names}
@@ -252,6 +254,7 @@ def notes(board: dict, ran: dict | None) -> list[str]:
         lines.append(
             f"Seen in {saw['slots']:,} slots of {ran['time_s']:.2f} s, {steps}, seed {ran['seed']}: {saw['overruns']} "
             f"overran; the longest took {saw['worst_us']:.1f} us, at {saw['worst_at_s']:.4f} s."
+            + (f" The robot fell: {ran['ended']}." if ran["ended"] else "")
         )
     logs = board["robot_execution_time_us"]
     if logs is not None:

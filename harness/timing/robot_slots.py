@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -35,13 +35,13 @@ class Held(StepWatch):
 
 
 class RobotSlots(SlotView):
-    """All slots of a robot's board since the recording began."""
+    """The slots of a robot's board since the recording began, or a selection of them."""
 
     def __init__(self, recording: Recording, robot: Any) -> None:
         SlotView.__init__(self, recording)
         self.robot = robot
 
-    def where(self, wanted: str | Condition | Callable[[Any], Any]) -> SlotView:
+    def where(self, wanted: str | Condition | Callable[[Any], Any]) -> Self:
         """Only slots that begin while a condition holds (harness/conditions.py); it is looked at from now on."""
         held = Held(self.robot, condition(wanted))
         self.robot.loop.watchers.append(held)

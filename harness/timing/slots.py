@@ -15,9 +15,10 @@ was recorded, or nothing was selected, so there is no answer.
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 from collections.abc import Callable, Iterator
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -182,14 +183,14 @@ class SlotView:
 
     # --- selections ---------------------------------------------------------------------------------------
 
-    def of_row(self, row: int) -> SlotView:
+    def of_row(self, row: int) -> Self:
         """Only slots of this row of the table."""
         count = len(self.legend.rows)
         if not 0 <= row < count:
             raise UserError(f"slots of {self.board}: row {row!r} is none of 0 ... {count - 1}")
         return self._select(f"of row {row}", lambda slots: slots.row == row)
 
-    def between(self, begin: Instant, end: Instant) -> SlotView:
+    def between(self, begin: Instant, end: Instant) -> Self:
         """Only slots that begin from `begin` on and before `end` (since the robot's power-up)."""
         first, last = _instant_ns(begin), _instant_ns(end)
         if last <= first:
@@ -197,12 +198,15 @@ class SlotView:
         called = f"between {duration_text(first)} and {duration_text(last)}"
         return self._select(called, lambda slots: (slots.start >= first) & (slots.start < last))
 
-    def during(self, called: str, held: Callable[[np.ndarray], np.ndarray]) -> SlotView:
+    def during(self, called: str, held: Callable[[np.ndarray], np.ndarray]) -> Self:
         """Only slots at whose start `held` (an array of instants, ns since power-up) is true."""
         return self._select(called, lambda slots: held(slots.start))
 
-    def _select(self, called: str, which: Callable[[Any], np.ndarray]) -> SlotView:
-        return SlotView(self.recording, (*self.chosen, (called, which)))
+    def _select(self, called: str, which: Callable[[Any], np.ndarray]) -> Self:
+        """The same view with one selection more."""
+        selected = copy.copy(self)
+        selected.chosen = (*self.chosen, (called, which))
+        return selected
 
     def forget(self) -> None:
         """Give up what was recorded so far."""

@@ -6,7 +6,7 @@ import re
 import pytest
 
 from ranger_sim.harness.timing import robot_figures
-from ranger_sim.tools import cli
+from ranger_sim.tools import cli, slots
 
 # docs/robot.md N3.2, line by line: functions of every slot, then rows, then the occasional list, then the record
 EVERY_SLOT = """adcx_convert_all adci_convert_all qdc_cap01_angle qdc_cap01_rate qdc_cap23_angle qdc_cap23_rate
@@ -73,12 +73,26 @@ def test_a_file_gets_the_json_and_the_terminal_the_table(capsys, tmp_path, wide)
     assert json.loads(file.read_text())["run"] is None and out.startswith("MCSI, 500 us slots of 30,000 cycles, 4 rows")
 
 
+def test_an_overrun_of_the_run_is_told_and_is_the_exit_code(capsys, monkeypatch, wide):
+    run = slots.seen
+
+    def with_a_slow_function(robot, names, options):
+        robot.replace("MCH", "mc_compliant_control", robot.board("MCH").compliant_control, cost=29_000)
+        return run(robot, names, options)
+
+    monkeypatch.setattr(slots, "seen", with_a_slow_function)
+    code, out, _ = told(capsys, "MCH", "--time", "0.15")
+    assert code == slots.EXIT_OVERRAN == 1
+    assert re.search(r"Seen in \d+ slots of 0.15 s, 0 steps, seed 1: [1-9]\d+ overran", out)
+
+
 @pytest.mark.parametrize(
     "arguments, complaint",
     [
         (["MCX"], "board 'MCX': there is none of this name"),
-        (["MCH", "--time", "0"], "--time 0: more than 0 s are needed"),
-        (["MCH", "--time", "nan"], "--time nan: more than 0 s are needed"),
+        (["MCH", "--time", "0"], "--time 0: a number of seconds is needed"),
+        (["MCH", "--time", "nan"], "--time nan: a number of seconds is needed"),
+        (["MCH", "--time", "0.1"], "--time 0.1: the first 0.1 s do not count, so more are needed"),
         (["MCH", "--static", "--edge-rate", "-1"], "a number of 0 or more is needed"),
     ],
 )

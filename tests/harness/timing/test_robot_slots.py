@@ -50,7 +50,10 @@ def test_no_interrupt_is_served_before_it_is_asked_for(name):
 def test_slots_are_selected_by_what_held_at_their_start():
     with contextlib.closing(Ranger()) as robot:
         late = robot.slots("MCH").where(lambda robot: 0.01 <= robot.time_s < 0.02)
+        second = robot.slots("MCH").of_row(2).where("12 ms").between("10 ms", "20 ms")
         robot.run_for(0.03)
+        assert {slot.row for slot in second} == {2} and len(second) == 4
+        assert min(slot.start_ns for slot in second) >= 12_000_000
         starts = [slot.start_ns for slot in late]
         assert len(starts) == 20 and min(starts) >= 10_000_000 and max(starts) < 20_250_000
 
