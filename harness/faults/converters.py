@@ -59,8 +59,10 @@ class TransferFault(ConverterFault):
     fields = ("gains", "scale", "offset_counts", "count_V")
 
     def before(self, now_ns: int) -> None:
-        if self.external and self.board.scheduler.slot_count == self.slots:
-            return  # nothing has been converted yet
+        slots = self.board.scheduler.slot_count
+        if slots == self.slots:
+            return  # nothing has been converted since then
+        self.slots = slots
         with_fault = list(self._results(now_ns))
         changed = {name: getattr(self.converter, name) for name in self.usual}
         self.finish(now_ns)

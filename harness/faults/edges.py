@@ -109,9 +109,6 @@ class EdgeFault(PlaceFault):
     def begin_on_wire(self, now_ns: int) -> None:
         """The wire is there, nothing has happened on it yet."""
 
-    def before(self, now_ns: int) -> None:
-        self.level_b = self.encoder.level_b(self.joint_rad())
-
     def finish(self, now_ns: int) -> None:
         self.level_b = self.encoder.level_b(self.joint_rad())
 
@@ -125,12 +122,14 @@ class EdgeFault(PlaceFault):
     def _write(self, rewrite: Any, start_ns: int, end_ns: int) -> None:
         """Let `rewrite` make the step's edges anew, of those that the sensor has sent."""
         buffer = self.encoder.edges
-        sent = [int(edge) for edge in buffer.kept[: buffer.count]]
-        self.wire.edges.clear()
+        sent = list(buffer.kept[: buffer.count]) if buffer.count else []
+        shown = self.wire.edges
+        shown.clear()
         rewrite(sent, start_ns, end_ns)
-        buffer.clear()
-        for time_ns, level_a, level_b in self.wire.edges:
-            buffer.push(time_ns, level_a, level_b)
+        if sent or shown:
+            buffer.clear()
+            for time_ns, level_a, level_b in shown:
+                buffer.push(time_ns, level_a, level_b)
 
     def differs(self, time_ns: int) -> None:
         """Note by how much the wire's count differs from the sensor's."""
@@ -355,6 +354,9 @@ class EdgesDropOut(OnTheLine):
     def begin_on_wire(self, now_ns: int) -> None:
         self.gaps = signals.Random(self.random, **self.values)
         self.gaps.begin(0.0, now_ns)
+
+    def before(self, now_ns: int) -> None:
+        self.level_b = self.encoder.level_b(self.joint_rad())
 
     def pass_on(self, sent: list[int], start_ns: int, end_ns: int) -> None:
         self._change(start_ns)

@@ -175,6 +175,8 @@ class Fault(StepWatch):
             self.largest_difference = difference
 
     def before_step(self, now_ns: int) -> None:
+        if self.ended_ns >= 0:
+            return
         if self.activated_ns < 0:
             if self.stop_wanted:
                 self.robot.loop.watchers.remove(self)
@@ -184,16 +186,21 @@ class Fault(StepWatch):
                 if isinstance(self.end, Lasting):
                     self.end.since_ns = now_ns
                 self.begin(now_ns)
-        if self.active and (self.stop_wanted or (self.end is not None and self.end.met())):
+            else:
+                return
+        end = self.end
+        if self.stop_wanted or (end is not None and end.met()):
             self.ended_ns = now_ns
             self.finish(now_ns)
-        if self.active:
+        else:
             self.before(now_ns)
 
     def after_step(self, start_ns: int, end_ns: int) -> None:
-        if self.active:
+        if self.activated_ns < 0:
+            return
+        if self.ended_ns < 0:
             self.after(start_ns, end_ns)
-        elif self.ended_ns >= 0 > self.cleared_ns and self.is_clear(start_ns, end_ns):
+        elif self.cleared_ns < 0 and self.is_clear(start_ns, end_ns):
             self.cleared_ns = end_ns
             self.robot.loop.watchers.remove(self)
 

@@ -16,7 +16,6 @@ from ranger_sim.plant.imu import PACKET_BYTES, SET_MODE
 
 ACKNOWLEDGEMENT_BYTES = 8
 RATE_X = 13  # place of the rate about x in a packet
-SUM = PACKET_BYTES - 2
 
 RATE = Quantity(
     unit="rad/s",
@@ -49,24 +48,20 @@ class PacketFault(PlaceFault):
 
     def after(self, start_ns: int, end_ns: int) -> None:
         line = self.imu.bytes
-        if line.count == 0:
-            return
-        times = [int(time_ns) for time_ns in line.times[: line.count]]
-        values = [int(value) for value in line.values[: line.count]]
-        line.clear()
-        at = 0
-        while at < len(values):
-            size = ACKNOWLEDGEMENT_BYTES if values[at] == SET_MODE else PACKET_BYTES
-            packet = values[at : at + size]
-            if size == PACKET_BYTES:
-                packet = self.packet_instead(packet, times[at])
-            for time_ns, value in zip(times[at : at + len(packet)], packet, strict=True):
-                line.push(time_ns, value)
-            at += size
+        at, count = 0, line.count
+        while at < count:
+            size = ACKNOWLEDGEMENT_BYTES if line.values[at] == SET_MODE else PACKET_BYTES
+            if size == PACKET_BYTES and not self.keep_packet(line.values, at, line.times[at]):
+                for place in range(at, count - size):  # the rest moves up
+                    line.times[place], line.values[place] = line.times[place + size], line.values[place + size]
+                count -= size
+                line.count = count
+            else:
+                at += size
 
-    def packet_instead(self, packet: list[int], time_ns: int) -> list[int]:
-        """What is sent in place of a packet whose first byte ends at `time_ns`."""
-        return packet
+    def keep_packet(self, values: Any, at: int, time_ns: int) -> bool:
+        """The packet of 31 bytes from `at` on, whose first one ends at `time_ns`, is changed; False: it is not sent."""
+        return True
 
     def is_clear(self, start_ns: int, end_ns: int) -> bool:
         """A packet tells the rate that the legs have, but for bias and noise. Six deviations: one in 5e8 is farther."""
@@ -81,15 +76,22 @@ class PacketFault(PlaceFault):
         return bool(min(rates) - room <= rate_of(values[-PACKET_BYTES:]) <= max(rates) + room)
 
 
-def rate_of(packet: list[int]) -> float:
-    """The rate about x that a packet tells, rad/s."""
-    return float_of_word(int.from_bytes(bytes(packet[RATE_X : RATE_X + 4]), "big"))
+def rate_of(values: Any, at: int = 0) -> float:
+    """The rate about x that the packet from `at` on tells, rad/s."""
+    a, b, c, d = values[at + RATE_X : at + RATE_X + 4]
+    return float_of_word(a << 24 | b << 16 | c << 8 | d)
 
 
-def with_rate(packet: list[int], rate_rad_s: float) -> list[int]:
-    """The packet with another rate about x, and the sum that fits."""
-    told = packet[:RATE_X] + list(word_of_float(rate_rad_s).to_bytes(4, "big")) + packet[RATE_X + 4 :]
-    return told[:SUM] + list((sum(told[:SUM]) & 0xFFFF).to_bytes(2, "big"))
+def tell_rate(values: Any, at: int, rate_rad_s: float) -> None:
+    """Another rate about x in the packet from `at` on, and the sum that fits."""
+    word = word_of_float(rate_rad_s)
+    high, low = at + PACKET_BYTES - 2, at + PACKET_BYTES - 1
+    total = values[high] << 8 | values[low]
+    for place, shift in zip(range(at + RATE_X, at + RATE_X + 4), (24, 16, 8, 0), strict=True):
+        byte = word >> shift & 255
+        total += byte - values[place]
+        values[place] = byte
+    values[high], values[low] = total >> 8 & 255, total & 255
 
 
 class SignalInPacket(PacketFault, SignalFault):
@@ -100,13 +102,13 @@ class SignalInPacket(PacketFault, SignalFault):
         self.signal = self.new_signal()
         self.signal.begin(self.imu.rate_x, now_ns)
 
-    def packet_instead(self, packet: list[int], time_ns: int) -> list[int]:
-        true = rate_of(packet)
-        told = with_rate(packet, self.signal.shown(true, time_ns))
-        if told == packet:
-            return packet
-        self.note(time_ns, rate_of(told) - true)
-        return told
+    def keep_packet(self, values: Any, at: int, time_ns: int) -> bool:
+        true = rate_of(values, at)
+        tell_rate(values, at, self.signal.shown(true, time_ns))
+        told = rate_of(values, at)
+        if told != true:
+            self.note(time_ns, told - true)
+        return True
 
 
 for each in mode_classes(SignalInPacket, IMU, RATE, without=("offset", "drop_out")):
@@ -127,11 +129,11 @@ class PacketsMissing(PacketFault):
         self.gaps = signals.Random(self.random, **self.values)
         self.gaps.begin(0.0, now_ns)
 
-    def packet_instead(self, packet: list[int], time_ns: int) -> list[int]:
+    def keep_packet(self, values: Any, at: int, time_ns: int) -> bool:
         if not self.gaps.on(time_ns):
-            return packet
-        self.note(time_ns, rate_of(packet))
-        return []
+            return True
+        self.note(time_ns, rate_of(values, at))
+        return False
 
 
 @mode
@@ -149,10 +151,10 @@ class GyroBias(PacketFault):
         self.usual = self.imu.bias_rad_s
         self.imu.bias_rad_s = self.usual + self.values["rate"]
 
-    def packet_instead(self, packet: list[int], time_ns: int) -> list[int]:
+    def keep_packet(self, values: Any, at: int, time_ns: int) -> bool:
         if not math.isclose(self.imu.bias_rad_s, self.usual):
             self.note(time_ns, self.imu.bias_rad_s - self.usual)
-        return packet
+        return True
 
     def finish(self, now_ns: int) -> None:
         super().finish(now_ns)

@@ -75,20 +75,22 @@ class WordFault(PlaceFault):
     def _hold_out(self, now_ns: int) -> None:
         """The other word, in place of the true one, from `now_ns` on."""
         shown = self.instead(now_ns)
-        words = list(self.robot.plant.words)
-        words[self.word] = shown
-        self.robot.plant.words = words
         if shown != self.true:
+            self._put(shown)
             self.note(now_ns, signed(self.counts(shown) - self.counts(self.true)))
+
+    def _put(self, word: int) -> None:
+        """This word is held out."""
+        words = self.robot.plant.words  # compiled, a copy of the array
+        words[self.word] = word
+        self.robot.plant.words = words
 
     def instead(self, now_ns: int) -> int:
         """The word that is held out in place of `true`."""
         raise NotImplementedError
 
     def finish(self, now_ns: int) -> None:
-        words = list(self.robot.plant.words)
-        words[self.word] = self.true
-        self.robot.plant.words = words
+        self._put(self.true)
 
     def is_clear(self, start_ns: int, end_ns: int) -> bool:
         """The word is that of the joint's angle, but for the encoder's noise."""

@@ -1,11 +1,15 @@
 """Faults on the whole robot: what the firmware makes of them, converters, and that nothing depends on how it is run."""
 
 import contextlib
+import json
 import math
+import os
+import subprocess
+import sys
 
 import pytest
 
-from ranger_sim import Ranger, Scenario, UserError
+from ranger_sim import Ranger, Scenario, UserError, loading
 from ranger_sim.datatable.generated import errors as codes
 
 RAD_PER_EDGE = math.pi / 2048.0
@@ -261,6 +265,35 @@ def test_the_same_faults_give_the_same_bytes_and_each_changes_them():
     assert trace != digest(())[0]
     assert digest(SEVERAL, seed=2)[0] != trace
     assert all(fault["acted"] for fault in stamps[1:])
+
+
+@pytest.mark.skipif(not loading.RUNS_COMPILED, reason="nothing is compiled here: there is nothing to compare with")
+def test_the_same_faults_give_the_same_bytes_interpreted():
+    def told(interpreted):
+        arguments = [
+            option
+            for place, mode, at, until, more in SEVERAL
+            for option in (
+                "--fault",
+                f"{place}:{mode}{''.join(f',{name}={value}' for name, value in more.items())}"
+                f"@{at or '0 s'}{f'..{until}' if until else ''}",
+            )
+        ]
+        done = subprocess.run(
+            [sys.executable, "-m", "ranger_sim", "walk", "--time", "0.15s", "--json", "-", *arguments],
+            env={**os.environ, "RANGER_SIM_INTERPRETED": "1" if interpreted else ""},
+            capture_output=True,
+            text=True,
+            check=False,
+            timeout=300,
+        )
+        summary = json.loads(done.stdout)
+        return summary["compiled"], summary["trace_digest"], summary["faults"]
+
+    compiled, interpreted = told(interpreted=False), told(interpreted=True)
+    assert (compiled[0], interpreted[0]) == (True, False)
+    assert compiled[1:] == interpreted[1:]
+    assert sum(fault["acted"] for fault in compiled[2]) >= 7
 
 
 def test_a_fault_that_never_begins_leaves_the_run_as_it_is():
