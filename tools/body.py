@@ -4,11 +4,11 @@ import argparse
 import json
 from typing import Any
 
-from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
 from ranger_sim.plant import body_files
+from ranger_sim.tools import terminal
 
 
 def register(commands: Any) -> None:
@@ -64,7 +64,7 @@ def run_show(options: argparse.Namespace) -> int:
     for row in found:
         value = f"{row['value']:g}" if isinstance(row["value"], float) else str(row["value"])
         table.add_row(*(escape(text) for text in (row["key"], value, row["unit"], row["limits"], row["source"])))
-    console = Console(highlight=False)
+    console = terminal.console(highlight=False)
     console.print(f"{body.title}: {body.description}")
     console.print(table)
     return 0

@@ -14,6 +14,7 @@ from rich.table import Table
 from ranger_sim.can_bus.bounds import Bound, response_times, utilisation
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness import bus_schedule, profile
+from ranger_sim.tools import terminal
 from ranger_sim.tools.files import json_target, replace_file
 from ranger_sim.tools.units import whole_number
 
@@ -51,7 +52,7 @@ def run(options: argparse.Namespace) -> int:
     if options.json == "-":
         print(text)
     else:
-        console = Console()
+        console = terminal.console()
         for bus in buses:
             show(bus, console)
     return EXIT_DONE if met else EXIT_MISSED

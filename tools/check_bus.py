@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from rich.console import Console
 
 from ranger_sim.harness import bus_schedule, profile
+from ranger_sim.tools import terminal
 from ranger_sim.tools.files import json_target, replace_file
 from ranger_sim.tools.units import TIMES, quantity
 
@@ -52,7 +53,7 @@ def run(options: argparse.Namespace) -> int:
     if options.json == "-":
         print(text)
     else:
-        show(found, Console())
+        show(found, terminal.console())
     return EXIT_DONE if ready else EXIT_FAULT
 
 

@@ -15,6 +15,7 @@ from rich.table import Table
 
 from ranger_sim.harness.faults import catalogue
 from ranger_sim.harness.faults.fault import Fault, Parameter, Place
+from ranger_sim.tools import terminal
 
 DOCUMENT = pathlib.Path(__file__).resolve().parent.parent / "docs" / "faults.md"
 EXIT_INVALID = 3  # of a run in which a fault did not act: it shows nothing
@@ -63,7 +64,7 @@ def run(options: argparse.Namespace) -> int:
     if options.json:
         print(json.dumps([place_json(place) for place in places], indent=2))
         return 0
-    console = Console(highlight=False)
+    console = terminal.console(highlight=False)
     if options.place is None:
         table = Table(box=None, pad_edge=False)
         table.add_column("place", no_wrap=True)

@@ -6,11 +6,11 @@ import platform
 import sys
 from typing import Any
 
-from rich.console import Console
 from rich.table import Table
 
 from ranger_sim import __version__, datatable, loading
 from ranger_sim.can_bus.edge import interfaces
+from ranger_sim.tools import terminal
 
 
 def register(commands: Any) -> None:
@@ -53,5 +53,5 @@ def run(options: argparse.Namespace) -> int:
     table.add_row("platform", found["platform"])
     table.add_row("CAN interfaces", ", ".join(found["can_interfaces"]) or "none found (python-can's own still work)")
     table.add_row("data table", found["data_table_hash"])
-    Console().print(table)
+    terminal.console().print(table)
     return 0

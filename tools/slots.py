@@ -17,8 +17,9 @@ from ranger_sim.harness.scenario import Scenario, StopRule
 from ranger_sim.harness.timing import robot_figures, static_check
 from ranger_sim.harness.timing.slots import SlotView, Statistics
 from ranger_sim.harness.timing.static_check import OVERRUNS, BoardBound, FunctionBound
+from ranger_sim.tools import terminal
 from ranger_sim.tools.files import json_target, replace_file
-from ranger_sim.tools.units import whole_number
+from ranger_sim.tools.units import TIMES, quantity, whole_number
 
 EXIT_DONE, EXIT_OVERRAN = 0, 1
 USUAL_TIME_S = 4.0  # the robot is let go after half of it and walks the rest (chosen by us: seconds of computing)
@@ -40,9 +41,11 @@ def register(commands: Any) -> None:
     )
     length = command.add_mutually_exclusive_group()
     length.add_argument("--static", action="store_true", help="only what can be said without a run")
-    length.add_argument("--time", type=float, metavar="S", help=f"virtual seconds of the run ({USUAL_TIME_S:g})")
+    length.add_argument(
+        "--time", type=quantity(TIMES, "s", 0.0), metavar="2s", help=f"virtual time of the run ({USUAL_TIME_S:g} s)"
+    )
     length.add_argument("--steps", type=whole_number(1), metavar="N", help="run until so many steps")
-    command.add_argument("--seed", type=whole_number(0), default=1, metavar="N", help="seed of the run (1)")
+    command.add_argument("--seed", type=int, default=1, metavar="N", help="seed of the run (1)")
     command.add_argument(
         "--edge-rate",
         type=float,
@@ -59,8 +62,6 @@ def run(options: argparse.Namespace) -> int:
     names = list(BOARD_CLASSES) if options.board is None else [options.board]
     if options.board is not None and options.board not in BOARD_CLASSES:
         raise UserError(f"board {options.board!r}: there is none of this name, but {', '.join(BOARD_CLASSES)}")
-    if options.time is not None and not 0.0 < options.time < float("inf"):
-        raise UserError(f"--time {options.time:g}: a number of seconds is needed")
     if options.time is not None and options.time <= FIRST_SECONDS:
         raise UserError(f"--time {options.time:g}: the first {FIRST_SECONDS:g} s do not count, so more are needed")
     json_file = json_target(options.json)
@@ -75,7 +76,7 @@ def run(options: argparse.Namespace) -> int:
     if options.json == "-":
         print(text)
     else:
-        console = Console(highlight=False)
+        console = terminal.console(highlight=False)
         for board in boards:
             show(board, ran, console, whole=options.board is not None)
     return EXIT_OVERRAN if any(board["seen"] and board["seen"]["overruns"] for board in boards) else EXIT_DONE

@@ -28,6 +28,7 @@ from rich.console import Console
 from ranger_sim.boards.main_brain import controllers, programs
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.scenario import Scenario, StopRule
+from ranger_sim.tools import terminal
 from ranger_sim.tools.evolution import Evolution
 from ranger_sim.tools.units import LENGTHS, quantity, whole_number
 
@@ -169,7 +170,7 @@ def parameter_step(text: str) -> tuple[str, float]:
 
 def run(options: argparse.Namespace) -> int:
     """Search and write the file; 0 when the found set walks every task to its end, else 1."""
-    console = Console(stderr=True)
+    console = terminal.console(stderr=True)
     out = pathlib.Path(options.out)
     if out.suffix != ".toml":
         raise UserError(f"--out {out}: a name ending in .toml is expected")

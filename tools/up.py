@@ -25,7 +25,7 @@ from ranger_sim.harness.processes.supervisor import ELSEWHERE, RUNNING, Supervis
 from ranger_sim.harness.profile import Profile
 from ranger_sim.harness.profile import load as load_profile
 from ranger_sim.harness.scenario import StopRule
-from ranger_sim.tools import serial_options, walk
+from ranger_sim.tools import serial_options, terminal, walk
 from ranger_sim.tools.files import json_target, writable_folder
 
 if TYPE_CHECKING:
@@ -175,7 +175,7 @@ def run(options: argparse.Namespace) -> int:
     )
     folder = writable_folder(options.out) if options.out else None
     json_file = json_target(options.json)
-    console = Console(stderr=True, quiet=options.json == "-")
+    console = terminal.console(stderr=True, quiet=options.json == "-")
     scenario, stop = walk.scenario_of(options), walk.stop_of(options) or FOREVER
     quirks = serial_options.quirks_of(options)
     profile = load_profile(options.profile) if options.profile is not None else None

@@ -21,7 +21,7 @@ from ranger_sim.harness.profile import Profile
 from ranger_sim.harness.profile import load as load_profile
 from ranger_sim.harness.scenario import Scenario, StopRule
 from ranger_sim.plant.electronics import SWITCHES
-from ranger_sim.tools import faults, serial_options, trace
+from ranger_sim.tools import faults, serial_options, terminal, trace
 from ranger_sim.tools.files import json_target, replace_file, writable_folder
 from ranger_sim.tools.units import ENERGIES_WH, LENGTHS, SHARES, TIMES, quantity, whole_number
 
@@ -192,7 +192,7 @@ def run_scenario(scenario: Scenario, stop: StopRule, options: argparse.Namespace
     folder = writable_folder(options.out) if options.out else None
     json_file = json_target(options.json)
     quiet = options.json == "-"
-    console = Console(stderr=True, quiet=quiet)
+    console = terminal.console(stderr=True, quiet=quiet)
     quirks = serial_options.quirks_of(options)
     profile = profile_of(options, console)
     faults.load_modules(options)

@@ -90,8 +90,6 @@ def test_an_overrun_of_the_run_is_told_and_is_the_exit_code(capsys, monkeypatch,
     "arguments, complaint",
     [
         (["MCX"], "board 'MCX': there is none of this name"),
-        (["MCH", "--time", "0"], "--time 0: a number of seconds is needed"),
-        (["MCH", "--time", "nan"], "--time nan: a number of seconds is needed"),
         (["MCH", "--time", "0.1"], "--time 0.1: the first 0.1 s do not count, so more are needed"),
         (["MCH", "--static", "--edge-rate", "-1"], "a number of 0 or more is needed"),
     ],
@@ -100,3 +98,12 @@ def test_a_mistake_is_told_in_one_line(capsys, arguments, complaint):
     code, out, error = told(capsys, *arguments)
     assert code == cli.EXIT_MISUSE and out == ""
     assert complaint in error and error.count("\n") == 1
+
+
+@pytest.mark.parametrize("time", ["0", "nan", "-1s", "2 fortnights"])
+def test_a_time_that_is_none_is_refused_before_anything_runs(capsys, time):
+    with pytest.raises(SystemExit) as ended:
+        cli.main(["slots", "MCH", f"--time={time}"])
+    assert ended.value.code == cli.EXIT_MISUSE
+    error = capsys.readouterr().err
+    assert "--time" in error and error.count("\n") == 1

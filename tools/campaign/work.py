@@ -18,6 +18,7 @@ from ranger_sim.foundation import wallclock
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.campaigns import engine, group, plan, pools, summary
 from ranger_sim.harness.campaigns.cases import Case
+from ranger_sim.tools import terminal
 from ranger_sim.tools.campaign import page
 from ranger_sim.tools.campaign.words import proof_text
 from ranger_sim.tools.files import replace_file, writable_folder
@@ -28,7 +29,7 @@ EXIT_UNSURE = 1  # a run crashed or timed out: its outcome is not known
 
 def run(options: argparse.Namespace) -> int:
     """Run the plan; 0 done, 1 when a run crashed or timed out, 130 interrupted."""
-    console = Console(stderr=True)
+    console = terminal.console(stderr=True)
     wanted = plan.load(options.file)
     if options.scheduler and options.pool == "local":
         raise UserError("--scheduler and --pool local: a scheduler is Dask's")
