@@ -43,7 +43,7 @@ def add_options(command: Any) -> None:
         "--trace-last",
         type=quantity(TIMES, "s", 0.0),
         metavar="10s",
-        help="keep only the last so many seconds of virtual time; without it everything, 16 MB of disk a second",
+        help="keep only the last so many seconds of virtual time; without it everything, 25 MB of disk a second",
     )
 
 

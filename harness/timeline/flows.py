@@ -266,13 +266,13 @@ def first_after(passing: Passing, content: np.ndarray, time_ns: np.ndarray) -> n
     found = np.full(len(passing.rows), -1, dtype=np.int64)
     if len(passing.rows) == 0 or len(content) == 0:
         return found
-    _, number = np.unique(np.concatenate([passing.content, content]), axis=0, return_inverse=True)
-    number = number.reshape(-1)
+    number = numbered(np.concatenate([passing.content, content]))
+    _, moment = np.unique(np.concatenate([passing.time_ns, time_ns]), return_inverse=True)
+    # one whole number of both, of which an earlier moment is the lower one
+    keys = number << 32 | moment.reshape(-1)
     wanted, offered = number[: len(found)], number[len(found) :]
-    order = np.lexsort((time_ns, offered))
-    # one whole number of both: contents are fewer than 2^20 in a window, instants below 2^43 ns (2.4 h)
-    keys = (offered << 43 | time_ns)[order]
-    place = np.searchsorted(keys, wanted << 43 | np.maximum(passing.time_ns, 0))
+    order = np.argsort(keys[len(found) :], kind="stable")
+    place = np.searchsorted(keys[len(found) :][order], keys[: len(found)])
     there = place < len(order)
     row = order[place[there]]
     same = (offered[row] == wanted[there]) & (time_ns[row] - passing.time_ns[there] <= LONGEST_WAY_NS)
@@ -280,8 +280,17 @@ def first_after(passing: Passing, content: np.ndarray, time_ns: np.ndarray) -> n
     return found
 
 
+def numbered(content: np.ndarray) -> np.ndarray:
+    """A number for each row of (identifier, two words of 32 bits): the same for the same row."""
+    _, words = np.unique(
+        content[:, 1].astype(np.uint64) << np.uint64(32) | content[:, 2].astype(np.uint64), return_inverse=True
+    )
+    _, number = np.unique(words.reshape(-1) << 29 | content[:, 0], return_inverse=True)  # identifiers have 29 bits
+    return number.reshape(-1)
+
+
 def once(rows: np.ndarray, targets: np.ndarray, slices: Slices) -> tuple[np.ndarray, Slices, np.ndarray]:
     """Pairs without repetition, as `connect` takes them: several frames may go the same way."""
     both = (rows >= 0) & (targets >= 0)
-    pairs = np.unique(np.stack([rows[both], targets[both]], axis=1), axis=0)
-    return pairs[:, 0], slices, pairs[:, 1]
+    pairs = np.unique(rows[both] << 32 | targets[both])
+    return pairs >> 32, slices, pairs & 0xFFFFFFFF

@@ -205,12 +205,14 @@ class Writer:
         at = slices.flow_at[order]
         place = firsts[at] + notes + (np.arange(len(at)) - np.searchsorted(at, at))
         values[place] = slices.flow_id[order]
-        known: dict[tuple[int, int, int], int] = {}
-        for row in np.unique(at).tolist():
-            key = (int(slices.name[row]), int(going[row]), int(ending[row]))
-            if key not in known:
-                known[key] = self._begin(track, slices, *key)
-            kinds[row] = known[key]
+        rows = np.flatnonzero(going + ending)
+        _, first, kind = np.unique(
+            slices.name[rows] << 40 | going[rows] << 20 | ending[rows], return_index=True, return_inverse=True
+        )
+        with_flows = [
+            self._begin(track, slices, int(slices.name[row]), int(going[row]), int(ending[row])) for row in rows[first]
+        ]
+        kinds[rows] = np.array(with_flows, dtype=np.int64)[kind.reshape(-1)]
         return kinds, firsts, values
 
     def _put(self, time: np.ndarray, kind: np.ndarray, values: np.ndarray, first: np.ndarray) -> None:
