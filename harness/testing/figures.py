@@ -18,11 +18,12 @@ class Figure:
 
 
 class Observed:
-    """What harness.testing keeps beside a robot: the last frames, and what was measured on them."""
+    """What harness.testing keeps beside a robot: the last frames, what was measured on them, perhaps a timeline."""
 
     def __init__(self, keeper: Any) -> None:
         self.keeper = keeper
         self.figures: list[Figure] = []
+        self.timeline: Any = None  # a harness.timeline.Timeline
 
     def note(self, name: str, measured: str, limit: str = "") -> None:
         """Keep a figure."""

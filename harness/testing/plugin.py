@@ -6,6 +6,8 @@ Everybody's pytest imports this module, so it imports nothing of the robot befor
 from __future__ import annotations
 
 import os
+import pathlib
+import re
 import shlex
 from collections.abc import Generator, Iterator
 from typing import TYPE_CHECKING, Any
@@ -31,7 +33,7 @@ OPTIONS = {
     "scope": ("RANGER_SIM_SCOPE", "function", f"scope of the fixtures: {', '.join(SCOPES)}"),
     "speed": ("RANGER_SIM_SPEED", "1.0", "virtual seconds per second, on vcan and hardware"),
     "fork": ("RANGER_SIM_FORK", "yes", "no: warmed-up robots are not branched, each test warms up its own"),
-    "trace": ("RANGER_SIM_TRACE", "", "folder for a trace of every robot whose test failed"),
+    "trace": ("RANGER_SIM_TRACE", "", "folder for a timeline of the last 10 s of every robot whose test fails"),
 }
 
 MARKERS = (
@@ -139,6 +141,7 @@ def order_for(node: Any, config: pytest.Config) -> Order:
         "backend": option(config, "backend"),
         "profile": option(config, "profile") or None,
         "speed": float(option(config, "speed")),
+        "trace": bool(option(config, "trace")),
     }
     for mark in reversed(list(node.iter_markers("ranger"))):
         if mark.args:
@@ -314,19 +317,20 @@ def last_errors(robot: Ranger) -> list[str]:
 
 
 def trace_of(item: pytest.Item, watched: Watched) -> list[str]:
-    """A trace of a failed test, where it is asked for: a hook `pytest_ranger_trace(item, robot, folder)` writes it."""
-    folder = option(item.config, "trace")
-    if not folder:
+    """The last seconds of a failed test as a timeline, where that is asked for: its path, or why there is none."""
+    timeline = watched.robot.observed.timeline
+    if timeline is None:
         return []
-    paths = item.config.hook.pytest_ranger_trace(item=item, robot=watched.robot, folder=folder)
-    return [f"trace: {path}" for path in paths if path] or ["trace: nothing here writes one"]
+    from ranger_sim.foundation.user_error import UserError
 
-
-def pytest_addhooks(pluginmanager: pytest.PytestPluginManager) -> None:
-    """The hook that others implement."""
-    from ranger_sim.harness.testing import hooks
-
-    pluginmanager.add_hookspecs(hooks)
+    folder = pathlib.Path(option(item.config, "trace"))
+    path = folder / (re.sub(r"[^\w.-]+", "_", item.nodeid) + ".pftrace")
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        timeline.write(path)
+    except (UserError, OSError) as reason:
+        return [f"no trace: {reason}"]
+    return [f"trace: ranger-sim trace open {shlex.quote(str(path))}"]
 
 
 # --- fixtures ---------------------------------------------------------------------------------------------

@@ -22,6 +22,7 @@ from ranger_sim.boards.counters import RangerCounters
 from ranger_sim.boards.quirks import Quirks
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness import wiring
+from ranger_sim.harness.conditions import Condition, ErrorNoted, condition
 from ranger_sim.harness.processes import board_process, kernel, places
 from ranger_sim.harness.processes.block import Block, new_stage
 from ranger_sim.harness.processes.remote_board import RemoteBoard
@@ -30,6 +31,7 @@ from ranger_sim.harness.processes.stage import Stage
 from ranger_sim.harness.profile import Profile
 from ranger_sim.harness.ranger import Ranger
 from ranger_sim.harness.scenario import Scenario, StopRule
+from ranger_sim.harness.step_watch import StepWatch
 from ranger_sim.harness.testing.backends import PROCESSES, MissingError
 
 PATIENCE_S = 60.0  # a turn takes some microseconds; the rest is for a busy machine
@@ -52,12 +54,26 @@ class ProcessRobot(Ranger):
 
     def run(self, stop: StopRule, slice_s: float = 1.0) -> bool:
         """Pass time; BoardLostError when a board's process has ended meanwhile."""
+        __tracebackhide__ = True
         if self.processes is None:
             self.processes = Processes(self)
         with self.processes.processor():
             done = Ranger.run(self, stop, slice_s)
         self.processes.check()
         return done
+
+    def until(self, wanted: str | Condition | Callable[[Any], Any], within: str = "60 s") -> float:
+        """As of a robot in this process; what boards noted is asked of them at each step then, which takes time."""
+        __tracebackhide__ = True
+        wanted = condition(wanted)
+        if not isinstance(wanted, ErrorNoted):
+            return Ranger.until(self, wanted, within)
+        asking = Asking(self, wanted.boards)
+        self.loop.watchers.append(asking)
+        try:
+            return Ranger.until(self, wanted, within)
+        finally:
+            self.loop.watchers.remove(asking)
 
     def board(self, name: str) -> Any:
         """The board as it was built, before time passes; afterwards it is in another process: MissingError."""
@@ -88,6 +104,19 @@ class ProcessRobot(Ranger):
         if self.processes is not None:
             self.processes.close()
         Ranger.close(self)
+
+
+class Asking(StepWatch):
+    """Before each step it fetches what these boards have counted."""
+
+    def __init__(self, robot: ProcessRobot, boards: tuple[str, ...]) -> None:
+        StepWatch.__init__(self)
+        self.robot = robot
+        self.boards = boards
+
+    def before_step(self, now_ns: int) -> None:
+        if self.robot.processes is not None:
+            self.robot.processes.fetch_counters(self.boards)
 
 
 class Processes:
@@ -151,6 +180,7 @@ class Processes:
 
     def check(self) -> None:
         """BoardLostError when a board is gone."""
+        __tracebackhide__ = True
         for name, remote in self.remotes.items():
             if remote.gone and not self.ended:
                 code = os.waitstatus_to_exitcode(os.waitpid(self.children[name], 0)[1])
@@ -163,12 +193,11 @@ class Processes:
                     f"{name}: its process {how} before {self.robot.time_s:.6f} s{': ' + why if why else ''}"
                 )
 
-    def fetch_counters(self) -> None:
-        """Bring every board to the present instant and ask it what it counted."""
-        for remote in self.remotes.values():
-            if not self.ended:
-                remote.catch_up(self.robot.loop.time)
-                remote.fetch_counters()
+    def fetch_counters(self, names: tuple[str, ...] = wiring.BOARDS) -> None:
+        """Bring boards to the present instant and ask them what they counted."""
+        for remote in (self.remotes[name] for name in names if not self.ended):
+            remote.catch_up(self.robot.loop.time)
+            remote.fetch_counters()
         self.check()
 
     def close(self) -> None:

@@ -22,7 +22,8 @@ from ranger_sim.harness.testing.health import Expected, Health
 from ranger_sim.harness.testing.wire import observe
 
 SCENARIO_FIELDS = tuple(field.name for field in dataclasses.fields(Scenario))
-OTHERS = ("quirks", "profile", "warmed_up", "backend", "speed", "log")
+OTHERS = ("quirks", "profile", "warmed_up", "backend", "speed", "log", "trace")
+TRACED_S = 10.0  # how much of a robot's last time its timeline keeps: some 16 steps
 WARM_UP_LIMIT = "1 h"  # of virtual time: the warm-up of a test is told to have failed after it
 
 
@@ -41,6 +42,7 @@ class Order:
     backend: str = SIM
     speed: float = 1.0
     log: str = "none"
+    trace: bool = False  # keep a timeline (`robot.observed.timeline`), as far as the backend can
 
 
 def order_of(wanted: Mapping[str, Any]) -> Order:
@@ -67,7 +69,11 @@ def robot_of(order: Order) -> Ranger:
     """The robot that was ordered, warmed up."""
     profile = load_profile(order.profile) if order.profile is not None else None
     robot = fresh(order, profile)
-    observe(robot)
+    observed = observe(robot)
+    if order.trace and order.backend == SIM:  # elsewhere boards keep no log of their slots here
+        from ranger_sim.harness.timeline import Timeline
+
+        observed.timeline = Timeline(robot, TRACED_S)
     if order.warmed_up:
         try:
             robot.until(order.warmed_up, within=WARM_UP_LIMIT)

@@ -37,6 +37,7 @@ def test_a_robot_of_processes_has_the_bytes_of_one_in_this_process_however_it_is
             robot.run_for(0.05)
             counters = robot.counters()
             robot.until("MCH_ANGLE > 0.2", within="10 ms")
+            robot.until("error MC_NOT_RUNNING from MCSI", within="10 ms")
             robot.run_for(0.0731)
             robot.wire("can1").assert_period("MCH_ANGLE", "2 ms", jitter="100 us")
             assert_healthy(robot)

@@ -1,8 +1,10 @@
 """An engineer's first ten minutes: an empty project, a ten-line test, a broken function, the other backend."""
 
+import re
+
 import pytest
 
-from tests.harness.testing.project import pytest_in, write
+from tests.harness.testing.project import ROOT, pytest_in, write
 
 LAW = """\
 def compliant_control(robot):
@@ -97,3 +99,18 @@ def test_what_is_imported():
     )
     done = pytest_in(tmp_path)
     assert done.code == 0, done.text
+
+
+def test_what_the_documents_show_runs(tmp_path):
+    blocks = []
+    for document in ("docs/testing.md", "README.md"):
+        blocks += re.findall(r"^```python\n(.*?)^```", (ROOT / document).read_text(encoding="utf-8"), re.M | re.S)
+    tests = [block for block in blocks if "def test_" in block]
+    [law] = [block for block in blocks if block.startswith("def compliant_control")]
+    [calls] = [block for block in blocks if "with contextlib.closing(new_robot(" in block]
+    assert len(tests) == 3 and TEST in tests and law == LAW.replace("law()\n", "law()  # or your own\n", 1)
+    for number, text in enumerate(tests):
+        write(tmp_path, **{f"tests__test_shown_{number}": "import pytest\n\n" + text})
+    write(tmp_path, boards__hip_law=law, tests__test_calls="def test_calls():\n    exec(" + repr(calls) + ", {})\n")
+    done = pytest_in(tmp_path)
+    assert done.code == 0 and len(done.cases) == 4, done.text
