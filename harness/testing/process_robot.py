@@ -51,6 +51,12 @@ class ProcessRobot(Ranger):
             raise MissingError("backend processes needs Linux (eventfd, pidfd)")
         Ranger.__init__(self, scenario, log, quirks, profile)
         self.processes: Processes | None = None
+        for board in self.boards.values():  # these will not run; a fault that has to be inside one is refused
+            board.apart = True
+
+    def slots(self, board: Any) -> NoReturn:
+        """Slots are logged where they run: MissingError."""
+        raise MissingError(f"backend processes has no board memory: the slots of {board} are logged in its own process")
 
     def run(self, stop: StopRule, slice_s: float = 1.0) -> bool:
         """Pass time; BoardLostError when a board's process has ended meanwhile."""

@@ -52,6 +52,10 @@ def test_what_is_in_another_process_is_out_of_reach_and_said_so():
         robot.run_for(0.001)
         with pytest.raises(MissingError, match="backend processes has no board memory: MCH runs in a process"):
             robot.board("MCH")
+        with pytest.raises(MissingError, match="the slots of MCH are logged in its own process"):
+            robot.slots("MCH")
+        with pytest.raises(UserError, match="MCH runs in a process of its own; its converter is there"):
+            robot.inject("MCH.adc_external", "gain", factor=1.1)
         with pytest.raises(UserError, match="its process runs already; replace before time passes"):
             robot.replace("MCH", "mc_compliant_control", lambda: None, cost=1)
 

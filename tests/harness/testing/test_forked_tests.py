@@ -202,6 +202,27 @@ def test_third(ranger):
     assert "slot overruns: MCSI" in done.reason("test_second")
 
 
+@pytest.mark.skipif(importlib.util.find_spec("perfetto") is None, reason="perfetto is not installed")
+def test_a_failed_test_leaves_the_timeline_of_its_last_seconds(tmp_path):
+    write(
+        tmp_path,
+        test_one="""
+import pytest
+
+@pytest.mark.ranger(seed=5, warmed_up="0.02 s")
+@pytest.mark.parametrize("steps", [0, 7])
+def test_steps(ranger, steps):
+    ranger.run_for(0.02)
+    assert ranger.steps == steps
+""",
+    )
+    done = pytest_in(tmp_path, RANGER_SIM_TRACE="traces")
+    assert done.outcome("test_steps[0]") == "passed"
+    [path] = (tmp_path / "traces").iterdir()
+    assert path.name == "test_one.py_test_steps_7_.pftrace" and path.stat().st_size > 10_000
+    assert f"trace: ranger-sim trace open traces/{path.name}" in done.text
+
+
 @pytest.mark.skipif(importlib.util.find_spec("xdist") is None, reason="pytest-xdist is not installed")
 def test_workers_of_xdist_branch_their_own_robots(tmp_path):
     write(
