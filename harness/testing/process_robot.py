@@ -23,6 +23,7 @@ from ranger_sim.boards.quirks import Quirks
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness import wiring
 from ranger_sim.harness.conditions import Condition, ErrorNoted, condition
+from ranger_sim.harness.faults.fault import Fault
 from ranger_sim.harness.processes import board_process, kernel, places
 from ranger_sim.harness.processes.block import Block, new_stage
 from ranger_sim.harness.processes.remote_board import RemoteBoard
@@ -51,21 +52,25 @@ class ProcessRobot(Ranger):
             raise MissingError("backend processes needs Linux (eventfd, pidfd)")
         Ranger.__init__(self, scenario, log, quirks, profile)
         self.processes: Processes | None = None
-        for board in self.boards.values():  # these will not run; a fault that has to be inside one is refused
-            board.apart = True
 
-    def slots(self, board: Any) -> NoReturn:
-        """Slots are logged where they run: MissingError."""
-        raise MissingError(f"backend processes has no board memory: the slots of {board} are logged in its own process")
+    def start(self) -> Processes:
+        """Give each board its process, if that has not been done."""
+        if self.processes is None:
+            self.processes = Processes(self)
+        return self.processes
+
+    def inject(self, *place_and_mode: Any, **more: Any) -> Fault:
+        """Arm a fault. The processes begin now, so that one that would have to be inside a board is refused."""
+        self.start()
+        return Ranger.inject(self, *place_and_mode, **more)
 
     def run(self, stop: StopRule, slice_s: float = 1.0) -> bool:
         """Pass time; BoardLostError when a board's process has ended meanwhile."""
         __tracebackhide__ = True
-        if self.processes is None:
-            self.processes = Processes(self)
-        with self.processes.processor():
+        processes = self.start()
+        with processes.processor():
             done = Ranger.run(self, stop, slice_s)
-        self.processes.check()
+        processes.check()
         return done
 
     def until(self, wanted: str | Condition | Callable[[Any], Any], within: str = "60 s") -> float:
@@ -147,8 +152,9 @@ class Processes:
             name: RemoteBoard(robot.boards[name], self.blocks[name], show, place, name == "MB")
             for place, name in enumerate(wiring.BOARDS)
         }
-        for remote in self.remotes.values():
+        for name, remote in self.remotes.items():
             loop.replace(remote)
+            robot.boards[name].apart = True  # it will not run here
 
     def _board(self, name: str, stage: tuple[Any, Any]) -> Callable[[], int]:
         def body() -> int:

@@ -52,12 +52,17 @@ def test_what_is_in_another_process_is_out_of_reach_and_said_so():
         robot.run_for(0.001)
         with pytest.raises(MissingError, match="backend processes has no board memory: MCH runs in a process"):
             robot.board("MCH")
-        with pytest.raises(MissingError, match="the slots of MCH are logged in its own process"):
-            robot.slots("MCH")
-        with pytest.raises(UserError, match="MCH runs in a process of its own; its converter is there"):
-            robot.inject("MCH.adc_external", "gain", factor=1.1)
         with pytest.raises(UserError, match="its process runs already; replace before time passes"):
             robot.replace("MCH", "mc_compliant_control", lambda: None, cost=1)
+
+
+def test_a_fault_inside_a_board_is_refused_and_one_at_its_sensor_acts():
+    with contextlib.closing(new_robot(seed=3, backend="processes")) as robot:
+        with pytest.raises(UserError, match="MCH runs in a process of its own; its converter is there"):
+            robot.inject("MCH.adc_external", "gain", factor=1.1)
+        fault = robot.inject("MCH.absolute_encoder", "offset", at="0.02 s")
+        robot.run_for(0.06)
+        assert fault.acted
 
 
 def test_a_board_whose_process_dies_is_named_and_no_process_remains():
