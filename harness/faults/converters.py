@@ -13,10 +13,11 @@ from ranger_sim.foundation.events import NEVER
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.faults.catalogue import mode
 from ranger_sim.harness.faults.fault import Parameter
-from ranger_sim.harness.faults.places import CONVERTER, INTERNAL_CONVERTER
+from ranger_sim.harness.faults.places import BURST_CONVERTER, CONVERTER, INTERNAL_CONVERTER
 from ranger_sim.harness.faults.sensor import PlaceFault
 
-CONVERTERS = (CONVERTER, INTERNAL_CONVERTER)
+CONVERTERS = (CONVERTER, INTERNAL_CONVERTER, BURST_CONVERTER)
+AWAITED = (CONVERTER, INTERNAL_CONVERTER)
 # Nobody waits so long for a conversion: a year.
 NEVER_DONE_NS = 31_536_000_000_000_000
 
@@ -149,14 +150,6 @@ class TimeFault(ConverterFault):
     unit = "us"
     fields = ("conversion_ns",)
 
-    def connect(self) -> None:
-        super().connect()
-        if not self.external and self.board.name == "CSR":
-            raise UserError(
-                f"fault {self.text()}: it cannot act there; the router's converter runs in burst mode, "
-                f"and nobody waits for it"
-            )
-
     def lateness_ns(self) -> int:
         """By how much a conversion is late."""
         raise NotImplementedError
@@ -170,8 +163,8 @@ class LateConversion(TimeFault):
     """Conversions take longer."""
 
     mode = "late_conversion"
-    kinds = CONVERTERS
-    needs = "a converter"
+    kinds = AWAITED
+    needs = "a converter that somebody waits for"
     meaning = "takes longer for each conversion"
     parameters = (
         Parameter("late_us", "us", 300.0, 1.0, 1e6, "by how much", "chosen by us: the sequence ends after its slot"),
@@ -194,8 +187,8 @@ class MissingConversion(TimeFault):
     """
 
     mode = "missing_conversion"
-    kinds = CONVERTERS
-    needs = "a converter"
+    kinds = AWAITED
+    needs = "a converter that somebody waits for"
     meaning = "begins a conversion and never ends it"
 
     def connect(self) -> None:

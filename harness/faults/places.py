@@ -21,6 +21,7 @@ SUPPLY_VOLTAGE = "supply voltage"
 IMU = "inertial unit"
 CONVERTER = "external converter"
 INTERNAL_CONVERTER = "internal converter"
+BURST_CONVERTER = "burst converter"  # it converts by itself, nobody waits for it
 MOTOR = "motor"
 BRIDGE = "bridge"
 CABLE = "cable"
@@ -97,9 +98,7 @@ def converters() -> list[Place]:
         details = {"board": board, "converter": "adc_internal"}
         places.append(Place(f"{board}.adc_internal", INTERNAL_CONVERTER, "the processor's 10-bit converter", details))
     details = {"board": "CSR", "converter": "adc"}
-    places.append(
-        Place("CSR.adc_internal", INTERNAL_CONVERTER, "the router's 10-bit converter, in burst mode", details)
-    )
+    places.append(Place("CSR.adc_internal", BURST_CONVERTER, "the router's 10-bit converter, in burst mode", details))
     return places
 
 
