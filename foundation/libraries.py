@@ -5,6 +5,9 @@ from types import ModuleType
 
 from ranger_sim.foundation.user_error import UserError
 
+# where a library is not called as the package that brings it
+PACKAGES = {"vcd": "pyvcd"}
+
 
 def imported(module: str) -> ModuleType:
     """The library `module`. UserError that says how to get it, when it is not installed."""
@@ -13,6 +16,7 @@ def imported(module: str) -> ModuleType:
     except ModuleNotFoundError as error:
         if error.name != module.partition(".")[0]:
             raise
+        package = PACKAGES.get(error.name, error.name)
         raise UserError(
-            f"this needs {error.name}, which is missing: in a checkout `make setup`, else pip install {error.name}"
+            f"this needs {package}, which is missing: in a checkout `make setup`, else pip install {package}"
         ) from None

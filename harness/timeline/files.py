@@ -5,6 +5,7 @@ import tempfile
 from collections.abc import Callable
 from typing import IO
 
+from ranger_sim.foundation.libraries import imported
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.timeline import mcap_file, perfetto_file, vcd_file
 from ranger_sim.harness.timeline.model import Events
@@ -16,6 +17,14 @@ FORMATS: dict[str, Callable[[Events, IO[bytes], str], None]] = {
     ".mcap": mcap_file.write,
 }
 
+# what each writer needs of what may not be installed
+LIBRARIES = {
+    ".pftrace": perfetto_file.SCHEMA,
+    ".perfetto-trace": perfetto_file.SCHEMA,
+    ".vcd": "vcd",
+    ".mcap": "mcap.writer",
+}
+
 
 def format_of(path: pathlib.Path) -> Callable[[Events, IO[bytes], str], None]:
     """What writes such a file. UserError for a suffix that means nothing here."""
@@ -25,8 +34,9 @@ def format_of(path: pathlib.Path) -> Callable[[Events, IO[bytes], str], None]:
 
 
 def check_target(path: pathlib.Path) -> None:
-    """Before a run: the suffix is known, and a file can be written there."""
+    """Before a run: the suffix is known, what writes it is installed, and a file can be written there."""
     format_of(path)
+    imported(LIBRARIES[path.suffix])
     if path.is_dir():
         raise UserError(f"trace {path}: that is a folder, not a file")
     try:

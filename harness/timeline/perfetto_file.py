@@ -15,6 +15,7 @@ from ranger_sim.foundation.libraries import imported
 from ranger_sim.harness.timeline.model import Counter, Events, Instants, Slices
 from ranger_sim.harness.timeline.packing import INNER_BEGINS, INNER_ENDS, OUTER_BEGINS, OUTER_ENDS, PacketPacker, nested
 
+SCHEMA = "perfetto.protos.perfetto.trace.perfetto_trace_pb2"
 SEQUENCE = 1  # all packets are of one sequence, so all use one table of names
 ROOT_NAME = "Ranger"
 CHUNK_ROWS = 200_000  # slices that are laid out at once: some 50 MB of arrays
@@ -22,7 +23,7 @@ CHUNK_ROWS = 200_000  # slices that are laid out at once: some 50 MB of arrays
 
 def library() -> Any:
     """The schema's classes. UserError where the package is missing."""
-    return imported("perfetto.protos.perfetto.trace.perfetto_trace_pb2")
+    return imported(SCHEMA)
 
 
 def write(events: Events, file: IO[bytes], title: str) -> None:

@@ -59,11 +59,14 @@ class Timeline:
             wires.watch = RowStream("q", OUTPUT_COLUMNS, False)
             self.outputs[wires.board.name] = self._store(wires.watch)
         self.activity: dict[str, RowStore] = {}
+        self.logs: dict[str, ActivityLog] = {}  # also where another board stands in the place of one by now
+        self.legends: dict[str, Any] = {}
         for name, board in robot.boards.items():
             if board.scheduler.log is None:
                 board.keep_activity(ActivityLog())
             store = RowStore(ACTIVITY_COLUMNS, self.last_ns)
-            board.scheduler.log.add_sink(store.take)
+            self.logs[name], self.legends[name] = board.scheduler.log, board.legend()
+            self.logs[name].add_sink(store.take)
             self.activity[name] = store
         link = robot.loop.wires[robot.loop.place("MB")].link
         link.watch = RowStream("q", LINK_COLUMNS, False)
@@ -76,8 +79,8 @@ class Timeline:
         robot = self.robot
         for stream in self.streams:
             stream.flush()
-        for name in self.activity:
-            robot.boards[name].scheduler.log.flush()
+        for log in self.logs.values():
+            log.flush()
         zero = robot.start_ns
         end = robot.loop.time - zero
         begin = self.begin_ns if self.last_ns is None else max(self.begin_ns, end - self.last_ns)
@@ -90,7 +93,7 @@ class Timeline:
             instants.events = [event for event in instants.events if begin <= event.time_ns <= end]
         found.slices += signals.machine_states(robot, words, zero, end)
         processors = {
-            name: Processor(robot.boards[name].legend(), self._since(store.rows(), begin, COLUMN_END), zero)
+            name: Processor(self.legends[name], self._since(store.rows(), begin, COLUMN_END), zero)
             for name, store in self.activity.items()
         }
         for processor in processors.values():
@@ -138,10 +141,10 @@ class Timeline:
             stream.sink = store.before
             store.close()
         for name, store in self.activity.items():
-            log = self.robot.boards[name].scheduler.log
+            log, board = self.logs[name], self.robot.boards[name]
             log.sinks.remove(store.take)
-            if not log.sinks:
-                self.robot.boards[name].keep_activity(None)
+            if not log.sinks and board.scheduler.log is log:
+                board.keep_activity(None)
             store.close()
         self.robot.loop.sampler.words = self.sampled_words
         for bus in self.robot.buses:
