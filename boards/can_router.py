@@ -165,19 +165,27 @@ class CanRouterBoard(FirmwareBoard):
             attach(CAN_RX, number, receiver.on_frame, RECEIVE_CYCLES, slot=FIQ, name=f"can{number} receive")
         attach(CAN_STATUS, 0, self.on_can_error, ERROR_CYCLES, slot=ERROR_SLOT, name="can error")
 
-        # ns that a turn takes by the frames it moves: one each from three sources; into two transmit buffers
-        route_cycles = [ROUTE_IDLE_CYCLES + ROUTE_FRAME_CYCLES * moved for moved in range(4)]
-        flush_cycles = [FLUSH_IDLE_CYCLES + FLUSH_FRAME_CYCLES * moved for moved in range(3)]
-        self.route_ns = [int(cycles * self.ns_per_cycle) for cycles in route_cycles]
-        self.flush_ns = [int(cycles * self.ns_per_cycle) for cycles in flush_cycles]
         self.sync_cycles = BUSES * CYCLES_PER_SYNC
-        self.pair_ns = int((ROUTE_IDLE_CYCLES + FLUSH_IDLE_CYCLES + LOOP_CYCLES // BUSES) * self.ns_per_cycle)
+        self._time_turns()
         self.idle = True
         self.idle_since = phase_ns
         self.flush_next = 0
         self.background = self.main_loop
         self.adc.start_burst(ANALOG["supply_current"], ANALOG["supply_voltage"])
         self.start(self.schedule(), phase_ns)
+
+    def _time_turns(self) -> None:
+        """What a turn of the main loop takes, by the frames it moves: one each from three sources; into two buffers."""
+        route_cycles = [ROUTE_IDLE_CYCLES + ROUTE_FRAME_CYCLES * moved for moved in range(4)]
+        flush_cycles = [FLUSH_IDLE_CYCLES + FLUSH_FRAME_CYCLES * moved for moved in range(3)]
+        self.route_ns = [int(cycles * self.ns_per_cycle) for cycles in route_cycles]
+        self.flush_ns = [int(cycles * self.ns_per_cycle) for cycles in flush_cycles]
+        self.pair_ns = int((ROUTE_IDLE_CYCLES + FLUSH_IDLE_CYCLES + LOOP_CYCLES // BUSES) * self.ns_per_cycle)
+
+    def retune(self, ppb, now) -> None:
+        """`Microcontroller.retune`, and the turns of the main loop with it."""
+        FirmwareBoard.retune(self, ppb, now)
+        self._time_turns()
 
     def counters(self) -> object:
         """What the board counted, by name."""

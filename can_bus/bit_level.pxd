@@ -14,7 +14,8 @@ cdef class BitLevel:
     cdef public list machines, levels, aborting
     cdef public TransmitBuffers buffers
     cdef public Disturbance disturbance
-    cdef public long long first_bit, bit, quiet, heard_bit, sent_bit
+    cdef public long long first_bit, bit, quiet, heard_bit, sent_bit, bitrate
+    cdef public object tampering
     cdef public bint open, at_rest, away
     # the frame that began last, and the error frame that goes on
     cdef public long long identifier, flags, sender
@@ -29,5 +30,6 @@ cdef class BitLevel:
     cdef int start_late(self, MediumAccess machine) except -1
     cdef int _note_start(self, long long row, long long bit) except -1
     cdef int pass_bit(self) except -1
+    cdef long long _sample_at_own_rate(self, MediumAccess machine) except? <long long>-1
     cdef int _note_error(self) except -1
     cdef bint error_is_over(self) except? -1

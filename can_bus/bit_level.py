@@ -39,12 +39,15 @@ class BitLevel:
     of the bits passed since the last open one. `at_rest`: no node is in a frame, and the bus has been recessive as long
     as that takes; `away`: some are in reset or bus-off. `aborting`: rows whose frame shall not be repeated.
     `heard_bit`: behind it a listening node had a frame, `sent_bit`: a transmitter was done. `in_error`: an error frame
-    goes on, which began in the frame of `error_begun`; `counted`: so the bus has noted.
+    goes on, which began in the frame of `error_begun`; `counted`: so the bus has noted. `tampering`: what faults do to
+    frames (`tampering.py`), or None. `bitrate`: of the bus.
     """
 
-    def __init__(self, buffers, disturbance) -> None:
+    def __init__(self, buffers, disturbance, bitrate) -> None:
         self.buffers = buffers
         self.disturbance = disturbance
+        self.bitrate = bitrate
+        self.tampering = None
         self.machines = []
         self.levels = []
         self.aborting = []
@@ -120,7 +123,7 @@ class BitLevel:
                     best = machine.offered
                     best_key = key
                 self._load(machine)
-                machine.start(self.bit)
+                machine.start(machine.own_bit if machine.own_rate else self.bit)
         if best >= 0:
             self._note_start(best, self.bit)
 
@@ -146,6 +149,8 @@ class BitLevel:
         self.identifier = slots[row + IDENTIFIER]
         self.flags = slots[row + FLAGS] & RECEIVERS_SEE | FLAG_ERROR
         self.sender = row >> NODE_SHIFT
+        if self.tampering is not None:
+            self.tampering.frame_begins(self, row, bit)
 
     def _offer(self, machine: MediumAccess) -> cython.longlong:
         """The row of the lowest frame of a node that is ready for the next bit, -1 for none."""
@@ -170,6 +175,7 @@ class BitLevel:
         machine: MediumAccess
         level: cython.longlong = RECESSIVE
         driven: cython.longlong
+        struck: cython.longlong = 0
         wrong: cython.bint = False
         for machine in self.machines:
             driven = machine.drive()
@@ -178,8 +184,13 @@ class BitLevel:
         if self.disturbance.next_bit <= self.bit:
             self.disturbance.strike(self.bit)
             level = 1 - level
+        if self.disturbance.next_misread <= self.bit:
+            struck = self.disturbance.misreading(self.bit)
         for machine in self.machines:
-            machine.met = machine.sample(level, self.bit)
+            if machine.own_rate:
+                machine.met = self._sample_at_own_rate(machine)
+            else:
+                machine.met = machine.sample(level ^ (struck >> machine.node.index & 1), self.bit)
             if machine.met & MET_ERROR:
                 wrong = True
         if wrong and not self.in_error:
@@ -187,6 +198,24 @@ class BitLevel:
         self.levels.append(level)
         self.quiet = self.quiet + 1 if level == RECESSIVE else 0
         self.bit += 1
+
+    def _sample_at_own_rate(self, machine: MediumAccess) -> cython.longlong:
+        """A node whose bits are longer or shorter than the bus's: none, one or more of them end in this bit.
+
+        It does not resynchronise to the edges of others: at such rates that would not help it (`set_rate_of`).
+        """
+        other: MediumAccess
+        level: cython.longlong = RECESSIVE
+        met: cython.longlong = 0
+        for other in self.machines:
+            if other is not machine and not other.node.silent:
+                level &= other.driven
+        machine.own_rest += machine.own_rate
+        while machine.own_rest >= self.bitrate and met == 0:  # the bus is told what came of one before the next
+            machine.own_rest -= self.bitrate
+            met = machine.sample(level & machine.drive(), machine.own_bit)
+            machine.own_bit += 1
+        return met
 
     def _note_error(self) -> None:
         """An error frame begins: of the first transmitter that saw why, else of the first node."""

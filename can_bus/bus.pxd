@@ -15,7 +15,9 @@ from ranger_sim.can_bus.medium_access cimport (
     MAC_JOINING, MAC_SUSPENDED, MET_COUNTER, MET_FAILURE, MET_JOIN, MET_LOSS, MET_RECEIVED, MET_SENT, MET_SETTLED,
     MET_START, MediumAccess,
 )
-from ranger_sim.can_bus.node cimport BUS_OFF, ICR_ERROR_WARNING, JOINING, OPERATING, RESET, SUSPEND_BITS, Node
+from ranger_sim.can_bus.node cimport (
+    BUS_OFF, ICR_ERROR_WARNING, JOINING, OPERATING, RESET, SUSPEND_BITS, UNPLUGGED, Node,
+)
 from ranger_sim.can_bus.transmit_buffers cimport (
     ASKED, BUFFER_MASK, BUFFER_SHIFT, BUFFERS, FLAGS, FREE_AT, HIGH, IDENTIFIER, LOW, NEXT, NODE_SHIFT, READY, ROW,
     TransmitBuffers,
@@ -49,6 +51,7 @@ cdef class Bus:
     cdef public EventQueue commands
     cdef public BitLevel bit_level
     cdef public long long joining, suspended_until, rivals
+    cdef public object tampering
 
     cpdef long long bit_of(self, long long time) noexcept
     cpdef long long edge_ns(self, long long bit) noexcept

@@ -3,8 +3,8 @@
 """One CAN bus to the bit: arbitration, timing, acknowledgement, and what came of every frame.
 
 Beside it: `node.py`, a controller with its error confinement; `transmit_buffers.py`, the frames that wait;
-`disturbance.py`, wrong bits; `bit_level.py` and `medium_access.py`, bit by bit what follows them;
-`load_meter.py`, `bus_counters.py`, `frame_log.py`.
+`disturbance.py`, wrong bits; `tampering.py`, faults of frames; `rewiring.py`, wires that part; `bit_level.py` and
+`medium_access.py`, bit by bit what follows them; `load_meter.py`, `bus_counters.py`, `frame_log.py`.
 
 Time. Inside, the bus counts absolute bits since power-up; an instant in ns is made from such a count only
 when a result leaves. Bit k begins at the first whole nanosecond at or after k / bitrate
@@ -65,7 +65,7 @@ if not cython.compiled:
         MET_SETTLED,
         MET_START,
     )
-    from ranger_sim.can_bus.node import BUS_OFF, ICR_ERROR_WARNING, JOINING, OPERATING, RESET, SUSPEND_BITS
+    from ranger_sim.can_bus.node import BUS_OFF, ICR_ERROR_WARNING, JOINING, OPERATING, RESET, SUSPEND_BITS, UNPLUGGED
     from ranger_sim.can_bus.transmit_buffers import (
         ASKED,
         BUFFER_MASK,
@@ -136,7 +136,8 @@ class Bus:
         self.intermission_ns, self.intermission_rest = divmod(INTERMISSION_BITS * second, bitrate)
         self.buffers = TransmitBuffers()
         self.disturbance = Disturbance(RandomStream(seed, f"can_bus/{name}/bit errors"))
-        self.bit_level = BitLevel(self.buffers, self.disturbance)
+        self.bit_level = BitLevel(self.buffers, self.disturbance, bitrate)
+        self.tampering = None
         self.rivals = 0  # frames that were ready beside the one that won the last arbitration
         self.counters = BusCounters()
         self.load = LoadMeter(bitrate)
@@ -174,6 +175,13 @@ class Bus:
         self.counters.frames += 1
         self.log.add(time, identifier, flags, lo, hi, -1)
 
+    def wake(self, wakes, place) -> None:
+        """From now on an earlier `next_time` lowers `wakes[place]` (whole numbers, ns) to it."""
+        self.wakes = wakes
+        self.wake_place = place
+        # compiled an address: beside the other fields of every request, where a memoryview takes 208 bytes
+        self.due = cython.address(self.wakes[0]) if cython.compiled else self.wakes
+
     # ---- time
 
     def bit_of(self, time: cython.longlong) -> cython.longlong:
@@ -187,13 +195,6 @@ class Bus:
         seconds: cython.longlong = bit // self.bitrate
         rest: cython.longlong = bit - seconds * self.bitrate
         return seconds * SECOND_NS + (rest * SECOND_NS + self.bitrate - 1) // self.bitrate
-
-    def wake(self, wakes, place) -> None:
-        """From now on an earlier `next_time` lowers `wakes[place]` (whole numbers, ns) to it."""
-        self.wakes = wakes
-        self.wake_place = place
-        # compiled an address: beside the other fields of every request, where a memoryview takes 208 bytes
-        self.due = cython.address(self.wakes[0]) if cython.compiled else self.wakes
 
     # ---- requests
 
@@ -337,7 +338,7 @@ class Bus:
         """READY of a request that could start at bit `first`: later if its node is suspended, NEVER + that bit while it
         is joining; -1, refused and answered, when it is off the bus."""
         owner: Node = self.nodes[node]
-        if owner.mode == RESET or owner.mode == BUS_OFF:
+        if owner.mode == RESET or owner.mode == BUS_OFF or owner.mode == UNPLUGGED:
             self._refuse(node, flags)
             owner.end_unsent(buffer, time, TX_ABORTED)
             return -1
@@ -403,10 +404,18 @@ class Bus:
         self.disturbance.set_rate(rate, max(self.bit_of(self.advanced), self.free_bit - 1))
         self._aim()
 
+    def tamper(self, tampering) -> None:
+        """Faults reach into frames from now on (`tampering.Tampering`); None: no longer."""
+        self.tampering = tampering
+        self.bit_level.tampering = tampering
+        self._aim()
+
     def _aim(self) -> None:
         """Set what tells a plain frame, after anything that decides on it; nobody acknowledges a lone node's."""
         strike: cython.longlong = self.disturbance.next_bit
-        self.next_strike = -1 if self.acknowledging < 2 or self.disturbance.frames_left > 0 else strike
+        self.next_strike = strike
+        if self.acknowledging < 2 or self.disturbance.frames_left > 0 or self.tampering is not None:
+            self.next_strike = -1
         if strike != self.strike_bit:
             self.strike_bit = strike
             self._look_ahead()
@@ -507,10 +516,7 @@ class Bus:
         elif commands.b == RESET:
             self._reset(node, commands.time)
         elif (node.mode == RESET or node.mode == BUS_OFF) and commands.time >= node.off_ns:
-            node.start_joining(self.bit_of(commands.time) + 1)
-            self.joining += 1
-            if self.disturbed and self.bit_level.join(node, node.join_from) & MET_JOIN:
-                self._join(node, self.bit_level.bit)
+            self._set_going(node, commands.time)
         self._note_changes()
 
     def _abort(self, node, buffer, time) -> None:
@@ -555,27 +561,33 @@ class Bus:
             self.buffers.rows[row + READY] = max(self.buffers.rows[row + READY] - NEVER, bit)
         self._note_changes()
 
-    # ---- for a bus that passes its own time
+    # ---- nodes that begin to join
 
-    def alone_and_passive(self) -> bool:
-        """True while what waits cannot be acknowledged, by nobody, and only repeats."""
-        if self.buffers.waiting_count == 0 or self.acknowledging >= 2 or self.disturbed:
-            return False
-        if self.joining or self.commands.count or self.strike_bit < NEVER or self.disturbance.frames_left > 0:
-            return False
-        return all(self.nodes[row >> NODE_SHIFT].passive for row in self.buffers.waiting())
+    def _set_going(self, node: Node, time) -> None:
+        """A node off the bus waits for its recessive sequences from `time` (ns) on."""
+        node.start_joining(self.bit_of(time) + 1)
+        self.joining += 1
+        if self.disturbed and self.bit_level.join(node, node.join_from) & MET_JOIN:
+            self._join(node, self.bit_level.bit)
+        self._note_changes()
 
-    def is_quiet(self) -> bool:
-        """True while nothing happens but for noise."""
-        waiting = self.buffers.waiting_count or self.joining or self.commands.count
-        return not waiting and not self.disturbed and not self.disturbance.planned_bits
+    def take_out(self, node, time) -> list:
+        """Take the requests that wait at a node, neither lost nor answered: (buffer, identifier, flags, lo, hi)."""
+        waited = []
+        for row in self.buffers.waiting_of(node):
+            rows = self.buffers.rows
+            frame = rows[row + IDENTIFIER], rows[row + FLAGS], rows[row + LOW], rows[row + HIGH]
+            waited.append((row >> BUFFER_SHIFT & BUFFER_MASK, *frame))
+            self.bit_level.forget(row)
+            self.buffers.remove(row)
+            self.buffers.rows[row + FREE_AT] = time
+        return waited
 
-    def hold_off(self, bit) -> None:
-        """No attempt before `bit`: what waits is not ready before."""
-        for row in self.buffers.waiting():
-            self.buffers.hold(row, bit)
-        self.next_bit = max(self.next_bit, bit)
-        self.next_time = max(self.next_time, self.edge_ns(bit))
+    def look_again(self) -> None:
+        """Nodes or requests were exchanged by hand: decide anew what comes next, and when."""
+        self._note_changes()
+        self._look_ahead()
+        self.wakes[self.wake_place] = min(self.wakes[self.wake_place], self.next_time)
 
     # ---- one frame
 
@@ -799,6 +811,8 @@ class Bus:
         """
         if self.strike_bit < end + INTERMISSION_BITS or self.disturbance.frames_left > 0:
             return True
+        if self.tampering is not None and self.tampering.reaches(self, best, k):
+            return True
         senders = self._senders(k, best) if merged else [best]
         if sum(not self.nodes[row >> NODE_SHIFT].silent for row in senders) >= self.acknowledging:
             return True  # nobody is left to acknowledge
@@ -889,7 +903,7 @@ class Bus:
         met: cython.longlong = machine.met
         row: cython.longlong = machine.row
         time: cython.longlong = self.edge_ns(bit)
-        if met & MET_RECEIVED and node.listening:
+        if met & MET_RECEIVED and node.listening and (self.tampering is None or self.tampering.receives(machine, time)):
             flags = machine.flags
             node.inbox.put(
                 time, node.order, CAN_RX, node.controller, machine.identifier, flags, machine.lo, machine.hi, 0
@@ -907,6 +921,8 @@ class Bus:
             elif self.buffers.rows[row + FLAGS] & FLAG_SINGLE_SHOT:
                 self._skip(row, time)
         if met & MET_COUNTER:
+            if self.tampering is not None:
+                self.tampering.notices(machine, time)
             self._confine(node, time, machine.capture)
             if node.mode == BUS_OFF:
                 self._flush(node, time)

@@ -13,9 +13,11 @@ cdef class Disturbance:
     cdef public list planned_bits
     cdef public RandomStream noise
     cdef public double bit_error_rate
-    cdef public long long next_noise_bit
+    cdef public long long next_noise_bit, next_misread
+    cdef public list misread
 
     cdef int _aim(self) except -1
     cdef int _draw_noise(self) except -1
     cdef int meet_frame(self, long long start, long long bits, long long flags) except -1
     cdef int strike(self, long long bit) except -1
+    cdef long long misreading(self, long long bit) except? <long long>-1

@@ -1,4 +1,4 @@
-"""Bits of a bus whose level is inverted for everybody: of chosen frames, chosen ones, and noise."""
+"""Bits of a bus whose level is inverted, for everybody: of chosen frames, chosen ones, and noise; or for one node."""
 
 import cython
 
@@ -15,7 +15,8 @@ class Disturbance:
     """What disturbs a bus. Bits are counted since power-up.
 
     `next_bit`: the next bit that is hit as far as known, NEVER when none is. `frames_left`: so many frames to come are
-    hit, at `position` each, negative: in their middle. `noise`: the RandomStream of the bit error rate.
+    hit, at `position` each, negative: in their middle. `noise`: the RandomStream of the bit error rate. `misread`: bits
+    that single nodes sample wrongly, as (bit, node), of which the first is `next_misread`.
     """
 
     def __init__(self, noise) -> None:
@@ -25,7 +26,27 @@ class Disturbance:
         self.planned_bits = []
         self.bit_error_rate = 0.0
         self.next_noise_bit = NEVER
+        self.misread = []
+        self.next_misread = NEVER
         self._aim()
+
+    def hit_node(self, bit, node) -> None:
+        """`node` samples the opposite of what is on the bus in a bit that has not passed."""
+        self.misread.append((bit, node))
+        self.misread.sort()
+        self.next_misread = self.misread[0][0]
+
+    def misreading(self, bit: cython.longlong) -> cython.longlong:
+        """Nodes that sample `bit` wrongly, as bits by node number; what was planned up to there is over."""
+        nodes: cython.longlong = 0
+        one: cython.longlong = 1
+        node: cython.longlong
+        while self.misread and self.misread[0][0] <= bit:
+            at, node = self.misread.pop(0)
+            if at == bit:
+                nodes |= one << node
+        self.next_misread = self.misread[0][0] if self.misread else NEVER
+        return nodes
 
     def hit_frames(self, count, position) -> None:
         """Hit the next `count` frames at bit `position`, negative: in their middle."""

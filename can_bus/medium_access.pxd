@@ -52,7 +52,10 @@ cdef class MediumAccess:
     cdef public long long row, offered, arbitration_bits
     cdef public list bits
     cdef public long long run_level, capture, met
+    # a node at a wrong bit rate
+    cdef public long long own_rate, own_bit, own_rest
 
+    cdef void _forget_frame(self) noexcept
     cpdef void place(self, long long bit, long long free_bit) noexcept
     cdef bint may_start(self) noexcept
     cdef bint is_at_rest(self) noexcept

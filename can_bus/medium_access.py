@@ -115,7 +115,8 @@ class MediumAccess:
     bit, -1 for none. `failed`: since then an error frame has gone on. `after_error`: the flag before was an error
     flag, no overload flag. `unacknowledged`: exception 1 of rule (c) may hold. `unheeded`: its frame is not for it.
     `met`: what came of the last bit. `stuff_run`, `stuff_level`: equal bits
-    seen last.
+    seen last. `own_rate`: its bits per second where they are not the bus's (0: they are); then `own_bit` counts its own
+    bits, and `own_rest` is what has passed of the next one.
     """
 
     def __init__(self, node) -> None:
@@ -127,18 +128,10 @@ class MediumAccess:
         self.failed = False
         self.after_error = False
         self.unacknowledged = False
-        self.unheeded = False
         self.begun = 0
-        self.position = 0
         self.field = FIELD_INTERMISSION
         self.left = 0
-        self.stuff_run = 0
-        self.stuff_level = RECESSIVE
-        self.register = 0
-        self.identifier = 0
-        self.flags = 0
-        self.lo = 0
-        self.hi = 0
+        self._forget_frame()
         self.row = -1
         self.offered = -1
         self.arbitration_bits = 0
@@ -146,6 +139,21 @@ class MediumAccess:
         self.run_level = RECESSIVE
         self.capture = 0
         self.met = 0
+        self.own_rate = 0
+        self.own_bit = 0
+        self.own_rest = 0
+
+    def _forget_frame(self) -> cython.void:
+        """Nothing of a frame has been seen."""
+        self.position = 0
+        self.stuff_run = 0
+        self.stuff_level = RECESSIVE
+        self.register = 0
+        self.identifier = 0
+        self.flags = 0
+        self.lo = 0
+        self.hi = 0
+        self.unheeded = False
 
     def place(self, bit: cython.longlong, free_bit: cython.longlong) -> cython.void:
         """Where the node stands at `bit`, when nothing has been on the bus since `free_bit`."""
@@ -194,17 +202,9 @@ class MediumAccess:
         """A frame begins at `bit`: its start of frame is what comes next."""
         self.state = MAC_FRAME
         self.begun = bit
-        self.position = 0
         self.field = FIELD_START
         self.left = 1
-        self.stuff_run = 0
-        self.stuff_level = RECESSIVE
-        self.register = 0
-        self.identifier = 0
-        self.flags = 0
-        self.lo = 0
-        self.hi = 0
-        self.unheeded = False
+        self._forget_frame()
 
     def drive(self) -> cython.longlong:
         """The level that it drives in this bit."""
@@ -284,7 +284,7 @@ class MediumAccess:
         if not self.sending:
             if self.field == FIELD_ACK_SLOT and self.node.silent and wire_level == RECESSIVE:
                 # ROBOT PARITY: a real silent controller takes a frame that nobody acknowledged, once per repetition;
-                # ours does not, so that a bus on which nobody else listens may rest (`Bus.alone_and_passive`).
+                # ours does not, so that a bus on which nobody else listens may rest (`edge.paced.alone_and_passive`).
                 self.unheeded = True
             return self._receive(level)
         if level != self.driven:

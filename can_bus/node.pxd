@@ -8,6 +8,7 @@ cpdef enum:
     RESET = 1
     BUS_OFF = 2
     JOINING = 3
+    UNPLUGGED = 4
     ICR_ERROR_WARNING = 0x4
     ICR_ERROR_PASSIVE = 0x20
     ICR_BUS_ERROR = 0x80

@@ -19,6 +19,7 @@ if not cython.compiled:
     RESET = 1  # off the bus: neither sends, receives nor acknowledges
     BUS_OFF = 2  # thrown off by its transmit error counter
     JOINING = 3  # waits for recessive sequences before it takes part
+    UNPLUGGED = 4  # no wire leads from it to this bus (`Bus.unplug`)
 
     # Interrupt bits of a CAN_STATUS message: CxICR of the LPC2194 (user manual UM10114, table of CANICR).
     ICR_ERROR_WARNING = 0x4  # bit 2, EI: the warning limit was crossed either way, or bus-off entered or left
@@ -148,6 +149,16 @@ class Node:
     def unplug(self) -> None:
         """Off the bus for good: who takes this place is a new controller."""
         self.mode = RESET
+
+    def take_over(self, other) -> None:
+        """It is the controller that was `other` on another bus, or on the other side of a cut: its counters."""
+        self.transmit_errors = other.transmit_errors
+        self.receive_errors = other.receive_errors
+        self.passive = other.passive
+        self.warning = other.warning
+        self.listening = other.listening
+        self.silent = other.silent
+        self.off_ns = other.off_ns
 
     def start_joining(self, bit) -> None:
         """It waits from `bit` on: out of reset for one recessive sequence, out of bus-off for its recovery."""

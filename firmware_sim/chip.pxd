@@ -26,3 +26,4 @@ cdef class Chip(Board):
     cdef public long long hz
     cdef public Crystal crystal
     cdef public long long unclaimed
+    cdef public list peripherals

@@ -33,6 +33,7 @@ class Chip(Board):
         self.ns_per_cycle = self.crystal.ns_per_cycle(hz)
         self.cycles_per_ns = self.crystal.cycles_per_ns(hz)
         self.vic = InterruptController(self.ns_per_cycle)
+        self.peripherals = []
         self.pins = integers(PINS)
         self.now = 0
         self.instant = 0  # up to which inputs have been taken in

@@ -42,6 +42,10 @@ class Crystal:
         quotient: cython.longlong = true_ns // 1000000000
         return quotient * rate + (true_ns - quotient * 1000000000) * rate // 1000000000
 
+    def in_its_time(self, true_ns, before) -> int:
+        """True duration (ns) in which this clock counts what `before` counts in `true_ns`."""
+        return self.true_ns(before.local_ns(true_ns))
+
     def cycles_to_ns(self, cycles: cython.longlong, hz: cython.longlong) -> cython.longlong:
         """True duration (ns) of `cycles` of a clock of nominally `hz` derived from this crystal."""
         seconds: cython.longlong = cycles // hz
@@ -83,6 +87,12 @@ class TickTrain:
         whole, self.rest = divmod(number * self.period_ns * 1_000_000_000, self.rate)
         self.number = number
         self.time = self.phase_ns + whole
+
+    def moved(self, crystal: Crystal, time) -> object:
+        """A train of the same period and present number on another crystal, of which the present tick is at `time`."""
+        train = TickTrain(crystal, self.period_ns, time - crystal.true_ns(self.number * self.period_ns))
+        train.go_to(self.number)
+        return train
 
     def next(self) -> cython.longlong:
         """Go to the next tick; returns its instant."""

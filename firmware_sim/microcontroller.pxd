@@ -7,7 +7,7 @@ from ranger_sim.firmware_sim.edge_line cimport EdgeLine
 from ranger_sim.firmware_sim.peripheral cimport Peripheral, Unclaimed
 from ranger_sim.foundation.edge_buffer cimport EdgeBuffer
 from ranger_sim.foundation.events cimport CAN_TX_DONE, NEVER, PIN_EDGE, EventQueue
-from ranger_sim.firmware_sim.clock cimport TickTrain
+from ranger_sim.firmware_sim.clock cimport Crystal, TickTrain
 from ranger_sim.firmware_sim.scheduler cimport ENTRY, ENTRY_CALLS, ENTRY_NS, OCCASIONAL_TASK, WAIT_TASK, Occasional, Schedule, SlotScheduler, Task, Wait, call, run
 from ranger_sim.firmware_sim.vic cimport FIRST_FIQ, InterruptController, InterruptSource, handle
 

@@ -19,7 +19,7 @@ import cython
 from ranger_sim.firmware_sim.activity import ActivityLog
 from ranger_sim.firmware_sim.alarm import Alarm, SlotTimer
 from ranger_sim.firmware_sim.chip import Chip
-from ranger_sim.firmware_sim.clock import TickTrain
+from ranger_sim.firmware_sim.clock import Crystal, TickTrain
 from ranger_sim.firmware_sim.counters import BoardCounters
 from ranger_sim.firmware_sim.edge_line import EdgeLine
 from ranger_sim.firmware_sim.legend import InterruptLegend, Legend, TaskLegend
@@ -217,6 +217,25 @@ class Microcontroller(Chip):
             latency=None if schedule.tick_latency < 0 else schedule.tick_latency,
             name="slot timer",
         )
+
+    def retune(self, ppb, now) -> None:
+        """From `now` (ns) on, up to which it has run, its crystal runs `ppb` parts per billion fast.
+
+        What runs by it goes on where it is at the new rate: slots, timers, PWM, serial lines, the processor's cycles.
+        """
+        before: Crystal = self.crystal
+        self.crystal = Crystal(before.nominal_hz, ppb)
+        self.ns_per_cycle = self.crystal.ns_per_cycle(self.hz)
+        self.cycles_per_ns = self.crystal.cycles_per_ns(self.hz)
+        self.vic.retune(self.ns_per_cycle)
+        self.scheduler.retune(self.ns_per_cycle)
+        if self.tick_time < NEVER:
+            self.match_time = now - self.crystal.in_its_time(now - self.match_time, before)
+            self.tick_time = now + self.crystal.in_its_time(self.tick_time - now, before)
+            self.ticks = self.ticks.moved(self.crystal, self.tick_time)
+            self.slot_timer.alarm.set(self.tick_time)
+        for peripheral in self.peripherals:
+            peripheral.retune(now, before)
 
     # --- what firmware calls ------------------------------------------------------------------------------
 

@@ -10,10 +10,14 @@ if not cython.compiled:
 
 
 class Peripheral:
-    """What all peripherals share: the chip, and the three ways in which the outside reaches them."""
+    """What all peripherals share: the chip, and the ways in which the outside reaches them."""
 
     def __init__(self, chip) -> None:
         self.chip = chip
+        chip.peripherals.append(self)
+
+    def retune(self, now, before) -> None:
+        """The chip's crystal runs at another rate from `now` (ns) on than `before` (a Crystal)."""
 
     def on_message(self, queue: EventQueue) -> InterruptSource | None:
         """A message of a kind claimed by this peripheral; it is in the fields of `queue`.

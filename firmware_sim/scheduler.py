@@ -356,6 +356,12 @@ class SlotScheduler:
             task.number = number
             self.lay(task)
 
+    def retune(self, ns_per_cycle) -> None:
+        """The processor's cycles last so long from now on."""
+        self.ns_per_cycle = ns_per_cycle
+        for task in self.tasks:
+            self.lay(task)
+
     def lay(self, task: Task) -> None:
         """Lay down what the event loop needs of `task`."""
         at: cython.longlong = ENTRY * task.number

@@ -217,6 +217,13 @@ class InterruptController:
             self.irq_list[slot] = source
         return source
 
+    def retune(self, ns_per_cycle) -> None:
+        """The processor's cycles last so long from now on."""
+        self.ns_per_cycle = ns_per_cycle
+        for source in self.sources.values():
+            source.base_ns = int(source.base_cycles * ns_per_cycle)
+            source.latency_ns = int(source.latency * ns_per_cycle)
+
     def detach(self, source) -> None:
         """Take a source out of the controller; a pending request of it is forgotten."""
         if not source.attached:

@@ -29,7 +29,7 @@ cdef class WordWire:
 cdef class SspWire:
     cdef public EventQueue master, slave
     cdef public long long exchange_ns, exchanges
-    cdef public object loaded
+    cdef public object loaded, tampering
     cdef public RowStream watch
     cpdef void start(self, long long time_ns, object segment) noexcept
     cpdef void load(self, object segment) noexcept

@@ -41,7 +41,10 @@ class WordWire:
 
 
 class SspWire:
-    """The serial link between two boards; an exchange that the master starts takes `exchange_ns`."""
+    """The serial link between two boards; an exchange that the master starts takes `exchange_ns`.
+
+    `tampering`: a fault that changes what arrives, or None (`harness/faults/link.py`).
+    """
 
     def __init__(self, master, slave, exchange_ns, idle_segment) -> None:
         self.master = master.inbox
@@ -50,12 +53,19 @@ class SspWire:
         self.loaded = idle_segment
         self.exchanges = 0
         self.watch = None  # a RowStream that takes what is exchanged (`_note`)
+        self.tampering = None
 
     def start(self, time_ns: cython.longlong, segment: object) -> cython.void:
         """The master starts an exchange; both sides have the other's segment at its end."""
         end: cython.longlong = time_ns + self.exchange_ns
-        self.slave.push(end, ORDER_INTERRUPTS, SSP_SEGMENT, 0, 0, 0, 0, 0, 0, segment)
-        self.master.push(end, ORDER_INTERRUPTS, SSP_SEGMENT, 0, 0, 0, 0, 0, 0, self.loaded)
+        to_slave: object = segment
+        to_master: object = self.loaded
+        if self.tampering is not None:
+            to_slave, to_master = self.tampering.exchange(end, segment, self.loaded)
+        if to_slave is not None:
+            self.slave.push(end, ORDER_INTERRUPTS, SSP_SEGMENT, 0, 0, 0, 0, 0, 0, to_slave)
+        if to_master is not None:
+            self.master.push(end, ORDER_INTERRUPTS, SSP_SEGMENT, 0, 0, 0, 0, 0, 0, to_master)
         self.exchanges += 1
         if self.watch is not None:
             self._note(time_ns, segment, 0)

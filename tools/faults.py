@@ -91,8 +91,8 @@ def print_place(place: Place, console: Console) -> None:
         if kind.permanent:
             tell(f"{'':20}stays until: {kind.permanent}")
         for p in kind.parameters:
-            unit = "" if p.unit == "1" else f" {p.unit}"
-            tell(f"    {p.name:16}{default_text(p)}{unit} ({p.low:g} to {p.high:g}): {p.meaning}")
+            unit = "" if p.unit in ("1", "name") else f" {p.unit}"
+            tell(f"    {p.name:16}{default_text(p)}{unit} ({limits_text(p)}): {p.meaning}")
             sources.setdefault(p.source, []).append(f"{name} {p.name}")
     units = sorted({kind.unit for kind in catalogue.modes_of(place).values() if kind.unit})
     tell(f"\nThe difference at the place is told in {' or '.join(units)}. Where the numbers come from:")
@@ -112,7 +112,14 @@ def refused(place: Place) -> dict[str, str]:
 
 def default_text(parameter: Parameter) -> str:
     """The default as it is shown; none where it means what the parameter says."""
+    if isinstance(parameter.default, str):
+        return parameter.default or "none"
     return "none" if math.isnan(parameter.default) else f"{parameter.default:g}"
+
+
+def limits_text(parameter: Parameter) -> str:
+    """Its limits as they are shown; of a name, that it is one."""
+    return "a name" if isinstance(parameter.default, str) else f"{parameter.low:g} to {parameter.high:g}"
 
 
 def place_json(place: Place) -> dict[str, Any]:
@@ -137,7 +144,7 @@ def mode_json(name: str, kind: type[Fault]) -> dict[str, Any]:
             {
                 "name": p.name,
                 "unit": p.unit,
-                "default": None if math.isnan(p.default) else p.default,
+                "default": None if default_text(p) == "none" else p.default,
                 "low": p.low,
                 "high": p.high,
                 "meaning": p.meaning,
@@ -192,7 +199,7 @@ def kind_lines(kind: str, places: list[Place]) -> list[str]:
     lines += ["| mode | what it does | parameters: default (limits) |", "|---|---|---|"]
     for name, mode in catalogue.modes_of(places[0]).items():
         parameters = "; ".join(
-            f"`{p.name}` {default_text(p)} ({p.low:g} to {p.high:g}{f' {p.unit}' if p.unit != '1' else ''})"
+            f"`{p.name}` {default_text(p)} ({limits_text(p)}{f' {p.unit}' if p.unit not in ('1', 'name') else ''})"
             for p in mode.parameters
         )
         lines.append(f"| `{name}` | {mode.meaning} | {parameters} |")

@@ -2,6 +2,7 @@
 
 from ranger_sim.can_bus.bus import Bus
 from ranger_sim.can_bus.edge.taps import TRANSMIT_QUEUE, Tap, Taps
+from ranger_sim.can_bus.transmit_buffers import NODE_SHIFT
 from ranger_sim.foundation import wallclock
 from ranger_sim.foundation.events import NEVER
 from ranger_sim.foundation.user_error import UserError
@@ -23,6 +24,29 @@ def speed_of(text: str | float) -> float:
     if not 0.001 <= speed <= 1000.0:
         raise UserError(f"speed {text!r} is neither a number in 0.001 ... 1000 nor 'max'")
     return speed
+
+
+def alone_and_passive(bus: Bus) -> bool:
+    """True while what waits on `bus` cannot be acknowledged, by nobody, and only repeats."""
+    if bus.buffers.waiting_count == 0 or bus.acknowledging >= 2 or bus.disturbed:
+        return False
+    if bus.joining or bus.commands.count or bus.strike_bit < NEVER or bus.disturbance.frames_left > 0:
+        return False
+    return all(bus.nodes[row >> NODE_SHIFT].passive for row in bus.buffers.waiting())
+
+
+def is_quiet(bus: Bus) -> bool:
+    """True while nothing happens on `bus` but for noise."""
+    waiting = bus.buffers.waiting_count or bus.joining or bus.commands.count
+    return not waiting and not bus.disturbed and not bus.disturbance.planned_bits
+
+
+def hold_off(bus: Bus, bit: int) -> None:
+    """No attempt on `bus` before `bit`: what waits is not ready before."""
+    for row in bus.buffers.waiting():
+        bus.buffers.hold(row, bit)
+    bus.next_bit = max(bus.next_bit, bit)
+    bus.next_time = max(bus.next_time, bus.edge_ns(bit))
 
 
 class PacedBus:
@@ -85,8 +109,8 @@ class PacedBus:
         for _ in range(BURST):
             hears = taps.poll(self.time)
             # at full speed an idle bus waits for its clients, whatever noise may hit it meanwhile
-            due = hears if self.speed == 0.0 and bus.is_quiet() else min(bus.next_time, hears)
-            waits = bus.operating < 2 and due <= until and bus.alone_and_passive()
+            due = hears if self.speed == 0.0 and is_quiet(bus) else min(bus.next_time, hears)
+            waits = bus.operating < 2 and due <= until and alone_and_passive(bus)
             if waits:
                 due = hears  # what happened before is still told
             if due > until:
@@ -97,15 +121,15 @@ class PacedBus:
                 bus.advance(self.time)
         else:
             return self.time
-        alone = bus.operating < 2 and bus.alone_and_passive()
+        alone = bus.operating < 2 and alone_and_passive(bus)
         if self.speed != 0.0:
             self.time = max(self.time, until)
         if alone:
-            bus.hold_off(bus.bit_of(self.time) + 1)
+            hold_off(bus, bus.bit_of(self.time) + 1)
         if self.speed != 0.0:
             bus.advance(self.time)
             hears = taps.poll(self.time)
-        rests = alone or (self.speed == 0.0 and bus.is_quiet())
+        rests = alone or (self.speed == 0.0 and is_quiet(bus))
         return hears if rests else min(bus.next_time, hears)
 
     def held(self) -> bool:

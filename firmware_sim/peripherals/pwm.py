@@ -58,6 +58,11 @@ class Pwm(Peripheral):
         self.rest = 0  # what `period_start` was rounded down by, in 1/rate ns
         self._count_periods()
 
+    def retune(self, now, before) -> None:
+        """The period that was found last stays; those behind it are longer or shorter."""
+        self.rate = 1_000_000_000 + self.chip.crystal.ppb
+        self.rest = 0
+
     def write(self, MR2: cython.longlong, MR6: cython.longlong) -> None:
         """Write the two bridge leads (counts) and enable their latches."""
         self.MR2 = MR2

@@ -60,6 +60,19 @@ class TimerCapture(Peripheral):
         if match_interrupt:
             self.alarm.set(self.next_wrap_time)
 
+    def retune(self, now, before) -> None:
+        """The count goes on where it is."""
+        crystal = self.chip.crystal
+        self.counts_per_ns = crystal.cycles_per_ns(self.hz)
+        if now >= self.next_wrap_time:
+            self._wrap_to(now)
+        self.wrap_time = now - crystal.in_its_time(now - self.wrap_time, before)
+        self.next_wrap_time = now + crystal.in_its_time(self.next_wrap_time - now, before)
+        self.ticks = self.ticks.moved(crystal, self.next_wrap_time)
+        self.phase_ns = self.ticks.phase_ns
+        if self.match_interrupt:
+            self.alarm.set(self.next_wrap_time)
+
     def use_channel(self, channel, pin, rising=True, falling=True, source=None):
         """Connect `pin` to capture `channel` 0 ... 3 and arm it; returns the interrupt source that its captures raise.
 

@@ -81,6 +81,10 @@ class Uart(Peripheral):
             BITS_PER_BYTE * CLOCKS_PER_BIT * DL * (MULVAL + DIVADDVAL) * 1000000000 // (self.hz * MULVAL)
         )
 
+    def retune(self, now, before) -> None:
+        """Its bytes take longer or shorter."""
+        self.set_divisor(self.DL, self.DIVADDVAL, self.MULVAL)
+
     def waiting(self) -> cython.longlong:
         """Received bytes that wait in the FIFO."""
         return self.fifo_count

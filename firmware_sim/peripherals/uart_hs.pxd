@@ -4,7 +4,7 @@ from ranger_sim.firmware_sim.vic cimport InterruptSource
 from ranger_sim.foundation.events cimport UART_OUTPUT
 
 cdef class HsUart(Peripheral):
-    cdef public long long number, rate, byte_ns
+    cdef public long long number, rate, hz, byte_ns
     cdef public Alarm done_alarm
     cdef public double baud
     cdef public InterruptSource source

@@ -40,7 +40,8 @@ class HsUart(Peripheral):
         self.number = number
         self.rate = rate
         self.baud = hz / (SAMPLES_PER_BIT * (rate + 1.0))
-        self.byte_ns = chip.crystal.true_ns(BITS_PER_BYTE * SAMPLES_PER_BIT * (rate + 1) * 1_000_000_000 // hz)
+        self.hz = hz
+        self.retune(0, chip.crystal)
         self.source = chip.vic.source(DMA_DONE, channel)
         self.done_alarm = chip.new_alarm(self, 0)
         self.busy = False
@@ -58,6 +59,11 @@ class HsUart(Peripheral):
         chip.claim(UART_BYTE, number, self)
         if cts_pin >= 0:
             chip.claim_pin(cts_pin, 0, self)
+
+    def retune(self, now, before) -> None:
+        """How long a byte takes by the chip's crystal."""
+        nominal_ns = BITS_PER_BYTE * SAMPLES_PER_BIT * (self.rate + 1) * 1_000_000_000 // self.hz
+        self.byte_ns = self.chip.crystal.true_ns(nominal_ns)
 
     # --- transmit ---------------------------------------------------------------------------------------
 

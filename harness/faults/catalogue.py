@@ -13,7 +13,10 @@ from ranger_sim.harness.faults import text as typed_text
 from ranger_sim.harness.faults.fault import Fault, Place, end_condition
 
 # Modules of this package that put places and modes here when they are imported, in the order in which they are listed.
-MODULES = ("places", "edges", "words", "voltages", "imu", "converters", "actuators", "world")
+MODULES = (
+    "places", "edges", "words", "voltages", "imu", "converters", "actuators", "world",
+    "frames", "buses", "links", "power", "processor",
+)  # fmt: skip
 
 PLACES: dict[str, Place] = {}
 # by (kind of place, name of the mode)

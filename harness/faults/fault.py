@@ -104,9 +104,7 @@ class Fault(StepWatch):
     unit: str = ""
     permanent: str = ""
 
-    def __init__(
-        self, place: Place, start: Condition | None, end: Condition | None, values: Mapping[str, float]
-    ) -> None:
+    def __init__(self, place: Place, start: Condition | None, end: Condition | None, values: Mapping[str, Any]) -> None:
         StepWatch.__init__(self)
         self.place = place
         self.start = start
@@ -207,15 +205,16 @@ class Fault(StepWatch):
     def text(self) -> str:
         """As it is typed after --fault."""
         values = "".join(
-            f",{name}={repr(value).removesuffix('.0')}"  # every digit: it has to give the same run again
+            # every digit: it has to give the same run again
+            f",{name}={value if isinstance(value, str) else repr(value).removesuffix('.0')}"
             for name, value in self.values.items()
-            if value != self.default(name) and not math.isnan(value)
+            if value != self.default(name) and (isinstance(value, str) or not math.isnan(value))
         )
         period = f"@{self.start.text if self.start else '0 s'}" if self.start or self.end else ""
         return f"{self.place.name}:{self.mode}{values}{period}" + (f"..{self.end.text}" if self.end else "")
 
     @classmethod
-    def default(cls, name: str) -> float:
+    def default(cls, name: str) -> Any:
         """Default of a parameter."""
         return next(parameter.default for parameter in cls.parameters if parameter.name == name)
 

@@ -17,6 +17,8 @@ class BitLevel:
     quiet: int
     heard_bit: int
     sent_bit: int
+    bitrate: int
+    tampering: Any
     open: bool
     at_rest: bool
     away: bool
@@ -28,7 +30,7 @@ class BitLevel:
     error_field: int
     error_begun: int
     error_position: int
-    def __init__(self, buffers: TransmitBuffers, disturbance: Disturbance) -> None: ...
+    def __init__(self, buffers: TransmitBuffers, disturbance: Disturbance, bitrate: int) -> None: ...
     def _forget_frame(self) -> None: ...
     def add_node(self, node: Any) -> None: ...
     def leave(self, node: Any) -> None: ...

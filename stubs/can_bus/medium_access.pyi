@@ -58,6 +58,9 @@ class MediumAccess:
     run_level: int
     capture: int
     met: int
+    own_rate: int
+    own_bit: int
+    own_rest: int
     def __init__(self, node: Node) -> None: ...
     def place(self, bit: int, free_bit: int) -> None: ...
     def sample(self, wire_level: int, bit: int) -> int: ...

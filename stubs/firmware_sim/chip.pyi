@@ -34,4 +34,5 @@ class Chip(Board):
     hz: int
     crystal: Crystal
     unclaimed: int
+    peripherals: list[Any]
     def __init__(self, name: Any, hz: int, crystal: Any = None) -> None: ...

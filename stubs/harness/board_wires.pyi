@@ -25,6 +25,7 @@ class SspWire:
     exchange_ns: int
     exchanges: int
     loaded: Any
+    tampering: Any
     watch: RowStream | None
     def __init__(self, master: Any, slave: Any, exchange_ns: int, idle_segment: Any) -> None: ...
     def start(self, time_ns: int, segment: Any) -> None: ...

@@ -9,6 +9,7 @@ import pytest
 
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.faults import catalogue, text
+from ranger_sim.harness.faults.names import NameParameter
 from ranger_sim.tools import cli, faults
 
 OWN = faults.DOCUMENT.read_text(encoding="utf-8").split("```python\n")[2].partition("```")[0]
@@ -195,6 +196,9 @@ def test_every_parameter_has_a_source_limits_around_its_default_and_every_mode_a
             where = (place_kind, name, parameter.name)
             assert parameter.source, where
             assert parameter.meaning, where
+            if isinstance(parameter, NameParameter):
+                assert isinstance(parameter.default, str), where
+                continue
             assert not parameter.low > parameter.default, where
             assert not parameter.high < parameter.default, where
             assert parameter.low < parameter.high, where

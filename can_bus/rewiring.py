@@ -1,0 +1,110 @@
+"""Wires that part and come together again, and controllers at a wrong bit rate: what is done to a bus by hand.
+
+Everything here takes effect between two bits that are decided: a plain frame under way is completed (`bus.py`).
+"""
+
+from typing import Any
+
+from ranger_sim.can_bus.bus import Bus
+from ranger_sim.can_bus.node import JOINING, OPERATING, UNPLUGGED
+from ranger_sim.foundation.user_error import UserError
+
+# A rate that synchronisation makes up for is no fault: bits of ten time quanta with a jump width of two stand 1 % at
+# either end (ISO 11898-1, oscillator tolerance), so 2 % between two controllers. The other limit is chosen by us: an
+# eighth to eight times covers every prescaler that is wrong by a few steps.
+LEAST_MISMATCH = 0.02
+MOST_TIMES = 8
+
+
+def unplug(bus: Any, node: int, time: int) -> list[tuple[int, int, int, int, int]]:
+    """No wire leads from a node to `bus` any more, from `time` (ns) on.
+
+    Returns the requests that waited there, as `Bus.take_out` does.
+    """
+    controller = bus.nodes[node]
+    if controller.mode == OPERATING:
+        bus.acknowledging -= not controller.silent
+    bus.joining -= controller.mode == JOINING
+    controller.mode = UNPLUGGED
+    if bus.disturbed:
+        bus.bit_level.leave(controller)
+    waited = bus.take_out(node, time)
+    bus.look_again()
+    return waited
+
+
+def plug(bus: Any, node: int, time: int) -> None:
+    """A node that was unplugged hangs on `bus` again: it takes part after one recessive sequence, as out of reset."""
+    controller = bus.nodes[node]
+    if controller.mode == UNPLUGGED:
+        controller.leave()
+        bus._set_going(controller, time)
+        bus.look_again()
+
+
+def check_rate(bus: Any, rate: int, where: str) -> None:
+    """UserError, naming `where`, for a rate (bit/s) that is not wrong enough on `bus`, or too wrong."""
+    off = abs(rate / bus.bitrate - 1.0)
+    if not (off >= LEAST_MISMATCH and bus.bitrate <= MOST_TIMES * rate <= MOST_TIMES**2 * bus.bitrate):
+        raise UserError(
+            f"{where}: {rate} bit/s must be {LEAST_MISMATCH:.0%} off {bus.bitrate} at least, because synchronisation"
+            f" makes up for less, and {MOST_TIMES} times off at most"
+        )
+
+
+def set_rate_of(bus: Any, node: int, rate: int, time: int) -> None:
+    """A controller takes its bits for those of `rate` bit/s from `time` (ns) on; 0: for the bus's.
+
+    That takes a reset, because CxBTR can be written in reset mode only: what waits there is answered with TX_ABORTED.
+    UserError for a rate that is not wrong enough, or too wrong.
+    """
+    controller = bus.nodes[node]
+    if rate:
+        check_rate(bus, rate, f"bus {bus.name}, {controller.name}")
+    takes_part = controller.mode in (OPERATING, JOINING)
+    bus._reset(controller, time)
+    bus.bit_level.machines[node].own_rate = rate
+    if takes_part:
+        bus._set_going(controller, time)
+    bus.look_again()
+
+
+class Cut:
+    """The cable between `node` and the other nodes of `bus` is cut: it is alone on a piece of its own, `far`.
+
+    Who passes time for `bus` has to pass it for `far` too. The node has number 0 there.
+    """
+
+    def __init__(self, bus: Any, node: int) -> None:
+        self.bus = bus
+        self.node = node
+        self.far: Any = None
+
+    def part(self, time: int) -> Any:
+        """Cut at `time` (ns); returns `far`."""
+        bus, controller = self.bus, self.bus.nodes[self.node]
+        self.far = far = Bus(f"{bus.name} behind the cut", bus.bitrate, log_capacity=0)
+        far.add_node(controller.name, controller.inbox, controller.controller, controller.order)
+        _move(bus, self.node, far, 0, time)
+        return far
+
+    def mend(self, time: int) -> None:
+        """The wire is whole again at `time` (ns): the node takes part after a recessive sequence."""
+        _move(self.far, 0, self.bus, self.node, time)
+
+
+def _move(source: Any, place: int, target: Any, to: int, time: int) -> None:
+    """The controller at `place` of one bus hangs on another one as `to`, with its counters and what waits there."""
+    before, after = source.nodes[place], target.nodes[to]
+    mode = before.mode
+    waited = unplug(source, place, time)
+    after.take_over(before)
+    if after.mode != UNPLUGGED:  # a new bus: its node takes part at once
+        unplug(target, to, time)
+    if mode in (OPERATING, JOINING):
+        plug(target, to, time)
+    else:  # off by its program or thrown off: so it stays
+        after.mode = mode
+        target.look_again()
+    for buffer, identifier, flags, low, high in waited:
+        target.request(to, buffer, time, identifier, flags, low, high)

@@ -1,0 +1,452 @@
+"""Faults that reach into the frames of a bus: what one node sees wrong, loses, or has late or changed.
+
+A bus with `Tampering` passes every frame that a fault reaches bit by bit. What follows from a bit that one node samples
+wrongly (error flags, counters, repetitions, bus-off) is then the controllers' own doing (`medium_access.py`).
+
+Errors have the names of FMI-LS-BUS: BIT, BIT_STUFFING, FORM, CRC, ACK, BROKEN_ERROR_FRAME. Of all nodes the one that a
+fault makes misread a bit sees the error first and signals it: its error is primary. What others see because of its
+error flag is secondary.
+"""
+
+from collections import Counter
+from typing import Any
+
+from ranger_sim.can_bus.frame import (
+    DOMINANT,
+    EIGHT_BYTES,
+    FIELD_ACK_SLOT,
+    FIELD_ACTIVE_FLAG,
+    FIELD_CRC,
+    FIELD_CRC_DELIMITER,
+    FIELD_DATA,
+    FIELD_DELIMITER,
+    FIELD_DLC,
+    FIELD_OVERLOAD_FLAG,
+    FIELD_PASSIVE_FLAG,
+    FIELD_R0,
+    FIELD_R1,
+    FIELD_RTR,
+    FIELD_SRTR,
+    FIELD_TOLERATED,
+    RECEIVERS_SEE,
+    RECESSIVE,
+    STUFF_AFTER,
+)
+from ranger_sim.can_bus.medium_access import MET_ERROR, MediumAccess
+from ranger_sim.can_bus.node import (
+    BUS_OFF,
+    BUS_OFF_LIMIT,
+    ICR_FIELD_MASK,
+    ICR_FIELD_SHIFT,
+    ICR_KIND_SHIFT,
+    JOINING,
+    KIND_BIT,
+    KIND_FORM,
+    KIND_STUFF,
+    OPERATING,
+    RESET,
+    Node,
+)
+from ranger_sim.can_bus.transmit_buffers import BUFFER_SHIFT, FLAGS, HIGH, IDENTIFIER, LOW, NODE_SHIFT
+from ranger_sim.can_bus.transmit_ends import TransmitEnds
+from ranger_sim.foundation.events import CAN_RX, NEVER, STAGE_BUS, EventQueue
+from ranger_sim.foundation.user_error import UserError
+
+ERRORS = ("BIT", "BIT_STUFFING", "FORM", "CRC", "ACK", "BROKEN_ERROR_FRAME")
+# What a node cannot see, and why: (error, whether it is the sender)
+IMPOSSIBLE = {
+    ("FORM", True): "a sender that samples a dominant bit where it sent a recessive one sees a BIT error",
+    ("CRC", True): "a sender does not check the CRC of its own frame",
+    ("ACK", False): "only a sender looks for the acknowledgement",
+}
+INTRUDERS_ORDER = STAGE_BUS * 256 + 255  # nobody of the robot has it
+FLAG_BIT_BROKEN = 3  # bits from an error to the one of its error flag that is misread: the third of six
+BIT_BEHIND_ARBITRATION = (FIELD_R1, FIELD_R0, FIELD_DLC, FIELD_DATA, FIELD_CRC)
+
+
+def error_name(capture: int) -> str:
+    """Name of the error that an ICR_* word with a bus error tells; "" for dominant bits behind a flag, no new one."""
+    field = capture >> ICR_FIELD_SHIFT & ICR_FIELD_MASK
+    kind = capture >> ICR_KIND_SHIFT & 3
+    if field in (FIELD_ACTIVE_FLAG, FIELD_DELIMITER, FIELD_OVERLOAD_FLAG):
+        return "BROKEN_ERROR_FRAME"
+    if field in (FIELD_TOLERATED, FIELD_PASSIVE_FLAG):
+        return ""
+    named = {KIND_BIT: "BIT", KIND_FORM: "FORM", KIND_STUFF: "BIT_STUFFING"}
+    return named.get(kind, "ACK" if field == FIELD_ACK_SLOT else "CRC")
+
+
+def places_of_error(error: str, of_sender: bool, bits: list, fields: list) -> list:
+    """Positions from the start of a frame at which a node must misread the bus in order to see `error`.
+
+    `bits` and `fields` of the frame on the wire, as `frame.wire` gives them. Empty: this frame has no such place.
+    """
+    if error == "ACK" or (error == "BIT" and not of_sender):  # of a receiver: the acknowledgement that it sends itself
+        return [fields.index(FIELD_ACK_SLOT)]
+    if error == "FORM":
+        return [fields.index(FIELD_CRC_DELIMITER)]
+    behind = next(n for n, field in enumerate(fields) if field in BIT_BEHIND_ARBITRATION)
+    if error == "BIT":
+        return [behind]
+    if error == "BROKEN_ERROR_FRAME":
+        first = behind if of_sender else fields.index(FIELD_CRC_DELIMITER)
+        return [first, first + FLAG_BIT_BROKEN]
+    if of_sender:
+        return _recessive_stuff_bit(bits, fields)[:1]
+    wanted = "BIT_STUFFING" if error == "BIT_STUFFING" else "CRC"
+    for place in range(behind, fields.index(FIELD_CRC_DELIMITER)):
+        if _what_a_receiver_sees(bits, fields, place) == wanted:
+            return [place]
+    return []
+
+
+def _recessive_stuff_bit(bits: list, fields: list) -> list:
+    """Recessive stuff bits of the arbitration field: one that is sampled dominant there is no lost arbitration."""
+    last = fields.index(FIELD_RTR if FIELD_RTR in fields else FIELD_SRTR)
+    found, run, level = [], 0, RECESSIVE
+    for place, bit in enumerate(bits[: last + 1]):
+        if run == STUFF_AFTER and bit == RECESSIVE:
+            found.append(place)
+        run = run + 1 if bit == level and run < STUFF_AFTER else 1
+        level = bit
+    return found
+
+
+def _what_a_receiver_sees(bits: list, fields: list, misread: int) -> str:
+    """Name of the first error of a receiver that misreads one bit of the frame, "" for none."""
+    machine = MediumAccess(Node("probe", 0, EventQueue(1), 1, 0))
+    machine.place(0, 0)
+    acknowledged = fields.index(FIELD_ACK_SLOT)
+    for place, bit in enumerate(bits):
+        level = DOMINANT if place == acknowledged else bit
+        if machine.sample(1 - level if place == misread else level, place) & MET_ERROR:
+            return error_name(machine.capture)
+    return ""
+
+
+class Tamper:
+    """What one fault does on a bus. Subclasses act in the four ways in which a bus asks (`Tampering`).
+
+    Picks frames of `identifier` (-1: any) sent by node `sender` (-1: any; `but`: any but this one): every `every`-th
+    of them, and of those a `share` by `random`. `count`: so many at most, 0: no end. `tampered`: frames so far.
+    `noted(time_ns, difference)` is called when it acted.
+    """
+
+    def __init__(self, identifier: int = -1, sender: int = -1, but: int = -1) -> None:
+        self.identifier = identifier
+        self.sender = sender
+        self.but = but
+        self.every = 1
+        self.share = 1.0
+        self.count = 0
+        self.random: Any = None
+        self.noted: Any = None
+        self.begun = 0
+        self.tampered = 0
+        self.hit = False  # the frame that is on the bus
+
+    def picks(self, identifier: int, sender: int) -> bool:
+        """Whether a frame is one of those that it may reach."""
+        return (
+            self.identifier in (-1, identifier)
+            and self.sender in (-1, sender)
+            and sender != self.but
+            and not (0 < self.count <= self.tampered)
+        )
+
+    def takes(self, identifier: int, sender: int) -> bool:
+        """Whether it reaches the frame that begins now."""
+        if not self.picks(identifier, sender):
+            return False
+        self.begun += 1
+        if self.begun % self.every:
+            return False
+        return self.share >= 1.0 or bool(self.random.uniform() < self.share)
+
+    def note(self, time: int, difference: float = 1.0) -> None:
+        """It acted."""
+        if self.noted is not None:
+            self.noted(time, difference)
+
+    def before_frame(self, bus: Any, row: int, bit: int) -> bool:
+        """A frame is about to begin on an idle bus. True: it shall pass bit by bit."""
+        return self.picks(bus.buffers.rows[row + IDENTIFIER], row >> NODE_SHIFT)
+
+    def frame_begins(self, level: Any, row: int, bit: int) -> None:
+        """A frame that it takes begins."""
+
+    def receives(self, machine: Any, time: int) -> bool:
+        """A node has a frame that was taken. False: its program does not get it by this way."""
+        return True
+
+    def notices(self, machine: Any, time: int) -> None:
+        """Error confinement of a node has something to tell."""
+
+
+class Tampering:
+    """Everything that reaches into the frames of one bus."""
+
+    def __init__(self, bus: Any) -> None:
+        self.bus = bus
+        self.tampers: list[Tamper] = []
+
+    def add(self, tamper: Tamper) -> None:
+        """One more."""
+        self.tampers.append(tamper)
+        self.bus.tamper(self)
+
+    def remove(self, tamper: Tamper) -> None:
+        """It does nothing any more. With the last one the bus passes plain frames as they are."""
+        self.tampers.remove(tamper)
+        if not self.tampers:
+            self.bus.tamper(None)
+
+    # ---- what the bus asks
+
+    def reaches(self, bus: Any, row: int, bit: int) -> bool:
+        """Whether the frame in `row`, which would begin at `bit` on an idle bus, has to pass bit by bit."""
+        return any([tamper.before_frame(bus, row, bit) for tamper in self.tampers])
+
+    def frame_begins(self, level: Any, row: int, bit: int) -> None:
+        """The frame in `row` begins at `bit`, perhaps beside others; bits misread in the one before are over."""
+        level.disturbance.misread.clear()
+        for tamper in self.tampers:
+            tamper.hit = tamper.takes(level.buffers.rows[row + IDENTIFIER], row >> NODE_SHIFT)
+            if tamper.hit:
+                tamper.frame_begins(level, row, bit)
+
+    def receives(self, machine: Any, time: int) -> bool:
+        """Whether the node of `machine` has a frame at `time` (ns), in whatever way it was changed."""
+        return all([tamper.receives(machine, time) for tamper in self.tampers if tamper.hit])
+
+    def notices(self, machine: Any, time: int) -> None:
+        """A node has an error, or a counter that moved, at `time` (ns)."""
+        for tamper in self.tampers:
+            tamper.notices(machine, time)
+
+
+def tampering_of(bus: Any) -> Tampering:
+    """What reaches into the frames of `bus`, made where nothing does yet."""
+    return bus.tampering if bus.tampering is not None else Tampering(bus)
+
+
+class Misreading(Tamper):
+    """`node` sees `error` in the frames that are picked, as their sender or as a receiver.
+
+    UserError for what such a node cannot see. `notes_errors`: it acted when the node saw the error. `seen`: how often
+    which node saw which error, primary or secondary, since the first frame hit: {(node, error, "primary" |
+    "secondary"): count}. `unfit`: frames without a place for it.
+    """
+
+    notes_errors = True
+
+    def __init__(self, error: str, node: int, of_sender: bool, identifier: int = -1) -> None:
+        Tamper.__init__(self, identifier, sender=node if of_sender else -1, but=-1 if of_sender else node)
+        if (error, of_sender) in IMPOSSIBLE:
+            raise UserError(f"{error}: {IMPOSSIBLE[error, of_sender]}")
+        self.error = error
+        self.node = node
+        self.of_sender = of_sender
+        self.seen: Counter[tuple[str, str, str]] = Counter()
+        self.unfit = 0
+
+    def frame_begins(self, level: Any, row: int, bit: int) -> None:
+        places = places_of_error(self.error, self.of_sender, *level.buffers.wire(row))
+        if not places or level.machines[self.node].node.mode != OPERATING:
+            self.unfit += 1
+            self.hit = False
+            return
+        self.tampered += 1
+        for place in places:
+            level.disturbance.hit_node(bit + place, self.node)
+
+    def notices(self, machine: Any, time: int) -> None:
+        error = error_name(machine.capture) if machine.met & MET_ERROR else ""
+        if self.hit and error:
+            rank = "primary" if machine.node.index == self.node else "secondary"
+            self.seen[machine.node.name, error, rank] += 1
+            # On a bus of two a wrong CRC is a missing acknowledgement as well: the sender's flag comes first, on the
+            # ACK delimiter, which is a FORM error to the receiver.
+            meant = error == self.error or (self.error, error) == ("CRC", "FORM")
+            if rank == "primary" and meant and self.notes_errors:
+                self.note(time)
+
+
+class Loss(Tamper):
+    """`node` acknowledges the frames that are picked, and its program never has them: lost behind the receive path."""
+
+    def __init__(self, node: int, identifier: int = -1) -> None:
+        Tamper.__init__(self, identifier, but=node)
+        self.node = node
+
+    def receives(self, machine: Any, time: int) -> bool:
+        if machine.node.index != self.node:
+            return True
+        self.tampered += 1
+        self.note(time)
+        return False
+
+
+class Corruption(Tamper):
+    """`node` has other data than was sent: word 0 with the bits of `mask` inverted, behind the check of the CRC."""
+
+    def __init__(self, node: int, mask: int, identifier: int = -1) -> None:
+        Tamper.__init__(self, identifier, but=node)
+        self.node = node
+        self.mask = mask
+
+    def receives(self, machine: Any, time: int) -> bool:
+        if machine.node.index == self.node:
+            self.tampered += 1
+            machine.lo ^= self.mask
+            self.note(time)
+        return True
+
+
+class Delay(Tamper):
+    """`node` has the frames that are picked `delay_ns` later; those that come behind may overtake them."""
+
+    def __init__(self, node: int, delay_ns: int, identifier: int = -1) -> None:
+        Tamper.__init__(self, identifier, but=node)
+        self.node = node
+        self.delay_ns = delay_ns
+
+    def receives(self, machine: Any, time: int) -> bool:
+        node = machine.node
+        if node.index != self.node:
+            return True
+        self.tampered += 1
+        node.received += 1
+        late = time + self.delay_ns
+        node.inbox.put(
+            late, node.order, CAN_RX, node.controller, machine.identifier, machine.flags, machine.lo, machine.hi, 0
+        )
+        self.note(time, self.delay_ns * 1e-3)
+        return False
+
+
+class Silence(Misreading):
+    """BIT errors in every frame that `node` sends until its controller is bus-off; then it is left to its recovery."""
+
+    notes_errors = False
+
+    def __init__(self, node: int) -> None:
+        Misreading.__init__(self, "BIT", node, True)
+
+    def takes(self, identifier: int, sender: int) -> bool:
+        return self.count == 0 and Misreading.takes(self, identifier, sender)
+
+    def notices(self, machine: Any, time: int) -> None:
+        Misreading.notices(self, machine, time)
+        if machine.node.index == self.node and self.count == 0 and machine.node.transmit_errors >= BUS_OFF_LIMIT:
+            self.count = self.tampered  # no more
+            self.note(time)
+
+
+class WrongRate(Tamper):
+    """A node takes its bits for longer or shorter than they are: every frame passes bit by bit while it takes part."""
+
+    def __init__(self, node: Node) -> None:
+        Tamper.__init__(self)
+        self.node = node
+
+    def picks(self, identifier: int, sender: int) -> bool:
+        return self.node.mode not in (BUS_OFF, RESET)
+
+    def notices(self, machine: Any, time: int) -> None:
+        if machine.node.index == self.node.index and machine.met & MET_ERROR and error_name(machine.capture):
+            self.tampered += 1
+            self.note(time)
+
+
+class Intruder:
+    """A controller clipped on a bus beside those of the robot: it acknowledges, and its program hears nothing."""
+
+    def __init__(self, bus: Any, name: str) -> None:
+        self.bus = bus
+        self.inbox = EventQueue(8)
+        self.number = bus.add_node(name, self.inbox, 1, INTRUDERS_ORDER)
+        self.node = bus.nodes[self.number]
+        self.node.listening = False
+        self.ends = TransmitEnds()
+        self.node.connect(self.ends)
+
+    def offer(self, buffer: int, ready: int, identifier: int, flags: int, low: int, high: int) -> bool:
+        """Put a frame in a transmit buffer that may start at bit `ready`, however far the bus has been advanced.
+
+        False while the buffer holds one, or while it is off the bus.
+        """
+        buffers = self.bus.buffers
+        row = self.number << NODE_SHIFT | buffer << BUFFER_SHIFT
+        if buffers.is_full(row) or self.node.mode not in (OPERATING, JOINING):
+            return False
+        self.inbox.clear()
+        self.ends.times[buffer] = NEVER
+        ready = max(ready, self.node.suspend_bit)
+        if self.node.mode == JOINING:
+            ready += NEVER
+        words = (NEVER, ready, self.bus.edge_ns(ready % NEVER), buffers.first, identifier, flags, low, high)
+        for place, word in enumerate(words):
+            buffers.rows[row + place] = word
+        buffers.first = row
+        buffers.waiting_count += 1
+        return True
+
+
+class Duplicate(Tamper):
+    """Whenever a frame of `identifier` begins, `intruder` begins one like it beside it, with other data."""
+
+    def __init__(self, intruder: Intruder, identifier: int, mask: int) -> None:
+        Tamper.__init__(self, identifier, but=intruder.number)
+        self.intruder = intruder
+        self.mask = mask
+
+    def before_frame(self, bus: Any, row: int, bit: int) -> bool:
+        if not Tamper.before_frame(self, bus, row, bit):
+            return False
+        rows = bus.buffers.rows
+        flags, low, high = rows[row + FLAGS] & RECEIVERS_SEE, rows[row + LOW] ^ self.mask, rows[row + HIGH]
+        if not self.intruder.offer(1, bit, self.identifier, flags, low & 0xFFFFFFFF, high):
+            return False
+        self.tampered += 1
+        self.note(bus.edge_ns(bit))
+        return True
+
+
+class Babbling(Tamper):
+    """`intruder` sends frames of `identifier` whenever it can, or one every `period_ns`; between two buffers."""
+
+    def __init__(self, intruder: Intruder, identifier: int, period_ns: int) -> None:
+        Tamper.__init__(self, identifier, sender=intruder.number)
+        self.intruder = intruder
+        self.period_ns = period_ns
+        self.due_ns = 0
+        self.buffer = 1
+
+    def speak(self, time: int) -> None:
+        """The first frame may start behind `time` (ns)."""
+        self.due_ns = time
+        self._offer(self.intruder.bus.bit_of(time) + 1)
+        self.intruder.bus.look_again()
+
+    def _offer(self, bit: int) -> None:
+        """The next frame, from `bit` on."""
+        bus = self.intruder.bus
+        ready = max(bit, bus.bit_of(self.due_ns))
+        if self.intruder.offer(3 - self.buffer, ready, self.identifier, EIGHT_BYTES, 0, 0):
+            self.buffer = 3 - self.buffer
+
+    def _begins(self, row: int, bit: int) -> None:
+        if row >> NODE_SHIFT == self.sender:
+            time = self.intruder.bus.edge_ns(bit)
+            self.tampered += 1
+            self.note(time)
+            self.due_ns = max(self.due_ns + self.period_ns, time)
+            self._offer(bit + 1)
+
+    def before_frame(self, bus: Any, row: int, bit: int) -> bool:
+        self._begins(row, bit)
+        return False
+
+    def frame_begins(self, level: Any, row: int, bit: int) -> None:
+        self._begins(row, bit)

@@ -1,0 +1,143 @@
+"""Faults on the wire of a bus: who does not belong there, and noise."""
+
+from typing import Any
+
+from ranger_sim.can_bus import rewiring, tampering
+from ranger_sim.can_bus.disturbance import HIGHEST_RATE
+from ranger_sim.can_bus.node import OPERATING
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.harness.faults.catalogue import add_places, mode
+from ranger_sim.harness.faults.fault import Fault, Parameter, Place
+from ranger_sim.harness.faults.names import ANY, identifier_of, name_parameter
+from ranger_sim.harness.faults.reach import bus_of, wake_buses
+
+BUS = "CAN bus"
+BUSES = 4
+
+add_places(Place(f"can{n}", BUS, f"the wire of CAN bus {n}", {"bus": n}) for n in range(1, BUSES + 1))
+
+
+class BusFault(Fault):
+    """A fault on the wire of one bus. Clear when all of the robot's controllers take part, counters as they were."""
+
+    kinds = (BUS,)
+    needs = "a CAN bus"
+
+    def connect(self) -> None:
+        self.bus = bus_of(self.robot, self.place.details["bus"], f"fault {self.text()}")
+
+    def begin(self, now_ns: int) -> None:
+        self.own = [node for node in self.bus.nodes if node.order != tampering.INTRUDERS_ORDER]
+        self.counters_before = self._counters()
+
+    def _counters(self) -> list[int]:
+        return [count for node in self.own for count in (node.transmit_errors, node.receive_errors)]
+
+    def is_clear(self, start_ns: int, end_ns: int) -> bool:
+        """Error counters fall by one with each good frame."""
+        calm = all(now <= before for now, before in zip(self._counters(), self.counters_before, strict=True))
+        return calm and all(node.mode == OPERATING for node in self.own)
+
+
+class IntruderFault(BusFault):
+    """A controller is clipped on the bus while the fault works, and taken off at its end."""
+
+    tamper: Any
+
+    def begin(self, now_ns: int) -> None:
+        BusFault.begin(self, now_ns)
+        self.intruder = tampering.Intruder(self.bus, f"intruder {len(self.bus.nodes)}")
+        self.clip_on(now_ns)
+        self.tamper.noted = self.note
+        tampering.tampering_of(self.bus).add(self.tamper)
+        wake_buses(self.robot, now_ns)
+
+    def clip_on(self, now_ns: int) -> None:
+        """Make `tamper`: what the intruder does."""
+        raise NotImplementedError
+
+    def finish(self, now_ns: int) -> None:
+        rewiring.unplug(self.bus, self.intruder.number, now_ns)
+        self.bus.tampering.remove(self.tamper)
+        wake_buses(self.robot, now_ns)
+
+
+@mode
+class BabblingNode(IntruderFault):
+    """A node that sends without being asked. With a low identifier it wins every arbitration: others starve."""
+
+    mode = "babbling"
+    meaning = "has a node that sends frames of one identifier all the time"
+    unit = "frames"
+    parameters = (
+        name_parameter("frame", "0", "variable or identifier that it sends", "chosen by us: what beats everybody"),
+        Parameter("period_us", "us", 0.0, 0.0, 1e6, "from frame to frame; 0: one after another", "chosen by us: worst"),
+    )
+
+    def connect(self) -> None:
+        BusFault.connect(self)
+        self.identifier = identifier_of(self.values["frame"], f"fault {self.text()}")
+        if self.identifier < 0:
+            raise UserError(f"fault {self.text()}: a babbling node needs an identifier, not {ANY!r}")
+
+    def clip_on(self, now_ns: int) -> None:
+        self.tamper = tampering.Babbling(self.intruder, self.identifier, round(1000 * self.values["period_us"]))
+
+    def begin(self, now_ns: int) -> None:
+        IntruderFault.begin(self, now_ns)
+        self.tamper.speak(now_ns)
+
+
+@mode
+class DuplicateIdentifier(IntruderFault):
+    """A second node sends an identifier that has its sender already: at the same bit, with another value.
+
+    Arbitration does not part the two, so the first bit of the data that differs is a bit error of one of them. Both
+    repeat at once, until both are error passive and the one whose flag is silent gives way.
+    """
+
+    mode = "duplicate"
+    meaning = "has a second node that sends the same identifier at the same time"
+    unit = "frames"
+    parameters = (
+        name_parameter("frame", "", "variable or identifier that both send", "has to be given"),
+        Parameter("bit", "1", 22, 0, 31, "of the value's word, in which they differ", "chosen by us"),
+    )
+
+    def connect(self) -> None:
+        BusFault.connect(self)
+        if not self.values["frame"] or self.values["frame"] == ANY:
+            raise UserError(f"fault {self.text()}: say by frame= which identifier is there twice")
+        self.identifier = identifier_of(self.values["frame"], f"fault {self.text()}")
+
+    def clip_on(self, now_ns: int) -> None:
+        self.tamper = tampering.Duplicate(self.intruder, self.identifier, 1 << int(self.values["bit"]))
+
+
+@mode
+class Noise(BusFault):
+    """Bits inverted for everybody, at random: a bad termination, a motor's leads beside the cable."""
+
+    mode = "noise"
+    meaning = "has bits inverted at random, for everybody"
+    unit = "error frames"
+    parameters = (
+        Parameter("rate", "1", 1e-4, 0.0, HIGHEST_RATE, "chance of each bit", "chosen by us: about a frame in eighty"),
+    )
+
+    def begin(self, now_ns: int) -> None:
+        BusFault.begin(self, now_ns)
+        self.errors = self.bus.counters.errors
+        self.bus.set_bit_error_rate(self.values["rate"])
+        wake_buses(self.robot, now_ns)
+
+    def before(self, now_ns: int) -> None:
+        new = self.bus.counters.errors - self.errors
+        if new:
+            self.errors += new
+            self.note(now_ns, new)
+
+    def finish(self, now_ns: int) -> None:
+        self.before(now_ns)
+        self.bus.set_bit_error_rate(0.0)
+        wake_buses(self.robot, now_ns)

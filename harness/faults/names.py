@@ -1,0 +1,56 @@
+"""Parameters that are names: of a frame, a task, an interrupt."""
+
+import dataclasses
+import difflib
+from typing import Any
+
+from ranger_sim.datatable.generated import all_variables
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.harness.faults.fault import Parameter
+
+ANY = "any"
+HIGHEST_IDENTIFIER = 0x7FF  # standard frames, as the robot sends them
+
+
+@dataclasses.dataclass(frozen=True)
+class NameParameter(Parameter):
+    """A name that a mode takes. Whether its place has it, the mode finds out when it is armed."""
+
+    def checked(self, value: Any, where: str) -> Any:
+        """`value` as text, or a UserError naming `where`."""
+        text = str(value).strip()
+        if not text:
+            raise UserError(f"{where}: {self.name} is empty, it is {self.meaning}")
+        return text
+
+
+def name_parameter(name: str, default: Any, meaning: str, source: str) -> NameParameter:
+    """A parameter that is a name; `default` where none is given."""
+    return NameParameter(name, "name", default, 0.0, 0.0, meaning, source)
+
+
+def identifier_of(text: str, where: str) -> int:
+    """Identifier of the frame called `text`: a variable, a number, or "any" (-1). UserError for anything else."""
+    if text == ANY:
+        return -1
+    if text in all_variables.ID_OF:
+        return int(all_variables.ID_OF[text])
+    try:
+        number = int(text, 0)
+    except ValueError:
+        near = difflib.get_close_matches(text, all_variables.ID_OF, 3)
+        hint = f", meant was perhaps {' or '.join(near)}" if near else ""
+        raise UserError(f"{where}: frame {text!r} is neither a variable nor an identifier{hint}") from None
+    if not 0 <= number <= HIGHEST_IDENTIFIER:
+        raise UserError(f"{where}: frame {text!r} is outside 0 ... {HIGHEST_IDENTIFIER:#x}")
+    return number
+
+
+def chosen(name: str, there: Any, what: str) -> str:
+    """`name`, which must be `there`; otherwise a UserError that says what there is."""
+    names = sorted(there)
+    if name not in names:
+        near = difflib.get_close_matches(name, names, 3)
+        hint = f"meant was perhaps {' or '.join(near)}" if near else f"there are {', '.join(names)}"
+        raise UserError(f"{what} {name!r}: {hint}")
+    return name

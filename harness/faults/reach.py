@@ -1,0 +1,60 @@
+"""How a fault reaches boards and controllers of a robot between two steps of the plant."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from ranger_sim.firmware_sim.microcontroller import Microcontroller
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.harness import wiring
+
+
+def emulated(robot: Any, name: str, where: str) -> Any:
+    """The board `name`, emulated in this process. UserError, naming `where`, when it runs anywhere else."""
+    board = robot.loop.board(name)
+    if not isinstance(board, Microcontroller):
+        raise UserError(f"{where}: {name} is not emulated in this process: its processor cannot be reached from here")
+    return board
+
+
+@contextmanager
+def reaching_into(robot: Any, name: str, now_ns: int) -> Iterator[Any]:
+    """The board `name`, run to `now_ns`; behind this it is due at once, because anything may have been done to it.
+
+    Some boards are left alone while they only hear (harness/lockstep.py), so they are brought up to date first: what
+    is done to them must not depend on when others looked at them.
+    """
+    loop = robot.loop
+    place = loop.place(name)
+    board = loop.boards[place]
+    board.advance(now_ns)
+    yield board
+    board = loop.boards[place]  # perhaps another one
+    board.next_time = min(board.next_time, now_ns)
+    loop.due[place] = loop.came[place] = now_ns
+    loop.wires[place].silent_until = 0
+
+
+def controller_of(robot: Any, board: str, bus: int, where: str) -> tuple[Any, int, Any, int]:
+    """(bus, node, wires, controller) of the controller of `board` on bus 1 ... 4. UserError where that is outside."""
+    loop = robot.loop
+    wire = next(wire for wire in wiring.CAN if wire.board == board and wire.bus == bus)
+    wires = loop.wires[loop.place(board)]
+    if wires.buses[wire.controller] is None:
+        raise UserError(
+            f"{where}: can{bus} is a real bus outside here, on which bits of others cannot be reached;"
+            " that takes a disturbance generator on the wire"
+        )
+    return wires.buses[wire.controller], wires.nodes[wire.controller], wires, wire.controller
+
+
+def bus_of(robot: Any, number: int, where: str) -> Any:
+    """Bus 1 ... 4. UserError where it is outside."""
+    wire = next(wire for wire in wiring.CAN if wire.bus == number)
+    return controller_of(robot, wire.board, number, where)[0]
+
+
+def wake_buses(robot: Any, now_ns: int) -> None:
+    """Buses are asked again what they have to decide: something was done to one of them."""
+    due = robot.loop.due
+    due[len(due) - 1] = min(due[len(due) - 1], now_ns)
