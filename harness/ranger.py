@@ -220,14 +220,23 @@ class Ranger:
         mode: str,
         at: str | Condition | Callable[[Any], Any] | None = None,
         until: str | Condition | Callable[[Any], Any] | None = None,
+        proof: bool = False,
         **parameters: float,
     ) -> Fault:
         """Arm a fault: `mode` at `place` from the condition `at` on (None: at once) `until` another one (None: stays).
 
         `ranger-sim faults` lists places, modes and parameters. UserError for what is not in that list. The Fault
         tells what became of it: `acted`, the stamps, the largest difference at its place.
+
+        proof: it can also be asked for `detected`, `detection_ms`, `reaction` and the rest of its `proof()`: a forked
+        process is the robot without it, both are recorded from now on (2 MB a second each), until `close`.
         """
-        return self.arm(catalogue.fault(place, mode, at, until, parameters))
+        fault = catalogue.fault(place, mode, at, until, parameters)
+        if proof:
+            from ranger_sim.harness.faults.twin import Twin
+
+            fault.twin = Twin(self)
+        return self.arm(fault)
 
     def arm(self, fault: Fault) -> Fault:
         """Arm a fault that has been made already, as by `catalogue.typed`."""
@@ -375,6 +384,9 @@ class Ranger:
     def close(self) -> None:
         """Give back the log's files and the ends that lead outside."""
         self.logbook.close()
+        for fault in self.faults:
+            if fault.twin is not None:
+                fault.twin.close()
         for end in self.polled:
             end.close()
 

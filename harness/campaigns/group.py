@@ -16,7 +16,7 @@ from typing import Any
 
 from ranger_sim.foundation import wallclock
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.campaigns.branching import BranchError, branch
+from ranger_sim.harness.branching import BranchError, branch
 from ranger_sim.harness.campaigns.cases import Case, Settings, version
 from ranger_sim.harness.campaigns.outcomes import Band, classify, deviation
 from ranger_sim.harness.conditions import condition
@@ -32,6 +32,7 @@ from ranger_sim.harness.step_watch import StepWatch
 # chosen by us, a tenth of a step.
 BRANCH_EARLY_NS = 60_000_000
 SLICE_S = 0.25
+WALL_PER_CPU = 20.0  # a run that got so little of the processor hangs
 
 Result = dict[str, Any]
 
@@ -40,13 +41,13 @@ Result = dict[str, Any]
 class Watch:
     """How runs are watched: `after_s` from the fault's start on; golden runs look for starts until `patience_s`.
 
-    from_s: where the gait of a run without a fault is judged from. limit_s: of the wall clock, per run.
+    from_s: where the gait of a run without a fault is judged from. limit_s: of computing, per run.
     """
 
     after_s: float = 7.0
     from_s: float = 5.0
     patience_s: float = 30.0
-    limit_s: float = 120.0
+    limit_s: float = 300.0
     band: Band = dataclasses.field(default_factory=Band)
 
     def as_dict(self) -> dict[str, Any]:
@@ -156,7 +157,7 @@ def finished(case: dict[str, Any], work: Callable[[], Result], watch: Watch) -> 
     """The result of a case, run in a branch; also when the branch gave none."""
     begun = wallclock.monotonic_s()
     try:
-        result = branch(work, watch.limit_s)
+        result = branch(work, watch.limit_s, WALL_PER_CPU * watch.limit_s)
     except BranchError as error:
         result = {"outcome": error.outcome, "why": str(error)}
     spent = {"wall_s": round(wallclock.monotonic_s() - begun, 3), "cpu_s": result.pop("cpu_s", None)}

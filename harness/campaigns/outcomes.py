@@ -8,7 +8,7 @@ from ranger_sim.harness.faults.proof import Gait, Proof
 # name: criterion, in the order in which they are asked
 CRITERIA = {
     "crashed": "the simulation raised an exception, or its process died: a defect of ours, not of the robot",
-    "timed out": "the run took longer than its limit of the wall clock",
+    "timed out": "the run took more computing than its limit, or hung",
     "invalid": "the fault never acted, cannot act there, or the golden run does not get that far: it proves nothing",
     "damage": "a motor's current stayed beyond 1.2 times its peak for more than 10 ms, or its thermal state beyond "
     "1.2 times what 3.1 A (steering 0.3 A) sustain",

@@ -94,6 +94,11 @@ class Evidence:
 
         return keep
 
+    def alone(self) -> None:
+        """From now on the robot's streams go here and nowhere else: in a branch, whose parent has the log's files."""
+        for name, stream in self.streams.items():
+            stream.sink = self._keeper(self.blocks[name], None)
+
     def record(self) -> Record:
         """Everything until now."""
         robot = self.robot

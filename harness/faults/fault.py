@@ -115,6 +115,7 @@ class Fault(StepWatch):
         self.acted_count = 0
         self.largest_difference = 0.0
         self.stop_wanted = False
+        self.twin: Any = None  # harness.faults.twin.Twin: of a fault that is to be proven
 
     # --- what a mode says -----------------------------------------------------------------------------------
 
@@ -201,6 +202,36 @@ class Fault(StepWatch):
         elif self.cleared_ns < 0 and self.is_clear(start_ns, end_ns):
             self.cleared_ns = end_ns
             self.robot.loop.watchers.remove(self)
+
+    # --- what it did, against the golden run ------------------------------------------------------------------
+
+    def proof(self) -> Any:
+        """A `harness.faults.proof.Proof` until now. UserError for a fault that was injected without `proof=True`.
+
+        What is normal is what the golden run raised since the fault was armed; a campaign knows more healthy walks.
+        """
+        if self.twin is None:
+            raise UserError(f"fault {self.text()}: it has no golden run; Ranger.inject(..., proof=True) gives it one")
+        from ranger_sim.harness.faults import proof  # only here: it brings numpy's part of the comparison
+
+        golden, faulty = self.twin.records()
+        return proof.prove(golden, faulty, self.activated_ns, self.acted)
+
+    @property
+    def detected(self) -> Any:
+        """The first error that tells of it (`code`, `board`), None: none does. As `proof`."""
+        return self.proof().detected
+
+    @property
+    def detection_ms(self) -> float | None:
+        """Activation to the first error that tells of it, ms. As `proof`."""
+        found: float | None = self.proof().detection_ms
+        return found
+
+    @property
+    def reaction(self) -> Any:
+        """The first machine (`machine`) that is in another state (`state`) than golden (`instead_of`). As `proof`."""
+        return self.proof().reaction
 
     def text(self) -> str:
         """As it is typed after --fault."""

@@ -150,8 +150,8 @@ def first_other_row(golden: np.ndarray, faulty: np.ndarray) -> int | None:
 def frame_differences(golden: Record, faulty: Record) -> Iterable[Difference]:
     """The first frame of each bus that is another one, or came at another time, until the faulty run's end."""
     for bus, rows in faulty.frames.items():
-        reference = golden.frames[bus]
-        reference = reference[reference[:, 0] <= faulty.end_ns]
+        # a frame under way at the end is in the stream of the run that has decided on it already
+        reference, rows = (each[each[:, 0] <= faulty.end_ns] for each in (golden.frames[bus], rows))
         place = first_other_row(reference, rows)
         if place is None:
             if len(reference) == len(rows):
@@ -197,7 +197,8 @@ def error_differences(golden: Record, faulty: Record) -> Iterable[Difference]:
         if len(reference) == len(rows):
             return
         place = min(len(reference), len(rows))
-    row = min((run[place] for run in (reference, rows) if place < len(run)), key=lambda each: int(each[0]))
+    # at one instant rows are in order of board and code: the lower one is missing in the other run
+    row = min((run[place] for run in (reference, rows) if place < len(run)), key=lambda each: tuple(each[:3]))
     name = f"{faulty.boards[int(row[1])]} {error_table.NAMES.get(int(row[2]), int(row[2]))}"
     yield Difference("errors", name, int(row[0]), None, None)
 

@@ -27,6 +27,9 @@ def register(commands: Any) -> None:
     )
     command.add_argument("--scheduler", metavar="ADDRESS", help="a Dask cluster that runs already, as tcp://host:8786")
     command.add_argument("--report", action="store_true", help="run nothing, write tables and page of what there is")
+    command.add_argument(
+        "--document", metavar="FILE.md", help="also put the tables into this document, between its two marks"
+    )
     command.add_argument("--replay", metavar="KEY", help="run one case again, from power-up, and tell what happened")
     command.set_defaults(run=run)
 

@@ -7,6 +7,7 @@ import io
 import json
 import os
 import pathlib
+import re
 from typing import Any
 
 from rich.console import Console
@@ -24,6 +25,8 @@ from ranger_sim.tools.campaign.words import proof_text
 from ranger_sim.tools.files import replace_file, writable_folder
 
 TELL_EVERY_S = 10.0  # where there is no terminal for a progress bar
+TABLES_BEGIN = "<!-- written by ranger-sim campaign --document: begin -->\n"
+TABLES_END = "<!-- end -->\n"
 EXIT_UNSURE = 1  # a run crashed or timed out: its outcome is not known
 
 
@@ -46,6 +49,8 @@ def run(options: argparse.Namespace) -> int:
             work(campaign, options, console)
         told = summary.of(campaign)
         write(told, folder)
+        if options.document:
+            into_document(pathlib.Path(options.document), told)
         show(told, console)
         console.print(f"page: {folder / 'index.html'}", soft_wrap=True, highlight=False)
         return EXIT_UNSURE if any(told["outcomes"][name]["count"] for name in ("crashed", "timed out")) else 0
@@ -131,6 +136,21 @@ def write(told: dict[str, Any], folder: pathlib.Path) -> None:
     replace_file(folder / "runs.csv", text.getvalue().encode())
     replace_file(folder / "report.md", page.markdown(told).encode())
     replace_file(folder / "index.html", page.render(told).encode())
+
+
+def into_document(path: pathlib.Path, told: dict[str, Any]) -> None:
+    """Put the tables, with date and version, between the marks of a document. UserError when it has none."""
+    try:
+        text = path.read_text(encoding="utf-8")
+    except OSError as error:
+        raise UserError(f"--document {path}: {error.strerror}") from None
+    before, begin, rest = text.partition(TABLES_BEGIN)
+    _, end, after = rest.partition(TABLES_END)
+    if not (begin and end):
+        raise UserError(f"--document {path}: it needs the lines {TABLES_BEGIN.strip()} and {TABLES_END.strip()}")
+    tables = page.markdown({**told, "title": f"Results of {wallclock.today_iso()}", "description": ""})
+    tables = re.sub("^#", "##", tables, flags=re.MULTILINE)
+    replace_file(path, (before + begin + tables + end + after).encode())
 
 
 def show(told: dict[str, Any], console: Console) -> None:

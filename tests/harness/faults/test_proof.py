@@ -66,6 +66,21 @@ def test_the_earlier_of_frame_and_variable_is_the_first():
     assert (first.where, first.name, first.time_ns) == ("MB", "MCH_ANGLE", 1100 * MS)
 
 
+def test_a_new_error_is_named_and_not_the_usual_one_that_comes_at_the_same_instant():
+    golden, faulty = record(), record()
+    golden.errors = errors((1200, "MB", LIMIT, 1))
+    faulty.errors = errors((1200, "MCFO", SPIKE, 1), (1200, "MB", LIMIT, 1))
+    for runs in ((faulty, golden), (golden, faulty)):
+        first = proven(*runs).first_firmware
+        assert (first.where, first.name) == ("errors", "MCFO AE_SPIKE")
+
+
+def test_a_frame_under_way_at_the_end_is_no_difference():
+    faulty = record(until_ms=1500)
+    faulty.frames["can1"] = frames(range(5, 1510, 10))  # the last one's receivers have it at 1505 ms
+    assert proven(faulty).first is None
+
+
 def test_a_body_that_moves_otherwise_is_no_difference_of_the_firmware():
     faulty = record()
     faulty.samples[600:, COLUMN["hip_rad"]] = 0.1

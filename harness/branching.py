@@ -7,6 +7,7 @@ branch that raises, dies or takes too long is a result as well, and harms nobody
 import contextlib
 import json
 import os
+import resource
 import select
 import signal
 import sys
@@ -36,37 +37,47 @@ def fork() -> int:
         return os.fork()
 
 
-def branch(work: Callable[[], dict[str, Any]], limit_s: float) -> dict[str, Any]:
-    """What `work` returns in a forked process; BranchError when it raises, dies, or takes longer than `limit_s`."""
+def branch(work: Callable[[], dict[str, Any]], cpu_s: float, wall_s: float) -> dict[str, Any]:
+    """What `work` returns in a forked process; BranchError when it raises, dies, or takes too long.
+
+    cpu_s: of computing, which a machine that does other things does not change. wall_s: of the wall clock, for what
+    waits for ever and computes nothing.
+    """
     sys.stdout.flush()
     sys.stderr.flush()
     reading, writing = os.pipe()
     child = fork()
     if child == 0:
         os.close(reading)
-        _be_the_branch(work, writing)
+        _be_the_branch(work, writing, cpu_s)
     os.close(writing)
     try:
-        answer = _read(reading, wallclock.monotonic_s() + limit_s)
+        answer = _read(reading, wallclock.monotonic_s() + wall_s)
     finally:
         os.close(reading)
         with contextlib.suppress(ProcessLookupError):
             os.kill(child, signal.SIGKILL)  # it has told all it will, or is late
         _, status = os.waitpid(child, 0)
     if answer is None:
-        raise BranchError("timed out", f"longer than {limit_s:g} s")
+        raise BranchError("timed out", f"no result within {wall_s:g} s of the wall clock")
+    code = os.waitstatus_to_exitcode(status)
+    if code == -signal.SIGXCPU:
+        raise BranchError("timed out", f"longer than {cpu_s:g} s of computing")
     if not answer:
-        raise BranchError("crashed", f"its process ended with {os.waitstatus_to_exitcode(status)}")
+        raise BranchError("crashed", f"its process ended with {code}")
     told: dict[str, Any] = json.loads(answer)
     if "raised" in told:
         raise BranchError("crashed", told["raised"])
     return told
 
 
-def _be_the_branch(work: Callable[[], dict[str, Any]], writing: int) -> None:
+def _be_the_branch(work: Callable[[], dict[str, Any]], writing: int, cpu_s: float) -> None:
     """Work, write the result, and end without any of the parent's clean-up."""
     code = 1
     try:
+        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+        allowed = max(1, round(cpu_s))  # whole seconds; a forked process counts from nothing
+        resource.setrlimit(resource.RLIMIT_CPU, (allowed, allowed + 1))
         try:
             told = work()
         except BaseException as error:
