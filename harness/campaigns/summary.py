@@ -44,7 +44,7 @@ def of(campaign: Campaign) -> dict[str, Any]:
         "version": campaign.version,
         "runs": len(rows),
         "foreseen": campaign.foreseen,
-        "finished": bool(campaign.cases) and len(rows) == len(campaign.cases),
+        "finished": bool(rows) and (len(rows) == campaign.foreseen or campaign.stopped_at is not None),
         "stopped_at_look": campaign.stopped_at,
         "interval": interval_text(plan),
         "criteria": CRITERIA,
@@ -106,7 +106,7 @@ def interval_text(plan: Plan) -> str:
             "they have no interval."
         )
     if plan.sample is None:
-        return "A census: every member of the population was run, so shares are exact and have no interval."
+        return "A census: every member of the population is run, so shares are exact and have no interval."
     percent = f"{100.0 * plan.sample.confidence:g} %"
     if plan.sample.stopping:
         rule, looks = plan.sample.stopping.rule, plan.sample.stopping.looks

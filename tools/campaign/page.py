@@ -147,8 +147,11 @@ def html_of(figure: Any) -> str:
 def markdown(told: dict[str, Any]) -> str:
     """The same in Markdown, without the plots."""
     lines = [f"# {told['title']}", "", told["description"], ""] if told["description"] else [f"# {told['title']}", ""]
+    runs = f"{told['runs']} runs"
+    if not told["finished"]:
+        runs = f"**Not finished: {told['runs']} of {told['foreseen']} runs, shares are of these.** The plan"
     lines += [
-        f"{told['runs']} runs ({told['population']}), version {told['version']}. {told['interval']}",
+        f"{runs} ({told['population']}), version {told['version']}. {told['interval']}",
         "",
         "| Outcome | Runs | Share | Criterion |",
         "|---|---|---|---|",
