@@ -21,6 +21,8 @@ MODULES = (
 PLACES: dict[str, Place] = {}
 # by (kind of place, name of the mode)
 MODES: dict[tuple[str, str], type[Fault]] = {}
+# The same, of modes that a kind of place does not take for a reason of its own.
+REASONS: dict[tuple[str, str], str] = {}
 
 
 def load() -> None:
@@ -72,6 +74,8 @@ def refusal(place: Place, mode: str) -> str:
     """Why a place does not take a mode that others take; empty when no place does, or this one does."""
     if (place.kind, mode) in MODES:
         return ""
+    if (place.kind, mode) in REASONS:
+        return REASONS[place.kind, mode]
     others = {kind: fault for (kind, name), fault in MODES.items() if name == mode}
     needs = next((fault.needs for fault in others.values() if fault.needs), "")
     if not others:

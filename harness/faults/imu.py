@@ -8,7 +8,7 @@ from typing import Any
 
 from ranger_sim.foundation.numbers import float_of_word, word_of_float
 from ranger_sim.harness.faults import signals
-from ranger_sim.harness.faults.catalogue import mode
+from ranger_sim.harness.faults.catalogue import REASONS, mode
 from ranger_sim.harness.faults.fault import Parameter
 from ranger_sim.harness.faults.places import IMU
 from ranger_sim.harness.faults.sensor import PlaceFault, Quantity, SignalFault, lasting, mode_classes
@@ -111,6 +111,7 @@ class SignalInPacket(PacketFault, SignalFault):
         return True
 
 
+REASONS[IMU, "offset"] = "a constant error of it is the mode gyro_bias"
 for each in mode_classes(SignalInPacket, IMU, RATE, without=("offset", "drop_out")):
     mode(each)
 

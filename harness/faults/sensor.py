@@ -64,7 +64,7 @@ class Row:
     signal: type[signals.Signal]
     meaning: str
     parameters: Callable[[Quantity], tuple[Parameter, ...]]
-    needs: str = ""
+    needs: str = "a sensor"
 
 
 def number(

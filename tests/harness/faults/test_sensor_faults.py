@@ -227,7 +227,7 @@ def test_a_stuck_contact_reads_as_swing_or_stance():
         ("UI.imu", "gyro_bias", {"rate": math.nan}, "rate is nan"),
         ("MCH.motor_current", "lost_edges", {}, "cannot act there; it needs edges on a wire, this is the current"),
         ("MCFO.left_foot", "swapped_sign", {}, "needs a signal on two wires"),
-        ("UI.imu", "offset", {}, "it needs"),
+        ("UI.imu", "offset", {}, "a constant error of it is the mode gyro_bias"),
     ],
 )
 def test_what_is_out_of_its_limits_or_cannot_act_is_refused(place, mode, parameters, words):
