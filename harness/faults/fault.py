@@ -208,7 +208,8 @@ class Fault(StepWatch):
     def proof(self) -> Any:
         """A `harness.faults.proof.Proof` until now. UserError for a fault that was injected without `proof=True`.
 
-        What is normal is what the golden run raised since the fault was armed; a campaign knows more healthy walks.
+        What is normal is what the golden run raised since the fault was armed. A detection by rate alone (`rate`) can
+        therefore be a false alarm: one walk does not know how loud another healthy one is; a campaign walks several.
         """
         if self.twin is None:
             raise UserError(f"fault {self.text()}: it has no golden run; Ranger.inject(..., proof=True) gives it one")
