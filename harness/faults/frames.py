@@ -99,7 +99,7 @@ class ErrorFault(FrameFault):
     """One of the errors of FMI-LS-BUS, seen by this controller first. `seen`: who saw what (`tampering.Misreading`)."""
 
     unit = "errors"
-    sends: ClassVar[float]
+    tamper: Any
 
     def made(self) -> tampering.Tamper:
         of_sender = self.values["sender"] != 0.0
@@ -121,7 +121,7 @@ class ErrorFault(FrameFault):
         return dict(self.tamper.seen)
 
 
-def _error_mode(error: str, sends: int, meaning: str) -> type[ErrorFault]:
+def _error_mode(error: str, sends: int, meaning: str) -> type[Fault]:
     """The mode of one error; `sends`: whether its node is by default the sender of the frame."""
     sender = Parameter(
         "sender", "1", sends, 0, 1, "1: in frames that it sends, 0: in those that it receives", "FMI-LS-BUS: IsSender"
