@@ -5,7 +5,7 @@ import importlib
 import importlib.util
 import pathlib
 from collections.abc import Callable, Iterable, Mapping
-from typing import Any
+from typing import Any, TypeVar
 
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.conditions import Condition, condition
@@ -17,6 +17,8 @@ MODULES = (
     "places", "edges", "words", "voltages", "imu", "converters", "actuators", "world",
     "frames", "buses", "links", "power", "processor",
 )  # fmt: skip
+
+Kind = TypeVar("Kind", bound=Fault)
 
 PLACES: dict[str, Place] = {}
 # by (kind of place, name of the mode)
@@ -56,7 +58,7 @@ def add_places(places: Iterable[Place]) -> None:
         PLACES[place.name] = place
 
 
-def mode(kind: type[Fault]) -> type[Fault]:
+def mode(kind: type[Kind]) -> type[Kind]:
     """A class decorator: the mode is in the catalogue, for each of its kinds of places."""
     for place_kind in kind.kinds:
         if (place_kind, kind.mode) in MODES:

@@ -118,6 +118,7 @@ class ErrorFault(FrameFault):
     @property
     def seen(self) -> dict[tuple[str, str, str], int]:
         """How often which board saw which error, primary or secondary: {(board, error, rank): count}."""
+        assert isinstance(self.tamper, tampering.Misreading)
         return dict(self.tamper.seen)
 
 
