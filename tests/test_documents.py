@@ -181,3 +181,14 @@ def test_the_figure_of_the_timeline_is_drawn_out_of_the_step_that_is_kept():
     kept = json.loads(program["STEP_FILE"].read_text(encoding="utf-8"))
     order = [kept["stations"][station][0] for station, _, _ in program["WAY"]]
     assert order == sorted(order) and len(order) == 17  # nothing comes before what it comes of
+
+
+def test_the_tables_of_the_marathon_are_those_of_the_walks_that_are_kept():
+    program = runpy.run_path(str(ROOT / "docs" / "marathon_tables.py"))
+    page = program["PAGE"].read_text(encoding="utf-8")
+    for table in program["tables"]():
+        assert table in page
+    kept = json.loads(program["KEPT"].read_text(encoding="utf-8"))
+    assert kept["until_empty"]["fall_cause"] == "battery empty"
+    assert not kept["the_rest"]["fell"]
+    assert all(kept[part]["electronics_off"] == ["left-outer-ankle"] for part in ("until_empty", "the_rest"))
