@@ -176,7 +176,28 @@ def fault_text(fault: dict) -> str:
     else:
         cleared = f", its place was clear at {fault['cleared_s']:.6g} s"
     permanent = f"; what stays: {fault['permanent']}" if fault["permanent"] else ""
-    return f"{begun}{acted}{ended}{cleared}{permanent}"
+    return f"{begun}{acted}{ended}{cleared}{permanent}{proof_text(fault['proof'])}"
+
+
+def proof_text(proof: dict | None) -> str:
+    """What tells the run from the one without the fault; nothing without a golden run."""
+    if proof is None:
+        return ""
+    first, told, reacted = proof["first_difference"], proof["detected"], proof["reaction"]
+    if first is None:
+        return "; against the run without it: NO EFFECT, nothing that the firmware sends differs"
+    parts = [f"{first['name']} differs after {first['after_ms']:.4g} ms ({first['where']})"]
+    if told is None:
+        parts.append("no error tells of it")
+    else:
+        more = ", more often than without" if told["rate"] else ""
+        parts.append(f"told by {told['code']} from {told['board']}{more} after {proof['detection_ms']:.4g} ms")
+    if reacted is not None:
+        instead = f"{reacted['machine']} in {reacted['state']} instead of {reacted['instead_of']}"
+        parts.append(f"{instead} after {proof['reaction_ms']:.4g} ms")
+    if proof["fall_ms"] is not None:
+        parts.append(f"fell after {proof['fall_ms']:.4g} ms")
+    return f"; against the run without it: {', '.join(parts)}"
 
 
 # --- the tables of docs/faults.md -----------------------------------------------------------------------------

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
     from types import FrameType
 
+    from ranger_sim.harness.faults.fault import Fault
     from ranger_sim.harness.ranger import Ranger
 
 DEFAULT_STEPS = 100
@@ -52,6 +53,12 @@ def register(commands: Any) -> None:
         metavar="TEXT",
         help='lets something fail: "MCH.joint_encoder:stuck@step 12..step 14"; may be given several times; exit code 3 '
         "when one did not act; ranger-sim faults lists places and modes",
+    )
+    command.add_argument(
+        "--proof",
+        action="store_true",
+        help="hold the walk against itself without its faults: what differs first, which error tells of it and when, "
+        "what the machines do (a second process walks that one; 2 MB a second in both)",
     )
     faults.add_module_option(command)
     trace.add_options(command)
@@ -199,8 +206,7 @@ def run_scenario(scenario: Scenario, stop: StopRule, options: argparse.Namespace
     wanted = [catalogue.typed(text) for text in options.fault]
     log = options.log if folder else "none"
     with contextlib.closing(Ranger(scenario, log=log, quirks=quirks, profile=profile)) as robot:
-        for fault in wanted:
-            robot.arm(fault)
+        arm(robot, wanted, options.proof)
         timeline = trace.attach(robot, options)
         ends, places = serial_options.connect(robot, options)
         for place in places:
@@ -220,6 +226,20 @@ def run_scenario(scenario: Scenario, stop: StopRule, options: argparse.Namespace
     if not all(fault["acted"] for fault in summary["faults"]):
         return faults.EXIT_INVALID
     return 1 if summary["fell"] or summary["failed_boards"] else 0
+
+
+def arm(robot: Ranger, wanted: list[Fault], proof: bool) -> None:
+    """Arm the faults; with `proof` all of them beside one golden run without any."""
+    if proof and not wanted:
+        raise UserError("--proof: there is no --fault to hold against the walk without it")
+    twin = None
+    if proof:
+        from ranger_sim.harness.faults.twin import Twin
+
+        twin = Twin(robot)
+    for fault in wanted:
+        fault.twin = twin
+        robot.arm(fault)
 
 
 def finish(

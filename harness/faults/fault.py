@@ -251,7 +251,7 @@ class Fault(StepWatch):
         return next(parameter.default for parameter in cls.parameters if parameter.name == name)
 
     def summary(self) -> dict[str, Any]:
-        """What became of it; times in s since power-up, None for not yet."""
+        """What became of it; times in s since power-up, None for not yet. proof: None without a golden run."""
 
         def seconds(stamp_ns: int) -> float | None:
             return None if stamp_ns < 0 else (stamp_ns - self.robot.start_ns) * 1e-9
@@ -268,4 +268,5 @@ class Fault(StepWatch):
             "largest_difference": self.largest_difference,
             "unit": self.unit,
             "permanent": self.permanent or None,
+            "proof": self.proof().summary() if self.twin is not None and self.activated_ns >= 0 else None,
         }

@@ -34,6 +34,9 @@ EACH_COUNT_TO = 32
 COUNT_GROWTH = 1.1
 
 
+Key = tuple[str, int]  # board, error code
+
+
 @dataclasses.dataclass(frozen=True)
 class Difference:
     """The first that differs: `where` (a bus, "MB", "errors", "body"), `name` of variable or quantity, values."""
@@ -107,13 +110,26 @@ class Proof:
         """Activation to the fall."""
         return None if self.fell_ns is None else (self.fell_ns - self.activated_ns) / NS_PER_MS
 
+    def summary(self) -> dict[str, Any]:
+        """As `walk --proof` keeps it: names, and ms after the activation; None for what did not happen."""
+        first, told, reacted = self.first_firmware, self.detected, self.reaction
+        return {
+            "first_difference": first and {"where": first.where, "name": first.name, "after_ms": self.after_ms(first)},
+            "detected": told and {"code": told.code, "board": told.board, "rate": told.rate},
+            "detection_ms": self.detection_ms,
+            "reaction": reacted
+            and {"machine": reacted.machine, "state": reacted.state, "instead_of": reacted.instead_of},
+            "reaction_ms": self.reaction_ms,
+            "fall_ms": self.fall_ms,
+        }
+
 
 def prove(golden: Record, faulty: Record, activated_ns: int, acted: bool, healthy: "Healthy | None" = None) -> Proof:
     """Hold the faulty run against the golden one. Both begin at one instant, before the fault; golden ends no earlier.
 
-    healthy: what healthy walks raise; without it the golden run alone says what is normal.
+    healthy: what healthy walks raise; without it the golden run and the master table say what is normal.
     """
-    normal = healthy if healthy is not None else Healthy.of([golden])
+    normal = healthy if healthy is not None else Healthy.of([golden], normal_per_s())
     firmware = [
         *frame_differences(golden, faulty),
         *word_differences(golden, faulty),
@@ -130,6 +146,12 @@ def prove(golden: Record, faulty: Record, activated_ns: int, acted: bool, health
         fell_ns=faulty.fell_ns if faulty.fell_ns >= 0 else None,
         fall_cause=faulty.fall_cause,
     )
+
+
+def normal_per_s() -> dict[Key, float]:
+    """How many errors a second are normal in a walk, by board and number: the master table's column."""
+    rates = error_table.NORMAL_PER_S.items()
+    return {(board, code): rate for code, boards in rates for board, rate in boards.items()}
 
 
 def earliest(differences: Iterable[Difference]) -> Difference | None:
@@ -233,8 +255,6 @@ def reaction(golden: Record, faulty: Record) -> Reaction | None:
 
 # --- what is normal -------------------------------------------------------------------------------------------------
 
-Key = tuple[str, int]  # board, error code
-
 
 class Healthy:
     """What walks without a fault raise.
@@ -243,13 +263,19 @@ class Healthy:
     healthy walk had so many, one per count, largest number where none had}. changes: {machine: {(from, to)}}.
     """
 
-    def __init__(self, spans: dict[Key, list[int]], changes: dict[str, set[tuple[int, int]]]) -> None:
+    def __init__(
+        self,
+        spans: dict[Key, list[int]],
+        changes: dict[str, set[tuple[int, int]]],
+        per_s: dict[Key, float] | None = None,
+    ) -> None:
         self.spans = spans
         self.changes = changes
+        self.per_s = per_s if per_s is not None else {}
 
     @classmethod
-    def of(cls, records: Sequence[Record]) -> "Healthy":
-        """From runs without a fault."""
+    def of(cls, records: Sequence[Record], per_s: dict[Key, float] | None = None) -> "Healthy":
+        """From runs without a fault. `per_s`: errors of which so many a second are known to be normal besides."""
         spans: dict[Key, list[int]] = {}
         changes: dict[str, set[tuple[int, int]]] = {machine: set() for machine in STATE_VARIABLES}
         for record in records:
@@ -260,16 +286,21 @@ class Healthy:
                 spans[key] = [min(a, b) for a, b in zip(longer, shorter, strict=False)] + longer[len(shorter) :]
             for machine, seen in changes.items():
                 seen.update(changes_of(record.machine(machine)))
-        return cls(spans, changes)
+        return cls(spans, changes, per_s)
 
     def most(self, key: Key, duration_ns: int) -> int:
         """The most errors of this kind that any healthy walk had within this time, rounded up to the next count."""
         spans = self.spans.get(key)
+        normal = int(self.per_s.get(key, 0.0) * duration_ns * 1e-9)
         if not spans:
-            return 0
+            return normal
         counts = looked_at(len(spans) + 1)
         place = int(np.searchsorted(spans, duration_ns, side="right"))
-        return counts[place] - 1 if place < len(spans) else counts[len(spans) - 1]
+        return max(normal, counts[place] - 1 if place < len(spans) else counts[len(spans) - 1])
+
+    def knows(self, key: Key) -> bool:
+        """Healthy walks have this error of this board."""
+        return key in self.spans or key in self.per_s
 
     def detections(self, record: Record, since_ns: int) -> list[Detection]:
         """The first error of each board and code, from `since_ns` on, that no healthy walk explains; in order."""
@@ -279,9 +310,9 @@ class Healthy:
             for count in looked_at_below(len(times)):
                 duration = int(times[count - 1]) - since_ns
                 most = self.most(key, duration)
-                if count > (0 if key not in self.spans else RATE_FACTOR * most + RATE_MORE):
+                if count > (RATE_FACTOR * most + RATE_MORE if self.knows(key) else 0):
                     name = error_table.NAMES.get(key[1], str(key[1]))
-                    found.append(Detection(key[0], name, int(times[count - 1]), key in self.spans))
+                    found.append(Detection(key[0], name, int(times[count - 1]), self.knows(key)))
                     break
         return sorted(found, key=lambda each: (each.time_ns, each.board, each.code))
 

@@ -211,3 +211,66 @@ def test_a_mode_or_a_place_that_is_there_already_is_refused():
         catalogue.mode(kind)
     with pytest.raises(UserError, match=r"world\.robot: it is in the catalogue already"):
         catalogue.add_places([catalogue.PLACES["world.robot"]])
+
+
+TOLD = {
+    "first_difference": {"where": "can1", "name": "MCH_ANGLE", "after_ms": 2.621},
+    "detected": {"code": "MCFI_ANKL_LO", "board": "MCFI", "rate": False},
+    "detection_ms": 738.5,
+    "reaction": {"machine": "inner_foot", "state": "afterpush", "instead_of": "prepush"},
+    "reaction_ms": 19.0,
+    "fall_ms": 1275.0,
+}
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        (
+            {},
+            "; against the run without it: MCH_ANGLE differs after 2.621 ms (can1), told by MCFI_ANKL_LO from MCFI "
+            "after 738.5 ms, inner_foot in afterpush instead of prepush after 19 ms, fell after 1275 ms",
+        ),
+        (
+            {"first_difference": None},
+            "; against the run without it: NO EFFECT, nothing that the firmware sends differs",
+        ),
+        (
+            {"detected": None, "reaction": None, "fall_ms": None},
+            "; against the run without it: MCH_ANGLE differs after 2.621 ms (can1), no error tells of it",
+        ),
+        (
+            {"detected": {**TOLD["detected"], "rate": True}, "reaction": None, "fall_ms": None},
+            "; against the run without it: MCH_ANGLE differs after 2.621 ms (can1), told by MCFI_ANKL_LO from MCFI, "
+            "more often than without after 738.5 ms",
+        ),
+    ],
+)
+def test_a_proof_is_told_in_the_faults_line(changes, words):
+    assert faults.proof_text(TOLD | changes) == words
+    assert faults.proof_text(None) == ""
+
+
+def test_a_walk_with_proof_says_when_who_told_and_changes_nothing(capsys, tmp_path):
+    fault = "MCH.absolute_encoder:offset,offset=300@300 ms"
+    summaries = []
+    for proof in ([], ["--proof"]):
+        file = tmp_path / "summary.json"
+        arguments = ["--time", "0.5s", "--fault", fault, *proof, "--json", str(file)]
+        assert cli.main(["walk", *arguments]) == 0
+        summaries.append(json.loads(file.read_text(encoding="utf-8")))
+    without, held = summaries
+    assert without["trace_digest"] == held["trace_digest"]
+    (plain,), (proven,) = without["faults"], held["faults"]
+    assert plain["proof"] is None
+    found = proven["proof"]
+    assert (found["first_difference"]["where"], found["first_difference"]["name"]) == ("errors", "MCH AE_SPIKE")
+    assert (found["detected"]["code"], found["detected"]["board"]) == ("AE_SPIKE", "MCH")
+    # the board reads the word in its next slot, within 0.5 ms; errors are looked at every 0.25 ms
+    assert 0.0 < found["detection_ms"] <= 0.75
+    assert found["fall_ms"] is None
+    assert "told by AE_SPIKE from MCH" in capsys.readouterr().err
+
+
+def test_a_proof_without_a_fault_is_refused(capsys):
+    assert "there is no --fault" in refused(capsys, "walk", "--proof")

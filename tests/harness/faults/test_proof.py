@@ -91,22 +91,33 @@ def test_a_body_that_moves_otherwise_is_no_difference_of_the_firmware():
 
 def test_a_code_that_no_healthy_walk_has_detects_with_its_first_error():
     faulty = record()
-    faulty.errors = errors((1012.5, "MCFO", SPIKE, 1), (1300, "MCH", LIMIT, 1))
+    faulty.errors = errors((1012.5, "MCH", SPIKE, 1), (1300, "MCH", LIMIT, 1))
     found = proven(faulty)
-    assert (found.detected.board, found.detected.code, found.detected.rate) == ("MCFO", "AE_SPIKE", False)
+    assert (found.detected.board, found.detected.code, found.detected.rate) == ("MCH", "AE_SPIKE", False)
     assert found.detection_ms == 12.5
     assert len(found.detections) == 2
 
 
+def test_what_the_master_table_calls_normal_needs_no_golden_run_that_shows_it():
+    few, many = record(), record()
+    few.errors = errors(*((1012 + ms, "MCFO", SPIKE, 1) for ms in range(0, 900, 180)))  # 6 a second are normal
+    many.errors = errors(*((1001 + ms, "MCFO", SPIKE, 1) for ms in range(0, 900, 10)))
+    assert proven(few).detected is None
+    found = proven(many)
+    assert (found.detected.code, found.detected.rate) == ("AE_SPIKE", True)
+    # error n comes 10 (n - 1) + 1 ms after the start, in which no whole one is normal: the sixth is above 5
+    assert found.detection_ms == 51.0
+
+
 def test_errors_before_the_fault_detect_nothing():
     faulty = record()
-    faulty.errors = errors((999, "MCFO", SPIKE, 1))
+    faulty.errors = errors((999, "MCH", SPIKE, 1))
     assert proven(faulty).detected is None
 
 
 def test_a_fault_that_did_not_act_is_detected_by_nothing():
     faulty = record()
-    faulty.errors = errors((1012, "MCFO", SPIKE, 1))
+    faulty.errors = errors((1012, "MCH", SPIKE, 1))
     assert proven(faulty, acted=False).detected is None
 
 
