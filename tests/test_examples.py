@@ -19,9 +19,14 @@ PRINTED = {
 }
 
 
+# Its examples, tests and a law beside them, are run in a project of their own: harness/testing/test_in_a_project.py.
+IN_A_PROJECT = "docs/testing.md"
+
+
 def examples(name):
-    """The Python blocks of a document, in order."""
-    return re.findall(r"^```python\n(.*?)^```", (ROOT / name).read_text(encoding="utf-8"), re.DOTALL | re.MULTILINE)
+    """The Python blocks of a document, in order; without tests, which are run in a project of their own as well."""
+    blocks = re.findall(r"^```python\n(.*?)^```", (ROOT / name).read_text(encoding="utf-8"), re.DOTALL | re.MULTILINE)
+    return [block for block in blocks if "def test_" not in block]
 
 
 def test_every_document_with_python_examples_is_run():
@@ -31,7 +36,7 @@ def test_every_document_with_python_examples_is_run():
         for path in documents
         if not {".venv", "build", "tests", ".pytest_cache"} & set(path.parts) and examples(path)
     }
-    assert found == set(PRINTED)
+    assert found == {*PRINTED, IN_A_PROJECT}
 
 
 @pytest.mark.parametrize("name", PRINTED)
