@@ -1,6 +1,5 @@
 """Runs a plan: healthy walks first, then every run that is not on the disk yet, in groups with one golden run each."""
 
-import dataclasses
 import hashlib
 import json
 import math
@@ -11,13 +10,15 @@ from typing import Any
 from ranger_sim.foundation.random_stream import RandomStream
 from ranger_sim.harness.campaigns.cases import Case, Settings, version
 from ranger_sim.harness.campaigns.group import request_of
-from ranger_sim.harness.campaigns.outcomes import severity
-from ranger_sim.harness.campaigns.plan import Plan, Range
+from ranger_sim.harness.campaigns.plan import Plan, Range, combinations
+from ranger_sim.harness.campaigns.statistics import Stopping
 from ranger_sim.harness.campaigns.store import Store
 
 # Runs of a group: few enough that a group's results are not long on the way and the workers end together, many enough
 # that its golden run, walked twice (3 s of computing), is shared: chosen by us.
 MOST_IN_A_GROUP = 16
+# A golden run, walked twice, costs what three runs do: a round of a search is not dealt out one by one.
+LEAST_IN_A_GROUP = 4
 NARROWER = 0.5  # of a search's box, from round to round
 FIRST_BOX = 0.25  # half its width in the first round, of the whole range
 
@@ -54,8 +55,9 @@ class Campaign:
         plan = self.plan
         if plan.sample:
             return plan.sample.runs
-        cells = math.prod(len(values) for values in plan.axes.values() if not isinstance(values, Range))
-        return cells * (plan.search.first + plan.search.rounds * plan.search.each) if plan.search else cells
+        if not plan.search:
+            return sum(1 for _ in combinations(plan.axes))
+        return len(self.cells()) * (plan.search.first + plan.search.rounds * plan.search.each)
 
     def run(self, pool: Any, tell: Callable[[int, str], None]) -> None:
         """Do what is missing. `tell(done, what)` after every result; `pool`: of pools.py."""
@@ -75,10 +77,37 @@ class Campaign:
             more = cases[len(self.cases) : stopping.look_after(look)]
             self.cases += more
             self.do(more, pool, tell)
-            hits = sum((self.result(case) or {}).get("outcome") == stopping.outcome for case in self.cases)
-            self.stopped_at = look
-            if stopping.decides(stopping.interval(hits, len(self.cases), look)):
+            if self.settled(stopping, look):
                 break
+
+    def settled(self, stopping: Stopping, look: int) -> bool:
+        """Whether the sample, which is whole up to look number `look`, has told enough."""
+        self.stopped_at = look
+        hits = sum((self.result(case) or {}).get("outcome") == stopping.outcome for case in self.cases)
+        return stopping.decides(stopping.interval(hits, len(self.cases), look))
+
+    def take_known(self) -> None:
+        """The runs decided on that have results, as far as the plan had come when it was left; nothing is run."""
+        plan = self.plan
+        self.cases = []
+        if plan.search:
+            for cases in self.searching(plan.search):
+                self.cases += [case for case in cases if self.result(case) is not None]
+                if any(self.result(case) is None for case in cases):
+                    return
+            return
+        cases = plan.cases()
+        stopping = plan.sample.stopping if plan.sample else None
+        if stopping is not None:
+            for look in range(1, stopping.looks + 1):
+                more = cases[len(self.cases) : stopping.look_after(look)]
+                if any(self.result(case) is None for case in more):
+                    break
+                self.cases += more
+                if self.settled(stopping, look):
+                    return
+        self.cases = [case for case in cases if self.result(case) is not None]
+        self.stopped_at = None if len(self.cases) < len(cases) else self.stopped_at
 
     def do(self, cases: list[Case], pool: Any, tell: Callable[[int, str], None]) -> None:
         """Run those of `cases` whose results are not there."""
@@ -90,7 +119,8 @@ class Campaign:
         requests = []
         for members in groups.values():
             golden = members[0][1].golden()
-            size = min(MOST_IN_A_GROUP, max(1, math.ceil(len(members) / (3 * pool.jobs))))
+            least = min(LEAST_IN_A_GROUP, math.ceil(len(members) / pool.jobs))
+            size = min(MOST_IN_A_GROUP, max(least, math.ceil(len(members) / (3 * pool.jobs))))
             for start in range(0, len(members), size):
                 part = members[start : start + size]
                 requests.append(
@@ -101,6 +131,7 @@ class Campaign:
                         self.plan.watch,
                         healthy[self.healthy_key(golden)]["healthy"],
                         self.version,
+                        self.plan.fault_module,
                     )
                 )
         for result in pool.run(requests):
@@ -148,7 +179,7 @@ class Campaign:
 
     def searching(self, search: Any) -> Iterator[list[Case]]:
         """The runs of a search, round by round: spread over the ranges, then around the worst of each cell."""
-        cells = list(self.cells())
+        cells = self.cells()
         ranges = {name: values for name, values in self.plan.axes.items() if isinstance(values, Range)}
         tried: list[list[tuple[dict[str, float], Case]]] = [[] for _ in cells]
         for number in range(search.rounds + 1):
@@ -158,8 +189,12 @@ class Campaign:
                 if number == 0:
                     points = spread(search.first, list(ranges), stream)
                 else:
-                    worst = max(tried[place], key=lambda each: severity(self.result(each[1]) or {"outcome": "invalid"}))
-                    points = around(worst[0], search.each, FIRST_BOX * NARROWER ** (number - 1), stream)
+                    worst, case = max(
+                        tried[place],
+                        key=lambda each: search.badness(each[0].get(search.least, 0.0), self.result(each[1])),
+                    )
+                    below = search.least if search.hits(self.result(case)) else None
+                    points = around(worst, search.each, FIRST_BOX * NARROWER ** (number - 1), stream, below)
                 for point in points:
                     values = {name: ranges[name].at(share) for name, share in point.items()}
                     case = self.plan.case({name: values.get(name, cell.get(name)) for name in self.plan.axes})
@@ -167,14 +202,9 @@ class Campaign:
                     round_cases.append(case)
             yield round_cases
 
-    def cells(self) -> Iterator[dict[str, Any]]:
+    def cells(self) -> list[dict[str, Any]]:
         """Every combination of what a search does not search over."""
-        lists: dict[str, list[Any] | Range] = {
-            name: values for name, values in self.plan.axes.items() if not isinstance(values, Range)
-        }
-        without = dataclasses.replace(self.plan, axes=lists, search=None)
-        for case in without.census():
-            yield case.axes
+        return list(combinations({name: each for name, each in self.plan.axes.items() if not isinstance(each, Range)}))
 
     def close(self) -> None:
         """Let another one write the results."""
@@ -193,9 +223,13 @@ def spread(count: int, names: list[str], stream: Any) -> list[dict[str, float]]:
     return [{name: columns[name][number] for name in names} for number in range(count)]
 
 
-def around(centre: dict[str, float], count: int, half: float, stream: Any) -> list[dict[str, float]]:
-    """`count` points in a box around `centre`, inside the unit box."""
-    return [
-        {name: min(1.0, max(0.0, share + half * (2.0 * stream.uniform() - 1.0))) for name, share in centre.items()}
-        for _ in range(count)
-    ]
+def around(
+    centre: dict[str, float], count: int, half: float, stream: Any, below: str | None = None
+) -> list[dict[str, float]]:
+    """`count` points in a box around `centre`, inside the unit box; of the axis `below` no more than the centre's."""
+
+    def near(name: str, share: float) -> float:
+        chance = stream.uniform()
+        return min(1.0, max(0.0, share + half * (-chance if name == below else 2.0 * chance - 1.0)))
+
+    return [{name: near(name, share) for name, share in centre.items()} for _ in range(count)]

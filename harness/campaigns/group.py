@@ -9,7 +9,9 @@ before it is paid for once per group; a sweep of settings differs from power-up 
 
 import dataclasses
 import functools
+import hashlib
 import json
+import pathlib
 import sys
 from collections.abc import Callable
 from typing import Any
@@ -31,7 +33,7 @@ from ranger_sim.harness.step_watch import StepWatch
 # Before the fault begins, so that what looks back a little (a delay line, the last edge) has something to look at:
 # chosen by us, a tenth of a step.
 BRANCH_EARLY_NS = 60_000_000
-SLICE_S = 0.25
+SLICE_NS = 250_000_000
 WALL_PER_CPU = 20.0  # a run that got so little of the processor hangs
 
 Result = dict[str, Any]
@@ -76,9 +78,23 @@ class Probe(StepWatch):
             self.robot.loop.watchers.remove(self)
 
 
+def digest_of(path: str) -> str:
+    """Of a file's content. UserError when it cannot be read."""
+    try:
+        return hashlib.blake2b(pathlib.Path(path).read_bytes(), digest_size=16).hexdigest()
+    except OSError as error:
+        raise UserError(f"{path}: {error.strerror}") from None
+
+
 def start_of(fault: str) -> str:
     """When a typed fault begins, as a condition; at once, when it does not say."""
     return typed_text.parse(fault).start or "0 s"
+
+
+def walk_until(robot: Ranger, end_ns: int) -> None:
+    """Pass time until `end_ns`, or until the robot falls."""
+    while robot.loop.time < end_ns and not robot.ended:
+        robot.run(StopRule(time_s=(end_ns - robot.start_ns) * 1e-9), (end_ns - robot.loop.time) * 1e-9)
 
 
 class Golden:
@@ -90,17 +106,19 @@ class Golden:
         probes = {text: Probe(robot, text) for text in sorted(starts)}
         robot.loop.watchers.extend(probes.values())
         self.starts: dict[str, int] = {}
-        end_s = watch.from_s + watch.after_s if not probes else 0.0
+        # Whole nanoseconds: sums of seconds may be a last digit beyond what the clock can reach.
+        after_ns, patience_ns = round(watch.after_s * 1e9), robot.start_ns + round(watch.patience_s * 1e9)
+        end_ns = robot.start_ns + round(watch.from_s * 1e9) + after_ns if not probes else 0
         while not robot.ended:
             met = [probe.met_ns for probe in probes.values()]
             if all(each >= 0 for each in met):
-                end_s = max([end_s, *((each - robot.start_ns) * 1e-9 + watch.after_s for each in met)])
-            elif robot.time_s >= watch.patience_s:
-                end_s = max([end_s, watch.patience_s + watch.after_s])
-            if end_s and robot.time_s >= end_s:
+                end_ns = max([end_ns, *(each + after_ns for each in met)])
+            elif robot.loop.time >= patience_ns:
+                end_ns = max(end_ns, patience_ns + after_ns)
+            if end_ns and robot.loop.time >= end_ns:
                 break
-            target = min(robot.time_s + SLICE_S, end_s) if end_s else robot.time_s + SLICE_S
-            robot.run(StopRule(time_s=target), SLICE_S)
+            target_ns = robot.loop.time + SLICE_NS
+            walk_until(robot, min(target_ns, end_ns) if end_ns else target_ns)
         self.starts = {text: probe.met_ns for text, probe in probes.items()}
         self.record: Record = evidence.record()
         self.digest = robot.trace_digest()
@@ -120,11 +138,18 @@ class Golden:
 def run_group(request: dict[str, Any], emit: Callable[[Result], None]) -> None:
     """Run the cases of a request and `emit` the result of each as soon as it is there.
 
-    request: version, settings of the golden run, watch, healthy (`Healthy.as_dict`), cases: [{key, fault, settings}].
+    request: version, settings of the golden run, watch, healthy (`Healthy.as_dict`), fault_module
+    (name and digest, or None), cases: [{key, fault, settings}].
     UserError when this installation has other sources than the one that asks.
     """
     if request["version"] != version():
         raise UserError(f"campaign: this worker runs {version()}, asked for is {request['version']}")
+    if request.get("fault_module"):
+        name, digest = request["fault_module"]
+        catalogue.load()
+        catalogue.load_file(name)
+        if digest_of(name) != digest:
+            raise UserError(f"campaign: fault module {name}: it is not the file that was asked for")
     watch = Watch.from_dict(request["watch"])
     healthy = Healthy.from_dict(request["healthy"]) if request.get("healthy") else None
     settings = Settings(**request["settings"])
@@ -173,9 +198,7 @@ def fault_run(
     except UserError as refused:
         return {"outcome": "invalid", "why": f"refused: {refused}"}
     start_ns = golden.starts[start_of(text)]
-    end_s = (start_ns - robot.start_ns) * 1e-9 + watch.after_s
-    while robot.time_s < end_s and not robot.ended:
-        robot.run(StopRule(time_s=end_s), end_s)
+    walk_until(robot, start_ns + round(watch.after_s * 1e9))
     record = evidence.record()
     began_ns = fault.activated_ns if fault.activated_ns >= 0 else start_ns
     normal = golden.healthy(healthy, start_ns + round(watch.after_s * 1e9))
@@ -206,18 +229,28 @@ def sweep_run(case: dict[str, Any], golden: Golden, healthy: Healthy | None, wat
     except UserError as refused:
         return {"outcome": "invalid", "why": f"refused: {refused}"}
     evidence = Evidence(robot)
-    end_s = watch.from_s + watch.after_s
-    while robot.time_s < end_s and not robot.ended:
-        robot.run(StopRule(time_s=end_s), end_s)
+    end_ns = robot.start_ns + round(watch.from_s * 1e9) + round(watch.after_s * 1e9)
+    walk_until(robot, end_ns)
     record = evidence.record()
     since_ns = robot.start_ns + round(watch.from_s * 1e9)
-    normal = golden.healthy(healthy, robot.start_ns + round(end_s * 1e9))
+    normal = golden.healthy(healthy, end_ns)
     proof = prove(golden.record, record, robot.start_ns, True, normal)
     return {
         **judged(proof, golden.record, record, since_ns, watch),
+        "slots": slots_of(robot),
         "digest": robot.trace_digest(),
         "cpu_s": round(wallclock.process_cpu_s(), 3),
     }
+
+
+def slots_of(robot: Ranger) -> Result:
+    """{board: {margin, overruns}} since power-up; margin: the share of its slot that the longest one left."""
+    told = {}
+    for board, counted in robot.counters().items():
+        slots = counted.slots
+        slot_cycles = slots.slot_ns * counted.hz * 1e-9
+        told[board] = {"margin": rounded(1.0 - slots.max_cycles / slot_cycles), "overruns": slots.overruns}
+    return told
 
 
 def judged(proof: Proof, golden: Record, record: Record, since_ns: int, watch: Watch) -> Result:
@@ -285,7 +318,13 @@ def healthy_walks(settings: Settings, seeds: list[int], watch: Watch) -> Result:
 
 
 def request_of(
-    cases: list[Case], keys: list[str], golden: Settings, watch: Watch, healthy: dict[str, Any] | None, version: str
+    cases: list[Case],
+    keys: list[str],
+    golden: Settings,
+    watch: Watch,
+    healthy: dict[str, Any] | None,
+    version: str,
+    fault_module: str | None = None,
 ) -> dict[str, Any]:
     """What a worker is asked."""
     return {
@@ -293,6 +332,7 @@ def request_of(
         "settings": golden.as_dict(),
         "watch": watch.as_dict(),
         "healthy": healthy,
+        "fault_module": None if fault_module is None else [fault_module, digest_of(fault_module)],
         "cases": [
             {"key": key, "fault": case.fault, "settings": case.settings.as_dict()}
             for case, key in zip(cases, keys, strict=True)

@@ -17,13 +17,14 @@ from ranger_sim.foundation.quantities import LENGTHS, SHARES, in_base_units, nan
 from ranger_sim.foundation.random_stream import RandomStream
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.campaigns.cases import Case, Settings
-from ranger_sim.harness.campaigns.group import Watch, rounded, start_of
-from ranger_sim.harness.campaigns.outcomes import OUTCOMES, Band
+from ranger_sim.harness.campaigns.group import Watch, digest_of, rounded, start_of
+from ranger_sim.harness.campaigns.outcomes import OUTCOMES, Band, severity
 from ranger_sim.harness.campaigns.statistics import CONFIDENCE, INTERVALS, Stopping
 from ranger_sim.harness.faults import catalogue
 from ranger_sim.harness.scenario import Scenario
 
-TABLES = ("title", "description", "walk", "watch", "band", "healthy", "vary", "faults", "tolerance", "sample", "search")
+TEXTS = ("title", "description", "fault_module")
+TABLES = (*TEXTS, "walk", "watch", "band", "healthy", "vary", "faults", "tolerance", "sample", "search")
 # What may stand in [walk] and, with several values, in [vary]: the field of Scenario, and its units.
 WALK: dict[str, tuple[str, dict[str, float] | None]] = {
     "controller": ("controller", None),
@@ -41,14 +42,33 @@ MOST_RUNS = 1_000_000
 
 @dataclasses.dataclass(frozen=True)
 class Range:
-    """Any number from `low` to `high`, each as likely as the next; `log`: each factor as likely as the next."""
+    """Any number from `low` to `high`, each as likely as the next; `log`: each factor as likely as the next.
+
+    step: only `low`, `low + step` and so on up to `high`; whole numbers when both are whole. None: any number.
+    """
 
     low: float
     high: float
     log: bool = False
+    step: float | None = None
+
+    @property
+    def values(self) -> list[float]:
+        """All values of a range with a step."""
+        assert self.step is not None
+        count = 1 + math.floor((self.high - self.low) / self.step + 1e-9)  # a last one that rounding put beyond
+        return [self.numbered(number) for number in range(count)]
+
+    def numbered(self, number: int) -> float:
+        """Value `number` of a range with a step."""
+        assert self.step is not None
+        value = self.low + number * self.step
+        return value if isinstance(value, int) else float(f"{value:.6g}")
 
     def at(self, share: float) -> float:
-        """The value at a share 0-1 of the way, with six digits."""
+        """The value at a share 0-1 of the way, with six digits; of a range with a step one of its values."""
+        if self.step is not None:
+            return self.numbered(min(len(self.values) - 1, int(share * len(self.values))))
         if self.log:
             value = self.low * (self.high / self.low) ** share
         else:
@@ -57,7 +77,8 @@ class Range:
 
     def text(self) -> str:
         """For people."""
-        return f"{self.low:g} to {self.high:g}" + (", by factors" if self.log else "")
+        told = f"{self.low:g} to {self.high:g}"
+        return told + (f" by {self.step:g}" if self.step is not None else ", by factors" if self.log else "")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -83,12 +104,29 @@ class Sample:
 
 @dataclasses.dataclass(frozen=True)
 class Search:
-    """For the worst case: `first` runs spread over the ranges, then `rounds` of `each` around the worst so far."""
+    """For the worst case: `first` runs spread over the ranges, then `rounds` of `each` around the worst so far.
+
+    least: the range whose smallest value with this `outcome` is looked for; None: what is worse by `severity`.
+    """
 
     first: int = 12
     rounds: int = 4
     each: int = 6
     seed: int = 1
+    least: str | None = None
+    outcome: str = "fall"
+
+    def hits(self, result: dict[str, Any] | None) -> bool:
+        """Whether a run came to the outcome; a robot that fell after damage fell."""
+        if result is None:
+            return False
+        return bool(result["outcome"] == self.outcome or (self.outcome == "fall" and result.get("fall_ms") is not None))
+
+    def badness(self, value: float, result: dict[str, Any] | None) -> tuple[float, float]:
+        """By this runs are ordered, the worst last. `value`: of the range `least`, as a share of its length."""
+        if self.least is not None and self.hits(result):
+            return 1.0, -value
+        return 0.0, severity(result or {"outcome": "invalid"})
 
 
 @dataclasses.dataclass(frozen=True)
@@ -105,6 +143,7 @@ class Plan:
     tolerances: tuple[Tolerance, ...] = ()
     sample: Sample | None = None
     search: Search | None = None
+    fault_module: str | None = None  # a user's file of modes and places
 
     @property
     def name(self) -> str:
@@ -120,6 +159,8 @@ class Plan:
         """What of the watching decides results."""
         found = self.watch.as_dict()
         del found["limit_s"]
+        if self.fault_module is not None:
+            found["fault_module"] = digest_of(self.fault_module)
         return {**found, "healthy_seeds": list(self.healthy_seeds)}
 
     def population(self) -> str:
@@ -155,9 +196,8 @@ class Plan:
 
     def census(self) -> Iterator[Case]:
         """Every combination of the axes' values."""
-        names = list(self.axes)
-        for values in itertools.product(*self.axes.values()):  # type: ignore[arg-type]
-            yield self.case(dict(zip(names, values, strict=True)))
+        for point in combinations(self.axes):
+            yield self.case(point)
 
     def drawn(self) -> Iterator[Case]:
         """The runs of a sample, in the order in which they were drawn, with replacement."""
@@ -169,6 +209,13 @@ class Plan:
     def cases(self) -> list[Case]:
         """All runs that are known before any has run; those of a search come later."""
         return list(self.drawn() if self.sample else self.census())
+
+
+def combinations(axes: dict[str, list[Any] | Range]) -> Iterator[dict[str, Any]]:
+    """Every combination of the values of lists, and of ranges with a step."""
+    lists = [each.values if isinstance(each, Range) else each for each in axes.values()]
+    for values in itertools.product(*lists):
+        yield dict(zip(axes, values, strict=True))
 
 
 def drawn(values: list[Any] | Range, stream: Any) -> Any:
@@ -212,6 +259,7 @@ def load(name: str | pathlib.Path) -> Plan:
 def of_data(data: dict[str, Any], path: str) -> Plan:
     """The plan in a file's content."""
     only(data, TABLES, path)
+    module = module_of(data, path)
     walk = table(data, "walk", path)
     only(walk, tuple(WALK), f"{path}: [walk]")
     fields = {WALK[name][0]: walk_value(name, value, path) for name, value in walk.items()}
@@ -225,11 +273,19 @@ def of_data(data: dict[str, Any], path: str) -> Plan:
     if sample and search:
         raise UserError(f"{path}: [sample] and [search]: one of them, or neither for a census")
     ranges = [name for name, values in axes.items() if isinstance(values, Range)]
-    if ranges and not (sample or search):
-        raise UserError(f"{path}: [vary] {ranges[0]}: a range needs [sample] or [search]; a census takes a list")
+    free = [name for name in ranges if axes[name].step is None]  # type: ignore[union-attr]
+    if free and not (sample or search):
+        raise UserError(
+            f"{path}: [vary] {free[0]}: a range needs [sample] or [search]; a census takes a list, or a range with step"
+        )
     if search and not ranges:
         raise UserError(f"{path}: [search]: at least one range in [vary] is expected, for instance start and magnitude")
-    runs = math.prod(len(values) for values in axes.values() if not isinstance(values, Range))
+    if search and search.least is not None and search.least not in ranges:
+        raise UserError(
+            f"{path}: [search] least = {search.least!r}: one of the ranges is expected, {', '.join(ranges)}"
+        )
+    stepped = [] if sample or search else [len(axes[name].values) for name in ranges]  # type: ignore[union-attr]
+    runs = math.prod([len(each) for each in axes.values() if not isinstance(each, Range)] + stepped)
     if runs > MOST_RUNS or (sample is None and search is None and runs == 0):
         raise UserError(f"{path}: {runs} runs, allowed are 1 to {MOST_RUNS}")
     healthy = table(data, "healthy", path)
@@ -248,9 +304,26 @@ def of_data(data: dict[str, Any], path: str) -> Plan:
         tolerances=tuple(tolerances_of(data, path)),
         sample=sample,
         search=search,
+        fault_module=module,
     )
     check_cases(plan)
     return plan
+
+
+def module_of(data: dict[str, Any], path: str) -> str | None:
+    """`fault_module`, a file beside the plan: its modes and places are in the catalogue from here on."""
+    name = data.get("fault_module")
+    if name is None:
+        return None
+    if not isinstance(name, str) or not name:
+        raise UserError(f"{path}: fault_module = {name!r}: the name of a .py file is expected, relative to the plan")
+    found = (pathlib.Path(path).parent / name).resolve()
+    catalogue.load()
+    try:
+        catalogue.load_file(found)
+    except UserError as error:
+        raise UserError(f"{path}: {error}") from None
+    return str(found)
 
 
 def check_cases(plan: Plan) -> None:
@@ -311,18 +384,32 @@ def flattened(values: dict[str, Any], before: str = "") -> dict[str, Any]:
 def values_of(name: str, values: Any, path: str) -> list[Any] | Range:
     """The values of one axis."""
     if isinstance(values, dict):
-        only(values, ("low", "high", "log"), f"{path}: [vary] {name}")
-        low, high, log = values["low"], values["high"], bool(values.get("log", False))
-        numbers = all(isinstance(each, int | float) and not isinstance(each, bool) for each in (low, high))
-        if not numbers or not low < high or (log and low <= 0.0):
-            raise UserError(
-                f"{path}: [vary] {name} = {low!r} to {high!r}: low below high" + (", above 0" if log else "")
-            )
-        return Range(float(low), float(high), log)
+        return range_of(name, values, path)
     listed = values if isinstance(values, list) else [values]
     if not listed or not all(isinstance(each, str | int | float) for each in listed):
         raise UserError(f"{path}: [vary] {name} = {values!r}: a list of values, or {{ low, high }}, is expected")
     return listed
+
+
+def range_of(name: str, values: dict[str, Any], path: str) -> Range:
+    """{ low, high, log } or { low, high, step }, with the units that [walk] takes."""
+    where = f"{path}: [vary] {name}"
+    only(values, ("low", "high", "log", "step"), where)
+    values = {key: walk_value(name, value, path) if name in WALK else value for key, value in values.items()}
+    low, high = values["low"], values["high"]
+    log, step = bool(values.get("log", False)), values.get("step")
+    if not (number(low) and number(high)) or not low < high or (log and low <= 0.0):
+        raise UserError(f"{where} = {low!r} to {high!r}: low below high" + (", above 0" if log else ""))
+    if step is None:
+        return Range(float(low), float(high), log)
+    if log or not number(step) or not 0.0 < step <= high - low or (high - low) / step >= MOST_RUNS:
+        raise UserError(f"{where}: step = {step!r}: above 0 and at most high - low is expected, without log")
+    return Range(low, high, False, step)
+
+
+def number(value: Any) -> bool:
+    """Whether a value of a file is a number."""
+    return isinstance(value, int | float) and not isinstance(value, bool)
 
 
 def faults_of(group: Any, path: str) -> Iterator[str]:
@@ -431,12 +518,19 @@ def search_of(data: dict[str, Any], path: str) -> Search | None:
         return None
     found = table(data, "search", path)
     where = f"{path}: [search]"
-    only(found, ("first", "rounds", "each", "seed"), where)
+    only(found, ("first", "rounds", "each", "seed", "least", "outcome"), where)
+    least, outcome = found.get("least"), found.get("outcome", "fall")
+    if outcome not in OUTCOMES:
+        raise UserError(f"{where}: outcome = {outcome!r}: allowed are {', '.join(OUTCOMES)}")
+    if "outcome" in found and least is None:
+        raise UserError(f"{where}: outcome = {outcome!r}: it needs `least`, the range whose smallest value is wanted")
     return Search(
         whole(found, "first", where, 12, 1, 100_000),
         whole(found, "rounds", where, 4, 0, 1000),
         whole(found, "each", where, 6, 1, 100_000),
         whole(found, "seed", where, 1, -(2**63), 2**63),
+        least,
+        outcome,
     )
 
 

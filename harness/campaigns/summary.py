@@ -10,7 +10,7 @@ from typing import Any
 from ranger_sim.harness.campaigns.cases import Case
 from ranger_sim.harness.campaigns.engine import Campaign
 from ranger_sim.harness.campaigns.outcomes import CRITERIA, OUTCOMES, SEVERITY, severity
-from ranger_sim.harness.campaigns.plan import WALK, Plan, Tolerance
+from ranger_sim.harness.campaigns.plan import WALK, Plan, Range, Tolerance
 from ranger_sim.harness.campaigns.statistics import (
     INTERVALS,
     Share,
@@ -21,6 +21,7 @@ from ranger_sim.harness.campaigns.statistics import (
 from ranger_sim.harness.faults import text as typed_text
 
 WORST = 20  # cases that are listed
+MOST_SETTINGS = 200  # of a sweep that are listed
 PROVES_NOTHING = ("invalid", "timed out", "crashed")
 SAFE = ("no effect", "masked", "detected and safe")
 
@@ -72,8 +73,11 @@ def of(campaign: Campaign) -> dict[str, Any]:
             for result in campaign.healthy_results()
         ],
         "axes": {name: by_axis(rows, name) for name in plan.axes if name != "fault" and varies(rows, name)},
+        "axis_names": [name for name in plan.axes if name != "fault"],
         "heat": heat(rows),
         "codes": codes(felt),
+        "settings": settings_table(plan, rows),
+        "extremes": extremes(plan, rows),
         "worst": [worst_row(plan, row) for row in worst(valid)],
         "unsure": [worst_row(plan, row) for row in rows if row[1]["outcome"] in PROVES_NOTHING],
         "cpu_s": round(sum((result.get("spent") or {}).get("cpu_s") or 0.0 for _, result in rows), 1),
@@ -183,6 +187,62 @@ def heat(rows: Sequence[Row]) -> dict[str, Any]:
     return {"places": list(cells), "modes": modes, "cells": cells}
 
 
+def settings_table(plan: Plan, rows: Sequence[Row]) -> list[dict[str, Any]]:
+    """Of a sweep that is a census, each run: settings, outcome, gait, and the slot with the least margin."""
+    if plan.design != "census" or len(rows) > MOST_SETTINGS:
+        return []
+    return [
+        {
+            "axes": case.axes,
+            "outcome": result["outcome"],
+            "why": result.get("why", ""),
+            "gait": result.get("gait") or {},
+            "slot": least_slot(result),
+        }
+        for case, result in rows
+        if not case.fault
+    ]
+
+
+def least_slot(result: Result) -> dict[str, Any]:
+    """{board, margin, overruns}: of the board whose longest slot left least, and the overruns of all boards."""
+    slots = result.get("slots")
+    if not slots:
+        return {"board": "", "margin": None, "overruns": None}
+    board = min(slots, key=lambda name: slots[name]["margin"])
+    overruns = sum(each["overruns"] for each in slots.values())
+    return {"board": board, "margin": slots[board]["margin"], "overruns": overruns}
+
+
+def extremes(plan: Plan, rows: Sequence[Row]) -> list[dict[str, Any]]:
+    """Of a search, for each listed combination: how many came to the outcome, the least value, the soonest fall."""
+    if plan.search is None:
+        return []
+    search = plan.search
+    ranges = [name for name, values in plan.axes.items() if isinstance(values, Range)]
+    of_cell: dict[str, list[Row]] = {}
+    for case, result in {result["key"]: (case, result) for case, result in rows}.values():
+        cell = ", ".join(f"{name} {value}" for name, value in case.axes.items() if name not in ranges)
+        of_cell.setdefault(cell, []).append((case, result))
+    found = []
+    for cell, members in of_cell.items():
+        hits = [row for row in members if search.hits(row[1])]
+        falls = [row for row in members if row[1].get("fall_ms") is not None]
+        least = min(hits, key=lambda row: row[0].axes[str(search.least)], default=None) if search.least else None
+        soonest = min(falls, key=lambda row: row[1]["fall_ms"], default=None)
+        found.append(
+            {
+                "cell": cell,
+                "runs": len(members),
+                "outcome": search.outcome,
+                "hits": len(hits),
+                "least": least and worst_row(plan, least),
+                "soonest": soonest and worst_row(plan, soonest),
+            }
+        )
+    return found
+
+
 def worst_of(outcomes: Sequence[str]) -> str:
     """The worst of several outcomes."""
     return max(outcomes, key=lambda each: (SEVERITY[each], OUTCOMES.index(each)))
@@ -212,7 +272,8 @@ def codes(felt: Sequence[Row]) -> list[dict[str, Any]]:
 
 def worst(valid: Sequence[Row]) -> list[Row]:
     """The worst cases, worst first; what falls fastest before what falls later."""
-    bad = [row for row in valid if SEVERITY[row[1]["outcome"]] >= SEVERITY["degraded gait"]]
+    once = {result["key"]: (case, result) for case, result in valid}.values()  # a search may come to a point again
+    bad = [row for row in once if SEVERITY[row[1]["outcome"]] >= SEVERITY["degraded gait"]]
     return sorted(bad, key=lambda row: -severity(row[1]))[:WORST]
 
 
@@ -237,6 +298,8 @@ def replay(plan: Plan, row: Row) -> str:
     if not case.fault or case.settings.controller or case.settings.body or case.settings.costs:
         return f"ranger-sim campaign {shlex.quote(plan.path)} --replay {result['key']}"
     parts = ["ranger-sim", "walk", "--fault", case.fault]
+    if plan.fault_module is not None:
+        parts += ["--fault-module", plan.fault_module]
     options = {"slope_rad": "--slope", "floor_roughness_m": "--floor-roughness", "model_file": "--model"}
     for name, (field, _) in WALK.items():
         value = case.settings.walk.get(field)
@@ -276,6 +339,8 @@ def flat(plan: Plan, row: Row) -> dict[str, Any]:
         "fall_ms": result.get("fall_ms"),
         "deviation": result.get("deviation"),
         **(result.get("gait") or {}),
+        **{f"{board}_slot_margin": each["margin"] for board, each in (result.get("slots") or {}).items()},
+        **{f"{board}_overruns": each["overruns"] for board, each in (result.get("slots") or {}).items()},
         "digest": (result.get("digest") or "")[:16],
         "replay": replay(plan, row),
     }

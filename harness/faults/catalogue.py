@@ -23,7 +23,9 @@ Kind = TypeVar("Kind", bound=Fault)
 PLACES: dict[str, Place] = {}
 # by (kind of place, name of the mode)
 MODES: dict[tuple[str, str], type[Fault]] = {}
-# The same, of modes that a kind of place does not take for a reason of its own.
+# Files of users that have been run.
+FILES: set[pathlib.Path] = set()
+# The same as MODES, of modes that a kind of place does not take for a reason of its own.
 REASONS: dict[tuple[str, str], str] = {}
 
 
@@ -34,10 +36,16 @@ def load() -> None:
 
 
 def load_file(name: str | pathlib.Path) -> None:
-    """Run a user's .py file, which puts modes and places here. UserError when it cannot be read, or does not run."""
+    """Run a user's .py file, which puts modes and places here. UserError when it cannot be read, or does not run.
+
+    A second call with the same file does nothing: several plans of one process may name it.
+    """
     path = pathlib.Path(name)
     if not path.is_file():
         raise UserError(f"fault module {path}: there is no such file")
+    whole = path.resolve()
+    if whole in FILES:
+        return
     spec = importlib.util.spec_from_file_location(f"ranger_sim_fault_module_{path.stem}", path)
     if spec is None or spec.loader is None:
         raise UserError(f"fault module {path}: it is no Python file (.py)")
@@ -48,6 +56,7 @@ def load_file(name: str | pathlib.Path) -> None:
         raise
     except Exception as error:  # whatever a user's program raises
         raise UserError(f"fault module {path}: {type(error).__name__}: {error}") from error
+    FILES.add(whole)
 
 
 def add_places(places: Iterable[Place]) -> None:

@@ -55,6 +55,9 @@ def render(told: dict[str, Any]) -> str:
         colours=COLOURS,
         criteria=CRITERIA,
         heat_html=Markup(heat_map(heat)) if heat["places"] else "",
+        extremes=[extremes_text(each) for each in told["extremes"]],
+        setting_columns=SETTING_COLUMNS,
+        settings=[(list(each["axes"].values()), setting_cells(each)) for each in told["settings"]],
         times_html=Markup(times(told["rows"])) if any(row["detection_ms"] is not None for row in told["rows"]) else "",
         plotly_js=Markup(get_plotlyjs()),
     )
@@ -186,6 +189,19 @@ def markdown(told: dict[str, Any]) -> str:
         for each in told["codes"]:
             told_first = f"{each['first']} | {each['own_board']} | {each['median_ms']:.4g} ms"
             lines.append(f"| {each['code']} | {each['board']} | {told_first} |")
+    if told["stopped_at_look"] is not None and told["runs"] < told["foreseen"]:
+        lines += ["", f"Stopped early, at look {told['stopped_at_look']}: {told['runs']} of {told['foreseen']} runs."]
+    for each in told["extremes"]:
+        lines += ["", extremes_text(each)]
+    if told["settings"]:
+        axes = list(told["settings"][0]["axes"])
+        lines += ["", "## Settings", ""]
+        lines += [
+            "| " + " | ".join([*axes, *SETTING_COLUMNS]) + " |",
+            "|---" * (len(axes) + len(SETTING_COLUMNS)) + "|",
+        ]
+        lines += [f"| {' | '.join([str(each['axes'][name]) for name in axes] + setting_cells(each))} |"
+                  for each in told["settings"]]  # fmt: skip
     for title, name in (("Worst cases", "worst"), ("Runs that prove nothing", "unsure")):
         if told[name]:
             lines += ["", f"## {title}", "", "| Outcome | Fault | Why | Detected | Again |", "|---|---|---|---|---|"]
@@ -196,6 +212,33 @@ def markdown(told: dict[str, Any]) -> str:
                 fault = each["fault"] or ", ".join(f"{key} {value}" for key, value in each["axes"].items())
                 lines.append(f"| {each['outcome']} | {fault} | {why} | {detected} | `{each['replay']}` |")
     return "\n".join(lines) + "\n"
+
+
+SETTING_COLUMNS = ("outcome", "why", "step length", "step time", "motor power", "least slot margin", "overruns")
+
+
+def setting_cells(each: dict[str, Any]) -> list[str]:
+    """A line of the table of settings, after the settings themselves."""
+
+    def of_gait(name: str, unit: str) -> str:
+        value = each["gait"].get(name)
+        return "" if value is None else f"{value:.3g} {unit}"
+
+    slot = each["slot"]
+    margin = "" if slot["margin"] is None else f"{100.0 * slot['margin']:.1f} % ({slot['board']})"
+    gait = [of_gait("step_length_m", "m"), of_gait("step_time_s", "s"), of_gait("motor_power_W", "W")]
+    return [each["outcome"], each["why"], *gait, margin, "" if slot["overruns"] is None else str(slot["overruns"])]
+
+
+def extremes_text(each: dict[str, Any]) -> str:
+    """What a search found for one listed combination, in a sentence."""
+    parts = [f"{each['cell'] or 'Search'}: {each['hits']} of {each['runs']} runs came to {each['outcome']}"]
+    for what in ("least", "soonest"):
+        if (found := each[what]) is not None:
+            values = ", ".join(f"{name} {value}" for name, value in found["axes"].items())
+            after = "" if found["fall_ms"] is None else f", fell after {found['fall_ms']:.0f} ms"
+            parts.append(f"{what} {values}{after}")
+    return "; ".join(parts) + "."
 
 
 def tolerance_text(each: dict[str, Any]) -> str:

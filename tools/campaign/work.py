@@ -18,7 +18,6 @@ from ranger_sim import loading
 from ranger_sim.foundation import wallclock
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.campaigns import engine, group, plan, pools, summary
-from ranger_sim.harness.campaigns.cases import Case
 from ranger_sim.tools import terminal
 from ranger_sim.tools.campaign import page
 from ranger_sim.tools.campaign.words import proof_text
@@ -44,7 +43,7 @@ def run(options: argparse.Namespace) -> int:
         if not loading.RUNS_COMPILED:
             console.print(f"running interpreted, slowly: {loading.RUNS_INTERPRETED_BECAUSE}", soft_wrap=True)
         if options.report:
-            campaign.cases = decided(campaign)
+            campaign.take_known()
         else:
             work(campaign, options, console)
         told = summary.of(campaign)
@@ -56,18 +55,6 @@ def run(options: argparse.Namespace) -> int:
         return EXIT_UNSURE if any(told["outcomes"][name]["count"] for name in ("crashed", "timed out")) else 0
     finally:
         campaign.close()
-
-
-def decided(campaign: engine.Campaign) -> list[Case]:
-    """The runs of the plan that have results, of a search round by round as far as it came."""
-    if campaign.plan.search is None:
-        return [case for case in campaign.plan.cases() if campaign.result(case) is not None]
-    cases: list[Case] = []
-    for round_cases in campaign.searching(campaign.plan.search):
-        cases += [case for case in round_cases if campaign.result(case) is not None]
-        if any(campaign.result(case) is None for case in round_cases):
-            break
-    return cases
 
 
 def pool_of(options: argparse.Namespace) -> Any:
@@ -171,7 +158,8 @@ def show(told: dict[str, Any], console: Console) -> None:
 
 def replay(campaign: engine.Campaign, key: str) -> int:
     """One case again, from power-up, and whether it comes out as it is on the disk."""
-    for case in decided(campaign) or campaign.plan.cases():
+    campaign.take_known()
+    for case in campaign.cases or ([] if campaign.plan.search else campaign.plan.cases()):
         if campaign.key(case).startswith(key):
             known = campaign.result(case)
             result = group.alone(case, campaign.plan.watch, campaign.healthy_of(case))

@@ -78,6 +78,32 @@ def test_a_range_by_factors_has_its_middle_at_the_geometric_mean():
     assert plan.Range(-1.0, 3.0).at(0.25) == 0.0
 
 
+def test_a_range_with_a_step_has_these_values_and_no_other_and_a_census_takes_it():
+    found = plan.Range(20, 60, step=10)
+    assert found.values == [20, 30, 40, 50, 60]
+    assert [found.at(share) for share in (0.0, 0.19, 0.2, 0.99, 1.0)] == [20, 20, 30, 60, 60]
+    assert plan.Range(0.1, 0.35, step=0.1).values == [0.1, 0.2, 0.3]
+    cases = made(vary={"seed": {"low": 1, "high": 3, "step": 1}, "slope": {"low": "0 deg", "high": 0.1, "step": 0.05}})
+    assert [(case.settings.walk["seed"], case.settings.walk["slope_rad"]) for case in cases.cases()] == [
+        (seed, slope) for seed in (1, 2, 3) for slope in (0.0, 0.05, 0.1)
+    ]
+
+
+def test_for_the_least_value_a_smaller_one_with_the_outcome_is_worse_and_any_other_outcome_is_not():
+    search = plan.Search(least="force")
+    fall, damage = {"outcome": "fall", "fall_ms": 900.0}, {"outcome": "damage", "fall_ms": None}
+    fell_damaged = {"outcome": "damage", "fall_ms": 500.0}
+    order = [(0.1, None), (0.1, damage), (0.9, fall), (0.5, fell_damaged), (0.4, fall)]
+    found = [search.badness(value, result) for value, result in order]
+    assert found == sorted(found) and len(set(found)) == len(found)
+
+
+def test_around_the_least_value_no_larger_one_is_tried():
+    points = around({"force": 0.5, "at": 0.5}, 200, 0.2, RandomStream(1, "test"), "force")
+    assert 0.3 <= min(point["force"] for point in points) < 0.31 < 0.49 < max(point["force"] for point in points) <= 0.5
+    assert max(point["at"] for point in points) > 0.6
+
+
 def test_the_first_round_of_a_search_has_one_point_in_each_part_of_every_range():
     points = spread(8, ["start", "magnitude"], RandomStream(1, "test"))
     for name in ("start", "magnitude"):
@@ -115,6 +141,14 @@ def test_later_rounds_stay_near_the_worst_point_and_inside_the_ranges():
         ({"healthy": {"seeds": [1]}, "vary": {"seed": [1]}}, "two or more whole numbers"),
         ({"tolerance": {"detecting": {"within": "1 ms"}}, "vary": {"seed": [1]}}, "allowed are detection, reaction"),
         ({"faults": [{"places": "XYZ*"}]}, "no place and mode fit"),
+        ({"vary": {"slope": {"low": 0.0, "high": 0.1, "step": 0.2}}}, "at most high - low"),
+        (
+            {"vary": {"slope": {"low": 0.0, "high": 0.1}}, "search": {"least": "seed"}},
+            "one of the ranges is expected, slope",
+        ),
+        ({"vary": {"slope": {"low": 0.0, "high": 0.1}}, "search": {"outcome": "fall"}}, "needs `least`"),
+        ({"fault_module": "none.py", "vary": {"seed": [1]}}, "none.py: there is no such file"),
+        ({"fault_module": 3, "vary": {"seed": [1]}}, "relative to the plan"),
         ({"whatever": 1}, "unknown key 'whatever'"),
     ],
 )
