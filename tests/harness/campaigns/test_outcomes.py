@@ -29,7 +29,7 @@ def differing():
 
 
 def with_error(run):
-    run.errors = errors((1010, "MCFO", error_table.AE_SPIKE, 1))
+    run.errors = errors((1010, "MCFO", error_table.MCFO_CBL_STRCH, 1))
     return run
 
 
@@ -51,12 +51,12 @@ def test_a_difference_without_error_and_with_the_same_gait_is_masked():
 
 
 def test_an_error_with_the_same_gait_is_detected_and_safe():
-    assert judged(with_error(differing())) == ("detected and safe", "AE_SPIKE from MCFO")
+    assert judged(with_error(differing())) == ("detected and safe", "MCFO_CBL_STRCH from MCFO")
 
 
 def test_an_error_and_another_gait_is_a_degraded_gait():
     outcome, why = judged(with_error(with_short_steps(differing())))
-    assert outcome == "degraded gait" and why == "step length -20 %; AE_SPIKE from MCFO"
+    assert outcome == "degraded gait" and why == "step length -20 %; MCFO_CBL_STRCH from MCFO"
 
 
 def test_another_gait_without_an_error_is_undetected_wrong():
