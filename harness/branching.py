@@ -8,7 +8,6 @@ import contextlib
 import json
 import os
 import resource
-import select
 import signal
 import sys
 import traceback
@@ -16,7 +15,7 @@ import warnings
 from collections.abc import Callable
 from typing import Any
 
-from ranger_sim.foundation import wallclock
+from ranger_sim.foundation import descriptors, wallclock
 
 CHUNK = 1 << 16
 
@@ -95,7 +94,7 @@ def _read(pipe: int, deadline_s: float) -> bytes | None:
     parts: list[bytes] = []
     while True:
         left = deadline_s - wallclock.monotonic_s()
-        if left <= 0.0 or not select.select([pipe], [], [], left)[0]:
+        if left <= 0.0 or not descriptors.wait([pipe], [], left)[0]:
             return None
         part = os.read(pipe, CHUNK)
         if not part:

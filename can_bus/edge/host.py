@@ -1,10 +1,9 @@
 """A host of private buses: passes their time and looks after who attaches, in one thread and without busy waiting."""
 
-import select
 from typing import Any
 
 from ranger_sim.can_bus.edge.paced import PacedBus
-from ranger_sim.foundation import wallclock
+from ranger_sim.foundation import descriptors, wallclock
 from ranger_sim.foundation.events import NEVER
 
 LONGEST_NAP_S = 1.0  # so that an interrupt by the user is never late; chosen by us
@@ -41,7 +40,7 @@ class BusHost:
             nap = min(nap, self.buses[0].seconds_until(due))
         readable = [fd for server in self.servers for fd in server.filenos()]
         writable = [fd for server in self.servers for fd in server.filenos_to_write()]
-        select.select(readable, writable, [], nap)
+        descriptors.wait(readable, writable, nap)
 
     def close(self) -> None:
         """End every server."""

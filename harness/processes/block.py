@@ -51,6 +51,13 @@ class Block:
         self.ask_descriptor = os.eventfd(0, os.EFD_CLOEXEC)
         self.answer_descriptor = os.eventfd(0, os.EFD_CLOEXEC)
 
+    def close(self) -> None:
+        """Close this process's ends of the bells; none of them may be rung or waited for after this."""
+        for descriptor in (self.ask_descriptor, self.answer_descriptor):
+            if descriptor >= 0:
+                os.close(descriptor)
+        self.ask_descriptor = self.answer_descriptor = -1
+
     def check(self, place: int) -> None:
         """UserError when the header is not that of board `place` in this version."""
         expected = {

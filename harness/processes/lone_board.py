@@ -5,10 +5,10 @@ Nobody supervises it, so who waits for its answer watches its process as well, a
 
 import gc
 import os
-import select
 import signal
 from typing import Any
 
+from ranger_sim.foundation import descriptors
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness import wiring
 from ranger_sim.harness.processes import board_process, kernel, places
@@ -47,7 +47,7 @@ class LoneBoard:
         """Ask the board and wait for its answer; UserError when it has ended instead, or does not answer."""
         self._ring(command, until)
         answer = self.block.answer_descriptor
-        ready = select.select([answer, self.watch], [], [], self.patience_s)[0]
+        ready = descriptors.wait([answer, self.watch], [], self.patience_s)[0]
         if answer in ready:
             os.eventfd_read(answer)
         elif ready:
@@ -62,7 +62,7 @@ class LoneBoard:
         """Tell its process to end, and return the exit code; UserError when it does not end."""
         if self.code is None:
             self._ring(places.COMMAND_STOP, 0)
-            if not select.select([self.watch], [], [], self.patience_s)[0]:
+            if not descriptors.wait([self.watch], [], self.patience_s)[0]:
                 self._hangs("no end")
         return self._reap()
 
@@ -72,6 +72,7 @@ class LoneBoard:
             os.kill(self.process, signal.SIGKILL)
         self._reap()
         os.close(self.watch)
+        self.block.close()
 
     def _ring(self, command: int, until: int) -> None:
         self.words[places.COMMAND] = command

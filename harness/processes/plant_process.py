@@ -1,7 +1,6 @@
 """What runs in the plant's process: the lockstep, released by the wall clock, with boards that live elsewhere."""
 
 import json
-import select
 import socket
 import struct
 from collections.abc import Callable
@@ -9,7 +8,7 @@ from typing import Any
 
 from ranger_sim.datatable.generated import all_variables
 from ranger_sim.datatable.packing import word_of_value
-from ranger_sim.foundation import wallclock
+from ranger_sim.foundation import descriptors, wallclock
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness import wiring
 from ranger_sim.harness.processes import kernel, places
@@ -92,7 +91,7 @@ class PlantRun:
             for each in ends:
                 read += each.filenos()
                 write += each.filenos_to_write() if hasattr(each, "filenos_to_write") else []
-            ready, writable, _ = select.select(read, write, [], max(0.0, end - now))
+            ready, writable = descriptors.wait(read, write, end - now)
             if read[0] in ready:
                 self.hear()
                 return
@@ -100,7 +99,7 @@ class PlantRun:
             if writable or ready:
                 self.robot.poll_now()
                 # what an end cannot take in at this instant of virtual time stays there: no spinning on it
-                if select.select(read[:1], [], [], min(NAP_S, max(0.0, end - now)))[0]:
+                if descriptors.wait(read[:1], [], min(NAP_S, end - now))[0]:
                     self.hear()
                     return
                 now = wallclock.monotonic_s()

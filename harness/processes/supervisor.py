@@ -10,7 +10,6 @@ import dataclasses
 import gc
 import json
 import os
-import select
 import signal
 import socket
 import sys
@@ -18,7 +17,7 @@ import warnings
 from collections.abc import Callable, Iterator
 from typing import Any
 
-from ranger_sim.foundation import wallclock
+from ranger_sim.foundation import descriptors, wallclock
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness import wiring
 from ranger_sim.harness.processes import board_process, kernel, places, plant_process
@@ -186,10 +185,18 @@ class Supervisor:
             finally:
                 self.view.close()
                 self.kill_all()
-                self.control.close()
+                self.close()
         if self.failure:
             raise UserError(self.failure)
         return self.exit_code
+
+    def close(self) -> None:
+        """Close what leads to clients and children; the children have ended."""
+        self.control.close()
+        for each in (self.link, self.plant_link, self.wakeup_read, self.wakeup_write):
+            each.close()
+        for block in self.blocks.values():
+            block.close()
 
     @contextlib.contextmanager
     def signals_noted(self) -> Iterator[None]:
@@ -235,7 +242,7 @@ class Supervisor:
     def turn(self) -> None:
         """Wait for something to happen, or a fifth of a second, and see to it."""
         read = [self.wakeup_read.fileno(), self.link.fileno(), *self.control.filenos()]
-        ready, _, _ = select.select(read, [], [], LOOK_S)
+        ready, _ = descriptors.wait(read, [], LOOK_S)
         if self.wakeup_read.fileno() in ready:
             with contextlib.suppress(BlockingIOError):
                 while self.wakeup_read.recv(4096):

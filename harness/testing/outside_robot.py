@@ -6,14 +6,13 @@ still, and frames from outside wait in the interface.
 
 from __future__ import annotations
 
-import select
 import socket
 from pathlib import Path
 from typing import Any
 
 from ranger_sim.boards.quirks import Quirks
 from ranger_sim.firmware_sim.board import Board
-from ranger_sim.foundation import wallclock
+from ranger_sim.foundation import descriptors, wallclock
 from ranger_sim.foundation.events import NEVER
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness import wiring
@@ -106,9 +105,9 @@ class OutsideRobot(Ranger):
 
     def _wait(self, due_s: float) -> None:
         """Until the wall clock is there; what comes from outside meanwhile is read at once."""
-        descriptors = [number for end in self.polled for number in end.filenos()]
+        numbers = [number for end in self.polled for number in end.filenos()]
         while (left := due_s - wallclock.monotonic_s()) > 0.0:
-            if select.select(descriptors, [], [], min(left, SLICE_S))[0]:
+            if descriptors.wait(numbers, [], min(left, SLICE_S))[0]:
                 self.poll_now()
 
     def summary(self) -> dict:

@@ -11,7 +11,6 @@ from __future__ import annotations
 import contextlib
 import gc
 import os
-import select
 import signal
 import sys
 import warnings
@@ -20,6 +19,7 @@ from typing import Any, NoReturn
 
 from ranger_sim.boards.counters import RangerCounters
 from ranger_sim.boards.quirks import Quirks
+from ranger_sim.foundation import descriptors
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness import wiring
 from ranger_sim.harness.conditions import Condition, ErrorNoted, condition
@@ -167,7 +167,7 @@ class Processes:
         open_watches = {descriptor: name for name, descriptor in self.watches.items()}
         turns: dict[str, int] = {}
         while open_watches:
-            ready, _, _ = select.select(list(open_watches), [], [], PATIENCE_S)
+            ready, _ = descriptors.wait(list(open_watches), [], PATIENCE_S)
             for descriptor in ready:
                 block = self.blocks[open_watches.pop(descriptor)]
                 block.words[places.FATE] = places.GONE
@@ -225,6 +225,8 @@ class Processes:
         self.children.clear()
         for descriptor in self.watches.values():
             os.close(descriptor)
+        for block in self.blocks.values():
+            block.close()
 
 
 def processor_for_this_worker() -> int:

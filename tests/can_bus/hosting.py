@@ -5,7 +5,6 @@ import itertools
 import os
 import pty
 import re
-import select
 import signal
 import subprocess
 import sys
@@ -14,6 +13,7 @@ import threading
 from ranger_sim.can_bus.edge.attach import AttachServer
 from ranger_sim.can_bus.edge.host import BusHost
 from ranger_sim.can_bus.edge.paced import PacedBus
+from ranger_sim.foundation import descriptors
 
 NUMBERS = itertools.count()
 PATIENCE_S = 60.0  # a guard against waiting for ever; nothing asserts on it
@@ -136,7 +136,7 @@ class Program:
 
     def _comes(self):
         """Wait for output or its end; False when neither comes."""
-        return bool(select.select([self.output], [], [], PATIENCE_S)[0])
+        return bool(descriptors.wait([self.output], [], PATIENCE_S)[0])
 
     def _said(self):
         return self.process.stderr.read().decode("utf-8", "replace") if self.process.stderr is not None else ""

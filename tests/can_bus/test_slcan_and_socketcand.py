@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from ranger_sim.can_bus.bus import Bus
 from ranger_sim.can_bus.edge.slcan import SlcanServer
 from ranger_sim.can_bus.edge.socketcand import SocketcandServer
-from ranger_sim.foundation import wallclock
+from ranger_sim.foundation import descriptors, wallclock
 from ranger_sim.foundation.events import FLAG_EXTENDED, FLAG_REMOTE, STAGE_BUS, EventQueue
 from ranger_sim.foundation.user_error import UserError
 
@@ -19,6 +19,7 @@ from .hosting import hosted
 
 RATE = 1_000_000
 STEP_NS = 31_250
+QUIET_S = 0.05  # the kernel hands on what was written to a terminal a while later, and in pieces
 
 
 def message(identifier, data=b"", **options):
@@ -65,10 +66,12 @@ def line():
     def say(text=""):
         os.write(end, text.encode("latin-1"))
         owner.run()
-        try:
-            return os.read(end, 1 << 16).decode()
-        except BlockingIOError:
-            return ""
+        answer = b""
+        while ready := descriptors.wait([end, *owner.server.filenos()], [], QUIET_S)[0]:
+            if end in ready:
+                answer += os.read(end, 1 << 16)
+            owner.run()
+        return answer.decode()
 
     yield owner, say
     os.close(end)

@@ -2,7 +2,6 @@
 
 import contextlib
 import os
-import select
 
 import pytest
 import serial
@@ -13,6 +12,7 @@ from ranger_sim.boards.modules.imu_parser import ImuParser, start_command
 from ranger_sim.boards.quirks import Quirks
 from ranger_sim.boards.user_interface import UserInterfaceBoard
 from ranger_sim.firmware_sim.clock import Crystal
+from ranger_sim.foundation import descriptors
 from ranger_sim.foundation.events import NEVER, PIN_EDGE, UART_BYTE
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness import serial_ports
@@ -80,7 +80,7 @@ def line_on(port, **options):
 def read_all(port, count):
     """So many bytes of a port; the kernel carries them in its own time."""
     data = b""
-    while len(data) < count and select.select(port.filenos(), [], [], 10.0)[0]:
+    while len(data) < count and descriptors.wait(port.filenos(), [], 10.0)[0]:
         data += port.read(count - len(data))
     return data
 
@@ -304,7 +304,7 @@ def test_a_real_inertial_unit_takes_the_place_of_the_plants():
         assert read_all(unit, 4) == start_command(0xC2)
         body = bytes((0xC2,)) + bytes.fromhex("00000000 00000000 bf800000 3f000000 3e800000 00000000 00000000")
         unit.write(body + (sum(body) & 0xFFFF).to_bytes(2, "big"))
-        select.select(line.filenos(), [], [], 10.0)
+        descriptors.wait(line.filenos(), [], 10.0)
         robot.run_for(0.05)
         assert robot.board("UI").imu.packets == 1
         assert robot.variable("UI_ANG_RATE_X") == 0.5
@@ -335,7 +335,7 @@ def test_a_host_may_command_the_plants_inertial_unit():
             before = offer.counters()["bytes_out"]
             host.read(before)
             host.write(start_command(0xCF))
-            select.select(offer.filenos(), [], [], 10.0)
+            descriptors.wait(offer.filenos(), [], 10.0)
             robot.run_for(0.02)
             heard = host.read(offer.counters()["bytes_out"] - before)
     assert bytes((0xC4, 0xCF)) in heard  # the acknowledgement

@@ -1,9 +1,9 @@
 """A process that a test forks, and a second one that watches it: nobody waits for ever for one that is gone."""
 
 import os
-import select
 import signal
 
+from ranger_sim.foundation import descriptors
 from ranger_sim.harness.processes import kernel, places
 
 PATIENCE_S = 60.0  # a guard against waiting for ever; nothing asserts on it
@@ -37,7 +37,7 @@ class Child:
         self.watcher = fork(self._look_after)
 
     def _look_after(self):
-        select.select([self.watch], [], [], PATIENCE_S)
+        descriptors.wait([self.watch], [], PATIENCE_S)
         self.block.words[places.FATE] = 1
         os.eventfd_write(self.block.answer_descriptor, 1)
         return 0
@@ -58,7 +58,7 @@ class Child:
 
     def ended(self):
         """Wait for its end; how it ended, as os.waitid has it. Fails when it stands still."""
-        assert select.select([self.watch], [], [], PATIENCE_S)[0], f"does not end: {self._fate()}"
+        assert descriptors.wait([self.watch], [], PATIENCE_S)[0], f"does not end: {self._fate()}"
         return os.waitid(os.P_PID, self.process, os.WEXITED | os.WNOWAIT)
 
     def _fate(self):

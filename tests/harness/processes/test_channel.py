@@ -26,10 +26,11 @@ NEAR = 1_000_000  # ns; stamps of the tests
 
 
 class Pair:
-    """Both ends of one mailbox of a board's block."""
+    """Both ends of one mailbox of a board's block. Nobody rings here: the bells are closed at once."""
 
     def __init__(self, direction):
         self.block = Block("MCH", 0, 0)
+        self.block.close()
         first, used = (
             (self.block.to_board_first, places.ASK_USED)
             if direction == TO_BOARD
@@ -233,33 +234,33 @@ def test_one_step_of_the_check_never_loses_a_difference(so_far, word):
 
 
 def test_a_header_of_another_version_is_refused():
-    block = Block("MCH", 0, 0)
-    block.check(0)
-    with pytest.raises(UserError, match="channel of MCH: place in its header is 0, not 3"):
-        block.check(3)
-    block.words[places.VERSION_WORD] = 99
-    with pytest.raises(UserError, match="version in its header is 99, not 1"):
+    with contextlib.closing(Block("MCH", 0, 0)) as block:
         block.check(0)
+        with pytest.raises(UserError, match="channel of MCH: place in its header is 0, not 3"):
+            block.check(3)
+        block.words[places.VERSION_WORD] = 99
+        with pytest.raises(UserError, match="version in its header is 99, not 1"):
+            block.check(0)
 
 
 def test_what_ended_a_process_is_kept_and_cut_to_what_fits():
-    block = Block("MCH", 0, 0)
-    assert block.fault() == ""
-    block.leave_fault("ZeroDivisionError: float division by zero")
-    assert block.fault() == "ZeroDivisionError: float division by zero"
-    block.leave_fault("x" * 5000)
-    assert block.fault() == "x" * 504
+    with contextlib.closing(Block("MCH", 0, 0)) as block:
+        assert block.fault() == ""
+        block.leave_fault("ZeroDivisionError: float division by zero")
+        assert block.fault() == "ZeroDivisionError: float division by zero"
+        block.leave_fault("x" * 5000)
+        assert block.fault() == "x" * 504
 
 
 @pytest.fixture
 def bells():
     """(block, ask, answer): the bells of a board's block."""
-    block = Block("MCH", 0, 0)
-    return (
-        block,
-        Bell(block.words, places.ASKED, places.BOARD_SLEEPS, block.ask_descriptor),
-        Bell(block.words, places.ANSWERED, places.PLANT_SLEEPS, block.answer_descriptor),
-    )
+    with contextlib.closing(Block("MCH", 0, 0)) as block:
+        yield (
+            block,
+            Bell(block.words, places.ASKED, places.BOARD_SLEEPS, block.ask_descriptor),
+            Bell(block.words, places.ANSWERED, places.PLANT_SLEEPS, block.answer_descriptor),
+        )
 
 
 def test_a_bell_between_two_processes_rings_as_often_as_it_was_rung(bells):
@@ -296,8 +297,8 @@ def test_who_sleeps_on_the_bell_of_a_process_that_ends_is_woken_and_told(bells):
 
 
 def test_a_board_that_ends_in_its_turn_is_gone_for_the_plant_and_not_asked_again():
-    with contextlib.closing(Ranger()) as robot:
-        block = Block("MCSI", wiring.BOARDS.index("MCSI"), 0)
+    new_block = Block("MCSI", wiring.BOARDS.index("MCSI"), 0)
+    with contextlib.closing(Ranger()) as robot, contextlib.closing(new_block) as block:
         words, doubles = new_stage()
         stage = Stage(words, doubles, robot.plant, robot.loop.step_times, [])
         remote = RemoteBoard(robot.boards["MCSI"], block, stage, wiring.BOARDS.index("MCSI"), False)
@@ -318,10 +319,10 @@ def test_a_board_that_ends_in_its_turn_is_gone_for_the_plant_and_not_asked_again
 
 
 def test_a_ring_from_a_third_side_wakes_without_being_an_answer():
-    block = Block("MCH", 0, 0)
-    answer = Bell(block.words, places.ANSWERED, places.PLANT_SLEEPS, block.answer_descriptor)
-    os.eventfd_write(block.answer_descriptor, 1)
-    assert not answer.wait(1)
+    with contextlib.closing(Block("MCH", 0, 0)) as block:
+        answer = Bell(block.words, places.ANSWERED, places.PLANT_SLEEPS, block.answer_descriptor)
+        os.eventfd_write(block.answer_descriptor, 1)
+        assert not answer.wait(1)
 
 
 def test_every_message_kind_of_the_foundation_may_travel():

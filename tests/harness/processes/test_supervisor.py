@@ -29,11 +29,8 @@ def alone():
     """A supervisor that has started nothing."""
     with contextlib.closing(Ranger()) as robot:
         settings = Settings(None, name=f"test-{os.getpid()}", real_time=False)
-        made = Supervisor(robot, settings, StopRule(time_s=1.0), lambda *_: 0, Said())
-        yield made
-        made.control.close()
-        for each in (made.link, made.plant_link, made.wakeup_read, made.wakeup_write):
-            each.close()
+        with contextlib.closing(Supervisor(robot, settings, StopRule(time_s=1.0), lambda *_: 0, Said())) as made:
+            yield made
 
 
 def test_orders_to_a_plant_that_does_not_listen_are_not_waited_for(alone):
