@@ -4,7 +4,7 @@ PYTHON ?= python3
 VENV   ?= .venv
 STEPS  ?= 100
 RUN    := $(VENV)/bin/python
-SOURCES := $(shell find ranger_sim foundation datatable can_bus plant firmware_sim boards harness tools \( -name '*.py' -o -name '*.pxd' \) -not -name '_*' 2>/dev/null)
+SOURCES := $(shell find ranger_sim foundation datatable can_bus plant firmware_sim boards harness sysid tools \( -name '*.py' -o -name '*.pxd' \) -not -name '_*' 2>/dev/null)
 
 .PHONY: walk test test-vm lint setup bench lock clean
 

@@ -39,6 +39,7 @@ ROOMS = (
     "firmware_sim",
     "boards",
     "harness",
+    "sysid",
     "tools",
 )
 DATA_FOLDERS = ("profiles",)  # shipped like a room, no Python in them

@@ -28,6 +28,7 @@ ROOMS = (
     "firmware_sim",
     "boards",
     "harness",
+    "sysid",
     "tools",
 )
 SHARED = "ranger_sim._shared"  # Cython's helpers, which all compiled modules use

@@ -25,13 +25,14 @@ MAY_IMPORT = {
     "firmware_sim": {"foundation", "can_bus"},
     "boards": {"foundation", "firmware_sim", "datatable"},
     "harness": {"foundation", "datatable", "can_bus", "plant", "firmware_sim", "boards"},
-    "tools": {"foundation", "datatable", "can_bus", "plant", "firmware_sim", "boards", "harness"},
+    "sysid": {"foundation", "plant"},
+    "tools": {"foundation", "datatable", "can_bus", "plant", "firmware_sim", "boards", "harness", "sysid"},
 }
 # Libraries that belong to one place of the house.
 ONLY_IN = {
     "can": ("can_bus/edge/",),
     "serial": ("harness/", "tools/"),
-    "asammdf": ("tools/", "harness/"),
+    "asammdf": ("tools/", "harness/", "sysid/readers/"),
     "plotly": ("tools/",),
     "pytest": ("harness/testing/",),
     "_pytest": ("harness/testing/forking.py",),
@@ -99,7 +100,7 @@ def test_a_library_with_one_place_stays_there(library):
 def test_nobody_draws_from_a_global_random_generator():
     pattern = re.compile(r"\b(?:np|numpy)\.random\b|\bdefault_rng\b")
     faults = [str(p.relative_to(ROOT)) for p in sources() if pattern.search(p.read_text(encoding="utf-8"))]
-    assert not faults
+    assert faults == ["foundation/random_arrays.py"]  # makes generators of their own, from seed and name
 
 
 @pytest.mark.parametrize("room", MAY_IMPORT)

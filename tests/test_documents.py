@@ -18,6 +18,7 @@ ROOMS = (
     "firmware_sim",
     "boards",
     "harness",
+    "sysid",
     "tools",
     "ranger_sim",
     "profiles",

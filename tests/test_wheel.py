@@ -16,7 +16,18 @@ from ranger_sim import loading
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 # folders that a user's project may well have; importing one of them instead of ours would be told
-OWN_FOLDERS = ("boards", "can_bus", "datatable", "firmware_sim", "foundation", "harness", "plant", "profiles", "tools")
+OWN_FOLDERS = (
+    "boards",
+    "can_bus",
+    "datatable",
+    "firmware_sim",
+    "foundation",
+    "harness",
+    "plant",
+    "profiles",
+    "sysid",
+    "tools",
+)
 COMMANDS = """\
 import contextlib, io
 from ranger_sim.tools.cli import parser

@@ -1,0 +1,160 @@
+"""Measured data: channels with unit and time stamps of their own, what was found wrong with them, what was mended.
+
+    Channel   one quantity: stamps and values, each of shape (n,), in SI units
+    Finding   something odd at a place in a channel, with its size; nothing is changed by finding it
+    Repair    a change that was made to a channel, with its reason; nothing is changed without one
+    Dataset   the channels of one recording, by name
+    Table     channels on one time base, cut where there is a gap: what fits and balances work on
+
+A channel's name carries its unit as in the project's other boundaries: "hip_angle_rad", "current_A".
+"""
+
+import dataclasses
+from collections.abc import Iterable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ranger_sim.foundation.user_error import UserError
+
+Array = NDArray[np.float64]
+
+
+@dataclasses.dataclass(frozen=True)
+class Channel:
+    """One measured quantity. time_s, value: shape (n,). resolution: of one count in the channel's unit, 0: unknown."""
+
+    name: str
+    unit: str
+    time_s: Array
+    value: Array
+    resolution: float = 0.0
+    source: str = ""
+
+    def __post_init__(self) -> None:
+        if self.time_s.shape != self.value.shape or self.time_s.ndim != 1:
+            raise UserError(
+                f"channel {self.name}: {self.time_s.shape} stamps and {self.value.shape} values, "
+                "both must be one row of the same length"
+            )
+
+
+@dataclasses.dataclass(frozen=True)
+class Finding:
+    """Something odd. `kind`: one of sanity.KINDS; `size` in `unit`; `severity`: "note", "warning" or "fatal"."""
+
+    channel: str
+    kind: str
+    start_s: float
+    end_s: float
+    size: float
+    unit: str
+    text: str
+    severity: str = "warning"
+
+
+@dataclasses.dataclass(frozen=True)
+class Repair:
+    """What was changed in a channel, and why."""
+
+    channel: str
+    kind: str
+    count: int
+    text: str
+
+
+@dataclasses.dataclass
+class Table:
+    """Channels on one time base. time_s, each column: shape (n,); `runs`: stretches without a gap, in order."""
+
+    time_s: Array
+    columns: dict[str, Array]
+    runs: tuple[slice, ...]
+    name: str = ""
+    resolution: dict[str, float] = dataclasses.field(default_factory=dict)
+
+    def __getitem__(self, name: str) -> Array:
+        return self.columns[name]
+
+    def __contains__(self, name: str) -> bool:
+        return name in self.columns
+
+    def __len__(self) -> int:
+        return len(self.time_s)
+
+    @property
+    def step_s(self) -> float:
+        """Median distance of two samples."""
+        return float(np.median(np.diff(self.time_s)))
+
+    def part(self, which: slice) -> "Table":
+        """The rows of `which`, with the runs that lie in it."""
+        start, stop, _ = which.indices(len(self))
+        runs = (slice(max(run.start, start) - start, min(run.stop, stop) - start) for run in self.runs)
+        return Table(
+            self.time_s[which],
+            {name: column[which] for name, column in self.columns.items()},
+            tuple(run for run in runs if run.stop > run.start),
+            self.name,
+            self.resolution,
+        )
+
+
+@dataclasses.dataclass
+class Dataset:
+    """The channels of one recording, by name; what was found, and what was mended."""
+
+    name: str
+    channels: dict[str, Channel]
+    findings: list[Finding] = dataclasses.field(default_factory=list)
+    repairs: list[Repair] = dataclasses.field(default_factory=list)
+
+    def __getitem__(self, name: str) -> Channel:
+        try:
+            return self.channels[name]
+        except KeyError:
+            there = ", ".join(self.channels) or "none"
+            raise UserError(f"{self.name}: there is no channel {name}; there are {there}") from None
+
+    def __contains__(self, name: str) -> bool:
+        return name in self.channels
+
+    def table(self, names: Iterable[str], longest_gap: float = 5.0) -> Table:
+        """These channels on the stamps of the densest of them, by straight lines, cut at gaps.
+
+        longest_gap: in median steps of a channel; what is farther apart is not bridged.
+        """
+        chosen = [self[name] for name in names]
+        if not chosen:
+            raise UserError(f"{self.name}: no channel asked for")
+        base = max(chosen, key=lambda channel: len(channel.time_s))
+        if len(base.time_s) < 2:
+            raise UserError(f"{self.name}: {base.name} has {len(base.time_s)} samples, at least 2 are needed")
+        time_s = base.time_s
+        inside = np.ones(len(time_s), dtype=bool)
+        cuts = np.zeros(len(time_s), dtype=bool)  # a run ends before these
+        columns = {}
+        for channel in chosen:
+            columns[channel.name] = np.interp(time_s, channel.time_s, channel.value)
+            steps = np.diff(channel.time_s)
+            limit = longest_gap * float(np.median(steps)) if len(steps) else 0.0
+            inside &= (time_s >= channel.time_s[0]) & (time_s <= channel.time_s[-1])
+            for number in np.flatnonzero(steps > limit):
+                low, high = channel.time_s[number], channel.time_s[number + 1]
+                inside &= ~((time_s > low) & (time_s < high))
+                cuts[min(np.searchsorted(time_s, high), len(time_s) - 1)] = True
+        kept = np.flatnonzero(inside)
+        if len(kept) < 2:
+            raise UserError(f"{self.name}: {', '.join(columns)} have no time in common")
+        starts = [
+            0,
+            *(number for number in range(1, len(kept)) if cuts[kept[number]] or kept[number] != kept[number - 1] + 1),
+        ]
+        ends = [*starts[1:], len(kept)]
+        return Table(
+            time_s[kept],
+            {name: column[kept] for name, column in columns.items()},
+            tuple(slice(start, end) for start, end in zip(starts, ends, strict=True)),
+            self.name,
+            {channel.name: channel.resolution for channel in chosen},
+        )
