@@ -146,10 +146,9 @@ class Dataset:
         kept = np.flatnonzero(inside)
         if len(kept) < 2:
             raise UserError(f"{self.name}: {', '.join(columns)} have no time in common")
-        starts = [
-            0,
-            *(number for number in range(1, len(kept)) if cuts[kept[number]] or kept[number] != kept[number - 1] + 1),
-        ]
+        begins = cuts[kept] | (np.diff(kept, prepend=-2) != 1)
+        begins[0] = True
+        starts = [int(number) for number in np.flatnonzero(begins)]
         ends = [*starts[1:], len(kept)]
         return Table(
             time_s[kept],
