@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+import os
 
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.plant.battery import BatteryParameters
@@ -48,6 +49,12 @@ class Scenario:
             value = getattr(self, name)
             if not (isinstance(value, int | float) and math.isfinite(value) and low <= value <= high):
                 raise UserError(f"scenario: {name} is {value!r}, allowed are {low} to {high} {unit}")
+        if not isinstance(self.seed, int) or isinstance(self.seed, bool):
+            raise UserError(f"scenario: seed is {self.seed!r}, a whole number is expected")
+        for name in ("controller", "body", "model_file"):
+            value = getattr(self, name)
+            if not isinstance(value, str | os.PathLike) and (name, value) != ("model_file", None):
+                raise UserError(f"scenario: {name} is {value!r}, a name or the path of a .toml file is expected")
         for name in self.electronics_off:
             if name not in SWITCHES:
                 raise UserError(f"scenario: electronics_off {name!r}: what can be off is {', '.join(SWITCHES)}")

@@ -1,5 +1,7 @@
 """Looks for what no healthy robot does: overruns, lost frames, bus errors, bus-off, errors beyond the normal, a fall.
 
+A fault that a test has injected and that never acted is told as well: what the test saw proves nothing about it.
+
 Normal is what the columns normal_per_s and normal_at_start of datatable/master/errors.csv say. A test may expect what
 is not normal; what it expects and does not come is a fault as well.
 """
@@ -33,6 +35,7 @@ class Expected:
 
     errors: names of the table, or "MCH:AE_SPIKE" for one board. overruns, lost_frames, bus_errors, bus_off, dead: True
     (at least one), a number (exactly so many), or the name of the board or bus that has them. fall: it falls.
+    idle_faults: injected faults that do not act, as the others; a name is place and mode.
     """
 
     errors: tuple[str, ...] = ()
@@ -42,6 +45,7 @@ class Expected:
     bus_off: Amount = False
     dead: Amount = False
     fall: bool = False
+    idle_faults: Amount = False
 
     def __post_init__(self) -> None:
         for text in self.errors:
@@ -87,12 +91,17 @@ def look(robot: Any) -> Seen:
 
 
 class Health:
-    """Watches `robot` from now on; `faults` says what happened since, and begins anew."""
+    """Watches `robot` from now on; `faults` says what happened since, and begins anew.
 
-    def __init__(self, robot: Any) -> None:
+    from_power_up: what has happened since power-up counts as well, and what comes once after it is normal.
+    """
+
+    def __init__(self, robot: Any, from_power_up: bool = False) -> None:
         self.robot = robot
-        self.before: Seen | None = look(robot) if robot.loop.time > robot.start_ns else None
-        self.had_fallen = bool(robot.ended)
+        whole = from_power_up or robot.loop.time <= robot.start_ns
+        self.before: Seen | None = None if whole else look(robot)
+        self.had_fallen = bool(robot.ended) and not whole
+        self.judged_faults = 0 if whole else len(robot.faults)  # injected before this watching began
 
     def faults(self, expected: Expected | None = None) -> list[str]:
         """What was not to be expected and happened, or was expected and did not; a line for each."""
@@ -109,6 +118,7 @@ class Health:
             *amount("bus-off", wanted.bus_off, self._bus_off(now, before)),
             *amount("boards that stand still", wanted.dead, self._dead(now)),
             *self._fall(wanted),
+            *amount("injected faults that did not act", wanted.idle_faults, self._idle()),
         ]
         found += [
             line
@@ -117,6 +127,7 @@ class Health:
             for line in end.watch.lines()
         ]
         self.before, self.had_fallen = now, bool(self.robot.ended)
+        self.judged_faults = len(self.robot.faults)
         return found
 
     def _errors(self, wanted: Expected, now: Seen, before: Seen | None) -> list[str]:
@@ -164,6 +175,16 @@ class Health:
 
     def _dead(self, now: Seen) -> dict[str, int]:
         return {name: 0 if summary.alive(self.robot, board) else 1 for name, board in now.boards.items()}
+
+    def _idle(self) -> dict[str, int]:
+        """How many of the faults that were injected since then have not acted, by place; but for those called off."""
+        idle: dict[str, int] = {}
+        for fault in self.robot.faults[self.judged_faults :]:
+            called_off = fault.stop_wanted and fault.activated_ns < 0
+            if not fault.acted and not called_off:
+                name = f"{fault.place.name}:{fault.mode}"
+                idle[name] = idle.get(name, 0) + 1
+        return idle
 
     def _fall(self, wanted: Expected) -> list[str]:
         robot = self.robot

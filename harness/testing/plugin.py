@@ -43,7 +43,8 @@ MARKERS = (
     "can_bus(bit_rate=...): the bus of the fixture `can_bus`",
     "requires(thing, ...): the test is skipped where the backend has not that thing",
     "expects_errors(name, ...): errors that the robot must show in this test; MCH:AE_SPIKE for one board",
-    "expects(overruns=..., lost_frames=..., bus_errors=..., bus_off=..., dead=..., fall=...): what else must happen",
+    "expects(overruns=..., lost_frames=..., bus_errors=..., bus_off=..., dead=..., fall=..., idle_faults=...): "
+    "what else must happen",
 )
 
 
@@ -191,12 +192,14 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
     if scope != "function" and any(mark.name in ("ranger", "board", "can_bus") for mark in item.own_markers):
         pytest.fail(f"the fixtures have the scope {scope}: their marks belong there (pytestmark = ...)", pytrace=False)
     things = tuple(thing for mark in item.iter_markers("requires") for thing in mark.args)
-    if things:
+    expects = item.get_closest_marker("expects") or item.get_closest_marker("expects_errors")
+    if things or expects is not None:
         from ranger_sim.foundation.user_error import UserError
         from ranger_sim.harness.testing.backends import missing
 
         wrong = reason = ""
         try:
+            expected_of(item)
             reason = missing(backend_of(item), things)
         except UserError as mistake:
             wrong = str(mistake)
@@ -222,6 +225,7 @@ def pytest_runtest_call(item: pytest.Item) -> Generator[None, Any, Any]:
     except Exception as error:
         if robots_of(item) and is_missing(error):
             pytest.skip(str(error))
+        cut_traceback(error)
         raise
     unhealthy = []
     for watched in robots_of(item):
@@ -236,6 +240,24 @@ def robots_of(item: pytest.Item) -> list[Watched]:
     return [watched for node in item.listchain() for watched in node.stash.get(ROBOTS, [])]
 
 
+def cut_traceback(error: Exception) -> None:
+    """A mistake in a call of ours is shown where the test made it, without the way through our rooms."""
+    from ranger_sim import loading
+    from ranger_sim.foundation.user_error import UserError
+
+    if not isinstance(error, UserError):
+        return
+    rooms = tuple(f"{loading.HOUSE / room}{os.sep}" for room in ("harness", "foundation", "datatable"))
+    entries = []
+    entry = error.__traceback__
+    while entry is not None:
+        entries.append(entry)
+        entry = entry.tb_next
+    own = [each for each in entries[1:] if not each.tb_frame.f_code.co_filename.startswith(rooms)]
+    if own:
+        own[-1].tb_next = None
+
+
 def is_missing(error: Exception) -> bool:
     """Whether a test met something that its backend has not."""
     from ranger_sim.harness.testing.backends import MissingError
@@ -244,13 +266,23 @@ def is_missing(error: Exception) -> bool:
 
 
 def expected_of(item: pytest.Item) -> Expected:
-    """What the marks of a test say that must happen."""
+    """What the marks of a test say that must happen. UserError for a wrong mark."""
+    import dataclasses
+
+    from ranger_sim.foundation.user_error import UserError
     from ranger_sim.harness.testing.health import Expected
 
     errors = tuple(name for mark in item.iter_markers("expects_errors") for name in mark.args)
     others: dict[str, Any] = {}
     for mark in reversed(list(item.iter_markers("expects"))):
         others |= mark.kwargs
+        if mark.args:
+            raise UserError(f"mark expects: {mark.args[0]!r} has no name; it reads like expects(fall=True)")
+    if any(mark.kwargs for mark in item.iter_markers("expects_errors")):
+        raise UserError('mark expects_errors: it takes names only, as expects_errors("MCH:AE_SPIKE")')
+    allowed = [field.name for field in dataclasses.fields(Expected) if field.name != "errors"]
+    if unknown := [name for name in others if name not in allowed]:
+        raise UserError(f"mark expects({unknown[0]}=...): what can be expected is {', '.join(allowed)}")
     return Expected(errors, **others)
 
 
@@ -295,7 +327,7 @@ def description(item: pytest.Item, watched: Watched) -> str:
         "last errors that boards sent, beyond what is normal in a walk:",
         *last_errors(robot),
         "last frames:",
-        *(f"  {frame.text()}" for frame in robot.observed.keeper.latest(LAST_FRAMES)),
+        *([f"  {frame.text()}" for frame in robot.observed.keeper.latest(LAST_FRAMES)] or ["  none"]),
     ]
     return "\n".join(lines + trace_of(item, watched))
 
@@ -358,10 +390,7 @@ def ranger(request: pytest.FixtureRequest) -> Iterator[Ranger]:
         pytest.skip(missing)
     if wrong:
         pytest.fail(wrong, pytrace=False)
-    health = Health(robot)
-    if not order.warmed_up:
-        health.before = None  # what comes once after power-up is of this test
-    watched = Watched(robot, order, health)
+    watched = Watched(robot, order, Health(robot, from_power_up=not order.warmed_up))
     node.stash.setdefault(ROBOTS, []).append(watched)
     yield robot
     node.stash[ROBOTS].remove(watched)
@@ -389,7 +418,15 @@ def board(request: pytest.FixtureRequest) -> Iterator[BoardAlone]:
 @pytest.fixture(scope=scope_of)  # type: ignore[arg-type]
 def can_bus(request: pytest.FixtureRequest) -> Iterator[BusAlone]:
     """One bus alone, with nodes of the test's own: `can_bus.node("a")`."""
+    from ranger_sim.foundation.user_error import UserError
     from ranger_sim.harness.testing.bench import BusAlone
 
     mark = request.node.get_closest_marker("can_bus")
-    yield BusAlone(**(mark.kwargs if mark is not None else {}))
+    wrong = ""
+    try:
+        alone = BusAlone(*(mark.args if mark is not None else ()), **(mark.kwargs if mark is not None else {}))
+    except (UserError, TypeError) as mistake:
+        wrong = f"mark can_bus: {mistake}"
+    if wrong:
+        pytest.fail(wrong, pytrace=False)
+    yield alone

@@ -100,9 +100,6 @@ def fresh(order: Order, profile: Profile | None) -> Ranger:
 
 def assert_healthy(robot: Ranger, **expected: Any) -> None:
     """AssertionError when something happened since power-up that no healthy robot does; `expected` as in `Expected`."""
-    health = Health(robot)
-    health.before = None
-    health.had_fallen = False
-    faults = health.faults(Expected(**expected))
+    faults = Health(robot, from_power_up=True).faults(Expected(**expected))
     if faults:
         raise AssertionError("\n".join(["the robot is not healthy:", *(f"  {line}" for line in faults)]))

@@ -1,7 +1,7 @@
 """A project of somebody else's in a folder, and pytest in it, as its engineer would start it."""
 
 import dataclasses
-import importlib.metadata
+import functools
 import os
 import pathlib
 import subprocess
@@ -12,10 +12,32 @@ ROOT = pathlib.Path(__file__).resolve().parents[3]
 LIMIT_S = 500  # a guard against waiting for ever; nothing asserts on it
 
 
+# As pytest looks for plugins: in every distribution, also in one that another of the same name hides.
+HAS_ENTRY_POINT = """\
+from importlib.metadata import distributions
+found = [each for one in distributions() for each in one.entry_points if each.group == "pytest11"]
+print(sum(each.name == "ranger_sim" for each in found))
+"""
+
+
+@functools.cache
 def how_to_find_the_plugin():
-    """Nothing where ranger-sim is installed with its entry point; a checkout may be linked without it."""
-    found = importlib.metadata.entry_points(group="pytest11", name="ranger_sim")
-    return [] if found else ["-p", "ranger_sim.harness.testing.plugin"]
+    """Nothing where ranger-sim is installed with its entry point; a checkout may be linked without it.
+
+    A process like the one that pytest will run in is asked, away from the checkout: this one has the checkout on its
+    path, and the packaging data that a build leaves there.
+    """
+    done = subprocess.run(
+        [sys.executable, "-c", HAS_ENTRY_POINT],
+        cwd=os.sep, env=environment(), capture_output=True, text=True, timeout=LIMIT_S, check=True,
+    )  # fmt: skip
+    return [] if int(done.stdout) else ["-p", "ranger_sim.harness.testing.plugin"]
+
+
+def environment():
+    """That of a user's process: of RANGER_SIM_... here only the way it runs, and nothing of our pytest."""
+    kept = {name: value for name, value in os.environ.items() if not name.startswith(("RANGER_SIM_", "PYTEST_"))}
+    return kept | {name: os.environ[name] for name in ("RANGER_SIM_INTERPRETED",) if name in os.environ}
 
 
 @dataclasses.dataclass
@@ -44,17 +66,15 @@ def write(folder, **files):
         path.write_text(text, encoding="utf-8")
 
 
-def pytest_in(folder, *arguments, plugin=True, **environment):
-    """Run pytest in a folder; RANGER_SIM_... of this process is not passed on but for the way it runs."""
-    kept = {name: value for name, value in os.environ.items() if not name.startswith(("RANGER_SIM_", "PYTEST_"))}
-    kept |= {name: os.environ[name] for name in ("RANGER_SIM_INTERPRETED",) if name in os.environ}
+def pytest_in(folder, *arguments, plugin=True, **more):
+    """Run pytest in a folder; `more`: variables of its environment."""
     xml_file = folder / "junit.xml"
     xml_file.unlink(missing_ok=True)
     command = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", "--junitxml", str(xml_file)]
     done = subprocess.run(
         [*command, *(how_to_find_the_plugin() if plugin else []), *map(str, arguments)],
         cwd=folder,
-        env={**kept, "COLUMNS": "200", **environment},
+        env={**environment(), "COLUMNS": "200", **more},
         capture_output=True,
         text=True,
         timeout=LIMIT_S,

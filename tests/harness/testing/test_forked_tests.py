@@ -90,6 +90,39 @@ def test_wrong_order(ranger):
 @pytest.mark.ranger(warmed_up="hip in NOWHERE")
 def test_wrong_warm_up(ranger):
     pass
+
+
+@pytest.mark.ranger(warmed_up="step 0", seed="three")
+def test_wrong_seed(ranger):
+    pass
+
+
+@pytest.mark.expects_errors("AE_SPYKE")
+def test_wrong_error(ranger):
+    pass
+
+
+@pytest.mark.expects(overrun=True)
+def test_wrong_expectation(ranger):
+    pass
+
+
+@pytest.mark.expects("fall")
+def test_expectation_without_name(ranger):
+    pass
+
+
+@pytest.mark.can_bus(bitrate=3)
+def test_wrong_bus(can_bus):
+    pass
+
+
+def test_mistake_in_a_call(ranger):
+    ranger.inject("MCH.joint_encodr", "stuck")
+
+
+def test_fault_that_does_not_act(ranger):
+    ranger.inject("MCH.joint_encoder", "stuck", at="step 9")
 """
 
 
@@ -141,6 +174,22 @@ def test_a_wrong_order_is_told_in_a_line(done):
     assert "ranger(colour=...): what can be asked for is controller, body, seed" in done.reason("test_wrong_order")
     assert "hip has no state 'NOWHERE'" in done.reason("test_wrong_warm_up")
     assert "Traceback" not in done.reason("test_wrong_order") + done.reason("test_wrong_warm_up")
+
+
+def test_a_wrong_mark_or_call_is_told_where_it_is_made_and_the_other_tests_go_on(done):
+    assert "seed is 'three', a whole number is expected" in done.reason("test_wrong_seed")
+    assert "meant was perhaps AE_SPIKE" in done.reason("test_wrong_error")
+    assert "expects(overrun=...): what can be expected is overruns" in done.reason("test_wrong_expectation")
+    assert "'fall' has no name" in done.reason("test_expectation_without_name")
+    assert "mark can_bus: " in done.reason("test_wrong_bus") and "'bitrate'" in done.reason("test_wrong_bus")
+    assert "meant was perhaps MCH.joint_encoder" in done.reason("test_mistake_in_a_call")
+    assert "catalogue.py" not in done.reason("test_mistake_in_a_call")  # not how we came to say so
+    assert "INTERNALERROR" not in done.text
+
+
+def test_a_test_whose_fault_did_not_act_is_never_green(done):
+    assert done.outcome("test_fault_that_does_not_act") == "failure"
+    assert "injected faults that did not act: MCH.joint_encoder:stuck" in done.reason("test_fault_that_does_not_act")
 
 
 def test_with_a_debugger_or_on_request_nothing_is_forked(tmp_path):

@@ -134,6 +134,24 @@ def test_a_fall_is_told_once_and_may_be_expected():
     assert "expected and not seen: a fall" in Health(Ranger(Scenario())).faults(Expected(fall=True))
 
 
+def test_an_injected_fault_that_did_not_act_is_told_unless_it_is_expected_or_called_off(robot):
+    robot.run_for(0.01)
+    health = Health(robot)
+    robot.inject("MCH.absolute_encoder", "offset")
+    assert health.faults() == ["injected faults that did not act: MCH.absolute_encoder:offset 1"]  # no time has passed
+    robot.inject("UI.imu", "gyro_bias", at="step 3")
+    robot.inject("UI.imu", "noise", at="step 4").stop()
+    robot.run_for(0.01)
+    assert robot.faults[0].acted
+    jump = Expected(("MCH:AE_SPIKE",))  # the offset's own
+    assert health.faults(jump) == ["injected faults that did not act: UI.imu:gyro_bias 1"]
+    assert health.faults(Expected(idle_faults=True)) == ["expected and not seen: injected faults that did not act"]
+    robot.inject("UI.imu", "gyro_bias", at="step 3")
+    assert health.faults(Expected(idle_faults="UI.imu:gyro_bias")) == []
+    with pytest.raises(AssertionError, match="did not act: UI.imu:gyro_bias 2"):
+        assert_healthy(robot, errors=("MCH:AE_SPIKE",))
+
+
 def test_amounts_are_held_exactly():
     assert amount("x", False, {"a": 0}) == []
     assert amount("x", False, {"a": 2, "b": 0}) == ["x: a 2"]
