@@ -36,6 +36,14 @@ def fork() -> int:
         return os.fork()
 
 
+def die_with(parent: int) -> None:
+    """Where the kernel can, it kills this process when `parent` (its parent's process id) ends, however it ends."""
+    if sys.platform.startswith("linux"):
+        from ranger_sim.harness.processes import kernel
+
+        kernel.die_with_parent(parent)
+
+
 def branch(work: Callable[[], dict[str, Any]], cpu_s: float, wall_s: float) -> dict[str, Any]:
     """What `work` returns in a forked process; BranchError when it raises, dies, or takes too long.
 
@@ -45,10 +53,10 @@ def branch(work: Callable[[], dict[str, Any]], cpu_s: float, wall_s: float) -> d
     sys.stdout.flush()
     sys.stderr.flush()
     reading, writing = os.pipe()
+    parent = os.getpid()
     child = fork()
     if child == 0:
-        os.close(reading)
-        _be_the_branch(work, writing, cpu_s)
+        _be_the_branch(work, parent, reading, writing, cpu_s)
     os.close(writing)
     try:
         answer = _read(reading, wallclock.monotonic_s() + wall_s)
@@ -64,26 +72,32 @@ def branch(work: Callable[[], dict[str, Any]], cpu_s: float, wall_s: float) -> d
         raise BranchError("timed out", f"longer than {cpu_s:g} s of computing")
     if not answer:
         raise BranchError("crashed", f"its process ended with {code}")
-    told: dict[str, Any] = json.loads(answer)
+    try:
+        told: dict[str, Any] = json.loads(answer)
+    except ValueError:
+        raise BranchError("crashed", f"its process ended with {code} while it told its result") from None
     if "raised" in told:
         raise BranchError("crashed", told["raised"])
     return told
 
 
-def _be_the_branch(work: Callable[[], dict[str, Any]], writing: int, cpu_s: float) -> None:
+def _be_the_branch(work: Callable[[], dict[str, Any]], parent: int, reading: int, writing: int, cpu_s: float) -> None:
     """Work, write the result, and end without any of the parent's clean-up."""
     code = 1
     try:
+        os.close(reading)
+        die_with(parent)
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
         allowed = max(1, round(cpu_s))  # whole seconds; a forked process counts from nothing
         resource.setrlimit(resource.RLIMIT_CPU, (allowed, allowed + 1))
         try:
-            told = work()
+            answer = json.dumps(work())
         except BaseException as error:
             place = traceback.extract_tb(error.__traceback__)[-1]
-            told = {"raised": f"{type(error).__name__}: {error} ({os.path.basename(place.filename)}:{place.lineno})"}
+            where = f"{os.path.basename(place.filename)}:{place.lineno}"
+            answer = json.dumps({"raised": f"{type(error).__name__}: {error} ({where})"})
         with os.fdopen(writing, "w", encoding="utf-8") as pipe:
-            json.dump(told, pipe)
+            pipe.write(answer)
         code = 0
     finally:
         os._exit(code)

@@ -62,6 +62,7 @@ class Campaign:
     def run(self, pool: Any, tell: Callable[[int, str], None]) -> None:
         """Do what is missing. `tell(done, what)` after every result; `pool`: of pools.py."""
         plan = self.plan
+        self.cases, self.stopped_at = [], None
         if plan.search:
             for cases in self.searching(plan.search):
                 self.cases += cases
@@ -89,7 +90,7 @@ class Campaign:
     def take_known(self) -> None:
         """The runs decided on that have results, as far as the plan had come when it was left; nothing is run."""
         plan = self.plan
-        self.cases = []
+        self.cases, self.stopped_at = [], None
         if plan.search:
             for cases in self.searching(plan.search):
                 self.cases += [case for case in cases if self.result(case) is not None]

@@ -11,6 +11,7 @@ import dataclasses
 import functools
 import hashlib
 import json
+import os
 import pathlib
 import sys
 from collections.abc import Callable
@@ -18,7 +19,7 @@ from typing import Any
 
 from ranger_sim.foundation import wallclock
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.branching import BranchError, branch
+from ranger_sim.harness.branching import BranchError, branch, die_with
 from ranger_sim.harness.campaigns.cases import Case, Settings, version
 from ranger_sim.harness.campaigns.outcomes import Band, classify, deviation
 from ranger_sim.harness.conditions import condition
@@ -351,18 +352,22 @@ def answer(request: dict[str, Any], emit: Callable[[Result], None]) -> None:
 
 
 def main() -> int:
-    """One request on standard input; results on standard output."""
+    """One request on standard input; results on standard output. It ends with the process that has started it."""
+    die_with(os.getppid())
+    results = os.fdopen(os.dup(1), "w", encoding="utf-8")
+    os.dup2(2, 1)  # what a user's fault module prints is no result
 
     def emit(result: Result) -> None:
-        sys.stdout.write(json.dumps(result) + "\n")
-        sys.stdout.flush()
+        results.write(json.dumps(result) + "\n")
+        results.flush()
 
+    request = sys.stdin.readline()
+    if not request:  # who asked is gone already
+        return 1
     try:
-        answer(json.loads(sys.stdin.readline()), emit)
+        answer(json.loads(request), emit)
     except UserError as mistake:
         emit({"refused": str(mistake)})
-    except BrokenPipeError:  # who asked is gone
-        return 1
     return 0
 
 

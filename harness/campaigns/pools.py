@@ -12,7 +12,7 @@ import queue
 import subprocess
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 from ranger_sim.foundation.user_error import UserError
@@ -25,8 +25,10 @@ Result = dict[str, Any]
 
 
 def process_for(request: Request) -> "subprocess.Popen[str]":
-    """A process that works on a request, which has been handed over."""
-    process = subprocess.Popen(COMMAND, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+    """A process that works on a request, which has been handed over. Ctrl-C is not for it but for who started it."""
+    process = subprocess.Popen(
+        COMMAND, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, start_new_session=True
+    )
     assert process.stdin is not None
     with contextlib.suppress(BrokenPipeError):
         process.stdin.write(json.dumps(request) + "\n")
@@ -48,14 +50,12 @@ def without(request: Request, done: set[str]) -> Request | None:
     return {**request, "cases": [case for case in request["cases"] if case["key"] not in done]}
 
 
-def results_of(request: Request, started: Any = None) -> Iterator[Result]:
-    """The results of a request, each as it comes, in as many processes as it takes. `started(process)`: of each."""
+def results_of(request: Request, start: Callable[[Request], "subprocess.Popen[str]"] = process_for) -> Iterator[Result]:
+    """The results of a request, each as it comes, in as many processes as it takes. `start` gives one its request."""
     left: Request | None = request
     deaths = 0
     while left is not None:
-        process = process_for(left)
-        if started is not None:
-            started(process)
+        process = start(left)
         done: set[str] = set()
         assert process.stdout is not None
         with process.stdout:
@@ -82,13 +82,18 @@ def results_of(request: Request, started: Any = None) -> Iterator[Result]:
             deaths = 0
 
 
+class ClosedError(Exception):
+    """The pool was closed: nothing is started any more."""
+
+
 class LocalPool:
     """`jobs` processes of this machine at a time."""
 
     def __init__(self, jobs: int) -> None:
         self.jobs = jobs
         self.told = f"{jobs} process{'es' if jobs > 1 else ''} of this machine"
-        self.running: set[subprocess.Popen[str]] = set()
+        self.latest: dict[int, subprocess.Popen[str]] = {}  # by thread: each has one process at a time
+        self.lock = threading.Lock()
         self.closed = False
 
     def run(self, requests: list[Request]) -> Iterator[Result]:
@@ -100,10 +105,10 @@ class LocalPool:
 
         def work() -> None:
             try:
-                while not self.closed:
-                    for result in results_of(waiting.get_nowait(), self.running.add):
+                while True:
+                    for result in results_of(waiting.get_nowait(), self._start):
                         results.put(result)
-            except queue.Empty:
+            except (queue.Empty, ClosedError):
                 pass
             except BaseException as error:  # told to who waits for the results
                 results.put(error)
@@ -123,12 +128,21 @@ class LocalPool:
             else:
                 yield result
 
+    def _start(self, request: Request) -> "subprocess.Popen[str]":
+        """A process for a request, in the calling thread; ClosedError when the pool has been closed."""
+        with self.lock:
+            if self.closed:
+                raise ClosedError
+            process = self.latest[threading.get_ident()] = process_for(request)
+            return process
+
     def close(self) -> None:
-        """End what still runs."""
-        self.closed = True
-        for process in self.running:
-            if process.poll() is None:
-                process.kill()
+        """End what still runs; nothing is started after this."""
+        with self.lock:
+            self.closed = True
+        for process in self.latest.values():
+            process.kill()
+            process.wait()
 
 
 def work_of(request: Request) -> list[Result]:

@@ -73,6 +73,8 @@ class Child:
             code = LOST
             try:
                 os.close(self.read)
+                from ranger_sim.harness.branching import die_with  # only here: everybody's pytest imports this
+
                 die_with(parent)
                 code = serve(item, write)
             except BaseException:  # noqa: BLE001  (a child must never return into the parent's program)
@@ -105,14 +107,6 @@ class Child:
             with contextlib.suppress(ProcessLookupError):
                 os.kill(self.process, signal.SIGKILL)
             self.wait()
-
-
-def die_with(parent: int) -> None:
-    """Where the kernel can, it kills this process when `parent` ends, however it ends."""
-    if sys.platform.startswith("linux"):
-        from ranger_sim.harness.processes import kernel
-
-        kernel.die_with_parent(parent)
 
 
 def serve(item: pytest.Item, pipe: int) -> int:

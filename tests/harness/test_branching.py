@@ -5,6 +5,8 @@ import signal
 
 import pytest
 
+from ranger_sim.foundation import descriptors
+from ranger_sim.harness import branching
 from ranger_sim.harness.branching import BranchError, branch
 
 
@@ -35,6 +37,37 @@ def test_a_branch_that_is_killed_has_crashed():
     with pytest.raises(BranchError, match="its process ended with -9") as error:
         branched(lambda: os.kill(os.getpid(), signal.SIGKILL) or {})
     assert error.value.outcome == "crashed"
+
+
+def test_a_result_that_cannot_be_told_is_a_crash_with_its_reason():
+    with pytest.raises(BranchError, match="TypeError: Object of type object is not JSON serializable") as error:
+        branched(lambda: {"what": object()})
+    assert error.value.outcome == "crashed"
+
+
+def test_a_result_that_breaks_off_is_a_crash():
+    def work():
+        branching.json.dumps = lambda told: '{"half'  # in the forked process alone
+        return {}
+
+    with pytest.raises(BranchError, match=r"its process ended with -?\d while it told its result") as error:
+        branched(work)
+    assert error.value.outcome == "crashed"
+
+
+def test_a_branch_ends_with_the_process_that_it_branched_off(tmp_path):
+    told = tmp_path / "process"
+    parent = os.fork()
+    if parent == 0:
+        branched(lambda: told.write_text(str(os.getpid())) and signal.pause())
+        os._exit(0)
+    while not (told.exists() and told.read_text()):
+        os.sched_yield()
+    watch = os.pidfd_open(int(told.read_text()))
+    os.kill(parent, signal.SIGKILL)
+    os.waitpid(parent, 0)
+    assert descriptors.wait([watch], [], 60.0)[0] == [watch]
+    os.close(watch)
 
 
 def test_a_branch_that_waits_for_ever_is_ended_at_its_limit():

@@ -10,7 +10,7 @@ import sys
 
 import pytest
 
-from ranger_sim.foundation import wallclock
+from ranger_sim.foundation import descriptors, wallclock
 from ranger_sim.harness.campaigns import engine, group, plan, pools
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
@@ -72,6 +72,16 @@ def until_results(process, folder, count):
     pytest.fail(f"not {count} results within {PATIENCE_S} s")
 
 
+def descendants(process):
+    """The processes that a process has started, and those that these have."""
+    found = []
+    for task in pathlib.Path(f"/proc/{process}/task").iterdir():
+        for child in map(int, (task / "children").read_text().split()):
+            with contextlib.suppress(FileNotFoundError):  # it has just ended
+                found += [child, *descendants(child)]
+    return found
+
+
 def test_a_run_branched_off_the_golden_run_is_the_run_from_power_up(few, tmp_path):
     campaign = engine.Campaign(plan.load(few), tmp_path)
     try:
@@ -97,12 +107,19 @@ def test_a_killed_campaign_goes_on_and_loses_and_doubles_nothing(few, tmp_path):
         campaign_command(few, killed, "--pool", "local", "--jobs", "1"), cwd=ROOT, stderr=subprocess.DEVNULL
     )
     until_results(process, killed, 2)
+    workers = []
+    for each in descendants(process.pid):
+        with contextlib.suppress(ProcessLookupError):  # it has just ended
+            workers.append(os.pidfd_open(each))
     process.send_signal(signal.SIGKILL)
     process.wait()
+    for worker in workers:  # none of them outlives it, neither the group's process nor a branch of that
+        assert descriptors.wait([worker], [], PATIENCE_S)[0]
+        os.close(worker)
     before = results_in(killed)
     assert HEALTHY + 2 <= len(before) < HEALTHY + RUNS
     told = run(few, killed, "--pool", "local", "--jobs", "2").stderr
-    assert f"{len(before)} results are there already" in told
+    assert f"{len(before) - HEALTHY} of them are there already" in told
     after = results_in(killed)
     assert len(after) == HEALTHY + RUNS and after == results_in(whole)
     assert {key: after[key] for key in before} == before

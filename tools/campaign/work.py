@@ -68,11 +68,12 @@ def pool_of(options: argparse.Namespace) -> Any:
 
 def work(campaign: engine.Campaign, options: argparse.Namespace, console: Console) -> None:
     """Run what is missing, with a progress bar, or a line every ten seconds where there is no terminal."""
-    total, before = campaign.foreseen, len(campaign.store.results)
+    campaign.take_known()
+    total, before = campaign.foreseen, len(campaign.cases)
     pool = pool_of(options)
     console.print(
         f"{campaign.plan.title}: {campaign.plan.design} of {total} runs on {pool.told}"
-        + (f"; {before} results are there already" if before else ""),
+        + (f"; {before} of them are there already" if before else ""),
         highlight=False,
         soft_wrap=True,
     )
