@@ -1,0 +1,104 @@
+"""Recorded CAN frames as channels, by the messages of a DBC file.
+
+The frames come from whoever can read the recording (candump, BLF, ASC ... are read at the edge of the CAN room): this
+room knows only their numbers. A channel is called Message.signal; the robot's own messages have one signal `value`,
+whose channel is called like the message. Stamps are those of the recording; a stamp that a message carries
+(`time_ms`) is a channel of its own, Message.time_s, so that the two clocks can be compared.
+"""
+
+import pathlib
+from collections.abc import Iterable, Mapping
+
+import numpy as np
+
+from ranger_sim.foundation.events import FLAG_ERROR, FLAG_EXTENDED, FLAG_REMOTE
+from ranger_sim.foundation.libraries import imported
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.sysid.dataset import Dataset, Finding
+from ranger_sim.sysid.readers import columns
+
+Frame = tuple[str, int, int, int, int, int]  # bus, time_ns, identifier, flags (length in the low four bits), lo, hi
+EXTENDED_BIT = 1 << 31  # keeps extended identifiers apart from standard ones
+LENGTH_BITS = 15
+MOST_BYTES = 8
+
+
+def decode(
+    name: str,
+    frames: Iterable[Frame],
+    databases: Iterable[str | pathlib.Path],
+    mapping: Mapping[str, str] | None = None,
+) -> Dataset:
+    """The signals of all frames that the DBC files know. UserError when there is none, or a file cannot be read."""
+    dataset = Dataset(name, {})
+    mapping = dict(mapping or {})
+    messages = _messages(databases)
+    samples: dict[tuple[str, str], tuple[list[int], list[float], str]] = {}
+    unknown: dict[int, int] = {}
+    broken: dict[str, int] = {}
+    first_ns: int | None = None
+    for _, time_ns, identifier, flags, lo, hi in frames:
+        if flags & (FLAG_ERROR | FLAG_REMOTE):
+            continue
+        first_ns = time_ns if first_ns is None else first_ns
+        message = messages.get(identifier | (EXTENDED_BIT if flags & FLAG_EXTENDED else 0))
+        if message is None:
+            unknown[identifier] = unknown.get(identifier, 0) + 1
+            continue
+        data = (lo.to_bytes(4, "little") + hi.to_bytes(4, "little"))[: min(flags & LENGTH_BITS, MOST_BYTES)]
+        try:
+            decoded = message.decode(data, decode_choices=False)
+        except Exception:  # too short, or a multiplexer's value that has no signals: of many kinds
+            broken[message.name] = broken.get(message.name, 0) + 1
+            continue
+        for signal, value in decoded.items():
+            key = (message.name, signal)
+            if key not in samples:
+                unit = message.get_signal_by_name(signal).unit or ""
+                samples[key] = ([], [], unit)
+            samples[key][0].append(time_ns)
+            samples[key][1].append(float(value))
+    if not samples or first_ns is None:
+        raise UserError(f"{name}: none of its frames is a message of the DBC file ({sum(unknown.values())} others)")
+    _tell(dataset, unknown, broken)
+    called = {key: key[0] if key[1] == "value" else f"{key[0]}.{key[1]}" for key in samples}
+    columns.check_mapping(dataset, mapping, list(called.values()))
+    begin_ns = first_ns if first_ns * 1e-9 > columns.EPOCH_S else 0
+    if begin_ns:
+        columns.from_zero(dataset, np.array([begin_ns * 1e-9]))  # for its note; whole nanoseconds are subtracted below
+    for key, (stamps, values, unit) in samples.items():
+        time_s = np.array([(stamp - begin_ns) * 1e-9 for stamp in stamps], dtype=np.float64)
+        named = columns.label(dataset.name, called[key], unit, mapping)
+        columns.add(dataset, called[key], named, time_s, np.array(values))
+    return dataset
+
+
+def _messages(databases: Iterable[str | pathlib.Path]) -> dict:
+    """Messages by identifier, of all files together."""
+    cantools = imported("cantools")
+    found: dict = {}
+    for path in databases:
+        try:
+            database = cantools.database.load_file(str(path), database_format="dbc", strict=False)
+        except OSError as error:
+            raise UserError(f"{path}: cannot be read ({error.strerror or error})") from None
+        except Exception as error:  # what a broken file makes of cantools is of many kinds
+            said = " ".join(f"{type(error).__name__}: {error}".split())[:200]
+            raise UserError(f"{path}: not a DBC file that cantools can read ({said})") from None
+        for message in database.messages:
+            found[message.frame_id | (EXTENDED_BIT if message.is_extended_frame else 0)] = message
+    if not found:
+        raise UserError("a recording of CAN frames needs a DBC file with messages (--dbc FILE)")
+    return found
+
+
+def _tell(dataset: Dataset, unknown: dict[int, int], broken: dict[str, int]) -> None:
+    """What was left out."""
+    if unknown:
+        some = ", ".join(f"{each:#x}" for each in sorted(unknown)[:5])
+        text = f"{sum(unknown.values())} frames have identifiers that the DBC file does not know ({some})"
+        size = float(sum(unknown.values()))
+        dataset.findings.append(Finding("", "unknown_frames", 0.0, 0.0, size, "frames", text, "note"))
+    for message, count in broken.items():
+        text = f"{count} frames do not fit their message and are left out"
+        dataset.findings.append(Finding(message, "broken_frames", 0.0, 0.0, float(count), "frames", text))

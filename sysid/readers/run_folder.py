@@ -1,0 +1,31 @@
+"""The folder that `ranger-sim walk` leaves: variables.mf4, and in summary.json how the walk ended."""
+
+import json
+import pathlib
+from collections.abc import Mapping
+
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.sysid.dataset import Dataset, Finding
+from ranger_sim.sysid.readers import measurement
+
+VARIABLES, SUMMARY = "variables.mf4", "summary.json"
+
+
+def read(path: str | pathlib.Path, mapping: Mapping[str, str] | None = None, truth: bool = False) -> Dataset:
+    """The variables that the boards knew, named like the folder; that the robot fell is a finding."""
+    folder = pathlib.Path(path)
+    if not (folder / VARIABLES).is_file():
+        raise UserError(f"{folder}: this is no folder of a walk, it has no {VARIABLES} (walk --log decides)")
+    dataset = measurement.read(folder / VARIABLES, mapping, truth)
+    dataset.name = folder.resolve().name
+    try:
+        summary = json.loads((folder / SUMMARY).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        text = f"{SUMMARY} is missing or cannot be read: how the walk ended is not known"
+        dataset.findings.append(Finding("", "no_summary", 0.0, 0.0, 0.0, "", text, "note"))
+        return dataset
+    if isinstance(summary, dict) and summary.get("fell"):
+        ends = max((float(channel.time_s[-1]) for channel in dataset.channels.values()), default=0.0)
+        text = f"the robot fell ({summary.get('fall_cause') or 'no cause told'}): the last step is no walking"
+        dataset.findings.append(Finding("", "fell", ends, ends, 1.0, "", text))
+    return dataset

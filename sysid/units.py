@@ -1,0 +1,175 @@
+"""Units in the names of columns, and what makes SI of them.
+
+A column says its unit at the end of its name, `current_mA`, `rate_deg_per_s`, `torque_N_mm`, or in brackets,
+`Motor current [mA]`. Temperatures are kept in degrees Celsius, as `temperature_C` everywhere in the project.
+A unit that is not known is no unit: nothing is guessed.
+"""
+
+import dataclasses
+import math
+import re
+
+# what people write: (what we write, factor). An exponent may follow: s2, m^2.
+ATOMS: dict[str, tuple[str, float]] = {
+    "s": ("s", 1.0), "ms": ("s", 1e-3), "us": ("s", 1e-6), "µs": ("s", 1e-6), "μs": ("s", 1e-6), "ns": ("s", 1e-9),
+    "min": ("s", 60.0), "h": ("s", 3600.0), "sec": ("s", 1.0),
+    "A": ("A", 1.0), "mA": ("A", 1e-3), "uA": ("A", 1e-6), "kA": ("A", 1e3), "Amp": ("A", 1.0),
+    "V": ("V", 1.0), "mV": ("V", 1e-3), "uV": ("V", 1e-6), "kV": ("V", 1e3), "Volt": ("V", 1.0),
+    "W": ("W", 1.0), "mW": ("W", 1e-3), "kW": ("W", 1e3),
+    "J": ("J", 1.0), "Wh": ("J", 3600.0), "kWh": ("J", 3.6e6),
+    "ohm": ("ohm", 1.0), "Ohm": ("ohm", 1.0), "mohm": ("ohm", 1e-3), "Ω": ("ohm", 1.0), "mH": ("H", 1e-3),
+    "rad": ("rad", 1.0), "mrad": ("rad", 1e-3), "deg": ("rad", math.pi / 180.0), "°": ("rad", math.pi / 180.0),
+    "degree": ("rad", math.pi / 180.0), "degrees": ("rad", math.pi / 180.0),
+    "rev": ("rad", 2.0 * math.pi), "turn": ("rad", 2.0 * math.pi), "turns": ("rad", 2.0 * math.pi),
+    "m": ("m", 1.0), "mm": ("m", 1e-3), "cm": ("m", 1e-2), "um": ("m", 1e-6), "µm": ("m", 1e-6), "km": ("m", 1e3),
+    "N": ("N", 1.0), "mN": ("N", 1e-3), "kN": ("N", 1e3),
+    "Nm": ("Nm", 1.0), "mNm": ("Nm", 1e-3), "Nmm": ("Nm", 1e-3), "Ncm": ("Nm", 1e-2), "kNm": ("Nm", 1e3),
+    "kg": ("kg", 1.0), "Pa": ("Pa", 1.0), "kPa": ("Pa", 1e3), "bar": ("Pa", 1e5),
+    "Hz": ("Hz", 1.0), "kHz": ("Hz", 1e3), "MHz": ("Hz", 1e6),
+    "counts": ("counts", 1.0), "count": ("counts", 1.0), "K": ("K", 1.0),
+}  # fmt: skip
+# what stands for more than one atom, or is no power of others: (numerator, denominator, factor, offset)
+WHOLE: dict[str, tuple[str, str, float, float]] = {
+    "rpm": ("rad", "s", 2.0 * math.pi / 60.0, 0.0),
+    "RPM": ("rad", "s", 2.0 * math.pi / 60.0, 0.0),
+    "rps": ("rad", "s", 2.0 * math.pi, 0.0),
+    "dps": ("rad", "s", math.pi / 180.0, 0.0),
+    "C": ("C", "", 1.0, 0.0),
+    "degC": ("C", "", 1.0, 0.0),
+    "°C": ("C", "", 1.0, 0.0),
+    "K": ("C", "", 1.0, -273.15),
+    "percent": ("", "", 1e-2, 0.0),
+    "%": ("", "", 1e-2, 0.0),
+    "1": ("", "", 1.0, 0.0),
+}
+AMBIGUOUS_ALONE = ("min", "h")  # current_min is a minimum; as units of their own only behind a word for time
+TIME_WORDS = ("t", "time", "times", "timestamp", "timestamps", "stamp", "elapsed", "elapsed_time", "zeit")
+LONGEST_SUFFIX = 6  # tokens of a unit in a name, as in cmd_dampness_A_s_per_rad
+
+
+@dataclasses.dataclass(frozen=True)
+class Unit:
+    """SI value = factor x what is written + offset. `numerator`, `denominator`: SI units with exponents."""
+
+    numerator: tuple[str, ...] = ()
+    denominator: tuple[str, ...] = ()
+    factor: float = 1.0
+    offset: float = 0.0
+
+    @property
+    def text(self) -> str:
+        """As in "A s/rad"; empty for a plain number."""
+        top = " ".join("N m" if each == "Nm" else each for each in self.numerator)
+        if not self.denominator:
+            return top
+        return f"{top or '1'}/{' '.join(self.denominator)}"
+
+    @property
+    def suffix(self) -> str:
+        """As at the end of a name: "A_s_per_rad"."""
+        parts = list(self.numerator)
+        if self.denominator:
+            parts += ["per", *self.denominator]
+        return "_".join(parts)
+
+    @property
+    def is_si(self) -> bool:
+        """True when nothing has to be converted."""
+        return self.factor == 1.0 and self.offset == 0.0
+
+    def same_kind(self, other: "Unit") -> bool:
+        """True when both measure the same quantity."""
+        return self.numerator == other.numerator and self.denominator == other.denominator
+
+
+def unit_of(text: str) -> Unit | None:
+    """The unit that `text` says ("deg/s", "A s/rad", "N m", "1/K"), None when it is not known."""
+    text = text.strip()
+    if not text or text == "-":
+        return Unit()
+    if text in WHOLE:
+        return _whole(text)
+    top, slash, bottom = text.partition("/")
+    words = _words(top.strip("() "))
+    if slash:
+        words = [*(words if words != ["1"] else []), "per", *_words(bottom.strip("() "))]
+    return _of_words(words)
+
+
+def _words(text: str) -> list[str]:
+    return [word for word in re.split(r"[\s*·._]+", text) if word]
+
+
+def _whole(text: str) -> Unit:
+    top, bottom, factor, offset = WHOLE[text]
+    return Unit((top,) if top else (), (bottom,) if bottom else (), factor, offset)
+
+
+def _of_words(words: list[str]) -> Unit | None:
+    """A unit of words with at most one "per" among them; None when one is unknown."""
+    if len(words) == 1 and words[0] in WHOLE:
+        return _whole(words[0])
+    sides: tuple[list[str], list[str]] = ([], [])
+    factor = 1.0
+    below = 0
+    for word in words:
+        if word == "per":
+            if below:
+                return None
+            below = 1
+            continue
+        match = re.fullmatch(r"(\D+?)\^?([2-4²³]?)", word)
+        if match is None or match[1] not in ATOMS:
+            return None
+        name, size = ATOMS[match[1]]
+        exponent = int(match[2].translate({ord("²"): "2", ord("³"): "3"}) or 1)
+        factor *= size ** (-exponent if below else exponent)
+        sides[below].append(name + (str(exponent) if exponent > 1 else ""))
+    if not below and len(sides[0]) == 2 and sides[0][0] in ("rad", "m") and sides[0][1] in ("s", "s2"):
+        sides = (sides[0][:1], sides[0][1:])  # speed_rad_s, accel_m_s2: nobody measures a product of these
+        factor = _ratio(words)
+    if not sides[0] and not sides[1] or (below and not sides[1]):
+        return None
+    top = sides[0]
+    for place in range(len(top) - 1):
+        if top[place : place + 2] == ["N", "m"]:
+            top[place : place + 2] = ["Nm"]
+            break
+    return Unit(tuple(top), tuple(sides[1]), factor)
+
+
+def _ratio(words: list[str]) -> float:
+    """The factor of two words of which the second divides."""
+    top, bottom = _of_words(words[:1]), _of_words(words[1:])
+    return top.factor / bottom.factor if top is not None and bottom is not None else 1.0
+
+
+def split(column: str) -> tuple[str, Unit | None]:
+    """(name without unit, unit) of a column's name; the unit is None when the name has none that is known."""
+    column = column.strip()
+    bracketed = re.fullmatch(r"(.*?\S)\s*_?[\[(]([^\])]*)[\])]", column)
+    if bracketed is not None:
+        unit = unit_of(bracketed[2])
+        return (_plain(bracketed[1]), unit) if unit is not None else (_plain(column), None)
+    tokens = _plain(column).split("_")
+    for length in range(min(LONGEST_SUFFIX, len(tokens) - 1), 0, -1):
+        words = tokens[-length:]
+        if words == ["1"]:  # current_1 is the first of two, not a pure number
+            continue
+        stem = "_".join(tokens[:-length])
+        if len(words) == 1 and words[0] in AMBIGUOUS_ALONE and stem.lower() not in TIME_WORDS:
+            continue
+        unit = _of_words(words)
+        if unit is not None and stem:
+            return stem, unit
+    return _plain(column), None
+
+
+def _plain(name: str) -> str:
+    """A name without spaces."""
+    return re.sub(r"\s+", "_", name.strip())
+
+
+def si_name(stem: str, unit: Unit) -> str:
+    """The name of a channel in SI: "current_A"."""
+    return f"{stem}_{unit.suffix}" if unit.suffix else stem

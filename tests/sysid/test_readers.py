@@ -1,0 +1,339 @@
+"""Files of every format as datasets: known values, units turned into SI, and mistakes told in a line."""
+
+import math
+import os
+import pathlib
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.sysid import channels, units
+from ranger_sim.sysid.readers import columns, read
+from ranger_sim.tools.recordings import open_recording
+from tests.boards.original_images import DATA
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
+needs_data = pytest.mark.skipif(not (DATA / "emps_run1.csv").exists(), reason=f"no measured data in {DATA.name}/")
+
+
+@pytest.fixture
+def table(tmp_path):
+    """Reads a text as a table."""
+
+    def write(text, name="table.csv", **options):
+        path = tmp_path / name
+        path.write_bytes(text if isinstance(text, bytes) else text.encode())
+        return read(path, **options)
+
+    return write
+
+
+# --- units --------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("column", "name", "factor"),
+    [
+        ("current_mA", "current_A", 1e-3),
+        ("rate_deg_per_s", "rate_rad_per_s", math.pi / 180),
+        ("rate_rad_s", "rate_rad_per_s", 1.0),
+        ("rate_deg_s", "rate_rad_per_s", math.pi / 180),
+        ("speed_rpm", "speed_rad_per_s", math.pi / 30),
+        ("torque_N_mm", "torque_Nm", 1e-3),
+        ("torque_Ncm", "torque_Nm", 1e-2),
+        ("Motor current [mA]", "Motor_current_A", 1e-3),
+        ("speed (deg/s)", "speed_rad_per_s", math.pi / 180),
+        ("cmd_dampness_A_s_per_rad", "cmd_dampness_A_s_per_rad", 1.0),
+        ("accel_mm_per_s2", "accel_m_per_s2", 1e-3),
+        ("housing_degC", "housing_C", 1.0),
+        ("duty_percent", "duty", 1e-2),
+        ("load_kg_cm2", "load_kg_m2", 1e-4),
+        ("gain_V_s_per_mm", "gain_V_s_per_m", 1e3),
+    ],
+)
+def test_a_unit_in_a_name_becomes_si(column, name, factor):
+    stem, unit = units.split(column)
+    assert units.si_name(stem, unit) == name
+    assert unit.factor == pytest.approx(factor, rel=1e-12)
+
+
+@pytest.mark.parametrize("column", ["current_min", "current_1", "position", "A", "state_x", "speed_furlongs"])
+def test_what_is_no_unit_is_not_taken_for_one(column):
+    assert units.split(column) == (column, None)
+
+
+def test_kelvin_become_degrees_celsius():
+    _, unit = units.split("winding_K")
+    assert (unit.text, unit.factor * 300.0 + unit.offset) == ("C", pytest.approx(26.85))
+
+
+# --- text tables --------------------------------------------------------------------------------------------
+
+
+def test_a_table_is_read_in_si_and_every_conversion_is_recorded(table):
+    data = table("time_ms,angle_deg,current_mA\n0,0,100\n4,90,200\n8,180,300\n")
+    assert data["angle_rad"].value.tolist() == pytest.approx([0.0, math.pi / 2, math.pi])
+    assert data["current_A"].value.tolist() == pytest.approx([0.1, 0.2, 0.3])
+    assert data["current_A"].time_s.tolist() == pytest.approx([0.0, 0.004, 0.008])
+    assert [(each.channel, each.kind) for each in data.repairs] == [
+        ("", "si_unit"), ("angle_rad", "si_unit"), ("current_A", "si_unit"),
+    ]  # fmt: skip
+    assert data["current_A"].resolution == pytest.approx(1e-3)  # whole mA were written
+    assert not data.findings
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "t_s,a_V\n0,1.5\n1,2.5\n",
+        "\ufefft_s,a_V\n0,1.5\n1,2.5\n",
+        "# made by hand\nt_s,a_V\n% and a comment\n0,1.5\n\n1,2.5\n",
+        "t_s;a_V\n0;1,5\n1;2,5\n",
+        "t_s\ta_V\n0\t1,5\n1\t2,5\n",
+        "t_s a_V\n 0  1.5\n 1  2.5\n",
+        "# t_s,a_V\n0,1.5\n1,2.5\n",
+        "t,a\n[s],[V]\n0,1.5\n1,2.5\n",
+        "t,a\nus,mV\n0,1500\n1000000,2500\n",
+        't_s,"a_V"\n"0","1.5"\n"1","2.5"\n',
+        "t_s,a_V,\n0,1.5,\n1,2.5,\n",
+        "t_s,a_V\r\n0,1.5\r\n1,2.5\r\n",
+        "time_min,a_V\n0,1.5\n0.016666666666666666,2.5\n",
+        "time,a_V\n2026-01-01 12:00:00.5,1.5\n2026-01-01 12:00:01.5,2.5\n",
+        "t_s,a_V\n0,1.5\n1,2.5\n".encode("utf-16"),
+    ],
+    ids=["plain", "mark", "comments", "decimal commas", "tabs", "spaces", "header behind a mark", "line of units",
+         "line of other units", "quotes", "comma at the end", "other line ends", "minutes", "dates", "utf-16"],
+)  # fmt: skip
+def test_one_table_in_many_dresses(table, text):
+    data = table(text)
+    name = "a_V" if "a_V" in data else "a"  # a line of units leaves the name as it is
+    assert data[name].unit == "V"
+    assert data[name].value.tolist() == pytest.approx([1.5, 2.5])
+    assert data[name].time_s.tolist() == pytest.approx([0.0, 1.0])
+
+
+def test_an_empty_cell_is_an_instant_without_a_sample(table):
+    data = table("t_s,fast_V,slow_A\n0,1,5\n1,2,\n2,3,7\n")
+    assert data["slow_A"].time_s.tolist() == [0.0, 2.0]
+    assert data["fast_V"].time_s.tolist() == [0.0, 1.0, 2.0]
+    assert not data.findings
+
+
+def test_a_column_is_called_as_the_mapping_says_and_takes_its_unit_where_it_has_none(table):
+    text = "t_s,q,i_mA\n0,90,5\n1,180,6\n"
+    data = table(text, mapping={"q": "hip_angle_deg", "i_mA": "current_A"})
+    assert data["hip_angle_rad"].value.tolist() == pytest.approx([math.pi / 2, math.pi])
+    assert data["current_A"].value.tolist() == pytest.approx([0.005, 0.006])
+    with pytest.raises(UserError, match=r"i_mA is in A, it cannot become voltage_V \(V\)"):
+        table(text, mapping={"i_mA": "voltage_V"})
+    with pytest.raises(UserError, match="there is no such column; there are t_s, q, i_mA"):
+        table(text, mapping={"x": "voltage_V"})
+
+
+def test_a_table_without_names_is_named_by_the_mapping(table):
+    data = table("0,1.5\n1,2.5\n", mapping={"column_1": "t_s", "column_2": "current_A"})
+    assert data["current_A"].value.tolist() == [1.5, 2.5]
+    assert [each.kind for each in data.findings] == ["no_header"]
+
+
+def test_a_pair_that_is_none_is_told():
+    assert columns.mapping_of(["a=b", "c = d"]) == {"a": "b", "c": "d"}
+    for text in ("a", "=b", "a="):
+        with pytest.raises(UserError, match="old=new is expected"):
+            columns.mapping_of([text])
+    with pytest.raises(UserError, match="is named already"):
+        columns.mapping_of(["a=b", "a=c"])
+
+
+@pytest.mark.parametrize(
+    ("text", "kind", "size"),
+    [
+        ("t_s,a_V\n0,1\n1,oops\n2,x\n", "unreadable", 2),
+        ("t_s,a_V\n0,1\n1\n2,3\n", "ragged", 1),
+        ("t_s,a_V\n0,1\n,2\n2,3\n", "no_stamp", 1),
+        ("t_s,a_V,b_V\n0,1,\n1,2,\n", "empty", 0),
+        ("t_s,a_V,b_V\n0,1,x\n1,2,y\n", "empty", 0),
+        ("time,a_V\n0,1\n1,2\n", "unit_assumed", 1),
+        ("t_s,a\n0,1\n1,2\n", "no_unit", 0),
+    ],
+)
+def test_what_is_odd_in_a_table_is_a_finding(table, text, kind, size):
+    found = [each for each in table(text).findings if each.kind == kind]
+    assert [each.size for each in found] == [size]
+
+
+@pytest.mark.parametrize(
+    ("text", "line"),
+    [
+        ("", "the table is empty"),
+        ("\n\n", "the table is empty"),
+        ("# nothing\n", "comment lines only"),
+        ("t_s,a_V\n", "no row below its header"),
+        ("a_V,b_V\n0,1\n1,2\n", "there is no time column"),
+        ("t_s\n0\n1\n", "no channel beside the time column"),
+        ("t_s,a_V,a_V\n0,1,2\n", "two columns are called a_V"),
+        ("t_s,a_V,a_mV\n0,1,2\n", "two columns would be called a_V"),
+        ("t_A,a_V\n0,1\n", "the time column t_A is in A, not in a time"),
+        ("t_s,a_V\n0,x\n1,y\n", "no channel beside"),
+        (b"t_s,a_V\n0,\x00\n", "bytes of value 0"),
+        (b"\x89PNG\r\n\x1a\n\xff\xfe\x9c", "no row below|no time column|empty"),
+        (b"\xff\xfe\x00", "no text table|no row|no time column|empty"),
+    ],
+)
+def test_what_is_no_table_is_told_in_a_line(table, text, line):
+    with pytest.raises(UserError, match=line) as error:
+        table(text)
+    assert "\n" not in str(error.value)
+
+
+GOOD = "t_s,angle_deg,current_mA\n" + "".join(f"{k * 0.004:.3f},{k % 90},{-k}\n" for k in range(40))
+
+
+@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    places=st.lists(st.tuples(st.integers(0, len(GOOD)), st.integers(0, 5), st.binary(max_size=4)), max_size=12),
+)
+def test_a_mangled_table_is_read_or_refused_in_a_line(tmp_path, places):
+    """Bytes are cut out and put in anywhere; whatever comes of it is a dataset with whole channels, or a UserError."""
+    content = GOOD.encode()
+    for place, cut, more in places:
+        content = content[:place] + more + content[place + cut :]
+    path = tmp_path / "mangled.csv"
+    path.write_bytes(content)
+    try:
+        data = read(path)
+    except UserError as error:
+        assert "\n" not in str(error)
+        return
+    for channel in data.channels.values():
+        assert len(channel.time_s) == len(channel.value) > 0
+        assert np.isfinite(channel.time_s).all()
+
+
+# --- other formats ------------------------------------------------------------------------------------------
+
+
+def test_a_robot_log_of_our_own_is_read_with_the_units_of_the_table(tmp_path):
+    from ranger_sim.datatable.generated import all_variables
+    from ranger_sim.foundation.numbers import word_of_float
+    from ranger_sim.tools.robodaq.codec import Point
+    from ranger_sim.tools.robodaq.logs import open_log
+
+    log = open_log(str(tmp_path / "session.txt"))
+    angle, current = all_variables.ID_OF["MCH_ANGLE"], all_variables.ID_OF["MCH_MOTOR_CURRENT"]
+    for number, value, stamp in ((angle, 0.25, 0), (angle, 0.5, 2000), (angle, 0.75, 2004), (current, -1.5, 2003),
+                                 (current, -1.5, 2003)):  # fmt: skip
+        log.hear(Point(number, word_of_float(value), stamp))
+    log.close()
+    data = open_recording(tmp_path / "session.txt", {"MCH_ANGLE": "hip_angle_rad"})
+    assert (data["hip_angle_rad"].time_s.tolist(), data["hip_angle_rad"].value.tolist()) == ([2.0, 2.004], [0.5, 0.75])
+    assert (data["MCH_MOTOR_CURRENT"].unit, data["MCH_MOTOR_CURRENT"].value.tolist()) == ("A", [-1.5])
+    assert set(data.channels) == {"hip_angle_rad", "MCH_MOTOR_CURRENT"}
+
+
+def test_a_log_without_names_keeps_its_numbers_and_says_so(tmp_path):
+    path = tmp_path / "Data.txt"
+    path.write_text("14\t0.5\t1000\n14\t0.6\t1002\n62\t-1\t1001\n14\t0.7\t1004\n")
+    data = read(path, {"id_14": "hip_angle_rad"})
+    assert data["hip_angle_rad"].value.tolist() == [0.5, 0.6, 0.7]
+    assert "id_62" in data
+    assert {each.kind for each in data.findings} == {"no_header", "no_unit"}
+
+
+def test_a_measurement_file_keeps_units_and_leaves_out_what_no_instrument_sees(tmp_path):
+    from ranger_sim.tools import variables_file
+
+    time_s = np.arange(5) * 0.1
+    variables_file.write_groups(
+        [
+            ("plant", time_s, [("plant.hip_rad", "rad", "", np.ones(5))]),
+            ("MCH_ANGLE", time_s, [("MCH_ANGLE", "rad", "", np.arange(5.0))]),
+            ("speed", time_s, [("speed", "rpm", "", np.arange(5.0))]),
+        ],
+        tmp_path / "variables.mf4",
+    )
+    data = read(tmp_path)  # as the folder of a walk
+    assert set(data.channels) == {"MCH_ANGLE", "speed"}
+    assert data["speed"].unit == "rad/s"
+    assert data["speed"].value.tolist() == pytest.approx((np.arange(5.0) * math.pi / 30).tolist())
+    assert [each.kind for each in data.findings] == ["no_summary"]
+    (tmp_path / "summary.json").write_text('{"fell": true, "fall_cause": "hip too low"}')
+    assert [each.kind for each in read(tmp_path).findings] == ["fell"]
+    named = channels.named_for(read(tmp_path), "walk")
+    assert named["hip_angle_rad"].value.tolist() == [0.0, 1.0, 2.0, 3.0, 4.0]
+
+
+def test_a_broken_measurement_file_is_told_in_a_line(tmp_path):
+    path = tmp_path / "broken.mf4"
+    for content in (b"", b"MDF     4.10    nothing of it is true" * 5, os.urandom(500)):
+        path.write_bytes(content)
+        with pytest.raises(UserError, match="not a measurement file that asammdf can read|no channel with numbers"):
+            read(path)
+    with pytest.raises(UserError, match="this is no folder of a walk"):
+        read(tmp_path)
+    with pytest.raises(UserError, match="there is no such file"):
+        read(tmp_path / "none.csv")
+
+
+@pytest.mark.parametrize("ending", [".log", ".blf", ".asc"])
+def test_recorded_frames_become_channels_by_their_dbc_file(tmp_path, ending):
+    import can
+
+    from ranger_sim.foundation.numbers import word_of_float
+
+    path = tmp_path / f"frames{ending}"
+    with can.Logger(str(path)) as logger:
+        for k in range(20):
+            data = word_of_float(0.125 * k).to_bytes(4, "little") + (1000 + 2 * k).to_bytes(4, "little")
+            for identifier in (14, 1999):  # MCH_ANGLE, and one that the robot does not have
+                logger.on_message_received(
+                    can.Message(timestamp=1.7e9 + 0.002 * k, arbitration_id=identifier, data=data,
+                                is_extended_id=False, channel="can1" if ending == ".log" else 0)
+                )  # fmt: skip
+    dbc = ROOT / "datatable" / "generated" / "can1.dbc"
+    data = open_recording(path, {"MCH_ANGLE": "hip_angle_rad"}, [dbc])
+    assert data["hip_angle_rad"].value.tolist() == [0.125 * k for k in range(20)]
+    assert np.diff(data["hip_angle_rad"].time_s) == pytest.approx(np.full(19, 0.002), abs=2e-6)
+    assert data["hip_angle_rad"].time_s[0] == pytest.approx(0.0, abs=1e-5)
+    assert data["MCH_ANGLE.time_s"].value.tolist() == pytest.approx([1.0 + 0.002 * k for k in range(20)])
+    assert [(each.kind, each.size) for each in data.findings] == [("unknown_frames", 20.0)]
+    with pytest.raises(UserError, match="needs a DBC file"):
+        open_recording(path)
+    with pytest.raises(UserError, match="none of its frames"):
+        open_recording(path, databases=[ROOT / "datatable" / "generated" / "can2.dbc"])
+
+
+# --- what was measured --------------------------------------------------------------------------------------
+
+
+@needs_data
+@pytest.mark.parametrize(
+    ("file", "experiment", "sizes"),
+    [
+        ("emps_run1.csv", "positioning", {"position_m": 24841, "voltage_V": 24841, "reference_m": 24841}),
+        ("emps_run2_pulses.csv", "positioning", {"position_m": 24841, "pulse_N": 24841}),
+        ("ranger_ankle_sine_slow.csv", "ankle", {"joint_angle_rad": 5099, "command_current_A": 5099}),
+        ("ranger_ankle_sine_fast.csv", "ankle", {"joint_angle_rad": 2982, "command_stiffness_A_per_rad": 2982}),
+        ("ranger_foot_inertia_1.csv", "ankle", {"motor_angle_rad": 5144, "current_A": 343}),
+        ("ranger_foot_inertia_4.csv", "ankle", {"motor_angle_rad": 5424, "current_A": 361}),
+        ("ranger_walk_20150820.csv", "walk", {"hip_angle_rad": 2496, "outer_leg_angle_rad": 2496, "walk_state": 2496}),
+    ],
+)
+def test_the_measured_files_read_under_the_names_of_their_experiments(file, experiment, sizes):
+    data = channels.named_for(read(DATA / file), experiment)
+    assert {name: len(data[name].value) for name in sizes} == sizes
+    assert not [each for each in data.findings if each.severity != "note"]
+    assert all(np.isfinite(each.value).all() for each in data.channels.values())
+
+
+def test_a_needed_channel_that_is_missing_is_told_with_what_names_it(table):
+    data = table("t_s,voltage_V,strom\n0,1,2\n1,2,3\n")
+    with pytest.raises(UserError, match="motor-bench needs current_A .*--map NAME=current_A names it"):
+        channels.named_for(data, "motor-bench")
+    with pytest.raises(UserError, match="hip_angle_rad"):
+        channels.named_for(data, "leg-swing")
+    with pytest.raises(UserError, match="'bench': no such experiment; there are motor-bench, leg-swing"):
+        channels.named_for(data, "bench")

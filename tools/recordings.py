@@ -1,0 +1,60 @@
+"""Recordings of any kind as datasets: what `sysid.readers` knows, and recordings of CAN frames with their DBC files."""
+
+from __future__ import annotations
+
+import pathlib
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.sysid import readers
+from ranger_sim.sysid.dataset import Dataset
+from ranger_sim.sysid.readers import columns, frames
+
+
+def add_options(command: Any) -> None:
+    """The options that say how recordings are read."""
+    command.add_argument(
+        "--map",
+        action="append",
+        default=[],
+        metavar="OLD=NEW",
+        help="call a column of the data by a channel's name; its unit counts where the column says none (repeatable)",
+    )
+    command.add_argument(
+        "--dbc", action="append", default=[], metavar="FILE", help="messages of a recording of CAN frames (repeatable)"
+    )
+    command.add_argument("--time-unit", metavar="ms", help="of a time column whose name does not say it")
+
+
+def open_recording(
+    path: str | pathlib.Path,
+    mapping: Mapping[str, str] | None = None,
+    databases: Sequence[str | pathlib.Path] = (),
+    time_unit: str | None = None,
+) -> Dataset:
+    """The channels of a file or folder. `databases`: DBC files, for frames (candump, BLF, ASC, TRC).
+
+    An MDF file is read as frames when DBC files are given, and as channels otherwise. UserError for all that is wrong.
+    """
+    path = pathlib.Path(path)
+    suffix = path.suffix.lower()
+    if path.is_file() and (suffix in readers.FRAMES or (databases and suffix in readers.MEASUREMENTS)):
+        from ranger_sim.can_bus.edge.logs import read_log
+
+        if not databases:
+            raise UserError(f"{path}: a recording of CAN frames needs a DBC file (--dbc FILE)")
+        return frames.decode(path.name, read_log(path), databases, mapping)
+    return readers.read(path, mapping, time_unit=time_unit, variable_units=robot_units())
+
+
+def open_with(options: Any, path: str) -> Dataset:
+    """The recording `path` as `add_options` says."""
+    return open_recording(path, columns.mapping_of(options.map), options.dbc, options.time_unit)
+
+
+def robot_units() -> dict[str, str]:
+    """{variable: unit} of the robot's own table, which its text logs do not carry."""
+    from ranger_sim.datatable.generated import all_variables
+
+    return {name: all_variables.UNITS[number] for number, name in all_variables.NAMES.items()}
