@@ -31,9 +31,10 @@ another interrupt's (a FIQ's in an IRQ's), never two that overlap by halves. So 
 the innermost row around it. `end - start` of a row less the cycles of the rows inside is its own cycles, but for the
 rounding: each time is whole nanoseconds, rounded down. An entry of an occasional list has a row inside its list's row,
 with the same start and end; the cycles of the list are those of choosing.
-A slot that was dropped as a whole has a SLOT_BEGAN and a SLOT_OVERRAN, and no SLOT_ENDED. What is not through yet (a
-task, an interrupt) has no row yet: rows come in the order in which their ends become known, an inner one before its
-outer one.
+A slot that was dropped as a whole has a SLOT_BEGAN and a SLOT_OVERRAN, and no SLOT_ENDED; one in which the processor
+stopped has only a SLOT_BEGAN, and a processor that begins anew counts its slots from 1 again. What is not through yet
+(a task, an interrupt) has no row yet: rows come in the order in which their ends become known, an inner one before
+its outer one.
 
 **How to read it.** `newest()`: the rows that are kept, the oldest first, in one flat array. `sinks`: each is called as
 `sink(time_ns, rows)`, rows as bytes, whenever the ring is full and at `flush()`; it gets every row that came since it

@@ -155,6 +155,16 @@ class Microcontroller(Chip):
         """From now on write what the processor does into `log`; None: no longer. It changes nothing of what it does."""
         self.scheduler.attach_log(log)
 
+    def break_off(self, now) -> None:
+        """The processor stops at `now` (ns), up to which it has run: what it was at ends there in its activity log.
+
+        The cycles of such rows are those that they would have taken.
+        """
+        log = self.scheduler.log
+        if log is not None:
+            log.end_irq(min(self.irq_free, now))
+            log.end_code(min(self.code_time, now))
+
     def activity(self) -> ActivityLog:
         """Its activity log; where it has none yet, it gets one now. Several readers can share it by its sinks."""
         if self.scheduler.log is None:
@@ -529,7 +539,7 @@ class Microcontroller(Chip):
         end: cython.longlong
         if self.irq_free <= time:
             log.end_irq(self.irq_free)
-        if self.code_time < time:  # the processor was idle: what ran before is through
+        if self.code_time <= time:  # nothing is interrupted: what ran before is through
             log.end_code(self.code_time)
         if source.bit >= FIRST_FIQ:
             end = time + int(cycles * self.ns_per_cycle)

@@ -8,7 +8,7 @@ loop in microcontroller.py serves; this file only keeps who waits.
 
 import cython
 
-from ranger_sim.foundation.events import EventQueue
+from ranger_sim.foundation.events import CAN_RX, CAN_STATUS, CAN_TX_DONE, PIN_EDGE, SSP_SEGMENT, UART_BYTE, EventQueue
 from ranger_sim.foundation.user_error import UserError
 
 if not cython.compiled:
@@ -29,6 +29,24 @@ UART_TRANSMIT = 68  # index: UART number; transmit FIFO empty (THRE)
 SLOT_TIMER = 69  # the scheduler's own timer
 SOFTWARE = 70  # index free: VICSoftInt
 DMA_DONE = 71  # index: DMA channel; transfer complete
+
+# What a line is called until a handler with a name of its own is attached; {} is its index.
+LINES = {
+    PIN_EDGE: "pin {} edge",
+    CAN_RX: "can{} receive",
+    CAN_TX_DONE: "can{} transmit",
+    CAN_STATUS: "can{} status",
+    UART_BYTE: "uart{} receive",
+    SSP_SEGMENT: "ssp{} segment",
+    TIMER_MATCH: "timer{} match",
+    EXTERNAL_INTERRUPT: "eint{}",
+    ADC_DONE: "adc{} done",
+    SPI_DONE: "spi{} done",
+    UART_TRANSMIT: "uart{} transmit",
+    SLOT_TIMER: "slot timer {}",
+    SOFTWARE: "software {}",
+    DMA_DONE: "dma{} done",
+}
 
 # ARM7TDMI technical reference manual: an interrupt waits 5 ... 29 cycles for the instruction in progress.
 # Chosen by us within that: FIQ with its banked registers 12, IRQ with the read of VICVectAddr 25.
@@ -51,7 +69,7 @@ class InterruptSource:
         self.index = index
         self.number = 0  # in the order in which the controller's sources were made
         self.requested = 0  # instant (ns) of the request that is or was served
-        self.name = f"{kind}/{index}"
+        self.name = LINES.get(kind, f"line {kind}/{{}}").format(index)
         self.handler = None
         self.service = None  # what is called: the handler, or before it what gives it the message
         # the two addresses by which compiled code calls `service`

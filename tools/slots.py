@@ -253,9 +253,9 @@ def notes(board: dict, ran: dict | None) -> list[str]:
     if ran is not None and saw is not None:
         steps = "1 step" if ran["steps"] == 1 else f"{ran['steps']} steps"
         lines.append(
-            f"Seen in {saw['slots']:,} slots of {ran['time_s']:.2f} s, {steps}, seed {ran['seed']}: {saw['overruns']} "
-            f"overran; the longest took {saw['worst_us']:.1f} us, at {saw['worst_at_s']:.4f} s."
-            + (f" The robot fell: {ran['ended']}." if ran["ended"] else "")
+            f"Seen in {saw['slots']:,} slots from {FIRST_SECONDS:.2f} to {ran['time_s']:.2f} s, {steps}, seed "
+            f"{ran['seed']}: {saw['overruns']} overran; the longest took {saw['worst_us']:.1f} us, "
+            f"at {saw['worst_at_s']:.4f} s." + (f" The robot fell: {ran['ended']}." if ran["ended"] else "")
         )
     logs = board["robot_execution_time_us"]
     if logs is not None:

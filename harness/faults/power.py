@@ -3,6 +3,7 @@
 import math
 from typing import Any
 
+from ranger_sim.firmware_sim.activity import ActivityLog
 from ranger_sim.firmware_sim.board import Board
 from ranger_sim.foundation.events import NEVER
 from ranger_sim.foundation.user_error import UserError
@@ -140,6 +141,7 @@ class PowerlessBoard(Board):
         self.errors = getattr(before, "errors", None)  # what it had noted
         self.slot_time = before.latest_slot()
         self.counted = before.counters()
+        self.log = before.scheduler.log  # of its activity, which the board that comes back goes on with
         self.buffers: list[Any] = []
 
     def listen_to_edges(self, buffer: Any, pin: int, partner_pin: int) -> None:
@@ -163,6 +165,12 @@ class PowerlessBoard(Board):
     def latest_slot(self) -> int:
         """Of the board that lost its power."""
         return int(self.slot_time)
+
+    def activity(self) -> Any:
+        """Of the board that lost its power, and of the one that comes back."""
+        if self.log is None:
+            self.log = ActivityLog()
+        return self.log
 
     def counters(self) -> Any:
         """Of the board that lost its power."""
@@ -196,6 +204,7 @@ class Restart(Fault):
         with reaching_into(robot, name, now_ns) as board:
             for bus, node in self._nodes():
                 bus.set_mode(node, RESET, now_ns)
+            board.break_off(now_ns)
             robot.loop.replace(PowerlessBoard(board))
             self.stop_motor(now_ns)
         self.back_ns = now_ns + self.down_ns() + START_NS
@@ -239,6 +248,7 @@ class Restart(Fault):
         while out.take():
             said.append((out.time, out.order, out.kind, out.a, out.b, out.c, out.d, out.e, out.f, out.ref))
         board.inbox = off.inbox  # buses, link and operator write there
+        board.keep_activity(off.log)
         robot.boards[name] = board
         for bus, node in self._nodes():
             bus.nodes[node].renew(name)

@@ -5,7 +5,6 @@ from typing import Any
 import numpy as np
 
 from ranger_sim.firmware_sim.activity import (
-    ACTIVITY_COLUMNS,
     COLUMN_CYCLES,
     COLUMN_END,
     COLUMN_ITEMS,
@@ -23,9 +22,8 @@ from ranger_sim.firmware_sim.activity import (
     TASK_RAN,
     WAIT_RAN,
 )
+from ranger_sim.foundation.events import NEVER
 from ranger_sim.harness.timeline.model import Instant, Instants, Slices
-
-__all__ = ["ACTIVITY_COLUMNS", "Processor"]
 
 
 class Processor:
@@ -41,7 +39,7 @@ class Processor:
         self.zero_ns = zero_ns
         kind = rows[:, COLUMN_KIND]
         self.tasks = self._tasks(rows[(kind == TASK_RAN) | (kind == WAIT_RAN)])
-        self.slots = self._slots(rows[kind == SLOT_ENDED], rows[kind == SLOT_BEGAN])
+        self.slots = self._slots(rows[kind == SLOT_ENDED], rows[kind == SLOT_BEGAN], rows[kind == SLOT_OVERRAN])
         self.slots.inside = self.tasks
         services = rows[kind == INTERRUPT_RAN]
         fast = np.array([source.fast for source in legend.interrupts] or [False])
@@ -71,19 +69,26 @@ class Processor:
         names = [task.name for task in self.legend.tasks]
         return self._made("slots", names, rows, rows[:, COLUMN_NUMBER], cycles=rows[:, COLUMN_CYCLES])
 
-    def _slots(self, rows: np.ndarray, begun: np.ndarray) -> Slices:
+    def _slots(self, rows: np.ndarray, begun: np.ndarray, overrun: np.ndarray) -> Slices:
         """One slice a slot, called by its row. A slot that waits for the end of an overrun one begins behind that.
 
-        The slot that has not ended yet lasts until the end of its latest task.
+        One that has not ended, because it goes on or its processor stopped in it, lasts until the end of its latest
+        task. One that was dropped as a whole is none.
         """
         names = [f"row {row}" for row in range(len(self.legend.rows))]
-        if len(begun) and (len(rows) == 0 or begun[-1, COLUMN_START] > rows[-1, COLUMN_START]):
-            running = begun[-1:].copy()
-            if len(self.tasks):
-                running[0, COLUMN_END] = max(running[0, COLUMN_START], self.tasks.end_ns[-1] + self.zero_ns)
-            lasts_ns = running[0, COLUMN_END] - running[0, COLUMN_START]
-            running[0, COLUMN_CYCLES] = int(lasts_ns * self.legend.cycles_per_ns)
-            rows = np.concatenate([rows, running])
+        began = begun[:, COLUMN_START]
+        dropped = np.zeros(len(began), dtype=bool)
+        places = np.searchsorted(began, overrun[:, COLUMN_START])
+        known = np.isin(overrun[:, COLUMN_START], began)
+        dropped[places[known]] = overrun[known, COLUMN_ITEMS] == begun[places[known], COLUMN_ITEMS]
+        open_ = begun[~dropped & ~np.isin(began, rows[:, COLUMN_START])].copy()
+        next_ns = np.append(began, NEVER)[np.searchsorted(began, open_[:, COLUMN_START]) + 1]
+        ends = np.append(0, self.tasks.end_ns + self.zero_ns)  # of the latest task before that, be it an earlier slot's
+        latest = ends[np.searchsorted(self.tasks.start_ns + self.zero_ns, next_ns)]
+        open_[:, COLUMN_END] = np.maximum(open_[:, COLUMN_START], latest)
+        open_[:, COLUMN_CYCLES] = (open_[:, COLUMN_END] - open_[:, COLUMN_START]) * self.legend.cycles_per_ns
+        rows = np.concatenate([rows, open_])
+        rows = rows[np.argsort(rows[:, COLUMN_START], kind="stable")]
         slots = self._made("slots", names, rows, rows[:, COLUMN_ROW], cycles=rows[:, COLUMN_CYCLES])
         if len(slots):
             slots.start_ns[1:] = np.maximum(slots.start_ns[1:], slots.end_ns[:-1])

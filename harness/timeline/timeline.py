@@ -6,9 +6,10 @@ from typing import Any
 import numpy as np
 
 from ranger_sim.can_bus.frame_log import FrameTimes
-from ranger_sim.firmware_sim.activity import ACTIVITY_COLUMNS, COLUMN_END, ActivityLog
+from ranger_sim.firmware_sim.activity import ACTIVITY_COLUMNS, COLUMN_END
 from ranger_sim.foundation.row_stream import RowStream
 from ranger_sim.foundation.user_error import UserError
+from ranger_sim.harness.activity import activity_of
 from ranger_sim.harness.timeline import files, flows, frames, happenings, signals
 from ranger_sim.harness.timeline.model import Events
 from ranger_sim.harness.timeline.processors import Processor
@@ -21,15 +22,14 @@ OUTPUT_COLUMNS = 5  # what BoardWires notes: ns, kind, three numbers
 class Timeline:
     """Attached to a Ranger before it runs: keeps the last `last_s` seconds of virtual time, or everything (None).
 
-    It changes nothing: the trace digest stays what it is. Memory is flat with `last_s`; without, everything lies in
-    temporary files that have no name. Use `write` (format by the file's suffix), or `events` to look at it in a test.
+    It changes nothing: the trace digest stays what it is. Boards may run in processes of their own; one that is outside
+    shows nothing of what its processor does. Memory is flat with `last_s`; without, everything lies in temporary files
+    that have no name. Use `write` (format by the file's suffix), or `events` to look at it in a test.
     """
 
     def __init__(self, robot: Any, last_s: float | None = None) -> None:
         if last_s is not None and not last_s > 0.0:
             raise UserError(f"timeline: last_s is {last_s!r}, it must be above 0 s")
-        if robot.loop.side_by_side:
-            raise UserError("timeline: boards in processes of their own keep no log of their slots here")
         self.robot = robot
         self.last_ns = None if last_s is None else round(last_s * 1e9)
         self.begin_ns = robot.loop.time - robot.start_ns
@@ -59,15 +59,11 @@ class Timeline:
             wires.watch = RowStream("q", OUTPUT_COLUMNS, False)
             self.outputs[wires.board.name] = self._store(wires.watch)
         self.activity: dict[str, RowStore] = {}
-        self.logs: dict[str, ActivityLog] = {}  # also where another board stands in the place of one by now
-        self.legends: dict[str, Any] = {}
-        for name, board in robot.boards.items():
-            if board.scheduler.log is None:
-                board.keep_activity(ActivityLog())
-            store = RowStore(ACTIVITY_COLUMNS, self.last_ns)
-            self.logs[name], self.legends[name] = board.scheduler.log, board.legend()
-            self.logs[name].add_sink(store.take)
-            self.activity[name] = store
+        for name in robot.boards:
+            log = activity_of(robot, name)
+            if log is not None:
+                self.activity[name] = RowStore(ACTIVITY_COLUMNS, self.last_ns)
+                log.add_sink(self.activity[name].take)
         link = robot.loop.wires[robot.loop.place("MB")].link
         link.watch = RowStream("q", LINK_COLUMNS, False)
         self.link = self._store(link.watch)
@@ -79,8 +75,8 @@ class Timeline:
         robot = self.robot
         for stream in self.streams:
             stream.flush()
-        for log in self.logs.values():
-            log.flush()
+        for name in self.activity:
+            self.gather(name)
         zero = robot.start_ns
         end = robot.loop.time - zero
         begin = self.begin_ns if self.last_ns is None else max(self.begin_ns, end - self.last_ns)
@@ -93,7 +89,7 @@ class Timeline:
             instants.events = [event for event in instants.events if begin <= event.time_ns <= end]
         found.slices += signals.machine_states(robot, words, zero, end)
         processors = {
-            name: Processor(self.legends[name], self._since(store.rows(), begin, COLUMN_END), zero)
+            name: Processor(robot.boards[name].legend(), self._since(store.rows(), begin, COLUMN_END), zero)
             for name, store in self.activity.items()
         }
         for processor in processors.values():
@@ -119,6 +115,10 @@ class Timeline:
         found.counters += signals.body(samples, zero)
         return found
 
+    def gather(self, name: str) -> None:
+        """Take what board `name` has written by now: from another process, where it lives there."""
+        activity_of(self.robot, name).flush()
+
     def _since(self, rows: np.ndarray, begin_ns: int, time_column: int = 0) -> np.ndarray:
         """The rows of which an instant, mostly the first number, is in the time to be shown."""
         return rows[rows[:, time_column] - self.robot.start_ns >= begin_ns]
@@ -141,11 +141,12 @@ class Timeline:
             stream.sink = store.before
             store.close()
         for name, store in self.activity.items():
-            log, board = self.logs[name], self.robot.boards[name]
+            log, board = self.robot.loop.board(name).activity(), self.robot.boards[name]
             log.sinks.remove(store.take)
             if not log.sinks and board.scheduler.log is log:
                 board.keep_activity(None)
             store.close()
+        self.activity = {}
         self.robot.loop.sampler.words = self.sampled_words
         for bus in self.robot.buses:
             bus.log.times = None

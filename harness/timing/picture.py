@@ -40,8 +40,7 @@ def of_slot(slot: Any, executions: list[Any], limit_ns: int | None = None) -> st
     interrupt_line = [_most(share, cell) for share in shares]
     shares = [{} for _ in range(WIDTH)]
     for each in tasks:
-        entries = [one for one in tasks if one is not each and _inside(one, each) and one.cycles > each.cycles]
-        if entries:  # an occasional list: its entry is shown
+        if each.chooses and any(_inside(one, each) for one in tasks if not one.chooses):  # its entry is shown
             continue
         _fill(None, shares, each.start_ns - slot.start_ns, each.end_ns - slot.start_ns, cell, task_signs[each.name])
     task_line = []

@@ -17,16 +17,21 @@ from ranger_sim.firmware_sim.activity import (
     COLUMN_NUMBER,
     COLUMN_ROW,
     COLUMN_START,
+    INTERRUPT_RAN,
+    MAIN_LOOP_RAN,
     SLOT_BEGAN,
     SLOT_ENDED,
     SLOT_OVERRAN,
     TASK_DROPPED,
+    TASK_RAN,
+    WAIT_RAN,
 )
 from ranger_sim.firmware_sim.legend import Legend
 
 # 256 MiB of one board, a minute of a motor board that walks (chosen by us): what is older is given up, and said
 MOST_ROWS = 4 * 1024 * 1024
 NOT_THROUGH = -1
+EXECUTIONS = (TASK_RAN, WAIT_RAN, INTERRUPT_RAN, MAIN_LOOP_RAN)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -56,7 +61,8 @@ class Slots:
 class Recording:
     """Everything that `board` does from now on. `rows`: an array of ACTIVITY_COLUMNS columns, sorted by start.
 
-    `find_log` says where its log is now, if not on `board`: a board may move into a process of its own.
+    `find_log` says where its log is now, if not on `board`: a board may move into a process of its own. `find_board`:
+    which one it is now, where another may take its place.
     `origin_ns`: power-up of the robot; instants are counted from there.
     `slot_of`: to which slot each row belongs, -1 for what ran before the first.
     """
@@ -68,8 +74,9 @@ class Recording:
         begun_ns: int = 0,
         most_rows: int = MOST_ROWS,
         find_log: Callable[[], Any] | None = None,
+        find_board: Callable[[], Any] | None = None,
     ) -> None:
-        self.board = board
+        self.find_board = find_board if find_board is not None else lambda: board
         self.find_log = find_log if find_log is not None else board.activity
         self.origin_ns = origin_ns
         self.begun_ns = begun_ns
@@ -87,7 +94,7 @@ class Recording:
 
     def legend(self) -> Legend:
         """Names, costs and limits as they are now."""
-        legend: Legend = self.board.legend()
+        legend: Legend = self.find_board().legend()
         return legend
 
     def forget(self) -> None:
@@ -106,6 +113,12 @@ class Recording:
             given_up = len(self.blocks.pop(0)) // (8 * ACTIVITY_COLUMNS)
             self.kept -= given_up
             self.given_up += given_up
+
+    def reaching_into(self, place: int, start_ns: int) -> np.ndarray:
+        """Of the rows before `place`: tasks, interrupts and turns that began before `start_ns` and ended behind it."""
+        rows = self.rows[:place]
+        chosen = np.isin(rows[:, COLUMN_KIND], EXECUTIONS) & (rows[:, COLUMN_START] < start_ns)
+        return rows[chosen & (rows[:, COLUMN_END] > start_ns)]
 
     @property
     def lost(self) -> int:

@@ -8,6 +8,7 @@ from typing import Any, Self
 import numpy as np
 
 from ranger_sim.foundation.user_error import UserError
+from ranger_sim.harness.activity import activity_of
 from ranger_sim.harness.conditions import Condition, condition
 from ranger_sim.harness.step_watch import StepWatch
 from ranger_sim.harness.timing.recording import Recording
@@ -53,13 +54,15 @@ def slot_view(robot: Any, name: str) -> RobotSlots:
     if name not in robot.boards:
         robot.board(name)  # says which there are
 
-    def find_log() -> Any:
-        board = robot.loop.board(name)
-        if not hasattr(board, "activity"):
-            raise UserError(f"slots of {name}: this board runs elsewhere and shows nothing of its activity")
-        if board.apart:
-            board.catch_up(robot.loop.time)
-        return board.activity()
+    def find_board() -> Any:
+        return robot.boards[name]  # another one after its supply failed
 
-    recording = Recording(robot.boards[name], robot.start_ns, robot.loop.time - robot.start_ns, find_log=find_log)
+    def find_log() -> Any:
+        log = activity_of(robot, name)
+        if log is None:
+            raise UserError(f"slots of {name}: this board runs elsewhere and shows nothing of its activity")
+        return log
+
+    begun_ns = robot.loop.time - robot.start_ns
+    recording = Recording(robot.boards[name], robot.start_ns, begun_ns, find_log=find_log, find_board=find_board)
     return RobotSlots(recording, robot)

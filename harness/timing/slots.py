@@ -30,6 +30,7 @@ from ranger_sim.firmware_sim.activity import (
     COLUMN_NUMBER,
     COLUMN_START,
     INTERRUPT_RAN,
+    MAIN_LOOP_RAN,
     TASK_DROPPED,
     TASK_RAN,
     WAIT_RAN,
@@ -40,6 +41,7 @@ from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.timing import picture
 from ranger_sim.harness.timing.recording import Recording
 
+MAIN_LOOP = "main loop"
 Limit = int | str
 Instant = float | str  # s since power-up, or text with a unit
 
@@ -56,6 +58,8 @@ class Ran:
     latency_ns: int = 0
     limit: int = 0
     interrupt: bool = False
+    main_loop: bool = False
+    chooses: bool = False  # an occasional list, whose entry has an execution of its own
 
 
 @dataclasses.dataclass(frozen=True)
@@ -77,13 +81,15 @@ class Statistics:
 class Slot:
     """One slot: `number` since the board's power-up, `row` of its table, `start_ns` since the robot's power-up.
 
-    `cycles` and `end_ns`: to the end of its last task, interrupts included. `ran`: functions and interrupts in order of
-    their start, up to the next tick; an interrupt after the slot's end is there and not in its `cycles`. `dropped`:
-    names of the tasks that an overrun dropped.
+    `cycles` and `end_ns`: to the end of its last task, interrupts included. `ran`: functions, interrupts and turns of
+    the main loop in order of their start, up to the next tick; what began after the slot's end is there and not in its
+    `cycles`. `reached_in`: what the tick found at work, such as a turn of the main loop; the slot waited for it.
+    `dropped`: names of the tasks that an overrun dropped.
     """
 
     def __init__(self, recording: Recording, place: int) -> None:
         slots = recording.slots
+        self.recording = recording
         self.rows = recording.rows
         first, last = int(slots.first[place]), int(slots.last[place])
         self.own = self.rows[first:last]
@@ -109,13 +115,24 @@ class Slot:
 
     @property
     def ran(self) -> list[Ran]:
-        """Functions and interrupts in order of their start."""
+        """Functions, interrupts and turns of the main loop in order of their start."""
         return self._executions(self.own)
+
+    @property
+    def reached_in(self) -> list[Ran]:
+        """What had begun before its tick and was not through."""
+        place = int(np.searchsorted(self.rows[:, COLUMN_START], self.start_ns))
+        return self._executions(self.recording.reaching_into(place, self.start_ns))
 
     @property
     def functions(self) -> list[Ran]:
         """Tasks and waits, in order."""
-        return [each for each in self.ran if not each.interrupt]
+        return [each for each in self.ran if not each.interrupt and not each.main_loop]
+
+    @property
+    def turns(self) -> list[Ran]:
+        """Turns of the main loop beside the scheduler, as the router has it, from its tick to the next."""
+        return [each for each in self.ran if each.main_loop]
 
     @property
     def interrupts(self) -> list[Ran]:
@@ -146,7 +163,17 @@ class Slot:
         window = self._executions(self.rows[begin:end])
         if self.end_ns > self.start_ns + self.legend.slot_ns:  # tasks of the slots after it are not its own
             window = [each for each in window if each.end_ns <= self.end_ns]
-        return picture.of_slot(self, window, limit_ns)
+        return picture.of_slot(self, self._from_its_tick(window) + window, limit_ns)
+
+    def _from_its_tick(self, window: list[Ran]) -> list[Ran]:
+        """What reached into it, with the cycles that it took behind the tick; `window`: what began from the tick on."""
+        found = []
+        for each in self.reached_in:
+            left_ns = min(each.end_ns, self.end_ns) - self.start_ns
+            inside = sum(one.cycles for one in window if one.interrupt and one.end_ns <= each.end_ns)
+            cycles = max(0, round(left_ns * self.legend.cycles_per_ns) - inside)
+            found.append(dataclasses.replace(each, name=f"{each.name} (before)", cycles=cycles))
+        return found
 
     def _executions(self, rows: np.ndarray) -> list[Ran]:
         found = []
@@ -156,7 +183,10 @@ class Slot:
                 found.append(Ran(name, start, end, cycles, items, latency_ns=latency, interrupt=True))
             elif kind in (TASK_RAN, WAIT_RAN):
                 task = self.legend.tasks[number]
-                found.append(Ran(task.name, start, end, cycles, items, limit=task.limit))
+                chooses = bool(task.entries)
+                found.append(Ran(task.name, start, end, cycles, items, limit=task.limit, chooses=chooses))
+            elif kind == MAIN_LOOP_RAN:
+                found.append(Ran(MAIN_LOOP, start, end, cycles, items, main_loop=True))
         return found
 
     def __repr__(self) -> str:
@@ -177,9 +207,11 @@ def _summed(executions: list[Ran]) -> dict[str, int]:
 class SlotView:
     """The slots of a board that were recorded, or a selection of them. Iterate, ask, assert; it grows with time."""
 
-    def __init__(self, recording: Recording, chosen: tuple[tuple[str, Callable[[Any], np.ndarray]], ...] = ()) -> None:
+    def __init__(self, recording: Recording) -> None:
         self.recording = recording
-        self.chosen = chosen  # what each selection is called, and which slots of `Recording.slots` it takes
+        # what each selection is called, and which slots of `Recording.slots` it takes
+        self.chosen: tuple[tuple[str, Callable[[Any], np.ndarray]], ...] = ()
+        self.from_ns = 0  # no slot before is chosen
 
     # --- selections ---------------------------------------------------------------------------------------
 
@@ -196,7 +228,9 @@ class SlotView:
         if last <= first:
             raise UserError(f"slots of {self.board}: nothing is between {begin} and {end}")
         called = f"between {duration_text(first)} and {duration_text(last)}"
-        return self._select(called, lambda slots: (slots.start >= first) & (slots.start < last))
+        selected = self._select(called, lambda slots: (slots.start >= first) & (slots.start < last))
+        selected.from_ns = max(first, self.from_ns)
+        return selected
 
     def during(self, called: str, held: Callable[[np.ndarray], np.ndarray]) -> Self:
         """Only slots at whose start `held` (an array of instants, ns since power-up) is true."""
@@ -239,10 +273,11 @@ class SlotView:
         """The same; UserError when there are none, or older ones were given up."""
         places = self._places()
         began = duration_text(self.recording.begun_ns)
-        if self.recording.lost and not any(called.startswith("between") for called, _ in self.chosen):
-            kept_from = duration_text(int(self.recording.rows[0, COLUMN_START]))
+        rows = self.recording.rows
+        kept_ns = int(rows[0, COLUMN_START]) if self.recording.lost and len(rows) else 0
+        if self.from_ns < kept_ns:
             raise UserError(
-                f"{self}: the oldest were given up, what is kept begins {kept_from} after power-up; "
+                f"{self}: the oldest were given up, what is kept begins {duration_text(kept_ns)} after power-up; "
                 f"ask .between(...) two instants after that, or forget() now and then"
             )
         if not len(places):
@@ -312,6 +347,12 @@ class SlotView:
         rows = self._rows(INTERRUPT_RAN)
         names = [source.name for source in self.legend.interrupts]
         return _by_name(rows, names, [0] * len(names))
+
+    @property
+    def main_loop(self) -> Statistics | None:
+        """Turns of the main loop beside the scheduler; None where there were none."""
+        rows = self._rows(MAIN_LOOP_RAN)
+        return _statistics(MAIN_LOOP, rows, 0) if len(rows) else None
 
     def _named(self, what: str, name: str, all_names: list[str], ran: dict[str, Statistics]) -> None:
         if name not in all_names:

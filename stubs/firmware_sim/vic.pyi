@@ -16,6 +16,7 @@ UART_TRANSMIT: int
 SLOT_TIMER: int
 SOFTWARE: int
 DMA_DONE: int
+LINES: dict[Any, str]
 FIQ_LATENCY: int
 IRQ_LATENCY: int
 

@@ -51,6 +51,20 @@ def test_a_quiet_slot_has_its_begin_its_tick_its_tasks_and_its_end():
     assert log.chip.legend().interrupts[log.chip.tick_source.number].name == "slot timer"
 
 
+def test_an_interrupt_at_the_end_of_a_task_is_behind_it_and_not_in_it():
+    log = Log()
+    log.start(rows=((log.task("a", 600),), ()), phase_ns=10_000)
+    activity = kept(log.chip)
+    source = attach(log, ADC_DONE, 0, "handler", cost=60)
+    end = 10_000 + TICK_NS + 10_000
+    raise_at(log.chip, source, end)
+    log.chip.advance(500_000)
+    [task] = [row for row in rows_of(activity) if row.kind == TASK_RAN]
+    assert (task.start, task.end) == (10_000 + TICK_NS, end)
+    [service] = [row for row in rows_of(activity) if row.kind == INTERRUPT_RAN and row.number == source.number]
+    assert service.start == end
+
+
 def test_items_and_spent_cycles_are_in_a_tasks_row():
     log = Log()
 

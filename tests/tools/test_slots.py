@@ -83,7 +83,7 @@ def test_an_overrun_of_the_run_is_told_and_is_the_exit_code(capsys, monkeypatch,
     monkeypatch.setattr(slots, "seen", with_a_slow_function)
     code, out, _ = told(capsys, "MCH", "--time", "0.15")
     assert code == slots.EXIT_OVERRAN == 1
-    assert re.search(r"Seen in \d+ slots of 0.15 s, 0 steps, seed 1: [1-9]\d+ overran", out)
+    assert re.search(r"Seen in \d+ slots from 0.10 to 0.15 s, 0 steps, seed 1: [1-9]\d+ overran", out)
 
 
 @pytest.mark.parametrize(

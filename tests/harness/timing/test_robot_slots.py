@@ -10,6 +10,7 @@ from ranger_sim.firmware_sim.board import Board
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.conditions import condition
 from ranger_sim.harness.ranger import BOARD_CLASSES, Ranger
+from ranger_sim.harness.timeline import Timeline
 from ranger_sim.harness.timing.robot_slots import Held
 
 
@@ -73,3 +74,47 @@ def test_a_board_that_shows_no_activity_is_refused_by_name():
             robot.slots("MCH")
         with pytest.raises(UserError, match="board 'MCX'"):
             robot.slots("MCX")
+
+
+def test_a_board_that_lost_its_supply_is_recorded_on_when_it_comes_back():
+    with contextlib.closing(Ranger()) as robot:
+        view = robot.slots("MCH")
+        timeline = Timeline(robot)
+        robot.inject("MCH.supply", "brown_out", at="0.1 s", off_ms=20.0)
+        robot.run_for(0.11)
+        off = list(view)  # also while it has no power there is an answer
+        robot.run_for(0.09)
+        slots = list(view)
+        drawn = timeline.events().track("Boards", "MCH", "slots")
+    assert [slot.start_ns for slot in slots[: len(off)]] == [slot.start_ns for slot in off]
+    before = [slot for slot in slots if slot.start_ns < 100e6]
+    after = [slot for slot in slots if slot.start_ns > 121e6]  # 20 ms off, and a millisecond until it begins
+    assert len(before) + len(after) == len(slots)
+    # boards begin within 2.5 ms of power, one slot each 0.5 ms
+    assert 195 <= len(before) <= 200 and 150 <= len(after) <= 158
+    assert [slot.row for slot in after[:5]] == [0, 1, 2, 3, 0] and after[0].number == 1
+    # the cut one is drawn too, though it is no whole slot; nothing lies in the dark
+    assert len(drawn) - len(slots) in (0, 1, 2)
+    assert not any((drawn.start_ns > 100_250_000) & (drawn.start_ns < 121_000_000))
+    assert not any((drawn.inside.end_ns > 100_250_000) & (drawn.inside.start_ns < 121_000_000))
+
+
+def test_every_interrupt_of_every_board_has_a_name_of_its_own():
+    with contextlib.closing(Ranger()) as robot:
+        for name in BOARD_CLASSES:
+            names = [source.name for source in robot.boards[name].legend().interrupts]
+            assert len(set(names)) == len(names) and not any("/" in each for each in names), names
+        names = [source.name for source in robot.boards["MCH"].legend().interrupts]
+        assert "can1 transmit" in names  # to which nothing listens: the firmware looks at the buffer instead
+
+
+def test_the_routers_main_loop_is_in_its_slots_and_no_function_of_theirs():
+    with contextlib.closing(Ranger()) as robot:
+        view, hip = robot.slots("CSR"), robot.slots("MCH")
+        robot.run_for(0.1)
+        slots = list(view)
+        turns = [turn for slot in slots for turn in slot.turns]
+        assert view.main_loop.calls == len(turns) > 500 and {turn.name for turn in turns} == {"main loop"}
+        assert not any(each.main_loop for slot in slots for each in slot.functions + slot.interrupts)
+        assert "main loop" not in view.functions
+        assert hip.main_loop is None

@@ -54,6 +54,27 @@ def test_the_worst_is_the_one_that_took_longest_and_the_margin_is_its():
     assert view.of_row(0).worst().taken_ns == TICK_NS + 30_000
 
 
+def test_a_turn_of_the_main_loop_that_a_tick_finds_at_work_is_part_of_the_slots_picture():
+    log = Log()
+    log.start(rows=two_rows(log), phase_ns=40_000)
+    ends = iter([30_000, 60_000])  # two turns of 30 us; nothing to do behind them
+
+    def turn():
+        return next(ends, log.chip.now)
+
+    log.chip.background = turn
+    view = SlotView(Recording(log.chip))
+    log.chip.advance(500_000)
+    [slot] = view
+    assert slot.turns == []
+    [before] = slot.reached_in
+    assert (before.name, before.start_ns, before.end_ns) == ("main loop", 30_000, 60_000 + TICK_NS)
+    # 20 us of the turn and the tick behind the match, and its own two tasks
+    assert slot.cycles == 1200 + TICK_CYCLES + 1800 - 1  # 1 by rounding down ns
+    drawn = {line.split()[1]: line.split() for line in slot.picture().splitlines() if " 1 " in line}
+    assert drawn["main"][2:5] == ["loop", "(before)", "1"] and drawn["main"][5] == "1,200"
+
+
 def test_the_robots_power_up_is_where_time_is_counted_from():
     view = recorded(rows=two_rows, phase_ns=10_000, origin_ns=10_000)
     assert [slot.start_ns for slot in view] == [0, 500_000, 1_000_000, 1_500_000]
@@ -252,6 +273,8 @@ def test_what_was_given_up_for_newer_rows_is_told_and_a_selection_of_what_is_kep
     assert recording.lost > 0
     with pytest.raises(UserError, match="the oldest were given up, what is kept begins"):
         view.assert_no_overrun()
+    with pytest.raises(UserError, match="the oldest were given up"):  # a part of it is kept
+        view.between("1 ms", "20 ms").assert_within("52 us")
     kept = view.between("18 ms", "20 ms")
     assert len(kept) == 4
     kept.assert_within("52 us")
