@@ -45,12 +45,20 @@ def test_a_result_that_cannot_be_told_is_a_crash_with_its_reason():
     assert error.value.outcome == "crashed"
 
 
-def test_a_result_that_breaks_off_is_a_crash():
+def test_a_branch_that_dies_while_it_tells_has_crashed():
     def work():
-        branching.json.dumps = lambda told: '{"half'  # in the forked process alone
+        whole = os.fdopen
+
+        def half(*arguments, **more):
+            pipe = whole(*arguments, **more)
+            pipe.write('{"half')
+            pipe.flush()
+            os.kill(os.getpid(), signal.SIGKILL)
+
+        branching.os.fdopen = half  # in the forked process alone
         return {}
 
-    with pytest.raises(BranchError, match=r"its process ended with -?\d while it told its result") as error:
+    with pytest.raises(BranchError, match="its process ended with -9 while it told its result") as error:
         branched(work)
     assert error.value.outcome == "crashed"
 
