@@ -493,7 +493,7 @@ class MediumAccess:
         if self.sending:
             node.transmit_errors += sender_penalty
         else:
-            node.receive_errors += receiver_penalty
+            node.count_receive_errors(receiver_penalty)
         self.state = MAC_PASSIVE_FLAG if node.passive else MAC_ACTIVE_FLAG
         self.field = FIELD_PASSIVE_FLAG if node.passive else FIELD_ACTIVE_FLAG
         self.count = 0
@@ -507,7 +507,7 @@ class MediumAccess:
         if self.sending:
             self.node.transmit_errors += SENDER_PENALTY
         else:
-            self.node.receive_errors += SENDER_PENALTY
+            self.node.count_receive_errors(SENDER_PENALTY)
         return MET_COUNTER
 
     def _note_error(self, kind: cython.longlong) -> cython.void:

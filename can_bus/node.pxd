@@ -23,6 +23,7 @@ cpdef enum:
     WARNING_LIMIT = 96
     PASSIVE_LIMIT = 128
     BUS_OFF_LIMIT = 256
+    RECEIVE_ERRORS_MOST = 255
     RECEIVER_CALMED = 119
     SENDER_PENALTY = 8
     SUSPEND_BITS = 8
@@ -48,6 +49,7 @@ cdef class Node:
 
     cdef int count_success(self) except -1
     cdef int count_reception(self) except -1
+    cpdef int count_receive_errors(self, long long penalty) except -1
     cpdef bint confine(self, long long time, long long interrupts) except? -1
     cdef int tell(self, long long time, long long interrupts) except -1
     cdef long long joins_at(self, long long free_bit) noexcept

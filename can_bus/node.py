@@ -38,6 +38,7 @@ if not cython.compiled:
     WARNING_LIMIT = 96  # CxEWL after reset; ISO 11898-1 recommends the same
     PASSIVE_LIMIT = 128  # error passive from here
     BUS_OFF_LIMIT = 256  # bus-off from here (transmit errors)
+    RECEIVE_ERRORS_MOST = 255  # RXERR of the LPC2194 has eight bits; beyond the passive limit more means nothing more
     RECEIVER_CALMED = 119  # an error-passive receiver after a good frame; the standard allows 119 ... 127
     SENDER_PENALTY = 8  # transmit errors that an error costs the sender; the heavier ones cost a receiver as much
     SUSPEND_BITS = 8  # suspend transmission: how long an error-passive sender waits after the intermission
@@ -114,6 +115,10 @@ class Node:
     def count_reception(self) -> None:
         """A good frame came in when it had receive errors."""
         self.receive_errors = self.receive_errors - 1 if self.receive_errors < PASSIVE_LIMIT else RECEIVER_CALMED
+
+    def count_receive_errors(self, penalty: cython.longlong) -> None:
+        """An error that it met as a receiver."""
+        self.receive_errors = min(self.receive_errors + penalty, RECEIVE_ERRORS_MOST)
 
     def confine(self, time: cython.longlong, interrupts: cython.longlong) -> cython.bint:
         """Take the error state that belongs to the counters, and tell it at `time` (ns) with `interrupts` (ICR_*).

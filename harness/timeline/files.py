@@ -50,8 +50,11 @@ def write(events: Events, path: pathlib.Path, title: str) -> None:
     """The timeline into `path`, whole or not at all."""
     writer = format_of(path)
     check_target(path)
-    with tempfile.TemporaryDirectory(dir=path.parent, prefix=f".{path.name}-") as folder:
-        partial = pathlib.Path(folder) / path.name
-        with partial.open("wb") as file:
-            writer(events, file, title)
-        partial.replace(path)
+    try:
+        with tempfile.TemporaryDirectory(dir=path.parent, prefix=f".{path.name}-") as folder:
+            partial = pathlib.Path(folder) / path.name
+            with partial.open("wb") as file:
+                writer(events, file, title)
+            partial.replace(path)
+    except OSError as error:  # above all a full disk
+        raise UserError(f"trace {path}: cannot be written: {error.strerror or error}") from None

@@ -4,9 +4,8 @@ An arrow joins two slices. How each pair is found:
 
 - function -> frame: the function had the processor at the instant of the request. A task takes effect at its start, so
   its start is that instant; else it is the interrupt, or the turn of the main loop, that ran then.
-- frame -> interrupt: frames and receive interrupts of a controller are paired in order; no interrupt begins before its
-  frame was heard. (A frame that a full controller lost would shift the pairs until the bus is idle; it is counted in
-  the summary as lost.)
+- frame -> interrupt: the one that was asked for when the frame was heard. Where a frame met an interrupt that waited
+  already, its own is asked for later: it is the last such frame before. A frame that was lost has no arrow.
 - interrupt -> function: the next start of the task that empties the ring, where that board listens to the identifier.
 - through the router and over the serial link: the same identifier and both words, at the first time after they came in.
 - the main brain's function of a segment: the latest one that began before that segment was put up for sending.
@@ -34,6 +33,7 @@ IDENTIFIER_MASK = 0x7FF  # of a half-word's header on the link
 # Longest way through the router: two full transmit rings at 36 us a frame take less (chosen by us).
 LONGEST_WAY_NS = 20_000_000
 LONGEST_SERVICE_NS = 1_000_000  # from a frame to its interrupt (chosen by us: the firmware's are below 100 us)
+ROUNDING_NS = 2  # both instants are rounded to whole ns, one of them twice
 
 
 class FlowBook:
@@ -131,26 +131,35 @@ def receive(
     rows = np.flatnonzero((bus.sender != bus.nodes.index(board)) & ~bus.is_error)
     fast = board == ROUTER
     slices = processor.fast if fast else processor.services
-    at, starts = slices.starts_of(f"can{controller} receive" if fast else "can_receive")
-    interrupt = paired(bus.heard_ns[rows], at, starts, LONGEST_SERVICE_NS)
+    asked_ns = processor.fast_asked_ns if fast else processor.services_asked_ns
+    at, _ = slices.starts_of(f"can{controller} receive" if fast else "can_receive")
+    order = np.argsort(bus.heard_ns[rows], kind="stable")
+    rows = rows[order]
+    found = paired(bus.heard_ns[rows], asked_ns[at], LONGEST_SERVICE_NS)
+    interrupt = np.where(found >= 0, np.append(at, -1)[found], -1)
     book.connect(bus.slices, rows, slices, interrupt)
     return rows, interrupt
 
 
-def paired(came_ns: np.ndarray, at: np.ndarray, starts_ns: np.ndarray, longest_ns: int) -> np.ndarray:
-    """For each instant, in order, the next slice of `at` that nobody before it has; -1 when that is too late."""
-    order = np.argsort(came_ns, kind="stable")
-    places = np.arange(len(order))
-    earliest = np.searchsorted(starts_ns, came_ns[order])
-    taken = np.maximum.accumulate(earliest - places) + places if len(order) else earliest
-    there = taken < len(at)
-    rows = np.full(len(order), -1, dtype=np.int64)
-    rows[there] = at[taken[there]]
-    late = np.zeros(len(order), dtype=bool)
-    late[there] = starts_ns[taken[there]] - came_ns[order][there] > longest_ns
-    rows[late] = -1
-    found = np.empty_like(rows)
-    found[order] = rows
+def paired(came_ns: np.ndarray, asked_ns: np.ndarray, longest_ns: int) -> np.ndarray:
+    """For each frame, heard at `came_ns`, the place of its interrupt among those asked for at `asked_ns`; -1 for none.
+
+    Both in order of time. An interrupt belongs to the frame that was heard at its request, be it with the tolerance of
+    a rounded bit; those left over, from the last one on, to the latest frame left over before them, in `longest_ns`.
+    """
+    found = np.full(len(came_ns), -1, dtype=np.int64)
+    if len(came_ns) == 0:
+        return found
+    frame = np.searchsorted(came_ns, asked_ns - ROUNDING_NS)
+    exact = frame < len(came_ns)
+    exact[exact] = came_ns[frame[exact]] <= asked_ns[exact] + ROUNDING_NS
+    found[frame[exact]] = np.flatnonzero(exact)
+    left = np.flatnonzero(found < 0).tolist()
+    for interrupt in np.flatnonzero(~exact)[::-1].tolist():
+        while left and came_ns[left[-1]] > asked_ns[interrupt]:
+            left.pop()
+        if left and asked_ns[interrupt] - came_ns[left[-1]] <= longest_ns:
+            found[left.pop()] = interrupt
     return found
 
 

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ranger_sim.foundation.libraries import imported
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.timeline.packing import index_packets
 from ranger_sim.harness.timeline.perfetto_file import library
@@ -86,7 +87,7 @@ def read(path: pathlib.Path, begin_ns: int | None = None, end_ns: int | None = N
         inside &= index[:, 2] <= end_ns
     reader = Reader(schema, begin_ns if begin_ns is not None else first)
     for start, end, _ in index[chosen | inside].tolist():
-        reader.take(schema.TracePacket.FromString(data[start:end]))
+        take(path, reader, schema, data[start:end])
     reader.close(end_ns if end_ns is not None else last)
     return ReadTrace(reader.tracks, first, last)
 
@@ -101,10 +102,21 @@ def read_instants(path: pathlib.Path) -> tuple[int, int, dict[str, list[ReadSlic
     reader = Reader(schema, begin)
     for start, stop, time in index.tolist():
         if time < 0 or INSTANT_TYPE in data[start:stop]:
-            reader.take(schema.TracePacket.FromString(data[start:stop]))
+            take(path, reader, schema, data[start:stop])
     trace = ReadTrace(reader.tracks, begin, end)
     instants = {" ".join(trace.path(track)): track.instants for track in trace.tracks.values() if track.instants}
     return begin, end, instants
+
+
+def take(path: pathlib.Path, reader: "Reader", schema: Any, packet: bytes) -> None:
+    """One packet of the file for the reader. UserError for what `Writer` would not have written."""
+    decode_error = imported("google.protobuf.message").DecodeError
+    try:
+        reader.take(schema.TracePacket.FromString(packet))
+    except (KeyError, decode_error):
+        raise UserError(
+            f"trace {path}: is a Perfetto trace, but none that ranger-sim wrote, or it is damaged"
+        ) from None
 
 
 def contents(path: pathlib.Path) -> bytes:

@@ -30,7 +30,7 @@ class Processor:
     """One board's activity. `rows`: of its ActivityLog; `legend`: what their numbers stand for.
 
     `slots`, with the tasks inside. `services`: the interrupts, the fast ones inside those that they interrupted.
-    `turns` of the main loop. `asked_ns`, by row of `services` and `fast`: when the interrupt was asked for.
+    `turns` of the main loop. `services_asked_ns`, `fast_asked_ns`: when each of them was asked for.
     """
 
     def __init__(self, legend: Any, rows: np.ndarray, zero_ns: int) -> None:
@@ -47,6 +47,7 @@ class Processor:
         self.fast = self._services(services[is_fast])
         self.services = self._services(services[~is_fast])
         self.services.inside = self.fast
+        self.fast_asked_ns, self.services_asked_ns = self._asked(self.fast), self._asked(self.services)
         self.turns = self._turns(rows[kind == MAIN_LOOP_RAN])
         self.overruns = self._overruns(rows[(kind == SLOT_OVERRAN) | (kind == TASK_DROPPED)])
 
@@ -102,6 +103,13 @@ class Processor:
         return self._made(
             "interrupts", names, rows, rows[:, COLUMN_NUMBER], cycles=rows[:, COLUMN_CYCLES], latency_us=latency_us
         )
+
+    def _asked(self, services: Slices) -> np.ndarray:
+        """Start and latency are those of the way to the handler, which takes the source's own latency."""
+        ways_ns = [int(source.latency / self.legend.cycles_per_ns) for source in self.legend.interrupts]
+        latency_ns = np.round(services.notes["latency_us"] * 1e3).astype(np.int64)
+        asked_ns: np.ndarray = services.start_ns + np.array([*ways_ns, 0])[services.name] - latency_ns
+        return asked_ns
 
     def _turns(self, rows: np.ndarray) -> Slices:
         return self._made("main loop", ["turn"], rows, np.zeros(len(rows), dtype=np.int64))

@@ -398,7 +398,7 @@ class Node:
             if not exempt and not self.pending_ack:
                 self.tec += 8
         else:
-            self.rec += 8 if in_flag else 1
+            self.rec = min(self.rec + (8 if in_flag else 1), 255)
         self.state = FLAG
         self.count = 0
         self.flag_level = None
@@ -441,13 +441,13 @@ class Node:
         if level == DOMINANT:
             self.dominant_after += 1
             if self.first_after and not self.transmitter and self.flag_kind != "overload":
-                self.rec += 8
+                self.rec = min(self.rec + 8, 255)
                 self.confine(bit)
             if self.dominant_after % 8 == 0:
                 if self.transmitter:
                     self.tec += 8
                 else:
-                    self.rec += 8
+                    self.rec = min(self.rec + 8, 255)
                 self.confine(bit)
             self.first_after = False
             return

@@ -87,3 +87,10 @@ def test_a_gap_counts_as_many_sequences_as_it_holds_with_the_one_that_ends_the_f
     node.start_joining(4000)
     node.count_sequences(3990, 4010)  # ten bits since it has waited
     assert node.sequences_left == 1
+
+
+@pytest.mark.parametrize(("before", "penalty", "after"), [(0, 1, 1), (247, 8, 255), (248, 8, 255), (255, 1, 255)])
+def test_the_receive_error_counter_ends_at_what_eight_bits_hold(before, penalty, after):
+    node = node_with(0, before)
+    node.count_receive_errors(penalty)
+    assert node.receive_errors == after

@@ -122,6 +122,10 @@ def test_what_cannot_be_shown_is_told_in_one_line(file, arguments, reason, capsy
         ("none.pftrace", None, "cannot be read: No such file"),
         ("run.pftrace", b"\x00 this is something else", "is no Perfetto trace"),
         ("empty.pftrace", b"", "is no Perfetto trace"),
+        # a packet with time stamp 5 and an instant on track 7, which no descriptor has told of
+        ("foreign.pftrace", b"\x0a\x08\x40\x05\x5a\x04\x48\x03\x58\x07", "none that ranger-sim wrote"),
+        # the same with a track event whose last field has no value
+        ("damaged.pftrace", b"\x0a\x07\x40\x05\x5a\x03\x48\x03\x58", "or it is damaged"),
     ],
 )
 def test_a_file_that_is_no_trace_is_told_in_one_line(name, content, reason, tmp_path, capsys):

@@ -3,12 +3,13 @@
 import collections
 import contextlib
 
+import numpy as np
 import pytest
 
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.ranger import Ranger
 from ranger_sim.harness.scenario import Scenario
-from ranger_sim.harness.timeline import Timeline, perfetto_reader
+from ranger_sim.harness.timeline import Timeline, files, flows, perfetto_reader
 
 perfetto_trace_pb2 = pytest.importorskip("perfetto.protos.perfetto.trace.perfetto_trace_pb2")
 
@@ -285,3 +286,67 @@ def test_a_file_that_cannot_be_is_refused_in_one_line(run, tmp_path, name, reaso
         with pytest.raises(UserError, match=reason) as told:
             Timeline(robot).write(tmp_path / name)
         assert "\n" not in str(told.value)
+
+
+# --- arrows where something went wrong ----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("came_ns", "asked_ns", "pairs"),
+    [
+        ([100, 200, 300], [100, 201, 298], [0, 1, 2]),  # be it by a rounded bit
+        ([100, 200, 300], [100, 300], [0, -1, 1]),  # a lost one shifts nothing
+        ([100, 200, 300], [100, 250, 300], [0, 1, 2]),  # it waited behind the first
+        ([100, 150, 200, 300], [100, 250, 300], [0, -1, 1, 2]),  # of two the later: the first was overwritten
+        ([100, 150, 200], [100, 250, 260], [0, 1, 2]),
+        ([100, 200], [50, 100, 200, 300], [1, 2]),  # asked for without a frame, before and behind
+        ([100, 5000], [2000, 5000], [-1, 1]),  # too late for the first
+        ([], [100], []),
+        ([100], [], [-1]),
+    ],
+)
+def test_frames_are_paired_with_the_interrupts_that_they_asked_for(came_ns, asked_ns, pairs):
+    found = flows.paired(np.array(came_ns, dtype=np.int64), np.array(asked_ns, dtype=np.int64), 1500)
+    assert found.tolist() == pairs
+
+
+def test_lost_frames_have_no_arrow_and_those_behind_them_have_theirs():
+    with contextlib.closing(Ranger(Scenario())) as robot:
+        timeline = Timeline(robot)
+        robot.inject("MCH.can1", "loss", at="0.02 s", until="0.03 s")
+        robot.run_for(RUN_S)
+        events = timeline.events()
+        timeline.close()
+    frames, interrupts = events.track("Buses", "can1", "frames"), events.track("Boards", "MCH", "interrupts")
+    begins, ends = frames.flow_ends == 0, interrupts.flow_ends == 1
+    numbers, sent, heard = np.intersect1d(
+        frames.flow_id[begins], interrupts.flow_id[ends], assume_unique=True, return_indices=True
+    )
+    came = np.stack(
+        [
+            frames.end_ns[frames.flow_at[begins][sent]],
+            interrupts.start_ns[interrupts.flow_at[ends][heard]],
+        ],
+        axis=1,
+    )
+    assert len(numbers) > 100
+    # heard a bit before the frame's end, and served within the longest handler and task that disables nothing
+    waited_us = (came[:, 1] - came[:, 0]) * 1e-3
+    assert ((waited_us > -0.34) & (waited_us < 20)).all()
+    # plant steps of 250 us begin and end the fault
+    lost = (frames.end_ns > 20.3e6) & (frames.end_ns < 29.9e6)
+    assert lost.sum() > 30 and not any((came[:, 0] > 20.3e6) & (came[:, 0] < 29.9e6))
+    assert (came[:, 0] > 30.3e6).sum() > 60
+
+
+def test_a_disk_that_fills_up_while_the_file_is_written_is_told_in_one_line_and_leaves_nothing(
+    run, tmp_path, monkeypatch
+):
+    def full(events, file, title):
+        file.write(b"some")
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setitem(files.FORMATS, ".pftrace", full)
+    with pytest.raises(UserError, match=r"run\.pftrace: cannot be written: No space left on device"):
+        files.write(run.events, tmp_path / "run.pftrace", "")
+    assert list(tmp_path.iterdir()) == []
