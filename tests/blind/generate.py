@@ -1,0 +1,54 @@
+"""Makes blind cases: `python -m tests.blind.generate --experiment motor-bench --count 60 --seed N --out DIR`.
+
+    DIR/data/cases.json       [{"id", "experiment", "files", "holdout"}], nothing else
+    DIR/data/ID/a.csv, b.csv  measured; b is held out
+    DIR/truth/ID.json         what is hidden there, for the scorer alone (another folder by --truth)
+
+Without --seed one is drawn and printed; the same seed gives the same files.
+"""
+
+import argparse
+import json
+import os
+import pathlib
+import sys
+
+from tests.blind.generator import motor_bench
+
+EXPERIMENTS = {"motor-bench": motor_bench}
+
+
+def main(arguments=None):
+    parser = argparse.ArgumentParser(prog="python -m tests.blind.generate", description=__doc__.splitlines()[0])
+    parser.add_argument("--experiment", choices=EXPERIMENTS, default="motor-bench")
+    parser.add_argument("--count", type=int, default=60)
+    parser.add_argument("--seed", type=int, help="drawn from the system when left out")
+    parser.add_argument("--out", type=pathlib.Path, required=True)
+    parser.add_argument("--truth", type=pathlib.Path, help="folder of the truth (default OUT/truth)")
+    parser.add_argument("--kinds", help="only these, by comma: single,null,pair,outside")
+    parser.add_argument("--causes", help="only these causes as single effects and in pairs, by comma")
+    options = parser.parse_args(arguments)
+    experiment = EXPERIMENTS[options.experiment]
+    kinds = options.kinds.split(",") if options.kinds else [kind for kind, _ in experiment.MIX]
+    causes = options.causes.split(",") if options.causes else list(experiment.CAUSES)
+    for wanted, known in ((kinds, dict(experiment.MIX)), (causes, experiment.CAUSES)):
+        for name in wanted:
+            if name not in known:
+                parser.error(f"{name!r} is not one of {', '.join(known)}")
+    seed = int.from_bytes(os.urandom(4), "big") if options.seed is None else options.seed
+    print(f"blind cases: experiment {options.experiment}, count {options.count}, seed {seed}", flush=True)
+    data, truth = options.out / "data", options.truth or options.out / "truth"
+    if data.exists():
+        parser.error(f"{data} is there already")
+    data.mkdir(parents=True)
+    truth.mkdir(parents=True, exist_ok=True)
+    public = []
+    said = (lambda text: print(text, file=sys.stderr, flush=True)) if sys.stderr.isatty() else (lambda text: None)
+    for key, files, holdout, hidden in experiment.generate(seed, options.count, data, kinds, causes, said):
+        (truth / f"{key}.json").write_text(json.dumps(hidden, indent=1), encoding="utf-8")
+        public.append({"id": key, "experiment": options.experiment, "files": files, "holdout": holdout})
+    (data / "cases.json").write_text(json.dumps(public, indent=1), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,234 @@
+"""Cases of the motor bench: which effects are hidden where, how strongly, and the files that are measured."""
+
+import numpy as np
+
+from ranger_sim.foundation.random_arrays import generator
+from tests.blind.generator.bench import NOMINAL, Lanes
+from tests.blind.generator.case import Case
+from tests.blind.generator.effects import CAUSES, EFFECTS, OUTSIDE
+from tests.blind.generator.excitation import STEP_S, monotone, rich
+from tests.blind.generator.instruments import NOISE, Instruments, write
+from tests.blind.generator.strength import Scale
+
+EXPERIMENT = "motor-bench"
+SAMPLES = int(20.0 / STEP_S)
+BRAKE_NM = 0.7  # most of what the brake motor is driven with: 2.8 A at standstill
+BATCH = 80  # cases simulated side by side: memory, not speed, sets it
+STRENGTHS = (0.5, 1.0, 2.0, 4.0)
+TIE = 0.95  # of the cosine of two effects' parts outside the base model
+SUBSYSTEM = {"E": "electrical", "M": "mechanical", "EM": "current_sensing", "T": "transmission", "t": "timing"}
+MIX = (  # shares of the kinds in a set of cases
+    ("single", 0.50),
+    ("null", 0.20),
+    ("pair", 0.12),
+    ("outside", 0.18),
+)
+
+
+def plan(seed, count, kinds, causes):
+    """Cases without files: kinds in the shares of MIX, causes in turn, strengths in turn for each kind."""
+    rng = generator(seed, "plan")
+    mix = [(kind, share) for kind, share in MIX if kind in kinds]
+    total = sum(share for _, share in mix)
+    wanted = []
+    for kind, share in mix:
+        wanted += [kind] * round(count * share / total)
+    wanted = (wanted + [mix[0][0]] * count)[:count]
+    turns = {kind: 0 for kind, _ in MIX}
+    order = {"single": list(rng.permutation(causes)), "outside": list(rng.permutation(OUTSIDE))}
+    cases = []
+    for number, kind in enumerate(wanted):
+        turn = turns[kind]
+        turns[kind] += 1
+        case = Case(number, kind)
+        if kind == "null":
+            case.variant = ("plain", "parameters", "noise")[turn % 3]
+        elif kind == "pair":
+            first, second = rng.choice(causes, 2, replace=False)
+            case.effects = [(str(first), 2.0), (str(second), 2.0)]
+        elif kind == "outside":
+            case.effects = [(str(order[kind][turn % len(OUTSIDE)]), 4.0)]
+        else:
+            round_, place = divmod(turn, len(causes))
+            strength = STRENGTHS[(place + round_ + seed) % 4]
+            case.effects = [(str(order[kind][place]), strength)]
+        cases.append(case)
+    return [cases[i] for i in rng.permutation(len(cases))]
+
+
+def prepare(seed, case):
+    """Base parameters, instruments and the conditions of both runs of a case."""
+    rng = generator(seed, f"case {case.number}")
+    low, high = (0.20, 0.40) if case.variant == "parameters" else (0.05, 0.15)
+    case.base = {
+        name: value * (1.0 + rng.choice((-1.0, 1.0)) * rng.uniform(low, high)) for name, value in NOMINAL.items()
+    }
+    louder = rng.uniform(2.0, 3.5) if case.variant == "noise" else 1.0
+    noise = {name: value * louder * rng.uniform(0.8, 1.3) for name, value in NOISE.items()}
+    case.instruments = Instruments(noise, float(rng.uniform(0.80, 0.93)))
+    supply_V = rng.uniform(5.6, 6.6)
+    # the held-out run: another trajectory, another level of the supply, another room
+    case.runs = []
+    for name, level in (("a", 1.0), ("b", float(rng.choice((0.82, 1.15))))):
+        profile = monotone if case.poor else rich
+        volt, brake = profile(generator(seed, f"case {case.number} run {name}"), SAMPLES, supply_V * level, BRAKE_NM)
+        case.runs.append((name, volt, brake, float(rng.uniform(16.0, 32.0)), float(rng.uniform(0.0, 15.0))))
+    for name, _ in case.effects:
+        effect = EFFECTS[name]
+        case.shapes.append(effect.draw(generator(seed, f"case {case.number} {name}")))
+        case.signs.append(float(rng.choice((-1.0, 1.0))) if effect.sign else 1.0)
+
+
+def lanes_of(pairs):
+    """Lanes for [(case, run)]."""
+    base = {name: np.array([case.base[name] for case, _ in pairs]) for name in NOMINAL}
+    runs = [run for _, run in pairs]
+    return Lanes(
+        base,
+        np.column_stack([run[1] for run in runs]),
+        np.column_stack([run[2] for run in runs]),
+        np.array([run[3] for run in runs]),
+        np.array([run[4] for run in runs]),
+    )
+
+
+def calibrate(case, scale):
+    """Amplitudes that give the wanted strengths along the trajectory without effects."""
+    for (name, wanted), shape, sign in zip(case.effects, case.shapes, case.signs, strict=True):
+        effect = EFFECTS[name]
+        if effect.linear:
+            unit = scale.strength(effect.show(scale.trajectory, shape))
+            if unit <= 0.0:
+                raise ValueError(f"case {case.number}: {name} does not show in this run")
+            case.amplitudes.append(sign * wanted / unit)
+            continue
+        low, high = 0.0, effect.start
+        while scale.strength(effect.show(scale.trajectory, shape, high)) < wanted and high < 10.0:
+            low, high = high, 2.0 * high
+        for _ in range(10):
+            middle = 0.5 * (low + high)
+            if scale.strength(effect.show(scale.trajectory, shape, middle)) < wanted:
+                low = middle
+            else:
+                high = middle
+        case.amplitudes.append(0.5 * (low + high))
+
+
+def balances(name, trajectory, shape, amplitude):
+    """What an effect adds to the balances."""
+    effect = EFFECTS[name]
+    if not effect.linear:
+        return effect.show(trajectory, shape, amplitude)
+    return tuple(amplitude * part for part in effect.show(trajectory, shape))
+
+
+def rivals(seed, case, scale):
+    """{other cause: cosine} with the case's only effect, along its trajectory."""
+    (name, _), shape = case.effects[0], case.shapes[0]
+    own = scale.outside(balances(name, scale.trajectory, shape, case.amplitudes[0]))
+    found = {}
+    for other in CAUSES:
+        if other == name:
+            continue
+        effect = EFFECTS[other]
+        drawn = effect.draw(generator(seed, f"case {case.number} {other}"))
+        turns = "once_per_turn" in (name, other)  # its period is its own
+        drawn |= {key: shape[key] for key in drawn if key in shape and not (turns and key == "periods")}
+        theirs = scale.outside(balances(other, scale.trajectory, drawn, effect.start))
+        length = np.linalg.norm(own) * np.linalg.norm(theirs)
+        found[other] = float(abs(own @ theirs) / length) if length > 0.0 else 0.0
+    return found
+
+
+def true_channels(trajectory):
+    """What ideal instruments would show."""
+    t = trajectory
+    return {"V": t.V, "I": t.I, "w": t.w, "T": t.T, "theta": t.theta, "temperature": t.housing_C}
+
+
+def apply_instruments(case, trajectory, true):
+    """Changes the true channels by the effects that sit in instruments."""
+    for (name, _), shape, amplitude in zip(case.effects, case.shapes, case.amplitudes, strict=True):
+        if EFFECTS[name].measure is not None:
+            EFFECTS[name].measure(true, trajectory, amplitude, shape)
+
+
+def let_act(lanes, cases):
+    """Puts the effects that act in the bench into the lanes, one lane per entry of `cases`."""
+    for lane, case in enumerate(cases):
+        for (name, _), shape, amplitude in zip(case.effects, case.shapes, case.amplitudes, strict=True):
+            if EFFECTS[name].law:
+                lanes.add(lane, EFFECTS[name].law, amplitude, shape)
+
+
+def measure(seed, case, run, trajectory):
+    """The columns of a run's file."""
+    true = true_channels(trajectory)
+    apply_instruments(case, trajectory, true)
+    return case.instruments.show(generator(seed, f"case {case.number} noise {run[0]}"), true)
+
+
+def truth(case, scale, cosines):
+    """What only the scorer may know."""
+    causes = []
+    for (name, wanted), shape, amplitude in zip(case.effects, case.shapes, case.amplitudes, strict=True):
+        effect = EFFECTS[name]
+        shown = balances(name, scale.trajectory, shape, amplitude)
+        causes.append(
+            {
+                "name": name,
+                "in_catalogue": effect.known,
+                "balance": effect.balance,
+                "subsystem": SUBSYSTEM[effect.balance],
+                "strength": wanted,
+                "strength_reached": scale.strength(shown),
+                "r": scale.r(shown),
+                "n_eff": scale.n_eff,
+                "share_by_balance": scale.shares(shown),
+                "amplitude": amplitude,
+                "shape": shape,
+                "parameters": effect.tell(amplitude, shape, case.base),
+            }
+        )
+    return {
+        "experiment": EXPERIMENT,
+        "kind": case.kind,
+        "variant": case.variant,
+        "causes": causes,
+        "ties": sorted(name for name, cosine in cosines.items() if cosine > TIE),
+        "cosines": {name: round(value, 3) for name, value in sorted(cosines.items(), key=lambda item: -item[1])},
+        "base": case.base,
+        "noise": case.instruments.noise,
+        "memory": case.instruments.memory,
+    }
+
+
+def generate(seed, count, data, kinds, causes, tell=lambda text: None):
+    """Writes data files below `data`; yields (id, files, holdout, truth) of each case.
+
+    Two passes of simulation: without effects, which sets the amplitudes, and with them.
+    """
+    names = generator(seed, "names")
+    cases = plan(seed, count, kinds, causes)
+    for start in range(0, count, BATCH):
+        batch = cases[start : start + BATCH]
+        for case in batch:
+            prepare(seed, case)
+        plain = lanes_of([(case, case.runs[0]) for case in batch]).run(fine=4)
+        tell(f"{len(batch)} cases simulated without effects")
+        for case, trajectory in zip(batch, plain, strict=True):
+            calibrate(case, Scale(trajectory, case.instruments))
+        pairs = [(case, run) for case in batch for run in case.runs]
+        lanes = lanes_of(pairs)
+        let_act(lanes, [case for case, _ in pairs])
+        trajectories = lanes.run()
+        tell(f"{len(batch)} cases simulated with effects")
+        for number, case in enumerate(batch):
+            key = names.bytes(6).hex()
+            (data / key).mkdir(parents=True)
+            ran = trajectories[2 * number : 2 * number + 2]
+            for run, trajectory in zip(case.runs, ran, strict=True):
+                write(data / key / f"{run[0]}.csv", measure(seed, case, run, trajectory))
+            scale = Scale(ran[0], case.instruments)
+            cosines = rivals(seed, case, scale) if case.kind == "single" else {}
+            yield key, [f"{key}/a.csv"], [f"{key}/b.csv"], truth(case, scale, cosines)
