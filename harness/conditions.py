@@ -201,18 +201,21 @@ class ErrorNoted(Condition):
         self.code = codes[error]
         self.error = error
         self.boards = (board,) if board is not None else wiring.BOARDS
-        self.before = 0
+        self.before: list[int] = []  # by board
 
     def begin(self, robot: Any) -> None:
         Condition.begin(self, robot)
-        self.before = self.count()
+        self.before = self.counts()
 
-    def count(self) -> int:
-        """How often these boards noted it since power-up."""
-        return sum(errors_of(self.robot.loop.board(name))[self.code] for name in self.boards)
+    def counts(self) -> list[int]:
+        """How often each of these boards noted it since its power-up."""
+        return [int(errors_of(self.robot.loop.board(name))[self.code]) for name in self.boards]
 
     def met(self) -> bool:
-        return self.count() > self.before
+        now = self.counts()
+        noted = any(count > before for count, before in zip(now, self.before, strict=True))
+        self.before = [min(pair) for pair in zip(now, self.before, strict=True)]  # a board that begins anew counts anew
+        return noted
 
     def nearest(self) -> str:
         return f"{', '.join(self.boards)} noted no {self.error}"

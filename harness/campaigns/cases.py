@@ -32,7 +32,7 @@ class Settings:
     """What is set before power-up.
 
     walk: fields of Scenario; controller, body: single values over those of the sets that `walk` names; costs:
-    {"MCH.publish_hip_angle": factor} on the modelled cycles of a task.
+    {"MCH.mc_compliant_control": factor} on the modelled cycles of a task.
     """
 
     walk: dict[str, Any] = dataclasses.field(default_factory=dict)

@@ -9,9 +9,8 @@ from typing import Any, ClassVar
 
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.faults.catalogue import mode
-from ranger_sim.harness.faults.fault import Parameter
+from ranger_sim.harness.faults.fault import Fault, Parameter, WholeNumber
 from ranger_sim.harness.faults.places import BRIDGE, CABLE, JOINT, MOTOR
-from ranger_sim.harness.faults.sensor import PlaceFault
 from ranger_sim.plant import wiring_points as point
 from ranger_sim.plant.drive import DRIVEN, HELD_HIGH, HELD_LOW, HELD_OPEN
 from ranger_sim.plant.leg import INNER, OUTER
@@ -20,7 +19,7 @@ from ranger_sim.plant.term_torques import ANKLE_CABLE, ANKLE_JOINT, HIP_JOINT, S
 SIDES = {point.OUTER_ANKLE: OUTER, point.INNER_ANKLE: INNER}
 
 
-class MotorFault(PlaceFault):
+class MotorFault(Fault):
     """A fault of one motor. `usual`: its own numbers, by name of the field."""
 
     unit = "A"
@@ -162,7 +161,7 @@ class WeakMotor(WindingFault):
 
 
 @mode
-class OneLeg(PlaceFault):
+class OneLeg(Fault):
     """One of the bridge's two half-bridges does not follow its PWM."""
 
     mode = "one_leg"
@@ -171,8 +170,8 @@ class OneLeg(PlaceFault):
     meaning = "has a leg that does not follow the PWM: open, or held low or high"
     unit = "of the battery voltage"
     parameters = (
-        Parameter("leg", "1", 2.0, 2.0, 6.0, "2: the lead of MR2, 6: that of MR6", "two leads (robot.md N4.4)"),
-        Parameter("state", "1", 0.0, 0.0, 2.0, "0: open, 1: held low, 2: held high", "what a transistor can do"),
+        WholeNumber("leg", "1", 2.0, 2.0, 6.0, "2: the lead of MR2, 6: that of MR6", "two leads (robot.md N4.4)"),
+        WholeNumber("state", "1", 0.0, 0.0, 2.0, "0: open, 1: held low, 2: held high", "what a transistor can do"),
     )
 
     def connect(self) -> None:
@@ -204,7 +203,7 @@ class OneLeg(PlaceFault):
 # --- torques on top of those that are there -------------------------------------------------------------------
 
 
-class TorqueFault(PlaceFault):
+class TorqueFault(Fault):
     """Rows of torques that the body has while the fault works."""
 
     unit = "N m"

@@ -7,7 +7,7 @@ from ranger_sim.can_bus.disturbance import HIGHEST_RATE
 from ranger_sim.can_bus.node import OPERATING
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.faults.catalogue import add_places, mode
-from ranger_sim.harness.faults.fault import Fault, Parameter, Place
+from ranger_sim.harness.faults.fault import Fault, Parameter, Place, WholeNumber
 from ranger_sim.harness.faults.names import ANY, identifier_of, name_parameter
 from ranger_sim.harness.faults.reach import bus_of, wake_buses
 
@@ -101,7 +101,7 @@ class DuplicateIdentifier(IntruderFault):
     unit = "frames"
     parameters = (
         name_parameter("frame", "", "variable or identifier that both send", "has to be given"),
-        Parameter("bit", "1", 22, 0, 31, "of the value's word, in which they differ", "chosen by us"),
+        WholeNumber("bit", "1", 22, 0, 31, "of the value's word, in which they differ", "chosen by us"),
     )
 
     def connect(self) -> None:

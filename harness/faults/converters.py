@@ -12,9 +12,8 @@ from ranger_sim.firmware_sim.peripherals.adc_external import GAIN_MASK, GAIN_SHI
 from ranger_sim.foundation.events import NEVER
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.faults.catalogue import mode
-from ranger_sim.harness.faults.fault import Parameter
+from ranger_sim.harness.faults.fault import Fault, Parameter
 from ranger_sim.harness.faults.places import BURST_CONVERTER, CONVERTER, INTERNAL_CONVERTER
-from ranger_sim.harness.faults.sensor import PlaceFault
 
 CONVERTERS = (CONVERTER, INTERNAL_CONVERTER, BURST_CONVERTER)
 AWAITED = (CONVERTER, INTERNAL_CONVERTER)
@@ -22,7 +21,7 @@ AWAITED = (CONVERTER, INTERNAL_CONVERTER)
 NEVER_DONE_NS = 31_536_000_000_000_000
 
 
-class ConverterFault(PlaceFault):
+class ConverterFault(Fault):
     """A fault of one converter on a board. `usual`: its own numbers, by name of the field."""
 
     fields: ClassVar[tuple[str, ...]] = ()  # that it changes, of either kind of converter
@@ -32,6 +31,7 @@ class ConverterFault(PlaceFault):
         if board.apart:
             raise UserError(f"fault {self.text()}: {board.name} runs in a process of its own; its converter is there")
         self.board: Any = board
+        self.inside = board.name
         self.converter: Any = getattr(board, self.place.details["converter"])
         self.external = self.place.kind == CONVERTER
 

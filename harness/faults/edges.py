@@ -21,9 +21,9 @@ from typing import Any
 
 from ranger_sim.harness.faults import signals
 from ranger_sim.harness.faults.catalogue import mode
-from ranger_sim.harness.faults.fault import Parameter
+from ranger_sim.harness.faults.fault import Fault, Parameter, WholeNumber
 from ranger_sim.harness.faults.places import EDGES
-from ranger_sim.harness.faults.sensor import PlaceFault, Quantity, SignalFault, lasting, mode_classes
+from ranger_sim.harness.faults.sensor import Quantity, SignalFault, lasting, mode_classes
 from ranger_sim.plant import wiring_points as point
 from ranger_sim.plant.incremental_encoder import BOUNCE_NS
 
@@ -76,7 +76,7 @@ def way_of(edge: int) -> int:
     return 2 * ((edge >> 1 ^ edge) & 1) - 1
 
 
-class EdgeFault(PlaceFault):
+class EdgeFault(Fault):
     """A fault on the two channels of an incremental encoder. `encoder`: that of the plant."""
 
     unit = COUNTS.unit
@@ -315,10 +315,24 @@ class EdgesStuck(OnTheLine):
     kinds = (EDGES,)
     meaning = "sends no edges: channel A, B or both keep their level"
     parameters = (
-        Parameter(
-            "level", "A x 2 + B", math.nan, 0.0, 3.0, "the two levels; none given: as they are", "of two wires: four"
+        WholeNumber(
+            "level",
+            "A x 2 + B",
+            math.nan,
+            0.0,
+            3.0,
+            "the two levels; none given: as they are",
+            "of two wires: four",
         ),
-        Parameter("channel", "1", 0.0, 0.0, 2.0, "0: both channels, 1: A alone, 2: B alone", "chosen by us: both"),
+        WholeNumber(
+            "channel",
+            "1",
+            0.0,
+            0.0,
+            2.0,
+            "0: both channels, 1: A alone, 2: B alone",
+            "chosen by us: both",
+        ),
     )
 
     def begin_on_wire(self, now_ns: int) -> None:
@@ -410,7 +424,15 @@ class ContactBounce(OnTheLine):
     meaning = "lets edges go back and over again"
     parameters = (
         Parameter("share", "1", 0.5, 0.0, 1.0, "share of the edges that bounce", "chosen by us: every other one"),
-        Parameter("times", "1", 1.0, 1.0, 10.0, "how often each does", "chosen by us; a contact bounces a few times"),
+        WholeNumber(
+            "times",
+            "1",
+            1.0,
+            1.0,
+            10.0,
+            "how often each does",
+            "chosen by us; a contact bounces a few times",
+        ),
     )
 
     def pass_on(self, sent: list[int], start_ns: int, end_ns: int) -> None:

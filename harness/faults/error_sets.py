@@ -54,8 +54,7 @@ class ErrorPort(StepWatch):
         self.active_set: ErrorSet | None = None
         self.active_errors: list[Fault] = []  # those of the active set
         self.leaving: list[Fault] = []  # those of the one before whose places are not clear yet
-        self.coming: list[Fault] = []  # of the next set, made when the configuration is set, so that mistakes are told
-        self.faults: list[list[Fault]] = []
+        self.coming: list[Fault] = []  # those of the active set while places are not clear yet
         self.number = -1
         self.waits: Condition | None = None
         self.triggered = False
@@ -64,8 +63,9 @@ class ErrorPort(StepWatch):
         """What will be activated. UserError for a fault that cannot be, or one that has a start or an end."""
         if self in self.robot.loop.watchers:
             raise UserError(f"error port: {configuration.name}: deactivate the one that is active first")
-        self.faults = [[self._made(configuration, each) for each in one.errors] for one in configuration.sets]
         for one in configuration.sets:
+            for each in one.errors:
+                self._made(configuration, each)  # so that mistakes are told now
             if one.trigger is not None:
                 condition(one.trigger)
         self.configuration = configuration
@@ -84,18 +84,22 @@ class ErrorPort(StepWatch):
             raise UserError(f"error port: {self.configuration.name} is active already")
         self.robot.loop.watchers.append(self)
         self.number = -1
+        self.triggered = False
         self._wait_for_next()
 
     def trigger(self) -> None:
         """The next set becomes active with the next step of the plant, whatever trigger it names."""
-        if self.configuration is None or self.number + 1 >= len(self.configuration.sets):
+        if self.configuration is None or self not in self.robot.loop.watchers:
+            raise UserError("error port: there is nothing to trigger before a configuration is activated")
+        if self.number + 1 >= len(self.configuration.sets):
             raise UserError("error port: there is no set left to trigger")
         self.triggered = True
 
     def deactivate(self) -> None:
-        """Every fault of the configuration ends; no set is active."""
+        """Every fault of the configuration ends; no set is active. It may be activated again: from its first set on."""
         for fault in self.active_errors:
             fault.stop()
+        self.leaving += self.active_errors
         self.active_errors, self.coming, self.active_set = [], [], None
         if self in self.robot.loop.watchers:
             self.robot.loop.watchers.remove(self)
@@ -104,7 +108,7 @@ class ErrorPort(StepWatch):
         if self.triggered or (self.waits is not None and self.waits.met()):
             self.triggered = False
             self._next()
-        self.leaving = [fault for fault in self.leaving if fault.cleared_ns < 0]
+        self.leaving = [fault for fault in self.leaving if not fault.over]
         if self.coming and not self.leaving:
             for fault in self.coming:
                 self.robot.arm(fault)
@@ -119,7 +123,7 @@ class ErrorPort(StepWatch):
         self.leaving += self.active_errors
         self.active_errors = []
         self.active_set = self.configuration.sets[self.number]
-        self.coming = self.faults[self.number]
+        self.coming = [self._made(self.configuration, each) for each in self.active_set.errors]
         self._wait_for_next()
 
     def _wait_for_next(self) -> None:

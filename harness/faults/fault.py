@@ -54,6 +54,18 @@ class Parameter:
 
 
 @dataclasses.dataclass(frozen=True)
+class WholeNumber(Parameter):
+    """A parameter that counts or numbers something."""
+
+    def checked(self, value: Any, where: str) -> float:
+        """`value` as a whole number within the limits, or a UserError naming `where`."""
+        number = Parameter.checked(self, value, where)
+        if not number.is_integer():
+            raise UserError(f"{where}: {self.name} is {value!r}, a whole number is expected")
+        return number
+
+
+@dataclasses.dataclass(frozen=True)
 class Place:
     """Where a fault can sit. `name` as it is typed ("MCH.joint_encoder"); `kind` decides which modes are possible.
 
@@ -103,6 +115,9 @@ class Fault(StepWatch):
     parameters: ClassVar[tuple[Parameter, ...]] = ()
     unit: str = ""
     permanent: str = ""
+    # The board whose processor or converters it reaches into, and the one that it takes away and puts back; "": none.
+    inside: str = ""
+    restarts: str = ""
 
     def __init__(self, place: Place, start: Condition | None, end: Condition | None, values: Mapping[str, Any]) -> None:
         StepWatch.__init__(self)
@@ -121,6 +136,10 @@ class Fault(StepWatch):
 
     def connect(self) -> None:
         """Once, when it is armed: find the place on `self.robot`. UserError when it cannot act there."""
+
+    def claims(self) -> tuple[str, ...]:
+        """What it has for itself while it works: its place. Finer, where several can act at one place side by side."""
+        return (self.place.name,)
 
     def begin(self, now_ns: int) -> None:
         """It begins to work."""
@@ -149,6 +168,11 @@ class Fault(StepWatch):
     def active(self) -> bool:
         """It works on its place now."""
         return self.activated_ns >= 0 > self.ended_ns
+
+    @property
+    def over(self) -> bool:
+        """Nothing of it is left to come: its place is clear, or it was stopped before it began."""
+        return self.cleared_ns >= 0 or (self.stop_wanted and self.activated_ns < 0)
 
     def arm(self, robot: Any) -> None:
         """It waits on `robot` for its start; without a start condition it begins with the next step."""
@@ -181,6 +205,7 @@ class Fault(StepWatch):
                 self.robot.loop.watchers.remove(self)
                 return
             if self.start is None or self.start.met():
+                self._take_its_claims()
                 self.activated_ns = now_ns
                 if isinstance(self.end, Lasting):
                     self.end.since_ns = now_ns
@@ -193,6 +218,19 @@ class Fault(StepWatch):
             self.finish(now_ns)
         else:
             self.before(now_ns)
+
+    def _take_its_claims(self) -> None:
+        """UserError when another fault that is not clear yet has one of them: neither could be proved, nor undone."""
+        for other in self.robot.faults:
+            if other is self or other.activated_ns < 0 or other.cleared_ns >= 0:
+                continue
+            common = [each for each in self.claims() if each in other.claims()]
+            if other.restarts and other.restarts in (self.inside, self.restarts):
+                common.append(f"{other.restarts}, which is not back yet")
+            if self.restarts and self.restarts == other.inside and other.active:  # what has ended, a restart may cure
+                common.append(f"{other.inside}, which would be taken away under it")
+            if common:
+                raise UserError(f"fault {self.text()}: {other.text()} still works at {common[0]}; one fault at a time")
 
     def after_step(self, start_ns: int, end_ns: int) -> None:
         if self.activated_ns < 0:

@@ -12,7 +12,7 @@ from ranger_sim.can_bus.node import OPERATING
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness import wiring
 from ranger_sim.harness.faults.catalogue import add_places, mode
-from ranger_sim.harness.faults.fault import Fault, Parameter, Place
+from ranger_sim.harness.faults.fault import Fault, Parameter, Place, WholeNumber
 from ranger_sim.harness.faults.names import ANY, identifier_of, name_parameter
 from ranger_sim.harness.faults.reach import controller_of, reaching_into, wake_buses
 
@@ -29,8 +29,16 @@ add_places(
 )
 
 FRAME = name_parameter("frame", ANY, "variable or identifier of the frames; any: all of them", "the master table")
-EVERY = Parameter("every", "frames", 1, 1, 1e6, "every n-th of these frames", "chosen by us: each of them")
-COUNT = Parameter("count", "frames", 0, 0, 1e9, "so many at most; 0: until the fault ends", "chosen by us: no end")
+EVERY = WholeNumber("every", "frames", 1, 1, 1e6, "every n-th of these frames", "chosen by us: each of them")
+COUNT = WholeNumber(
+    "count",
+    "frames",
+    0,
+    0,
+    1e9,
+    "so many at most; 0: until the fault ends",
+    "chosen by us: no end",
+)
 SHARE = Parameter("share", "1", 1.0, 0.0, 1.0, "chance of each, by the fault's own seeded stream", "chosen by us: all")
 
 
@@ -87,6 +95,10 @@ class FrameFault(ControllerFault):
         """What it does on the bus."""
         raise NotImplementedError
 
+    def claims(self) -> tuple[str, ...]:
+        """Faults of other frames act beside it."""
+        return (f"{self.place.name}:{self.mode} of frame {self.values['frame']}",)
+
     def begin(self, now_ns: int) -> None:
         ControllerFault.begin(self, now_ns)
         tampering.tampering_of(self.bus).add(self.tamper)
@@ -124,8 +136,14 @@ class ErrorFault(FrameFault):
 
 def _error_mode(error: str, sends: int, meaning: str) -> type[Fault]:
     """The mode of one error; `sends`: whether its node is by default the sender of the frame."""
-    sender = Parameter(
-        "sender", "1", sends, 0, 1, "1: in frames that it sends, 0: in those that it receives", "FMI-LS-BUS: IsSender"
+    sender = WholeNumber(
+        "sender",
+        "1",
+        sends,
+        0,
+        1,
+        "1: in frames that it sends, 0: in those that it receives",
+        "FMI-LS-BUS: IsSender",
     )
     fields = {
         "mode": error,
@@ -186,7 +204,15 @@ class Corruption(Reception):
     unit = "frames"
     parameters = (
         *FrameFault.parameters,
-        Parameter("bit", "1", 22, 0, 31, "of the value's word, that is inverted", "chosen by us: a float's top digit"),
+        WholeNumber(
+            "bit",
+            "1",
+            22,
+            0,
+            31,
+            "of the value's word, that is inverted",
+            "chosen by us: a float's top digit",
+        ),
     )
 
     def made(self) -> tampering.Tamper:
@@ -216,7 +242,9 @@ class BusOff(ControllerFault):
     mode = "bus_off"
     meaning = "is driven bus-off by bit errors in the frames that it sends"
     unit = "times"
-    parameters = (Parameter("times", "1", 1, 1, 1000, "so often, each time after its recovery", "chosen by us: once"),)
+    parameters = (
+        WholeNumber("times", "1", 1, 1, 1000, "so often, each time after its recovery", "chosen by us: once"),
+    )
 
     def begin(self, now_ns: int) -> None:
         ControllerFault.begin(self, now_ns)

@@ -9,9 +9,9 @@ from typing import Any
 from ranger_sim.foundation.numbers import float_of_word, word_of_float
 from ranger_sim.harness.faults import signals
 from ranger_sim.harness.faults.catalogue import REASONS, mode
-from ranger_sim.harness.faults.fault import Parameter
+from ranger_sim.harness.faults.fault import Fault, Parameter
 from ranger_sim.harness.faults.places import IMU
-from ranger_sim.harness.faults.sensor import PlaceFault, Quantity, SignalFault, lasting, mode_classes
+from ranger_sim.harness.faults.sensor import Quantity, SignalFault, lasting, mode_classes
 from ranger_sim.plant.imu import PACKET_BYTES, SET_MODE
 
 ACKNOWLEDGEMENT_BYTES = 8
@@ -28,7 +28,7 @@ RATE = Quantity(
 )
 
 
-class PacketFault(PlaceFault):
+class PacketFault(Fault):
     """A fault of the packets that the unit sends in a step."""
 
     unit = RATE.unit

@@ -5,12 +5,12 @@ from typing import Any
 from ranger_sim.firmware_sim.peripherals.ssp import SspSegment
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.faults.catalogue import add_places, mode
-from ranger_sim.harness.faults.fault import Fault, Parameter, Place
+from ranger_sim.harness.faults.fault import Fault, Parameter, Place, WholeNumber
 
 LINK = "serial link"
 SERIAL = "serial line"
 SEGMENT_BITS = 31 * 16  # half-words of a segment, the last one its checksum (robot.md N1.6)
-EVERY = Parameter("every", "exchanges", 1, 1, 1e6, "every n-th exchange", "chosen by us: each of them")
+EVERY = WholeNumber("every", "exchanges", 1, 1, 1e6, "every n-th exchange", "chosen by us: each of them")
 SHARE = Parameter("share", "1", 1.0, 0.0, 1.0, "chance of each, by the fault's own seeded stream", "chosen by us: all")
 
 add_places(
@@ -36,9 +36,11 @@ class LinkFault(Fault):
         self.to_slave = self.place.details["slave"]  # the main brain is the slave of the exchanges
         self.count = 0
 
+    def claims(self) -> tuple[str, ...]:
+        """Both ends' places are of one link."""
+        return ("the link of router and main brain",)
+
     def begin(self, now_ns: int) -> None:
-        if self.link.tampering is not None:
-            raise UserError(f"fault {self.text()}: another fault reaches into the link already")
         self.link.tampering = self
 
     def finish(self, now_ns: int) -> None:
@@ -71,7 +73,15 @@ class FlippedBit(LinkFault):
     mode = "checksum"
     meaning = "receives segments with a bit inverted, so that their checksum is wrong"
     parameters = (
-        Parameter("bit", "1", 20, 0, SEGMENT_BITS - 1, "from the segment's begin, highest first", "chosen by us: data"),
+        WholeNumber(
+            "bit",
+            "1",
+            20,
+            0,
+            SEGMENT_BITS - 1,
+            "from the segment's begin, highest first",
+            "chosen by us: data",
+        ),
         EVERY,
         SHARE,
     )

@@ -9,7 +9,7 @@ from ranger_sim.foundation.events import NEVER
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness import bus_schedule, wiring
 from ranger_sim.harness.faults.catalogue import add_places, mode
-from ranger_sim.harness.faults.fault import Fault, Parameter, Place
+from ranger_sim.harness.faults.fault import Fault, Parameter, Place, WholeNumber
 from ranger_sim.harness.faults.reach import emulated, reaching_into, wake_buses
 
 BATTERY = "battery"
@@ -100,7 +100,7 @@ class PackLost(BatteryFault):
 
     mode = "pack_lost"
     meaning = "loses packs: the others carry the current"
-    parameters = (Parameter("packs", "1", 1, 1, 100, "so many of them", "chosen by us: a plug; the robot has seven"),)
+    parameters = (WholeNumber("packs", "1", 1, 1, 100, "so many of them", "chosen by us: a plug; the robot has seven"),)
 
     def connect(self) -> None:
         BatteryFault.connect(self)
@@ -187,7 +187,7 @@ class Restart(Fault):
     unit = "boards"
 
     def connect(self) -> None:
-        self.name = self.place.details["board"]
+        self.name = self.restarts = self.place.details["board"]
         self.where = f"fault {self.text()}"
         emulated(self.robot, self.name, self.where)
         if self.robot.polled:

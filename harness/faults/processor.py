@@ -11,7 +11,7 @@ from ranger_sim.firmware_sim.scheduler import NORMAL_TASK
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness import wiring
 from ranger_sim.harness.faults.catalogue import add_places, mode
-from ranger_sim.harness.faults.fault import Fault, Parameter, Place
+from ranger_sim.harness.faults.fault import Fault, Parameter, Place, WholeNumber
 from ranger_sim.harness.faults.names import chosen, name_parameter
 from ranger_sim.harness.faults.power import Restart
 from ranger_sim.harness.faults.reach import emulated, reaching_into
@@ -31,7 +31,7 @@ class ProcessorFault(Fault):
     needs = "a processor"
 
     def connect(self) -> None:
-        self.name = self.place.details["board"]
+        self.name = self.inside = self.place.details["board"]
         emulated(self.robot, self.name, f"fault {self.text()}")
 
     @property
@@ -56,6 +56,10 @@ class TaskFault(ProcessorFault):
         ProcessorFault.connect(self)
         self.task = self.found(self.values["task"])
 
+    def claims(self) -> tuple[str, ...]:
+        """One function of it."""
+        return (f"{self.place.name}, {self.task.name}",)
+
     def found(self, name: str) -> Any:
         """The task of this name. UserError for one that is not there, or that calls others."""
         tasks = [task for task in self.board.scheduler.schedule.all_tasks() if task.kind == NORMAL_TASK]
@@ -72,7 +76,7 @@ class ExtraCycles(TaskFault):
     unit = "cycles"
     parameters = (
         *TaskFault.parameters,
-        Parameter("cycles", "1", 6000, 1, 1e9, "more, in each call", "chosen by us: 100 us at 60 MHz"),
+        WholeNumber("cycles", "1", 6000, 1, 1e9, "more, in each call", "chosen by us: 100 us at 60 MHz"),
     )
 
     def begin(self, now_ns: int) -> None:
@@ -232,6 +236,10 @@ class CrystalOff(ProcessorFault):
         ),
     )  # fmt: skip
 
+    def claims(self) -> tuple[str, ...]:
+        """Functions and interrupts go on beside it."""
+        return (f"{self.place.name}, its crystal",)
+
     def begin(self, now_ns: int) -> None:
         self.slots = self.board.scheduler.slot_count
         self._set(round(1000 * self.values["ppm"]), now_ns)
@@ -273,6 +281,10 @@ class StuckInterrupt(ProcessorFault):
         self.source = there[name]
         if name == "can_receive" and self.robot.quirks.full_receive_ring_kills:
             self.permanent = POWER_CYCLE  # its handler fills the ring with copies of the last frame
+
+    def claims(self) -> tuple[str, ...]:
+        """One interrupt of it."""
+        return (f"{self.place.name}, {self.source.name}",)
 
     def begin(self, now_ns: int) -> None:
         with reaching_into(self.robot, self.name, now_ns) as board:

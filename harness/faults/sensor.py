@@ -10,7 +10,6 @@ import math
 from collections.abc import Callable
 from typing import Any, ClassVar
 
-from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.faults import signals
 from ranger_sim.harness.faults.fault import Fault, Parameter
 
@@ -30,23 +29,7 @@ class Quantity:
     source: str
 
 
-class PlaceFault(Fault):
-    """A fault of one physical place, which can have one at a time: of two, nobody could say which of them acted."""
-
-    def claim(self) -> None:
-        """From now on the place is this fault's. UserError when another one has not left it."""
-        for other in self.robot.faults:
-            if other is not self and other.place.name == self.place.name:
-                if other.activated_ns >= 0 and other.cleared_ns < 0:
-                    raise UserError(
-                        f"fault {self.text()}: {other.text()} still works at this place; one at a time can be proved"
-                    )
-
-    def begin(self, now_ns: int) -> None:
-        self.claim()
-
-
-class SignalFault(PlaceFault):
+class SignalFault(Fault):
     """A signal in the place of what a sensor shows."""
 
     signal_class: ClassVar[type[signals.Signal]]

@@ -7,9 +7,11 @@ battery, rad, V of a foot's sensor) and go through the sensor's line to the pin 
 from collections.abc import Mapping
 from typing import Any
 
+from ranger_sim.boards.steering import LIMITS as STEERING_LIMITS
+from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.faults import places, signals
 from ranger_sim.harness.faults.catalogue import mode
-from ranger_sim.harness.faults.fault import Parameter
+from ranger_sim.harness.faults.fault import Parameter, WholeNumber
 from ranger_sim.harness.faults.sensor import Quantity, SignalFault, lasting, mode_classes
 from ranger_sim.plant.electrics import STEERING_CENTRE_V, STEERING_V_PER_RAD
 from ranger_sim.plant.foot_sensor import STANCE_COUNTS, SWING_COUNTS, VOLTS_PER_COUNT
@@ -21,7 +23,7 @@ QUANTITIES: Mapping[str, Quantity] = {
     #                              unit  typical limit  clip low, high       open
     places.MOTOR_CURRENT: Quantity("A",  1.0,    20.0,  -1.0, 1.0,           0.0,
         "chosen by us: a quarter of the hip's largest command (robot.md N4.2); the sensor ends at 12.6 A"),
-    places.BATTERY_CURRENT: Quantity("A", 0.5,   10.0,  -0.2, 0.2,           0.0,
+    places.BATTERY_CURRENT: Quantity("A", 0.5,   10.0,  -0.3, 0.3,           0.0,
         "chosen by us: the motors of the 65 km walk took 0.4 A together (robot.md B5)"),
     places.BATTERY_VOLTAGE: Quantity("V", 2.0,   60.0,  0.0, 20.0,           0.0,
         "chosen by us: the packs go from 29 to 23 V; the converter ends at 33 V"),
@@ -35,6 +37,7 @@ QUANTITIES: Mapping[str, Quantity] = {
         "chosen by us: as the motor boards' battery voltage"),
 }
 # fmt: on
+STEERING_BOARD = "MCSI"
 # Only the currents of the motor boards come on two wires (robot.md N4.5).
 DIFFERENTIAL = (places.MOTOR_CURRENT, places.BATTERY_CURRENT)
 
@@ -45,11 +48,23 @@ class VoltageFault(SignalFault):
     def connect(self) -> None:
         self.electrics: Any = self.robot.plant.electrics
         self.voltage: int = self.place.details["voltage"]
+        self.check_range()
         self.zero_V: float = self.electrics.zero_V[self.voltage]
         self.slope_V: float = self.electrics.slope_V[self.voltage]
         self.started = False
         self.true_end_V = 0.0  # at the end of the latest step, as the sensor gives it
         self.shown_end_V = 0.0
+
+    def check_range(self) -> None:
+        """UserError for limits that the sensor never comes to."""
+        if self.signal_class is not signals.Saturation or self.place.details["board"] != STEERING_BOARD:
+            return
+        most_A, low, high = STEERING_LIMITS["current_max"], self.values["low"], self.values["high"]
+        if self.place.kind in DIFFERENTIAL and low <= -most_A and high >= most_A:
+            raise UserError(
+                f"fault {self.text()}: it cannot act there; the steering's board holds its motor to {most_A:g} A, so "
+                f"its currents never leave {low:g} to {high:g} A; give low= and high= inside -{most_A:g} to {most_A:g}"
+            )
 
     def begin(self, now_ns: int) -> None:
         super().begin(now_ns)
@@ -126,7 +141,7 @@ class ContactStuck(VoltageFault):
     meaning = "stays open or closed"
     unit = "V"
     signal_class = signals.Stuck
-    parameters = (Parameter("closed", "1", 1.0, 0.0, 1.0, "1: closed as in stance, 0: open as in swing", LEVELS),)
+    parameters = (WholeNumber("closed", "1", 1.0, 0.0, 1.0, "1: closed as in stance, 0: open as in swing", LEVELS),)
 
     def new_signal(self) -> signals.Signal:
         return signals.Stuck(self.random, level=STANCE_V if self.values["closed"] >= 0.5 else SWING_V)

@@ -9,9 +9,9 @@ from typing import Any
 
 from ranger_sim.harness.faults import signals
 from ranger_sim.harness.faults.catalogue import mode
-from ranger_sim.harness.faults.fault import Parameter
+from ranger_sim.harness.faults.fault import Fault, Parameter, WholeNumber
 from ranger_sim.harness.faults.places import WORD
-from ranger_sim.harness.faults.sensor import PlaceFault, Quantity, SignalFault, lasting, mode_classes
+from ranger_sim.harness.faults.sensor import Quantity, SignalFault, lasting, mode_classes
 from ranger_sim.plant import wiring_points as point
 from ranger_sim.plant.absolute_encoder import COUNTS_PER_TURN, WORD_BITS
 
@@ -32,7 +32,7 @@ def signed(counts: int) -> int:
     return (counts + COUNTS_PER_TURN // 2) % COUNTS_PER_TURN - COUNTS_PER_TURN // 2
 
 
-class WordFault(PlaceFault):
+class WordFault(Fault):
     """A fault of one absolute encoder's word. `encoder`: that of the plant; `true`: the word that it holds out."""
 
     unit = COUNTS.unit
@@ -128,7 +128,15 @@ class WordDropOut(WordFault):
     kinds = (WORD,)
     meaning = "reads as an open data line for a while, at random"
     parameters = (
-        Parameter("word", "counts", 0.0, 0.0, 8191.0, "what the line reads: 0 low, 8191 high", "chosen by us: low"),
+        WholeNumber(
+            "word",
+            "counts",
+            0.0,
+            0.0,
+            8191.0,
+            "what the line reads: 0 low, 8191 high",
+            "chosen by us: low",
+        ),
         *lasting("a drop-out", 10.0, 100.0),
     )
 
@@ -150,7 +158,15 @@ class BitFlips(WordFault):
     meaning = "has a bit read wrong in some of its words"
     parameters = (
         Parameter("share", "1", 0.05, 0.0, 1.0, "share of the words with a wrong bit", "chosen by us: one in twenty"),
-        Parameter("bit", "1", -1.0, -1.0, 12.0, "which bit; -1: each time another one", "13 bits (robot.md N4.7)"),
+        WholeNumber(
+            "bit",
+            "1",
+            -1.0,
+            -1.0,
+            12.0,
+            "which bit; -1: each time another one",
+            "13 bits (robot.md N4.7)",
+        ),
     )
 
     def instead(self, now_ns: int) -> int:

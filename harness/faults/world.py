@@ -5,13 +5,12 @@ from typing import Any
 
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.faults.catalogue import mode
-from ranger_sim.harness.faults.fault import Parameter
+from ranger_sim.harness.faults.fault import Fault, Parameter
 from ranger_sim.harness.faults.places import FLOOR, ROBOT
-from ranger_sim.harness.faults.sensor import PlaceFault
 from ranger_sim.plant.leg import RIGID
 
 
-class WorldFault(PlaceFault):
+class WorldFault(Fault):
     """A fault of what surrounds the robot."""
 
     def connect(self) -> None:
@@ -129,7 +128,7 @@ class StepInFloor(WorldFault):
 
 @mode
 class SlipperyFloor(WorldFault):
-    """Less friction under both feet. Acts while a foot slides or brushes, or a strike asks for more than is left."""
+    """Another friction under both feet. It acts while a foot has load: what the floor can hold is another force."""
 
     mode = "slippery"
     kinds = (FLOOR,)

@@ -79,6 +79,18 @@ def test_an_error_counts_only_when_it_is_noted_after_the_waiting_began(robot):
     assert of_the_feet.nearest() == "MCFO noted no MC_TCURR_OOB"
 
 
+def test_an_error_of_a_board_that_begins_anew_counts_from_nothing(robot):
+    for _ in range(5):
+        robot.board("MCH").errors.report(43)
+    wanted = condition("error MC_TCURR_OOB from MCH")
+    wanted.begin(robot)
+    robot.inject("MCH.processor", "reset")
+    robot.until(lambda robot: robot.faults[0].cleared_ns > 0, within="100 ms")
+    assert robot.board("MCH").errors.totals[43] == 0 and not wanted.met()
+    robot.board("MCH").errors.report(43)
+    assert wanted.met()
+
+
 def test_a_fall_ends_the_waiting_and_is_told():
     robot = Ranger(Scenario(controller="record-2011", slope_rad=0.2))
     with pytest.raises(ConditionNotMetError, match=r"step 1000: the robot fell \(.*\) after .*; step \d+ was reached"):

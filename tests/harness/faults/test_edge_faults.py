@@ -367,7 +367,7 @@ def test_a_second_fault_at_a_place_that_is_taken_is_refused_when_it_begins():
     bench = EdgeBench(forward)
     bench.inject(bench.place, "offset")
     bench.inject(bench.place, "stuck", at="5 ms")
-    with pytest.raises(UserError, match=r"stuck.*offset.* still works at this place"):
+    with pytest.raises(UserError, match=r"stuck.*offset.* still works at MCH.joint_encoder; one fault at a time"):
         run(bench, 10)
 
 

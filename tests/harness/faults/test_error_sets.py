@@ -77,6 +77,36 @@ def test_deactivating_ends_every_fault_of_the_configuration():
     assert bench.loop.watchers == []
 
 
+def test_a_configuration_that_is_activated_again_acts_again_when_all_places_are_clear():
+    bench = Armed()
+    port = port_of(bench, ErrorSet("now", ("MCH.absolute_encoder:offset",)))
+    made = []
+    for _ in range(2):
+        port.activate()
+        port.trigger()
+        bench.step(6)
+        made += port.active_errors
+        port.deactivate()
+    bench.step(4)
+    first, second = made
+    assert first.acted and second.acted
+    assert second.activated_ns >= first.cleared_ns > 0 and second.cleared_ns > 0
+    with pytest.raises(UserError, match="nothing to trigger before a configuration is activated"):
+        port.trigger()
+
+
+def test_a_set_whose_faults_had_no_time_to_begin_does_not_keep_the_next_one_waiting():
+    bench = Armed()
+    port = port_of(bench, ErrorSet("short", ("MCH.absolute_encoder:offset",)), OFF)
+    port.activate()
+    port.trigger()
+    bench.step(1)
+    port.trigger()
+    bench.step(4)
+    assert port.active_set == OFF and all(fault.acted for fault in port.active_errors)
+    assert len(port.active_errors) == 2 and port.leaving == []
+
+
 @pytest.mark.parametrize(
     ("sets", "words"),
     [

@@ -200,3 +200,53 @@ def test_an_interrupt_that_asks_for_ever_leaves_its_board_no_time(robot):
     assert fault.cleared_ns > 62_000_000 and board.errors.totals[codes.ASCHED_DNF] > 0
     with pytest.raises(UserError, match="there are|meant was"):
         robot.inject("UI.processor", "stuck_interrupt", interrupt="nothing")
+
+
+# ---- two at a time
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "common"),
+    [
+        (("battery", "sag", {}), ("battery", "pack_lost", {}), "battery"),
+        (("battery", "sag", {}), ("battery", "sag", {"drop": 1.0}), "battery"),
+        (("can1", "noise", {}), ("can1", "noise", {"rate": 1e-3}), "can1"),
+        (("MCH.can1", "bit_rate", {}), ("MCH.can1", "bit_rate", {"rate": 5e5}), "MCH.can1"),
+        (("MCH.can1", "loss", {}), ("MCH.can1", "loss", {}), "MCH.can1:loss of frame any"),
+        (("CSR.ssp", "missing", {}), ("MB.ssp", "checksum", {}), "the link of router and main brain"),
+        (
+            ("MCH.processor", "extra_cycles", {"task": "MCH_ANGLE"}),
+            ("MCH.processor", "stall", {"task": "MCH_ANGLE"}),
+            "MCH.processor, MCH_ANGLE",
+        ),
+        (("MCH.processor", "crystal", {}), ("MCH.processor", "crystal", {"ppm": -5000}), "MCH.processor, its crystal"),
+        (("MCH.supply", "brown_out", {}), ("MCH.processor", "reset", {}), "MCH, which is not back yet"),
+        (("MCH.supply", "brown_out", {}), ("MCH.processor", "crystal", {}), "MCH, which is not back yet"),
+        (("MCH.adc_external", "gain", {}), ("MCH.supply", "brown_out", {}), "MCH, which would be taken away"),
+    ],
+)
+def test_a_second_fault_of_what_the_first_one_has_is_refused_and_may_come_when_that_is_clear(
+    robot, first, second, common
+):
+    one = robot.inject(first[0], first[1], "10 ms", "12 ms", **first[2])
+    robot.inject(second[0], second[1], "11 ms", "13 ms", **second[2])
+    with pytest.raises(UserError, match=f"still works at {common}.*; one fault at a time"):
+        robot.run_for(0.02)
+    robot.loop.watchers.remove(robot.faults.pop())
+    robot.run_for(0.15)
+    assert one.cleared_ns > 0
+    later = robot.inject(second[0], second[1], **second[2])
+    robot.run_for(0.001)
+    assert later.activated_ns > one.cleared_ns
+
+
+def test_what_is_apart_at_one_place_may_be_at_fault_side_by_side(robot):
+    faults = [
+        robot.inject("MCH.processor", "extra_cycles", "10 ms", "20 ms", task="MCH_ANGLE"),
+        robot.inject("MCH.processor", "extra_cycles", "10 ms", "20 ms", task="motor_encoder_rezero"),
+        robot.inject("MCH.processor", "crystal", "10 ms", "20 ms"),
+        robot.inject("CSR.can1", "loss", "10 ms", "20 ms", frame="MCH_ANGLE"),
+        robot.inject("CSR.can1", "loss", "10 ms", "20 ms", frame="MCH_ANG_RATE"),
+    ]
+    robot.run_for(0.06)
+    assert [fault.acted and fault.cleared_ns > 0 for fault in faults] == [True] * 5

@@ -228,12 +228,21 @@ def test_a_stuck_contact_reads_as_swing_or_stance():
         ("MCH.motor_current", "lost_edges", {}, "cannot act there; it needs edges on a wire, this is the current"),
         ("MCFO.left_foot", "swapped_sign", {}, "needs a signal on two wires"),
         ("UI.imu", "offset", {}, "a constant error of it is the mode gyro_bias"),
+        ("MCH.absolute_encoder", "bit_flips", {"bit": 3.5}, "bit is 3.5, a whole number is expected"),
+        ("MCH.joint_encoder", "stuck", {"channel": "0.5"}, "channel is '0.5', a whole number is expected"),
+        ("MCSI.motor_current", "saturation", {}, "holds its motor to 0.3 A, so its currents never leave -1 to 1 A"),
+        ("MCSI.battery_current", "saturation", {}, "holds its motor to 0.3 A, so its currents never leave -0.3 to 0.3"),
     ],
 )
 def test_what_is_out_of_its_limits_or_cannot_act_is_refused(place, mode, parameters, words):
     with pytest.raises(UserError) as refused:
         PlantBench().inject(place, mode, **parameters)
     assert words in str(refused.value)
+
+
+@pytest.mark.parametrize("limits", [{"low": -0.29}, {"high": 0.29}])
+def test_limits_that_the_steerings_current_can_come_to_are_taken_on_either_side(limits):
+    PlantBench().inject("MCSI.motor_current", "saturation", **limits)
 
 
 def test_a_fault_that_has_not_begun_changes_nothing():
