@@ -1,0 +1,558 @@
+"""What is odd in measured data, each with place and size, before anything is concluded from them.
+
+Nothing is changed here: `repairs.py` does, explicitly. Thresholds are chosen by us so that the measured logs of
+docs/robot.md C6 show what is told of them there and nothing else; each stands with its reason beside it.
+"""
+
+import dataclasses
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.sysid.dataset import Array, Channel, Dataset, Finding
+
+NOTE, WARNING, FATAL = "note", "warning", "fatal"
+KINDS = {
+    # of the file, told by its reader
+    "no_header": "the columns have no names",
+    "no_unit": "nothing says the unit",
+    "unit_assumed": "nothing says the unit of the stamps, seconds are assumed",
+    "no_stamp": "rows without a stamp",
+    "ragged": "rows with too many or too few cells",
+    "unreadable": "cells that are no numbers",
+    "no_numbers": "channels of a measurement file that hold no plain numbers",
+    "unknown_frames": "frames that the DBC file does not know",
+    "broken_frames": "frames that do not fit their message",
+    "no_summary": "a walk's folder without its summary",
+    "fell": "the robot fell in this walk",
+    # of the stamps
+    "empty": "no sample",
+    "single_sample": "one sample",
+    "one_instant": "all samples have one stamp",
+    "stamp_wrap": "the clock's counter ran over",
+    "reversed_stamps": "stamps that go back",
+    "duplicate_stamps": "stamps that come twice",
+    "gap": "no samples for a while",
+    "clock_drift": "two clocks do not run alike",
+    # of the values
+    "not_finite": "values that are no numbers",
+    "wrap": "an integer ran over",
+    "bit_flip": "single values that are wrong by a power of two of the finest step",
+    "spike": "single values far from both neighbours",
+    "stuck": "a value stands still while other channels move",
+    "constant": "one value all the time",
+    "saturation": "values cut off at a limit",
+    "lag": "a channel comes later than a redundant one",
+    "wrong_unit": "values as of another unit than is told",
+}
+GAP_STEPS = 5.0  # of the median step; radio gaps of the robot's logs are 9 to 45 steps of 4 to 6 ms (C6.2)
+NAMED_PLACES = 6  # single findings of a kind in a channel; more of them are one finding together
+SPIKE_STEPS = 12.0  # of the usual second difference; noise reaches 6 in a million samples
+STUCK_SAMPLES = 50  # a fifth of a second of a fast channel of the robot
+STUCK_RATIO = 8.0  # to the longest other stretch: a quantised channel at rest stands still as well
+CLIPPED_SAMPLES = 3  # in a row at the limit
+CLIPPED_RUNS = 2
+FLAT_PART = 0.5  # of the steps are zero in commands that are held, which cannot be told from cut-off ones
+DRIFT_PPM = 100.0  # quartz crystals differ by less
+LONGEST_LAG_S = 0.25
+LAG_STEPS = 0.5  # of the sampling: what lies below is the stamps' own rounding
+FEWEST = 30  # samples below which nothing but stamps is looked at
+SLOPES = {  # what a rate may be as a multiple of the angle's derivative, and what that says
+    180.0 / math.pi: "the rate is in deg/s, or the angle in turns of rad",
+    math.pi / 180.0: "the angle is in degrees",
+    30.0 / math.pi: "the rate is in rpm",
+    math.pi / 30.0: "the angle is in 9.5 times smaller units",
+    6.0: "the rate is in rpm and the angle in degrees, wrongly converted",
+    1000.0: "the angle is in thousands, or the stamps are in ms",
+    1e-3: "the rate is in thousands, or the stamps are in ms",
+    1e6: "the stamps are in us",
+    1e-6: "the stamps are in us",
+    -1.0: "one of the two counts the other way round",
+}
+SLOPE_TOLERANCE = 0.05
+ALIKE = 0.9  # correlation from which on a rate and a derivative are the same motion
+# (angle, rate) that show the same motion. The bench's speed is at the gearbox's output, its angle at the motor.
+DERIVATIVES = (
+    ("joint_angle_rad", "joint_rate_rad_per_s"),
+    ("target_angle_rad", "target_rate_rad_per_s"),
+    ("hip_angle_rad", "hip_rate_rad_per_s"),
+    ("hip_motor_angle_rad", "hip_motor_rate_rad_per_s"),
+    ("outer_ankle_angle_rad", "outer_ankle_rate_rad_per_s"),
+    ("inner_ankle_angle_rad", "inner_ankle_rate_rad_per_s"),
+    ("outer_motor_angle_rad", "outer_motor_rate_rad_per_s"),
+    ("inner_motor_angle_rad", "inner_motor_rate_rad_per_s"),
+    ("outer_leg_angle_rad", "outer_leg_rate_rad_per_s"),
+    ("motor_angle_rad", "motor_rate_rad_per_s"),
+)
+# the same angle by two encoders, but for what lies between them
+REDUNDANT = (
+    ("joint_angle_rad", "motor_angle_rad"),
+    ("hip_angle_rad", "hip_motor_angle_rad"),
+    ("outer_ankle_angle_rad", "outer_motor_angle_rad"),
+    ("inner_ankle_angle_rad", "inner_motor_angle_rad"),
+)
+JOINTS = ("hip_angle", "joint_angle", "ankle_angle", "leg_angle")
+# (end of a name, largest value that is likely, what it would rather be): a machine of this size has no more
+LARGEST = (
+    ("_A", 200.0, "mA"),
+    ("_V", 1000.0, "mV"),
+    ("_C", 200.0, "K"),
+    ("_Nm", 2000.0, "mNm or N mm"),
+)
+LARGEST_JOINT_RAD = 2.0 * math.pi
+LONGEST_STEP_S = 0.5  # median of the stamps: slower than any experiment here
+
+
+def inspect(dataset: Dataset) -> list[Finding]:
+    """Everything that is odd: what the reader told, each channel's stamps and values, channels against each other."""
+    found = list(dataset.findings)
+    if not dataset.channels:
+        found.append(Finding("", "empty", 0.0, 0.0, 0.0, "", "there is no channel", FATAL))
+    sound: dict[str, Channel] = {}
+    for channel in dataset.channels.values():
+        found += _stamps(channel)
+        tidy = _tidied(channel)
+        found += _not_finite(channel)
+        if len(tidy.value) >= FEWEST:
+            sound[channel.name] = tidy
+    for channel in sound.values():
+        found += _values(channel, sound)
+    found += _between(sound)
+    return found
+
+
+def stop_if_fatal(name: str, findings: list[Finding]) -> None:
+    """UserError with the first finding that leaves nothing to work on."""
+    for finding in findings:
+        if finding.severity == FATAL:
+            raise UserError(f"{name}: {finding.channel + ': ' if finding.channel else ''}{finding.text}")
+
+
+def _tidied(channel: Channel) -> Channel:
+    """Only finite samples at stamps that run forward: what the checks of values look at."""
+    kept = np.isfinite(channel.time_s) & np.isfinite(channel.value)
+    time_s, value = channel.time_s[kept], channel.value[kept]
+    forward = np.ones(len(time_s), dtype=bool)
+    if len(time_s):
+        forward[1:] = time_s[1:] > np.maximum.accumulate(time_s)[:-1]
+    return dataclasses.replace(channel, time_s=time_s[forward], value=value[forward])
+
+
+# --- stamps -------------------------------------------------------------------------------------------------
+
+
+def _stamps(channel: Channel) -> Iterator[Finding]:
+    name, time_s = channel.name, channel.time_s
+    count = len(time_s)
+    if count == 0:
+        yield Finding(name, "empty", 0.0, 0.0, 0.0, "", "there is no sample", FATAL)
+        return
+    finite = time_s[np.isfinite(time_s)]
+    if len(finite) < count:
+        missing = count - len(finite)
+        first = float(finite[0]) if len(finite) else 0.0
+        yield Finding(name, "no_stamp", first, first, missing, "samples", f"{missing} stamps are no numbers")
+    if len(finite) < 2:
+        place = float(finite[0]) if len(finite) else 0.0
+        yield Finding(name, "single_sample", place, place, 1.0, "samples", "there is one sample only", FATAL)
+        return
+    steps = np.diff(finite)
+    if not steps.any():
+        text = f"all {len(finite)} samples are at {finite[0]:g} s"
+        yield Finding(name, "one_instant", float(finite[0]), float(finite[0]), 0.0, "s", text, FATAL)
+        return
+    back = np.flatnonzero(steps < 0.0)
+    wraps = [int(place) for place in back if is_clock_wrap(finite, int(place))]
+    for place in wraps[:NAMED_PLACES]:
+        size = -float(steps[place])
+        text = f"the clock's counter runs over: {size:.6g} s back"
+        yield Finding(name, "stamp_wrap", float(finite[place]), float(finite[place + 1]), size, "s", text)
+    back = np.setdiff1d(back, wraps)
+    if len(back):
+        size = -float(steps[back].min())
+        text = f"stamps go back {len(back)} times, by up to {size:.6g} s"
+        yield Finding(name, "reversed_stamps", float(finite[back[0]]), float(finite[back[-1]]), size, "s", text)
+    same = np.flatnonzero(steps == 0.0)
+    if len(same):
+        text = f"{len(same)} stamps come twice"
+        ends = float(finite[same[0]]), float(finite[same[-1]])
+        yield Finding(name, "duplicate_stamps", *ends, len(same), "samples", text)
+    usual = float(np.median(steps[steps > 0.0])) if (steps > 0.0).any() else 0.0
+    yield from _gaps(name, finite, steps, usual)
+    if usual > LONGEST_STEP_S and len(finite) >= FEWEST:
+        text = f"samples are {usual:.4g} s apart: the stamps are probably in ms"
+        yield Finding(name, "wrong_unit", float(finite[0]), float(finite[-1]), usual, "s", text)
+
+
+def is_clock_wrap(time_s: Array, place: int) -> bool:
+    """True when a step back is a counter's: the stamps fall to near nothing from near all that they ever were."""
+    before, after = time_s[place], time_s[place + 1]
+    return bool(after <= 0.02 * before and before >= time_s.max() * 0.98 and before > 30.0)
+
+
+def _gaps(name: str, time_s: Array, steps: Array, usual: float) -> Iterator[Finding]:
+    places = np.flatnonzero(steps > GAP_STEPS * usual) if usual > 0.0 else np.array([], dtype=int)
+    if len(places) > NAMED_PLACES:
+        longest = places[np.argmax(steps[places])]
+        text = (
+            f"{len(places)} gaps of more than {GAP_STEPS * usual:.4g} s, {float(steps[places].sum()):.4g} s in all; "
+            f"the longest is {float(steps[longest]):.4g} s at {float(time_s[longest]):.4g} s"
+        )
+        ends = float(time_s[places[0]]), float(time_s[places[-1] + 1])
+        yield Finding(name, "gap", *ends, float(steps[longest]), "s", text, NOTE)
+        return
+    for place in places:
+        text = f"no sample for {float(steps[place]):.4g} s, usual are {usual:.4g} s"
+        yield Finding(name, "gap", float(time_s[place]), float(time_s[place + 1]), float(steps[place]), "s", text)
+
+
+# --- values of one channel ----------------------------------------------------------------------------------
+
+
+def _not_finite(channel: Channel) -> Iterator[Finding]:
+    wrong = np.flatnonzero(~np.isfinite(channel.value))
+    if len(wrong):
+        ends = [float(t) if math.isfinite(t) else 0.0 for t in channel.time_s[wrong[[0, -1]]]]
+        text = f"{len(wrong)} of {len(channel.value)} values are no numbers"
+        worst = FATAL if len(channel.value) - len(wrong) < 2 else WARNING
+        yield Finding(channel.name, "not_finite", ends[0], ends[1], float(len(wrong)), "samples", text, worst)
+
+
+def _values(channel: Channel, all_channels: dict[str, Channel]) -> Iterator[Finding]:
+    value, time_s = channel.value, channel.time_s
+    if np.ptp(value) == 0.0:
+        text = f"it is {value[0]:.6g} all the time"
+        yield Finding(channel.name, "constant", float(time_s[0]), float(time_s[-1]), 0.0, channel.unit, text, NOTE)
+        return
+    yield from _size(channel)
+    wraps = wrap_places(value)
+    for place in wraps[:NAMED_PLACES]:
+        size = abs(float(value[place + 1] - value[place]))
+        text = f"it jumps by {size:.6g} {channel.unit} against its motion: an integer ran over"
+        yield Finding(
+            channel.name, "wrap", float(time_s[place]), float(time_s[place + 1]), size, channel.unit, text
+        )  # fmt: skip
+    yield from _spikes(channel, wraps)
+    yield from _stuck(channel, all_channels)
+    yield from _saturation(channel)
+
+
+def _size(channel: Channel) -> Iterator[Finding]:
+    top = float(np.abs(channel.value).max())
+    ends = float(channel.time_s[0]), float(channel.time_s[-1])
+    typical = float(np.median(np.abs(channel.value)))
+    for end, largest, rather in LARGEST:
+        if channel.name.endswith(end) and typical > largest:
+            text = f"values around {typical:.4g} {channel.unit}: they are probably {rather}"
+            yield Finding(channel.name, "wrong_unit", *ends, typical, channel.unit, text)
+    if channel.unit == "rad" and any(word in channel.name for word in JOINTS) and "motor" not in channel.name:
+        if top > LARGEST_JOINT_RAD:
+            text = f"a joint's angle of {top:.4g} rad is more than a turn: it is probably in degrees or counts"
+            yield Finding(channel.name, "wrong_unit", *ends, top, "rad", text)
+
+
+def wrap_places(value: Array) -> list[int]:
+    """Where a counter runs over: a jump of most of the range, against a motion that goes on behind it as before."""
+    steps = np.diff(value)
+    spread = float(np.ptp(value))
+    found = []
+    for place in np.flatnonzero(np.abs(steps) > 0.8 * spread):
+        before, after = steps[max(0, place - 5) : place], steps[place + 1 : place + 6]
+        if len(before) < 3 or len(after) < 3:
+            continue
+        slopes = float(before.mean()), float(after.mean())
+        calm = max(np.abs(before).max(), np.abs(after).max()) < 0.2 * abs(steps[place])
+        if calm and slopes[0] * slopes[1] > 0.0 and slopes[0] * steps[place] < 0.0:
+            if min(map(abs, slopes)) > 0.2 * max(map(abs, slopes)):
+                found.append(int(place))
+    return found
+
+
+def spike_places(value: Array) -> Array:
+    """Samples that are far from both neighbours, while these agree."""
+    if len(value) < FEWEST:
+        return np.array([], dtype=int)
+    left, right = value[1:-1] - value[:-2], value[1:-1] - value[2:]
+    size = np.minimum(np.abs(left), np.abs(right))
+    usual = max(_usual(np.abs(value[2:] - 2.0 * value[1:-1] + value[:-2])), _usual(np.abs(np.diff(value))))
+    far = (left * right > 0.0) & (size > SPIKE_STEPS * usual) & (np.abs(left - right) < 0.35 * size)
+    return np.flatnonzero(far & (size > 4.0 * lattice_step(value))) + 1
+
+
+def _usual(sizes: Array) -> float:
+    """A size that most do not pass: the 90th percentile, so that a channel that mostly rests is not all spikes."""
+    return float(np.percentile(sizes, 90.0))
+
+
+def _spikes(channel: Channel, wraps: list[int]) -> Iterator[Finding]:
+    places = np.array([place for place in spike_places(channel.value) if place not in wraps], dtype=int)
+    if not len(places):
+        return
+    value, time_s = channel.value, channel.time_s
+    sizes = value[places] - 0.5 * (value[places - 1] + value[places + 1])
+    step = lattice_step(np.delete(value, places))
+    ends = float(time_s[places[0]]), float(time_s[places[-1]])
+    worst = float(sizes[np.argmax(np.abs(sizes))])
+    if step > 0.0:
+        # neighbours that move blur the size by a few steps, which are nothing beside a high bit
+        powers = np.round(np.log2(np.abs(sizes) / step))
+        blur = np.abs(value[places + 1] - value[places - 1]) + 2.0 * step
+        if np.all(np.abs(np.abs(sizes) - step * 2.0**powers) <= blur) and powers.min() >= 3:
+            bits = ", ".join(str(int(each)) for each in sorted(set(powers))[:8])
+            text = f"{len(places)} single values are wrong by one bit ({bits}) of steps of {step:.4g} {channel.unit}"
+            yield Finding(channel.name, "bit_flip", *ends, abs(worst), channel.unit, text)
+            return
+    text = f"{len(places)} single values are off, by up to {abs(worst):.4g} {channel.unit}"
+    yield Finding(channel.name, "spike", *ends, abs(worst), channel.unit, text)
+
+
+def equal_runs(value: Array) -> tuple[Array, Array]:
+    """(first sample, length) of every stretch of equal values."""
+    starts = np.flatnonzero(np.concatenate(([True], np.diff(value) != 0.0)))
+    return starts, np.diff(np.concatenate((starts, [len(value)])))
+
+
+def _stuck(channel: Channel, all_channels: dict[str, Channel]) -> Iterator[Finding]:
+    """The longest stretch of one value, when it is far longer than all others and other channels move in it."""
+    starts, lengths = equal_runs(channel.value)
+    if len(lengths) < 10 or _is_held(channel.value):
+        return
+    longest = int(np.argmax(lengths))
+    length = int(lengths[longest])
+    others = np.delete(lengths, longest)
+    if length < STUCK_SAMPLES or length < STUCK_RATIO * others.max():
+        return
+    begin, end = channel.time_s[starts[longest]], channel.time_s[starts[longest] + length - 1]
+    moving = []
+    for other in all_channels.values():
+        inside = other.value[(other.time_s > begin) & (other.time_s < end)]
+        if other.name != channel.name and len(inside) > 3 and not _is_held(other.value):
+            if np.ptp(inside) > 0.2 * np.ptp(other.value):
+                moving.append(other.name)
+    if moving:
+        text = (
+            f"it stands at {channel.value[starts[longest]]:.6g} {channel.unit} for {end - begin:.4g} s "
+            f"while {', '.join(moving[:3])} move"
+        )
+        yield Finding(channel.name, "stuck", float(begin), float(end), float(end - begin), "s", text)
+
+
+def _is_held(value: Array) -> bool:
+    """True for a command or a state: most of its steps are zero."""
+    return bool(np.mean(np.diff(value) == 0.0) > FLAT_PART)
+
+
+def _saturation(channel: Channel) -> Iterator[Finding]:
+    """Stretches at the largest or smallest value that are entered at speed: a turning point is entered slowly."""
+    value, time_s = channel.value, channel.time_s
+    starts, lengths = equal_runs(value)
+    if len(lengths) < 20 or np.mean(np.diff(value) == 0.0) > 0.9:
+        return
+    step = lattice_step(value)
+    usual = float(np.median(np.abs(np.diff(value))[np.diff(value) != 0.0]))
+    for limit in (float(value.min()), float(value.max())):
+        runs = [k for k in range(1, len(starts)) if value[starts[k]] == limit and lengths[k] >= CLIPPED_SAMPLES]
+        fast = [k for k in runs if abs(value[starts[k]] - value[starts[k] - 1]) > max(3.0 * step, 0.3 * usual)]
+        count = int(sum(lengths[k] for k in runs))
+        if len(fast) < CLIPPED_RUNS or len(fast) < 0.5 * len(runs) or _rests_at(value, limit):
+            continue
+        ends = float(time_s[starts[fast[0]]]), float(time_s[starts[fast[-1]] + lengths[fast[-1]] - 1])
+        text = f"{count} values are cut off at {limit:.6g} {channel.unit}, in {len(runs)} stretches"
+        yield Finding(channel.name, "saturation", *ends, limit, channel.unit, text)
+
+
+def _rests_at(value: Array, limit: float) -> bool:
+    """True when the value lies there most of the time: a resting value, no limit."""
+    return bool(np.mean(value == limit) > 0.5)
+
+
+def lattice_step(value: Array) -> float:
+    """The finest step of a quantised or printed channel; 0 when its values lie on no lattice."""
+    different = np.unique(value[np.isfinite(value)])
+    if len(different) < 4:
+        return 0.0
+    different = different[:20_000]
+    gaps = np.diff(different)
+    gaps = gaps[gaps > 1e-9 * (different[-1] - different[0])]
+    small = gaps[gaps < 1.5 * np.percentile(gaps, 5.0)]
+    step = float(np.median(small))
+    counts = np.concatenate(([0.0], np.cumsum(np.round(gaps / step))))
+    if (np.round(gaps / step) < 1.0).any():
+        return 0.0
+    places = np.concatenate(([0.0], np.cumsum(gaps)))
+    step = float(counts @ places / (counts @ counts))
+    off = places / step - counts
+    return step if float(np.sqrt(np.mean((off - off.mean()) ** 2))) < 0.15 else 0.0
+
+
+# --- channels against each other ----------------------------------------------------------------------------
+
+
+def _between(channels: dict[str, Channel]) -> Iterator[Finding]:
+    for channel in channels.values():
+        yield from _clock(channel)
+    for angle, rate in DERIVATIVES:
+        if angle in channels and rate in channels:
+            yield from _derivative(channels[angle], channels[rate])
+    for first, second in REDUNDANT:
+        if first in channels and second in channels:
+            late = lag_s(channels[first], channels[second])
+            if late is not None:
+                yield from _lag(channels[first], channels[second], late)
+
+
+def _clock(channel: Channel) -> Iterator[Finding]:
+    """A channel that is itself a clock, against the stamps."""
+    if channel.unit != "s" or len(channel.value) < FEWEST or not (np.diff(channel.value) >= 0.0).all():
+        return
+    span = channel.time_s[-1] - channel.time_s[0]
+    slope, offset = np.polyfit(channel.time_s - channel.time_s[0], channel.value, 1)
+    if not 0.99 < slope < 1.01:
+        return
+    left = channel.value - slope * (channel.time_s - channel.time_s[0]) - offset
+    # a straight line through n stamps with this scatter is uncertain by so much
+    uncertain = float(left.std()) * math.sqrt(12.0 / len(left)) / span
+    ppm = (slope - 1.0) * 1e6
+    if abs(ppm) > max(DRIFT_PPM, 5e6 * uncertain):
+        text = f"its clock runs {abs(ppm):.0f} ppm {'fast' if ppm > 0 else 'slow'} against the stamps"
+        ends = float(channel.time_s[0]), float(channel.time_s[-1])
+        yield Finding(channel.name, "clock_drift", *ends, ppm, "ppm", text)
+
+
+def _derivative(angle: Channel, rate: Channel) -> Iterator[Finding]:
+    """A rate against the derivative of its angle: the factor between them, and the lag."""
+    slopes = np.gradient(angle.value, angle.time_s)
+    derivative = dataclasses.replace(angle, value=_smooth(slopes))
+    usual = float(np.median(np.diff(angle.time_s)))
+    turned = dataclasses.replace(rate, value=-rate.value)
+    late = lag_s(derivative, rate)
+    shift = late if late is not None else (lag_s(derivative, turned) or 0.0)
+    inside = (rate.time_s - shift > angle.time_s[0]) & (rate.time_s - shift < angle.time_s[-1])
+    if inside.sum() < FEWEST:
+        return
+    expected = np.interp(rate.time_s[inside] - shift, derivative.time_s, derivative.value)
+    given = rate.value[inside]
+    if expected.std() == 0.0 or given.std() == 0.0:
+        return
+    alike = float(np.corrcoef(expected, given)[0, 1])
+    ends = float(rate.time_s[inside][0]), float(rate.time_s[inside][-1])
+    if abs(alike) < ALIKE:
+        return
+    factor = float(given.std() / expected.std()) * (1.0 if alike > 0.0 else -1.0)
+    for slope, meaning in SLOPES.items():
+        if abs(factor / slope - 1.0) < SLOPE_TOLERANCE:
+            text = f"it is {factor:.4g} times the derivative of {angle.name}: {meaning}"
+            yield Finding(rate.name, "wrong_unit", *ends, factor, "", text)
+            return
+    if abs(factor - 1.0) > 0.2:
+        text = f"it is {factor:.4g} times the derivative of {angle.name}: a gear, or another unit"
+        yield Finding(rate.name, "wrong_unit", *ends, factor, "", text)
+        return
+    if late is not None and abs(late) > usual:
+        yield from _lag(derivative, rate, late)
+
+
+def _smooth(value: Array) -> Array:
+    """The mean of five neighbours, which shifts nothing."""
+    if len(value) < FEWEST:
+        return value
+    return np.convolve(np.pad(value, 2, mode="edge"), np.full(5, 0.2), mode="valid")
+
+
+def _lag(first: Channel, second: Channel, late: float) -> Iterator[Finding]:
+    usual = float(np.median(np.diff(second.time_s)))
+    base = float(np.median(np.diff(first.time_s)))
+    if abs(late) <= LAG_STEPS * max(usual, base):
+        return
+    text = f"it comes {abs(late) * 1e3:.3g} ms {'after' if late > 0.0 else 'before'} {first.name}"
+    ends = float(second.time_s[0]), float(second.time_s[-1])
+    yield Finding(second.name, "lag", *ends, late, "s", text)
+    drift = _drift(first, second)
+    if drift is not None:
+        text = f"its lag against {first.name} changes by {drift * 1e6:.0f} us per second: their clocks differ"
+        yield Finding(second.name, "clock_drift", *ends, drift * 1e6, "ppm", text)
+
+
+def lag_s(first: Channel, second: Channel) -> float | None:
+    """By how much the second comes later than the first, in s; None when they are not the same motion.
+
+    The maximum of their cross-correlation, between samples by a parabola.
+    """
+    if min(len(first.value), len(second.value)) < FEWEST:
+        return None
+    step = min(float(np.median(np.diff(first.time_s))), float(np.median(np.diff(second.time_s))))
+    begin, end = _longest_stretch(first, second)
+    if not step > 0.0 or (end - begin) / step < FEWEST or (end - begin) / step > 5e6:
+        return None
+    grid = np.arange(begin, end, step)
+    a = np.interp(grid, first.time_s, first.value)
+    b = np.interp(grid, second.time_s, second.value)
+    a, b = a - a.mean(), b - b.mean()
+    longest = min(int(LONGEST_LAG_S / step), len(a) // 4)
+    wide = 1 << (len(a) + longest).bit_length()
+    product = np.fft.irfft(np.fft.rfft(b, wide) * np.conj(np.fft.rfft(a, wide)), wide)
+    shifts = np.arange(-longest, longest + 1)
+    # each shift against what overlaps in it: without that the shorter overlap of larger shifts draws towards zero
+    squares = [np.concatenate(([0.0], np.cumsum(each * each))) for each in (a, b)]
+    ahead, behind = np.maximum(shifts, 0), np.maximum(-shifts, 0)
+    count = len(a)
+    energy_a = squares[0][count - ahead] - squares[0][behind]
+    energy_b = squares[1][count - behind] - squares[1][ahead]
+    sizes = np.sqrt(energy_a * energy_b)
+    if not (sizes > 0.0).all():
+        return None
+    values = product[shifts] / sizes
+    best = int(np.argmax(values))
+    if values[best] < ALIKE or best in (0, len(values) - 1):
+        return None
+    low, mid, high = values[best - 1 : best + 2]
+    bend = low - 2.0 * mid + high
+    part = 0.5 * (low - high) / bend if bend < 0.0 else 0.0
+    return float((shifts[best] + part) * step)
+
+
+def _longest_stretch(first: Channel, second: Channel) -> tuple[float, float]:
+    """Begin and end of the longest time in which neither has a gap: across one, straight lines would be compared."""
+    begin, end = max(first.time_s[0], second.time_s[0]), min(first.time_s[-1], second.time_s[-1])
+    edges = [begin, end]
+    for time_s in (first.time_s, second.time_s):
+        steps = np.diff(time_s)
+        for place in np.flatnonzero(steps > GAP_STEPS * np.median(steps)):
+            edges += [time_s[place], time_s[place + 1]]
+    edges = sorted(edge for edge in edges if begin <= edge <= end)
+    pieces = [(low, high) for low, high in zip(edges[:-1], edges[1:], strict=True) if high > low]
+    sound = [piece for piece in pieces if not _is_gap(*piece, first, second)]
+    low, high = max(sound, key=lambda piece: piece[1] - piece[0], default=(begin, begin))
+    return float(low), float(high)
+
+
+def _is_gap(low: float, high: float, *channels: Channel) -> bool:
+    """True when one of the channels has no sample between."""
+    return any(not ((channel.time_s > low) & (channel.time_s < high)).any() for channel in channels)
+
+
+def _drift(first: Channel, second: Channel) -> float | None:
+    """Change of the lag in s per s, when five parts of the recording say it alike; else None."""
+    begin, end = max(first.time_s[0], second.time_s[0]), min(first.time_s[-1], second.time_s[-1])
+    cuts = np.linspace(begin, end, 6)
+    lags, middles = [], []
+    for low, high in zip(cuts[:-1], cuts[1:], strict=True):
+        parts = [_part(channel, low, high) for channel in (first, second)]
+        if min(len(part.value) for part in parts) < FEWEST:
+            return None
+        late = lag_s(parts[0], parts[1])
+        if late is None:
+            return None
+        lags.append(late)
+        middles.append(0.5 * (low + high))
+    slope, offset = np.polyfit(middles, lags, 1)
+    left = np.array(lags) - slope * np.array(middles) - offset
+    error = math.sqrt(float(left @ left) / 3.0) / math.sqrt(float(np.var(middles)) * 5.0)  # two of five are fitted
+    return float(slope) if abs(slope) > max(DRIFT_PPM * 1e-6, 6.0 * error) else None
+
+
+def _part(channel: Channel, low: float, high: float) -> Channel:
+    inside = (channel.time_s >= low) & (channel.time_s <= high)
+    return dataclasses.replace(channel, time_s=channel.time_s[inside], value=channel.value[inside])
