@@ -25,7 +25,8 @@ def main(arguments=None):
     parser.add_argument("--seed", type=int, help="drawn from the system when left out")
     parser.add_argument("--out", type=pathlib.Path, required=True)
     parser.add_argument("--truth", type=pathlib.Path, help="folder of the truth (default OUT/truth)")
-    parser.add_argument("--kinds", help="only these, by comma: single,null,pair,outside")
+    parser.add_argument("--check", action="store_true", help="the 60 cases of continuous integration, whatever --count")
+    parser.add_argument("--kinds", help="only these, by comma: single,null,pair,outside,confusable")
     parser.add_argument("--causes", help="only these causes as single effects and in pairs, by comma")
     options = parser.parse_args(arguments)
     experiment = EXPERIMENTS[options.experiment]
@@ -36,7 +37,8 @@ def main(arguments=None):
             if name not in known:
                 parser.error(f"{name!r} is not one of {', '.join(known)}")
     seed = int.from_bytes(os.urandom(4), "big") if options.seed is None else options.seed
-    print(f"blind cases: experiment {options.experiment}, count {options.count}, seed {seed}", flush=True)
+    cases = experiment.check_plan(seed) if options.check else experiment.plan(seed, options.count, kinds, causes)
+    print(f"blind cases: experiment {options.experiment}, count {len(cases)}, seed {seed}", flush=True)
     data, truth = options.out / "data", options.truth or options.out / "truth"
     if data.exists():
         parser.error(f"{data} is there already")
@@ -44,7 +46,7 @@ def main(arguments=None):
     truth.mkdir(parents=True, exist_ok=True)
     public = []
     said = (lambda text: print(text, file=sys.stderr, flush=True)) if sys.stderr.isatty() else (lambda text: None)
-    for key, files, holdout, hidden in experiment.generate(seed, options.count, data, kinds, causes, said):
+    for key, files, holdout, hidden in experiment.generate(seed, cases, data, said):
         (truth / f"{key}.json").write_text(json.dumps(hidden, indent=1), encoding="utf-8")
         public.append({"id": key, "experiment": options.experiment, "files": files, "holdout": holdout})
     (data / "cases.json").write_text(json.dumps(public, indent=1), encoding="utf-8")

@@ -53,9 +53,8 @@ def rich(rng, count, supply_V, brake_Nm):
     return lagged(voltage_V, SUPPLY_LAG_S), lagged(torque_Nm, BRAKE_LAG_S)
 
 
-def monotone(rng, count, supply_V, brake_Nm):
-    """A poor experiment: one direction, slow changes of voltage, a brake that only brakes."""
-    voltage_V = np.abs(segments(rng, count + 1, 2.0, 4.0, supply_V, (0.3, 0.7, 0.0, 0.0)))
-    torque_Nm = 0.5 * np.abs(segments(rng, count + 1, 2.0, 4.0, brake_Nm, (0.3, 0.7, 0.0, 0.0)))
-    voltage_V[int(STILL_S / STEP_S) :] = np.maximum(voltage_V[int(STILL_S / STEP_S) :], 0.45 * supply_V)
-    return lagged(voltage_V, 20 * SUPPLY_LAG_S), lagged(torque_Nm, 10 * BRAKE_LAG_S)
+def one_sided(rng, count, supply_V, brake_Nm):
+    """A poor experiment: a supply that cannot be turned round, so that only the brake drives backwards."""
+    voltage_V = np.abs(segments(rng, count + 1, 0.4, 1.6, supply_V - 0.5, (0.4, 0.2, 0.3, 0.1))) + 0.5
+    torque_Nm = segments(rng, count + 1, 0.5, 2.0, 1.5 * brake_Nm, (0.35, 0.2, 0.25, 0.2))
+    return lagged(voltage_V, SUPPLY_LAG_S), lagged(torque_Nm, BRAKE_LAG_S)

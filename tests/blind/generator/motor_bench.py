@@ -6,7 +6,7 @@ from ranger_sim.foundation.random_arrays import generator
 from tests.blind.generator.bench import NOMINAL, Lanes
 from tests.blind.generator.case import Case
 from tests.blind.generator.effects import CAUSES, EFFECTS, OUTSIDE
-from tests.blind.generator.excitation import STEP_S, monotone, rich
+from tests.blind.generator.excitation import STEP_S, one_sided, rich
 from tests.blind.generator.instruments import NOISE, Instruments, write
 from tests.blind.generator.strength import Scale
 
@@ -18,40 +18,75 @@ STRENGTHS = (0.5, 1.0, 2.0, 4.0)
 TIE = 0.95  # of the cosine of two effects' parts outside the base model
 SUBSYSTEM = {"E": "electrical", "M": "mechanical", "EM": "current_sensing", "T": "transmission", "t": "timing"}
 MIX = (  # shares of the kinds in a set of cases
-    ("single", 0.50),
+    ("single", 0.46),
     ("null", 0.20),
     ("pair", 0.12),
-    ("outside", 0.18),
+    ("outside", 0.14),
+    ("confusable", 0.08),
 )
+# With a supply of one sign these two are one: the sensor's step at zero duty is never crossed.
+CONFUSABLE = ("current_step_at_zero_duty", "sensor_offset")
+# Causes that show in one balance only, or nearly: a diagnosis that lacks it cannot see them.
+ONLY_IN = {
+    "E": ("contact_drop_change", "resistance_temperature", "voltage_clip", "commutation_ripple"),
+    "M": ("cogging", "once_per_turn", "stribeck", "direction_friction", "friction_warm_up", "drag"),
+    "T": ("eccentricity", "lost_counts"),
+}
+CHECK_AT_4 = 8  # cases for each balance in the subset that continuous integration runs
+CHECK_KINDS = (("single", 10), ("null", 12), ("pair", 6), ("outside", 6), ("confusable", 2))  # singles at 2
 
 
 def plan(seed, count, kinds, causes):
     """Cases without files: kinds in the shares of MIX, causes in turn, strengths in turn for each kind."""
-    rng = generator(seed, "plan")
     mix = [(kind, share) for kind, share in MIX if kind in kinds]
     total = sum(share for _, share in mix)
     wanted = []
     for kind, share in mix:
-        wanted += [kind] * round(count * share / total)
-    wanted = (wanted + [mix[0][0]] * count)[:count]
-    turns = {kind: 0 for kind, _ in MIX}
-    order = {"single": list(rng.permutation(causes)), "outside": list(rng.permutation(OUTSIDE))}
+        wanted += [(kind, None, None)] * round(count * share / total)
+    wanted = (wanted + [(mix[0][0], None, None)] * count)[:count]
+    return fill(seed, wanted, causes)
+
+
+def check_plan(seed):
+    """The subset for continuous integration, 60 cases: at 4 eight causes of each balance, at 2 ten of all, others."""
+    rng = generator(seed, "check plan")
+    wanted = []
+    for names in ONLY_IN.values():
+        order = rng.permutation(names)
+        wanted += [("single", str(order[i % len(order)]), 4.0) for i in range(CHECK_AT_4)]
+    for kind, count in CHECK_KINDS:
+        wanted += [(kind, None, 2.0 if kind == "single" else None)] * count
+    return fill(seed, wanted, CAUSES)
+
+
+def fill(seed, wanted, causes):
+    """Cases from [(kind, cause or None, strength or None)], in random order; what is None goes in turn."""
+    rng = generator(seed, "plan")
+    order = {
+        "single": [str(name) for name in rng.permutation(causes)],
+        "outside": [str(name) for name in rng.permutation(OUTSIDE)],
+        "confusable": [str(name) for name in rng.permutation(CONFUSABLE)],
+    }
+    turns = dict.fromkeys(("null", "pair", *order), 0)
     cases = []
-    for number, kind in enumerate(wanted):
+    for number, (kind, name, strength) in enumerate(wanted):
         turn = turns[kind]
-        turns[kind] += 1
+        turns[kind] += name is None
         case = Case(number, kind)
         if kind == "null":
             case.variant = ("plain", "parameters", "noise")[turn % 3]
         elif kind == "pair":
-            first, second = rng.choice(causes, 2, replace=False)
-            case.effects = [(str(first), 2.0), (str(second), 2.0)]
-        elif kind == "outside":
-            case.effects = [(str(order[kind][turn % len(OUTSIDE)]), 4.0)]
+            case.effects = [(str(one), 2.0) for one in rng.choice(causes, 2, replace=False)]
         else:
-            round_, place = divmod(turn, len(causes))
-            strength = STRENGTHS[(place + round_ + seed) % 4]
-            case.effects = [(str(order[kind][place]), strength)]
+            round_, place = divmod(turn, len(order[kind]))
+            # every strength for every cause after four rounds
+            usual = {
+                "single": STRENGTHS[(place + round_ + seed) % 4],
+                "outside": 4.0,
+                "confusable": (2.0, 4.0)[turn % 2],
+            }
+            case.effects = [(name or order[kind][place], strength or usual[kind])]
+            case.poor = kind == "confusable"
         cases.append(case)
     return [cases[i] for i in rng.permutation(len(cases))]
 
@@ -70,7 +105,7 @@ def prepare(seed, case):
     # the held-out run: another trajectory, another level of the supply, another room
     case.runs = []
     for name, level in (("a", 1.0), ("b", float(rng.choice((0.82, 1.15))))):
-        profile = monotone if case.poor else rich
+        profile = one_sided if case.poor else rich
         volt, brake = profile(generator(seed, f"case {case.number} run {name}"), SAMPLES, supply_V * level, BRAKE_NM)
         case.runs.append((name, volt, brake, float(rng.uniform(16.0, 32.0)), float(rng.uniform(0.0, 15.0))))
     for name, _ in case.effects:
@@ -203,14 +238,13 @@ def truth(case, scale, cosines):
     }
 
 
-def generate(seed, count, data, kinds, causes, tell=lambda text: None):
-    """Writes data files below `data`; yields (id, files, holdout, truth) of each case.
+def generate(seed, cases, data, tell=lambda text: None):
+    """Writes data files of planned cases below `data`; yields (id, files, holdout, truth) of each.
 
     Two passes of simulation: without effects, which sets the amplitudes, and with them.
     """
     names = generator(seed, "names")
-    cases = plan(seed, count, kinds, causes)
-    for start in range(0, count, BATCH):
+    for start in range(0, len(cases), BATCH):
         batch = cases[start : start + BATCH]
         for case in batch:
             prepare(seed, case)
@@ -230,5 +264,5 @@ def generate(seed, count, data, kinds, causes, tell=lambda text: None):
             for run, trajectory in zip(case.runs, ran, strict=True):
                 write(data / key / f"{run[0]}.csv", measure(seed, case, run, trajectory))
             scale = Scale(ran[0], case.instruments)
-            cosines = rivals(seed, case, scale) if case.kind == "single" else {}
+            cosines = rivals(seed, case, scale) if case.kind in ("single", "confusable") else {}
             yield key, [f"{key}/a.csv"], [f"{key}/b.csv"], truth(case, scale, cosines)

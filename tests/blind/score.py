@@ -1,0 +1,281 @@
+"""What a diagnosis is worth, from its answers and the truth: `python -m tests.blind.score --truth DIR --answers DIR`.
+
+    truth/ID.json      written by the generator
+    answers/ID.json    what `ranger-sim diagnose ... --json` says of the case; a missing one counts as wrong
+
+Every figure comes with how many cases it rests on and its 95 % interval (Clopper and Pearson for shares; order
+statistics for a median and a percentile) beside its target.
+
+What counts as named: the causes of an answer that does not abstain. A set: the causes with all that they are tied with.
+Parameters: the first one of a cause, which is its size. The gain is the answer's own word.
+"""
+
+import argparse
+import dataclasses
+import json
+import pathlib
+
+import numpy as np
+from scipy import stats
+
+LEVEL = 0.95
+# An answer may call a subsystem by the letter of its balance or by a word.
+LETTER = {
+    "electrical": "E",
+    "motor": "E",
+    "winding": "E",
+    "mechanical": "M",
+    "friction": "M",
+    "joint": "M",
+    "transmission": "T",
+    "gearbox": "T",
+    "cable": "T",
+    "redundancy": "S",
+    "sensors": "S",
+    "angle_sensing": "S",
+    "current_sensing": "E",
+    "power": "P",
+    "timing": "t",
+    "time": "t",
+}
+
+
+@dataclasses.dataclass(frozen=True)
+class Figure:
+    """One figure: value (None without a case), 95 % interval, cases; its target and whether that is a floor."""
+
+    name: str
+    value: float | None
+    low: float | None
+    high: float | None
+    cases: int
+    target: float | None = None
+    at_least: bool = True
+    successes: int | None = None
+
+    @property
+    def meets(self):
+        """Whether the value keeps its target; None without either."""
+        if self.value is None or self.target is None:
+            return None
+        return self.value >= self.target if self.at_least else self.value <= self.target
+
+
+def share_interval(successes, cases):
+    """Exact interval of a share (Clopper and Pearson 1934)."""
+    tail = 0.5 * (1.0 - LEVEL)
+    low = 0.0 if successes == 0 else float(stats.beta.ppf(tail, successes, cases - successes + 1))
+    high = 1.0 if successes == cases else float(stats.beta.ppf(1.0 - tail, successes + 1, cases - successes))
+    return low, high
+
+
+def share(name, hits, target=None, at_least=True):
+    """A Figure from one truth value per case."""
+    hits = [bool(hit) for hit in hits]
+    if not hits:
+        return Figure(name, None, None, None, 0, target, at_least)
+    count = sum(hits)
+    return Figure(
+        name, count / len(hits), *share_interval(count, len(hits)), len(hits), target, at_least, successes=count
+    )
+
+
+def quantile(name, values, part, target=None, at_least=True):
+    """A Figure of a quantile, its interval from order statistics."""
+    values = np.sort(np.asarray(values, dtype=float))
+    n = len(values)
+    if n == 0:
+        return Figure(name, None, None, None, 0, target, at_least)
+    tail = 0.5 * (1.0 - LEVEL)
+    low = int(max(stats.binom.ppf(tail, n, part) - 1, 0))
+    high = int(min(stats.binom.ppf(1.0 - tail, n, part), n - 1))
+    return Figure(name, float(np.quantile(values, part)), float(values[low]), float(values[high]), n, target, at_least)
+
+
+def mean(name, values, target=None, at_least=True):
+    """A Figure of a mean, its interval from the normal law."""
+    values = np.asarray(values, dtype=float)
+    if len(values) == 0:
+        return Figure(name, None, None, None, 0, target, at_least)
+    spread = 1.96 * float(np.std(values, ddof=1)) / np.sqrt(len(values)) if len(values) > 1 else float("inf")
+    middle = float(np.mean(values))
+    return Figure(name, middle, middle - spread, middle + spread, len(values), target, at_least)
+
+
+class Answer:
+    """One diagnosis; `data`: its JSON, or None where there is none."""
+
+    def __init__(self, data):
+        self.given = data is not None
+        data = data or {}
+        self.detected = bool(data.get("detected", False))
+        self.abstained = bool(data.get("abstained", False))
+        self.subsystem = data.get("subsystem")
+        self.causes = list(data.get("causes") or []) if self.detected and not self.abstained else []
+        self.gain = (data.get("gain") or {}).get("fraction_of_achievable")
+
+    def names(self):
+        return [cause["name"] for cause in self.causes]
+
+    def groups(self):
+        """Each cause with what it is tied with."""
+        return [{cause["name"], *(cause.get("tied_with") or [])} for cause in self.causes]
+
+    def reported(self):
+        """All names, with ties."""
+        return set().union(*self.groups()) if self.causes else set()
+
+    def parameter(self, cause, name):
+        """(value, ci95) of a parameter of a cause, or None."""
+        for entry in self.causes:
+            if entry["name"] == cause:
+                found = (entry.get("parameters") or {}).get(name)
+                if found is not None and found.get("value") is not None:
+                    return float(found["value"]), found.get("ci95")
+        return None
+
+
+def subsystem_is_right(answer, truth):
+    """Whether an answer's subsystem is one in which the cause acts."""
+    word = answer.subsystem
+    if not isinstance(word, str):
+        return False
+    cause = truth["causes"][0]
+    letter = word if len(word) == 1 else LETTER.get(word, "")
+    right = set(cause["balance"]) | ({"T"} if "S" in cause["balance"] else set())
+    if "T" in right:
+        right.add("S")  # an angle against another angle: one balance on a bench with two of them
+    return word == cause["subsystem"] or letter in right
+
+
+def relative_error(cause, name, value):
+    """Of a parameter; a scale's error is that of its distance from 1."""
+    true = cause["parameters"][name]
+    if name == "factor":
+        return abs((value - 1.0) / (true - 1.0) - 1.0)
+    return abs(value / true - 1.0)
+
+
+def matched(groups, wanted):
+    """(how many of the wanted names are met each by a group of its own, groups that meet none).
+
+    Two effects, so trying every order is cheap.
+    """
+    best, extra = 0, len(groups)
+    for order in ((0, 1), (1, 0)):
+        free = list(groups)
+        met = 0
+        for i in order[: len(wanted)]:
+            hit = next((group for group in free if wanted[i] in group), None)
+            if hit is not None:
+                free.remove(hit)
+                met += 1
+        if met > best:
+            best, extra = met, len(free)
+    return best, extra
+
+
+def score(truths, answers):
+    """[Figure] for {id: truth} and {id: answer's JSON}; an id without an answer counts as wrong."""
+    cases = [(truth, Answer(answers.get(key))) for key, truth in truths.items()]
+    nulls = [(t, a) for t, a in cases if t["kind"] == "null"]
+    singles = [(t, a) for t, a in cases if t["kind"] in ("single", "confusable")]
+    pairs = [(t, a) for t, a in cases if t["kind"] == "pair"]
+    outside = [(t, a) for t, a in cases if t["kind"] == "outside"]
+
+    def at(*strengths):
+        return [(t, a) for t, a in singles if t["causes"][0]["strength"] in strengths]
+
+    def name(truth):
+        return truth["causes"][0]["name"]
+
+    figures = [share("answers missing", [not a.given for _, a in cases], 0.0, False)]
+    figures.append(share("false alarms", [a.detected or not a.given for _, a in nulls], 0.02, False))
+    for variant in ("plain", "parameters", "noise"):
+        chosen = [a.detected or not a.given for t, a in nulls if t["variant"] == variant]
+        figures.append(share(f"false alarms, {variant}", chosen, None, False))
+    for strength, target in ((0.5, None), (1.0, None), (2.0, 0.97), (4.0, 0.99)):
+        figures.append(share(f"detection at {strength:g}", [a.detected for _, a in at(strength)], target))
+    for strength, target in ((0.5, None), (1.0, None), (2.0, 0.85), (4.0, 0.95)):
+        hits = [a.names()[:1] == [name(t)] for t, a in at(strength) if a.detected and not t["ties"]]
+        figures.append(share(f"top-1 cause at {strength:g}", hits, target))
+    strong = [(t, a) for t, a in at(2.0, 4.0) if a.detected]
+    figures.append(share("right subsystem", [subsystem_is_right(a, t) for t, a in strong], 0.95))
+    figures.append(share("truth in the set", [name(t) in a.reported() for t, a in strong], 0.95))
+    figures.append(mean("size of the set", [len(a.reported()) for _, a in strong if a.reported()], 1.5, False))
+    tied = [any(name(t) in group and group & set(t["ties"]) for group in a.groups()) for t, a in strong if t["ties"]]
+    figures.append(share("confusable pair declared a tie", tied, 0.90))
+
+    covered = []
+    for strength, target in ((2.0, 0.10), (4.0, 0.05)):
+        errors = []
+        for t, a in at(strength):
+            for parameter in list(t["causes"][0]["parameters"])[:1]:
+                found = a.parameter(name(t), parameter)
+                if found is None:
+                    continue
+                errors.append(relative_error(t["causes"][0], parameter, found[0]))
+                if found[1] is not None:
+                    covered.append(found[1][0] <= t["causes"][0]["parameters"][parameter] <= found[1][1])
+        figures.append(quantile(f"parameter error at {strength:g}, median", errors, 0.5, target, False))
+    figures.append(share("coverage of 95 % intervals", covered, 0.90))
+    figures.append(share("coverage of 95 % intervals, at most", covered, 0.98, False))
+
+    gains = [a.gain for t, a in strong if a.gain is not None and name(t) in a.reported()]
+    figures.append(quantile("gain fraction, median", gains, 0.5, 0.90))
+    figures.append(quantile("gain fraction, 10th percentile", gains, 0.1, 0.70))
+    every_gain = [a.gain for _, a in cases if a.gain is not None]
+    figures.append(share("extended model worse", [gain < 0.0 for gain in every_gain], 0.01, False))
+
+    met = [matched(a.groups(), [cause["name"] for cause in t["causes"]]) for t, a in pairs]
+    figures.append(share("two effects exact", [found == 2 and extra == 0 for found, extra in met], 0.70))
+    figures.append(share("two effects, one or more spurious", [extra > 0 for _, extra in met], 0.10, False))
+    figures.append(share("outside: detection", [a.detected for _, a in outside]))
+    figures.append(share("outside: abstains", [a.detected and a.abstained for _, a in outside], 0.85))
+    figures.append(share("outside: wrong name", [bool(a.names()) for _, a in outside], 0.05, False))
+    for letter in "EMT":
+        chosen = [a.detected for t, a in at(4.0) if main_balance(t) == letter]
+        figures.append(share(f"detection at 4, balance {letter}", chosen))
+    return figures
+
+
+def main_balance(truth):
+    """The balance in which a single effect shows most."""
+    shares = truth["causes"][0]["share_by_balance"]
+    return max(shares, key=shares.get)
+
+
+def table(figures):
+    """The figures as text for a person."""
+    lines = [f"{'figure':40s} {'value':>7s}  {'95 % interval':17s} {'cases':>5s}  target"]
+    for figure in figures:
+        if figure.value is None:
+            lines.append(f"{figure.name:40s} {'-':>7s}  {'':17s} {0:5d}")
+            continue
+        target = ""
+        if figure.target is not None:
+            target = f"{'>=' if figure.at_least else '<='} {figure.target:g}{'' if figure.meets else '  MISSED'}"
+        interval = f"{figure.low:.3f} ... {figure.high:.3f}"
+        lines.append(f"{figure.name:40s} {figure.value:7.3f}  {interval:17s} {figure.cases:5d}  {target}".rstrip())
+    return "\n".join(lines)
+
+
+def read_folder(folder):
+    """{ID: content} of the JSON files in a folder."""
+    return {path.stem: json.loads(path.read_text(encoding="utf-8")) for path in sorted(folder.glob("*.json"))}
+
+
+def main(arguments=None):
+    parser = argparse.ArgumentParser(prog="python -m tests.blind.score", description=__doc__.splitlines()[0])
+    parser.add_argument("--truth", type=pathlib.Path, required=True)
+    parser.add_argument("--answers", type=pathlib.Path, required=True)
+    parser.add_argument("--json", type=pathlib.Path, help="the figures, for a program")
+    options = parser.parse_args(arguments)
+    figures = score(read_folder(options.truth), read_folder(options.answers))
+    print(table(figures))
+    if options.json:
+        options.json.write_text(json.dumps([dataclasses.asdict(f) for f in figures], indent=1), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
