@@ -3,6 +3,7 @@
 import dataclasses
 import hashlib
 import json
+import math
 import pathlib
 import tempfile
 from typing import Any
@@ -67,7 +68,12 @@ class Settings:
             board, _, entry = task.partition(".")
             if board not in robot.boards:
                 raise UserError(f"campaign: cost.{task}: there is no board {board!r}, but {', '.join(robot.boards)}")
-            found = robot.boards[board].scheduler.find(entry)
+            try:
+                found = robot.boards[board].scheduler.find(entry)
+            except UserError as error:
+                raise UserError(f"campaign: cost.{task}: {error}") from None
+            if not 0.0 <= factor < math.inf:
+                raise UserError(f"campaign: cost.{task} is {factor:g}, a factor of 0 or more is expected")
             found.cost, found.per_item = round(found.cost * factor), round(found.per_item * factor)
         return robot
 

@@ -21,7 +21,7 @@ from ranger_sim.foundation import wallclock
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.branching import BranchError, branch, die_with
 from ranger_sim.harness.campaigns.cases import Case, Settings, version
-from ranger_sim.harness.campaigns.outcomes import Band, classify, deviation
+from ranger_sim.harness.campaigns.outcomes import Band, against_fallen, classify, deviation
 from ranger_sim.harness.conditions import condition
 from ranger_sim.harness.faults import catalogue
 from ranger_sim.harness.faults import text as typed_text
@@ -204,8 +204,9 @@ def fault_run(
     began_ns = fault.activated_ns if fault.activated_ns >= 0 else start_ns
     normal = golden.healthy(healthy, start_ns + round(watch.after_s * 1e9))
     proof = prove(golden.record, record, began_ns, fault.acted, normal)
+    until = golden.record.until(start_ns + round(watch.after_s * 1e9))
     return {
-        **judged(proof, golden.record, record, began_ns, watch),
+        **judged(proof, until, record, began_ns, watch),
         "fault": {name: rounded(value) for name, value in fault.summary().items()},
         "digest": robot.trace_digest(),
         "cpu_s": round(wallclock.process_cpu_s(), 3),
@@ -237,7 +238,7 @@ def sweep_run(case: dict[str, Any], golden: Golden, healthy: Healthy | None, wat
     normal = golden.healthy(healthy, end_ns)
     proof = prove(golden.record, record, robot.start_ns, True, normal)
     return {
-        **judged(proof, golden.record, record, since_ns, watch),
+        **judged(proof, golden.record.until(end_ns), record, since_ns, watch, is_sweep=True),
         "slots": slots_of(robot),
         "digest": robot.trace_digest(),
         "cpu_s": round(wallclock.process_cpu_s(), 3),
@@ -254,11 +255,17 @@ def slots_of(robot: Ranger) -> Result:
     return told
 
 
-def judged(proof: Proof, golden: Record, record: Record, since_ns: int, watch: Watch) -> Result:
-    """Outcome, reason and what the proof has, as JSON can carry it; times in ms from the fault's start."""
+def judged(proof: Proof, golden: Record, record: Record, since_ns: int, watch: Watch, is_sweep: bool = False) -> Result:
+    """Outcome, reason and what the proof has, as JSON can carry it; times in ms from the fault's start.
+
+    golden: its record until the instant at which this run was to end.
+    """
     here = gait(record, since_ns)
     there = gait(golden, since_ns, record.end_ns)
     outcome, why = classify(proof, here, there, damage(record, since_ns), watch.band)
+    if outcome != "invalid":
+        fell_ms = None if golden.fell_ns < 0 else (golden.fell_ns - since_ns) * 1e-6
+        outcome, why = against_fallen(outcome, why, fell_ms, golden.fall_cause, is_sweep)
 
     def difference(found: Difference | None) -> Result | None:
         if found is None:

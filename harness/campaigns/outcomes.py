@@ -9,7 +9,8 @@ from ranger_sim.harness.faults.proof import Gait, Proof
 CRITERIA = {
     "crashed": "the simulation raised an exception, or its process died: a defect of ours, not of the robot",
     "timed out": "the run took more computing than its limit, or hung",
-    "invalid": "the fault never acted, cannot act there, or the golden run does not get that far: it proves nothing",
+    "invalid": "the fault never acted, cannot act there, or the golden run does not get that far, or falls itself: it "
+    "proves nothing",
     "damage": "a motor's current stayed beyond 1.2 times its peak for more than 10 ms, or its thermal state beyond "
     "1.2 times what 3.1 A (steering 0.3 A) sustain",
     "fall": "the robot fell",
@@ -92,6 +93,18 @@ def classify(proof: Proof, gait: Gait, golden: Gait, overload: str, band: Band) 
         told = f"{proof.detected.code} from {proof.detected.board}"
         return ("degraded gait", f"{outside}; {told}") if outside else ("detected and safe", told)
     return ("undetected wrong", outside) if outside else ("masked", "")
+
+
+def against_fallen(
+    outcome: str, why: str, golden_fell_ms: float | None, golden_cause: str, is_sweep: bool
+) -> tuple[str, str]:
+    """(outcome, why) beside a golden run that fell `golden_fell_ms` after the watching began; None: it stood.
+
+    Nothing that a faulty run does then is the fault's doing. A sweep's run that fell or was damaged did so by itself.
+    """
+    if golden_fell_ms is None or (is_sweep and outcome in ("damage", "fall")):
+        return outcome, why
+    return "invalid", f"the golden run fell as well, after {golden_fell_ms:.0f} ms ({golden_cause})"
 
 
 def severity(result: dict[str, Any]) -> float:

@@ -20,6 +20,7 @@ from ranger_sim.harness.campaigns.cases import Case, Settings
 from ranger_sim.harness.campaigns.group import Watch, digest_of, rounded, start_of
 from ranger_sim.harness.campaigns.outcomes import OUTCOMES, Band, severity
 from ranger_sim.harness.campaigns.statistics import CONFIDENCE, INTERVALS, Stopping
+from ranger_sim.harness.conditions import condition
 from ranger_sim.harness.faults import catalogue
 from ranger_sim.harness.scenario import Scenario
 
@@ -38,6 +39,7 @@ WALK: dict[str, tuple[str, dict[str, float] | None]] = {
 }
 PREFIXES = ("controller.", "body.", "cost.")
 MOST_RUNS = 1_000_000
+MOST_CHECKED = 10_000  # texts of one fault that are read before anything runs; of more, so many
 
 
 @dataclasses.dataclass(frozen=True)
@@ -53,11 +55,15 @@ class Range:
     step: float | None = None
 
     @property
+    def size(self) -> int:
+        """How many values a range with a step has."""
+        assert self.step is not None
+        return 1 + math.floor((self.high - self.low) / self.step + 1e-9)  # with a last one that rounding put beyond
+
+    @property
     def values(self) -> list[float]:
         """All values of a range with a step."""
-        assert self.step is not None
-        count = 1 + math.floor((self.high - self.low) / self.step + 1e-9)  # a last one that rounding put beyond
-        return [self.numbered(number) for number in range(count)]
+        return [self.numbered(number) for number in range(self.size)]
 
     def numbered(self, number: int) -> float:
         """Value `number` of a range with a step."""
@@ -68,7 +74,7 @@ class Range:
     def at(self, share: float) -> float:
         """The value at a share 0-1 of the way, with six digits; of a range with a step one of its values."""
         if self.step is not None:
-            return self.numbered(min(len(self.values) - 1, int(share * len(self.values))))
+            return self.numbered(min(self.size - 1, int(share * self.size)))
         if self.log:
             value = self.low * (self.high / self.low) ** share
         else:
@@ -185,7 +191,7 @@ class Plan:
                 body[name.partition(".")[2]] = value
             elif name.startswith("cost."):
                 costs[name.partition(".")[2]] = float(value)
-        walk = {name: value for name, value in walk.items() if name != "seed"} | {"seed": int(walk.get("seed", 1))}
+        walk = {"seed": 1} | walk
         settings = Settings(walk, controller, body, costs)
         fault = point.get("fault")
         if fault:
@@ -263,10 +269,7 @@ def of_data(data: dict[str, Any], path: str) -> Plan:
     walk = table(data, "walk", path)
     only(walk, tuple(WALK), f"{path}: [walk]")
     fields = {WALK[name][0]: walk_value(name, value, path) for name, value in walk.items()}
-    try:
-        Scenario(**fields)
-    except UserError as error:
-        raise UserError(f"{path}: [walk]: {error}") from None
+    check_settings(Settings(fields), f"{path}: [walk]")
     axes = axes_of(data, path)
     sample = sample_of(data, path)
     search = search_of(data, path)
@@ -284,15 +287,20 @@ def of_data(data: dict[str, Any], path: str) -> Plan:
         raise UserError(
             f"{path}: [search] least = {search.least!r}: one of the ranges is expected, {', '.join(ranges)}"
         )
-    stepped = [] if sample or search else [len(axes[name].values) for name in ranges]  # type: ignore[union-attr]
+    stepped = [] if sample or search else [axes[name].size for name in ranges]  # type: ignore[union-attr]
     runs = math.prod([len(each) for each in axes.values() if not isinstance(each, Range)] + stepped)
     if runs > MOST_RUNS or (sample is None and search is None and runs == 0):
         raise UserError(f"{path}: {runs} runs, allowed are 1 to {MOST_RUNS}")
     healthy = table(data, "healthy", path)
     only(healthy, ("seeds",), f"{path}: [healthy]")
     seeds = healthy.get("seeds", [1, 2, 3, 4, 5, 6])
-    if not (isinstance(seeds, list) and all(isinstance(each, int) for each in seeds) and len(set(seeds)) >= 2):
+    if not (isinstance(seeds, list) and all(type(each) is int for each in seeds) and len(set(seeds)) >= 2):
         raise UserError(f"{path}: [healthy] seeds = {seeds!r}: a list of two or more whole numbers is expected")
+    tolerances = tuple(tolerances_of(data, path))
+    if search and tolerances:
+        raise UserError(
+            f"{path}: [tolerance] {tolerances[0].what}: the runs of a [search] are chosen and stand for no population"
+        )
     plan = Plan(
         path=path,
         title=text(data, "title", path, pathlib.Path(path).stem),
@@ -301,12 +309,13 @@ def of_data(data: dict[str, Any], path: str) -> Plan:
         watch=watch_of(data, path),
         healthy_seeds=tuple(seeds),
         axes=axes,
-        tolerances=tuple(tolerances_of(data, path)),
+        tolerances=tolerances,
         sample=sample,
         search=search,
         fault_module=module,
     )
-    check_cases(plan)
+    check_axes(plan)
+    check_faults(plan)
     return plan
 
 
@@ -326,22 +335,60 @@ def module_of(data: dict[str, Any], path: str) -> str | None:
     return str(found)
 
 
-def check_cases(plan: Plan) -> None:
-    """UserError for a fault that the catalogue does not have, before anything is run."""
-    seen: set[str] = set()
-    middle = {name: values.at(0.5) if isinstance(values, Range) else values[0] for name, values in plan.axes.items()}
+def check_settings(settings: Settings, where: str) -> None:
+    """UserError, naming `where`, for settings of which no robot can be made."""
+    try:
+        Scenario(**settings.walk)
+        settings.robot()
+    except UserError as error:
+        raise UserError(f"{where}: {error}") from None
+
+
+def check_axes(plan: Plan) -> None:
+    """UserError for a value of [vary] with which no robot can be made, before anything is run: names, and both ends."""
+    for name, values in plan.axes.items():
+        if name not in WALK and not name.startswith(PREFIXES):
+            continue
+        some = ends(values) if not isinstance(ends(values)[0], str) else values
+        for value in some:  # type: ignore[union-attr]
+            check_settings(plan.case({name: value}).settings, f"{plan.path}: [vary] {name} = {value}")
+
+
+def ends(values: list[Any] | Range) -> list[Any]:
+    """The first and the last value of an axis; of a range with a step its last."""
+    listed = [values.at(0.0), values.at(1.0)] if isinstance(values, Range) else values
+    return [listed[0], listed[-1]]
+
+
+def check_faults(plan: Plan) -> None:
+    """UserError for a fault that the catalogue does not have, before anything is run: with every value in its text."""
+    first = {name: ends(values)[0] for name, values in plan.axes.items()}
     for fault in plan.axes.get("fault", []):  # type: ignore[union-attr]
-        try:
-            found = plan.case({**middle, "fault": fault})
-        except (KeyError, ValueError, IndexError) as error:
-            raise UserError(f"{plan.path}: fault {fault!r}: {error} is no name of [vary]") from None
-        if found.fault and found.fault not in seen:
-            seen.add(found.fault)
-            start_of(found.fault)
+        used = names_in(fault, plan.path) & set(plan.axes)
+        several: dict[str, list[Any] | Range] = {}
+        for name in sorted(used):
+            each = plan.axes[name]
+            several[name] = ends(each) if isinstance(each, Range) else each
+        for point in itertools.islice(combinations(several), MOST_CHECKED):
             try:
-                catalogue.typed(found.fault)
+                text = str(plan.case({**first, **point, "fault": fault}).fault)
+            except KeyError as error:
+                raise UserError(f"{plan.path}: fault {fault!r}: {error} is no name of [vary]") from None
+            except (ValueError, IndexError, AttributeError) as error:
+                raise UserError(f"{plan.path}: fault {fault!r}: {error}") from None
+            try:
+                condition(start_of(text))
+                catalogue.typed(text)
             except UserError as error:
                 raise UserError(f"{plan.path}: {error}") from None
+
+
+def names_in(fault: str, path: str) -> set[str]:
+    """The names of [vary] in a fault's text. UserError for braces that hold none."""
+    try:
+        return {name for _, name, _, _ in string.Formatter().parse(fault) if name}
+    except ValueError as error:
+        raise UserError(f"{path}: fault {fault!r}: {error}") from None
 
 
 def axes_of(data: dict[str, Any], path: str) -> dict[str, list[Any] | Range]:
@@ -357,14 +404,14 @@ def axes_of(data: dict[str, Any], path: str) -> dict[str, list[Any] | Range]:
         if "fault" in axes:
             raise UserError(f"{path}: [vary] fault and [[faults]]: one of them")
         axes["fault"] = listed  # last, so that a campaign that is cut short has every fault at the first of the starts
-    used = set()
+    used: set[str] = set()
     for fault in axes.get("fault", []):  # type: ignore[union-attr]
-        used |= {name for _, name, _, _ in string.Formatter().parse(str(fault)) if name}
+        used |= names_in(fault, path)
     for name in axes:
         if name not in WALK and name != "fault" and not name.startswith(PREFIXES) and name not in used:
             raise UserError(
-                f"{path}: [vary] {name}: it is no setting of a walk ({', '.join(WALK)}, {'..., '.join(PREFIXES)}...) "
-                f"and no fault's text has {{{name}}}"
+                f"{path}: [vary] {name}: it is no setting of a walk ({', '.join(WALK)}, controller.PARAMETER, "
+                f"body.PARAMETER, cost.BOARD.TASK) and no fault's text has {{{name}}}"
             )
     return axes
 
@@ -383,11 +430,17 @@ def flattened(values: dict[str, Any], before: str = "") -> dict[str, Any]:
 
 def values_of(name: str, values: Any, path: str) -> list[Any] | Range:
     """The values of one axis."""
-    if isinstance(values, dict):
+    if isinstance(values, dict) and name != "fault":
         return range_of(name, values, path)
     listed = values if isinstance(values, list) else [values]
-    if not listed or not all(isinstance(each, str | int | float) for each in listed):
-        raise UserError(f"{path}: [vary] {name} = {values!r}: a list of values, or {{ low, high }}, is expected")
+    kinds: tuple[type, ...] = (str, int, float)
+    expected = "a list of values, or { low, high },"
+    if name == "fault":
+        kinds, expected = (str,), "a list of texts"
+    elif name.startswith(PREFIXES):
+        kinds, expected = (int, float), "a list of numbers, or { low, high },"
+    if not listed or not all(type(each) in kinds for each in listed):
+        raise UserError(f"{path}: [vary] {name} = {values!r}: {expected} is expected")
     return listed
 
 
@@ -457,13 +510,16 @@ def watch_of(data: dict[str, Any], path: str) -> Watch:
     found = table(data, "watch", path)
     only(found, ("after", "from", "patience", "limit"), f"{path}: [watch]")
     times = {f"{name}_s": nanoseconds(value, f"{path}: [watch] {name}") * 1e-9 for name, value in found.items()}
+    for name in ("after", "limit"):
+        if times.get(f"{name}_s") == 0.0:
+            raise UserError(f"{path}: [watch] {name} = {found[name]!r}: it must be above 0")
     band = table(data, "band", path)
     names = tuple(field.name for field in dataclasses.fields(Band))
     only(band, names, f"{path}: [band]")
     shares = {}
     for name, value in band.items():
         share = in_base_units(value, SHARES) if isinstance(value, str) else value
-        if not isinstance(share, int | float) or not 0.0 < share < 10.0:
+        if share is None or not number(share) or not 0.0 < share < 10.0:
             raise UserError(f"{path}: [band] {name} = {value!r}: a share such as 0.15 or '15 %' is expected")
         shares[name] = float(share)
     return Watch(**times, band=Band(**shares))
@@ -479,7 +535,7 @@ def tolerances_of(data: dict[str, Any], path: str) -> Iterator[Tolerance]:
             raise UserError(f"{where}: a table with `within` is expected")
         only(value, ("within", "share", "confidence"), where)
         share, confidence = value.get("share", 0.95), value.get("confidence", CONFIDENCE)
-        if not (0.0 < share < 1.0 and 0.0 < confidence < 1.0):
+        if not all(number(each) and 0.0 < each < 1.0 for each in (share, confidence)):
             raise UserError(f"{where}: share {share!r} and confidence {confidence!r} must be above 0 and below 1")
         yield Tolerance(name, rounded(nanoseconds(value["within"], where) * 1e-6), share, confidence)
 
@@ -493,7 +549,7 @@ def sample_of(data: dict[str, Any], path: str) -> Sample | None:
     only(found, ("runs", "seed", "interval", "confidence", "stop"), where)
     runs = whole(found, "runs", where, None, 1, MOST_RUNS)
     interval = found.get("interval", "clopper-pearson")
-    if interval not in INTERVALS:
+    if not isinstance(interval, str) or interval not in INTERVALS:
         raise UserError(f"{where}: interval = {interval!r}: allowed are {', '.join(INTERVALS)}")
     confidence = found.get("confidence", CONFIDENCE)
     if not isinstance(confidence, float) or not 0.5 <= confidence < 1.0:
@@ -505,9 +561,14 @@ def sample_of(data: dict[str, Any], path: str) -> Sample | None:
         outcome = stop.get("outcome")
         if outcome not in OUTCOMES:
             raise UserError(f"{where} stop: outcome = {outcome!r}: allowed are {', '.join(OUTCOMES)}")
+        limit: Any = stop.get("limit")
+        rule = stop.get("rule", Stopping.rule)
+        if not number(limit) or not isinstance(rule, str):
+            raise UserError(f"{where} stop: limit = {limit!r}, rule = {rule!r}: a share and a name are expected")
+        looks = whole(stop, "looks", f"{where} stop", Stopping.looks, 1, 50)
         try:
-            stopping = Stopping(runs=runs, confidence=confidence, **stop)
-        except (TypeError, UserError) as error:
+            stopping = Stopping(outcome, limit, runs, looks, rule, confidence)
+        except UserError as error:
             raise UserError(f"{where} stop: {error}") from None
     return Sample(runs, whole(found, "seed", where, 1, -(2**63), 2**63), interval, confidence, stopping)
 
@@ -522,6 +583,8 @@ def search_of(data: dict[str, Any], path: str) -> Search | None:
     least, outcome = found.get("least"), found.get("outcome", "fall")
     if outcome not in OUTCOMES:
         raise UserError(f"{where}: outcome = {outcome!r}: allowed are {', '.join(OUTCOMES)}")
+    if least is not None and not isinstance(least, str):
+        raise UserError(f"{where}: least = {least!r}: the name of a range in [vary] is expected")
     if "outcome" in found and least is None:
         raise UserError(f"{where}: outcome = {outcome!r}: it needs `least`, the range whose smallest value is wanted")
     return Search(

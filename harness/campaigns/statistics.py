@@ -105,6 +105,14 @@ def tolerance_place(total: int, share: float, confidence: float) -> int | None:
     return int(stats.binom.ppf(confidence, total, share)) + 1
 
 
+def shown_to_miss(within: int, total: int, share: float, confidence: float) -> bool:
+    """Whether `within` of `total` are so few that less than `share` of the population are, with `confidence`.
+
+    If just `share` were, so few would come with a probability of 1 - confidence at most: Clopper and Pearson, one side.
+    """
+    return bool(stats.binom.cdf(within, total, share) <= 1.0 - confidence)
+
+
 def values_needed(share: float, confidence: float) -> int:
     """The fewest values of which the largest is an upper tolerance limit (Wilks): 59 for 95 % with 95 %."""
     return math.ceil(math.log(1.0 - confidence) / math.log(share))

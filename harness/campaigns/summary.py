@@ -15,6 +15,7 @@ from ranger_sim.harness.campaigns.statistics import (
     INTERVALS,
     Share,
     census,
+    shown_to_miss,
     tolerance_place,
     values_needed,
 )
@@ -45,9 +46,9 @@ def of(campaign: Campaign) -> dict[str, Any]:
         "version": campaign.version,
         "runs": len(rows),
         "foreseen": campaign.foreseen,
-        "finished": bool(rows) and (len(rows) == campaign.foreseen or campaign.stopped_at is not None),
+        "finished": is_finished(campaign, rows),
         "stopped_at_look": campaign.stopped_at,
-        "interval": interval_text(plan),
+        "interval": interval_text(plan, is_finished(campaign, rows)),
         "criteria": CRITERIA,
         "outcomes": {
             name: as_dict(share(sum(result["outcome"] == name for _, result in rows), len(rows))) for name in OUTCOMES
@@ -67,7 +68,7 @@ def of(campaign: Campaign) -> dict[str, Any]:
                 )
             ),
         },
-        "tolerances": [tolerance(plan, wanted, felt) for wanted in plan.tolerances],
+        "tolerances": [tolerance(plan, wanted, felt) for wanted in plan.tolerances if is_finished(campaign, rows)],
         "healthy": [
             {name: value for name, value in result.items() if name != "healthy"}
             for result in campaign.healthy_results()
@@ -85,15 +86,20 @@ def of(campaign: Campaign) -> dict[str, Any]:
     }
 
 
+def is_finished(campaign: Campaign, rows: Sequence[Row]) -> bool:
+    """Whether everything that the plan asks for has been run."""
+    return bool(rows) and (len(rows) == campaign.foreseen or campaign.stopped_at is not None)
+
+
 def counted(rows: Sequence[Row], hit: Callable[[Result], bool]) -> tuple[int, int]:
     """(how many hit, of how many)."""
     return sum(hit(result) for _, result in rows), len(rows)
 
 
 def sharing(campaign: Campaign, rows: Sequence[Row]) -> Callable[[int, int], Share]:
-    """How a share of this campaign's runs is told: exact, or with the interval of its sample."""
+    """How a share of this campaign's runs is told: as it is, or with the interval of its finished sample."""
     sample = campaign.plan.sample
-    if sample is None:
+    if sample is None or not is_finished(campaign, rows):
         return census
     stopping, look = sample.stopping, campaign.stopped_at
     if stopping is not None and look is not None:
@@ -102,8 +108,10 @@ def sharing(campaign: Campaign, rows: Sequence[Row]) -> Callable[[int, int], Sha
     return lambda count, total: make(count, total, sample.confidence) if total else Share(count, total)
 
 
-def interval_text(plan: Plan) -> str:
+def interval_text(plan: Plan, finished: bool) -> str:
     """How shares are to be read, in a sentence."""
+    if not finished:
+        return "Shares are of the runs that are there and of nothing else: those that end soon come first."
     if plan.search:
         return (
             "The runs were chosen to find the worst case: shares describe the search and stand for no population, so "
@@ -154,7 +162,12 @@ def tolerance(plan: Plan, wanted: Tolerance, felt: Sequence[Row]) -> dict[str, A
         needed = values_needed(wanted.share, wanted.confidence)
         return {**told, "verdict": f"open: {needed} runs are needed", "by": f"{100 * wanted.confidence:g} %"}
     limit = times[place - 1]
-    verdict = "met" if limit <= wanted.limit_ms else "not met"
+    if limit <= wanted.limit_ms:
+        verdict = "met"
+    elif shown_to_miss(within, len(times), wanted.share, wanted.confidence):
+        verdict = "not met"
+    else:
+        verdict = "open: neither it nor its contrary is shown by so many runs"
     return {**told, "verdict": verdict, "by": f"{100 * wanted.confidence:g} %", "upper_ms": finite(limit)}
 
 
@@ -306,10 +319,11 @@ def replay(plan: Plan, row: Row) -> str:
         if value is not None:
             parts += [
                 options.get(field, "--" + name.replace("_", "-")),
-                f"{value:g}" if isinstance(value, float) else str(value),
+                str(value),  # every digit: it has to be the same run
             ]
     began = (result.get("fault") or {}).get("activated_s")
-    parts += ["--time", f"{(began or plan.watch.from_s) + plan.watch.after_s:.3f}s"]
+    since_s = plan.watch.from_s if began is None else began
+    parts += ["--time", f"{since_s + plan.watch.after_s:.3f}s"]
     return shlex.join(parts)
 
 

@@ -5,7 +5,7 @@ import dataclasses
 import pytest
 
 from ranger_sim.datatable.generated import errors as error_table
-from ranger_sim.harness.campaigns import outcomes
+from ranger_sim.harness.campaigns import group, outcomes
 from ranger_sim.harness.campaigns.outcomes import Band, classify
 from ranger_sim.harness.faults.evidence import COLUMN
 from ranger_sim.harness.faults.proof import damage, gait, prove
@@ -74,6 +74,25 @@ def test_damage_comes_before_a_fall():
     fallen.samples[700:800, COLUMN["outer_A"]] = 12.0
     outcome, why = judged(fallen)
     assert outcome == "damage" and why.startswith("outer motor beyond 9.6 A")
+
+
+def test_beside_a_golden_run_that_fell_a_fall_is_nobodys_fault_but_a_sweeps():
+    fell = ("fall", "fell forward")
+    assert outcomes.against_fallen(*fell, None, "", False) == fell
+    told = ("invalid", "the golden run fell as well, after 812 ms (fell backward)")
+    assert outcomes.against_fallen(*fell, 812.4, "fell backward", False) == told
+    assert outcomes.against_fallen("masked", "", 812.4, "fell backward", False) == told
+    assert outcomes.against_fallen(*fell, 812.4, "fell backward", True) == fell
+    assert outcomes.against_fallen("masked", "", 812.4, "fell backward", True) == told
+
+
+def test_a_golden_run_counts_until_the_run_was_to_end():
+    golden, faulty = record(LONG), differing()
+    fallen = dataclasses.replace(golden, fell_ns=5000 * MS, fall_cause="fell forward")
+    proven = prove(golden, faulty, BEGAN, True)
+    watch = group.Watch(after_s=3.0)
+    assert group.judged(proven, fallen.until(4000 * MS), faulty, BEGAN, watch)["outcome"] == "masked"
+    assert group.judged(proven, fallen.until(5000 * MS), faulty, BEGAN, watch)["outcome"] == "invalid"
 
 
 @pytest.mark.parametrize(

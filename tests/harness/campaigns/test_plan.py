@@ -32,7 +32,12 @@ def test_a_census_is_every_combination():
 def test_settings_reach_the_walk_in_its_units():
     found = made(
         walk={"floor_roughness": "1 mm", "controller": "robust"},
-        vary={"battery": ["50 %"], "controller.P_H_PM_H_TRATE": [2.1], "body.hip_gear": [60.0], "cost.MCH.x": [1.5]},
+        vary={
+            "battery": ["50 %"],
+            "controller.P_H_PM_H_TRATE": [2.1],
+            "body.hip_gear": [60.0],
+            "cost.MCH.dn_safety": [1.5],
+        },
     )
     case = found.cases()[0]
     assert case.settings.walk == {
@@ -43,7 +48,7 @@ def test_settings_reach_the_walk_in_its_units():
     }
     assert case.settings.controller == {"P_H_PM_H_TRATE": 2.1}
     assert case.settings.body == {"hip_gear": 60.0}
-    assert case.settings.costs == {"MCH.x": 1.5}
+    assert case.settings.costs == {"MCH.dn_safety": 1.5}
     assert case.fault is None
     assert case.reference.walk == {"floor_roughness_m": 0.001, "controller": "robust", "seed": 1}
 
@@ -122,6 +127,39 @@ def test_later_rounds_stay_near_the_worst_point_and_inside_the_ranges():
         ({"vary": {"fault": ["MCH.absolute_encoder:stuk@step 6"]}}, "meant was perhaps stuck"),
         ({"vary": {"fault": ["MCH.encoder:stuck"]}}, "fault place 'MCH.encoder'"),
         ({"vary": {"fault": [STUCK]}}, "'start' is no name of [vary]"),
+        ({"vary": {"fault": ["MCH.joint_encoder:stuck@{"]}}, "Single '{'"),
+        ({"vary": {"fault": {"low": 1, "high": 2}}}, "[vary] fault = {'low': 1, 'high': 2}: a list of texts"),
+        ({"vary": {"fault": ["MCH.joint_encoder:stuck@{at}"], "at": ["step 3", "soon"]}}, "condition 'soon'"),
+        (
+            {"vary": {"fault": ["UI.imu:gyro_bias,rate={rate}"], "rate": {"low": 1, "high": 9}}, "sample": {"runs": 2}},
+            "rate is '9', allowed are -5.2 to 5.2",
+        ),
+        ({"walk": {"seed": 1.5}}, "[walk]: scenario: seed is 1.5, a whole number"),
+        ({"walk": {"controller": "nobody"}}, "[walk]: controller 'nobody': unknown"),
+        ({"vary": {"seed": ["one"]}}, "[vary] seed = one: scenario: seed is 'one', a whole number"),
+        ({"vary": {"body.gear_of_the_hip": [60]}}, "[vary] body.gear_of_the_hip = 60: "),
+        ({"vary": {"controller.P_X": ["fast"]}}, "[vary] controller.P_X = ['fast']: a list of numbers"),
+        ({"vary": {"cost.MCH.nothing": [2.0]}}, "cost.MCH.nothing: schedule: no task named 'nothing'"),
+        ({"vary": {"cost.MCH.mc_compliant_control": [1.0, -2.0]}}, "a factor of 0 or more"),
+        ({"tolerance": {"detection": {"within": "1 s", "share": "most"}}}, "share 'most' and confidence 0.95"),
+        (
+            {
+                "vary": {"slope": {"low": 0.0, "high": 0.1}},
+                "search": {},
+                "tolerance": {"detection": {"within": "1 s"}},
+            },
+            "the runs of a [search] are chosen",
+        ),
+        ({"vary": {"seed": [1]}, "sample": {"runs": 5, "interval": ["wilson"]}}, "allowed are clopper-pearson, wilson"),
+        (
+            {"vary": {"seed": [1]}, "sample": {"runs": 5, "stop": {"outcome": "fall", "limit": "few"}}},
+            "limit = 'few'",
+        ),
+        (
+            {"vary": {"seed": [1]}, "sample": {"runs": 5, "stop": {"outcome": "fall", "limit": 0.1, "looks": 2.5}}},
+            "looks = 2.5: a whole number from 1 to 50",
+        ),
+        ({"watch": {"after": "0 s"}}, "[watch] after = '0 s': it must be above 0"),
         ({"vary": {"sed": [1]}}, "[vary] sed: it is no setting of a walk"),
         ({"vary": {"seed": []}}, "a list of values"),
         ({"vary": {"seed": {"low": 1, "high": 3}}}, "a range needs [sample] or [search]"),

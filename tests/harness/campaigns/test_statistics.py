@@ -117,3 +117,10 @@ def test_a_clear_share_stops_early_and_a_doubtful_one_does_not():
     assert stopping.decides(stopping.interval(40, 40, 1))
     assert not stopping.decides(stopping.interval(24, 40, 1))
     assert stopping.decides(stopping.interval(0, 40, 1))
+
+
+def test_a_tolerance_is_missed_only_when_so_few_would_hardly_come_by_chance():
+    assert statistics.shown_to_miss(0, 5, 0.5, 0.95) and not statistics.shown_to_miss(0, 4, 0.5, 0.95)  # 1/32 and 1/16
+    assert not statistics.shown_to_miss(95, 100, 0.95, 0.95)
+    # P(Binomial(100, 0.95) <= 90) = 0.0282, <= 91 = 0.0631 (tables)
+    assert statistics.shown_to_miss(90, 100, 0.95, 0.95) and not statistics.shown_to_miss(91, 100, 0.95, 0.95)
