@@ -42,7 +42,7 @@ def test_the_generator_imports_no_model_of_the_project(path):
 
 
 def made(folder, monkeypatch, *arguments):
-    monkeypatch.setattr(motor_bench, "SAMPLES", 2500)
+    monkeypatch.setattr(motor_bench, "SAMPLES", 1500)
     generate.main(["--out", str(folder), *arguments])
     return json.loads((folder / "data" / "cases.json").read_text(encoding="utf-8"))
 
@@ -69,7 +69,7 @@ def test_data_carry_no_label(tmp_path, monkeypatch):
         for name in case["files"] + case["holdout"]:
             head, *rows = (tmp_path / "data" / name).read_text(encoding="ascii").splitlines()
             assert tuple(head.split(",")) == COLUMNS
-            assert len(rows) == 2500
+            assert len(rows) == 1500
             assert np.isfinite(np.loadtxt(rows, delimiter=",")).all()
     assert len(list((tmp_path / "data").rglob("*.*"))) == 1 + 2 * len(cases)
 
@@ -132,9 +132,9 @@ LARGE = {
 
 @pytest.fixture(scope="module")
 def large_effects():
-    """{name: (case, trajectory)} of every effect, three seconds each, in lanes of one simulation."""
+    """{name: (case, trajectory)} of every effect, 2.2 seconds each, in lanes of one simulation."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(motor_bench, "SAMPLES", 3000)
+        patch.setattr(motor_bench, "SAMPLES", 2200)
         cases = {name: clean(21, name, amplitude) for name, amplitude in LARGE.items()}
         lanes = motor_bench.lanes_of([(case, case.runs[0]) for case in cases.values()])
         motor_bench.let_act(lanes, cases.values())
@@ -164,7 +164,7 @@ def test_what_an_effect_shows_is_what_it_does(name, large_effects):
 
 def test_the_bench_without_effects_keeps_its_own_balances(monkeypatch):
     """What ten steps a sample leave in the balances is far below what any detector sees: a strength of 0.5 at most."""
-    monkeypatch.setattr(motor_bench, "SAMPLES", 3000)
+    monkeypatch.setattr(motor_bench, "SAMPLES", 2200)
     case = clean(5)
     trajectory = motor_bench.lanes_of([(case, case.runs[0])]).run()[0]
     scale = Scale(trajectory, case.instruments)

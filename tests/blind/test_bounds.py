@@ -1,0 +1,243 @@
+"""The bounds of a blind run: kept by a method that meets the targets, broken by what must not pass.
+
+Here diagnoses are played: an oracle that is right as often as the targets ask, and comparators that need no data. The
+diagnosis itself is held to these bounds on fresh cases when RANGER_SIM_BLIND is set (its value: a seed, or "fresh").
+"""
+
+import importlib.util
+import json
+import os
+import subprocess
+import sys
+
+import pytest
+from scipy import stats
+
+from ranger_sim.foundation.random_arrays import generator
+from tests.blind import answers as answering
+from tests.blind.bounds import BOUNDS, RISK, least, refusals
+from tests.blind.comparators import majority_label, refit_only, said, without_balance
+from tests.blind.generator import motor_bench
+from tests.blind.generator.effects import CAUSES, EFFECTS
+from tests.blind.score import score, table
+
+DIAGNOSIS = "ranger_sim.sysid.diagnose.diagnose:diagnose"
+SINGLE_RISK = RISK / len(BOUNDS)
+
+
+def truths(seed):
+    """{id: truth} of the continuous integration's cases at a seed, without their data."""
+    out = {}
+    for case in motor_bench.check_plan(seed):
+        causes = []
+        for name, strength in case.effects:
+            balance = EFFECTS[name].balance
+            main = balance[0] if balance[0] in "EMT" else "M"
+            causes.append(
+                {
+                    "name": name,
+                    "balance": balance,
+                    "subsystem": motor_bench.SUBSYSTEM[balance],
+                    "strength": strength,
+                    "share_by_balance": {"E": 0.0, "M": 0.0, "T": 0.0} | {main: 1.0},
+                    "parameters": {},
+                }
+            )
+        ties = [name for name in motor_bench.CONFUSABLE if name != causes[0]["name"]] if case.poor else []
+        out[str(case.number)] = {"kind": case.kind, "variant": case.variant, "causes": causes, "ties": ties}
+    return out
+
+
+def oracle(rng, truth):
+    """An answer that is right just as often as the targets ask."""
+    causes = truth["causes"]
+    if not causes:
+        return said(rng.random() < 0.02)
+    name, strength, balance = causes[0]["name"], causes[0]["strength"], causes[0]["balance"][0]
+    other = str(rng.choice([cause for cause in CAUSES if cause != name]))
+    if truth["kind"] == "pair":
+        draw = rng.random()
+        names = [cause["name"] for cause in causes] if draw < 0.70 else [name]
+        return said(True, balance, [*names, other] if draw > 0.90 else names)
+    if rng.random() > (0.97 if strength < 4.0 else 0.99):
+        return said()
+    if truth["kind"] == "outside":
+        draw = rng.random()
+        return said(True, balance, [], True) if draw > 0.05 else said(True, balance, [other])
+    right = rng.random() < (0.85 if strength < 4.0 else 0.95)
+    found = said(True, balance if rng.random() < 0.95 else "P", [name if right else other])
+    if not right and rng.random() < 0.8:
+        found["causes"][0]["tied_with"] = [name]
+    if truth["ties"] and rng.random() < 0.9:
+        found["causes"][0] |= {"name": name, "tied_with": truth["ties"]}
+    return found
+
+
+def perfect(truth):
+    """An answer that is right, with balances named."""
+    causes = truth["causes"]
+    if not causes:
+        return said()
+    if truth["kind"] == "outside":
+        return said(True, causes[0]["balance"][0], [], True)
+    found = said(True, main_of(causes[0]), [cause["name"] for cause in causes])
+    for entry, cause in zip(found["causes"], causes, strict=True):
+        entry["balance"] = main_of(cause)
+    if truth["ties"]:
+        found["causes"][0]["tied_with"] = truth["ties"]
+    return found
+
+
+def main_of(cause):
+    return max(cause["share_by_balance"], key=cause["share_by_balance"].get)
+
+
+def refused(hidden, answer):
+    """Refusals of a method that answers from the truth."""
+    return refusals(score(hidden, {key: answer(truth) for key, truth in hidden.items()}))
+
+
+@pytest.mark.parametrize("bound", BOUNDS, ids=lambda bound: bound.figure)
+def test_a_bound_fails_falsely_within_its_risk_and_is_the_tightest_that_does(bound):
+    share = bound.target if bound.hits else 1.0 - bound.target
+    for cases in range(1, 120, 7):
+        k = least(cases, share, SINGLE_RISK)
+        assert stats.binom.cdf(k - 1, cases, share) <= SINGLE_RISK  # P(fewer than k)
+        assert k == cases or stats.binom.cdf(k, cases, share) > SINGLE_RISK
+
+
+def test_known_bounds():
+    """0.5 to the tenth is 0.001: with ten fair coins one head may be asked for at that risk, not two."""
+    assert least(10, 0.5, 0.001) == 1
+    assert least(10, 0.5, 0.0009) == 0
+    assert least(10, 1.0, 1e-9) == 10
+
+
+def test_the_subset_has_sixty_cases_of_every_kind():
+    hidden = truths(1)
+    kinds = [truth["kind"] for truth in hidden.values()]
+    assert len(hidden) == 60
+    assert {kind: kinds.count(kind) for kind in set(kinds)} == {
+        "single": 32,
+        "null": 10,
+        "pair": 6,
+        "outside": 10,
+        "confusable": 2,
+    }
+
+
+def test_an_oracle_that_meets_the_targets_is_never_refused():
+    """50 runs at a millionth each: to see one refusal by chance has a probability of 5e-5, and the seeds are fixed."""
+    rng = generator(1, "oracle")
+    for seed in range(50):
+        hidden = truths(seed)
+        assert refused(hidden, lambda truth: oracle(rng, truth)) == []
+
+
+def test_a_perfect_diagnosis_is_not_refused():
+    assert refused(truths(3), perfect) == []
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_no_answer_at_all_is_refused(seed):
+    assert refusals(score(truths(seed), {}))
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_a_refit_is_refused_by_each_figure_of_detection(seed):
+    refusal = "\n".join(refused(truths(seed), lambda truth: said(gain=0.0)))
+    for figure in (
+        "detection at 2:",
+        "detection at 4:",
+        "balance E:",
+        "balance M:",
+        "balance T:",
+        "outside: abstains:",
+    ):
+        assert figure in refusal
+
+
+@pytest.mark.parametrize("label", CAUSES)
+def test_one_label_for_everything_is_refused_whichever_it_is(label):
+    """Each is the majority's somewhere: false alarms, and a name that is right for few."""
+    refusal = "\n".join(refused(truths(7), lambda truth: said(True, "M", [label])))
+    assert "false alarms:" in refusal
+    assert "top-1 cause at 4:" in refusal
+
+
+@pytest.mark.parametrize("balance", "EMT")
+def test_a_diagnosis_without_one_balance_is_refused_for_that_balance(balance):
+    """Else perfect. Eight cases at strength 4 show in that balance alone, and it sees none of them."""
+    for seed in range(5):
+        hidden = truths(seed)
+        refusal = refused(hidden, lambda truth: without_balance(lambda *_: perfect(truth), balance)([], [], ""))
+        assert any(text.startswith(f"detection at 4, balance {balance}:") for text in refusal), seed
+
+
+def test_comparators_speak_the_form_of_an_answer():
+    answer = majority_label([], [], "motor-bench")
+    assert answer["detected"] and answer["causes"][0]["name"] in CAUSES
+    assert set(answer) == {
+        "detected",
+        "misfit",
+        "subsystem",
+        "causes",
+        "abstained",
+        "gain",
+        "next_experiment",
+        "model_file",
+        "data_findings",
+    }
+
+
+def generated(folder, *arguments):
+    """Cases made by the generator in a process of its own; returns what it printed."""
+    command = [sys.executable, "-m", "tests.blind.generate", "--out", str(folder), *arguments]
+    return subprocess.run(command, capture_output=True, text=True, check=True).stdout
+
+
+wanted = pytest.mark.skipif(
+    not os.environ.get("RANGER_SIM_BLIND"), reason="minutes: set RANGER_SIM_BLIND to a seed or to fresh"
+)
+
+
+@pytest.fixture(scope="module")
+def fresh_cases(tmp_path_factory):
+    """(folder of the data, {id: truth}) of the sixty cases; the seed is printed."""
+    folder = tmp_path_factory.mktemp("blind")
+    seed = os.environ["RANGER_SIM_BLIND"]
+    print(generated(folder, "--check", *([] if seed == "fresh" else ["--seed", seed])))
+    hidden = {path.stem: json.loads(path.read_text(encoding="utf-8")) for path in (folder / "truth").glob("*.json")}
+    return folder / "data", hidden
+
+
+@wanted
+@pytest.mark.parametrize("name", ["refit_only", "majority_label", "gaussian_process", "sindy"])
+def test_comparators_are_refused_on_the_cases(name, fresh_cases, tmp_path):
+    library = {"gaussian_process": "sklearn", "sindy": "pysindy"}.get(name)
+    if library:
+        pytest.importorskip(library)
+    data, hidden = fresh_cases
+    figures = score(hidden, answering.answer_all(name, data, tmp_path))
+    print(table(figures))
+    assert (tmp_path / "errors.txt").read_text() == ""
+    assert refusals(figures)
+
+
+@wanted
+def test_the_diagnosis_keeps_the_bounds_on_fresh_cases(fresh_cases, tmp_path):
+    if importlib.util.find_spec("ranger_sim.sysid.diagnose") is None:
+        pytest.skip("there is no diagnosis yet")
+    data, hidden = fresh_cases
+    found = answering.answer_all(DIAGNOSIS, data, tmp_path, processes=os.cpu_count() or 1)
+    figures = score(hidden, found)
+    print(table(figures))
+    assert not refusals(figures), table(figures) + "\n" + (tmp_path / "errors.txt").read_text()
+
+
+def test_the_refit_reads_the_files_and_finds_nothing(tmp_path, monkeypatch):
+    monkeypatch.setattr(motor_bench, "SAMPLES", 1500)
+    (case,) = motor_bench.plan(4, 1, ["null"], list(CAUSES))
+    ((_, files, holdout, _),) = motor_bench.generate(4, [case], tmp_path)
+    answer = refit_only([tmp_path / files[0]], [tmp_path / holdout[0]], "motor-bench")
+    assert answer["detected"] is False and answer["gain"]["fraction_of_achievable"] == 0.0
