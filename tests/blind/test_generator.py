@@ -42,15 +42,15 @@ def test_the_generator_imports_no_model_of_the_project(path):
 
 
 def made(folder, monkeypatch, *arguments):
-    monkeypatch.setattr(motor_bench, "SAMPLES", 1500)
+    monkeypatch.setattr(motor_bench, "SAMPLES", 2000)
     generate.main(["--out", str(folder), *arguments])
     return json.loads((folder / "data" / "cases.json").read_text(encoding="utf-8"))
 
 
 def test_a_seed_repeats_its_cases_and_another_does_not(tmp_path, monkeypatch, capsys):
-    first = made(tmp_path / "one", monkeypatch, "--count", "2", "--seed", "11")
-    again = made(tmp_path / "two", monkeypatch, "--count", "2", "--seed", "11")
-    other = made(tmp_path / "three", monkeypatch, "--count", "2", "--kinds", "null")  # with a seed of its own
+    first = made(tmp_path / "one", monkeypatch, "--count", "2", "--kinds", "single", "--causes", "drag", "--seed", "11")
+    again = made(tmp_path / "two", monkeypatch, "--count", "2", "--kinds", "single", "--causes", "drag", "--seed", "11")
+    other = made(tmp_path / "three", monkeypatch, "--count", "1", "--kinds", "null")  # with a seed of its own
     assert re.findall(r"seed (\d+)", capsys.readouterr().out)[:2] == ["11", "11"]
     assert first == again
     assert first != other
@@ -69,7 +69,7 @@ def test_data_carry_no_label(tmp_path, monkeypatch):
         for name in case["files"] + case["holdout"]:
             head, *rows = (tmp_path / "data" / name).read_text(encoding="ascii").splitlines()
             assert tuple(head.split(",")) == COLUMNS
-            assert len(rows) == 1500
+            assert len(rows) == 2000
             assert np.isfinite(np.loadtxt(rows, delimiter=",")).all()
     assert len(list((tmp_path / "data").rglob("*.*"))) == 1 + 2 * len(cases)
 
@@ -132,9 +132,9 @@ LARGE = {
 
 @pytest.fixture(scope="module")
 def large_effects():
-    """{name: (case, trajectory)} of every effect, 2.2 seconds each, in lanes of one simulation."""
+    """{name: (case, trajectory)} of every effect, three seconds each, in lanes of one simulation."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(motor_bench, "SAMPLES", 2200)
+        patch.setattr(motor_bench, "SAMPLES", 3000)
         cases = {name: clean(21, name, amplitude) for name, amplitude in LARGE.items()}
         lanes = motor_bench.lanes_of([(case, case.runs[0]) for case in cases.values()])
         motor_bench.let_act(lanes, cases.values())
@@ -164,7 +164,7 @@ def test_what_an_effect_shows_is_what_it_does(name, large_effects):
 
 def test_the_bench_without_effects_keeps_its_own_balances(monkeypatch):
     """What ten steps a sample leave in the balances is far below what any detector sees: a strength of 0.5 at most."""
-    monkeypatch.setattr(motor_bench, "SAMPLES", 2200)
+    monkeypatch.setattr(motor_bench, "SAMPLES", 3000)
     case = clean(5)
     trajectory = motor_bench.lanes_of([(case, case.runs[0])]).run()[0]
     scale = Scale(trajectory, case.instruments)
