@@ -453,12 +453,13 @@ class _Objective:
 
     def covariance(self, derivatives: Array) -> tuple[Array, str]:
         """Of the estimates, shape (p, p), and the names that nothing determines ("" in the good case)."""
-        scaled = np.vstack([self.weight * derivatives, self.root]) * self.step
-        _, sizes, axes = np.linalg.svd(scaled, full_matrices=False)
-        # 1e-10: central differences leave about 1e-11 of a column, so less than this is no direction but their error.
-        good = sizes > 1e-10 * sizes[0]
+        rows = np.vstack([self.weight * derivatives, self.root])
+        lengths = np.linalg.norm(rows, axis=0)
+        _, sizes, axes = np.linalg.svd(rows / lengths, full_matrices=False)
+        # Central differences of a simulation leave 1e-9 of a column; a direction so weak is their error and no finding.
+        good = sizes > 1e-7 * sizes[0]
         inverse = np.where(good, 1.0 / np.where(good, sizes, 1.0), 0.0)
-        covariance = (axes.T * inverse**2) @ axes * np.outer(self.step, self.step)
+        covariance = (axes.T * inverse**2) @ axes / np.outer(lengths, lengths)
         lost = [name for at, name in enumerate(self.names) if np.max(np.abs(axes[~good, at]), initial=0.0) > 1e-3]
         return covariance, " and ".join(lost)
 

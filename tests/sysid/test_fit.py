@@ -149,7 +149,7 @@ def test_neighbours_of_an_autoregression_correlate_and_ends_of_runs_are_no_neigh
 @pytest.mark.parametrize("rho", [0.0, 0.9])
 def test_intervals_hold_the_truth_at_their_rate_also_in_correlated_noise(rho):
     # Of 100 intervals 95 % should hold the truth. The rule of the effective samples is asymptotic, so 93 % is asked of
-    # the rate; 82 or fewer of 100 have then a probability of 2e-4. Without the rule, rho 0.9 holds it in less than 40 %.
+    # the rate; 82 or fewer of 100 have then a probability of 2e-4. Without the rule, at rho 0.9, less than 50 do.
     x = np.linspace(-1.0, 1.0, 800)
     held = naive = 0
     for seed in range(100):
