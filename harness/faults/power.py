@@ -7,10 +7,11 @@ from ranger_sim.firmware_sim.activity import ActivityLog
 from ranger_sim.firmware_sim.board import Board
 from ranger_sim.foundation.events import NEVER
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness import bus_schedule, wiring
+from ranger_sim.harness import wiring
 from ranger_sim.harness.faults.catalogue import add_places, mode
 from ranger_sim.harness.faults.fault import Fault, Parameter, Place, WholeNumber
 from ranger_sim.harness.faults.reach import emulated, reaching_into, wake_buses
+from ranger_sim.harness.fresh_board import first_outputs, fresh_board, pass_on
 
 BATTERY = "battery"
 SUPPLY = "board supply"
@@ -235,18 +236,8 @@ class Restart(Fault):
         place = loop.place(name)
         off = loop.boards[place]
         off.advance(now_ns)
-        board = robot.new_board(name, now_ns)
-        if robot.profile is not None:
-            bus_schedule.apply(board, robot.profile.schedules())
-        for analog in wiring.ANALOG:
-            if analog.board == name:
-                channel = wiring.ANALOG_INPUTS[name][analog.input]
-                start, end = robot.plant.analog_start, robot.plant.analog_end
-                board.analog.follow(channel, loop.step_times, start, end, analog.voltage)
-        said: list[tuple[Any, ...]] = []  # what its program put out while it started
-        out = board.outbox
-        while out.take():
-            said.append((out.time, out.order, out.kind, out.a, out.b, out.c, out.d, out.e, out.f, out.ref))
+        board = fresh_board(robot, name, now_ns)
+        said = first_outputs(board)
         board.inbox = off.inbox  # buses, link and operator write there
         board.keep_activity(off.log)
         robot.boards[name] = board
@@ -255,8 +246,7 @@ class Restart(Fault):
             bus.nodes[node].unplug()
             bus.set_mode(node, OPERATING, now_ns)
         loop.replace(board)
-        for message in said:
-            loop.wires[place].push(max(message[0], now_ns), *message[1:])
+        pass_on(said, loop.wires[place], now_ns)
         loop.due[place] = loop.came[place] = now_ns
         loop.wires[place].silent_until = 0
         wake_buses(robot, now_ns)

@@ -5,11 +5,11 @@ import traceback
 from typing import Any
 
 from ranger_sim.harness import wiring
+from ranger_sim.harness.fresh_board import first_outputs, fresh_board, pass_on
 from ranger_sim.harness.processes import kernel, places
 from ranger_sim.harness.processes.block import Block
 from ranger_sim.harness.processes.channel import Bell
 from ranger_sim.harness.processes.endpoint import Endpoint
-from ranger_sim.harness.processes.fresh_board import wire_fresh_board
 from ranger_sim.harness.processes.settings import Settings
 from ranger_sim.harness.processes.stage import Audience
 
@@ -24,6 +24,7 @@ def serve(robot: Any, name: str, block: Block, stage: tuple, settings: Settings,
     kernel.begin_process(f"ranger-{name}", settings)
     place = wiring.BOARDS.index(name)
     board = robot.boards[name]
+    said = []
     if fresh:
         bell = Bell(block.words, places.ASKED, places.BOARD_SLEEPS, block.ask_descriptor)
         turns = block.words[places.ASKED]
@@ -31,7 +32,8 @@ def serve(robot: Any, name: str, block: Block, stage: tuple, settings: Settings,
         first = turns + 1 if turns == block.words[places.ANSWERED] else turns
         while not bell.wait(first):
             pass
-        board = wire_fresh_board(robot, name, block.words[places.POWER_UP])
+        board = fresh_board(robot, name, block.words[places.POWER_UP])
+        said = first_outputs(board)
     if block.table_words:
         board.move_memory(block.table())
     wires = [
@@ -41,7 +43,9 @@ def serve(robot: Any, name: str, block: Block, stage: tuple, settings: Settings,
     words, doubles = stage
     audience = Audience(words, doubles, robot.loop.step_times, plant.analog_start, plant.analog_end, board.words, wires)
     try:
-        Endpoint(board, block, stage, audience, place).serve()
+        endpoint = Endpoint(board, block, stage, audience, place)  # gives the board another outbox
+        pass_on(said, board.outbox, 0)
+        endpoint.serve()
     except BaseException as error:  # noqa: BLE001  (whatever a program on a board raises is said by the supervisor)
         where = traceback.extract_tb(error.__traceback__)[-1:]
         place_text = f" ({os.path.basename(where[0].filename)}:{where[0].lineno})" if where else ""

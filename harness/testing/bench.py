@@ -48,6 +48,7 @@ from ranger_sim.foundation.row_stream import FrameStream
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness import wiring
 from ranger_sim.harness.conditions import ConditionNotMetError
+from ranger_sim.harness.fresh_board import first_outputs, pass_on
 from ranger_sim.harness.ranger import BOARD_CLASSES, BUS_BIT_RATE
 from ranger_sim.harness.testing.figures import Figure, Observed
 from ranger_sim.harness.testing.frames import Frame, FrameKeeper, identifier_of
@@ -353,6 +354,7 @@ class BoardAlone(Bench):
         Bench.__init__(self, {f"can{wire.bus}": bit_rate for wire in wires})
         self.name = name
         self.chip: Any = BOARD_CLASSES[name](Crystal(10_000_000, crystal_ppb), quirks or Quirks(), 0)
+        said = first_outputs(self.chip)
         self.chip.outbox = Outputs(self)
         self.buses_of: dict[int, tuple[Bus, int]] = {}
         self.node_on: dict[str, Node] = {}
@@ -368,6 +370,7 @@ class BoardAlone(Bench):
         self.uart_log: dict[int, list[tuple[float, int]]] = collections.defaultdict(list)
         self.encoders: dict[str, Encoder] = {}
         self.link: Link | None = link_of(self)
+        pass_on(said, self.chip.outbox, 0)
         if network_time and name != "CSR":
             self.call_at(SYNC_NS, self._send_time, SYNC_NS)
 

@@ -101,6 +101,12 @@ def test_the_report_needs_nothing_from_outside(folder):
     assert not outside
 
 
+def test_the_report_calls_the_robots_only_what_was_measured_on_it(folder):
+    beside = re.findall(r"<br>([^<]*)</span>", (folder / "report.html").read_text())
+    assert "the robot: 0.35 m" in beside and "a floor: 0 N or more" in beside
+    assert not [text for text in beside if re.fullmatch(r"the robot: 0( N)?", text)]
+
+
 @pytest.mark.skipif(BROWSER is None, reason="no Chromium or Chrome here to render the report in")
 def test_the_report_renders_in_a_browser_and_the_robot_moves(folder, tmp_path):
     flags = ["--headless", "--no-sandbox", "--disable-gpu", "--disable-background-networking", "--disable-sync"]

@@ -27,6 +27,7 @@ ROBOT = {
     "total": "16 W",
     "tcot": "0.28",
     "delay": "14 ± 3 ms",
+    "walked": "65.2 km in 30.8 h",
     "energy": "493 Wh in 30.8 h",
 }
 
@@ -72,24 +73,37 @@ def render(robot: Any, summary: dict) -> str:
     )
 
 
+def of_the_robot(what: str) -> str:
+    """What was measured on the real robot, as it stands beside a figure."""
+    return f"the robot: {ROBOT[what]}"
+
+
 def tiles(summary: dict) -> list[dict]:
-    """The key figures beside the real robot's."""
+    """The key figures, beside the real robot's or what a real floor can do."""
     delay = summary["heel_strike_delay_ms"]
     rows = (
         ("steps", f"{summary['steps']}", None),
-        ("mean step length", f"{summary['mean_step_length_m']:.3f} m", ROBOT["step"]),
-        ("mean step time", f"{summary['mean_step_time_s']:.3f} s", ROBOT["time"]),
-        ("speed", f"{summary['speed_m_per_s']:.2f} m/s", ROBOT["speed"]),
-        ("motors", f"{summary['motor_power_W']:.1f} W", ROBOT["motors"]),
-        ("in all", f"{summary['total_power_W']:.1f} W", ROBOT["total"]),
-        ("cost of transport", "none" if summary["tcot"] is None else f"{summary['tcot']:.3f}", ROBOT["tcot"]),
+        ("mean step length", f"{summary['mean_step_length_m']:.3f} m", of_the_robot("step")),
+        ("mean step time", f"{summary['mean_step_time_s']:.3f} s", of_the_robot("time")),
+        ("speed", f"{summary['speed_m_per_s']:.2f} m/s", of_the_robot("speed")),
+        ("motors", f"{summary['motor_power_W']:.1f} W", of_the_robot("motors")),
+        ("in all", f"{summary['total_power_W']:.1f} W", of_the_robot("total")),
+        (
+            "cost of transport",
+            "none" if summary["tcot"] is None else f"{summary['tcot']:.3f}",
+            of_the_robot("tcot"),
+        ),
         (
             "heel-strike delay",
             "none" if delay["mean"] is None else f"{delay['mean']:.1f} ± {delay['std']:.1f} ms",
-            ROBOT["delay"],
+            of_the_robot("delay"),
         ),
-        ("walked", f"{summary['distance_m'] / 1000.0:.3f} km in {summary['walked_h']:.2f} h", "65.2 km in 30.8 h"),
-        ("energy used", f"{summary['energy_Wh']['total']:.3g} Wh", ROBOT["energy"]),
+        (
+            "walked",
+            f"{summary['distance_m'] / 1000.0:.3f} km in {summary['walked_h']:.2f} h",
+            of_the_robot("walked"),
+        ),
+        ("energy used", f"{summary['energy_Wh']['total']:.3g} Wh", of_the_robot("energy")),
         *odd(summary["oddities"]),
         (
             "batteries",
@@ -97,7 +111,7 @@ def tiles(summary: dict) -> list[dict]:
             None,
         ),
     )
-    return [{"name": name, "value": value, "real": real} for name, value, real in rows]
+    return [{"name": name, "value": value, "beside": beside} for name, value, beside in rows]
 
 
 def odd(oddities: dict) -> tuple:
@@ -112,9 +126,9 @@ def odd(oddities: dict) -> tuple:
         (
             "strikes that pull",
             told(strikes, "{}") + (f" (to {oddities['tensile_impulse_min_Ns']:.2f} N s)" if strikes else ""),
-            "0",
+            "a floor: none",
         ),
-        ("lowest push of the floor", told(oddities["normal_force_min_N"], "{:.1f} N"), "0 N"),
+        ("lowest push of the floor", told(oddities["normal_force_min_N"], "{:.1f} N"), "a floor: 0 N or more"),
         ("worst friction ratio", told(oddities["friction_ratio_max"], "{:.2f}"), None),
         ("slides", f"{oddities['slides']} in {oddities['slip_s'] * 1e3:.1f} ms", None),
         ("touches, lift-offs", f"{oddities['touches']}, {oddities['lift_offs']}", None),

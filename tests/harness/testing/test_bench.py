@@ -71,6 +71,12 @@ def test_a_key_is_in_the_frame_that_tells_of_keys():
     assert board.can(2).received("UI_BUTTONS")[-1].value == 1 << 2
 
 
+def test_what_a_board_puts_out_while_it_starts_is_seen():
+    """The user interface board sets the pin of its sync light before any time has passed; motor boards set none."""
+    assert list(BoardAlone("UI").pin_log.values()) == [[(0.0, 1)]]
+    assert BoardAlone("MCH").pin_log == {}
+
+
 def test_the_router_passes_a_frame_on_between_bus_and_link():
     board = BoardAlone("CSR")
     board.run_for("5 ms")

@@ -1,0 +1,39 @@
+"""A board that takes the place of one that is gone: same wires, its own program from the start."""
+
+from typing import Any
+
+from ranger_sim.harness import bus_schedule, wiring
+
+Message = tuple[Any, ...]
+
+
+def fresh_board(robot: Any, name: str, power_up_ns: int) -> Any:
+    """A new board `name` at the sensors of `robot`; gets its power at `power_up_ns`.
+
+    What a power-up forgets is forgotten: the router's time begins at 0, the main brain has its parameter set again.
+    What its program puts out while it starts waits in its outbox (`first_outputs`).
+    """
+    board = robot.new_board(name, power_up_ns)
+    if robot.profile is not None:
+        bus_schedule.apply(board, robot.profile.schedules())
+    loop, plant = robot.loop, robot.plant
+    for analog in wiring.ANALOG:
+        if analog.board == name:
+            channel = wiring.ANALOG_INPUTS[name][analog.input]
+            board.analog.follow(channel, loop.step_times, plant.analog_start, plant.analog_end, analog.voltage)
+    return board
+
+
+def first_outputs(board: Any) -> list[Message]:
+    """What a board has put out since it was made, out of the outbox that it was made with."""
+    out = board.outbox
+    said = []
+    while out.take():
+        said.append((out.time, out.order, out.kind, out.a, out.b, out.c, out.d, out.e, out.f, out.ref))
+    return said
+
+
+def pass_on(said: list[Message], outbox: Any, not_before_ns: int) -> None:
+    """Put messages into another outbox, none with a stamp before `not_before_ns`."""
+    for message in said:
+        outbox.push(max(message[0], not_before_ns), *message[1:])
