@@ -66,7 +66,7 @@ def _counted_on(name: str, time_s: Array, repairs: list[Repair]) -> Array:
         span = _span_of(float(time_s[place] - time_s[place + 1]) + usual)
         mended[place + 1 :] += span
         text = f"{span:.9g} s added behind {time_s[place]:.6g} s, where the counter ran over"
-        repairs.append(Repair(name, "stamp_wrap", len(time_s) - place - 1, text))
+        repairs.append(Repair(name, "stamp_wrap", len(time_s) - int(place) - 1, text))
     return mended
 
 

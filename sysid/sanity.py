@@ -9,6 +9,7 @@ import math
 from collections.abc import Iterator
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.sysid.dataset import Array, Channel, Dataset, Finding
@@ -270,10 +271,10 @@ def wrap_places(value: Array) -> list[int]:
     return found
 
 
-def spike_places(value: Array) -> Array:
+def spike_places(value: Array) -> NDArray[np.intp]:
     """Samples that are far from both neighbours, while these agree."""
     if len(value) < FEWEST:
-        return np.array([], dtype=int)
+        return np.array([], dtype=np.intp)
     left, right = value[1:-1] - value[:-2], value[1:-1] - value[2:]
     size = np.minimum(np.abs(left), np.abs(right))
     usual = max(_usual(np.abs(value[2:] - 2.0 * value[1:-1] + value[:-2])), _usual(np.abs(np.diff(value))))
@@ -308,7 +309,7 @@ def _spikes(channel: Channel, wraps: list[int]) -> Iterator[Finding]:
     yield Finding(channel.name, "spike", *ends, abs(worst), channel.unit, text)
 
 
-def equal_runs(value: Array) -> tuple[Array, Array]:
+def equal_runs(value: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """(first sample, length) of every stretch of equal values."""
     starts = np.flatnonzero(np.concatenate(([True], np.diff(value) != 0.0)))
     return starts, np.diff(np.concatenate((starts, [len(value)])))

@@ -25,7 +25,21 @@ class OneLineParser(argparse.ArgumentParser):
 def parser() -> argparse.ArgumentParser:
     """The whole command line."""
     from ranger_sim.datatable import cli as table_command
-    from ranger_sim.tools import body, bus, can_bounds, check_bus, daq, faults, info, slots, trace, tune, up, walk
+    from ranger_sim.tools import (
+        body,
+        bus,
+        can_bounds,
+        causes,
+        check_bus,
+        daq,
+        faults,
+        info,
+        slots,
+        trace,
+        tune,
+        up,
+        walk,
+    )
     from ranger_sim.tools.bench import command as bench
     from ranger_sim.tools.campaign import command as campaign
     from ranger_sim.tools.fuzz import command as fuzz
@@ -54,6 +68,7 @@ def parser() -> argparse.ArgumentParser:
     faults.register(commands)
     slots.register(commands)
     campaign.register(commands)
+    causes.register(commands)
     return top
 
 
