@@ -184,8 +184,9 @@ def proof_text(proof: dict | None) -> str:
     if proof is None:
         return ""
     first, told, reacted = proof["first_difference"], proof["detected"], proof["reaction"]
+    without = "it" if proof["of_faults"] == 1 else f"the {proof['of_faults']} faults, from the first one's beginning on"
     if first is None:
-        return "; against the run without it: NO EFFECT, nothing that the firmware sends differs"
+        return f"; against the run without {without}: NO EFFECT, nothing that the firmware sends differs"
     parts = [f"{first['name']} differs after {first['after_ms']:.4g} ms ({first['where']})"]
     if told is None:
         parts.append("no error tells of it")
@@ -197,7 +198,7 @@ def proof_text(proof: dict | None) -> str:
         parts.append(f"{instead} after {proof['reaction_ms']:.4g} ms")
     if proof["fall_ms"] is not None:
         parts.append(f"fell after {proof['fall_ms']:.4g} ms")
-    return f"; against the run without it: {', '.join(parts)}"
+    return f"; against the run without {without}: {', '.join(parts)}"
 
 
 # --- the tables of docs/faults.md -----------------------------------------------------------------------------

@@ -248,13 +248,21 @@ class Fault(StepWatch):
 
         What is normal is what the golden run raised since the fault was armed. A detection by rate alone (`rate`) can
         therefore be a false alarm: one walk does not know how loud another healthy one is; a campaign walks several.
+        Faults that have one golden run in common, as those of `walk --proof`, are held against it together, from the
+        first one's activation on: nothing says whose doing a difference is.
         """
         if self.twin is None:
             raise UserError(f"fault {self.text()}: it has no golden run; Ranger.inject(..., proof=True) gives it one")
         from ranger_sim.harness.faults import proof  # only here: it brings numpy's part of the comparison
 
         golden, faulty = self.twin.records()
-        return proof.prove(golden, faulty, self.activated_ns, self.acted)
+        together = self._together()
+        began_ns = min((each.activated_ns for each in together), default=self.activated_ns)
+        return proof.prove(golden, faulty, began_ns, any(each.acted for each in together))
+
+    def _together(self) -> list["Fault"]:
+        """The faults that have begun and have this one's golden run."""
+        return [each for each in self.robot.faults if each.twin is self.twin and each.activated_ns >= 0]
 
     @property
     def detected(self) -> Any:
@@ -306,5 +314,7 @@ class Fault(StepWatch):
             "largest_difference": self.largest_difference,
             "unit": self.unit,
             "permanent": self.permanent or None,
-            "proof": self.proof().summary() if self.twin is not None and self.activated_ns >= 0 else None,
+            "proof": {**self.proof().summary(), "of_faults": len(self._together())}
+            if self.twin is not None and self.activated_ns >= 0
+            else None,
         }

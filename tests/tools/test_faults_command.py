@@ -214,6 +214,7 @@ def test_a_mode_or_a_place_that_is_there_already_is_refused():
 
 
 TOLD = {
+    "of_faults": 1,
     "first_difference": {"where": "can1", "name": "MCH_ANGLE", "after_ms": 2.621},
     "detected": {"code": "MCFI_ANKL_LO", "board": "MCFI", "rate": False},
     "detection_ms": 738.5,
@@ -270,6 +271,17 @@ def test_a_walk_with_proof_says_when_who_told_and_changes_nothing(capsys, tmp_pa
     assert 0.0 < found["detection_ms"] <= 0.75
     assert found["fall_ms"] is None
     assert "told by AE_SPIKE from MCH" in capsys.readouterr().err
+
+
+def test_several_faults_are_held_against_one_golden_run_together_from_the_first_one_on(capsys, tmp_path):
+    file = tmp_path / "summary.json"
+    late, early = "MCH.absolute_encoder:offset,offset=300@300 ms", "UI.imu:gyro_bias@200 ms..250 ms"
+    assert cli.main(["walk", "--time", "0.4s", "--fault", late, "--fault", early, "--proof", "--json", str(file)]) == 0
+    first, second = (fault["proof"] for fault in json.loads(file.read_text(encoding="utf-8"))["faults"])
+    assert first == second and first["of_faults"] == 2
+    assert first["first_difference"]["name"] == "UI_ANG_RATE_X" and 0.0 < first["first_difference"]["after_ms"] < 10.0
+    assert 100.0 < first["detection_ms"] <= 100.75  # of the encoder's word, from the other one's beginning on
+    assert "against the run without the 2 faults, from the first one's beginning on: " in capsys.readouterr().err
 
 
 def test_a_proof_without_a_fault_is_refused(capsys):
