@@ -344,7 +344,7 @@ def test_a_frame_directly_behind_the_welcome_is_not_forgotten():
 
 def test_a_host_naps_no_longer_than_its_servers_are_patient(monkeypatch):
     naps = []
-    monkeypatch.setattr(host_module.select, "select", lambda read, write, error, nap: naps.append(nap))
+    monkeypatch.setattr(host_module.descriptors, "wait", lambda read, write, nap: naps.append(nap))
     host = BusHost([PacedBus("can1")])
     host.serve(AttachServer(fresh_name(), {"can1": host.buses[0].taps}))
     host.turn(0.5)

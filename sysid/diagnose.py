@@ -1,0 +1,266 @@
+"""From measured data to what the simulation gets wrong: detect, localise, name, tie or abstain, extend, gain.
+
+The answer is a dictionary that `json` writes as it is; its keys are those of `ranger-sim diagnose --json`.
+"""
+
+import dataclasses
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from scipy import stats
+
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.sysid import gain, misfit, naming
+from ranger_sim.sysid.dataset import Table
+from ranger_sim.sysid.machine import Effect, Machine, Recording
+from ranger_sim.sysid.naming import Named
+from ranger_sim.sysid.regression import Regression
+
+GENERAL_LEVEL = 0.005  # of all general tests together
+NAMED_LEVEL = 0.005  # of the whole selection
+EXPLAINED = 0.7  # of what repeats: a name that explains less is none
+SKEW = 0.5  # samples: stamps of two channels differ by so much in any log
+
+
+@dataclasses.dataclass
+class Diagnosis:
+    """Everything that was found, for the report; `answer` is what is printed."""
+
+    machine: Machine
+    recordings: list[Recording]
+    plain: Regression
+    extended: Regression
+    skews: list[Named]
+    named: list[Named]
+    before: misfit.Misfit
+    after: misfit.Misfit
+    answer: dict[str, Any]
+
+
+def diagnose(
+    machine: Machine,
+    tables: Sequence[Table],
+    holdout: Sequence[Table] = (),
+    seed: int = 0,
+    findings: Sequence[dict] = (),
+) -> Diagnosis:
+    """What `machine`'s equations get wrong about these recordings. UserError when they cannot be judged at all."""
+    recordings = [machine.prepare(table) for table in tables]
+    general = misfit.general_features(machine, recordings)
+    whole = Regression(recordings, general=[columns for _, _, columns in general])
+    effects = machine.effects(recordings)
+    skews = _skews(effects, whole)
+    plain = naming.refit(whole, skews)
+    before = misfit.look(plain, general)
+    named = naming.select(
+        [each for each in effects if all(each is not skew.effect for skew in skews)], plain, NAMED_LEVEL
+    )
+    extended = naming.refit(plain, named, [*skews, *named])
+    after = misfit.look(extended, general)
+    detected = before.p < GENERAL_LEVEL or bool(named)
+    share = _explained(plain, extended, after)
+    doubtful = detected and (not named or (share < EXPLAINED and after.p < GENERAL_LEVEL))
+    answer: dict[str, Any] = {
+        "detected": bool(detected),
+        "misfit": _channels(plain, extended, recordings),
+        "subsystem": _subsystem(plain, before, named) if detected else None,
+        "causes": [_cause(each, extended, before, skews) for each in named] if detected and not doubtful else [],
+        "abstained": bool(doubtful),
+        "gain": None,
+        "next_experiment": _next(named),
+        "model_file": None,
+        "data_findings": list(findings),
+        "evidence": {
+            "p_general": before.p,
+            "p_general_after": after.p,
+            "explained": share,
+            "suspects": [each.effect.name for each in named] if doubtful else [],
+            "parameters": {
+                name: {
+                    "value": value,
+                    "ci95": [value - 1.96 * _error(extended, name), value + 1.96 * _error(extended, name)],
+                }
+                for name, value in extended.values.items()
+                if "@" not in name
+            },
+            "parameters_are_physical": not doubtful,
+            "skew_samples": {
+                each.effect.at: extended.values[each.coefficients[0]] / recordings[0].table.step_s for each in skews
+            },
+        },
+    }
+    if holdout and detected:
+        answer["gain"] = _gain(machine, plain, extended, holdout, skews, named if not doubtful else [], seed)
+    return Diagnosis(machine, recordings, plain, extended, skews, named, before, after, answer)
+
+
+def _skews(effects: Sequence[Effect], regression: Regression) -> list[Named]:
+    """Lags of less than half a sample: stamps, not causes. They are taken into account without a word."""
+    lags = [each for each in effects if each.cause == "sensor_lag"]
+    step_s = regression.recordings[0].table.step_s
+    found = naming.select(lags, regression, NAMED_LEVEL, most=2)
+    if not found:
+        return []
+    values = naming.refit(regression, found).values
+    return [each for each in found if abs(values[each.coefficients[0]]) < SKEW * step_s]
+
+
+def _explained(plain: Regression, extended: Regression, after: misfit.Misfit) -> float:
+    """Share of the repeatable excess that the named effects explain."""
+    gained = plain.chi2 - extended.chi2 - (extended.count - plain.count)
+    total = gained + after.excess
+    return float(gained / total) if total > 0.0 else 0.0
+
+
+def _error(regression: Regression, name: str) -> float:
+    number = regression.names.index(name)
+    return math.sqrt(max(0.0, float(regression.covariance[number, number])))
+
+
+def _subsystem(plain: Regression, before: misfit.Misfit, named: Sequence[Named]) -> str | None:
+    if named:
+        return named[0].effect.subsystem
+    telling = before.telling.equation
+    return next(e.subsystem for r in plain.recordings for e in r.equations.values() if e.name == telling)
+
+
+def _letters(each: Named, recordings: Sequence[Recording]) -> str:
+    made = each.effect.columns(recordings[0], each.shape, {name: 1.0 for name in _parameter_names(recordings)})
+    return "".join(recordings[0].equations[name].letter for name in made if name in recordings[0].equations)
+
+
+def _parameter_names(recordings: Sequence[Recording]) -> list[str]:
+    return [name for e in recordings[0].equations.values() for name in e.columns]
+
+
+def _cause(each: Named, extended: Regression, before: misfit.Misfit, skews: Sequence[Named]) -> dict[str, Any]:
+    parameters = {
+        name: {
+            "value": extended.values[full],
+            "ci95": [
+                extended.values[full] - 1.96 * _error(extended, full),
+                extended.values[full] + 1.96 * _error(extended, full),
+            ],
+        }
+        for name, full in zip(each.effect.coefficients, each.coefficients, strict=True)
+    }
+    for name, value in each.shape.items():
+        low, high = _neighbours(each, name, value)
+        parameters[name] = {"value": value, "ci95": [low, high]}
+    return {
+        "name": each.effect.cause,
+        "at": each.effect.at,
+        "balance": _letters(each, extended.recordings),
+        "parameters": parameters,
+        "tied_with": list(dict.fromkeys(tie.cause for tie in each.tied if tie.cause != each.effect.cause)),
+        "evidence": {
+            "chi2": each.chi2,
+            "p": each.p,
+            "bic": each.bic,
+            "ties": [tie.name for tie in each.tied],
+            "behind": {effect.name: behind for effect, behind in each.rivals},
+        },
+    }
+
+
+def _neighbours(each: Named, name: str, value: float) -> tuple[float, float]:
+    """A shape is known to the middle of its neighbours on the grid."""
+    grid = sorted({shape[name] for shape in each.effect.shapes})
+    place = grid.index(value)
+    low = 0.5 * (grid[place - 1] + value) if place else value
+    high = 0.5 * (grid[place + 1] + value) if place + 1 < len(grid) else value
+    return low, high
+
+
+def _channels(plain: Regression, extended: Regression, recordings: Sequence[Recording]) -> list[dict[str, Any]]:
+    """Misfit of each equation, in all and in each regime: rms of the residual over its noise, both in deviations."""
+    from ranger_sim.sysid.regression import kept_rows
+
+    out = []
+    for equation in plain.equations:
+        rows, good = plain.rows_of(equation), plain.good[equation]
+        residual = plain.residual[rows]
+        scale = plain.whitening[equation].deviation
+        better = extended.residual[rows]
+        noise = float(np.sqrt(np.mean(better**2)))
+        names = ["all", *dict.fromkeys(name for r in recordings for name in r.regimes)]
+        for name in names:
+            where = np.ones(len(residual), dtype=bool)
+            if name != "all":
+                masks = [kept_rows(r, r.regimes.get(name, np.zeros(len(r.table), dtype=bool))) for r in recordings]
+                where = np.concatenate(masks)[good]
+            if np.count_nonzero(where) < 50:
+                continue
+            rms = float(np.sqrt(np.mean(residual[where] ** 2)))
+            repeatable = max(0.0, 1.0 - float(np.mean(better[where] ** 2)) / max(rms * rms, 1e-300))
+            out.append(
+                {
+                    "channel": equation,
+                    "regime": name,
+                    "rms": rms * scale,
+                    "noise": noise * scale,
+                    "repeatable_fraction": repeatable,
+                }
+            )
+    return out
+
+
+def _gain(
+    machine: Machine,
+    plain: Regression,
+    extended: Regression,
+    holdout: Sequence[Table],
+    skews: Sequence[Named],
+    named: Sequence[Named],
+    seed: int,
+) -> dict[str, Any]:
+    recordings = [machine.prepare(table) for table in holdout]
+    general = misfit.general_features(machine, recordings)
+    columns = [each for _, _, each in general]
+    base = Regression(recordings, noise=plain, general=columns)
+    if not named:
+        return {"fraction_of_achievable": 0.0, "ci95": [0.0, 0.0], "holdout": ", ".join(t.name for t in holdout)}
+    one = naming.refit(base, skews, values=plain.values)
+    two = naming.refit(base, [*skews, *named], values=plain.values)
+    found = gain.measure(one, plain.values, two, extended.values, general, seed)
+    return {
+        "fraction_of_achievable": found.fraction,
+        "ci95": list(found.ci95),
+        "holdout": found.holdout,
+        "worse": found.worse,
+    }
+
+
+NEXT = {
+    frozenset(
+        {"sensor_offset", "direction_friction"}
+    ): "a recording at standstill, which shows an offset without friction",
+    frozenset({"sensor_scale", "load_friction"}): "a load cell's calibration, or stalls at several currents",
+    frozenset({"stribeck", "presliding"}): "slow reversals, far below the speed at which friction has settled",
+    frozenset({"resistance_temperature", "contact_drop_change"}): "the winding's temperature beside the current",
+}
+
+
+def _next(named: Sequence[Named]) -> list[str]:
+    out = []
+    for each in named:
+        for tie in each.tied:
+            pair = frozenset({each.effect.cause, tie.cause})
+            if len(pair) == 2:
+                out.append(NEXT.get(pair, f"an experiment in which {each.effect.name} and {tie.name} differ"))
+    return list(dict.fromkeys(out))
+
+
+def shared_evidence(p: float) -> float:
+    """Standard deviations of a normal distribution that are as unlikely as `p`, for readers of the report."""
+    return float(stats.norm.isf(max(p, 1e-300) / 2.0))
+
+
+def parameters_of(machine: Machine) -> Mapping[str, Any]:
+    """The machine's parameters by name; UserError when two have the same."""
+    names = [each.name for each in machine.parameters]
+    if len(set(names)) != len(names):
+        raise UserError(f"{machine.name}: two parameters have the same name, of {', '.join(names)}")
+    return {each.name: each for each in machine.parameters}

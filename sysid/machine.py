@@ -1,0 +1,113 @@
+"""What a machine must tell to be diagnosed: its channels, its equations, and what could be wrong with it.
+
+The diagnosis knows no machine. One is an object with the members of `Machine`; those of this room stand in
+`machines/`, a user's own comes by `module:object`. An equation is a balance, linear in its parameters:
+
+    response = sum over parameters of value x column + noise
+
+and the same name in two equations is the same parameter. An `Effect` is a cause that adds columns of its own to one
+or more equations: one for each of its coefficients, with shapes (a speed, a number of periods, a lag) from a grid.
+"""
+
+import dataclasses
+from collections.abc import Callable, Mapping, Sequence
+from typing import Protocol
+
+import numpy as np
+
+from ranger_sim.sysid.dataset import Array, Table
+
+Values = Mapping[str, float]
+Columns = dict[str, Array]  # by equation, each of shape (n, k): k coefficients
+
+
+@dataclasses.dataclass(frozen=True)
+class Quantity:
+    """A channel that the machine knows. `needed`: without it there is no diagnosis."""
+
+    name: str
+    unit: str
+    meaning: str
+    needed: bool = True
+
+
+@dataclasses.dataclass(frozen=True)
+class Known:
+    """A parameter of the equations: value as the simulation has it, and limits beyond which no machine is."""
+
+    name: str
+    unit: str
+    value: float
+    low: float
+    high: float
+    meaning: str
+
+
+@dataclasses.dataclass(frozen=True)
+class Equation:
+    """One balance over one recording. response: (n,); columns: (n,) by parameter; valid: (n,), rows that count.
+
+    instruments: for a parameter whose column is itself noisy (a derivative), columns (n, m) that move with it and do
+    not share its noise.
+    """
+
+    name: str
+    letter: str  # balance of the catalogue: E, M, T, S, P, t
+    subsystem: str
+    unit: str
+    response: Array
+    columns: dict[str, Array]
+    valid: np.ndarray
+    instruments: dict[str, Array] = dataclasses.field(default_factory=dict)
+
+
+@dataclasses.dataclass
+class Recording:
+    """A table made ready: even stamps, the machine's derived signals (n,) by name, its equations."""
+
+    table: Table
+    signals: dict[str, Array]
+    equations: dict[str, Equation]
+    regimes: dict[str, np.ndarray] = dataclasses.field(default_factory=dict)
+    width: float = 0.0  # samples; standard deviation of the Gaussian that is still to be put over both sides
+    every: int = 1  # rows that count after it: one in so many
+
+
+@dataclasses.dataclass(frozen=True)
+class Effect:
+    """A cause that may be at work. columns(recording, shape, values) -> for some equations (n, k) columns.
+
+    cause, at: identifier of the catalogue and the place. coefficients: names of the k linear parameters, with units in
+    their names. shapes: the grid. values: the machine's parameters as fitted without the effect. admissible: of the
+    found parameters (coefficients and shape), False for what no machine can have.
+    """
+
+    cause: str
+    at: str
+    subsystem: str
+    coefficients: tuple[str, ...]
+    shapes: Sequence[Mapping[str, float]]
+    columns: Callable[[Recording, Mapping[str, float], Values], Columns]
+    admissible: Callable[[Mapping[str, float]], bool] = lambda found: True
+    meaning: str = ""
+
+    @property
+    def name(self) -> str:
+        return f"{self.cause} at {self.at}"
+
+
+class Machine(Protocol):
+    """What can be diagnosed."""
+
+    name: str
+    quantities: tuple[Quantity, ...]
+    parameters: tuple[Known, ...]
+
+    def prepare(self, table: Table) -> Recording:
+        """Signals and equations of one recording; UserError when a needed channel is missing."""
+
+    def effects(self, recordings: Sequence[Recording]) -> list[Effect]:
+        """Everything that could be wrong, with grids that suit these recordings."""
+
+    def generic(self, recording: Recording) -> dict[str, dict[str, Array]]:
+        """For each equation the signals over which a misfit is looked for without any cause in mind, by name (n,)."""

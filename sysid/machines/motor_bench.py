@@ -1,0 +1,513 @@
+"""A geared brushed motor on the bench: voltage, current, speed and torque at the output of its gearbox.
+
+    electric     V = R I + V_c sgn I + K G w + L dI/dt                                        appendix eq. 32
+    mechanical   T = K G I - C_0 sgn w - C_1 w - mu K G |I| sgn w - J dw/dt                   appendix eq. 33, 35
+    transmission dtheta_m/dt / G = w                            where the motor's angle is measured as well
+
+K stands in both: what changes one side of it only is a sensor's scale. Near standstill friction may be anything up to
+its limit (eq. 35), and near zero current so may the brushes' drop: rows whose sign is within the noise do not count.
+"""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.sysid import signals
+from ranger_sim.sysid.dataset import Array, Table
+from ranger_sim.sysid.machine import Columns, Effect, Equation, Known, Quantity, Recording, Values
+
+SLOW = 5.0  # samples; Gaussian of what must not have the noise of a derivative
+GAP, AROUND = 24, 12  # samples: beyond the Gaussian and the memory of the whitening, twice
+WIDTH = 2.0  # samples; Gaussian over both sides of each equation
+EVERY = 3  # rows that count after it
+JUMP_IN_STEPS = 0.06  # of the whole range, within one sample
+SIGN_IN_NOISE = 4.0  # deviations of noise within which a sign means nothing
+HEAT_TIMES_S = (3.0, 10.0, 30.0, 100.0, 300.0)
+SPEED_SHARES = (0.01, 0.02, 0.04, 0.08, 0.16, 0.3, 0.5)
+CURRENT_SHARES = (0.1, 0.3, 1.0)
+LAGS_S = (0.0005, 0.001, 0.002, 0.004, 0.01, 0.03)
+MOST_PERIODS = 60  # per turn of the rotor
+
+Shape = Mapping[str, float]
+
+
+def column(*parts: Array) -> Array:
+    """(n, k) from k columns (n,)."""
+    return np.column_stack(parts)
+
+
+class MotorBench:
+    """The bench of appendix figure 26. gear: turns of the rotor per turn of the output."""
+
+    name = "motor-bench"
+    quantities = (
+        Quantity("voltage_V", "V", "at the motor's terminals"),
+        Quantity("current_A", "A", "through the winding"),
+        Quantity("speed_rad_per_s", "rad/s", "of the gearbox's output"),
+        Quantity("torque_Nm", "N m", "at the gearbox's output, as the motor drives"),
+        Quantity("temperature_C", "C", "of the motor's housing", needed=False),
+        Quantity("motor_angle_rad", "rad", "of the rotor", needed=False),
+    )
+
+    def __init__(self, gear: float = 14.0) -> None:
+        self.gear = gear
+        k = 0.018 * gear
+        # values: appendix table 3 at the 14:1 gearbox; limits chosen by us, a hundred times either way
+        self.parameters = (
+            Known("resistance_ohm", "ohm", 1.3, 0.0, 130.0, "winding, brushes and leads"),
+            Known("contact_drop_V", "V", 0.7, 0.0, 70.0, "at the brushes, both together"),
+            Known("torque_constant_Nm_per_A", "N m/A", k, 0.0, 100.0 * k, "at the output, gear included"),
+            Known("inductance_H", "H", 1e-4, -0.01, 0.1, "of the winding; next to nothing at this sampling"),
+            Known("constant_friction_Nm", "N m", 0.01, 0.0, 1.0, "of motor and gearbox"),
+            Known("viscous_friction_Nms", "N m s/rad", 0.0, -0.01, 1.0, "of motor and gearbox"),
+            Known("load_friction_Nm_per_A", "N m/A", 0.1 * k, 0.0, 10.0 * k, "mu K G"),
+            Known("inertia_kg_m2", "kg m^2", 1.6e-6 * gear * gear, 0.0, 1.0, "of the rotor as the output feels it"),
+        )
+
+    def prepare(self, table: Table) -> Recording:
+        """Signals and the two or three equations of one recording."""
+        missing = [each.name for each in self.quantities if each.needed and each.name not in table]
+        if missing:
+            raise UserError(
+                f"{table.name}: {self.name} needs {', '.join(missing)}; there are {', '.join(table.columns)}"
+            )
+        table = signals.uniform(table)
+        V, I, w, T = (table[each.name] for each in self.quantities[:4])  # noqa: E741  (the paper's letters)
+        light = {name: signals.smooth(table, column_, 1.0) for name, column_ in (("I", I), ("w", w))}
+        s: dict[str, Array] = {"V": V, "I": I, "w": w, "T": T, "t": table.time_s - table.time_s[0]}
+        for name, values in (("dV", V), ("dI", I), ("dw", w), ("dT", T)):
+            s[name] = np.gradient(values, table.step_s)  # the Gaussian of both sides smooths it
+        noise_I = signals.noise_deviation(table, I, table.resolution.get("current_A", 0.0))
+        noise_w = signals.noise_deviation(table, w, table.resolution.get("speed_rad_per_s", 0.0))
+        s["dI_around"] = np.gradient(signals.around(table, I, GAP, AROUND), table.step_s)
+        s["dT_slow"] = signals.derivative(table, T, SLOW)
+        s["dI_slow"], s["dw_slow"] = signals.derivative(table, I, SLOW), signals.derivative(table, w, SLOW)
+        s["sgn_I"] = np.tanh(light["I"] / max(noise_I, 1e-9))
+        s["sgn_w"] = np.tanh(light["w"] / max(noise_w, 1e-9))
+        s["I_smooth"], s["w_smooth"] = light["I"], light["w"]
+        s["I_slow"], s["w_slow"] = signals.smooth(table, I, SLOW), signals.smooth(table, w, SLOW)
+        measured = "motor_angle_rad" in table
+        s["angle"] = table["motor_angle_rad"] if measured else self.gear * signals.integral(table, w)
+        if "temperature_C" in table:
+            s["warmth"] = signals.smooth(table, table["temperature_C"], 50.0) - 25.0
+        reach = int(math.ceil(3.0 * SLOW)) + 1  # what is smoothed slowly is smeared so far
+        steady = _no_jump(V, JUMP_IN_STEPS, reach)
+        firm_I = steady & _away(light["I"], SIGN_IN_NOISE * noise_I, reach)
+        firm_w = steady & _away(light["w"], SIGN_IN_NOISE * noise_w, reach)
+        equations = {
+            "electric": Equation(
+                "electric",
+                "E",
+                "electrical",
+                "V",
+                V,
+                {
+                    "resistance_ohm": I,
+                    "contact_drop_V": s["sgn_I"],
+                    "torque_constant_Nm_per_A": w,
+                    "inductance_H": s["dI"],
+                },
+                firm_I,
+                {"inductance_H": column(s["dI_slow"], s["dV"])},
+            ),
+            "mechanical": Equation(
+                "mechanical",
+                "M",
+                "mechanical",
+                "N m",
+                T,
+                {
+                    "torque_constant_Nm_per_A": I,
+                    "constant_friction_Nm": -s["sgn_w"],
+                    "viscous_friction_Nms": -w,
+                    "load_friction_Nm_per_A": -np.abs(light["I"]) * s["sgn_w"],
+                    "inertia_kg_m2": -s["dw"],
+                },
+                firm_w,
+                {"inertia_kg_m2": _acceleration_helpers(table, s)},
+            ),
+        }
+        if measured:
+            turning = np.gradient(s["angle"], table.step_s) / self.gear
+            everywhere = np.ones(len(table), dtype=bool)
+            equations["transmission"] = Equation(
+                "transmission", "T", "transmission", "rad/s", turning - w, {}, everywhere
+            )
+        regimes = _regimes(s, firm_w)
+        return Recording(table, s, equations, regimes, WIDTH, EVERY)
+
+    def generic(self, recording: Recording) -> dict[str, dict[str, Array]]:
+        """Signals over which each equation is looked at without a cause in mind."""
+        s = recording.signals
+        shared = {name: signals.around(recording.table, s[name], GAP, AROUND) for name in ("I", "w", "V")}
+        shared["t"] = s["t"]
+        return {name: shared for name in recording.equations}
+
+    def effects(self, recordings: Sequence[Recording]) -> list[Effect]:
+        """The catalogue's causes that such a bench can have."""
+        top_w = max(float(np.quantile(np.abs(r.signals["w_smooth"]), 0.98)) for r in recordings)
+        top_I = max(float(np.quantile(np.abs(r.signals["I_smooth"]), 0.98)) for r in recordings)
+        top_V = max(float(np.max(np.abs(r.signals["V"]))) for r in recordings)
+        made = _electric(top_I, top_V, all("warmth" in r.signals for r in recordings))
+        made += _sensors(self.gear, top_w, top_V)
+        made += _friction(top_w)
+        made += _periodic(self.gear)
+        if all("transmission" in r.equations for r in recordings):
+            made += _transmission()
+        return made
+
+
+def _away(values: Array, limit: float, reach: int) -> np.ndarray:
+    """True where the values stay `limit` away from 0, also `reach` samples before and after."""
+    near = np.abs(values) < limit
+    return np.convolve(near, np.ones(2 * reach + 1), mode="same") < 0.5
+
+
+def _acceleration_helpers(table: Table, s: Mapping[str, Array]) -> Array:
+    """Columns (n, m) that move with the acceleration and hardly have the noise of the speed's difference."""
+    slow = signals.smooth(table, s["w"], SLOW)
+    rate = np.gradient(slow, table.step_s)
+    bend = np.gradient(np.gradient(rate, table.step_s), table.step_s)
+    return column(rate, bend, s["dV"], signals.smooth(table, s["dI"], SLOW))
+
+
+def _no_jump(values: Array, limit: float, reach: int) -> np.ndarray:
+    """True where nothing jumps, also `reach` samples before and after: between two samples nobody knows when it was.
+
+    A jump is a step larger than `limit` times that which a sine over all values would make in a fiftieth of its period.
+    """
+    step = np.abs(np.diff(values, prepend=values[0]))
+    sized = limit * (float(np.ptp(values)) or 1.0)
+    return np.convolve(step > sized, np.ones(2 * reach + 1), mode="same") < 0.5
+
+
+def _regimes(s: Mapping[str, Array], moving: np.ndarray) -> dict[str, np.ndarray]:
+    """Rows by what the machine does: standstill, low speed, cruise, accelerating; signs of rate and power."""
+    speed = np.abs(s["w_smooth"])
+    top = float(np.quantile(speed, 0.98))
+    changing = np.abs(s["dw"]) > float(np.quantile(np.abs(s["dw"]), 0.8))
+    power = s["I_smooth"] * s["w_smooth"]
+    return {
+        "standstill": ~moving,
+        "low speed": moving & (speed < 0.2 * top),
+        "cruise": moving & (speed >= 0.2 * top) & ~changing,
+        "accelerating": moving & changing,
+        "forward": moving & (s["w_smooth"] > 0),
+        "backward": moving & (s["w_smooth"] < 0),
+        "driving": moving & (power > 0),
+        "braking": moving & (power < 0),
+    }
+
+
+Made = Callable[[Recording, Shape, Values], Columns]
+
+
+def _one(equation: str, make: Callable[[Mapping[str, Array], Shape, Values], Array]) -> Made:
+    """An effect's `columns` for one equation and one coefficient."""
+    return lambda r, shape, values: {equation: column(make(r.signals, shape, values))}
+
+
+def _ones(s: Mapping[str, Array], _: Shape, __: Values) -> Array:
+    return np.ones_like(s["V"])
+
+
+def _minus(name: str) -> Callable[[Mapping[str, Array], Shape, Values], Array]:
+    return lambda s, _, __: -s[name]
+
+
+def _heat(r: Recording, shape: Shape) -> Array:
+    """What warms with the winding's losses: measured, or I^2 behind a first-order filter."""
+    if shape["time_constant_s"] == 0.0:
+        return r.signals["warmth"]
+    return signals.lagged(r.table, r.signals["I"] ** 2, shape["time_constant_s"])
+
+
+def _electric(top_I: float, top_V: float, warmth: bool) -> list[Effect]:
+    heats = [{"time_constant_s": time_s} for time_s in ((0.0,) if warmth else ()) + HEAT_TIMES_S]
+    E = "electrical"
+
+    def torque_constant(r: Recording, shape: Shape, _: Values) -> Columns:
+        heat = _heat(r, shape)
+        return {"electric": column(r.signals["w"] * heat), "mechanical": column(r.signals["I"] * heat)}
+
+    return [
+        Effect(
+            "contact_drop_change",
+            "hip_motor",
+            E,
+            ("change_V",),
+            [{"current_A": share * top_I} for share in CURRENT_SHARES],
+            _one("electric", lambda s, p, _: s["sgn_I"] * (1.0 - np.exp(-np.abs(s["I"]) / p["current_A"]))),
+            meaning="a drop at the brushes that depends on the current",
+        ),
+        Effect(
+            "resistance_temperature",
+            "hip_motor",
+            E,
+            ("ohm_per_heat",),
+            heats,
+            lambda r, p, _: {"electric": column(r.signals["I"] * _heat(r, p))},
+            meaning="resistance that grows with the winding's temperature",
+        ),
+        Effect("torque_constant_temperature", "hip_motor", E, ("per_heat",), heats, torque_constant),
+        Effect(
+            "inductance_frequency",
+            "hip_motor",
+            E,
+            ("inductance_H",),
+            [{"time_constant_s": time_s} for time_s in (0.005, 0.01, 0.02, 0.05)],
+            lambda r, p, _: {"electric": column(signals.lagged(r.table, r.signals["dI_around"], p["time_constant_s"]))},
+        ),
+        Effect(
+            "dead_time",
+            "hip_motor",
+            E,
+            ("drop_V",),
+            [{}],
+            _one("electric", lambda s, p, _: s["sgn_I"] * (np.abs(s["V"]) > 0.02 * top_V)),
+            meaning="a drop against the current while the bridge switches",
+        ),
+        Effect("battery_sag", "supply", E, ("per_A",), [{}], _one("electric", lambda s, p, _: s["V"] * np.abs(s["I"]))),
+        Effect(
+            "charge_drift",
+            "supply",
+            E,
+            ("per_As",),
+            [{}],
+            lambda r, p, _: {"electric": column(r.signals["V"] * signals.integral(r.table, np.abs(r.signals["I"])))},
+        ),
+        Effect(
+            "voltage_clip",
+            "voltage_V",
+            E,
+            ("share",),
+            [{"limit_V": share * top_V} for share in (0.5, 0.6, 0.7, 0.8, 0.9, 0.95)],
+            _one("electric", lambda s, p, _: np.sign(s["V"]) * np.maximum(np.abs(s["V"]) - p["limit_V"], 0.0)),
+        ),
+        Effect(
+            "pwm_ripple",
+            "hip_motor",
+            E,
+            ("V_per_V",),
+            [{}],
+            _one("electric", lambda s, p, _: s["V"] * (1.0 - np.abs(s["V"]) / top_V)),
+        ),
+    ]
+
+
+def _sensors(gear: float, top_w: float, top_V: float) -> list[Effect]:
+    S = "sensor"
+
+    def current_offset(mask: Callable[[Mapping[str, Array]], Array]) -> Made:
+        def made(r: Recording, _: Shape, v: Values) -> Columns:
+            where = mask(r.signals)
+            return {
+                "electric": column(-v["resistance_ohm"] * where),
+                "mechanical": column(
+                    -(
+                        v["torque_constant_Nm_per_A"]
+                        - v["load_friction_Nm_per_A"] * r.signals["sgn_w"] * r.signals["sgn_I"]
+                    )
+                    * where
+                ),
+            }
+
+        return made
+
+    def speed_offset(r: Recording, _: Shape, v: Values) -> Columns:
+        ones = np.ones(len(r.table))
+        return {
+            "electric": column(-v["torque_constant_Nm_per_A"] * ones),
+            "mechanical": column(v["viscous_friction_Nms"] * ones),
+        }
+
+    def current_lag(r: Recording, _: Shape, v: Values) -> Columns:
+        s = r.signals
+        return {
+            "electric": column(v["resistance_ohm"] * s["dI_slow"]),
+            "mechanical": column(v["torque_constant_Nm_per_A"] * s["dI_slow"]),
+        }
+
+    def speed_lag(r: Recording, _: Shape, v: Values) -> Columns:
+        s = r.signals
+        return {
+            "electric": column(v["torque_constant_Nm_per_A"] * s["dw_slow"]),
+            "mechanical": column(-v["viscous_friction_Nms"] * s["dw_slow"]),
+        }
+
+    def eccentric(r: Recording, shape: Shape, v: Values) -> Columns:
+        s = r.signals
+        angle = shape["turns"] * s["angle"] / gear
+        error, other = s["w"] * np.cos(angle), s["w"] * np.sin(angle)
+        rate, other_rate = np.gradient(error, r.table.step_s), np.gradient(other, r.table.step_s)
+        k, c, j = v["torque_constant_Nm_per_A"], v["viscous_friction_Nms"], v["inertia_kg_m2"]
+        return {
+            "electric": column(-k * error, -k * other),
+            "mechanical": column(c * error + j * rate, c * other + j * other_rate),
+        }
+
+    turns = [{"turns": 1.0}, {"turns": 2.0}, {"turns": gear}]
+    return [
+        Effect("sensor_scale", "current_A", S, ("change",), [{}], _one("mechanical", lambda s, p, _: s["I"])),
+        Effect("sensor_offset", "voltage_V", S, ("offset_V",), [{}], _one("electric", _ones)),
+        Effect("sensor_offset", "current_A", S, ("offset_A",), [{}], current_offset(lambda s: np.ones_like(s["V"]))),
+        Effect("sensor_offset", "torque_Nm", S, ("offset_Nm",), [{}], _one("mechanical", _ones)),
+        Effect("sensor_offset", "speed_rad_per_s", S, ("offset_rad_s",), [{}], speed_offset),
+        Effect(
+            "current_step_at_zero_duty",
+            "current_A",
+            S,
+            ("offset_A",),
+            [{}],
+            current_offset(lambda s: np.where(np.abs(s["V"]) < 0.02 * top_V, 1.0, 0.0)),
+        ),
+        Effect("sensor_lag", "voltage_V", S, ("time_constant_s",), [{}], _one("electric", _minus("dV"))),
+        Effect("sensor_lag", "current_A", S, ("time_constant_s",), [{}], current_lag),
+        Effect("sensor_lag", "speed_rad_per_s", S, ("time_constant_s",), [{}], speed_lag),
+        Effect("sensor_lag", "torque_Nm", S, ("time_constant_s",), [{}], _one("mechanical", _minus("dT_slow"))),
+        Effect("eccentricity", "speed_rad_per_s", S, ("cosine", "sine"), turns, eccentric),
+        Effect(
+            "lost_counts",
+            "speed_rad_per_s",
+            S,
+            ("share",),
+            [{"speed_rad_s": share * top_w} for share in (0.4, 0.5, 0.6, 0.7, 0.8, 0.9)],
+            lambda r, p, v: {
+                "electric": column(
+                    v["torque_constant_Nm_per_A"]
+                    * np.sign(r.signals["w"])
+                    * np.maximum(np.abs(r.signals["w_smooth"]) - p["speed_rad_s"], 0.0)
+                )
+            },
+        ),
+    ]  # fmt: skip
+
+
+def _friction(top_w: float) -> list[Effect]:
+    M = "mechanical"
+    speeds = [{"speed_rad_s": share * top_w} for share in SPEED_SHARES]
+
+    def presliding(r: Recording, shape: Shape, _: Values) -> Columns:
+        return {"mechanical": column(r.signals["sgn_w"] - _bristles(r, shape["slide_rad"]))}
+
+    def warm_up(r: Recording, shape: Shape, _: Values) -> Columns:
+        s = r.signals
+        worked = signals.lagged(r.table, np.abs(s["w_smooth"]), shape["time_constant_s"])
+        return {"mechanical": column(s["sgn_w"] * worked)}
+
+    def direction(kind: str) -> Made:
+        def made(s: Mapping[str, Array], _: Shape, __: Values) -> Array:
+            return -np.ones_like(s["w"]) if kind == "coulomb" else -np.abs(s["w_smooth"])
+
+        return _one("mechanical", made)
+
+    return [
+        Effect(
+            "stribeck",
+            "hip_motor",
+            M,
+            ("excess_Nm",),
+            speeds,
+            _one("mechanical", lambda s, p, _: -s["sgn_w"] * np.exp(-((s["w_smooth"] / p["speed_rad_s"]) ** 2))),
+            lambda found: found["excess_Nm"] > 0.0,
+            "friction that is larger at low speed",
+        ),
+        Effect(
+            "presliding",
+            "hip_motor",
+            M,
+            ("friction_Nm",),
+            [{"slide_rad": slide} for slide in (0.003, 0.01, 0.03, 0.1, 0.3)],
+            presliding,
+            lambda found: found["friction_Nm"] > 0.0,
+            "friction that builds up over a way after a reversal",
+        ),
+        Effect(
+            "load_friction",
+            "hip_motor",
+            M,
+            ("per_A",),
+            [{}],
+            _one("mechanical", lambda s, p, _: -np.abs(s["I"]) * s["sgn_w"] * (s["I_smooth"] * s["w_smooth"] > 0.0)),
+            meaning="friction under load that differs between driving and being driven",
+        ),
+        Effect("direction_friction", "hip_motor", M, ("coulomb_Nm",), [{}], direction("coulomb")),
+        Effect("direction_friction", "hip_motor", M, ("viscous_Nms",), [{}], direction("viscous")),
+        Effect(
+            "friction_warm_up",
+            "hip_motor",
+            M,
+            ("Nm_s_per_rad",),
+            [{"time_constant_s": time_s} for time_s in HEAT_TIMES_S],
+            warm_up,
+            lambda found: found["Nm_s_per_rad"] > 0.0,
+            "friction that falls as the gearbox warms",
+        ),
+        Effect(
+            "drag",
+            "hip_motor",
+            M,
+            ("quadratic_Nms2",),
+            [{}],
+            _one("mechanical", lambda s, p, _: -s["w"] * np.abs(s["w_smooth"])),
+            lambda found: found["quadratic_Nms2"] > 0.0,
+        ),
+    ]
+
+
+def _periodic(gear: float) -> list[Effect]:
+    M = "mechanical"
+    each = [{"periods_per_turn": float(n)} for n in range(1, MOST_PERIODS + 1)]
+
+    def wave(r: Recording, shape: Shape) -> tuple[Array, Array]:
+        angle = shape["periods_per_turn"] * r.signals["angle"]
+        return np.cos(angle), np.sin(angle)
+
+    def cogging(r: Recording, shape: Shape, _: Values) -> Columns:
+        return {"mechanical": column(*wave(r, shape))}
+
+    def commutation(r: Recording, shape: Shape, v: Values) -> Columns:
+        cos, sin = wave(r, shape)
+        drive = v["torque_constant_Nm_per_A"] * r.signals["I"]
+        return {"mechanical": column(drive * cos, drive * sin)}
+
+    def turn(r: Recording, shape: Shape, _: Values) -> Columns:
+        angle = shape["periods_per_turn"] * r.signals["angle"] / gear
+        return {"mechanical": column(np.cos(angle), np.sin(angle))}
+
+    return [
+        Effect("cogging", "hip_motor", M, ("cosine_Nm", "sine_Nm"), each, cogging),
+        Effect("commutation_ripple", "hip_motor", M, ("cosine", "sine"), each, commutation),
+        Effect("once_per_turn", "hip_joint", M, ("cosine_Nm", "sine_Nm"), each[:3], turn),
+    ]  # fmt: skip
+
+
+def _transmission() -> list[Effect]:
+    T = "transmission"
+
+    def play(r: Recording, shape: Shape, _: Values) -> Columns:
+        load = np.tanh(signals.smooth(r.table, r.signals["T"], 2.0) / shape["torque_Nm"])
+        return {"transmission": column(np.gradient(load, r.table.step_s))}
+
+    return [
+        Effect("cable_stiffening", T, T, ("rad_per_Nm",), [{}], _one(T, lambda s, p, _: s["dT_slow"])),
+        Effect("cable_backlash", T, T, ("half_gap_rad",), [{"torque_Nm": x} for x in (0.003, 0.01, 0.03)], play),
+        Effect("pulley_slip", T, T, ("share",), [{}], _one(T, lambda s, p, _: s["w"])),
+    ]  # fmt: skip
+
+
+def _bristles(r: Recording, slide_rad: float) -> Array:
+    """Dahl's state over its limit: goes to the sign of the rate over a way of `slide_rad`, run by run."""
+    way = r.signals["w_smooth"] * r.table.step_s / slide_rad
+    keep = np.exp(-np.abs(way)).tolist()
+    sign = np.sign(way).tolist()
+    out, state = [], 0.0
+    starts = {run.start for run in r.table.runs}
+    for number, (share, direction) in enumerate(zip(keep, sign, strict=True)):
+        if number in starts:
+            state = 0.0
+        state = direction + (state - direction) * share if direction else state
+        out.append(state)
+    return np.asarray(out)

@@ -1,0 +1,158 @@
+"""Which cause explains a misfit: forward selection among the effects of a machine, with thresholds that are honest.
+
+Every effect is tried at every shape of its grid. What is taken must be more than chance among all that was tried, pay
+for its parameters (Bayesian information criterion), be possible for a machine, and what explains the data as well is
+told as a tie.
+"""
+
+import dataclasses
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from scipy import stats
+
+from ranger_sim.sysid.dataset import Array
+from ranger_sim.sysid.machine import Columns, Effect
+from ranger_sim.sysid.regression import Regression, explained
+
+LEVEL = 0.01  # of the whole selection, shared among all that is tried
+PAYS = 10.0  # difference of the information criterion that an effect must earn
+TIE = 6.0  # within this of the best is a tie
+MOST = 4  # effects that are taken
+
+
+@dataclasses.dataclass
+class Trial:
+    """One effect at one shape: its whitened columns, orthogonal to the base."""
+
+    effect: Effect
+    shape: Mapping[str, float]
+    columns: Array
+    inflation: float
+
+
+@dataclasses.dataclass
+class Named:
+    """An effect that was taken, at its best shape. p: by chance among all trials; bic: gained; tied: does as well."""
+
+    effect: Effect
+    shape: Mapping[str, float]
+    chi2: float
+    freedom: int
+    p: float
+    bic: float
+    tied: list[Effect]
+    rivals: list[tuple[Effect, float]]  # information criterion behind the best, for the report
+
+    @property
+    def coefficients(self) -> tuple[str, ...]:
+        """Names of its columns in a regression that has them, unlike those of any other effect."""
+        return tuple(f"{self.effect.cause}@{self.effect.at}:{name}" for name in self.effect.coefficients)
+
+
+def trials(effects: Sequence[Effect], regression: Regression) -> list[Trial]:
+    """Every effect at every shape."""
+    made = []
+    for effect in effects:
+        for shape in effect.shapes:
+            columns = [effect.columns(recording, shape, regression.values) for recording in regression.recordings]
+            if not any(columns):
+                continue
+            white = regression.columns(columns)
+            if np.linalg.norm(white) > 1e-6:
+                made.append(Trial(effect, shape, white, regression.inflation(white)))
+    return made
+
+
+def select(effects: Sequence[Effect], regression: Regression, level: float = LEVEL, most: int = MOST) -> list[Named]:
+    """The effects that the data ask for, the most telling first."""
+    all_trials = trials(effects, regression)
+    residual = regression.residual.copy()
+    taken: list[Named] = []
+    count = max(1, len(all_trials))
+    size = regression.size
+    while len(taken) < most:
+        scored = []
+        for trial in all_trials:
+            if any(trial.effect is each.effect for each in taken):
+                continue
+            chi2, freedom = explained(trial.columns, residual)
+            chi2 /= trial.inflation
+            if freedom:
+                shapes = len(trial.effect.shapes)
+                # a shape found on a grid is a parameter too
+                free = freedom + (1 if shapes > 1 else 0)
+                bic = chi2 - free * math.log(size) - 2.0 * math.log(shapes)
+                scored.append((bic, chi2, freedom, trial))
+        if not scored:
+            break
+        best: dict[int, tuple[float, float, int, Trial]] = {}
+        for each in scored:
+            key = id(each[3].effect)
+            if key not in best or each[0] > best[key][0]:
+                best[key] = each
+        ranking = sorted(best.values(), key=lambda each: -each[0])
+        chosen = next((each for each in ranking if _possible(each[3], residual)), None)
+        if chosen is None:
+            break
+        bic, chi2, freedom, trial = chosen
+        p = min(1.0, float(stats.chi2.sf(chi2, freedom)) * count)
+        if p >= level or bic <= PAYS:
+            break
+        rivals = [(each[3].effect, bic - each[0]) for each in ranking if each[3].effect is not trial.effect]
+        tied = [
+            each[3].effect
+            for each in ranking
+            if each[3].effect is not trial.effect and bic - each[0] < TIE and _possible(each[3], residual)
+        ]
+        taken.append(Named(trial.effect, trial.shape, chi2, freedom, p, bic, tied, rivals[:6]))
+        basis = _basis(trial.columns)
+        residual = residual - basis @ (basis.T @ residual)
+        for other in all_trials:
+            other.columns = other.columns - basis @ (basis.T @ other.columns)
+    return taken
+
+
+def coefficients(columns: Array, residual: Array) -> Array:
+    """Least-squares coefficients of these columns."""
+    return np.asarray(np.linalg.lstsq(columns, residual, rcond=1e-9)[0], dtype=float)
+
+
+def _possible(trial: Trial, residual: Array) -> bool:
+    found = coefficients(trial.columns, residual)
+    return trial.effect.admissible({**dict(zip(trial.effect.coefficients, found, strict=True)), **trial.shape})
+
+
+def _basis(columns: Array) -> Array:
+    q, r = np.linalg.qr(columns)
+    return q[:, np.abs(np.diag(r)) > 1e-9 * max(1e-300, np.max(np.abs(np.diag(r))))]
+
+
+def refit(
+    regression: Regression,
+    named: Sequence[Named],
+    together: Sequence[Named] | None = None,
+    values: Mapping[str, float] | None = None,
+) -> Regression:
+    """The regression with these effects in its base; noise and freed columns stay as they were.
+
+    together: what the base is to have besides, when the regression has some of it already. values: the machine's
+    parameters with which the effects' columns are made, those of the regression when None.
+    """
+    chosen = list(named if together is None else together)
+    if not chosen:
+        return regression
+    at = values if values is not None else regression.values
+    names = [name for each in chosen for name in each.coefficients]
+    extra: list[Columns] = []
+    for recording in regression.recordings:
+        made = [(each.effect.columns(recording, each.shape, at), len(each.effect.coefficients)) for each in chosen]
+        rows = len(recording.table)
+        extra.append(
+            {
+                equation: np.hstack([part.get(equation, np.zeros((rows, width))) for part, width in made])
+                for equation in recording.equations
+            }
+        )
+    return Regression(regression.recordings, extra, names, noise=regression, clean=regression)

@@ -1,0 +1,106 @@
+"""Filters and derivatives for measured signals, without phase, run by run.
+
+A balance is a linear equation between signals and their derivatives. Filtered by one filter on both sides it holds as
+before, and the derivative of the filtered signal is the filtered derivative: so derivatives are taken with the
+derivative of the same Gaussian that smooths everything else.
+"""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+from scipy import ndimage
+from scipy.signal import lfilter
+
+from ranger_sim.sysid.dataset import Array, Table
+
+
+def per_run(table: Table, work: Callable[..., Array], *columns: Array) -> Array:
+    """`work` on each run of the columns, put together again; shape (n,)."""
+    out = np.empty(len(table))
+    for run in table.runs:
+        out[run] = work(*(column[run] for column in columns))
+    return out
+
+
+def smooth(table: Table, column: Array, width: float) -> Array:
+    """The column under a Gaussian whose standard deviation is `width` samples; a run's end repeats its last value."""
+    return per_run(table, lambda part: ndimage.gaussian_filter1d(part, width, mode="nearest"), column)
+
+
+def derivative(table: Table, column: Array, width: float) -> Array:
+    """Rate per second of the smoothed column."""
+    step_s = table.step_s
+    return per_run(table, lambda part: ndimage.gaussian_filter1d(part, width, order=1, mode="nearest") / step_s, column)
+
+
+def around(table: Table, column: Array, gap: int, width: int) -> Array:
+    """Mean of `width` samples before and after each, those nearer than `gap` left out.
+
+    What a signal is near a sample, without that sample's own noise: cells made of it do not sort rows by noise that
+    stands in the row's residual too.
+    """
+    reach = gap + width
+    weights = np.zeros(2 * reach + 1)
+    weights[:width] = weights[-width:] = 0.5 / width
+    return per_run(table, lambda part: ndimage.convolve1d(part, weights, mode="nearest"), column)
+
+
+def lagged(table: Table, column: Array, time_constant_s: float) -> Array:
+    """Behind a first-order filter that starts at rest in 0."""
+    keep = math.exp(-table.step_s / time_constant_s)
+    return per_run(table, lambda part: lfilter([1.0 - keep], [1.0, -keep], part), column)
+
+
+def integral(table: Table, column: Array) -> Array:
+    """By trapezoids over the whole recording, 0 at its start; a gap counts as a straight line."""
+    steps = np.diff(table.time_s, prepend=table.time_s[0])
+    between = np.concatenate(([column[0]], 0.5 * (column[1:] + column[:-1])))
+    return np.cumsum(steps * between)
+
+
+def noise_deviation(table: Table, column: Array, resolution: float = 0.0) -> float:
+    """Standard deviation of white noise in the column, from its third differences, at least that of its rounding.
+
+    Third differences of a smooth signal are small; those of white noise have 20 times its variance. Their median
+    absolute value (0.6745 of a deviation) does not see jumps.
+    """
+    parts = [np.diff(column[run], 3) for run in table.runs if run.stop - run.start > 3]
+    differences = np.concatenate(parts) if parts else np.zeros(1)
+    white = float(np.median(np.abs(differences))) / 0.6745 / math.sqrt(20.0)
+    return max(white, resolution / math.sqrt(12.0))
+
+
+def uniform(table: Table) -> Table:
+    """The table on even stamps, run by run, each column by straight lines; itself when they are even already."""
+    step_s = table.step_s
+    if np.max(np.abs(np.diff(table.time_s) - step_s), initial=0.0, where=_inside(table)) < 0.01 * step_s:
+        return table
+    stamps: list[Array] = []
+    columns: dict[str, list[Array]] = {name: [] for name in table.columns}
+    runs: list[slice] = []
+    start = 0
+    for run in table.runs:
+        time_s = table.time_s[run]
+        even = time_s[0] + step_s * np.arange(int((time_s[-1] - time_s[0]) / step_s + 0.5) + 1)
+        even = even[even <= time_s[-1] + 1e-9]
+        stamps.append(even)
+        for name, column in table.columns.items():
+            columns[name].append(np.interp(even, time_s, column[run]))
+        runs.append(slice(start, start + len(even)))
+        start += len(even)
+    return Table(
+        np.concatenate(stamps),
+        {name: np.concatenate(parts) for name, parts in columns.items()},
+        tuple(runs),
+        table.name,
+        table.resolution,
+    )
+
+
+def _inside(table: Table) -> np.ndarray:
+    """True for the differences of stamps that lie within a run."""
+    inside = np.ones(max(0, len(table) - 1), dtype=bool)
+    for run in table.runs[1:]:
+        inside[run.start - 1] = False
+    return inside
