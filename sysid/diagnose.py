@@ -49,7 +49,7 @@ def diagnose(
     """What `machine`'s equations get wrong about these recordings. UserError when they cannot be judged at all."""
     recordings = [machine.prepare(table) for table in tables]
     general = misfit.general_features(machine, recordings)
-    whole = Regression(recordings, general=[columns for _, _, columns in general])
+    whole = Regression(recordings)
     effects = machine.effects(recordings)
     skews = _skews(effects, whole)
     plain = naming.refit(whole, skews)
@@ -60,7 +60,7 @@ def diagnose(
     extended = naming.refit(plain, named, [*skews, *named])
     after = misfit.look(extended, general)
     detected = before.p < GENERAL_LEVEL or bool(named)
-    share = _explained(plain, extended, after)
+    share = _explained(named, after)
     doubtful = detected and (not named or (share < EXPLAINED and after.p < GENERAL_LEVEL))
     answer: dict[str, Any] = {
         "detected": bool(detected),
@@ -107,9 +107,9 @@ def _skews(effects: Sequence[Effect], regression: Regression) -> list[Named]:
     return [each for each in found if abs(values[each.coefficients[0]]) < SKEW * step_s]
 
 
-def _explained(plain: Regression, extended: Regression, after: misfit.Misfit) -> float:
+def _explained(named: Sequence[Named], after: misfit.Misfit) -> float:
     """Share of the repeatable excess that the named effects explain."""
-    gained = plain.chi2 - extended.chi2 - (extended.count - plain.count)
+    gained = sum(each.chi2 - each.freedom for each in named)
     total = gained + after.excess
     return float(gained / total) if total > 0.0 else 0.0
 
@@ -218,13 +218,10 @@ def _gain(
 ) -> dict[str, Any]:
     recordings = [machine.prepare(table) for table in holdout]
     general = misfit.general_features(machine, recordings)
-    columns = [each for _, _, each in general]
-    base = Regression(recordings, noise=plain, general=columns)
+    base = naming.refit(Regression(recordings, noise=plain), skews, values=plain.values)
     if not named:
         return {"fraction_of_achievable": 0.0, "ci95": [0.0, 0.0], "holdout": ", ".join(t.name for t in holdout)}
-    one = naming.refit(base, skews, values=plain.values)
-    two = naming.refit(base, [*skews, *named], values=plain.values)
-    found = gain.measure(one, plain.values, two, extended.values, general, seed)
+    found = gain.measure(base, named, extended.values, general, seed)
     return {
         "fraction_of_achievable": found.fraction,
         "ci95": list(found.ci95),

@@ -1,12 +1,14 @@
 """What an extension of the model gains on data that had no part in finding it."""
 
 import dataclasses
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from ranger_sim.foundation.random_arrays import generator
-from ranger_sim.sysid.dataset import Array
 from ranger_sim.sysid.misfit import General
+from ranger_sim.sysid.naming import Named
+from ranger_sim.sysid.naming import coefficients as coefficients_of
 from ranger_sim.sysid.regression import Regression, orthonormal
 
 BLOCK = 50  # rows of one block of the bootstrap: longer than any memory of the residual
@@ -29,41 +31,46 @@ class Gain:
         return self.rms_after > self.rms_before
 
 
-def errors(regression: Regression, values: dict[str, float]) -> Array:
-    """Whitened residual (N,) of these parameters, found elsewhere."""
-    theta = np.array([values.get(name, 0.0) for name in regression.names])
-    return regression.response - regression.base @ theta
-
-
 def measure(
-    plain: Regression,
-    before: dict[str, float],
-    extended: Regression,
-    after: dict[str, float],
-    general: General,
-    seed: int,
+    plain: Regression, named: Sequence[Named], values: Mapping[str, float], general: General, seed: int
 ) -> Gain:
-    """plain, extended: of the held-out recordings, with the whitening found in training; before, after: parameters."""
-    first, second = errors(plain, before) ** 2, errors(extended, after) ** 2
-    features = np.hstack([extended.whitened(columns) for _, _, columns in general])
-    basis = orthonormal(np.hstack([extended.base, features]))
-    rest = extended.response - basis @ (basis.T @ extended.response)
-    floor = rest**2 * (len(rest) / max(1, len(rest) - basis.shape[1]))
-    blocks = max(1, len(first) // BLOCK)
-    sums = [
-        np.add.reduceat(each[: blocks * BLOCK], np.arange(0, blocks * BLOCK, BLOCK)) for each in (first, second, floor)
-    ]
+    """plain: the held-out recordings in the base model, whitened as in training. values: found in training.
+
+    The machine's own parameters are fitted anew, with and without the effects: temperature and wear of another day are
+    no fault of the extension. Its coefficients stay those of training; only the phase of a periodic effect is free,
+    for an incremental encoder starts anywhere. What can be achieved is what the effects and all general features
+    together take out of the residual, beyond what so many columns take out of noise.
+    """
+    before = plain.residual
+    after = before.copy()
+    columns = []
+    for each in named:
+        made = [each.effect.columns(recording, each.shape, plain.values) for recording in plain.recordings]
+        if not any(made):
+            continue
+        white = plain.columns(made)
+        columns.append(white)
+        coefficients = np.array([values[name] for name in each.coefficients])
+        if each.effect.phase_is_free and len(coefficients) == 2:
+            here = coefficients_of(white, before)
+            coefficients = here * (np.linalg.norm(coefficients) / max(float(np.linalg.norm(here)), 1e-300))
+        after = after - white @ coefficients
+    features = [plain.beside(plain.whitened(each)) for _, _, each in general]
+    basis = orthonormal(np.hstack([*columns, *features]))
+    fitted = basis @ (basis.T @ before)
+    # per row: what could be taken out, less what noise alone gives to so many columns
+    possible = before**2 - (before - fitted) ** 2 - basis.shape[1] / len(before)
+    blocks = max(1, len(before) // BLOCK)
+    edges = np.arange(0, blocks * BLOCK, BLOCK)
+    won, most = (np.add.reduceat(each[: blocks * BLOCK], edges) for each in (before**2 - after**2, possible))
     draws = generator(seed, "bootstrap of the gain").integers(0, blocks, (DRAWS, blocks))
-    zero, one, least = (each[draws].sum(axis=1) for each in sums)
-    achievable = np.maximum(zero - least, 1e-9)
-    fractions = (zero - one) / achievable
-    total = float(sum(sums[0]) - sum(sums[2]))
-    fraction = float((sums[0].sum() - sums[1].sum()) / total) if total > 0.0 else 0.0
+    bound = max(float(most.sum()), float(np.abs(won.sum())), 1e-9)
+    fractions = won[draws].sum(axis=1) / np.maximum(most[draws].sum(axis=1), 0.1 * bound)
     low, high = np.quantile(fractions, [0.025, 0.975])
     return Gain(
-        fraction,
+        float(won.sum()) / bound,
         (float(low), float(high)),
-        float(np.sqrt(np.mean(first))),
-        float(np.sqrt(np.mean(second))),
+        float(np.sqrt(np.mean(before**2))),
+        float(np.sqrt(np.mean(after**2))),
         ", ".join(recording.table.name for recording in plain.recordings),
     )

@@ -47,8 +47,9 @@ class Known:
 class Equation:
     """One balance over one recording. response: (n,); columns: (n,) by parameter; valid: (n,), rows that count.
 
-    instruments: for a parameter whose column is itself noisy (a derivative), columns (n, m) that move with it and do
-    not share its noise.
+    The columns are what was measured, noise and all. stand_ins: for a parameter, a column (n,) that moves as its own
+    does and has no noise in common with any measurement of this equation; fits and tests go against these
+    (instrumental variables), for a noisy column would leave its shadow in the residual.
     """
 
     name: str
@@ -58,7 +59,7 @@ class Equation:
     response: Array
     columns: dict[str, Array]
     valid: np.ndarray
-    instruments: dict[str, Array] = dataclasses.field(default_factory=dict)
+    stand_ins: dict[str, Array] = dataclasses.field(default_factory=dict)
 
 
 @dataclasses.dataclass
@@ -90,6 +91,7 @@ class Effect:
     columns: Callable[[Recording, Mapping[str, float], Values], Columns]
     admissible: Callable[[Mapping[str, float]], bool] = lambda found: True
     meaning: str = ""
+    phase_is_free: bool = False  # two coefficients, cosine and sine, of an angle whose zero another run does not share
 
     @property
     def name(self) -> str:

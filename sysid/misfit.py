@@ -18,9 +18,7 @@ from ranger_sim.sysid.regression import Regression, explained, orthonormal
 SINGLE_CELLS = 10
 PAIR_CELLS = 5
 TIME_CELLS = 8
-# Samples back. Beyond the smoothing of what they are made of, or 0: in between, a signal's slope has the noise of the
-# signal, which stands in the residual as well.
-BACK = (0, 100, 250)
+BACK = (0, 10, 30, 100)  # samples
 
 
 @dataclasses.dataclass(frozen=True)

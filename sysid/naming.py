@@ -135,7 +135,7 @@ def refit(
     together: Sequence[Named] | None = None,
     values: Mapping[str, float] | None = None,
 ) -> Regression:
-    """The regression with these effects in its base; noise and freed columns stay as they were.
+    """The regression with these effects in its base; the noise stays as it was.
 
     together: what the base is to have besides, when the regression has some of it already. values: the machine's
     parameters with which the effects' columns are made, those of the regression when None.
@@ -155,4 +155,4 @@ def refit(
                 for equation in recording.equations
             }
         )
-    return Regression(regression.recordings, extra, names, noise=regression, clean=regression)
+    return Regression(regression.recordings, extra, names, noise=regression)

@@ -16,6 +16,7 @@ from ranger_sim.foundation.user_error import UserError
 from ranger_sim.sysid.dataset import Array
 from ranger_sim.sysid.machine import Columns, Equation, Recording
 
+RANK = 1e-8  # a parameter whose column the others have to this part is not separable from them
 ORDER = 3  # of the autoregression: two for a filter, one more
 
 
@@ -63,6 +64,17 @@ def autoregression(residual: Array, valid: np.ndarray) -> Array:
 
 
 @dataclasses.dataclass
+class Part:
+    """One equation over all recordings, unwhitened: n rows, p columns measured and their stand-ins."""
+
+    response: Array
+    measured: Array
+    stand_in: Array
+    valid: np.ndarray
+    starts: np.ndarray
+
+
+@dataclasses.dataclass
 class Whitening:
     """How one equation's residual becomes white noise of deviation 1."""
 
@@ -73,7 +85,7 @@ class Whitening:
 class Regression:
     """Equations of some recordings, whitened, and what is asked of them.
 
-    response: (N,) whitened; base: (N, p) whitened columns of `names`; q: (N, p) orthonormal basis of the base.
+    response: (N,) whitened; measured, stand_in: (N, p) whitened columns of `names`; residual: (N,).
     """
 
     def __init__(
@@ -82,21 +94,15 @@ class Regression:
         extra: Sequence[Columns] = (),
         extra_names: Sequence[str] = (),
         noise: "Regression | None" = None,
-        general: Sequence[Sequence[Columns]] = (),
-        clean: "Regression | None" = None,
     ) -> None:
         """extra: more base columns, as an effect gives them: one {equation: (n, k)} per recording, named so. noise:
-        another regression whose whitening is taken over. general: features, each one {equation: (n, k)} per recording,
-        with which columns that have instruments are freed of their noise. clean: a regression of the same recordings
-        whose freed columns are taken over."""
+        another regression whose whitening and parameters are taken over as a start."""
         self.recordings = list(recordings)
         self.equations = list(dict.fromkeys(name for each in recordings for name in each.equations))
         self.names = list(dict.fromkeys(name for r in recordings for e in r.equations.values() for name in e.columns))
         self.names += list(extra_names)
         self.count = len(self.names)
         self.parts = {name: self._part(name, extra, list(extra_names)) for name in self.equations}
-        self.freed: list[str] = []  # parameters whose columns are free of their noise
-        self._free_of_noise(general)
         if noise is None:
             self.whitening: dict[str, Whitening] = {}
             self.shared: dict[tuple[str, str], float] = {}
@@ -104,89 +110,38 @@ class Regression:
         else:
             self.whitening, self.shared = noise.whitening, noise.shared
         self._whiten()
-        if clean is not None:
-            for name in clean.freed:
-                self.base[:, self.names.index(name)] = clean.base[:, clean.names.index(name)]
-            self.freed = clean.freed
-            self._solve()
-        if general:
-            self.purify(np.hstack([self.whitened(made) for made in general]))
 
-    def _part(
-        self, equation: str, extra: Sequence[Columns], extra_names: list[str]
-    ) -> tuple[Array, Array, np.ndarray, np.ndarray]:
-        """(response, base, valid, starts) of one equation over all recordings, unwhitened."""
-        responses, bases, valids, starts = [], [], [], []
+    def _part(self, equation: str, extra: Sequence[Columns], extra_names: list[str]) -> Part:
+        """One equation over all recordings, unwhitened."""
+        parts = []
         for number, recording in enumerate(self.recordings):
             rows = len(_rows(recording))
-            starts.append(_starts(recording))
+            measured = np.zeros((rows, self.count))
             made: Equation | None = recording.equations.get(equation)
-            base = np.zeros((rows, self.count))
             if made is None:
-                responses.append(np.zeros(rows))
-                valids.append(np.zeros(rows, dtype=bool))
-                bases.append(base)
+                nothing = np.zeros(rows, dtype=bool)
+                parts.append((np.zeros(rows), measured, measured.copy(), nothing, _starts(recording)))
                 continue
             for name, column in made.columns.items():
-                base[:, self.names.index(name)] = reduced(recording, column)
+                measured[:, self.names.index(name)] = reduced(recording, column)
+            stand_in = measured.copy()
+            for name, column in made.stand_ins.items():
+                stand_in[:, self.names.index(name)] = reduced(recording, column)
             if extra and equation in extra[number]:
                 first = self.count - len(extra_names)
-                base[:, first:] = reduced(recording, extra[number][equation])
-            responses.append(reduced(recording, made.response))
-            valids.append(made.valid[_rows(recording)])
-            bases.append(base)
-        return np.concatenate(responses), np.vstack(bases), np.concatenate(valids), np.concatenate(starts)
-
-    def _free_of_noise(self, general: Sequence[Sequence[Columns]]) -> None:
-        """The first of the two stages on rows that are not whitened yet, so that the noise is found without it."""
-        for equation, (_, base, valid, _) in self.parts.items():
-            made = [r.equations[equation].instruments for r in self.recordings if equation in r.equations]
-            names = [name for name in self.names if any(name in each for each in made)]
-            if not names:
-                continue
-            kept = [number for number, name in enumerate(self.names) if name not in names]
-            helpers = [base[:, kept]]
-            for name in names:
-                parts = []
-                for recording in self.recordings:
-                    there = recording.equations.get(equation)
-                    if there is None or name not in there.instruments:
-                        width = next(each[name].shape[1] for each in made if name in each)
-                        parts.append(np.zeros((len(_rows(recording)), width)))
-                    else:
-                        parts.append(reduced(recording, there.instruments[name]))
-                helpers.append(np.vstack(parts))
-            for feature in general:
-                width = next(column.shape[1] for each in feature for column in each.values())
-                if any(equation in each for each in feature):
-                    helpers.append(
-                        np.vstack(
-                            [
-                                reduced(recording, each[equation])
-                                if equation in each
-                                else np.zeros((len(_rows(recording)), width))
-                                for recording, each in zip(self.recordings, feature, strict=True)
-                            ]
-                        )
-                    )
-            all_helpers = np.hstack(helpers)
-            lengths = np.linalg.norm(all_helpers[valid], axis=0)
-            scaled = all_helpers[:, lengths > 0.0] / lengths[lengths > 0.0]
-            for name in names:
-                number = self.names.index(name)
-                gram = scaled[valid].T @ scaled[valid]
-                found = np.linalg.lstsq(gram, scaled[valid].T @ base[valid, number], rcond=1e-9)[0]
-                base[:, number] = scaled @ found
+                measured[:, first:] = stand_in[:, first:] = reduced(recording, extra[number][equation])
+            response, valid = reduced(recording, made.response), made.valid[_rows(recording)]
+            parts.append((response, measured, stand_in, valid, _starts(recording)))
+        return Part(*(np.concatenate(each) for each in zip(*parts, strict=True)))
 
     def _find_whitening(self) -> None:
-        """Ordinary least squares, whose residuals tell the noise; once more with that noise."""
+        """The residual of a first fit tells the noise; once more with that noise."""
         residuals = {}
         for _ in range(2):
             found = self._quick()
-            for name, (response, base, valid, _starts) in self.parts.items():
-                residual = response - base @ found
-                residuals[name] = residual
-                coefficients = autoregression(np.where(valid, residual, 0.0), valid)
+            for name, part in self.parts.items():
+                residual = residuals[name] = part.response - part.measured @ found
+                coefficients = autoregression(np.where(part.valid, residual, 0.0), part.valid)
                 white = lfilter(np.concatenate(([1.0], -coefficients)), [1.0], residual)
                 good = self._good(name)
                 deviation = float(np.sqrt(np.mean(white[good] ** 2))) if np.any(good) else 1.0
@@ -200,10 +155,10 @@ class Regression:
 
     def _good(self, equation: str) -> np.ndarray:
         """Rows that count: valid with everything before them that the whitening looks at."""
-        _, _, valid, starts = self.parts[equation]
-        good = valid & ~starts
+        part = self.parts[equation]
+        good = part.valid & ~part.starts
         for lag in range(1, ORDER + 1):
-            good[lag:] &= valid[:-lag]
+            good[lag:] &= part.valid[:-lag]
         good[:ORDER] = False
         return good
 
@@ -213,24 +168,28 @@ class Regression:
         return white / whitening.deviation
 
     def _quick(self) -> Array:
-        """Parameters by least squares with the whitening known so far."""
-        rows, responses = [], []
-        for name, (response, base, valid, _) in self.parts.items():
+        """Parameters with the whitening known so far."""
+        measured, stand_ins, responses = [], [], []
+        for name, part in self.parts.items():
             if name in self.whitening:
                 good = self._good(name)
-                rows.append(self._scaled(name, base)[good])
-                responses.append(self._scaled(name, response)[good])
+                columns = [self._scaled(name, each)[good] for each in (part.measured, part.stand_in, part.response)]
             else:
-                scale = max(float(np.std(response[valid])) if np.any(valid) else 1.0, 1e-12)
-                rows.append(base[valid] / scale)
-                responses.append(response[valid] / scale)
-        found, *_ = np.linalg.lstsq(np.vstack(rows), np.concatenate(responses), rcond=1e-10)
-        return found
+                level = float(np.std(part.response[part.valid])) if np.any(part.valid) else 1.0
+                scale = max(level, 1e-12)
+                columns = [each[part.valid] / scale for each in (part.measured, part.stand_in, part.response)]
+            measured.append(columns[0])
+            stand_ins.append(columns[1])
+            responses.append(columns[2])
+        stand_in = np.vstack(stand_ins)
+        found = np.linalg.lstsq(stand_in.T @ np.vstack(measured), stand_in.T @ np.concatenate(responses), rcond=1e-10)
+        return np.asarray(found[0], dtype=float)
 
     def _whiten(self) -> None:
         self.good = {name: self._good(name) for name in self.equations}
-        self.response = self._stack({name: part[0] for name, part in self.parts.items()})
-        self.base = self._stack({name: part[1] for name, part in self.parts.items()})
+        self.response = self._stack({name: part.response for name, part in self.parts.items()})
+        self.measured = self._stack({name: part.measured for name, part in self.parts.items()})
+        self.stand_in = self._stack({name: part.stand_in for name, part in self.parts.items()})
         self.size = len(self.response)
         self.both: dict[tuple[str, str], tuple[np.ndarray, np.ndarray]] = {}
         for one, other in self.shared:
@@ -244,22 +203,24 @@ class Regression:
     def _solve(self) -> None:
         if self.size <= 10 * self.count:
             raise UserError(f"{self.size} samples count, too few for {self.count} parameters")
-        scale = np.linalg.norm(self.base, axis=0)
+        scale = np.linalg.norm(self.stand_in, axis=0)
         self.idle = [name for name, length in zip(self.names, scale, strict=True) if length == 0.0]
-        q, r, pivot = linalg.qr(self.base / np.where(scale > 0.0, scale, 1.0), mode="economic", pivoting=True)
-        rank = int(np.count_nonzero(np.abs(np.diag(r)) > 1e-8 * abs(r[0, 0]))) if r.size else 0
-        self.unseparable = sorted(self.names[number] for number in pivot[rank:] if self.names[number] not in self.idle)
-        self.q = q[:, :rank]
-        solved = np.zeros(self.count)
-        inverse = linalg.solve_triangular(r[:rank, :rank], np.eye(rank))
-        solved[pivot[:rank]] = inverse @ (self.q.T @ self.response)
-        covariance = np.zeros((self.count, self.count))
-        covariance[np.ix_(pivot[:rank], pivot[:rank])] = inverse @ inverse.T
         scale = np.where(scale > 0.0, scale, 1.0)
-        self.covariance = covariance / np.outer(scale, scale)
-        self.solution = solved / scale
-        self.values = dict(zip(self.names, (float(each) for each in self.solution), strict=True))
-        self.residual = self.response - self.q @ (self.q.T @ self.response)
+        r, pivot = linalg.qr(self.stand_in / scale, mode="r", pivoting=True)
+        rank = int(np.count_nonzero(np.abs(np.diag(r)) > RANK * abs(r[0, 0])))
+        self.unseparable = sorted(self.names[number] for number in pivot[rank:] if self.names[number] not in self.idle)
+        kept = np.sort(pivot[:rank])
+        self.z = self.stand_in[:, kept] / scale[kept]
+        self.phi = self.measured[:, kept] / scale[kept]
+        self.inverse = np.linalg.inv(self.z.T @ self.phi)
+        solved = np.zeros(self.count)
+        solved[kept] = self.inverse @ (self.z.T @ self.response) / scale[kept]
+        covariance = np.zeros((self.count, self.count))
+        spread = self.inverse @ (self.z.T @ self.z) @ self.inverse.T
+        covariance[np.ix_(kept, kept)] = spread / np.outer(scale[kept], scale[kept])
+        self.covariance = covariance
+        self.values = dict(zip(self.names, (float(each) for each in solved), strict=True))
+        self.residual = self.response - self.measured @ solved
         self.chi2 = float(self.residual @ self.residual)
 
     def _stack(self, columns: Mapping[str, Array]) -> Array:
@@ -267,36 +228,17 @@ class Regression:
         scaled = {name: self._scaled(name, column) for name, column in columns.items()}
         return np.concatenate([scaled[name][self.good[name]] for name in self.equations])
 
-    def purify(self, features: Array) -> None:
-        """Take the noise out of the columns that have instruments.
-
-        Such a column is replaced by what the instruments, the other columns and these features (N, m) say of it: two
-        stages of least squares. What it loses is noise and orthogonal to everything that is tested afterwards; with
-        it in, the parameter would come out too small and its shadow would look like a misfit.
-        """
-        noisy: dict[str, list[Columns]] = {}
-        for number, recording in enumerate(self.recordings):
-            for equation in recording.equations.values():
-                for name, instruments in equation.instruments.items():
-                    noisy.setdefault(name, [{} for _ in self.recordings])[number][equation.name] = instruments
-        if not noisy:
-            return
-        self.freed = list(noisy)
-        kept = [number for number, name in enumerate(self.names) if name not in noisy]
-        helpers = [self.whitened(made) for made in noisy.values()]
-        basis = orthonormal(np.hstack([self.base[:, kept], *helpers, features]))
-        for name in noisy:
-            number = self.names.index(name)
-            self.base[:, number] = basis @ (basis.T @ self.base[:, number])
-        self._solve()
-
     def columns(self, made: Sequence[Columns]) -> Array:
         """An effect's columns, one {equation: (n, k)} per recording, whitened and orthogonal to the base: (N, k)."""
         return self.beside(self.whitened(made))
 
     def beside(self, stacked: Array) -> Array:
-        """What of whitened columns (N, k) the base does not have."""
-        return stacked - self.q @ (self.q.T @ stacked)
+        """What of whitened columns (N, k) the base does not have.
+
+        The residual is (1 - phi (z^T phi)^-1 z^T) noise; so a column's product with it is the product of this with the
+        noise, which has the variance of its length.
+        """
+        return stacked - self.z @ (self.inverse.T @ (self.phi.T @ stacked))
 
     def inflation(self, columns: Array) -> float:
         """How much larger than chance alone the chi-square of whitened columns (N, k) is, at least 1.

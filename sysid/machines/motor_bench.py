@@ -8,7 +8,6 @@ K stands in both: what changes one side of it only is a sensor's scale. Near sta
 its limit (eq. 35), and near zero current so may the brushes' drop: rows whose sign is within the noise do not count.
 """
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
@@ -18,10 +17,11 @@ from ranger_sim.sysid import signals
 from ranger_sim.sysid.dataset import Array, Table
 from ranger_sim.sysid.machine import Columns, Effect, Equation, Known, Quantity, Recording, Values
 
+CALM = 20.0  # samples; Gaussian of a signal whose own noise stands in the residual that it is to sort
 SLOW = 5.0  # samples; Gaussian of what must not have the noise of a derivative
-GAP, AROUND = 24, 12  # samples: beyond the Gaussian and the memory of the whitening, twice
 WIDTH = 2.0  # samples; Gaussian over both sides of each equation
 EVERY = 3  # rows that count after it
+REACH = 16  # samples about a jump or a change of sign that do not count: what is smoothed slowly is smeared so far
 JUMP_IN_STEPS = 0.06  # of the whole range, within one sample
 SIGN_IN_NOISE = 4.0  # deviations of noise within which a sign means nothing
 HEAT_TIMES_S = (3.0, 10.0, 30.0, 100.0, 300.0)
@@ -75,27 +75,26 @@ class MotorBench:
             )
         table = signals.uniform(table)
         V, I, w, T = (table[each.name] for each in self.quantities[:4])  # noqa: E741  (the paper's letters)
-        light = {name: signals.smooth(table, column_, 1.0) for name, column_ in (("I", I), ("w", w))}
-        s: dict[str, Array] = {"V": V, "I": I, "w": w, "T": T, "t": table.time_s - table.time_s[0]}
-        for name, values in (("dV", V), ("dI", I), ("dw", w), ("dT", T)):
-            s[name] = np.gradient(values, table.step_s)  # the Gaussian of both sides smooths it
-        noise_I = signals.noise_deviation(table, I, table.resolution.get("current_A", 0.0))
-        noise_w = signals.noise_deviation(table, w, table.resolution.get("speed_rad_per_s", 0.0))
-        s["dI_around"] = np.gradient(signals.around(table, I, GAP, AROUND), table.step_s)
-        s["dT_slow"] = signals.derivative(table, T, SLOW)
-        s["dI_slow"], s["dw_slow"] = signals.derivative(table, I, SLOW), signals.derivative(table, w, SLOW)
-        s["sgn_I"] = np.tanh(light["I"] / max(noise_I, 1e-9))
-        s["sgn_w"] = np.tanh(light["w"] / max(noise_w, 1e-9))
-        s["I_smooth"], s["w_smooth"] = light["I"], light["w"]
-        s["I_slow"], s["w_slow"] = signals.smooth(table, I, SLOW), signals.smooth(table, w, SLOW)
+        s: dict[str, Array] = {"V": V, "t": table.time_s - table.time_s[0]}
         measured = "motor_angle_rad" in table
         s["angle"] = table["motor_angle_rad"] if measured else self.gear * signals.integral(table, w)
+        # stand-ins: speed by the angle, current by voltage and speed; neither has the noise of what it stands for
+        s["w"] = signals.derivative(table, s["angle"], SLOW) / self.gear if measured else signals.smooth(table, w, SLOW)
+        s["dw"] = np.gradient(s["w"], table.step_s)
+        rough = _rough_electrics(V, I, s["w"])
+        s["I"] = _current(signals.smooth(table, V, 1.0), s["w"], *rough)
+        s["w_by_voltage"] = signals.smooth(table, V - rough[0] * I - rough[1] * np.sign(s["I"]), SLOW) / rough[2]
+        s["dI"] = np.gradient(s["I"], table.step_s)
+        s["dT"] = signals.derivative(table, T, SLOW)
+        s["dV"] = np.gradient(V, table.step_s)
+        steady = _no_jump(V, JUMP_IN_STEPS, REACH)
+        noise_I, noise_w = _spread(I - s["I"], steady), _spread(w - s["w"], steady)
+        s["sgn_I"], s["sgn_w"] = np.tanh(s["I"] / max(noise_I, 1e-9)), np.tanh(s["w"] / max(noise_w, 1e-9))
         if "temperature_C" in table:
             s["warmth"] = signals.smooth(table, table["temperature_C"], 50.0) - 25.0
-        reach = int(math.ceil(3.0 * SLOW)) + 1  # what is smoothed slowly is smeared so far
-        steady = _no_jump(V, JUMP_IN_STEPS, reach)
-        firm_I = steady & _away(light["I"], SIGN_IN_NOISE * noise_I, reach)
-        firm_w = steady & _away(light["w"], SIGN_IN_NOISE * noise_w, reach)
+        firm_I = steady & _away(s["I"], SIGN_IN_NOISE * noise_I, REACH)
+        firm_w = steady & _away(s["w"], SIGN_IN_NOISE * noise_w, REACH)
+        loaded = -s["sgn_w"] * np.sign(s["I"])
         equations = {
             "electric": Equation(
                 "electric",
@@ -110,7 +109,7 @@ class MotorBench:
                     "inductance_H": s["dI"],
                 },
                 firm_I,
-                {"inductance_H": column(s["dI_slow"], s["dV"])},
+                {"resistance_ohm": s["I"], "torque_constant_Nm_per_A": s["w"]},
             ),
             "mechanical": Equation(
                 "mechanical",
@@ -122,11 +121,16 @@ class MotorBench:
                     "torque_constant_Nm_per_A": I,
                     "constant_friction_Nm": -s["sgn_w"],
                     "viscous_friction_Nms": -w,
-                    "load_friction_Nm_per_A": -np.abs(light["I"]) * s["sgn_w"],
-                    "inertia_kg_m2": -s["dw"],
+                    "load_friction_Nm_per_A": loaded * I,
+                    "inertia_kg_m2": -np.gradient(w, table.step_s),
                 },
                 firm_w,
-                {"inertia_kg_m2": _acceleration_helpers(table, s)},
+                {
+                    "torque_constant_Nm_per_A": s["I"],
+                    "viscous_friction_Nms": -s["w"],
+                    "load_friction_Nm_per_A": loaded * s["I"],
+                    "inertia_kg_m2": -s["dw"],
+                },
             ),
         }
         if measured:
@@ -141,14 +145,17 @@ class MotorBench:
     def generic(self, recording: Recording) -> dict[str, dict[str, Array]]:
         """Signals over which each equation is looked at without a cause in mind."""
         s = recording.signals
-        shared = {name: signals.around(recording.table, s[name], GAP, AROUND) for name in ("I", "w", "V")}
-        shared["t"] = s["t"]
-        return {name: shared for name in recording.equations}
+        calm = {name: signals.smooth(recording.table, s[name], CALM) for name in ("I", "V")}
+        of_voltage = {**calm, "w": s["w"], "t": s["t"]}
+        of_torque = {name: s[name] for name in ("I", "w", "V", "t")}
+        of_speed = {**of_torque, "w": s["w_by_voltage"]}
+        made = {"electric": of_voltage, "mechanical": of_torque, "transmission": of_speed}
+        return {name: made[name] for name in recording.equations}
 
     def effects(self, recordings: Sequence[Recording]) -> list[Effect]:
         """The catalogue's causes that such a bench can have."""
-        top_w = max(float(np.quantile(np.abs(r.signals["w_smooth"]), 0.98)) for r in recordings)
-        top_I = max(float(np.quantile(np.abs(r.signals["I_smooth"]), 0.98)) for r in recordings)
+        top_w = max(float(np.quantile(np.abs(r.signals["w"]), 0.98)) for r in recordings)
+        top_I = max(float(np.quantile(np.abs(r.signals["I"]), 0.98)) for r in recordings)
         top_V = max(float(np.max(np.abs(r.signals["V"]))) for r in recordings)
         made = _electric(top_I, top_V, all("warmth" in r.signals for r in recordings))
         made += _sensors(self.gear, top_w, top_V)
@@ -165,12 +172,23 @@ def _away(values: Array, limit: float, reach: int) -> np.ndarray:
     return np.convolve(near, np.ones(2 * reach + 1), mode="same") < 0.5
 
 
-def _acceleration_helpers(table: Table, s: Mapping[str, Array]) -> Array:
-    """Columns (n, m) that move with the acceleration and hardly have the noise of the speed's difference."""
-    slow = signals.smooth(table, s["w"], SLOW)
-    rate = np.gradient(slow, table.step_s)
-    bend = np.gradient(np.gradient(rate, table.step_s), table.step_s)
-    return column(rate, bend, s["dV"], signals.smooth(table, s["dI"], SLOW))
+def _rough_electrics(V: Array, I: Array, w: Array) -> tuple[float, float, float]:  # noqa: E741
+    """(R, V_c, K G) by plain least squares; good enough for a stand-in."""
+    found = np.linalg.lstsq(np.column_stack([I, np.sign(I), w]), V, rcond=None)[0]
+    resistance, drop, constant = (float(each) for each in found)
+    return max(resistance, 1e-6), max(drop, 0.0), constant
+
+
+def _current(V: Array, w: Array, resistance: float, drop: float, constant: float) -> Array:
+    """What flows by the electric equation: nothing while the driving voltage stays below the brushes' drop."""
+    driving = V - constant * w
+    return np.sign(driving) * np.maximum(np.abs(driving) - drop, 0.0) / resistance
+
+
+def _spread(difference: Array, where: np.ndarray) -> float:
+    """Standard deviation of most of it: outliers have no say."""
+    part = difference[where] if np.any(where) else difference
+    return float(np.median(np.abs(part - np.median(part)))) / 0.6745
 
 
 def _no_jump(values: Array, limit: float, reach: int) -> np.ndarray:
@@ -185,17 +203,17 @@ def _no_jump(values: Array, limit: float, reach: int) -> np.ndarray:
 
 def _regimes(s: Mapping[str, Array], moving: np.ndarray) -> dict[str, np.ndarray]:
     """Rows by what the machine does: standstill, low speed, cruise, accelerating; signs of rate and power."""
-    speed = np.abs(s["w_smooth"])
+    speed = np.abs(s["w"])
     top = float(np.quantile(speed, 0.98))
     changing = np.abs(s["dw"]) > float(np.quantile(np.abs(s["dw"]), 0.8))
-    power = s["I_smooth"] * s["w_smooth"]
+    power = s["I"] * s["w"]
     return {
         "standstill": ~moving,
         "low speed": moving & (speed < 0.2 * top),
         "cruise": moving & (speed >= 0.2 * top) & ~changing,
         "accelerating": moving & changing,
-        "forward": moving & (s["w_smooth"] > 0),
-        "backward": moving & (s["w_smooth"] < 0),
+        "forward": moving & (s["w"] > 0),
+        "backward": moving & (s["w"] < 0),
         "driving": moving & (power > 0),
         "braking": moving & (power < 0),
     }
@@ -252,14 +270,6 @@ def _electric(top_I: float, top_V: float, warmth: bool) -> list[Effect]:
             meaning="resistance that grows with the winding's temperature",
         ),
         Effect("torque_constant_temperature", "hip_motor", E, ("per_heat",), heats, torque_constant),
-        Effect(
-            "inductance_frequency",
-            "hip_motor",
-            E,
-            ("inductance_H",),
-            [{"time_constant_s": time_s} for time_s in (0.005, 0.01, 0.02, 0.05)],
-            lambda r, p, _: {"electric": column(signals.lagged(r.table, r.signals["dI_around"], p["time_constant_s"]))},
-        ),
         Effect(
             "dead_time",
             "hip_motor",
@@ -321,34 +331,51 @@ def _sensors(gear: float, top_w: float, top_V: float) -> list[Effect]:
         return {
             "electric": column(-v["torque_constant_Nm_per_A"] * ones),
             "mechanical": column(v["viscous_friction_Nms"] * ones),
+            "transmission": column(-ones),
         }
 
     def current_lag(r: Recording, _: Shape, v: Values) -> Columns:
         s = r.signals
         return {
-            "electric": column(v["resistance_ohm"] * s["dI_slow"]),
-            "mechanical": column(v["torque_constant_Nm_per_A"] * s["dI_slow"]),
+            "electric": column(v["resistance_ohm"] * s["dI"]),
+            "mechanical": column(v["torque_constant_Nm_per_A"] * s["dI"]),
         }
 
     def speed_lag(r: Recording, _: Shape, v: Values) -> Columns:
         s = r.signals
         return {
-            "electric": column(v["torque_constant_Nm_per_A"] * s["dw_slow"]),
-            "mechanical": column(-v["viscous_friction_Nms"] * s["dw_slow"]),
+            "electric": column(v["torque_constant_Nm_per_A"] * s["dw"]),
+            "mechanical": column(-v["viscous_friction_Nms"] * s["dw"]),
+            "transmission": column(s["dw"]),
         }
 
-    def eccentric(r: Recording, shape: Shape, v: Values) -> Columns:
+    def eccentric_speed(r: Recording, shape: Shape, v: Values) -> Columns:
+        """The output's encoder: once or twice per turn of the output."""
         s = r.signals
-        angle = shape["turns"] * s["angle"] / gear
+        angle = shape["periods_per_turn"] * s["angle"] / gear
         error, other = s["w"] * np.cos(angle), s["w"] * np.sin(angle)
-        rate, other_rate = np.gradient(error, r.table.step_s), np.gradient(other, r.table.step_s)
-        k, c, j = v["torque_constant_Nm_per_A"], v["viscous_friction_Nms"], v["inertia_kg_m2"]
-        return {
-            "electric": column(-k * error, -k * other),
-            "mechanical": column(c * error + j * rate, c * other + j * other_rate),
-        }
+        k = v["torque_constant_Nm_per_A"]
+        return {"electric": column(-k * error, -k * other), "transmission": column(-error, -other)}
 
-    turns = [{"turns": 1.0}, {"turns": 2.0}, {"turns": gear}]
+    def eccentric_angle(r: Recording, shape: Shape, _: Values) -> Columns:
+        """The rotor's encoder: once or twice per turn of the rotor."""
+        angle = shape["periods_per_turn"] * r.signals["angle"]
+        return {T: column(*(np.gradient(f(angle), r.table.step_s) / gear for f in (np.cos, np.sin)))}
+
+    def over(s: Mapping[str, Array], shape: Shape, _: Values) -> Array:
+        w = s["w_by_voltage"]
+        return -np.sign(w) * np.maximum(np.abs(w) - shape["speed_rad_s"], 0.0)
+
+    def lost_speed(r: Recording, shape: Shape, v: Values) -> Columns:
+        lost = over(r.signals, shape, v)
+        return {"electric": column(-v["torque_constant_Nm_per_A"] * lost), T: column(-lost)}
+
+    def drifting(s: Mapping[str, Array], _: Shape, __: Values) -> Array:
+        return s["t"] * s["dT"]
+
+    T = "transmission"
+    fast = [{"speed_rad_s": share * top_w} for share in (0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)]
+    turns = [{"periods_per_turn": n} for n in (1.0, 2.0)]
     return [
         Effect("sensor_scale", "current_A", S, ("change",), [{}], _one("mechanical", lambda s, p, _: s["I"])),
         Effect("sensor_offset", "voltage_V", S, ("offset_V",), [{}], _one("electric", _ones)),
@@ -361,27 +388,17 @@ def _sensors(gear: float, top_w: float, top_V: float) -> list[Effect]:
             S,
             ("offset_A",),
             [{}],
-            current_offset(lambda s: np.where(np.abs(s["V"]) < 0.02 * top_V, 1.0, 0.0)),
+            current_offset(lambda s: np.tanh(s["V"] / (0.02 * top_V))),
         ),
         Effect("sensor_lag", "voltage_V", S, ("time_constant_s",), [{}], _one("electric", _minus("dV"))),
         Effect("sensor_lag", "current_A", S, ("time_constant_s",), [{}], current_lag),
         Effect("sensor_lag", "speed_rad_per_s", S, ("time_constant_s",), [{}], speed_lag),
-        Effect("sensor_lag", "torque_Nm", S, ("time_constant_s",), [{}], _one("mechanical", _minus("dT_slow"))),
-        Effect("eccentricity", "speed_rad_per_s", S, ("cosine", "sine"), turns, eccentric),
-        Effect(
-            "lost_counts",
-            "speed_rad_per_s",
-            S,
-            ("share",),
-            [{"speed_rad_s": share * top_w} for share in (0.4, 0.5, 0.6, 0.7, 0.8, 0.9)],
-            lambda r, p, v: {
-                "electric": column(
-                    v["torque_constant_Nm_per_A"]
-                    * np.sign(r.signals["w"])
-                    * np.maximum(np.abs(r.signals["w_smooth"]) - p["speed_rad_s"], 0.0)
-                )
-            },
-        ),
+        Effect("sensor_lag", "torque_Nm", S, ("time_constant_s",), [{}], _one("mechanical", _minus("dT"))),
+        Effect("eccentricity", "speed_rad_per_s", S, ("cosine", "sine"), turns, eccentric_speed, phase_is_free=True),
+        Effect("eccentricity", "motor_angle_rad", S, ("cosine_rad", "sine_rad"), turns, eccentric_angle, phase_is_free=True),
+        Effect("lost_counts", "speed_rad_per_s", S, ("share",), fast, lost_speed),
+        Effect("lost_counts", "motor_angle_rad", S, ("share",), fast, _one(T, over)),
+        Effect("clock_drift", "torque_Nm", S, ("share",), [{}], _one("mechanical", drifting)),
     ]  # fmt: skip
 
 
@@ -394,12 +411,12 @@ def _friction(top_w: float) -> list[Effect]:
 
     def warm_up(r: Recording, shape: Shape, _: Values) -> Columns:
         s = r.signals
-        worked = signals.lagged(r.table, np.abs(s["w_smooth"]), shape["time_constant_s"])
+        worked = signals.lagged(r.table, np.abs(s["w"]), shape["time_constant_s"])
         return {"mechanical": column(s["sgn_w"] * worked)}
 
     def direction(kind: str) -> Made:
         def made(s: Mapping[str, Array], _: Shape, __: Values) -> Array:
-            return -np.ones_like(s["w"]) if kind == "coulomb" else -np.abs(s["w_smooth"])
+            return -np.ones_like(s["w"]) if kind == "coulomb" else -np.abs(s["w"])
 
         return _one("mechanical", made)
 
@@ -410,7 +427,7 @@ def _friction(top_w: float) -> list[Effect]:
             M,
             ("excess_Nm",),
             speeds,
-            _one("mechanical", lambda s, p, _: -s["sgn_w"] * np.exp(-((s["w_smooth"] / p["speed_rad_s"]) ** 2))),
+            _one("mechanical", lambda s, p, _: -s["sgn_w"] * np.exp(-((s["w"] / p["speed_rad_s"]) ** 2))),
             lambda found: found["excess_Nm"] > 0.0,
             "friction that is larger at low speed",
         ),
@@ -430,7 +447,7 @@ def _friction(top_w: float) -> list[Effect]:
             M,
             ("per_A",),
             [{}],
-            _one("mechanical", lambda s, p, _: -np.abs(s["I"]) * s["sgn_w"] * (s["I_smooth"] * s["w_smooth"] > 0.0)),
+            _one("mechanical", lambda s, p, _: -np.abs(s["I"]) * s["sgn_w"] * (s["I"] * s["w"] > 0.0)),
             meaning="friction under load that differs between driving and being driven",
         ),
         Effect("direction_friction", "hip_motor", M, ("coulomb_Nm",), [{}], direction("coulomb")),
@@ -451,7 +468,7 @@ def _friction(top_w: float) -> list[Effect]:
             M,
             ("quadratic_Nms2",),
             [{}],
-            _one("mechanical", lambda s, p, _: -s["w"] * np.abs(s["w_smooth"])),
+            _one("mechanical", lambda s, p, _: -s["w"] * np.abs(s["w"])),
             lambda found: found["quadratic_Nms2"] > 0.0,
         ),
     ]
@@ -469,18 +486,22 @@ def _periodic(gear: float) -> list[Effect]:
         return {"mechanical": column(*wave(r, shape))}
 
     def commutation(r: Recording, shape: Shape, v: Values) -> Columns:
-        cos, sin = wave(r, shape)
-        drive = v["torque_constant_Nm_per_A"] * r.signals["I"]
-        return {"mechanical": column(drive * cos, drive * sin)}
+        """K itself ripples: in the torque and in the voltage that the turning rotor makes."""
+        k = v["torque_constant_Nm_per_A"]
+        both = wave(r, shape)
+        return {
+            "electric": column(*(k * r.signals["w"] * each for each in both)),
+            "mechanical": column(*(k * r.signals["I"] * each for each in both)),
+        }
 
     def turn(r: Recording, shape: Shape, _: Values) -> Columns:
         angle = shape["periods_per_turn"] * r.signals["angle"] / gear
         return {"mechanical": column(np.cos(angle), np.sin(angle))}
 
     return [
-        Effect("cogging", "hip_motor", M, ("cosine_Nm", "sine_Nm"), each, cogging),
-        Effect("commutation_ripple", "hip_motor", M, ("cosine", "sine"), each, commutation),
-        Effect("once_per_turn", "hip_joint", M, ("cosine_Nm", "sine_Nm"), each[:3], turn),
+        Effect("cogging", "hip_motor", M, ("cosine_Nm", "sine_Nm"), each, cogging, phase_is_free=True),
+        Effect("commutation_ripple", "hip_motor", M, ("cosine", "sine"), each, commutation, phase_is_free=True),
+        Effect("once_per_turn", "hip_joint", M, ("cosine_Nm", "sine_Nm"), each[:3], turn, phase_is_free=True),
     ]  # fmt: skip
 
 
@@ -488,19 +509,19 @@ def _transmission() -> list[Effect]:
     T = "transmission"
 
     def play(r: Recording, shape: Shape, _: Values) -> Columns:
-        load = np.tanh(signals.smooth(r.table, r.signals["T"], 2.0) / shape["torque_Nm"])
+        load = np.tanh(signals.smooth(r.table, r.table["torque_Nm"], 2.0) / shape["torque_Nm"])
         return {"transmission": column(np.gradient(load, r.table.step_s))}
 
     return [
-        Effect("cable_stiffening", T, T, ("rad_per_Nm",), [{}], _one(T, lambda s, p, _: s["dT_slow"])),
+        Effect("cable_stiffening", T, T, ("rad_per_Nm",), [{}], _one(T, lambda s, p, _: s["dT"])),
         Effect("cable_backlash", T, T, ("half_gap_rad",), [{"torque_Nm": x} for x in (0.003, 0.01, 0.03)], play),
-        Effect("pulley_slip", T, T, ("share",), [{}], _one(T, lambda s, p, _: s["w"])),
+        Effect("pulley_slip", T, T, ("share",), [{}], _one(T, lambda s, p, _: s["w_by_voltage"])),
     ]  # fmt: skip
 
 
 def _bristles(r: Recording, slide_rad: float) -> Array:
     """Dahl's state over its limit: goes to the sign of the rate over a way of `slide_rad`, run by run."""
-    way = r.signals["w_smooth"] * r.table.step_s / slide_rad
+    way = r.signals["w"] * r.table.step_s / slide_rad
     keep = np.exp(-np.abs(way)).tolist()
     sign = np.sign(way).tolist()
     out, state = [], 0.0
