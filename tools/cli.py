@@ -43,6 +43,7 @@ def parser() -> argparse.ArgumentParser:
     from ranger_sim.tools.bench import command as bench
     from ranger_sim.tools.campaign import command as campaign
     from ranger_sim.tools.fuzz import command as fuzz
+    from ranger_sim.tools.identify import command as identify
     from ranger_sim.tools.vm import command as vm
 
     top = OneLineParser(
@@ -69,6 +70,7 @@ def parser() -> argparse.ArgumentParser:
     slots.register(commands)
     campaign.register(commands)
     causes.register(commands)
+    identify.register(commands)
     return top
 
 
