@@ -18,8 +18,8 @@ from ranger_sim.sysid import causes, channels, isolability
 from ranger_sim.tools import terminal
 
 REASONS = {
-    "structure": "they enter the same equations, and look alike there",
-    "signature": "different equations, alike once the parameters are fitted",
+    "structure": "no equation shows one without the other, and they look alike",
+    "signature": "equations could show one without the other, but they look alike once the parameters are fitted",
 }
 
 

@@ -23,6 +23,7 @@ EMPTY = ("", "-", "na", "n/a", "null", "none")
 NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?|[-+]?(?:nan|inf|infinity)", re.IGNORECASE)
 DECIMAL_COMMA = re.compile(r"[-+]?\d*,\d+(?:[eE][-+]?\d+)?")
 CLOCKS = ("datetime", "date_time", "date", "utc")  # columns that hold ISO dates, besides those called time
+SNIFFED_CELLS = 50
 NAMED_LINES = 3  # of the places of a finding, so many are named
 LARGEST_BYTES = 2_000_000_000
 
@@ -196,14 +197,16 @@ def _time(
         stem, unit = units.split(mapping.get(name, name))
         if stem.lower() not in (*units.TIME_WORDS, *CLOCKS):
             continue
-        dates = [_date_s(cell) for cell in cells[index]]
-        if sum(date is not None for date in dates) > len(dates) // 2:
+        some = cells[index][:SNIFFED_CELLS]
+        if sum(_date_s(cell) is not None for cell in some) > len(some) // 2:
+            dates = [_date_s(cell) for cell in cells[index]]
             stamps = np.array([np.nan if date is None else date for date in dates])
             dataset.repairs.append(Repair("", "dates", len(stamps), f"{name}: dates are read as seconds"))
             return index, stamps
         said = units.unit_of(unit_texts[index] or "") if unit_texts[index] else None
         unit = said or unit or (units.unit_of(time_unit) if time_unit else None)
-        stamps = np.array([_value(cell, decimal_comma) for cell in cells[index]])
+        plain = _plain_numbers(cells[index], decimal_comma)
+        stamps = plain if plain is not None else np.array([_value(cell, decimal_comma) for cell in cells[index]])
         if unit is None:
             text = f"{name}: nothing says the unit of the stamps; seconds are assumed"
             dataset.findings.append(Finding("", "unit_assumed", *columns.ends(stamps), 1.0, "s", text))
@@ -247,6 +250,9 @@ def _numbers(
     decimal_comma: bool,
 ) -> tuple[Array, np.ndarray, float]:
     """(values, where there is one, size of the last digit) of a column; what is unreadable is told."""
+    plain = _plain_numbers(cells, decimal_comma)
+    if plain is not None:
+        return plain, np.ones(len(plain), dtype=bool), _last_digit(cells)
     present = np.array([cell.lower() not in EMPTY for cell in cells])
     value = np.array([_value(cell, decimal_comma) for cell in cells])
     odd = [i for i in np.flatnonzero(np.isnan(value) & present) if not re.fullmatch("[-+]?nan", cells[i].lower())]
@@ -258,10 +264,22 @@ def _numbers(
     return value, present, _last_digit(cells)
 
 
+def _plain_numbers(cells: list[str], decimal_comma: bool) -> Array | None:
+    """The values of a column in which every cell is a number, at once; None for any other."""
+    if decimal_comma or "_" in "".join(cells):
+        return None
+    try:
+        value = np.array(list(map(float, cells)))
+    except ValueError:
+        return None
+    return None if np.isnan(value).any() else value
+
+
 def _last_digit(cells: list[str]) -> float:
     """Size of the finest digit that is written, by a sample of the cells; 0 beside powers of ten."""
     finest = 1.0
-    written = [cell for cell in cells if cell.lower() not in EMPTY]
+    some = cells[:: max(1, len(cells) // 5000)]
+    written = [cell for cell in some if cell.lower() not in EMPTY]
     for cell in written[:: max(1, len(written) // 500)]:
         if "e" in cell.lower():
             return 0.0

@@ -237,11 +237,11 @@ def test_a_robot_log_of_our_own_is_read_with_the_units_of_the_table(tmp_path):
 
 def test_a_log_without_names_keeps_its_numbers_and_says_so(tmp_path):
     path = tmp_path / "Data.txt"
-    path.write_text("14\t0.5\t1000\n14\t0.6\t1002\n62\t-1\t1001\n14\t0.7\t1004\n")
+    path.write_text("14\t0.5\t1000\n14\t0.6\t1002\n14\t0.\n62\t-1\t1001\n14\t0.7\t1004\n")
     data = read(path, {"id_14": "hip_angle_rad"})
     assert data["hip_angle_rad"].value.tolist() == [0.5, 0.6, 0.7]
     assert "id_62" in data
-    assert {each.kind for each in data.findings} == {"no_header", "no_unit"}
+    assert {each.kind: each.size for each in data.findings} == {"ragged": 1.0, "no_header": 2.0, "no_unit": 0.0}
 
 
 def test_a_measurement_file_keeps_units_and_leaves_out_what_no_instrument_sees(tmp_path):
