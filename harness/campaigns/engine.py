@@ -46,8 +46,11 @@ class Campaign:
         return case.key(self.version, self.plan.watch_key())
 
     def result(self, case: Case) -> Result | None:
-        """The result of a case, when it is there."""
-        return self.store.results.get(self.key(case))
+        """The result of a case, when it is there; None as well for one that timed out and has more time now."""
+        found = self.store.results.get(self.key(case))
+        if found is not None and found["outcome"] == "timed out" and found["limit_s"] < self.plan.watch.limit_s:
+            return None
+        return found
 
     @property
     def foreseen(self) -> int:
@@ -118,6 +121,8 @@ class Campaign:
             groups.setdefault(case.golden().text(), []).append((key, case))
         healthy = self.healthy([members[0][1].golden() for members in groups.values()], pool, tell)
         requests = []
+        for key in keys:
+            self.store.forget(key)  # one that timed out
         for members in groups.values():
             golden = members[0][1].golden()
             least = min(LEAST_IN_A_GROUP, math.ceil(len(members) / pool.jobs))

@@ -185,7 +185,7 @@ def finished(case: dict[str, Any], work: Callable[[], Result], watch: Watch) -> 
     try:
         result = branch(work, watch.limit_s, WALL_PER_CPU * watch.limit_s)
     except BranchError as error:
-        result = {"outcome": error.outcome, "why": str(error)}
+        result = {"outcome": error.outcome, "why": str(error), "limit_s": watch.limit_s}
     spent = {"wall_s": round(wallclock.monotonic_s() - begun, 3), "cpu_s": result.pop("cpu_s", None)}
     return {"key": case["key"], **result, "spent": spent}
 

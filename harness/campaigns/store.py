@@ -56,6 +56,10 @@ class Store:
         self.results[result["key"]] = result
         return True
 
+    def forget(self, key: str) -> None:
+        """A result that is to be had anew; in the file the later one counts."""
+        self.results.pop(key, None)
+
     def close(self) -> None:
         """Let another one write."""
         self.file.close()
