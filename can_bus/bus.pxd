@@ -7,7 +7,7 @@ from ranger_sim.can_bus.bus_counters cimport BusCounters
 from ranger_sim.can_bus.disturbance cimport Disturbance
 from ranger_sim.can_bus.frame cimport (
     ACK_DELIMITER_FROM_END, EIGHT_BYTES, HIGHEST_EXTENDED, HIGHEST_STANDARD, INTERMISSION_BITS, LENGTH_CODE, MEASURED_BITS,
-    RECEIVERS_SEE, SENDABLE, arbitration_key, measure,
+    RECEIVERS_SEE, SENDABLE, arbitration_key, measure, frame_bits,
 )
 from ranger_sim.can_bus.frame_log cimport SENDER_SHIFT, TIMES_BUFFER_SHIFT, FrameLog
 from ranger_sim.can_bus.load_meter cimport LoadMeter

@@ -51,6 +51,7 @@ if not cython.compiled:
         MEASURED_BITS,
         RECEIVERS_SEE,
         SENDABLE,
+        frame_bits,
     )
     from ranger_sim.can_bus.frame_log import SENDER_SHIFT, TIMES_BUFFER_SHIFT
     from ranger_sim.can_bus.medium_access import (
@@ -174,6 +175,10 @@ class Bus:
         """A frame has passed on the real bus that stands in the place of this one, which keeps the record."""
         self.counters.frames += 1
         self.log.add(time, identifier, flags, lo, hi, -1)
+        if self.log.times is not None:  # who asked for it, and when, nobody here knows
+            bits = frame_bits(identifier, flags & RECEIVERS_SEE, lo, hi)
+            begun = time - bits * SECOND_NS // self.bitrate
+            self.log.times.add(begun, begun, time, identifier, flags & RECEIVERS_SEE, lo, hi)
 
     def wake(self, wakes, place) -> None:
         """From now on an earlier `next_time` lowers `wakes[place]` (whole numbers, ns) to it."""

@@ -24,7 +24,7 @@ cpdef enum:
 @cython.final
 cdef class ActivityLog(RowStream):
     cdef public list sinks
-    cdef public long long handed, laps
+    cdef public long long handed, laps, keep_ns
     cdef public bint code_open, list_open, irq_open
     cdef public long long code_kind, code_number, code_start, code_cycles, code_row, code_items
     cdef public long long list_number, list_cycles

@@ -19,7 +19,8 @@ writes nothing and loses no time. What the robot does is the same with a log and
     TASK_RAN        a task of the schedule
     WAIT_RAN        a task that spins; items: cycles for which it span
     INTERRUPT_RAN   a service; cycles and start include the processor's way to the handler (the source's `latency`)
-    MAIN_LOOP_RAN   a turn of the main loop beside the scheduler, as the router has it; its number is 0
+    MAIN_LOOP_RAN   the main loop beside the scheduler was at work, as the router's; its number is 0. Turns that follow
+                    each other without a gap are one row, so that it does not matter in which steps time passes
     SLOT_BEGAN      start and end: the timer's match; items: tasks that the slot is to run
     SLOT_ENDED      start: the match; end: the last task is through, the one running at an overrun too; items: 1 if so
     SLOT_OVERRAN    a tick found the slot unfinished; start: the match of that slot; end: that tick's; items: tasks
@@ -73,6 +74,9 @@ USUAL_ROWS = 32_768
 class ActivityLog(RowStream):
     """The newest `rows` rows in a ring; `sinks` get all of them. `laps`: how often the ring was full.
 
+    `keep_ns`: where the board moves into a process of its own, how much is kept there until somebody asks (0: all that
+    there is room for).
+
     What runs is open until its end is known: the task (with its occasional list) or turn of the main loop in `code_*`
     and `list_*`, the IRQ in `irq_*`. A FIQ cannot be interrupted, so its end is known at once.
     """
@@ -82,6 +86,7 @@ class ActivityLog(RowStream):
         self.sinks = []
         self.handed = 0  # up to here (a place in the ring) the sinks have everything
         self.laps = 0
+        self.keep_ns = 0
         self.code_open = False
         self.code_kind = 0
         self.code_number = 0

@@ -481,6 +481,8 @@ class Microcontroller(Chip):
     def _background(self) -> cython.longlong:
         """One turn of the main loop beside the scheduler."""
         if self.code_time < self.instant:
+            if self.scheduler.recording:
+                self._log_end_of_code()
             self.code_time = self.instant
         self.now = self.code_time
         done: cython.longlong = self.main_loop()
@@ -489,9 +491,12 @@ class Microcontroller(Chip):
             self.background_wanted = False
             return done
         if self.scheduler.recording:
-            self._log_end_of_code()
             cycles = int((done - self.code_time) * self.cycles_per_ns)
-            self.scheduler.log.begin_code(MAIN_LOOP_RAN, 0, self.code_time, cycles, self.scheduler.row, 0)
+            if self.scheduler.log.code_open and self.scheduler.log.code_kind == MAIN_LOOP_RAN:
+                self.scheduler.log.code_cycles += cycles
+            else:
+                self._log_end_of_code()
+                self.scheduler.log.begin_code(MAIN_LOOP_RAN, 0, self.code_time, cycles, self.scheduler.row, 0)
         self.code_time = done
         return done
 

@@ -47,16 +47,23 @@ def add_options(command: Any) -> None:
     )
 
 
-def attach(robot: Ranger, options: argparse.Namespace) -> Timeline | None:
-    """A timeline on `robot` when one was asked for. UserError, before anything runs, for a file that cannot be."""
-    if not options.trace:
-        if options.trace_last:
-            raise UserError("--trace-last needs --trace FILE")
-        return None
-    from ranger_sim.harness.timeline import Timeline, files
-
+def check(options: argparse.Namespace) -> None:
+    """UserError, before anything runs, for a file that cannot be."""
+    if options.trace_last and not options.trace:
+        raise UserError("--trace-last needs --trace FILE")
     for path in options.trace:
+        from ranger_sim.harness.timeline import files
+
         files.check_target(path)
+
+
+def attach(robot: Ranger, options: argparse.Namespace) -> Timeline | None:
+    """A timeline on `robot` when one was asked for. UserError for a file that cannot be."""
+    check(options)
+    if not options.trace:
+        return None
+    from ranger_sim.harness.timeline import Timeline
+
     return Timeline(robot, options.trace_last)
 
 

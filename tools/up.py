@@ -25,13 +25,14 @@ from ranger_sim.harness.processes.supervisor import ELSEWHERE, RUNNING, Supervis
 from ranger_sim.harness.profile import Profile
 from ranger_sim.harness.profile import load as load_profile
 from ranger_sim.harness.scenario import StopRule
-from ranger_sim.tools import serial_options, terminal, walk
+from ranger_sim.tools import serial_options, terminal, trace, walk
 from ranger_sim.tools.files import json_target, writable_folder
 
 if TYPE_CHECKING:
     from ranger_sim.can_bus.edge.external_bus import ExternalBus
     from ranger_sim.harness.processes.plant_process import PlantRun
     from ranger_sim.harness.ranger import Ranger
+    from ranger_sim.harness.timeline import Timeline
 
 PLAIN_S = 2.0  # between two lines where there is no terminal
 FOREVER = StopRule(steps=1 << 40)
@@ -109,6 +110,7 @@ def register(commands: Any) -> None:
         "needed ('can1=slcan:/dev/ttyACM0 --bitrate 1000000'); can1= asks python-can's configuration, section can1; "
         "MCH=... gives one board of such a bus a place of its own (repeatable). The run is then asynchronous",
     )
+    trace.add_options(up)
     up.set_defaults(run=run)
 
     ctl = commands.add_parser(
@@ -166,6 +168,7 @@ def run(options: argparse.Namespace) -> int:
     from ranger_sim.tools import bus
 
     check_platform()
+    trace.check(options)
     settings = Settings(
         speed=options.speed,
         restart=options.restart,
@@ -203,6 +206,7 @@ def run(options: argparse.Namespace) -> int:
             )
 
         elsewhere: list[HardwareInTheLoop] = []
+        timelines: list[Timeline | None] = []
 
         def finish(robot: Ranger, run: PlantRun, interrupted: bool) -> int:
             summary = {**robot.summary(), "interrupted": interrupted}
@@ -216,6 +220,8 @@ def run(options: argparse.Namespace) -> int:
                 console.print(line, highlight=False, soft_wrap=True)
             walk.finish(robot, summary, options, folder, json_file, console)
             print_processes(summary["processes"], console)
+            for timeline in timelines:
+                trace.write(timeline, options, console)
             if interrupted:
                 return 130
             return 1 if summary["fell"] or summary["failed_boards"] else 0
@@ -227,6 +233,7 @@ def run(options: argparse.Namespace) -> int:
                 move_bus(robot, each, openers, settings.boards)
             if profile is not None and (profile.external() or profile.absent()):
                 elsewhere.append(HardwareInTheLoop(robot, profile, outside))
+            timelines.append(trace.attach(robot, options))
 
         supervisor = Supervisor(robot, settings, stop, finish, view, begin)
         view.say(f"ranger-sim up, name {settings.name}: {supervisor.describe()}")

@@ -13,7 +13,7 @@ from typing import Any
 
 from ranger_sim.firmware_sim.activity import ACTIVITY_COLUMNS
 from ranger_sim.harness.processes.kinds import NOTE_ACTIVITY
-from ranger_sim.harness.processes.places import COMMAND_ACTIVITY
+from ranger_sim.harness.processes.places import COMMAND_ACTIVITY, KEEP_NS
 
 HEAD_BYTES = 16
 ROW_BYTES = 8 * ACTIVITY_COLUMNS
@@ -26,12 +26,14 @@ Sink = Callable[[int, bytes], None]
 class ActivityStore:
     """In the board's process: the rows that nobody has fetched yet. The log is there from the first question on.
 
-    A log that the board had before its process was forked is the plant's to read: its sinks are in another memory now.
+    Of them the last `words[KEEP_NS]` (ns), or what MOST_BYTES hold. A log that the board had before its process was
+    forked is the plant's to read: its sinks are in another memory now.
     """
 
-    def __init__(self, board: Any) -> None:
+    def __init__(self, board: Any, words: Any) -> None:
         self.board = board
-        self.blocks: collections.deque[bytes] = collections.deque()
+        self.words = words
+        self.blocks: collections.deque[tuple[int, bytes]] = collections.deque()
         self.kept = 0
         self.lost = 0
         self.begun = False
@@ -44,11 +46,12 @@ class ActivityStore:
         self.board.activity().add_sink(self.take)
 
     def take(self, time_ns: int, rows: bytes) -> None:
-        """Keep rows; the oldest go when there are too many."""
-        self.blocks.append(rows)
+        """Keep rows; the oldest go when there are too many, or when they are too old."""
+        self.blocks.append((time_ns, rows))
         self.kept += len(rows)
-        while self.kept > MOST_BYTES:
-            given_up = len(self.blocks.popleft())
+        oldest_ns = time_ns - self.words[KEEP_NS] if self.words[KEEP_NS] else 0
+        while self.kept > MOST_BYTES or self.blocks[0][0] < oldest_ns:
+            given_up = len(self.blocks.popleft()[1])
             self.kept -= given_up
             self.lost += given_up // ROW_BYTES
 
@@ -60,9 +63,9 @@ class ActivityStore:
         parts = []
         room = ANSWER_BYTES
         while self.blocks and room > 0:
-            block = self.blocks.popleft()
+            time_ns, block = self.blocks.popleft()
             if len(block) > room:
-                self.blocks.appendleft(block[room:])
+                self.blocks.appendleft((time_ns, block[room:]))
                 block = block[:room]
             parts.append(block)
             room -= len(block)
@@ -75,10 +78,21 @@ class ActivityStore:
 class RemoteActivity:
     """In the plant's process: like an ActivityLog of the board, for who reads it. `lost`: rows given up unread."""
 
-    def __init__(self, remote: Any, before: Any) -> None:
+    def __init__(self, remote: Any, words: Any, before: Any) -> None:
         self.remote = remote
+        self.words = words
         self.sinks: list[Sink] = [] if before is None else before.sinks  # who read the board's log before it moved out
         self.lost = 0
+        self.keep_ns = 0 if before is None else before.keep_ns
+
+    @property
+    def keep_ns(self) -> int:
+        """How much the board keeps until somebody asks; 0: all that there is room for."""
+        return int(self.words[KEEP_NS])
+
+    @keep_ns.setter
+    def keep_ns(self, length_ns: int) -> None:
+        self.words[KEEP_NS] = length_ns
 
     def add_sink(self, sink: Sink) -> None:
         """Call `sink(time_ns, rows)` with the rows from here on."""

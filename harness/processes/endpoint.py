@@ -98,7 +98,7 @@ class Endpoint:
         self.audience = audience
         errors = getattr(board, "errors", None)
         self.totals: object = None if errors is None else errors.totals
-        self.activity: object = ActivityStore(board)
+        self.activity: object = ActivityStore(board, shared.words)
         self.can_wait = SLOT_KINDS if board.name in HEAR_IN_SLOTS else 0
         self.promised = 0
         self.clock: object = wallclock.monotonic_ns

@@ -12,6 +12,7 @@ cpdef enum:
     ASK_USED = 20
     ROWS = 21
     POWER_UP = 22
+    KEEP_NS = 23
     ANSWERED = 32
     PLANT_SLEEPS = 33
     RESULT = 34

@@ -23,6 +23,7 @@ if not cython.compiled:
     ASK_USED = 20  # slots in use of the mailbox to the board
     ROWS = 21  # rows of the stage that were written so far
     POWER_UP = 22  # ns: when a restarted board gets its power
+    KEEP_NS = 23  # how much of its activity the board keeps for who has not asked yet; 0: as much as there is room for
     # the board's words
     ANSWERED = 32  # how often the board has rung
     PLANT_SLEEPS = 33

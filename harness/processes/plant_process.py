@@ -239,6 +239,8 @@ class PlantRun:
         self.mourned.discard(name)
         for bus, node in self.nodes_of(name):
             bus.set_mode(node, OPERATING, self.robot.loop.time)
+        if remote.activity().sinks:  # its new process keeps a log from here on
+            remote.activity().flush()
 
     # --- the end ------------------------------------------------------------------------------------------
 
@@ -252,6 +254,8 @@ class PlantRun:
         for remote in self.remotes.values():
             remote.catch_up(self.robot.loop.time)
             remote.fetch_counters()
+            if remote.activity().sinks:
+                remote.activity().flush()
             remote.dismiss()
 
 

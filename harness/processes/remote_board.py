@@ -78,7 +78,7 @@ class RemoteBoard(Board):
         self.watched_number = built.watched()
         self.slot_time = built.latest_slot()
         self.counted = None
-        self.log = RemoteActivity(self, built.scheduler.log)
+        self.log = RemoteActivity(self, shared.words, built.scheduler.log)
         self.uncounted = built.counters()
         self.block = shared.words
         self.ask = Bell(shared.words, ASKED, BOARD_SLEEPS, shared.ask_descriptor)

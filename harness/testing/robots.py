@@ -42,7 +42,7 @@ class Order:
     backend: str = SIM
     speed: float = 1.0
     log: str = "none"
-    trace: bool = False  # keep a timeline (`robot.observed.timeline`), as far as the backend can
+    trace: bool = False  # keep a timeline (`robot.observed.timeline`)
 
 
 def order_of(wanted: Mapping[str, Any]) -> Order:
@@ -70,7 +70,7 @@ def robot_of(order: Order) -> Ranger:
     profile = load_profile(order.profile) if order.profile is not None else None
     robot = fresh(order, profile)
     observed = observe(robot)
-    if order.trace and order.backend == SIM:  # elsewhere boards keep no log of their slots here
+    if order.trace:
         from ranger_sim.harness.timeline import Timeline
 
         observed.timeline = Timeline(robot, TRACED_S)

@@ -1,5 +1,6 @@
 """`Timeline`: what is to be kept of a run while it passes, and the events that are made of it when somebody asks."""
 
+import itertools
 import pathlib
 from typing import Any
 
@@ -10,6 +11,7 @@ from ranger_sim.firmware_sim.activity import ACTIVITY_COLUMNS, COLUMN_END
 from ranger_sim.foundation.row_stream import RowStream
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.activity import activity_of
+from ranger_sim.harness.step_watch import StepWatch
 from ranger_sim.harness.timeline import files, flows, frames, happenings, signals
 from ranger_sim.harness.timeline.model import Events
 from ranger_sim.harness.timeline.processors import Processor
@@ -17,6 +19,7 @@ from ranger_sim.harness.timeline.row_store import RowStore
 
 LINK_COLUMNS = 5  # what SspWire notes: ns, from the slave, header, two words
 OUTPUT_COLUMNS = 5  # what BoardWires notes: ns, kind, three numbers
+GATHER_NS = 50_000_000  # of seven boards each every 0.35 s: some 2 MB of a motor board (chosen by us)
 
 
 class Timeline:
@@ -64,6 +67,11 @@ class Timeline:
             if log is not None:
                 self.activity[name] = RowStore(ACTIVITY_COLUMNS, self.last_ns)
                 log.add_sink(self.activity[name].take)
+                log.keep_ns = self.last_ns or 0
+                log.keep_ns = self.last_ns or 0
+        self.gathering = Gathering(self)
+        if self.last_ns is None:
+            robot.loop.watchers.append(self.gathering)
         link = robot.loop.wires[robot.loop.place("MB")].link
         link.watch = RowStream("q", LINK_COLUMNS, False)
         self.link = self._store(link.watch)
@@ -146,7 +154,10 @@ class Timeline:
             if not log.sinks and board.scheduler.log is log:
                 board.keep_activity(None)
             store.close()
+            log.keep_ns = 0
         self.activity = {}
+        if self.gathering in self.robot.loop.watchers:
+            self.robot.loop.watchers.remove(self.gathering)
         self.robot.loop.sampler.words = self.sampled_words
         for bus in self.robot.buses:
             bus.log.times = None
@@ -155,3 +166,21 @@ class Timeline:
             if wires.link is not None:
                 wires.link.watch = None
         self.streams, self.stores = [], []
+
+
+class Gathering(StepWatch):
+    """Takes from boards in processes of their own what they have written, one after another, before they keep too much.
+
+    Only for a timeline that keeps everything: of the last seconds each board keeps its own until the end.
+    """
+
+    def __init__(self, timeline: Timeline) -> None:
+        StepWatch.__init__(self)
+        self.timeline = timeline
+        self.names = itertools.cycle(tuple(timeline.activity))
+        self.next_ns = 0
+
+    def before_step(self, now_ns: int) -> None:
+        if now_ns >= self.next_ns and self.timeline.robot.loop.side_by_side:
+            self.next_ns = now_ns + GATHER_NS
+            self.timeline.gather(next(self.names))

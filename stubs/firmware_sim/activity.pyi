@@ -29,6 +29,7 @@ class ActivityLog(RowStream):
     sinks: list[Any]
     handed: int
     laps: int
+    keep_ns: int
     code_open: bool
     list_open: bool
     irq_open: bool

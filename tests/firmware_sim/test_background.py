@@ -1,7 +1,8 @@
 """What a chip's main loop does beside the scheduler."""
 
+from ranger_sim.firmware_sim.activity import MAIN_LOOP_RAN
 from ranger_sim.foundation.events import CAN_RX
-from tests.firmware_sim.board import TICK_NS, Log
+from tests.firmware_sim.board import TICK_NS, Log, kept, rows_of
 
 
 class Worker:
@@ -64,3 +65,17 @@ def test_background_work_does_not_depend_on_the_steps_of_time():
         pieces.chip.advance(until)
     assert pieces.turns == whole.turns
     assert len(whole.turns) == 5
+
+
+def test_turns_that_follow_each_other_are_one_row_of_the_activity_in_whatever_steps_time_passes():
+    def rows(step_ns):
+        worker = Worker(jobs=3)
+        activity = kept(worker.chip)
+        worker.chip.inbox.push(100_000, 0, CAN_RX, 1, 7)  # behind the three turns: a gap
+        for end in range(step_ns, 400_001, step_ns):
+            worker.chip.advance(end)
+        worker.chip.break_off(400_000)
+        return [(row.start, row.end, row.cycles) for row in rows_of(activity) if row.kind == MAIN_LOOP_RAN]
+
+    # 30 us of 60 cycles each; the frame's interrupt takes 1 us
+    assert rows(400_000) == rows(10_000) == [(0, 90_000, 5400), (101_000, 131_000, 1800)]

@@ -16,6 +16,7 @@ from ranger_sim.foundation import wallclock
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness import wiring
 from ranger_sim.harness.processes import control
+from ranger_sim.harness.timeline import perfetto_reader
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 TWO_SECONDS = 2.0  # the promise for naming what died or hangs
@@ -411,3 +412,21 @@ def test_ctrl_c_finishes_the_files_as_walk_does(up, tmp_path):
 def test_a_mistake_in_an_option_is_one_line(command, arguments, complaint):
     done = command("up", "--time", "0.01s", *arguments)
     assert done.returncode == 2 and complaint in done.stderr and "Traceback" not in done.stderr
+
+
+def test_the_timeline_of_a_run_has_the_slots_of_every_board_in_its_process(command, tmp_path):
+    pytest.importorskip("perfetto.protos.perfetto.trace.perfetto_trace_pb2")
+    file = tmp_path / "run.pftrace"
+    name = f"test-{uuid.uuid4().hex[:12]}"
+    done = command("up", "--time", "0.1s", "--speed", "max", "--name", name, "--trace", str(file))
+    assert done.returncode == 0 and "timeline: " in done.stderr, done.stderr
+    trace = perfetto_reader.read(file)
+    for board, slot_ms in (("MCH", 0.5), ("CSR", 1.0), ("MB", 2.0)):
+        slots = [each for each in trace.find("Boards", board, "slots").slices if each.depth == 0]
+        # boards begin within 2.5 ms; a run is over at the end of a turn of 5 ms
+        assert 97 / slot_ms <= len(slots) <= 105 / slot_ms, board
+
+
+def test_a_timeline_that_cannot_be_is_refused_before_any_process_begins(command, tmp_path):
+    done = command("up", "--time", "0.1s", "--trace", str(tmp_path / "run.txt"))
+    assert done.returncode == 2 and "is no format" in done.stderr and done.stderr.count("\n") == 1

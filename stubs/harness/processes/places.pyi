@@ -13,6 +13,7 @@ UNTIL: int
 ASK_USED: int
 ROWS: int
 POWER_UP: int
+KEEP_NS: int
 ANSWERED: int
 PLANT_SLEEPS: int
 RESULT: int

@@ -1,14 +1,16 @@
 """A board in a process of its own keeps its activity there, and its slots are what they are in one process."""
 
+import array
 import contextlib
 import sys
 
 import pytest
 
-from ranger_sim.harness.processes import activity
+from ranger_sim.harness.processes import activity, places
 from ranger_sim.harness.ranger import Ranger
 from ranger_sim.harness.scenario import Scenario
 from ranger_sim.harness.testing.process_robot import ProcessRobot
+from ranger_sim.harness.timeline import Timeline
 
 pytestmark = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="needs Linux (eventfd, pidfd)")
 
@@ -57,8 +59,8 @@ class Written:
 def test_who_does_not_ask_for_long_gets_the_newest_and_is_told_what_was_given_up(monkeypatch):
     monkeypatch.setattr(activity, "MOST_BYTES", 10 * activity.ROW_BYTES)
     monkeypatch.setattr(activity, "ANSWER_BYTES", 4 * activity.ROW_BYTES)
-    board = Written()
-    store = activity.ActivityStore(board)
+    board, words = Written(), array.array("q", bytes(8 * places.SLOTS))
+    store = activity.ActivityStore(board, words)
 
     class Remote:
         reached = 5
@@ -66,7 +68,7 @@ def test_who_does_not_ask_for_long_gets_the_newest_and_is_told_what_was_given_up
         def notes_of(self, command, what):
             return store.next()
 
-    log = activity.RemoteActivity(Remote(), None)
+    log = activity.RemoteActivity(Remote(), words, None)
     got = []
     log.add_sink(lambda time_ns, rows: got.append(rows))
     for block in range(5):
@@ -86,6 +88,33 @@ def test_of_a_board_that_is_gone_nothing_comes():
         def notes_of(self, command, what):
             return b""
 
-    log = activity.RemoteActivity(Gone(), None)
+    log = activity.RemoteActivity(Gone(), array.array("q", bytes(8 * places.SLOTS)), None)
     log.add_sink(lambda time_ns, rows: pytest.fail("nothing was to come"))
     log.flush()
+
+
+@pytest.mark.parametrize("last_s", [None, 0.05])
+def test_the_timeline_of_boards_in_processes_is_byte_for_byte_that_of_one_process(last_s, tmp_path):
+    pytest.importorskip("perfetto.protos.perfetto.trace.perfetto_trace_pb2")
+    for kind, robot in ((Ranger, Ranger()), (ProcessRobot, ProcessRobot(Scenario(), "none", None, None))):
+        with contextlib.closing(robot):
+            timeline = Timeline(robot, last_s)
+            robot.run_for(0.15)
+            timeline.write(tmp_path / f"{kind.__name__}.pftrace")
+            timeline.close()
+            assert not robot.loop.watchers
+    written = [path.read_bytes() for path in sorted(tmp_path.iterdir())]
+    assert len(written) == 2 and written[0] == written[1] and len(written[0]) > 900_000
+
+
+def test_a_board_in_a_process_keeps_no_more_of_the_past_than_it_was_told(monkeypatch):
+    board, words = Written(), array.array("q", bytes(8 * places.SLOTS))
+    log = activity.RemoteActivity(None, words, None)
+    log.keep_ns = 100
+    store = activity.ActivityStore(board, words)
+    store.next()
+    for time_ns in (0, 50, 149, 150, 250):
+        store.take(time_ns, bytes([time_ns]) * activity.ROW_BYTES)
+    answer = store.next()
+    assert answer[activity.HEAD_BYTES :] == bytes([150]) * activity.ROW_BYTES + bytes([250]) * activity.ROW_BYTES
+    assert array.array("q", answer[: activity.HEAD_BYTES]).tolist() == [3, 0]  # given up, left
