@@ -164,7 +164,8 @@ def _friction(b: Builder, w: Signal, torque: Signal, way: float, slow: float) ->
         "viscous_friction": w,
         "stribeck": sign * np.exp(-((w / slow) ** 2)),
         "presliding": b.bristle(w, way),
-        "load_friction": sign * np.abs(torque),
+        # beyond what the base model has: more of it while the load drives
+        "load_friction": sign * np.abs(torque) * (torque * w < 0.0),
         "direction_friction": np.abs(sign) + 0.2 * np.abs(w) / slow,
         "friction_warm_up": sign * np.exp(-4.0 * b.t / b.t[-1]),
         "drag": w * np.abs(w),
@@ -241,11 +242,11 @@ def motor_bench() -> Model:
     b.equation("turning", "S", [("q", 1.0, 1), ("w", -14.0)], {}, {"lost_counts": 20.0 * (np.abs(w) > 10.0)}, 0.2)
     b.sensor("voltage_V", "V", 0.008, "E")
     _current_sensor(b, "current_A", "I", current, duty)
-    b.sensor("speed_rad_per_s", "w", 0.04, "S", {"sensor_lag": b.rate(w)})
-    b.sensor("torque_Nm", "load", 0.008, "M", {"clock_drift": b.rate(load) * b.t})
+    b.sensor("speed_rad_per_s", "w", 0.04, "S", {"sensor_lag": b.rate(w), "clock_drift": b.rate(w) * b.t})
+    b.sensor("torque_Nm", "load", 0.008, "M")
     b.sensor("temperature_C", "T", 0.1, "E")
     b.sensor("motor_angle_rad", "q", 0.003, "S", {"eccentricity": np.sin(q) + 0.5 * np.sin(2.0 * q)})
-    b.places = {"sensor_lag": "speed_rad_per_s", "clock_drift": "torque_Nm", "eccentricity": "motor_angle_rad"}
+    b.places = {"sensor_lag": "speed_rad_per_s", "clock_drift": "speed_rad_per_s", "eccentricity": "motor_angle_rad"}
     return b.model("motor-bench", "20 s of speed up to 14 rad/s with standstill, load up to 0.4 Nm both ways")
 
 
