@@ -13,9 +13,10 @@ import os
 import pathlib
 import sys
 
-from tests.blind.generator import motor_bench
+from tests.blind.generator.leg_swing import LEG_SWING
+from tests.blind.generator.motor_bench import MOTOR_BENCH
 
-EXPERIMENTS = {"motor-bench": motor_bench}
+EXPERIMENTS = {experiment.NAME: experiment for experiment in (MOTOR_BENCH, LEG_SWING)}
 
 
 def main(arguments=None):

@@ -17,8 +17,8 @@ from ranger_sim.foundation.random_arrays import generator
 from tests.blind import answers as answering
 from tests.blind.bounds import BOUNDS, RISK, least, refusals
 from tests.blind.comparators import majority_label, refit_only, said, without_balance
-from tests.blind.generator import motor_bench
-from tests.blind.generator.effects import CAUSES, EFFECTS
+from tests.blind.generator.experiment import SUBSYSTEM
+from tests.blind.generator.motor_bench import MOTOR_BENCH
 from tests.blind.score import score, table
 
 DIAGNOSIS = "ranger_sim.sysid.diagnose.diagnose:diagnose"
@@ -28,22 +28,22 @@ SINGLE_RISK = RISK / len(BOUNDS)
 def truths(seed):
     """{id: truth} of the continuous integration's cases at a seed, without their data."""
     out = {}
-    for case in motor_bench.check_plan(seed):
+    for case in MOTOR_BENCH.check_plan(seed):
         causes = []
         for name, strength in case.effects:
-            balance = EFFECTS[name].balance
+            balance = MOTOR_BENCH.EFFECTS[name].balance
             main = balance[0] if balance[0] in "EMT" else "M"
             causes.append(
                 {
                     "name": name,
                     "balance": balance,
-                    "subsystem": motor_bench.SUBSYSTEM[balance],
+                    "subsystem": SUBSYSTEM[balance],
                     "strength": strength,
                     "share_by_balance": {"E": 0.0, "M": 0.0, "T": 0.0} | {main: 1.0},
                     "parameters": {},
                 }
             )
-        ties = [name for name in motor_bench.CONFUSABLE if name != causes[0]["name"]] if case.poor else []
+        ties = [name for name in MOTOR_BENCH.CONFUSABLE if name != causes[0]["name"]] if case.poor else []
         out[str(case.number)] = {"kind": case.kind, "variant": case.variant, "causes": causes, "ties": ties}
     return out
 
@@ -54,7 +54,7 @@ def oracle(rng, truth):
     if not causes:
         return said(rng.random() < 0.02)
     name, strength, balance = causes[0]["name"], causes[0]["strength"], causes[0]["balance"][0]
-    other = str(rng.choice([cause for cause in CAUSES if cause != name]))
+    other = str(rng.choice([cause for cause in MOTOR_BENCH.CAUSES if cause != name]))
     if truth["kind"] == "pair":
         draw = rng.random()
         names = [cause["name"] for cause in causes] if draw < 0.70 else [name]
@@ -157,7 +157,7 @@ def test_a_refit_is_refused_by_each_figure_of_detection(seed):
         assert figure in refusal
 
 
-@pytest.mark.parametrize("label", CAUSES)
+@pytest.mark.parametrize("label", MOTOR_BENCH.CAUSES)
 def test_one_label_for_everything_is_refused_whichever_it_is(label):
     """Each is the majority's somewhere: false alarms, and a name that is right for few."""
     refusal = "\n".join(refused(truths(7), lambda truth: said(True, "M", [label])))
@@ -176,7 +176,7 @@ def test_a_diagnosis_without_one_balance_is_refused_for_that_balance(balance):
 
 def test_comparators_speak_the_form_of_an_answer():
     answer = majority_label([], [], "motor-bench")
-    assert answer["detected"] and answer["causes"][0]["name"] in CAUSES
+    assert answer["detected"] and answer["causes"][0]["name"] in MOTOR_BENCH.CAUSES
     assert set(answer) == {
         "detected",
         "misfit",
@@ -236,8 +236,8 @@ def test_the_diagnosis_keeps_the_bounds_on_fresh_cases(fresh_cases, tmp_path):
 
 
 def test_the_refit_reads_the_files_and_finds_nothing(tmp_path, monkeypatch):
-    monkeypatch.setattr(motor_bench, "SAMPLES", 1500)
-    (case,) = motor_bench.plan(4, 1, ["null"], list(CAUSES))
-    ((_, files, holdout, _),) = motor_bench.generate(4, [case], tmp_path)
+    monkeypatch.setattr(MOTOR_BENCH, "SAMPLES", 1500)
+    (case,) = MOTOR_BENCH.plan(4, 1, ["null"], list(MOTOR_BENCH.CAUSES))
+    ((_, files, holdout, _),) = MOTOR_BENCH.generate(4, [case], tmp_path)
     answer = refit_only([tmp_path / files[0]], [tmp_path / holdout[0]], "motor-bench")
     assert answer["detected"] is False and answer["gain"]["fraction_of_achievable"] == 0.0

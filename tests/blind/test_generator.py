@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from tests.blind import generate
-from tests.blind.generator import bench, motor_bench
 from tests.blind.generator.case import Case
-from tests.blind.generator.effects import EFFECTS, rate
-from tests.blind.generator.instruments import COLUMNS
-from tests.blind.generator.strength import FLOWS_A, MOVES_RAD_S, Scale
+from tests.blind.generator.effects import rate
+from tests.blind.generator.leg_swing import LEG_SWING
+from tests.blind.generator.motor_bench import MOTOR_BENCH
+from tests.blind.generator.strength import FLOWS_A
 
 HERE = pathlib.Path(__file__).parent
 ALLOWED = {"numpy", "scipy", "ranger_sim.foundation.random_arrays"}
@@ -42,7 +42,7 @@ def test_the_generator_imports_no_model_of_the_project(path):
 
 
 def made(folder, monkeypatch, *arguments):
-    monkeypatch.setattr(motor_bench, "SAMPLES", 2000)
+    monkeypatch.setattr(MOTOR_BENCH, "SAMPLES", 2000)
     generate.main(["--out", str(folder), *arguments])
     return json.loads((folder / "data" / "cases.json").read_text(encoding="utf-8"))
 
@@ -68,18 +68,18 @@ def test_data_carry_no_label(tmp_path, monkeypatch):
         assert set(case) == {"id", "experiment", "files", "holdout"}
         for name in case["files"] + case["holdout"]:
             head, *rows = (tmp_path / "data" / name).read_text(encoding="ascii").splitlines()
-            assert tuple(head.split(",")) == COLUMNS
+            assert tuple(head.split(",")) == ("t_s", *MOTOR_BENCH.COLUMNS)
             assert len(rows) == 2000
             assert np.isfinite(np.loadtxt(rows, delimiter=",")).all()
     assert len(list((tmp_path / "data").rglob("*.*"))) == 1 + 2 * len(cases)
 
 
-def clean(seed, name=None, amplitude=0.0):
+def clean(experiment, seed, name=None, amplitude=0.0):
     """A case with one effect of that amplitude, nothing calibrated."""
     case = Case(0, "single")
     if name:
         case.effects = [(name, 1.0)]
-    motor_bench.prepare(seed, case)
+    experiment.prepare(seed, case)
     case.amplitudes = [amplitude] * len(case.effects)
     return case
 
@@ -87,13 +87,15 @@ def clean(seed, name=None, amplitude=0.0):
 def balances_of(trajectory, true):
     """Balances E, M, T of noise-free data, from the equations in generator/effects.py."""
     p, V, current, w, T = trajectory.base, true["V"], true["I"], true["w"], true["T"]
-    GK = bench.GEAR * p["K"]
+    GK = p["G"] * p["K"]
+    q = trajectory.theta / p["G"]
+    leg = p["kh"] * q + p["mgc"] * np.sin(q) - p["mgw"] * np.cos(q)
     sign_I, sign_w = np.sign(trajectory.I), np.sign(trajectory.w)
     acceleration = trajectory.acceleration + rate(w - trajectory.w)
     E = V - p["R"] * current - p["Vc"] * sign_I - p["L"] * rate(current) - GK * w
     friction = (p["C0"] + p["mu"] * GK * sign_I * current) * sign_w + p["C1"] * w
-    M = GK * current - p["J"] * acceleration - friction - T
-    return E, M, rate(true["theta"]) / bench.GEAR - w
+    M = GK * current - p["J"] * acceleration - friction - T - leg
+    return E, M, rate(true["theta"]) / p["G"] - w
 
 
 # Amplitudes of about what calibration finds at a strength of 4, or some times that where the formula holds.
@@ -106,9 +108,9 @@ LARGE = {
     "sensor_offset": 0.1,
     "voltage_clip": 0.3,
     "cogging": 0.04,
-    "commutation_ripple": 0.02,
+    "commutation_ripple": 0.01,
     "once_per_turn": 0.04,
-    "stribeck": 0.03,
+    "stribeck": 0.1,
     "presliding": 0.01,
     "load_friction": 0.1,
     "direction_friction": 0.02,
@@ -130,44 +132,78 @@ LARGE = {
 }
 
 
+LARGE_ON_A_LEG = {
+    "contact_drop_change": 0.5,
+    "resistance_temperature": 0.01,
+    "torque_constant_temperature": 0.005,
+    "current_step_at_zero_duty": 0.1,
+    "sensor_offset": 0.1,
+    "voltage_clip": 0.3,
+    "cogging": 0.3,
+    "commutation_ripple": 0.05,
+    "stribeck": 0.2,
+    "presliding": 0.01,
+    "friction_warm_up": 0.5,
+    "drag": 0.1,
+    "hip_spring_bend": 0.3,
+    "sensor_lag": 0.0005,
+    "tight_arc_friction": 10.0,
+    "eddy_brake_saturating": 1.0,
+    "magnetic_hysteresis": 0.5,
+    "voltage_ripple_torque": 0.05,
+    "iron_saturation": 0.5,
+    "mains_pickup": 0.1,
+}
+EVERY = [("motor-bench", name) for name in LARGE] + [("leg-swing", name) for name in LARGE_ON_A_LEG]
+AMPLITUDES = {"motor-bench": LARGE, "leg-swing": LARGE_ON_A_LEG}
+
+
 @pytest.fixture(scope="module")
 def large_effects():
-    """{name: (case, trajectory)} of every effect, three seconds each, in lanes of one simulation."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(motor_bench, "SAMPLES", 3000)
-        cases = {name: clean(21, name, amplitude) for name, amplitude in LARGE.items()}
-        lanes = motor_bench.lanes_of([(case, case.runs[0]) for case in cases.values()])
-        motor_bench.let_act(lanes, cases.values())
-        return dict(zip(cases, zip(cases.values(), lanes.run(), strict=True), strict=True))
+    """{(experiment, effect): (case, trajectory)}, three seconds each, in lanes of one simulation per experiment."""
+    out = {}
+    for experiment in (MOTOR_BENCH, LEG_SWING):
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(experiment, "SAMPLES", 3000)
+            amplitudes = AMPLITUDES[experiment.NAME]
+            cases = {name: clean(experiment, 23, name, amplitude) for name, amplitude in amplitudes.items()}
+            lanes = experiment.lanes_of([(case, case.runs[0]) for case in cases.values()])
+            experiment.let_act(lanes, cases.values())
+            for (name, case), trajectory in zip(cases.items(), lanes.run(), strict=True):
+                out[experiment.NAME, name] = case, trajectory
+    return out
 
 
-def test_every_effect_is_tried_large():
-    assert set(LARGE) == set(EFFECTS)
+@pytest.mark.parametrize("experiment", [MOTOR_BENCH, LEG_SWING], ids=lambda experiment: experiment.NAME)
+def test_every_effect_is_tried_large(experiment):
+    assert set(AMPLITUDES[experiment.NAME]) == set(experiment.EFFECTS)
 
 
-@pytest.mark.parametrize("name", LARGE)
-def test_what_an_effect_shows_is_what_it_does(name, large_effects):
+@pytest.mark.parametrize("name, effect", EVERY)
+def test_what_an_effect_shows_is_what_it_does(name, effect, large_effects):
     """The balances of simulated data, less what the effect's own formula says, leave little of it.
 
     A seventh: the formulas are of first order in the amplitude. 6: what corners within a sample leave without any
     effect is 2-4 here, in units of the noise, summed over the run.
     """
-    case, trajectory = large_effects[name]
-    true = motor_bench.true_channels(trajectory)
-    motor_bench.apply_instruments(case, trajectory, true)
-    scale = Scale(trajectory, case.instruments)
+    experiment = {"motor-bench": MOTOR_BENCH, "leg-swing": LEG_SWING}[name]
+    case, trajectory = large_effects[name, effect]
+    true = experiment.true_channels(trajectory)
+    experiment.apply_instruments(case, trajectory, true)
+    scale = experiment.scale(case, trajectory)
     got = scale.vector(balances_of(trajectory, true))
-    wanted = scale.vector(motor_bench.balances(name, trajectory, case.shapes[0], case.amplitudes[0]))
+    wanted = scale.vector(experiment.balances(effect, trajectory, case.shapes[0], case.amplitudes[0]))
     assert np.linalg.norm(wanted) > 20.0
     assert np.linalg.norm(got - wanted) < np.linalg.norm(wanted) / 7.0 + 6.0
 
 
-def test_the_bench_without_effects_keeps_its_own_balances(monkeypatch):
+@pytest.mark.parametrize("experiment", [MOTOR_BENCH, LEG_SWING], ids=lambda experiment: experiment.NAME)
+def test_an_experiment_without_effects_keeps_its_own_balances(experiment, monkeypatch):
     """What ten steps a sample leave in the balances is far below what any detector sees: a strength of 0.5 at most."""
-    monkeypatch.setattr(motor_bench, "SAMPLES", 3000)
-    case = clean(5)
-    trajectory = motor_bench.lanes_of([(case, case.runs[0])]).run()[0]
-    scale = Scale(trajectory, case.instruments)
-    assert scale.strength(balances_of(trajectory, motor_bench.true_channels(trajectory))) < 0.5
-    assert np.mean(np.abs(trajectory.w) > MOVES_RAD_S) > 0.5
+    monkeypatch.setattr(experiment, "SAMPLES", 3000)
+    case = clean(experiment, 5)
+    trajectory = experiment.lanes_of([(case, case.runs[0])]).run()[0]
+    scale = experiment.scale(case, trajectory)
+    assert scale.strength(balances_of(trajectory, experiment.true_channels(trajectory))) < 0.5
+    assert np.mean(np.abs(trajectory.w) > experiment.MOVES_RAD_S) > 0.5
     assert np.mean(np.abs(trajectory.I) > FLOWS_A) > 0.4

@@ -1,8 +1,9 @@
-"""A motor with gearbox against a brake, many runs at once (one lane each), at ten steps a sample.
+"""A motor with gearbox against a brake or under a leg, many runs at once (one lane each), at ten steps a sample.
 
 Set-valued laws, solved in each step: no current inside the brushes' drop, true standstill inside the friction.
 
-    V = R I + drop(I) + L dI/dt + G K w          J dw/dt = G K I - friction - effects - T_brake
+    V = R I + drop(I) + L dI/dt + G K w
+    J dw/dt = G K I - friction - effects - T_brake - k_h q - m g (c sin q - w cos q)       (the last two: a leg)
 
 Everything is at the gearbox's output but the rotor's angle theta. I and w are means over a sample's interval, as
 integrating converters give them; the scheme is of second order away from the corners. What an effect adds is set in
@@ -12,28 +13,16 @@ integrating converters give them; the scheme is of second order away from the co
 import dataclasses
 
 import numpy as np
+from scipy.signal import lfilter
 
 from tests.blind.generator.excitation import STEP_S
 
 FINE = 10  # steps a sample
 DT_S = STEP_S / FINE
-GEAR = 14.0
-# Nominal: appendix table 3 (R with 0.04 ohm of leads), 8.4.3 for C1, 3 for L (20 + 47 uH); J: rotor 1.6e-6 times gear
-# squared, and twice that for couplings and brake, chosen by us.
-NOMINAL = {
-    "R": 1.34,
-    "Vc": 0.7,
-    "K": 0.018,
-    "C0": 0.01,
-    "C1": 0.0033,
-    "mu": 0.1,
-    "J": 9.4e-4,
-    "L": 67e-6,
-}
 # Heat, chosen by us: a small motor whose winding follows in seconds and whose housing is light.
 WINDING_K_PER_W, WINDING_S = 2.5, 6.0
 HOUSING_K_PER_W, HOUSING_S = 6.0, 15.0
-GEAR_WARM_S, GEAR_WARM_RAD_S = 8.0, 10.0  # the grease warms with travel
+GEAR_WARM_S = 8.0  # the grease warms with travel: `travel_rad_s` of the base keeps it warm
 
 
 @dataclasses.dataclass
@@ -58,7 +47,7 @@ class Trajectory:
     def ideal_Nm(self):
         """Torque of the current less the friction that goes with it: what one ampere is worth in the torque balance."""
         p = self.base
-        return GEAR * p["K"] * (1.0 - p["mu"] * np.sign(self.w * self.I))
+        return p["G"] * p["K"] * (1.0 - p["mu"] * np.sign(self.w * self.I))
 
 
 class Lanes:
@@ -85,7 +74,7 @@ class Lanes:
         after = [law.after for law in laws if hasattr(law, "after")]
         torque = [law.torque for law in laws if hasattr(law, "torque")]
         s = self.state = State(n)
-        s.GK0 = GEAR * p["K"]
+        s.GK0 = p["G"] * p["K"]
         s.GK = s.GK0.copy()
         s.drop = p["Vc"].copy()
         s.friction0 = p["C0"].copy()
@@ -95,7 +84,8 @@ class Lanes:
         muGK, L_dt = p["mu"] * s.GK0, p["L"] / dt_s
         J_dt = p["J"] / dt_s
         divisor = J_dt + p["C1"]
-        half_turn = GEAR * 0.5 * dt_s
+        half_turn = p["G"] * 0.5 * dt_s
+        hangs = bool(np.any(p["mgc"] > 0.0))
         out = np.zeros((8, samples, n))
         w, current = np.zeros(n), np.zeros(n)
         change = np.zeros(n)
@@ -123,6 +113,9 @@ class Lanes:
                 current = s.I = u
                 drive = s.GK * u
                 drive -= T
+                if hangs:
+                    q = s.middle / p["G"]
+                    drive -= p["kh"] * q + p["mgc"] * np.sin(q) - p["mgw"] * np.cos(q)
                 np.abs(u, out=bound)
                 bound *= muGK
                 bound += s.friction0
@@ -153,24 +146,34 @@ class Lanes:
             heat = p["R"] * mean_I * mean_I
             s.winding_C += STEP_S / WINDING_S * (WINDING_K_PER_W * heat - (s.winding_C - s.housing_C))
             s.housing_C += STEP_S / HOUSING_S * (HOUSING_K_PER_W * heat - (s.housing_C - self.ambient_C))
-            s.grease += STEP_S / GEAR_WARM_S * (np.abs(w) / GEAR_WARM_RAD_S - s.grease)
+            s.grease += STEP_S / GEAR_WARM_S * (np.abs(w) / p["travel_rad_s"] - s.grease)
         time_s = (np.arange(samples) + 0.5) * STEP_S
         lanes = []
         for lane in range(n):
             V, current, w, acceleration, theta, T, winding_C, housing_C = (out[i, :, lane].copy() for i in range(8))
             base = {name: float(values[lane]) for name, values in p.items()}
             lanes.append(
-                Trajectory(base, time_s, V, current, w, acceleration, theta, T, winding_C, housing_C, warmed(w))
+                Trajectory(
+                    base,
+                    time_s,
+                    V,
+                    current,
+                    w,
+                    acceleration,
+                    theta,
+                    T,
+                    winding_C,
+                    housing_C,
+                    warmed(w, base["travel_rad_s"]),
+                )
             )
         return lanes
 
 
-def warmed(w):
+def warmed(w, travel_rad_s):
     """State of the grease from the speed, as the loop above has it (to the difference of a mean and an end value)."""
-    from scipy.signal import lfilter
-
     rate = STEP_S / GEAR_WARM_S
-    return lfilter([0.0, rate], [1.0, rate - 1.0], np.abs(w) / GEAR_WARM_RAD_S)
+    return lfilter([0.0, rate], [1.0, rate - 1.0], np.abs(w) / travel_rad_s)
 
 
 class State:
@@ -306,7 +309,7 @@ class TightArc(Law):
     """Friction over part of the output's turn only."""
 
     def after(self, s):
-        arc = np.maximum(np.cos(s.middle[self.lane] / GEAR - self.centre_rad) - self.dead, 0.0)
+        arc = np.maximum(np.cos(s.middle[self.lane] / self.base["G"] - self.centre_rad) - self.dead, 0.0)
         s.bound[self.lane] += self.a * arc
 
 
@@ -320,6 +323,14 @@ class Hysteresis(Law):
         current = s.I[self.lane]
         self.kept = np.minimum(np.maximum(self.kept, current - self.play_A), current + self.play_A)
         drive[self.lane] -= self.a * (current - self.kept)
+
+
+class SpringBend(Law):
+    """A spring that hardens by an exponential law."""
+
+    def torque(self, s, drive):
+        x = s.middle[self.lane] / self.base["G"] / self.knee_rad
+        drive[self.lane] -= self.a * np.sign(x) * (np.exp(np.abs(x)) - 1.0 - np.abs(x))
 
 
 class Saturation(Law):
@@ -348,5 +359,6 @@ LAWS = {
         TightArc,
         Hysteresis,
         Saturation,
+        SpringBend,
     )
 }

@@ -10,49 +10,59 @@ from scipy.signal import lfilter
 
 from tests.blind.generator.excitation import STEP_S
 
-# Standard deviation of the noise and size of a step. Voltage: 16 bit over +/-20 V. Current: Hall sensor, 12 bit over
+# Size of a step. Voltage: 16 bit over +/-20 V. Current: Hall sensor, 12 bit over
 # +/-10 A. Speed: encoder of the brake by differences, filtered. Torque: load cell, 16 bit over +/-16 N m. Angle: 512
-# lines, four edges each, on the rotor. Temperature: on the housing.
-NOISE = {"V": 0.008, "I": 0.020, "w": 0.040, "T": 0.008}
-LSB = {"V": 0.001, "I": 0.005, "w": 0.005, "T": 0.0005, "theta": 2.0 * np.pi / 2048.0, "temperature": 0.1}
+# lines, four edges each, on the rotor; of a joint an absolute encoder of 13 bit. Temperature: on the housing.
+LSB = {
+    "V": 0.001,
+    "I": 0.005,
+    "w": 0.005,
+    "T": 0.0005,
+    "q": 2.0 * np.pi / 8192.0,
+    "theta": 2.0 * np.pi / 2048.0,
+    "temperature": 0.1,
+}
 TEMPERATURE_NOISE_C = 0.05
-COLUMNS = ("t_s", "voltage_V", "current_A", "speed_rad_per_s", "torque_Nm", "temperature_C", "motor_angle_rad")
+SLOW_RAD_S = 12.0  # a joint's rate from its angle has the angle's noise times this, of what matters to a leg
 
 
 @dataclasses.dataclass(frozen=True)
 class Instruments:
-    """noise: standard deviations by channel; memory: of one sample of noise in the next."""
+    """noise: standard deviations by channel; memory: of one sample in the next; columns: {name in a file: channel}."""
 
     noise: dict
     memory: float
+    columns: dict
 
-    def balance_deviation(self, base, gear):
-        """Standard deviation of the noise in balances E, M, T, from the four channels; of the slow part of it.
+    def balance_deviation(self, base):
+        """Standard deviation of the noise in balances E, M, T, from the channels; of the slow part of it.
 
-        The rotor's inertia times the speed's noise and the angle's counts over a sample are left out: both grow with
-        frequency and are little where the effects are.
+        The inertia times the speed's noise and the angle's counts over a sample are left out: both grow with frequency
+        and are little where the effects are. Without a second angle there is no balance T.
         """
         v = {name: deviation**2 + LSB[name] ** 2 / 12.0 for name, deviation in self.noise.items()}
-        back = (gear * base["K"]) ** 2
-        E = v["V"] + base["R"] ** 2 * v["I"] + back * v["w"]
-        M = v["T"] + back * v["I"] + base["C1"] ** 2 * v["w"]
-        return np.sqrt((E, M, v["w"]))
+        angle, torque = v.get("q", 0.0), v.get("T", 0.0)
+        speed = v.get("w", angle * SLOW_RAD_S**2)
+        back = (base["G"] * base["K"]) ** 2
+        E = v["V"] + base["R"] ** 2 * v["I"] + back * speed
+        M = torque + back * v["I"] + base["C1"] ** 2 * speed + (base["kh"] + base["mgc"]) ** 2 * angle
+        return np.sqrt((E, M, v["w"] if "w" in v else np.inf))
 
     def show(self, rng, true):
         """Columns of a file from the true channels."""
         count = len(true["V"])
         out = {"t_s": np.round(np.arange(count) * STEP_S, 6)}
-        whole = {}
-        for name in ("V", "I", "w", "T"):
-            start = rng.standard_normal()
-            shocks = rng.standard_normal(count) * np.sqrt(1.0 - self.memory**2)
-            noise = lfilter([1.0], [1.0, -self.memory], shocks, zi=[self.memory * start])[0]
-            whole[name] = true[name] + self.noise[name] * noise
-        whole["theta"] = np.floor(true["theta"] / LSB["theta"]) * LSB["theta"]
-        whole["temperature"] = true["temperature"] + TEMPERATURE_NOISE_C * rng.standard_normal(count)
-        for column, name in zip(COLUMNS[1:], ("V", "I", "w", "T", "temperature", "theta"), strict=True):
-            step = LSB[name]
-            out[column] = np.round(whole[name] / step) * step
+        for column, name in self.columns.items():
+            step, value = LSB[name], true[name]
+            if name in self.noise:
+                start = rng.standard_normal()
+                shocks = rng.standard_normal(count) * np.sqrt(1.0 - self.memory**2)
+                noise = lfilter([1.0], [1.0, -self.memory], shocks, zi=[self.memory * start])[0]
+                value = value + self.noise[name] * noise
+            elif name == "temperature":
+                value = value + TEMPERATURE_NOISE_C * rng.standard_normal(count)
+            count_of = np.floor if name == "theta" else np.round
+            out[column] = count_of(value / step) * step
         return out
 
 

@@ -1,269 +1,48 @@
-"""Cases of the motor bench: which effects are hidden where, how strongly, and the files that are measured."""
+"""The motor bench: a motor with a 14:1 gearbox against a brake motor."""
 
-import numpy as np
-
-from ranger_sim.foundation.random_arrays import generator
-from tests.blind.generator.bench import NOMINAL, Lanes
-from tests.blind.generator.case import Case
-from tests.blind.generator.effects import CAUSES, EFFECTS, OUTSIDE
+from tests.blind.generator.effects import EFFECTS
 from tests.blind.generator.excitation import STEP_S, one_sided, rich
-from tests.blind.generator.instruments import NOISE, Instruments, write
-from tests.blind.generator.strength import Scale
+from tests.blind.generator.experiment import Experiment
 
-EXPERIMENT = "motor-bench"
-SAMPLES = int(20.0 / STEP_S)
 BRAKE_NM = 0.7  # most of what the brake motor is driven with: 2.8 A at standstill
-BATCH = 80  # cases simulated side by side: memory, not speed, sets it
-STRENGTHS = (0.5, 1.0, 2.0, 4.0)
-TIE = 0.95  # of the cosine of two effects' parts outside the base model
-SUBSYSTEM = {"E": "electrical", "M": "mechanical", "EM": "current_sensing", "T": "transmission", "t": "timing"}
-MIX = (  # shares of the kinds in a set of cases
-    ("single", 0.46),
-    ("null", 0.20),
-    ("pair", 0.12),
-    ("outside", 0.14),
-    ("confusable", 0.08),
-)
-# With a supply of one sign these two are one: the sensor's step at zero duty is never crossed.
-CONFUSABLE = ("current_step_at_zero_duty", "sensor_offset")
-# Causes that show in one balance only, or nearly: a diagnosis that lacks it cannot see them.
-ONLY_IN = {
-    "E": ("contact_drop_change", "resistance_temperature", "voltage_clip", "commutation_ripple"),
-    "M": ("cogging", "once_per_turn", "stribeck", "direction_friction", "friction_warm_up", "drag"),
-    "T": ("eccentricity", "lost_counts"),
-}
-CHECK_AT_4 = 8  # cases for each balance in the subset that continuous integration runs
-# Singles at 2. Ten outside the catalogue: fewer would bound nothing at a risk of a millionth (0.15^9 = 4e-8).
-CHECK_KINDS = (("single", 8), ("null", 10), ("pair", 6), ("outside", 10), ("confusable", 2))
 
 
-def plan(seed, count, kinds, causes):
-    """Cases without files: kinds in the shares of MIX, causes in turn, strengths in turn for each kind."""
-    mix = [(kind, share) for kind, share in MIX if kind in kinds]
-    total = sum(share for _, share in mix)
-    wanted = []
-    for kind, share in mix:
-        wanted += [(kind, None, None)] * round(count * share / total)
-    wanted = (wanted + [(mix[0][0], None, None)] * count)[:count]
-    return fill(seed, wanted, causes)
+class MotorBench(Experiment):
+    """Columns as `ranger-sim diagnose --experiment motor-bench` takes them; the torque is what the brake takes."""
 
-
-def check_plan(seed):
-    """The subset for continuous integration, 60 cases: at 4 eight causes of each balance, at 2 eight of all, others."""
-    rng = generator(seed, "check plan")
-    wanted = []
-    for names in ONLY_IN.values():
-        order = rng.permutation(names)
-        wanted += [("single", str(order[i % len(order)]), 4.0) for i in range(CHECK_AT_4)]
-    for kind, count in CHECK_KINDS:
-        wanted += [(kind, None, 2.0 if kind == "single" else None)] * count
-    return fill(seed, wanted, CAUSES)
-
-
-def fill(seed, wanted, causes):
-    """Cases from [(kind, cause or None, strength or None)], in random order; what is None goes in turn."""
-    rng = generator(seed, "plan")
-    order = {
-        "single": [str(name) for name in rng.permutation(causes)],
-        "outside": [str(name) for name in rng.permutation(OUTSIDE)],
-        "confusable": [str(name) for name in rng.permutation(CONFUSABLE)],
+    NAME = "motor-bench"
+    COLUMNS = {
+        "voltage_V": "V",
+        "current_A": "I",
+        "speed_rad_per_s": "w",
+        "torque_Nm": "T",
+        "temperature_C": "temperature",
+        "motor_angle_rad": "theta",
     }
-    turns = dict.fromkeys(("null", "pair", *order), 0)
-    cases = []
-    for number, (kind, name, strength) in enumerate(wanted):
-        turn = turns[kind]
-        turns[kind] += name is None
-        case = Case(number, kind)
-        if kind == "null":
-            case.variant = ("plain", "parameters", "noise")[turn % 3]
-        elif kind == "pair":
-            case.effects = [(str(one), 2.0) for one in rng.choice(causes, 2, replace=False)]
-        else:
-            round_, place = divmod(turn, len(order[kind]))
-            # every strength for every cause after four rounds
-            usual = {
-                "single": STRENGTHS[(place + round_ + seed) % 4],
-                "outside": 4.0,
-                "confusable": (2.0, 4.0)[turn % 2],
-            }
-            case.effects = [(name or order[kind][place], strength or usual[kind])]
-            case.poor = kind == "confusable"
-        cases.append(case)
-    return [cases[i] for i in rng.permutation(len(cases))]
-
-
-def prepare(seed, case):
-    """Base parameters, instruments and the conditions of both runs of a case."""
-    rng = generator(seed, f"case {case.number}")
-    low, high = (0.20, 0.40) if case.variant == "parameters" else (0.05, 0.15)
-    case.base = {
-        name: value * (1.0 + rng.choice((-1.0, 1.0)) * rng.uniform(low, high)) for name, value in NOMINAL.items()
+    # Appendix table 3 (R with 0.04 ohm of leads), 8.4.3 for C1, 3 for L (20 + 47 uH); J: rotor 1.6e-6 times gear
+    # squared, and twice that for couplings and brake, chosen by us.
+    NOMINAL = {"R": 1.34, "Vc": 0.7, "K": 0.018, "C0": 0.01, "C1": 0.0033, "mu": 0.1, "J": 9.4e-4, "L": 67e-6}
+    FIXED = {"G": 14.0, "kh": 0.0, "mgc": 0.0, "mgw": 0.0, "travel_rad_s": 10.0}
+    NOISE = {"V": 0.008, "I": 0.020, "w": 0.040, "T": 0.008}
+    EFFECTS = {name: effect for name, effect in EFFECTS.items() if name != "hip_spring_bend"}
+    CAUSES = tuple(name for name, effect in EFFECTS.items() if effect.known)
+    OUTSIDE = tuple(name for name, effect in EFFECTS.items() if not effect.known)
+    # With a supply of one sign these two are one: the sensor's step at zero duty is never crossed.
+    CONFUSABLE = ("current_step_at_zero_duty", "sensor_offset")
+    MIX = (("single", 0.46), ("null", 0.20), ("pair", 0.12), ("outside", 0.14), ("confusable", 0.08))
+    ONLY_IN = {
+        "E": ("contact_drop_change", "resistance_temperature", "voltage_clip", "commutation_ripple"),
+        "M": ("cogging", "once_per_turn", "stribeck", "direction_friction", "friction_warm_up", "drag"),
+        "T": ("eccentricity", "lost_counts"),
     }
-    louder = rng.uniform(2.0, 3.5) if case.variant == "noise" else 1.0
-    noise = {name: value * louder * rng.uniform(0.8, 1.3) for name, value in NOISE.items()}
-    case.instruments = Instruments(noise, float(rng.uniform(0.80, 0.93)))
-    supply_V = rng.uniform(5.6, 6.6)
-    # the held-out run: another trajectory, another level of the supply, another room
-    case.runs = []
-    for name, level in (("a", 1.0), ("b", float(rng.choice((0.82, 1.15))))):
-        profile = one_sided if case.poor else rich
-        volt, brake = profile(generator(seed, f"case {case.number} run {name}"), SAMPLES, supply_V * level, BRAKE_NM)
-        case.runs.append((name, volt, brake, float(rng.uniform(16.0, 32.0)), float(rng.uniform(0.0, 15.0))))
-    for name, _ in case.effects:
-        effect = EFFECTS[name]
-        case.shapes.append(effect.draw(generator(seed, f"case {case.number} {name}")))
-        case.signs.append(float(rng.choice((-1.0, 1.0))) if effect.sign else 1.0)
+    CHECK_AT_4 = 8
+    # Singles at 2. Ten outside the catalogue: fewer would bound nothing at a risk of a millionth (0.15^9 = 4e-8).
+    CHECK_KINDS = (("single", 8), ("null", 10), ("pair", 6), ("outside", 10), ("confusable", 2))
+    SAMPLES = int(20.0 / STEP_S)
+    MOVES_RAD_S = 0.15
+
+    def excite(self, rng, supply_V, poor):
+        return (one_sided if poor else rich)(rng, self.SAMPLES, supply_V, BRAKE_NM)
 
 
-def lanes_of(pairs):
-    """Lanes for [(case, run)]."""
-    base = {name: np.array([case.base[name] for case, _ in pairs]) for name in NOMINAL}
-    runs = [run for _, run in pairs]
-    return Lanes(
-        base,
-        np.column_stack([run[1] for run in runs]),
-        np.column_stack([run[2] for run in runs]),
-        np.array([run[3] for run in runs]),
-        np.array([run[4] for run in runs]),
-    )
-
-
-def calibrate(case, scale):
-    """Amplitudes that give the wanted strengths along the trajectory without effects."""
-    for (name, wanted), shape, sign in zip(case.effects, case.shapes, case.signs, strict=True):
-        effect = EFFECTS[name]
-        if effect.linear:
-            unit = scale.strength(effect.show(scale.trajectory, shape))
-            if unit <= 0.0:
-                raise ValueError(f"case {case.number}: {name} does not show in this run")
-            case.amplitudes.append(sign * wanted / unit)
-            continue
-        low, high = 0.0, effect.start
-        while scale.strength(effect.show(scale.trajectory, shape, high)) < wanted and high < 10.0:
-            low, high = high, 2.0 * high
-        for _ in range(10):
-            middle = 0.5 * (low + high)
-            if scale.strength(effect.show(scale.trajectory, shape, middle)) < wanted:
-                low = middle
-            else:
-                high = middle
-        case.amplitudes.append(0.5 * (low + high))
-
-
-def balances(name, trajectory, shape, amplitude):
-    """What an effect adds to the balances."""
-    effect = EFFECTS[name]
-    if not effect.linear:
-        return effect.show(trajectory, shape, amplitude)
-    return tuple(amplitude * part for part in effect.show(trajectory, shape))
-
-
-def rivals(seed, case, scale):
-    """{other cause: cosine} with the case's only effect, along its trajectory."""
-    (name, _), shape = case.effects[0], case.shapes[0]
-    own = scale.outside(balances(name, scale.trajectory, shape, case.amplitudes[0]))
-    found = {}
-    for other in CAUSES:
-        if other == name:
-            continue
-        effect = EFFECTS[other]
-        drawn = effect.draw(generator(seed, f"case {case.number} {other}"))
-        turns = "once_per_turn" in (name, other)  # its period is its own
-        drawn |= {key: shape[key] for key in drawn if key in shape and not (turns and key == "periods")}
-        theirs = scale.outside(balances(other, scale.trajectory, drawn, effect.start))
-        length = np.linalg.norm(own) * np.linalg.norm(theirs)
-        found[other] = float(abs(own @ theirs) / length) if length > 0.0 else 0.0
-    return found
-
-
-def true_channels(trajectory):
-    """What ideal instruments would show."""
-    t = trajectory
-    return {"V": t.V, "I": t.I, "w": t.w, "T": t.T, "theta": t.theta, "temperature": t.housing_C}
-
-
-def apply_instruments(case, trajectory, true):
-    """Changes the true channels by the effects that sit in instruments."""
-    for (name, _), shape, amplitude in zip(case.effects, case.shapes, case.amplitudes, strict=True):
-        if EFFECTS[name].measure is not None:
-            EFFECTS[name].measure(true, trajectory, amplitude, shape)
-
-
-def let_act(lanes, cases):
-    """Puts the effects that act in the bench into the lanes, one lane per entry of `cases`."""
-    for lane, case in enumerate(cases):
-        for (name, _), shape, amplitude in zip(case.effects, case.shapes, case.amplitudes, strict=True):
-            if EFFECTS[name].law:
-                lanes.add(lane, EFFECTS[name].law, amplitude, shape)
-
-
-def measure(seed, case, run, trajectory):
-    """The columns of a run's file."""
-    true = true_channels(trajectory)
-    apply_instruments(case, trajectory, true)
-    return case.instruments.show(generator(seed, f"case {case.number} noise {run[0]}"), true)
-
-
-def truth(case, scale, cosines):
-    """What only the scorer may know."""
-    causes = []
-    for (name, wanted), shape, amplitude in zip(case.effects, case.shapes, case.amplitudes, strict=True):
-        effect = EFFECTS[name]
-        shown = balances(name, scale.trajectory, shape, amplitude)
-        causes.append(
-            {
-                "name": name,
-                "in_catalogue": effect.known,
-                "balance": effect.balance,
-                "subsystem": SUBSYSTEM[effect.balance],
-                "strength": wanted,
-                "strength_reached": scale.strength(shown),
-                "r": scale.r(shown),
-                "n_eff": scale.n_eff,
-                "share_by_balance": scale.shares(shown),
-                "amplitude": amplitude,
-                "shape": shape,
-                "parameters": effect.tell(amplitude, shape, case.base),
-            }
-        )
-    return {
-        "experiment": EXPERIMENT,
-        "kind": case.kind,
-        "variant": case.variant,
-        "causes": causes,
-        "ties": sorted(name for name, cosine in cosines.items() if cosine > TIE),
-        "cosines": {name: round(value, 3) for name, value in sorted(cosines.items(), key=lambda item: -item[1])},
-        "base": case.base,
-        "noise": case.instruments.noise,
-        "memory": case.instruments.memory,
-    }
-
-
-def generate(seed, cases, data, tell=lambda text: None):
-    """Writes data files of planned cases below `data`; yields (id, files, holdout, truth) of each.
-
-    Two passes of simulation: without effects, which sets the amplitudes, and with them.
-    """
-    names = generator(seed, "names")
-    for start in range(0, len(cases), BATCH):
-        batch = cases[start : start + BATCH]
-        for case in batch:
-            prepare(seed, case)
-        plain = lanes_of([(case, case.runs[0]) for case in batch]).run(fine=4)
-        tell(f"{len(batch)} cases simulated without effects")
-        for case, trajectory in zip(batch, plain, strict=True):
-            calibrate(case, Scale(trajectory, case.instruments))
-        pairs = [(case, run) for case in batch for run in case.runs]
-        lanes = lanes_of(pairs)
-        let_act(lanes, [case for case, _ in pairs])
-        trajectories = lanes.run()
-        tell(f"{len(batch)} cases simulated with effects")
-        for number, case in enumerate(batch):
-            key = names.bytes(6).hex()
-            (data / key).mkdir(parents=True)
-            ran = trajectories[2 * number : 2 * number + 2]
-            for run, trajectory in zip(case.runs, ran, strict=True):
-                write(data / key / f"{run[0]}.csv", measure(seed, case, run, trajectory))
-            scale = Scale(ran[0], case.instruments)
-            cosines = rivals(seed, case, scale) if case.kind in ("single", "confusable") else {}
-            yield key, [f"{key}/a.csv"], [f"{key}/b.csv"], truth(case, scale, cosines)
+MOTOR_BENCH = MotorBench()

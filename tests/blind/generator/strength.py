@@ -8,36 +8,37 @@ A strength of 1 is r = 4.85 / sqrt(N_eff): 90 % detection by a test among 28 can
 
 import numpy as np
 
-from tests.blind.generator.bench import GEAR
 from tests.blind.generator.effects import rate
 
 UNIT = 4.85
-MOVES_RAD_S = 0.15  # below it friction takes what it must: the torque balance says nothing
-FLOWS_A = 0.06  # the same inside the brushes' drop
+FLOWS_A = 0.06  # below it the brushes' drop takes what it must: the voltage balance says nothing
 
 
 class Scale:
     """Measures effects along one trajectory as given instruments see it."""
 
-    def __init__(self, trajectory, instruments):
+    def __init__(self, trajectory, instruments, moves_rad_s):
         t = self.trajectory = trajectory
         self.n_eff = len(t.time_s) * (1.0 - instruments.memory) / (1.0 + instruments.memory)
-        sigma = instruments.balance_deviation(t.base, GEAR)
-        weights = (np.abs(t.I) > FLOWS_A, np.abs(t.w) > MOVES_RAD_S, np.ones(len(t.w)))
+        sigma = instruments.balance_deviation(t.base)
+        weights = (np.abs(t.I) > FLOWS_A, np.abs(t.w) > moves_rad_s, np.ones(len(t.w)))
         self.weights = [weight / deviation for weight, deviation in zip(weights, sigma, strict=True)]
         tangent = [self.vector(column) for column in self.sensitivities()]
         self.tangent = np.linalg.qr(np.array(tangent).T)[0]
 
     def sensitivities(self):
-        """Balances' derivatives for R, Vc, L, K, C0, C1, mu, J."""
+        """Balances' derivatives for R, Vc, L, K, C0, C1, mu, J; of a leg for k_h and m g w too."""
         t, p = self.trajectory, self.trajectory.base
         zero, sign = np.zeros_like(t.w), np.sign(t.w)
-        pull = GEAR * t.I * (1.0 - p["mu"] * np.sign(t.w * t.I))
+        pull = p["G"] * t.I * (1.0 - p["mu"] * np.sign(t.w * t.I))
+        q = t.theta / p["G"]
+        leg = ((zero, q, zero), (zero, np.cos(q), zero)) if p["mgc"] > 0.0 else ()
         return (
+            *leg,
             (t.I, zero, zero),
             (np.sign(t.I), zero, zero),
             (rate(t.I), zero, zero),
-            (GEAR * t.w, -pull, zero),
+            (p["G"] * t.w, -pull, zero),
             (zero, sign, zero),
             (zero, t.w, zero),
             (zero, np.abs(t.I) * sign, zero),
