@@ -239,8 +239,19 @@ def motor_bench() -> Model:
         {"R": current**2, "conductance": b.low_pass(current**2, 60.0), "air": 1.0},
         {"pwm_ripple": np.abs(duty) * (1.0 - np.clip(np.abs(duty), 0.0, 1.0))},
     )
-    b.equation("turning", "S", [("q", 1.0, 1), ("w", -14.0)], {}, {"lost_counts": 20.0 * (np.abs(w) > 10.0)}, 0.2)
-    b.sensor("voltage_V", "V", 0.008, "E")
+    transmission = {
+        "lost_counts": 20.0 * (np.abs(w) > 10.0),
+        "cable_backlash": b.rate(np.tanh(load / 0.02)),
+        "cable_stiffening": b.rate(load**3),
+        "pulley_slip": np.where(np.abs(load) > 0.25, w, 0.0),
+    }
+    b.equation("turning", "T", [("q", 1.0, 1), ("w", -14.0)], {"compliance": b.rate(load)}, transmission, 0.2)
+    supply = {
+        "voltage_clip": np.sign(volts) * np.maximum(np.abs(volts) - 0.8 * np.abs(volts).max(), 0.0),
+        "battery_sag": volts * np.abs(current),
+        "charge_drift": volts * b.integral(np.abs(current)),
+    }
+    b.sensor("voltage_V", "V", 0.008, "E", supply)
     _current_sensor(b, "current_A", "I", current, duty)
     b.sensor("speed_rad_per_s", "w", 0.04, "S", {"sensor_lag": b.rate(w), "clock_drift": b.rate(w) * b.t})
     b.sensor("torque_Nm", "load", 0.008, "M")

@@ -9,6 +9,7 @@ import pytest
 from ranger_sim.foundation.random_arrays import generator
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.sysid import causes, channels, isolability
+from ranger_sim.sysid.dataset import Table
 from ranger_sim.sysid.experiment_models import MODELS, SAMPLES
 from ranger_sim.sysid.isolability import (
     AS_PARAMETER,
@@ -20,6 +21,7 @@ from ranger_sim.sysid.isolability import (
     analyse,
     model_of,
 )
+from ranger_sim.sysid.machines.motor_bench import MotorBench
 from ranger_sim.sysid.structure import overdetermined
 from ranger_sim.tools import cli
 
@@ -32,6 +34,27 @@ def test_every_cause_of_the_catalogue_is_in_an_experiment_and_every_channel_is_o
     assert set(MODELS) == set(channels.EXPERIMENTS)
     for name in MODELS:
         assert set(model_of(name).channels) <= {each.name for each in channels.experiment(name).channels}
+
+
+def test_what_the_motor_bench_is_diagnosed_for_is_in_the_catalogue_and_in_its_equations():
+    time_s = np.arange(4000) * 0.005
+    w = 8.0 * np.sin(1.3 * time_s) * np.sin(0.2 * time_s)
+    current = 0.9 * np.sin(0.8 * time_s) + 0.05 * w
+    columns = {
+        "voltage_V": 1.3 * current + 0.7 * np.sign(current) + 0.252 * w,
+        "current_A": current,
+        "speed_rad_per_s": w,
+        "torque_Nm": 0.252 * current - 0.05 * np.sign(w),
+        "temperature_C": 25.0 + 0.1 * time_s,
+        "motor_angle_rad": 14.0 * np.cumsum(w) * 0.005,
+    }
+    bench = MotorBench()
+    recording = bench.prepare(Table(time_s, columns, (slice(0, len(time_s)),), "bench"))
+    identifiers = {cause.identifier for cause in causes.CAUSES.values()}
+    in_equations = {causes.CAUSES[key].identifier for key in model_of("motor-bench").causes}
+    diagnosed = {effect.cause for effect in bench.effects([recording])}
+    assert diagnosed <= identifiers
+    assert diagnosed <= in_equations
 
 
 def test_a_current_gain_needs_a_load_cell():
