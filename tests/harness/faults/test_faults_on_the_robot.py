@@ -183,6 +183,56 @@ def test_a_reference_that_sags_makes_every_voltage_read_higher(robot, share, fac
     assert fault.cleared_ns == 310_250_000
 
 
+def reading(board, place):
+    """A result of a converter at a voltage that hardly moves: battery, supply, or a standing foot at the external one."""
+    if place == "MCFO.adc_external":
+        return list(board.adc_external.results[:4])[2]
+    return board.adc.DR(1) if place == "CSR.adc_internal" else board.adc_internal.result
+
+
+# What the value is multiplied by, and what is added, at the converters that the tests above leave out.
+TRANSFERS = [
+    ("MCH.adc_internal", "gain", {"factor": 0.8}, 0.8, 0),
+    ("CSR.adc_internal", "gain", {"factor": 0.7}, 0.7, 0),
+    ("CSR.adc_internal", "gain", {"factor": 1.2}, 1.2, 0),
+    ("CSR.adc_internal", "reference_sag", {"share": 0.2}, 1.25, 0),
+    ("CSR.adc_internal", "reference_sag", {"share": -0.25}, 0.8, 0),
+    ("MCFO.adc_external", "offset", {"offset": 400}, 1.0, 400),
+    ("MCFO.adc_external", "offset", {"offset": -400}, 1.0, -400),
+    ("MCFO.adc_external", "reference_sag", {"share": 0.1}, 1.0 / 0.9, 0),
+    ("MCFO.adc_external", "reference_sag", {"share": -0.25}, 0.8, 0),
+]
+
+
+@pytest.mark.parametrize(("place", "mode", "parameters", "factor", "more"), TRANSFERS)
+def test_a_transfer_that_is_wrong_is_seen_in_the_results_and_gone_after(robot, place, mode, parameters, factor, more):
+    board = robot.board(place[: place.index(".")])
+    top, noise = (8191, 60) if place == "MCFO.adc_external" else (1023, 12)  # counts; as in the tests above
+    before = reading(board, place)
+    fault = robot.inject(place, mode, until="310 ms", **parameters)
+    robot.run_for(0.008)
+    assert reading(board, place) == pytest.approx(min(top, factor * before + more), abs=noise * max(1.0, factor))
+    robot.run_for(0.006)
+    assert reading(board, place) == pytest.approx(before, abs=noise)
+    assert fault.acted and fault.largest_difference * (factor - 1.0 or more) > 0.0
+    assert fault.cleared_ns == 310_250_000
+
+
+def test_a_late_conversion_of_the_internal_converter_is_reported_when_it_comes_after_its_slot(robot):
+    board = robot.board("MCH")
+    before = noted(board, "ADCI_DNF")
+    fault = robot.inject("MCH.adc_internal", "late_conversion", until="310 ms", late_us=600)
+    robot.run_for(0.009)
+    told = noted(board, "ADCI_DNF") - before
+    assert told >= 8  # of 18 slots: a conversion of more than a slot is still busy in every other one at least
+    assert fault.acted and fault.largest_difference == 600
+    robot.run_for(0.002)
+    before = noted(board, "ADCI_DNF")
+    robot.run_for(0.01)
+    assert noted(board, "ADCI_DNF") == before
+    assert fault.cleared_ns == 310_250_000
+
+
 def test_a_conversion_that_never_ends_stops_a_motor_board_for_good_although_the_converter_works_again(robot):
     board = robot.board("MCH")
     fault = robot.inject("MCH.adc_external", "missing_conversion", until="305 ms")

@@ -114,6 +114,11 @@ def test_a_board_that_is_thrown_off_its_bus_restarts_and_is_back_after_128_seque
         assert fault.acted_count == 1 and node.transmit_errors == 0
         totals = robot.board("MCSI").errors.totals
         assert totals[codes.CAN2_BUS_RX] > 0
+        assert fault.active  # once is over, and nothing is done to it any more: ending it leaves the bus as it is
+        errors = robot.buses[3].counters.errors
+        fault.stop()
+        robot.run_for(0.05)
+        assert fault.cleared_ns > fault.ended_ns > 0 and robot.buses[3].counters.errors == errors
 
 
 def test_a_babbling_node_starves_its_bus_and_every_other_one_goes_on():
