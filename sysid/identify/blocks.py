@@ -114,7 +114,10 @@ def solve(
     return refused_if_negative(found)
 
 
-NEVER_NEGATIVE = ("R", "V_c", "K", "C_0", "C_1", "mu", "k_", "J", "outer_cm", "inner_cm", "outer_J", "inner_J")
+NEVER_NEGATIVE = (  # how such names begin
+    *("R", "V_c", "K", "C_0", "C_1", "mu", "ankle_C_0"),
+    *("outer_cm", "inner_cm", "outer_J", "inner_J", "J_foot", "k_"),
+)
 
 
 def refused_if_negative(found: Fit) -> Fit:

@@ -14,7 +14,7 @@ from scipy import stats
 from ranger_sim.foundation.random_arrays import generator
 from ranger_sim.plant.motor_parameters import MotorParameters
 from ranger_sim.plant.parameters import BodyParameters
-from ranger_sim.sysid.benches import leg, motor, pulley, springs
+from ranger_sim.sysid.benches import ankle_sine, leg, motor, pulley, springs
 from ranger_sim.sysid.fit import Fit
 from ranger_sim.sysid.identify import legs as identify_legs
 from ranger_sim.sysid.identify import motor as identify_motor
@@ -47,8 +47,8 @@ class Machine:
     body: BodyParameters
 
     def truth(self) -> dict[str, float]:
-        """The numbers of tables 2 and 3 by the names of the fits."""
-        m, b = self.motor, self.body
+        """The numbers of tables 2 and 3, and of the ankle that hangs, by the names of the fits."""
+        m, b, a = self.motor, self.body, ankle_sine.HANGING
         outer, inner = leg.legs_of(b)
         return {
             "R": m.loop_resistance_ohm,
@@ -65,6 +65,10 @@ class Machine:
             "inner_J_hip": inner.J_hip_kg_m2,
             "k_h": b.hip_spring_Nm_per_rad,
             "k_s": b.ankle_spring_Nm_per_rad + b.ankle_return_Nm_per_rad,
+            "J_foot": a.foot_inertia_kg_m2,
+            "k_r": a.ankle_return_Nm_per_rad,
+            "return_Nm": a.ankle_return_Nm_per_rad * a.ankle_return_rest_rad,
+            "ankle_C_0": ankle_sine.MOTOR.constant_friction_Nm,
         }
 
 

@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from ranger_sim.sysid.identify.registry import BENCHES
+from ranger_sim.sysid.identify.registry import OF_TABLES
 from ranger_sim.tools.cli import main
 
 
@@ -29,7 +29,7 @@ def folder(tmp_path_factory):
 def test_all_leaves_recordings_figures_and_the_same_numbers_from_its_own_recordings(folder, capsys):
     capsys.readouterr()
     written = json.loads((folder / "identify.json").read_text())
-    names = {f"{name}.csv" for name in BENCHES} | {"identify.html", "identify.json"}
+    names = {f"{name}.csv" for name in OF_TABLES} | {"identify.html", "identify.json"}
     assert {path.name for path in folder.iterdir()} == names
     for bench, title in (("stall", "8.3.1"), ("hip-spring", "hip-spring")):
         again, code = told(capsys, bench, "--data", str(folder / f"{bench}.csv"))
@@ -119,3 +119,14 @@ def test_corrupt_empty_or_foreign_data_are_a_finding_and_never_a_value(content, 
     code = main(["identify", "stall", "--data", str(path)])
     captured = capsys.readouterr()
     assert code == 2 and captured.err.count("\n") == 1 or code == 1 and "refused" in captured.out
+
+
+def test_an_effect_that_the_model_lacks_marks_the_values_as_not_physical(folder, tmp_path, capsys):
+    lines = (folder / "stall.csv").read_text().splitlines()
+    rows = [[float(cell) for cell in line.split(",")] for line in lines[1:]]
+    bent = tmp_path / "bent.csv"
+    bent.write_text(lines[0] + "\n" + "".join(f"{t},{V + 0.05 * A**3},{A}\n" for t, V, A in rows))
+    assert main(["identify", "stall", "--data", str(bent)]) == 0
+    assert "something that is not in the model moves it" in capsys.readouterr().out
+    found, _ = told(capsys, "stall", "--data", str(folder / "stall.csv"))
+    assert found["fits"][0]["unexplained"] is False

@@ -22,13 +22,20 @@ from ranger_sim.sysid import readers, sanity
 from ranger_sim.sysid.dataset import Dataset
 from ranger_sim.sysid.fit import Fit, Parameter
 from ranger_sim.sysid.identify import coverage, legs, motor
-from ranger_sim.sysid.identify.registry import BENCHES, alone, bench_of, by_virtual_benches
+from ranger_sim.sysid.identify.registry import BENCHES, OF_TABLES, alone, bench_of, by_virtual_benches
 from ranger_sim.sysid.readers.columns import mapping_of
 from ranger_sim.tools import files, terminal
 from ranger_sim.tools.identify import page
 
 ALL = "all"
 EXIT_DONE, EXIT_REFUSED = 0, 1
+# Residual in standard deviations of the stated instruments, above which noise is no explanation. Chosen by us: double
+# noise may be another instrument's.
+UNEXPLAINED = 2.0
+UNEXPLAINED_TEXT = (
+    "the residual is {:.0f} times the instruments' noise: something that is not in the model moves it, "
+    "and these values may stand in for it (not physical)"
+)
 
 
 def register(commands: Any) -> None:
@@ -124,7 +131,7 @@ def known_of(text: str) -> Parameter:
 def recorded(name: str, path: pathlib.Path, mapping: dict[str, str], console: Console) -> Dataset:
     """A user's recording of a bench; what is odd in a series of samples is told."""
     data = readers.read(path, mapping)
-    if name in ("pendulum",):
+    if name in ("pendulum", "ankle-sine"):  # the others are single readings
         findings = sanity.inspect(data)
         sanity.stop_if_fatal(str(path), findings)
         for finding in findings:
@@ -153,22 +160,25 @@ def identify_one(
         else:
             recordings, fits = by_virtual_benches(bench, coverage.ROBOT, options.seed, options.gear, tell)
         truth = coverage.ROBOT.truth()
-    titled = {f"{BENCHES[name].title} (appendix {BENCHES[name].appendix})": found for name, found in fits.items()}
+    titled = {}
+    for name, found in fits.items():
+        source = BENCHES[name].appendix
+        titled[f"{BENCHES[name].title} ({'appendix ' if source[0].isdigit() else ''}{source})"] = found
     return recordings, told_of(options, titled, truth), titled
 
 
 def identify_all(options: argparse.Namespace, console: Console) -> tuple[dict[str, Dataset], dict, dict[str, Fit]]:
     """Tables 2 and 3 in steps and jointly."""
     if options.data is None:
-        recordings = {name: bench.record(coverage.ROBOT, options.seed) for name, bench in BENCHES.items()}
+        recordings = {name: BENCHES[name].record(coverage.ROBOT, options.seed) for name in OF_TABLES}
         truth = coverage.ROBOT.truth()
     else:
         folder, truth = pathlib.Path(options.data), {}
-        lacking = [name for name in BENCHES if not (folder / f"{name}.csv").is_file()]
+        lacking = [name for name in OF_TABLES if not (folder / f"{name}.csv").is_file()]
         if lacking:
             raise UserError(f"--data {options.data}: for all a folder is needed; {lacking[0]}.csv is not in it")
         mapping = mapping_of(options.map)
-        recordings = {name: recorded(name, folder / f"{name}.csv", mapping, console) for name in BENCHES}
+        recordings = {name: recorded(name, folder / f"{name}.csv", mapping, console) for name in OF_TABLES}
     tell = before(console)
     of_motor = (recordings["stall"], recordings["cantilever"], recordings["pulley"])
     of_legs = (recordings["level"], recordings["hang"], recordings["pendulum"])
@@ -222,6 +232,10 @@ def print_fit(console: Console, found: Fit, truth: dict[str, float]) -> None:
         table.add_row(*row)
     console.print(table)
     console.print(f"[dim]{escape(found.lines()[-1])}; in standard deviations of the instruments[/dim]")
+    if found.residual_rms > UNEXPLAINED:
+        console.print(
+            f"[yellow]{UNEXPLAINED_TEXT.format(found.residual_rms)}[/yellow]",
+        )
 
 
 def told_of(options: argparse.Namespace, fits: dict[str, Fit], truth: dict[str, float]) -> dict:
@@ -260,6 +274,7 @@ def fit_as_data(title: str, found: Fit) -> dict:
             for name in found.values
         },
         "residual_rms": found.residual_rms,
+        "unexplained": found.residual_rms > UNEXPLAINED,
         "samples": len(found.residual),
         "effective_samples": found.effective_samples,
         "rho": found.rho,
@@ -272,12 +287,16 @@ def fit_as_data(title: str, found: Fit) -> dict:
 
 
 def csv_of(data: Dataset) -> str:
-    """A recording as a table that `--data` reads."""
-    names = list(data.channels)
-    time_s = data[names[0]].time_s
-    columns = np.column_stack([time_s, *(data[name].value for name in names)])
-    rows = [",".join(f"{number:.9g}" for number in row) for row in columns]
-    return "\n".join([",".join(["t_s", *names]), *rows]) + "\n"
+    """A recording as a table that `--data` reads; a cell is empty where a channel has no sample."""
+    stamps = np.unique(np.concatenate([channel.time_s for channel in data.channels.values()]))
+    cells = [[f"{time_s:.9g}" for time_s in stamps]]
+    for channel in data.channels.values():
+        column = [""] * len(stamps)
+        for place, number in zip(np.searchsorted(stamps, channel.time_s), channel.value, strict=True):
+            column[place] = f"{number:.9g}"
+        cells.append(column)
+    rows = [",".join(row) for row in zip(*cells, strict=True)]
+    return "\n".join([",".join(["t_s", *data.channels]), *rows]) + "\n"
 
 
 def run_coverage(options: argparse.Namespace, console: Console) -> dict:

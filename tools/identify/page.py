@@ -55,6 +55,8 @@ def drawn(recordings: dict[str, Dataset], v: dict[str, float], gear: float) -> l
             made.append(friction_check(recordings["cantilever"], v, gear))
     if "pendulum" in recordings:
         made.append(swings(recordings["pendulum"]))
+    if "ankle-sine" in recordings:
+        made.append(ankle(recordings["ankle-sine"]))
     for bench, name in (("hip-spring", "k_h"), ("ankle-spring", "k_s")):
         if bench in recordings and name in v:
             made.append(pulls(bench, name, recordings[bench], v[name]))
@@ -140,6 +142,19 @@ def swings(data: Dataset) -> Figure:
         figure.add_trace(line(swing.time_s, swing.angle_rad, f"{swing.leg} leg", colour))
     figure.update_xaxes(title_text="time, s").update_yaxes(title_text="angle, rad")
     return finished(figure, "Swinging legs", "Free swings at the clamped hip; their period gives J (eq. 29, 30).")
+
+
+def ankle(data: Dataset) -> Figure:
+    """Target, motor and joint of the ankle over time."""
+    figure = go.Figure()
+    for name, label, colour in (
+        ("target_angle_rad", "target", INK),
+        ("motor_angle_rad", "motor", OUTER),
+        ("joint_angle_rad", "joint", INNER),
+    ):
+        figure.add_trace(line(data[name].time_s, data[name].value, label, colour))
+    figure.update_xaxes(title_text="time, s").update_yaxes(title_text="angle, rad")
+    return finished(figure, "Ankle on its sine", "Joint and motor differ by the stretch of the cable.")
 
 
 def pulls(bench: str, name: str, data: Dataset, stiffness: float) -> Figure:
