@@ -48,6 +48,9 @@ KINDS = {
     "lag": "a channel comes later than a redundant one",
     "wrong_unit": "values as of another unit than is told",
 }
+DOUBTED = ("wrong_unit", "stuck")
+LEFT_OUT = ("ragged", "unreadable", "no_stamp", "not_finite", "duplicate_stamps")  # their sizes count samples
+DOUBTED_PART = 0.1  # of the samples; radio links lose a few in a hundred
 GAP_STEPS = 5.0  # of the median step; radio gaps of the robot's logs are 9 to 45 steps of 4 to 6 ms (C6.2)
 NAMED_PLACES = 6  # single findings of a kind in a channel; more of them are one finding together
 SPIKE_STEPS = 12.0  # of the usual second difference; noise reaches 6 in a million samples
@@ -129,6 +132,18 @@ def stop_if_fatal(name: str, findings: list[Finding]) -> None:
     for finding in findings:
         if finding.severity == FATAL:
             raise UserError(f"{name}: {finding.channel + ': ' if finding.channel else ''}{finding.text}")
+
+
+def doubts(dataset: Dataset, findings: list[Finding]) -> list[Finding]:
+    """The findings after which no cause may be named with confidence: the data are not what they are said to be."""
+    count = max((len(channel.value) for channel in dataset.channels.values()), default=0)
+    many = [each for each in findings if each.kind in LEFT_OUT and each.size > DOUBTED_PART * count]
+    return [each for each in findings if each.kind in DOUBTED] + many
+
+
+def as_json(finding: Finding) -> dict[str, object]:
+    """A finding for programs."""
+    return dataclasses.asdict(finding)
 
 
 def _tidied(channel: Channel) -> Channel:
@@ -318,10 +333,11 @@ def equal_runs(value: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
 def _stuck(channel: Channel, all_channels: dict[str, Channel]) -> Iterator[Finding]:
     """The longest stretch of one value, when it is far longer than all others and other channels move in it."""
     starts, lengths = equal_runs(channel.value)
-    if len(lengths) < 10 or _is_held(channel.value):
-        return
     longest = int(np.argmax(lengths))
     length = int(lengths[longest])
+    rest = np.delete(channel.value, slice(starts[longest] + 1, starts[longest] + length))
+    if len(lengths) < 10 or _is_held(rest):
+        return
     others = np.delete(lengths, longest)
     if length < STUCK_SAMPLES or length < STUCK_RATIO * others.max():
         return

@@ -2,14 +2,25 @@
 
 from __future__ import annotations
 
+import dataclasses
 import pathlib
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.sysid import readers
-from ranger_sim.sysid.dataset import Dataset
+from ranger_sim.sysid import channels, readers, repairs, sanity
+from ranger_sim.sysid.dataset import Dataset, Finding, Table
 from ranger_sim.sysid.readers import columns, frames
+
+
+@dataclasses.dataclass(frozen=True)
+class Prepared:
+    """A recording ready for work. findings: all that is odd; doubts: those after which no cause may be named."""
+
+    dataset: Dataset
+    table: Table
+    findings: list[Finding]
+    doubts: list[Finding]
 
 
 def add_options(command: Any) -> None:
@@ -51,6 +62,24 @@ def open_recording(
 def open_with(options: Any, path: str) -> Dataset:
     """The recording `path` as `add_options` says."""
     return open_recording(path, columns.mapping_of(options.map), options.dbc, options.time_unit)
+
+
+def prepared(options: Any, path: str, experiment: str) -> Prepared:
+    """The recording `path` under its experiment's names, inspected, mended, its channels on one time base.
+
+    UserError when it cannot be read, lacks a needed channel, or has nothing to work on.
+    """
+    dataset = channels.named_for(open_with(options, path), experiment)
+    wanted = [each.name for each in channels.experiment(experiment).channels if each.name in dataset]
+    if not wanted:
+        raise UserError(f"{path}: it has no channel of the experiment {experiment}; --map NAME=CHANNEL names them")
+    dataset.channels = {name: dataset.channels[name] for name in wanted}
+    dataset.findings = [each for each in dataset.findings if each.channel in ("", *wanted)]
+    findings = sanity.inspect(dataset)
+    sanity.stop_if_fatal(path, findings)
+    mended = repairs.mend(dataset, findings)
+    names = [name for name in wanted if name in mended]
+    return Prepared(mended, mended.table(names), findings, sanity.doubts(dataset, findings))
 
 
 def robot_units() -> dict[str, str]:
