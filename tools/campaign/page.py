@@ -48,6 +48,7 @@ def render(told: dict[str, Any]) -> str:
         undefined=jinja2.StrictUndefined,
     )
     environment.filters["share"] = share_text
+    environment.filters["why"] = why_text
     environment.filters["ms"] = lambda value: "" if value is None else f"{value:.4g} ms"
     heat = told["heat"]
     return environment.get_template("template.html.j2").render(
@@ -208,10 +209,18 @@ def markdown(told: dict[str, Any]) -> str:
             for each in told[name]:
                 first = each["detected"]
                 detected = f"{first['code']} from {first['board']}, {first['ms']:.4g} ms" if first else "no"
-                why = each["why"] + (f" after {each['fall_ms']:.0f} ms" if each["fall_ms"] is not None else "")
+                why = why_text(each)
                 fault = each["fault"] or ", ".join(f"{key} {value}" for key, value in each["axes"].items())
                 lines.append(f"| {each['outcome']} | {fault} | {why} | {detected} | `{each['replay']}` |")
     return "\n".join(lines) + "\n"
+
+
+def why_text(each: dict[str, Any]) -> str:
+    """Why a run has its outcome, and when it fell."""
+    if each["fall_ms"] is None:
+        return str(each["why"])
+    told = " after" if each["outcome"] == "fall" else "; fell after"
+    return f"{each['why']}{told} {each['fall_ms']:.0f} ms"
 
 
 SETTING_COLUMNS = ("outcome", "why", "step length", "step time", "motor power", "least slot margin", "overruns")

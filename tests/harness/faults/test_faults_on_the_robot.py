@@ -184,7 +184,7 @@ def test_a_reference_that_sags_makes_every_voltage_read_higher(robot, share, fac
 
 
 def reading(board, place):
-    """A result of a converter at a voltage that hardly moves: battery, supply, or a standing foot at the external one."""
+    """A result of a converter at a voltage that hardly moves: battery, supply, or a standing foot."""
     if place == "MCFO.adc_external":
         return list(board.adc_external.results[:4])[2]
     return board.adc.DR(1) if place == "CSR.adc_internal" else board.adc_internal.result
