@@ -14,7 +14,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.sysid import causes, channels, isolability
+from ranger_sim.sysid import causes, channels
 from ranger_sim.tools import terminal
 
 REASONS = {
@@ -82,6 +82,8 @@ def print_cause(cause: causes.Cause) -> None:
     print(f"signature: {cause.signature}")
     print(f"similar: {', '.join(causes.rivals(cause)) or 'nothing that is known'}")
     print(f"in a model file: {f'form = {cause.form!r}' if cause.form else 'there is no form for it yet'}")
+    from ranger_sim.sysid import isolability  # with scipy, which a first `make walk` does without
+
     for name in channels.EXPERIMENTS:
         status = isolability.analyse(name).status.get(cause.key)
         if status is not None:
@@ -90,6 +92,8 @@ def print_cause(cause: causes.Cause) -> None:
 
 def analysis_json(experiment: str, given: list[str] | None) -> dict[str, Any]:
     """What channels can show, for programs."""
+    from ranger_sim.sysid import isolability
+
     analysis = isolability.analyse(experiment, given)
     model = isolability.model_of(experiment)
     rows = [
@@ -137,6 +141,8 @@ def print_analysis(told: dict[str, Any]) -> None:
 
     tell(f"{told['experiment']} by {', '.join(told['channels'])}")
     tell(f"on a reference motion: {told['excitation']}")
+    from ranger_sim.sysid import isolability
+
     headings = {
         isolability.SHOWN: "These channels show, whatever the fitted parameters are",
         isolability.AS_PARAMETER: "Seen only as another value of a fitted parameter, against its known value",
