@@ -143,7 +143,9 @@ def gaussian_process(files, holdout, experiment):
 
 def sindy(files, holdout, experiment):
     """Sparse regression (SINDy's) of the residual on a library of terms, the strongest of which gives a name."""
-    import pysindy
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # what its imports say about themselves
+        import pysindy
 
     names = {1: "sensor_offset", 2: "drag", 3: "direction_friction", 4: "contact_drop_change", 5: "stribeck"}
 
@@ -159,7 +161,9 @@ def sindy(files, holdout, experiment):
         columns = library(x)
         scale = np.std(columns, axis=0) + 1e-12
         scale[0] = 1.0
-        fit = pysindy.STLSQ(threshold=0.1, alpha=0.01).fit(columns / scale, (y / np.std(y))[:, None])
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # it warns when no term is left
+            fit = pysindy.STLSQ(threshold=0.1, alpha=0.01).fit(columns / scale, (y / np.std(y))[:, None])
         weights = np.ravel(fit.coef_)
         chosen["term"] = int(np.argmax(np.abs(weights))) + 1
         return library(at) / scale @ weights * np.std(y)

@@ -31,12 +31,42 @@ LETTER = {
     "gearbox": "T",
     "cable": "T",
     "redundancy": "S",
+    "sensor": "S",
     "sensors": "S",
     "angle_sensing": "S",
     "current_sensing": "E",
     "power": "P",
     "timing": "t",
     "time": "t",
+}
+
+
+# Causes that sit in an instrument, in whatever balance they show: an answer may say so.
+IN_A_SENSOR = {
+    "current_step_at_zero_duty",
+    "sensor_scale",
+    "sensor_offset",
+    "sensor_lag",
+    "voltage_clip",
+    "eccentricity",
+    "lost_counts",
+    "clock_drift",
+}
+# Other words for a cause's size: {(cause, parameter of the truth): (parameter of an answer, factor, summand)}, and two
+# components of which the size is the length.
+SAME = {
+    ("sensor_offset", "value"): ("offset_A", 1.0, 0.0),
+    ("sensor_scale", "factor"): ("change", 1.0, 1.0),
+    ("current_step_at_zero_duty", "step_A"): ("offset_A", 2.0, 0.0),
+    ("cable_backlash", "gap_rad"): ("half_gap_rad", 2.0, 0.0),
+    ("lost_counts", "fraction"): ("share", 1.0, 0.0),
+    ("clock_drift", "drift"): ("share", 1.0, 0.0),
+    ("presliding", "deflection_rad"): ("slide_rad", 1.0, 0.0),
+}
+COMPONENTS = {
+    "amplitude_Nm": ("cosine_Nm", "sine_Nm"),
+    "fraction": ("cosine", "sine"),
+    "once_rad": ("cosine_rad", "sine_rad"),
 }
 
 
@@ -126,13 +156,23 @@ class Answer:
         return set().union(*self.groups()) if self.causes else set()
 
     def parameter(self, cause, name):
-        """(value, ci95) of a parameter of a cause, or None."""
-        for entry in self.causes:
-            if entry["name"] == cause:
-                found = (entry.get("parameters") or {}).get(name)
-                if found is not None and found.get("value") is not None:
-                    return float(found["value"]), found.get("ci95")
+        """(value, ci95 or None) of a cause's parameter, or None; by other words for it or components too."""
+        given = next((entry.get("parameters") or {} for entry in self.causes if entry["name"] == cause), {})
+        if name in given:
+            return _value(given[name])
+        other, factor, summand = SAME.get((cause, name), ("", 1.0, 0.0))
+        if other in given and (found := _value(given[other])):
+            value, interval = found
+            return factor * value + summand, interval and [factor * end + summand for end in interval]
+        parts = [_value(given[part]) for part in COMPONENTS.get(name, ()) if part in given]
+        if len(parts) == 2 and all(parts):
+            return float(np.hypot(parts[0][0], parts[1][0])), None
         return None
+
+
+def _value(entry):
+    """(value, ci95 or None) of an answer's parameter, or None."""
+    return None if entry.get("value") is None else (float(entry["value"]), entry.get("ci95"))
 
 
 def subsystem_is_right(answer, truth):
@@ -145,6 +185,8 @@ def subsystem_is_right(answer, truth):
     right = set(cause["balance"]) | ({"T"} if "S" in cause["balance"] else set())
     if "T" in right:
         right.add("S")  # an angle against another angle: one balance on a bench with two of them
+    if cause["name"] in IN_A_SENSOR:
+        right.add("S")
     return word == cause["subsystem"] or letter in right
 
 

@@ -4,7 +4,6 @@ Here diagnoses are played: an oracle that is right as often as the targets ask, 
 diagnosis itself is held to these bounds on fresh cases when RANGER_SIM_BLIND is set (its value: a seed, or "fresh").
 """
 
-import importlib.util
 import json
 import os
 import subprocess
@@ -21,7 +20,7 @@ from tests.blind.generator.experiment import SUBSYSTEM
 from tests.blind.generator.motor_bench import MOTOR_BENCH
 from tests.blind.score import score, table
 
-DIAGNOSIS = "ranger_sim.sysid.diagnose.diagnose:diagnose"
+DIAGNOSIS = "tests.blind.diagnosis:diagnose"
 SINGLE_RISK = RISK / len(BOUNDS)
 
 
@@ -226,8 +225,6 @@ def test_comparators_are_refused_on_the_cases(name, fresh_cases, tmp_path):
 
 @wanted
 def test_the_diagnosis_keeps_the_bounds_on_fresh_cases(fresh_cases, tmp_path):
-    if importlib.util.find_spec("ranger_sim.sysid.diagnose") is None:
-        pytest.skip("there is no diagnosis yet")
     data, hidden = fresh_cases
     found = answering.answer_all(DIAGNOSIS, data, tmp_path, processes=os.cpu_count() or 1)
     figures = score(hidden, found)

@@ -124,6 +124,28 @@ def test_the_error_of_a_scale_is_that_of_its_distance_from_one():
     assert found["parameter error at 2, median"].value == pytest.approx(0.05)
 
 
+@pytest.mark.parametrize(
+    "cause, true, given, error, cases",
+    [
+        ("sensor_offset", {"value": 0.02}, {"offset_A": (0.019, 0.018, 0.021)}, 0.05, 1),
+        ("sensor_scale", {"factor": 0.98}, {"change": (-0.019, -0.021, -0.018)}, 0.05, 1),
+        ("cable_backlash", {"gap_rad": 0.002}, {"half_gap_rad": (0.0011, 0.0009, 0.0012)}, 0.10, 1),
+        ("cogging", {"amplitude_Nm": 0.05}, {"cosine_Nm": (0.03, 0, 1), "sine_Nm": (-0.04, -1, 0)}, 0.0, 0),
+    ],
+)
+def test_other_words_for_a_size_are_understood(cause, true, given, error, cases):
+    """Two components have a length, but no interval of it."""
+    found = figures([(hidden(cause, parameters=true), named((cause, (), given)))])
+    assert found["parameter error at 4, median"].value == pytest.approx(error, abs=1e-12)
+    assert found["coverage of 95 % intervals"].cases == cases
+    assert found["coverage of 95 % intervals"].value in (1.0, None)
+
+
+def test_what_sits_in_a_sensor_may_be_said_to():
+    found = figures([(hidden("sensor_offset", balance="E"), named(("sensor_offset", ()), subsystem="sensor"))])
+    assert found["right subsystem"].value == 1.0
+
+
 def test_gain_is_taken_where_the_cause_is_reported_and_worse_models_everywhere():
     cases = [(hidden("drag"), named(("drag", ()), gain=g)) for g in (0.95, 0.85, 0.9)]
     found = figures([*cases, (hidden("drag"), named(("cogging", ()), gain=-0.2))])
