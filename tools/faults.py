@@ -37,6 +37,18 @@ def register(commands: Any) -> None:
     command.set_defaults(run=run)
 
 
+def add_fault_option(command: Any) -> None:
+    """The option that lets something fail."""
+    command.add_argument(
+        "--fault",
+        action="append",
+        default=[],
+        metavar="TEXT",
+        help='lets something fail: "MCH.joint_encoder:stuck@step 12..step 14"; may be given several times; exit code 3 '
+        "when one did not act; ranger-sim faults lists places and modes",
+    )
+
+
 def add_module_option(command: Any) -> None:
     """The option that brings in a user's own modes and places."""
     command.add_argument(

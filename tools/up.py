@@ -16,6 +16,8 @@ from ranger_sim import loading
 from ranger_sim.foundation import wallclock
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness import wiring
+from ranger_sim.harness.conditions import ErrorNoted
+from ranger_sim.harness.faults import catalogue
 from ranger_sim.harness.processes import control, places
 from ranger_sim.harness.processes.hardware import HardwareInTheLoop
 from ranger_sim.harness.processes.lateness import figures
@@ -25,11 +27,12 @@ from ranger_sim.harness.processes.supervisor import ELSEWHERE, RUNNING, Supervis
 from ranger_sim.harness.profile import Profile
 from ranger_sim.harness.profile import load as load_profile
 from ranger_sim.harness.scenario import StopRule
-from ranger_sim.tools import serial_options, terminal, trace, walk
+from ranger_sim.tools import faults, serial_options, terminal, trace, walk
 from ranger_sim.tools.files import json_target, writable_folder
 
 if TYPE_CHECKING:
     from ranger_sim.can_bus.edge.external_bus import ExternalBus
+    from ranger_sim.harness.faults.fault import Fault
     from ranger_sim.harness.processes.plant_process import PlantRun
     from ranger_sim.harness.ranger import Ranger
     from ranger_sim.harness.timeline import Timeline
@@ -110,6 +113,8 @@ def register(commands: Any) -> None:
         "needed ('can1=slcan:/dev/ttyACM0 --bitrate 1000000'); can1= asks python-can's configuration, section can1; "
         "MCH=... gives one board of such a bus a place of its own (repeatable). The run is then asynchronous",
     )
+    faults.add_fault_option(up)
+    faults.add_module_option(up)
     trace.add_options(up)
     up.set_defaults(run=run)
 
@@ -169,6 +174,8 @@ def run(options: argparse.Namespace) -> int:
 
     check_platform()
     trace.check(options)
+    faults.load_modules(options)
+    wanted = [catalogue.typed(text) for text in options.fault]
     settings = Settings(
         speed=options.speed,
         restart=options.restart,
@@ -224,6 +231,8 @@ def run(options: argparse.Namespace) -> int:
                 trace.write(timeline, options, console)
             if interrupted:
                 return 130
+            if not all(fault["acted"] for fault in summary["faults"]):
+                return faults.EXIT_INVALID
             return 1 if summary["fell"] or summary["failed_boards"] else 0
 
         view = LiveView(console) if console.is_terminal else PlainView(console)
@@ -233,11 +242,24 @@ def run(options: argparse.Namespace) -> int:
                 move_bus(robot, each, openers, settings.boards)
             if profile is not None and (profile.external() or profile.absent()):
                 elsewhere.append(HardwareInTheLoop(robot, profile, outside))
+            arm(robot, wanted)
             timelines.append(trace.attach(robot, options))
 
         supervisor = Supervisor(robot, settings, stop, finish, view, begin)
         view.say(f"ranger-sim up, name {settings.name}: {supervisor.describe()}")
         return supervisor.run()
+
+
+def arm(robot: Ranger, wanted: list[Fault]) -> None:
+    """Arm the faults in the plant's process. UserError for one that would have to act inside a board's."""
+    for fault in wanted:
+        for each in (fault.start, fault.end):
+            if isinstance(each, ErrorNoted):
+                raise UserError(
+                    f"fault {fault.text()}: {each.text!r} is counted in the process of its board, and asked for only "
+                    "at the end; a time, a step, a state or a variable can be waited for here"
+                )
+        robot.arm(fault)
 
 
 def processes_summary(

@@ -46,14 +46,7 @@ def register(commands: Any) -> None:
         description="All seven boards, four buses and the body in virtual time. Without an end it walks 100 steps.",
     )
     add_run_options(command)
-    command.add_argument(
-        "--fault",
-        action="append",
-        default=[],
-        metavar="TEXT",
-        help='lets something fail: "MCH.joint_encoder:stuck@step 12..step 14"; may be given several times; exit code 3 '
-        "when one did not act; ranger-sim faults lists places and modes",
-    )
+    faults.add_fault_option(command)
     command.add_argument(
         "--proof",
         action="store_true",

@@ -276,6 +276,13 @@ class ExternalBus:
             self.poller.register(peer.descriptor, select.POLLIN)
         return peer
 
+    def remove_peer(self, peer: Peer) -> None:
+        """One that `add_peer` gave leaves the bus; what waits there is not sent."""
+        self.peers.remove(peer)
+        if peer.descriptor >= 0:
+            self.poller.unregister(peer.descriptor)
+        peer.connection.shutdown()
+
     def poll(self, now_ns: int) -> int:
         """Frames in, and what waited out; returns when it wants to be polled next."""
         ready = {descriptor for descriptor, _ in self.poller.poll(0)}  # one question for all: recv asks again

@@ -9,6 +9,7 @@ from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.faults.catalogue import add_places, mode
 from ranger_sim.harness.faults.fault import Fault, Parameter, Place, WholeNumber
 from ranger_sim.harness.faults.names import ANY, identifier_of, name_parameter
+from ranger_sim.harness.faults.outside import OutsideBabbling, OutsideDuplicate, OutsideIntruder, external_bus
 from ranger_sim.harness.faults.reach import bus_of, wake_buses
 
 BUS = "CAN bus"
@@ -40,11 +41,36 @@ class BusFault(Fault):
 
 
 class IntruderFault(BusFault):
-    """A controller is clipped on the bus while the fault works, and taken off at its end."""
+    """A controller is clipped on the bus while the fault works, and taken off at its end.
+
+    Of a bus outside it is one more peer on the same interface (`outside.py`); what nodes there count is not seen here,
+    so the place is clear when the peer is gone.
+    """
 
     tamper: Any
+    peer: Any = None
+
+    def connect(self) -> None:
+        self.external = external_bus(self.robot, self.place.details["bus"])
+        if self.external is None:
+            BusFault.connect(self)
+
+    def made_outside(self) -> OutsideIntruder:
+        """What the intruder does on a bus outside."""
+        raise NotImplementedError
+
+    def before(self, now_ns: int) -> None:
+        if self.peer is not None:
+            self.peer.step(now_ns)
+
+    def is_clear(self, start_ns: int, end_ns: int) -> bool:
+        return self.external is not None or BusFault.is_clear(self, start_ns, end_ns)
 
     def begin(self, now_ns: int) -> None:
+        if self.external is not None:
+            self.peer = self.made_outside()
+            self.peer.step(now_ns)
+            return
         BusFault.begin(self, now_ns)
         self.intruder = tampering.Intruder(self.bus, f"intruder {len(self.bus.nodes)}")
         self.clip_on(now_ns)
@@ -57,6 +83,10 @@ class IntruderFault(BusFault):
         raise NotImplementedError
 
     def finish(self, now_ns: int) -> None:
+        if self.peer is not None:
+            self.peer.leave()
+            self.peer = None
+            return
         rewiring.unplug(self.bus, self.intruder.number, now_ns)
         self.bus.tampering.remove(self.tamper)
         wake_buses(self.robot, now_ns)
@@ -75,7 +105,7 @@ class BabblingNode(IntruderFault):
     )
 
     def connect(self) -> None:
-        BusFault.connect(self)
+        IntruderFault.connect(self)
         self.identifier = identifier_of(self.values["frame"], f"fault {self.text()}")
         if self.identifier < 0:
             raise UserError(f"fault {self.text()}: a babbling node needs an identifier, not {ANY!r}")
@@ -83,15 +113,20 @@ class BabblingNode(IntruderFault):
     def clip_on(self, now_ns: int) -> None:
         self.tamper = tampering.Babbling(self.intruder, self.identifier, round(1000 * self.values["period_us"]))
 
+    def made_outside(self) -> OutsideIntruder:
+        return OutsideBabbling(self.external, self.identifier, round(1000 * self.values["period_us"]), self.note)
+
     def begin(self, now_ns: int) -> None:
         IntruderFault.begin(self, now_ns)
-        self.tamper.speak(now_ns)
+        if self.external is None:
+            self.tamper.speak(now_ns)
 
 
 @mode
 class DuplicateIdentifier(IntruderFault):
     """A second node sends an identifier that has its sender already: at the same bit, with another value.
 
+    On a bus outside the bit cannot be met: there it sends its frame behind each of the other's.
     Arbitration does not part the two, so the first bit of the data that differs is a bit error of one of them. Both
     repeat at once, until both are error passive and the one whose flag is silent gives way.
     """
@@ -105,10 +140,13 @@ class DuplicateIdentifier(IntruderFault):
     )
 
     def connect(self) -> None:
-        BusFault.connect(self)
+        IntruderFault.connect(self)
         if not self.values["frame"] or self.values["frame"] == ANY:
             raise UserError(f"fault {self.text()}: say by frame= which identifier is there twice")
         self.identifier = identifier_of(self.values["frame"], f"fault {self.text()}")
+
+    def made_outside(self) -> OutsideIntruder:
+        return OutsideDuplicate(self.external, self.identifier, 1 << int(self.values["bit"]), self.note)
 
     def clip_on(self, now_ns: int) -> None:
         self.tamper = tampering.Duplicate(self.intruder, self.identifier, 1 << int(self.values["bit"]))

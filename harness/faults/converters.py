@@ -14,6 +14,7 @@ from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.faults.catalogue import mode
 from ranger_sim.harness.faults.fault import Fault, Parameter
 from ranger_sim.harness.faults.places import BURST_CONVERTER, CONVERTER, INTERNAL_CONVERTER
+from ranger_sim.harness.faults.reach import emulated
 
 CONVERTERS = (CONVERTER, INTERNAL_CONVERTER, BURST_CONVERTER)
 AWAITED = (CONVERTER, INTERNAL_CONVERTER)
@@ -27,9 +28,10 @@ class ConverterFault(Fault):
     fields: ClassVar[tuple[str, ...]] = ()  # that it changes, of either kind of converter
 
     def connect(self) -> None:
-        board = self.robot.boards[self.place.details["board"]]
+        board = self.robot.loop.board(self.place.details["board"])
         if board.apart:
             raise UserError(f"fault {self.text()}: {board.name} runs in a process of its own; its converter is there")
+        emulated(self.robot, board.name, f"fault {self.text()}")
         self.board: Any = board
         self.inside = board.name
         self.converter: Any = getattr(board, self.place.details["converter"])

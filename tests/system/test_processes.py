@@ -430,3 +430,14 @@ def test_the_timeline_of_a_run_has_the_slots_of_every_board_in_its_process(comma
 def test_a_timeline_that_cannot_be_is_refused_before_any_process_begins(command, tmp_path):
     done = command("up", "--time", "0.1s", "--trace", str(tmp_path / "run.txt"))
     assert done.returncode == 2 and "is no format" in done.stderr and done.stderr.count("\n") == 1
+
+
+def test_a_fault_at_a_sensor_acts_beside_processes_and_one_inside_a_board_is_refused(command):
+    run = ("up", "--time", "0.06s", "--speed", "max", "--json", "-", "--name", f"test-{uuid.uuid4().hex[:12]}")
+    done = command(*run, "--fault", "MCH.absolute_encoder:offset@0.03 s")
+    [fault] = json.loads(done.stdout)["faults"]
+    assert done.returncode == 0 and fault["acted"] and fault["activated_s"] == pytest.approx(0.03, abs=3e-4)
+    refused = command(*run, "--fault", "MCH.processor:stall")
+    assert refused.returncode == 2 and "MCH is not emulated in this process" in refused.stderr
+    late = command(*run, "--fault", "MCH.absolute_encoder:offset@error MC_TCURR_OOB from MCH")
+    assert late.returncode == 2 and "is counted in the process of its board" in late.stderr
