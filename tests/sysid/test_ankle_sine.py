@@ -78,7 +78,7 @@ DATA = FOLDER / "ranger_foot_inertia_5.csv"
 def test_the_robot_s_own_foot_is_found_and_its_misfit_is_in_the_interval():
     data = readers.read(DATA)
     first = {
-        name: dataclasses.replace(each, time_s=each.time_s[each.time_s < 2.5], value=each.value[each.time_s < 2.5])
+        name: dataclasses.replace(each, time_s=each.time_s[each.time_s < 1.6], value=each.value[each.time_s < 1.6])
         for name, each in data.channels.items()
     }
     found = ankle.foot(Dataset(data.name, first))

@@ -4,8 +4,10 @@ import json
 
 import pytest
 
+from ranger_sim.sysid.identify import motor, registry
 from ranger_sim.sysid.identify.registry import OF_TABLES
 from ranger_sim.tools.cli import main
+from ranger_sim.tools.identify import command
 
 
 def told(capsys, *arguments):
@@ -45,6 +47,11 @@ def test_all_leaves_recordings_figures_and_the_same_numbers_from_its_own_recordi
     assert [row["name"] for row in written["balance"]] == ["J_hip", "cm", "wm"]
     for row in parameters(written, "Table 3").values():
         assert row["ci95"][0] < row["value"] < row["ci95"][1]
+
+
+def test_the_command_line_names_the_benches_that_there_are():
+    assert {name: bench.title for name, bench in registry.BENCHES.items()} == command.BENCHES
+    assert command.GEAR == motor.GEAR
 
 
 def test_identifiability_is_told_before_the_values(capsys):
