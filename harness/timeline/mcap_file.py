@@ -2,6 +2,8 @@
 
 `/body` and `/variables/MCH` ... A message has every quantity of its group as a double, by name; units are in the names
 of the body's, and in the channel's metadata of all. Time is virtual, from the start of the run.
+
+`/events` has steps, falls, faults and overruns as messages of the type `foxglove.Log`, for Foxglove's log panel.
 """
 
 from typing import IO, Any
@@ -12,6 +14,7 @@ from ranger_sim.foundation.libraries import imported
 from ranger_sim.harness.timeline.model import Counter, Events
 
 PACKAGE = "ranger_sim"
+LOG_LEVELS = {"UNKNOWN": 0, "DEBUG": 1, "INFO": 2, "WARNING": 3, "ERROR": 4, "FATAL": 5}  # of foxglove.Log
 
 
 def write(events: Events, file: IO[bytes], title: str) -> None:
@@ -30,6 +33,7 @@ def write(events: Events, file: IO[bytes], title: str) -> None:
         units = {counter.path[-1]: counter.unit for counter in counters if counter.unit}
         channel = writer.register_channel("/" + "/".join((path[0].lower(), *path[1:])), "protobuf", schema, units)
         messages += [(time, channel, text) for time, text in rows(message_class, counters)]
+    messages += log_messages(writer, events)
     messages.sort(key=lambda message: message[:2])
     for time, channel, text in messages:
         writer.add_message(channel, log_time=time, publish_time=time, data=text)
@@ -69,3 +73,62 @@ def rows(message_class: Any, counters: list[Counter]) -> list[tuple[int, bytes]]
         known = {name: value for name, value in zip(names, values, strict=True) if value == value}
         found.append((time, message_class(**known).SerializeToString()))
     return found
+
+
+def log_messages(writer: Any, events: Events) -> list[tuple[int, int, bytes]]:
+    """(ns, channel, message) of everything that happened at one moment; the channel is there only if something did."""
+    if not any(instants.events for instants in events.instants):
+        return []
+    log_class, descriptors = log_type()
+    schema = writer.register_schema(log_class.DESCRIPTOR.full_name, "protobuf", descriptors)
+    channel = writer.register_channel("/events", "protobuf", schema)
+    found = []
+    for instants in events.instants:
+        for event in instants.events:
+            notes = ", ".join(f"{name} {value}" for name, value in event.notes.items())
+            log = log_class(
+                level=level_of(instants.path, event.name),
+                message=f"{event.name} ({notes})" if notes else event.name,
+                name=" ".join(instants.path),
+            )
+            log.timestamp.seconds, log.timestamp.nanos = divmod(event.time_ns, 1_000_000_000)
+            found.append((event.time_ns, channel, log.SerializeToString()))
+    return found
+
+
+def level_of(path: tuple[str, ...], name: str) -> int:
+    """How serious: a fall is an error, faults and overruns warn, steps inform."""
+    if path == ("Steps",):
+        return LOG_LEVELS["ERROR"] if name.startswith("fell") else LOG_LEVELS["INFO"]
+    return LOG_LEVELS["WARNING"]
+
+
+def log_type() -> tuple[Any, bytes]:
+    """(class of `foxglove.Log`, the description of it with what it needs), field by field as Foxglove published it."""
+    descriptor_pb2 = imported("google.protobuf.descriptor_pb2")
+    kinds = descriptor_pb2.FieldDescriptorProto
+    stamp = descriptor_pb2.FileDescriptorProto()
+    imported("google.protobuf.timestamp_pb2").DESCRIPTOR.CopyToProto(stamp)
+    described = descriptor_pb2.FileDescriptorProto(name="foxglove/Log.proto", package="foxglove", syntax="proto3")
+    described.dependency.append(stamp.name)
+    log = described.message_type.add(name="Log")
+    levels = log.enum_type.add(name="Level")
+    for level, number in LOG_LEVELS.items():
+        levels.value.add(name=level, number=number)
+    for number, (field, kind, of) in enumerate(
+        (
+            ("timestamp", kinds.TYPE_MESSAGE, ".google.protobuf.Timestamp"),
+            ("level", kinds.TYPE_ENUM, ".foxglove.Log.Level"),
+            ("message", kinds.TYPE_STRING, None),
+            ("name", kinds.TYPE_STRING, None),
+            ("file", kinds.TYPE_STRING, None),
+            ("line", kinds.TYPE_FIXED32, None),
+        ),
+        start=1,
+    ):
+        log.field.add(name=field, number=number, type=kind, type_name=of, label=kinds.LABEL_OPTIONAL)
+    pool = imported("google.protobuf.descriptor_pool").DescriptorPool()
+    pool.Add(stamp)
+    pool.Add(described)
+    made = imported("google.protobuf.message_factory").GetMessageClass(pool.FindMessageTypeByName("foxglove.Log"))
+    return made, descriptor_pb2.FileDescriptorSet(file=[stamp, described]).SerializeToString()

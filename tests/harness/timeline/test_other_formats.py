@@ -9,6 +9,8 @@ import pytest
 from ranger_sim.harness.ranger import Ranger
 from ranger_sim.harness.scenario import Scenario
 from ranger_sim.harness.timeline import Timeline
+from ranger_sim.harness.timeline import files as formats
+from ranger_sim.harness.timeline.model import Events, Instant, Instants
 
 RUN_S = 0.03
 
@@ -144,3 +146,32 @@ def test_body_and_signals_come_back_from_an_mcap_file(tmp_path):
     assert seen["/body"] == [2_000_000 * number for number in range(15)]
     assert last["/body"].hip_rad == pytest.approx(0.35, abs=0.01)
     assert last["/variables/MCH"].MCH_ANGLE == pytest.approx(angle, abs=1e-3)
+
+
+def test_what_happened_comes_back_from_an_mcap_file_as_foxgloves_log(tmp_path):
+    reader = pytest.importorskip("mcap.reader")
+    descriptor_pb2 = pytest.importorskip("google.protobuf.descriptor_pb2")
+    from google.protobuf import message_factory
+
+    events = Events(0, 3_000_000_000)
+    events.instants = [
+        Instants(
+            ("Steps",), [Instant(1_250_000_000, "step 3", {"length_m": 0.25}), Instant(2_500_000_007, "fell: hip")]
+        ),
+        Instants(("Faults",), [Instant(2_000_000_000, "acted: MCH.joint_encoder:stuck")]),
+    ]
+    formats.write(events, tmp_path / "run.mcap", "title")
+    found = []
+    with (tmp_path / "run.mcap").open("rb") as file:
+        for schema, channel, message in reader.make_reader(file).iter_messages():
+            described = descriptor_pb2.FileDescriptorSet.FromString(schema.data)
+            log = message_factory.GetMessages(described.file)[schema.name].FromString(message.data)
+            assert (schema.name, channel.topic) == ("foxglove.Log", "/events")
+            assert log.timestamp.seconds * 10**9 + log.timestamp.nanos == message.log_time
+            found.append((message.log_time, log.level, log.message, log.name))
+    # levels of foxglove.Log: 2 informs, 3 warns, 4 is an error
+    assert found == [
+        (1_250_000_000, 2, "step 3 (length_m 0.25)", "Steps"),
+        (2_000_000_000, 3, "acted: MCH.joint_encoder:stuck", "Faults"),
+        (2_500_000_007, 4, "fell: hip", "Steps"),
+    ]
