@@ -32,6 +32,7 @@ def parser() -> argparse.ArgumentParser:
         causes,
         check_bus,
         daq,
+        diagnose,
         faults,
         info,
         slots,
@@ -70,6 +71,7 @@ def parser() -> argparse.ArgumentParser:
     slots.register(commands)
     campaign.register(commands)
     causes.register(commands)
+    diagnose.register(commands)
     identify.register(commands)
     return top
 

@@ -395,7 +395,7 @@ def _sensors(gear: float, top_w: float, top_V: float) -> list[Effect]:
         Effect("sensor_lag", "speed_rad_per_s", S, ("time_constant_s",), [{}], speed_lag),
         Effect("sensor_lag", "torque_Nm", S, ("time_constant_s",), [{}], _one("mechanical", _minus("dT"))),
         Effect("eccentricity", "speed_rad_per_s", S, ("cosine", "sine"), turns, eccentric_speed, phase_is_free=True),
-        Effect("eccentricity", "motor_angle_rad", S, ("cosine_rad", "sine_rad"), turns, eccentric_angle, phase_is_free=True),
+        Effect("eccentricity", "motor_angle_rad", S, ("cosine_rad", "sine_rad"), turns, eccentric_angle, phase_is_free=True),  # noqa: E501
         Effect("lost_counts", "speed_rad_per_s", S, ("share",), fast, lost_speed),
         Effect("lost_counts", "motor_angle_rad", S, ("share",), fast, _one(T, over)),
         Effect("clock_drift", "torque_Nm", S, ("share",), [{}], _one("mechanical", drifting)),

@@ -1,0 +1,219 @@
+"""`ranger-sim diagnose`: what the simulation gets wrong about measured data, by name, and what mending it gains."""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import importlib
+import json
+import sys
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table as RichTable
+
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.sysid import repairs, sanity
+from ranger_sim.sysid.channels import named_for
+from ranger_sim.sysid.dataset import Dataset, Table
+from ranger_sim.sysid.diagnose import Diagnosis, diagnose
+from ranger_sim.sysid.machine import Machine
+from ranger_sim.sysid.machines import MACHINES
+from ranger_sim.sysid.model_file import model_text
+from ranger_sim.tools import recordings, terminal
+from ranger_sim.tools.files import json_target, replace_file, writable_folder
+
+EXIT_CLEAN, EXIT_FOUND = 0, 1
+
+
+def register(commands: Any) -> None:
+    """Add the subcommand to the command line."""
+    command = commands.add_parser(
+        "diagnose",
+        help="what the simulation gets wrong about measured data",
+        description="Looks for a misfit between measured data and the equations of an experiment, names its cause or "
+        "says that it cannot, and measures what the extended model gains on held-out data. Exit code 1 when something "
+        "was found.",
+    )
+    command.add_argument("data", nargs="+", metavar="DATA", help="recordings: CSV, MF4, a run's folder, CAN logs")
+    command.add_argument(
+        "--holdout", nargs="+", default=[], metavar="DATA", help="recordings that only measure the gain"
+    )
+    command.add_argument(
+        "--experiment",
+        required=True,
+        metavar="NAME",
+        help=f"{', '.join(MACHINES)}, or a machine of your own as module:object",
+    )
+    command.add_argument("--gear", type=float, metavar="N", help="of the motor bench's gearbox (14)")
+    command.add_argument("--seed", type=int, default=0, metavar="N", help="of the bootstrap (0)")
+    command.add_argument("--out", metavar="DIR", help="folder for the extended model and the answer")
+    command.add_argument("--json", metavar="FILE|-", help="the answer as JSON; - prints it and nothing else")
+    recordings.add_options(command)
+    command.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """The command."""
+    target = json_target(options.json)
+    folder = writable_folder(options.out) if options.out else None
+    found = of_options(options)
+    if folder is not None:
+        if found.named and not found.answer["abstained"]:
+            path = folder / "extended.toml"
+            replace_file(path, model_text(found).encode())
+            found.answer["model_file"] = str(path)
+        replace_file(folder / "diagnosis.json", _json(found.answer).encode())
+    if options.json == "-":
+        print(_json(found.answer))
+    else:
+        if target is not None:
+            replace_file(target, _json(found.answer).encode())
+        _show(found, terminal.console())
+    return EXIT_FOUND if found.answer["detected"] else EXIT_CLEAN
+
+
+def of_options(options: argparse.Namespace) -> Diagnosis:
+    """The diagnosis that a command line asks for."""
+    machine = machine_of(options.experiment, options.gear)
+    data = [_prepared(recordings.open_with(options, path), machine, options.experiment) for path in options.data]
+    held = [_prepared(recordings.open_with(options, path), machine, options.experiment) for path in options.holdout]
+    return _diagnosed(machine, data, held, options.seed)
+
+
+def answer(files: Sequence[str], holdout: Sequence[str], experiment: str) -> dict[str, Any]:
+    """What `--json` prints, for programs: files and held-out files of one experiment."""
+    machine = machine_of(experiment)
+    data, held = (
+        [_prepared(recordings.open_recording(path), machine, experiment) for path in each] for each in (files, holdout)
+    )
+    return _diagnosed(machine, data, held, 0).answer
+
+
+def machine_of(experiment: str, gear: float | None = None) -> Machine:
+    """A machine of ours by its experiment's name, or a user's as module:object; UserError when there is none."""
+    if experiment in MACHINES:
+        if gear is not None:
+            if experiment != "motor-bench":
+                raise UserError(f"--gear {gear:g}: only the motor bench has a gearbox to be told, not {experiment}")
+            if not 0.01 <= gear <= 1e4:
+                raise UserError(f"--gear {gear:g}: allowed are 0.01 to 10000")
+            return MACHINES[experiment](gear)
+        return MACHINES[experiment]()
+    module_name, colon, name = experiment.partition(":")
+    if not colon:
+        raise UserError(
+            f"--experiment {experiment}: there are {', '.join(MACHINES)}; a machine of yours is module:object"
+        )
+    if "" not in sys.path:
+        sys.path.insert(0, "")  # a user's module stands where the command is started
+    try:
+        found = getattr(importlib.import_module(module_name), name)
+    except (ImportError, AttributeError) as error:
+        raise UserError(f"--experiment {experiment}: {error}") from None
+    machine = found() if isinstance(found, type) else found
+    missing = [
+        each
+        for each in ("name", "quantities", "parameters", "prepare", "effects", "generic")
+        if not hasattr(machine, each)
+    ]
+    if missing:
+        raise UserError(
+            f"--experiment {experiment}: it has no {', '.join(missing)} (sysid/machine.py tells what a machine has)"
+        )
+    return machine
+
+
+def _prepared(dataset: Dataset, machine: Machine, experiment: str) -> tuple[Table, list[sanity.Finding]]:
+    """The table of a recording, mended, and what was odd in it."""
+    findings = sanity.inspect(dataset)
+    sanity.stop_if_fatal(dataset.name, findings)
+    mended = repairs.mend(dataset, findings)
+    if experiment in MACHINES:
+        mended = named_for(mended, experiment)
+    for quantity in machine.quantities:
+        if quantity.needed and quantity.name not in mended:
+            raise UserError(
+                f"{dataset.name}: {machine.name} needs {quantity.name}; there are {', '.join(mended.channels)}"
+            )
+    names = [quantity.name for quantity in machine.quantities if quantity.name in mended]
+    table = mended.table(names)
+    wrong = [each for each in findings if each.kind == "wrong_unit" and each.channel in names]
+    if wrong:
+        raise UserError(f"{dataset.name}: {wrong[0].channel}: {wrong[0].text}; nothing is concluded from it")
+    return table, findings
+
+
+def _diagnosed(machine: Machine, data: Sequence[tuple], held: Sequence[tuple], seed: int) -> Diagnosis:
+    findings = [
+        {**dataclasses.asdict(finding), "recording": table.name} for table, found in (*data, *held) for finding in found
+    ]
+    return diagnose(machine, [table for table, _ in data], [table for table, _ in held], seed, findings)
+
+
+def _json(answer: Mapping[str, Any]) -> str:
+    return json.dumps(answer, indent=1, allow_nan=False)
+
+
+def _show(found: Diagnosis, console: Console) -> None:
+    """The answer for a person."""
+    answer = found.answer
+    console.print(sentence(found), highlight=False, soft_wrap=True)
+    for finding in answer["data_findings"]:
+        console.print(
+            f"data: {finding['recording']}: {finding['channel']}: {finding['text']}", highlight=False, soft_wrap=True
+        )
+    if not answer["detected"]:
+        return
+    table = RichTable("equation", "regime", "misfit", "noise", "repeatable", box=None)
+    for each in answer["misfit"]:
+        if each["regime"] == "all" or each["repeatable_fraction"] > 0.02:
+            table.add_row(
+                each["channel"],
+                each["regime"],
+                f"{each['rms']:.3g}",
+                f"{each['noise']:.3g}",
+                f"{each['repeatable_fraction']:.1%}",
+            )
+    console.print(table)
+    for cause in answer["causes"]:
+        values = ", ".join(
+            f"{name} {_figure(value['value'])} ({_figure(value['ci95'][0])} to {_figure(value['ci95'][1])})"
+            for name, value in cause["parameters"].items()
+        )
+        tied = f"; ties with {', '.join(cause['evidence']['ties'])}" if cause["evidence"]["ties"] else ""
+        console.print(f"{cause['name']} at {cause['at']}: {values}{tied}", highlight=False, soft_wrap=True)
+    if answer["gain"] is not None:
+        gain = answer["gain"]
+        low, high = gain["ci95"]
+        console.print(
+            f"gain on {gain['holdout']}: {gain['fraction_of_achievable']:.0%} of what can be achieved "
+            f"({low:.0%} to {high:.0%})",
+            highlight=False,
+            soft_wrap=True,
+        )
+    for each in answer["next_experiment"]:
+        console.print(f"next: {each}", highlight=False, soft_wrap=True)
+
+
+def sentence(found: Diagnosis) -> str:
+    """What is wrong, in one sentence."""
+    answer = found.answer
+    name = found.machine.name
+    if not answer["detected"]:
+        p = answer["evidence"]["p_general"]
+        return f"{name}: nothing that these data could show is missing from the equations (p {p:.2g})."
+    if answer["abstained"]:
+        suspects = answer["evidence"]["suspects"]
+        also = f"; {', '.join(suspects)} would explain {answer['evidence']['explained']:.0%} of it" if suspects else ""
+        return (
+            f"{name}: something is wrong in the {answer['subsystem']} part, and no cause of the catalogue explains it"
+            f"{also}. Fitted parameters are not physical while this stands."
+        )
+    names = " and ".join(f"{each['name']} at {each['at']}" for each in answer["causes"])
+    return f"{name}: the {answer['subsystem']} part is wrong: {names}."
+
+
+def _figure(value: float) -> str:
+    return f"{value:.4g}"
