@@ -20,6 +20,8 @@ from ranger_sim.sysid.regression import Regression
 
 GENERAL_LEVEL = 0.005  # of all general tests together
 NAMED_LEVEL = 0.005  # of the whole selection
+HOLDS_OUT = 0.0  # chi-square that a further effect must win on held-out data
+ROUNDS, MOST = 4, 5  # of naming; effects that are named
 EXPLAINED = 0.7  # of what repeats: a name that explains less is none
 SKEW = 0.5  # samples: stamps of two channels differ by so much in any log
 
@@ -54,10 +56,17 @@ def diagnose(
     skews = _skews(effects, whole)
     plain = naming.refit(whole, skews)
     before = misfit.look(plain, general)
-    named = naming.select(
-        [each for each in effects if all(each is not skew.effect for skew in skews)], plain, NAMED_LEVEL
-    )
-    extended = naming.refit(plain, named, [*skews, *named])
+    named: list[Named] = []
+    extended = plain
+    rest = [each for each in effects if all(each is not skew.effect for skew in skews)]
+    for _ in range(ROUNDS):
+        found = naming.select(rest, extended, NAMED_LEVEL, MOST - len(named))
+        if not found:
+            break
+        named += found
+        rest = [each for each in rest if all(each is not other.effect for other in found)]
+        # what was named no longer counts as noise, and smaller effects stand out
+        extended = naming.refit(plain, named, [*skews, *named], fresh=True)
     after = misfit.look(extended, general)
     detected = before.p < GENERAL_LEVEL or bool(named)
     share = _explained(named, after)
@@ -92,7 +101,14 @@ def diagnose(
         },
     }
     if holdout and detected:
-        answer["gain"] = _gain(machine, plain, extended, holdout, skews, named if not doubtful else [], seed)
+        answer["gain"] = _gain(machine, plain, extended, holdout, skews, [] if doubtful else named, seed)
+        refused = answer["gain"].pop("refused")
+        answer["evidence"]["refused_by_holdout"] = [each.effect.name for each in refused]
+        if refused:
+            named = [each for each in named if each not in refused]
+            extended = naming.refit(plain, named, [*skews, *named], fresh=True)
+            answer["causes"] = [_cause(each, extended, before, skews) for each in named]
+            answer["abstained"] = not named
     return Diagnosis(machine, recordings, plain, extended, skews, named, before, after, answer)
 
 
@@ -183,7 +199,7 @@ def _channels(plain: Regression, extended: Regression, recordings: Sequence[Reco
         rows, good = plain.rows_of(equation), plain.good[equation]
         residual = plain.residual[rows]
         scale = plain.whitening[equation].deviation
-        better = extended.residual[rows]
+        better = extended.residual[rows] * (extended.whitening[equation].deviation / scale)
         noise = float(np.sqrt(np.mean(better**2)))
         names = ["all", *dict.fromkeys(name for r in recordings for name in r.regimes)]
         for name in names:
@@ -219,14 +235,31 @@ def _gain(
     recordings = [machine.prepare(table) for table in holdout]
     general = misfit.general_features(machine, recordings)
     base = naming.refit(Regression(recordings, noise=plain), skews, values=plain.values)
-    if not named:
-        return {"fraction_of_achievable": 0.0, "ci95": [0.0, 0.0], "holdout": ", ".join(t.name for t in holdout)}
-    found = gain.measure(base, named, extended.values, general, seed)
+    kept: list[Named] = []
+    refused: list[Named] = []
+    found = None
+    for each in named:
+        tried = gain.measure(base, [*kept, each], extended.values, general, seed)
+        if found is None or tried.chi2_won > found.chi2_won + HOLDS_OUT:
+            kept, found = [*kept, each], tried
+        else:
+            refused.append(each)
+    if found is not None and found.ci95[0] <= 0.0 and len(kept) == 1 and found.chi2_won < -HOLDS_OUT:
+        kept, refused, found = [], [*refused, *kept], None
+    if found is None:
+        return {
+            "fraction_of_achievable": 0.0,
+            "ci95": [0.0, 0.0],
+            "holdout": ", ".join(table.name for table in holdout),
+            "worse": False,
+            "refused": refused,
+        }
     return {
         "fraction_of_achievable": found.fraction,
         "ci95": list(found.ci95),
         "holdout": found.holdout,
         "worse": found.worse,
+        "refused": refused,
     }
 
 

@@ -24,6 +24,7 @@ class Gain:
     rms_before: float
     rms_after: float
     holdout: str
+    chi2_won: float = 0.0  # by which the extended model is nearer
 
     @property
     def worse(self) -> bool:
@@ -73,4 +74,5 @@ def measure(
         float(np.sqrt(np.mean(before**2))),
         float(np.sqrt(np.mean(after**2))),
         ", ".join(recording.table.name for recording in plain.recordings),
+        float(np.sum(before**2 - after**2)),
     )

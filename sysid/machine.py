@@ -72,6 +72,9 @@ class Recording:
     regimes: dict[str, np.ndarray] = dataclasses.field(default_factory=dict)
     width: float = 0.0  # samples; standard deviation of the Gaussian that is still to be put over both sides
     every: int = 1  # rows that count after it: one in so many
+    # False where what the equations miss is far above the noise: whitening it would weigh frequencies by what is
+    # wrong. Then fits are plain least squares, and only the count of samples is that of independent ones.
+    whitened: bool = True
 
 
 @dataclasses.dataclass(frozen=True)

@@ -134,8 +134,9 @@ def refit(
     named: Sequence[Named],
     together: Sequence[Named] | None = None,
     values: Mapping[str, float] | None = None,
+    fresh: bool = False,
 ) -> Regression:
-    """The regression with these effects in its base; the noise stays as it was.
+    """The regression with these effects in its base; its noise stays as it was, or is found anew when `fresh`.
 
     together: what the base is to have besides, when the regression has some of it already. values: the machine's
     parameters with which the effects' columns are made, those of the regression when None.
@@ -155,4 +156,4 @@ def refit(
                 for equation in recording.equations
             }
         )
-    return Regression(regression.recordings, extra, names, noise=regression)
+    return Regression(regression.recordings, extra, names, noise=None if fresh else regression)

@@ -40,6 +40,16 @@ def kept_rows(recording: Recording, column: np.ndarray) -> np.ndarray:
     return column[_rows(recording)]
 
 
+def _inside(recording: Recording) -> np.ndarray:
+    """False for kept rows so near an end of their run that the Gaussian reaches over it."""
+    reach = int(np.ceil(4.0 * recording.width)) if recording.width > 0.0 else 0
+    parts = []
+    for run in recording.table.runs:
+        rows = np.arange(run.start, run.stop, recording.every)
+        parts.append((rows >= run.start + reach) & (rows < run.stop - reach))
+    return np.concatenate(parts)
+
+
 def _starts(recording: Recording) -> np.ndarray:
     """True for the first kept rows of each run, which have not enough others before them."""
     first = [
@@ -130,7 +140,7 @@ class Regression:
             if extra and equation in extra[number]:
                 first = self.count - len(extra_names)
                 measured[:, first:] = stand_in[:, first:] = reduced(recording, extra[number][equation])
-            response, valid = reduced(recording, made.response), made.valid[_rows(recording)]
+            response, valid = reduced(recording, made.response), made.valid[_rows(recording)] & _inside(recording)
             parts.append((response, measured, stand_in, valid, _starts(recording)))
         return Part(*(np.concatenate(each) for each in zip(*parts, strict=True)))
 
@@ -142,10 +152,19 @@ class Regression:
             for name, part in self.parts.items():
                 residual = residuals[name] = part.response - part.measured @ found
                 coefficients = autoregression(np.where(part.valid, residual, 0.0), part.valid)
+                memory = 1.0
+                if not all(recording.whitened for recording in self.recordings):
+                    # N_eff = N (1 - rho) / (1 + rho) with the first autocorrelation
+                    both = part.valid[1:] & part.valid[:-1]
+                    total = float(np.mean(residual[part.valid] ** 2)) if np.any(part.valid) else 1.0
+                    rho = float(np.mean(residual[1:][both] * residual[:-1][both])) / total if np.any(both) else 0.0
+                    rho = min(max(rho, 0.0), 0.99)
+                    memory = float(np.sqrt((1.0 + rho) / (1.0 - rho)))
+                    coefficients = np.zeros(ORDER)
                 white = lfilter(np.concatenate(([1.0], -coefficients)), [1.0], residual)
                 good = self._good(name)
                 deviation = float(np.sqrt(np.mean(white[good] ** 2))) if np.any(good) else 1.0
-                self.whitening[name] = Whitening(coefficients, max(deviation, 1e-300))
+                self.whitening[name] = Whitening(coefficients, max(memory * deviation, 1e-300))
         for first, one in enumerate(self.equations):
             for other in self.equations[first + 1 :]:
                 both = self._good(one) & self._good(other)

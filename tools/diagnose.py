@@ -16,7 +16,7 @@ from rich.table import Table as RichTable
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.sysid import repairs, sanity
 from ranger_sim.sysid.channels import named_for
-from ranger_sim.sysid.dataset import Dataset, Table
+from ranger_sim.sysid.dataset import Dataset, Finding, Table
 from ranger_sim.sysid.diagnose import Diagnosis, diagnose
 from ranger_sim.sysid.machine import Machine
 from ranger_sim.sysid.machines import MACHINES
@@ -125,7 +125,7 @@ def machine_of(experiment: str, gear: float | None = None) -> Machine:
     return machine
 
 
-def _prepared(dataset: Dataset, machine: Machine, experiment: str) -> tuple[Table, list[sanity.Finding]]:
+def _prepared(dataset: Dataset, machine: Machine, experiment: str) -> tuple[Table, list[Finding]]:
     """The table of a recording, mended, and what was odd in it."""
     findings = sanity.inspect(dataset)
     sanity.stop_if_fatal(dataset.name, findings)

@@ -4,5 +4,6 @@ from collections.abc import Callable
 from typing import Any
 
 from ranger_sim.sysid.machines.motor_bench import MotorBench
+from ranger_sim.sysid.machines.positioning import Positioning
 
-MACHINES: dict[str, Callable[..., Any]] = {MotorBench.name: MotorBench}
+MACHINES: dict[str, Callable[..., Any]] = {MotorBench.name: MotorBench, Positioning.name: Positioning}

@@ -407,7 +407,7 @@ def _friction(top_w: float) -> list[Effect]:
     speeds = [{"speed_rad_s": share * top_w} for share in SPEED_SHARES]
 
     def presliding(r: Recording, shape: Shape, _: Values) -> Columns:
-        return {"mechanical": column(r.signals["sgn_w"] - _bristles(r, shape["slide_rad"]))}
+        return {"mechanical": column(r.signals["sgn_w"] - bristles(r, r.signals["w"], shape["slide_rad"]))}
 
     def warm_up(r: Recording, shape: Shape, _: Values) -> Columns:
         s = r.signals
@@ -519,9 +519,9 @@ def _transmission() -> list[Effect]:
     ]  # fmt: skip
 
 
-def _bristles(r: Recording, slide_rad: float) -> Array:
-    """Dahl's state over its limit: goes to the sign of the rate over a way of `slide_rad`, run by run."""
-    way = r.signals["w"] * r.table.step_s / slide_rad
+def bristles(r: Recording, rate: Array, slide: float) -> Array:
+    """Dahl's state over its limit: goes to the sign of the rate over a way of `slide`, run by run."""
+    way = rate * r.table.step_s / slide
     keep = np.exp(-np.abs(way)).tolist()
     sign = np.sign(way).tolist()
     out, state = [], 0.0

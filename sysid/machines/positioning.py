@@ -1,0 +1,139 @@
+"""A mass on a guide, driven by a motor under a position controller (EMPS: Janot, Gautier, Brunot 2019).
+
+    force   F = M a + F_v v + F_c sgn v + F_0        F = the drive's gain times the voltage command
+
+Only the position is measured, and well: velocity and acceleration come from it, by the derivatives of the one filter
+that stands on both sides of the equation (the inverse dynamic model identified by least squares). Published for this
+machine: M 95.1089 kg, F_v 203.50 N s/m, F_c 20.39 N, relative error of the force 4.08 % on run 1 and 5.98 % on run 2.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.sysid import signals
+from ranger_sim.sysid.dataset import Array, Table
+from ranger_sim.sysid.machine import Columns, Effect, Equation, Known, Quantity, Recording, Values
+from ranger_sim.sysid.machines.motor_bench import Made, bristles
+
+FORCE_N_PER_V = 35.15065188  # the drive's gain, published with the data
+WIDTH_S = 0.006  # Gaussian over both sides: -3 dB at 22 Hz, well above the controller's motion and below its noise
+EVERY_S = 0.008
+NEAR_STANDSTILL = 0.01  # of the fastest speed: below it friction may be anything up to its limit
+PITCHES_M = tuple(round(0.0005 * n, 4) for n in range(2, 61))
+
+Shape = Mapping[str, float]
+
+
+class Positioning:
+    """force_N_per_V: gain of the drive."""
+
+    name = "positioning"
+    quantities = (
+        Quantity("position_m", "m", "of the mass"),
+        Quantity("voltage_V", "V", "command to the drive"),
+        Quantity("pulse_N", "N", "known force besides the motor's", needed=False),
+    )
+    parameters = (
+        Known("mass_kg", "kg", 95.1089, 0.0, 1e4, "of carriage, screw and rotor together"),
+        Known("viscous_friction_Ns_per_m", "N s/m", 203.5, 0.0, 1e5, "of the guide"),
+        Known("coulomb_friction_N", "N", 20.39, 0.0, 1e4, "of the guide"),
+        Known("force_offset_N", "N", 0.0, -1e3, 1e3, "of drive and guide"),
+    )
+
+    def __init__(self, force_N_per_V: float = FORCE_N_PER_V) -> None:
+        self.force_N_per_V = force_N_per_V
+
+    def prepare(self, table: Table) -> Recording:
+        """Signals and the equation of one recording."""
+        missing = [each.name for each in self.quantities if each.needed and each.name not in table]
+        if missing:
+            raise UserError(
+                f"{table.name}: {self.name} needs {', '.join(missing)}; there are {', '.join(table.columns)}"
+            )
+        table = signals.uniform(table)
+        width = WIDTH_S / table.step_s
+        q = table["position_m"]
+        force = self.force_N_per_V * table["voltage_V"]
+        if "pulse_N" in table:
+            force = force - table["pulse_N"]
+        v = signals.derivative(table, q, 0.25 * width)
+        s = {"x": q, "v": v, "F": force, "t": table.time_s - table.time_s[0], "a": np.gradient(v, table.step_s)}
+        s["dF"] = np.gradient(force, table.step_s)
+        top = float(np.quantile(np.abs(v), 0.98))
+        s["sgn_v"] = np.tanh(v / (0.25 * NEAR_STANDSTILL * top))
+        equation = Equation(
+            "force",
+            "M",
+            "mechanical",
+            "N",
+            force,
+            {
+                "mass_kg": s["a"],
+                "viscous_friction_Ns_per_m": v,
+                "coulomb_friction_N": s["sgn_v"],
+                "force_offset_N": np.ones_like(v),
+            },
+            np.abs(v) > NEAR_STANDSTILL * top,
+        )
+        fast = np.abs(v) > 0.2 * top
+        regimes = {"forward": v > 0.0, "backward": v < 0.0, "low speed": ~fast, "fast": fast}
+        every = max(1, round(EVERY_S / table.step_s))
+        return Recording(table, s, {"force": equation}, regimes, width, every, whitened=False)
+
+    def generic(self, recording: Recording) -> dict[str, dict[str, Array]]:
+        """Signals over which the force is looked at without a cause in mind."""
+        return {"force": {name: recording.signals[name] for name in ("v", "a", "x", "t")}}
+
+    def effects(self, recordings: Sequence[Recording]) -> list[Effect]:
+        """What a guide, its screw and its drive can have."""
+        top = max(float(np.quantile(np.abs(r.signals["v"]), 0.98)) for r in recordings)
+        speeds = [{"speed_m_per_s": share * top} for share in (0.02, 0.04, 0.08, 0.16, 0.3)]
+
+        def force(make: Callable[[Mapping[str, Array], Shape, Values], tuple[Array, ...]]) -> Made:
+            return lambda r, p, v: {"force": np.column_stack(make(r.signals, p, v))}
+
+        def presliding(r: Recording, p: Shape, _: Values) -> Columns:
+            return {"force": (bristles(r, r.signals["v"], p["slide_m"]) - r.signals["sgn_v"])[:, None]}
+
+        def waves(s: Mapping[str, Array], p: Shape, _: Values) -> tuple[Array, Array]:
+            angle = 2.0 * np.pi * s["x"] / p["pitch_m"]
+            return np.cos(angle), np.sin(angle)
+
+        made: list[tuple[str, tuple[str, ...], list[dict[str, float]], Made, bool]] = [
+            ("direction_friction", ("viscous_Ns_per_m",), [{}], force(lambda s, p, _: (np.abs(s["v"]),)), False),
+            ("drag", ("quadratic_Ns2_per_m2",), [{}], force(lambda s, p, _: (s["v"] * np.abs(s["v"]),)), False),
+            (
+                "stribeck",
+                ("excess_N",),
+                speeds,
+                force(lambda s, p, _: (s["sgn_v"] * np.exp(-((s["v"] / p["speed_m_per_s"]) ** 2)),)),
+                False,
+            ),
+            (
+                "presliding",
+                ("friction_N",),
+                [{"slide_m": x} for x in (1e-4, 3e-4, 1e-3, 3e-3, 1e-2)],
+                presliding,
+                False,
+            ),
+            ("sensor_lag", ("time_constant_s",), [{}], force(lambda s, p, _: (-s["dF"],)), False),
+            ("once_per_turn", ("cosine_N", "sine_N"), [{"pitch_m": x} for x in PITCHES_M], force(waves), False),
+            (
+                "friction_warm_up",
+                ("N_per_m",),
+                [{"time_constant_s": x} for x in (3.0, 10.0, 30.0, 100.0)],
+                lambda r, p, _: {
+                    "force": (
+                        -r.signals["sgn_v"] * signals.lagged(r.table, np.abs(r.signals["v"]), p["time_constant_s"])
+                    )[:, None]
+                },
+                False,
+            ),
+        ]
+        places = {"sensor_lag": ("drive", "timing")}
+        return [
+            Effect(cause, *places.get(cause, ("guide", "mechanical")), names, shapes, columns, phase_is_free=free)
+            for cause, names, shapes, columns, free in made
+        ]
