@@ -16,6 +16,7 @@ from ranger_sim.foundation.user_error import UserError
 from ranger_sim.sysid.dataset import Array
 from ranger_sim.sysid.machine import Columns, Equation, Recording
 
+LEAST = 1e-9  # of the largest response: noise below it is rounding
 RANK = 1e-8  # a parameter whose column the others have to this part is not separable from them
 ORDER = 3  # of the autoregression: two for a filter, one more
 
@@ -113,6 +114,9 @@ class Regression:
         self.names += list(extra_names)
         self.count = len(self.names)
         self.parts = {name: self._part(name, extra, list(extra_names)) for name in self.equations}
+        counted = sum(int(np.count_nonzero(self._good(name))) for name in self.equations)
+        if counted <= 10 * self.count:
+            raise UserError(f"{counted} samples count, too few for {self.count} parameters")
         if noise is None:
             self.whitening: dict[str, Whitening] = {}
             self.shared: dict[tuple[str, str], float] = {}
@@ -164,7 +168,8 @@ class Regression:
                 white = lfilter(np.concatenate(([1.0], -coefficients)), [1.0], residual)
                 good = self._good(name)
                 deviation = float(np.sqrt(np.mean(white[good] ** 2))) if np.any(good) else 1.0
-                self.whitening[name] = Whitening(coefficients, max(memory * deviation, 1e-300))
+                least = LEAST * float(np.max(np.abs(part.response), initial=0.0)) or 1.0
+                self.whitening[name] = Whitening(coefficients, max(memory * deviation, least))
         for first, one in enumerate(self.equations):
             for other in self.equations[first + 1 :]:
                 both = self._good(one) & self._good(other)
@@ -220,8 +225,6 @@ class Regression:
         self._solve()
 
     def _solve(self) -> None:
-        if self.size <= 10 * self.count:
-            raise UserError(f"{self.size} samples count, too few for {self.count} parameters")
         scale = np.linalg.norm(self.stand_in, axis=0)
         self.idle = [name for name, length in zip(self.names, scale, strict=True) if length == 0.0]
         scale = np.where(scale > 0.0, scale, 1.0)

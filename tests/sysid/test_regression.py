@@ -1,0 +1,119 @@
+"""Balances as one regression: its noise, columns that are noisy themselves, and what a test of a column is worth."""
+
+import numpy as np
+import pytest
+from scipy import stats
+from scipy.signal import lfilter
+
+from ranger_sim.foundation.random_arrays import generator
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.sysid.dataset import Table
+from ranger_sim.sysid.machine import Equation, Recording
+from ranger_sim.sysid.regression import Regression, autoregression, explained
+
+SIZE = 4000
+
+
+def coloured(rng, size, memory=0.8):
+    """Noise of deviation 1 that remembers."""
+    white = rng.normal(size=size) * np.sqrt(1.0 - memory**2)
+    return lfilter([1.0], [1.0, -memory], white)
+
+
+def recording(response, columns, stand_ins=None, **more):
+    size = len(response)
+    valid = np.ones(size, dtype=bool)
+    table = Table(np.arange(size) * 1e-3, {}, (slice(0, size),), "made")
+    made = Equation("one", "M", "mechanical", "N", response, columns, valid, stand_ins or {})
+    return Recording(table, {}, {"one": made}, **more)
+
+
+def test_an_autoregression_is_found():
+    rng = generator(1, "noise")
+    noise = lfilter([1.0], [1.0, -1.2, 0.5], rng.normal(size=200_000))
+    # deviation of a coefficient: at most 1 / sqrt(N) = 0.0022; five
+    assert autoregression(noise, np.ones(len(noise), dtype=bool)) == pytest.approx([1.2, -0.5, 0.0], abs=0.012)
+
+
+def test_intervals_hold_with_noise_that_remembers():
+    """Of 200 fits as many 95 % intervals hold as 200 tosses of such a coin allow, one time in 10^4 apart."""
+    held = 0
+    for seed in range(200):
+        rng = generator(seed, "interval")
+        x = np.cumsum(rng.normal(size=SIZE)) * 0.02
+        made = Regression([recording(2.0 * x + coloured(rng, SIZE), {"slope": x, "level": np.ones(SIZE)})])
+        error = np.sqrt(made.covariance[0, 0])
+        held += abs(made.values["slope"] - 2.0) < 1.96 * error
+    assert stats.binom.ppf(1e-4, 200, 0.95) <= held <= 199
+
+
+def test_a_noisy_column_biases_least_squares_and_not_a_fit_by_its_stand_in():
+    rng = generator(3, "errors in variables")
+    truth = np.sin(np.arange(SIZE) * 0.02)
+    measured, other = truth + 0.5 * rng.normal(size=SIZE), truth + 0.5 * rng.normal(size=SIZE)
+    response = 3.0 * truth + 0.1 * rng.normal(size=SIZE)
+    plain = Regression([recording(response, {"slope": measured})])
+    # attenuated by var / (var + noise) = 0.5 / 0.75; the whitening of a wrong model leaves it in that region
+    assert plain.values["slope"] < 2.3
+    with_stand_in = Regression([recording(response, {"slope": measured}, {"slope": other})])
+    error = float(np.sqrt(with_stand_in.covariance[0, 0]))
+    assert abs(with_stand_in.values["slope"] - 3.0) < 4.0 * error
+    assert error < 0.1
+
+
+def test_what_chance_explains_is_a_chi_square():
+    """Mean of 300 chi-squares of 3 degrees: 3 with deviation sqrt(6 / 300) = 0.14; five of them either way."""
+    found = []
+    for seed in range(300):
+        rng = generator(seed, "chance")
+        x = np.cumsum(rng.normal(size=1500)) * 0.03
+        made = Regression([recording(x + coloured(rng, 1500), {"slope": x})])
+        columns = made.columns([{"one": np.column_stack([np.sin(x), np.cos(x), x**2])}])
+        chi2, freedom = explained(columns, made.residual)
+        assert freedom == 3
+        found.append(chi2)
+    assert np.mean(found) == pytest.approx(3.0, abs=0.7)
+    # above the 99 % quantile: 3 expected of 300; more than 14 in one of 10^6
+    assert sum(each > stats.chi2.ppf(0.99, 3) for each in found) <= 14
+
+
+def test_the_chi_square_of_a_real_column_is_its_size_over_its_noise():
+    rng = generator(5, "real")
+    x = np.sin(np.arange(SIZE) * 0.1)
+    extra = np.sign(np.sin(np.arange(SIZE) * 0.013))
+    made = Regression([recording(x + 0.2 * extra + rng.normal(size=SIZE), {"slope": x})])
+    columns = made.columns([{"one": extra[:, None]}])
+    chi2, _ = explained(columns, made.residual)
+    # 0.2^2 * 4000 = 160, deviation 2 * sqrt(160) = 25; five
+    assert chi2 == pytest.approx(160.0, abs=126.0)
+    assert chi2 > 60.0
+
+
+def test_equations_that_share_noise_tell_by_how_much():
+    rng = generator(6, "shared")
+    common, x = rng.normal(size=SIZE), np.sin(np.arange(SIZE) * 0.1)
+    valid = np.ones(SIZE, dtype=bool)
+    table = Table(np.arange(SIZE) * 1e-3, {}, (slice(0, SIZE),), "made")
+    both = {
+        name: Equation(name, "M", "mechanical", "N", x + common + rng.normal(size=SIZE), {name: x}, valid)
+        for name in ("one", "other")
+    }
+    made = Regression([Recording(table, {}, both)])
+    assert made.shared["one", "other"] == pytest.approx(0.5, abs=0.06)
+    ones = np.ones((SIZE, 1))
+    assert made.inflation(made.whitened([{"one": ones}])) == 1.0
+    # the same column in both: variance of the sum is 1 + correlation
+    assert made.inflation(made.whitened([{"one": ones, "other": ones}])) == pytest.approx(1.5, abs=0.1)
+
+
+def test_columns_that_are_the_same_are_named_and_not_separated():
+    rng = generator(7, "twins")
+    x = np.sin(np.arange(SIZE) * 0.1)
+    made = Regression([recording(x + rng.normal(size=SIZE), {"one": x, "twin": 2.0 * x, "idle": np.zeros(SIZE)})])
+    assert made.unseparable in (["one"], ["twin"])
+    assert made.idle == ["idle"]
+
+
+def test_too_few_samples_are_refused_in_a_line():
+    with pytest.raises(UserError, match="samples count, too few for 1 parameters"):
+        Regression([recording(np.ones(12), {"level": np.ones(12)})])
