@@ -32,7 +32,6 @@ def parser() -> argparse.ArgumentParser:
         causes,
         check_bus,
         daq,
-        diagnose,
         faults,
         info,
         slots,
@@ -43,6 +42,7 @@ def parser() -> argparse.ArgumentParser:
     )
     from ranger_sim.tools.bench import command as bench
     from ranger_sim.tools.campaign import command as campaign
+    from ranger_sim.tools.diagnose import command as diagnose
     from ranger_sim.tools.fuzz import command as fuzz
     from ranger_sim.tools.identify import command as identify
     from ranger_sim.tools.vm import command as vm

@@ -1,9 +1,15 @@
 """The machines of this room, by the name of their experiment."""
 
-from collections.abc import Callable
+import importlib
 from typing import Any
 
-from ranger_sim.sysid.machines.motor_bench import MotorBench
-from ranger_sim.sysid.machines.positioning import Positioning
+MACHINES = {
+    "motor-bench": "motor_bench:MotorBench",
+    "positioning": "positioning:Positioning",
+}
 
-MACHINES: dict[str, Callable[..., Any]] = {MotorBench.name: MotorBench, Positioning.name: Positioning}
+
+def made(experiment: str) -> Any:
+    """The class of a machine; loaded only when it is asked for."""
+    module, _, name = MACHINES[experiment].partition(":")
+    return getattr(importlib.import_module(f"ranger_sim.sysid.machines.{module}"), name)

@@ -20,7 +20,7 @@ from tests.blind.generator.experiment import SUBSYSTEM
 from tests.blind.generator.motor_bench import MOTOR_BENCH
 from tests.blind.score import score, table
 
-DIAGNOSIS = "tests.blind.diagnosis:diagnose"
+DIAGNOSIS = "ranger_sim.tools.diagnose.work:answer"
 SINGLE_RISK = RISK / len(BOUNDS)
 
 

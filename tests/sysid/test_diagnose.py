@@ -14,14 +14,14 @@ from ranger_sim.sysid.dataset import Table
 from ranger_sim.sysid.diagnose import diagnose
 from ranger_sim.sysid.machine import Effect, Equation, Known, Quantity, Recording
 from ranger_sim.tools.cli import main
-from ranger_sim.tools.diagnose import answer, machine_of
+from ranger_sim.tools.diagnose.work import answer, machine_of
 
 SIZE = 6000
 STEP_S = 0.01
 
 
 class Cart:
-    """A cart pushed along a rail: F = m a + c v. What may be wrong: drag, a slope, a magnet somewhere along the rail."""
+    """A cart pushed along a rail: F = m a + c v. It may have drag, a slope, or a magnet along the rail."""
 
     name = "cart"
     quantities = (Quantity("force_N", "N", "push"), Quantity("v_m_per_s", "m/s", "speed"))
@@ -220,9 +220,7 @@ def test_a_fault_of_the_motor_bench_is_named(tmp_path):
 
 # --- real data ------------------------------------------------------------------------------------------------
 
-DATA = pathlib.Path(
-    os.environ.get("RANGER_SIM_DATA", pathlib.Path(__file__).resolve().parents[2].parent / "shared" / "data")
-)
+DATA = pathlib.Path(__file__).resolve().parents[3] / "shared" / "data"
 
 
 @pytest.mark.skipif(not (DATA / "emps_run1.csv").exists(), reason="no measured data here (../shared/data)")

@@ -1,4 +1,4 @@
-"""`ranger-sim diagnose`: what the simulation gets wrong about measured data, by name, and what mending it gains."""
+"""The work of `ranger-sim diagnose`: what the simulation gets wrong about measured data, and what mending it gains."""
 
 from __future__ import annotations
 
@@ -19,39 +19,12 @@ from ranger_sim.sysid.channels import named_for
 from ranger_sim.sysid.dataset import Dataset, Finding, Table
 from ranger_sim.sysid.diagnose import Diagnosis, diagnose
 from ranger_sim.sysid.machine import Machine
-from ranger_sim.sysid.machines import MACHINES
+from ranger_sim.sysid.machines import MACHINES, made
 from ranger_sim.sysid.model_file import model_text
 from ranger_sim.tools import recordings, terminal
 from ranger_sim.tools.files import json_target, replace_file, writable_folder
 
 EXIT_CLEAN, EXIT_FOUND = 0, 1
-
-
-def register(commands: Any) -> None:
-    """Add the subcommand to the command line."""
-    command = commands.add_parser(
-        "diagnose",
-        help="what the simulation gets wrong about measured data",
-        description="Looks for a misfit between measured data and the equations of an experiment, names its cause or "
-        "says that it cannot, and measures what the extended model gains on held-out data. Exit code 1 when something "
-        "was found.",
-    )
-    command.add_argument("data", nargs="+", metavar="DATA", help="recordings: CSV, MF4, a run's folder, CAN logs")
-    command.add_argument(
-        "--holdout", nargs="+", default=[], metavar="DATA", help="recordings that only measure the gain"
-    )
-    command.add_argument(
-        "--experiment",
-        required=True,
-        metavar="NAME",
-        help=f"{', '.join(MACHINES)}, or a machine of your own as module:object",
-    )
-    command.add_argument("--gear", type=float, metavar="N", help="of the motor bench's gearbox (14)")
-    command.add_argument("--seed", type=int, default=0, metavar="N", help="of the bootstrap (0)")
-    command.add_argument("--out", metavar="DIR", help="folder for the extended model and the answer")
-    command.add_argument("--json", metavar="FILE|-", help="the answer as JSON; - prints it and nothing else")
-    recordings.add_options(command)
-    command.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -99,8 +72,8 @@ def machine_of(experiment: str, gear: float | None = None) -> Machine:
                 raise UserError(f"--gear {gear:g}: only the motor bench has a gearbox to be told, not {experiment}")
             if not 0.01 <= gear <= 1e4:
                 raise UserError(f"--gear {gear:g}: allowed are 0.01 to 10000")
-            return MACHINES[experiment](gear)
-        return MACHINES[experiment]()
+            return made(experiment)(gear)
+        return made(experiment)()
     module_name, colon, name = experiment.partition(":")
     if not colon:
         raise UserError(

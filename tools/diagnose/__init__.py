@@ -1,0 +1,1 @@
+"""`ranger-sim diagnose`: causes of a misfit between measured data and a simulation, by name."""

@@ -1,0 +1,43 @@
+"""`ranger-sim diagnose`: its options. What it does stands in work.py, which needs libraries that a walk does not."""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+from ranger_sim.sysid.machines import MACHINES
+from ranger_sim.tools import recordings
+
+
+def register(commands: Any) -> None:
+    """Add the subcommand to the command line."""
+    command = commands.add_parser(
+        "diagnose",
+        help="what the simulation gets wrong about measured data",
+        description="Looks for a misfit between measured data and the equations of an experiment, names its cause or "
+        "says that it cannot, and measures what the extended model gains on held-out data. Exit code 1 when something "
+        "was found.",
+    )
+    command.add_argument("data", nargs="+", metavar="DATA", help="recordings: CSV, MF4, a run's folder, CAN logs")
+    command.add_argument(
+        "--holdout", nargs="+", default=[], metavar="DATA", help="recordings that only measure the gain"
+    )
+    command.add_argument(
+        "--experiment",
+        required=True,
+        metavar="NAME",
+        help=f"{', '.join(MACHINES)}, or a machine of your own as module:object",
+    )
+    command.add_argument("--gear", type=float, metavar="N", help="of the motor bench's gearbox (14)")
+    command.add_argument("--seed", type=int, default=0, metavar="N", help="of the bootstrap (0)")
+    command.add_argument("--out", metavar="DIR", help="folder for the extended model and the answer")
+    command.add_argument("--json", metavar="FILE|-", help="the answer as JSON; - prints it and nothing else")
+    recordings.add_options(command)
+    command.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """The command."""
+    from ranger_sim.tools.diagnose import work
+
+    return work.run(options)
