@@ -60,13 +60,15 @@ def measure(
     basis = orthonormal(np.hstack([*columns, *features]))
     fitted = basis @ (basis.T @ before)
     # per row: what could be taken out, less what noise alone gives to so many columns
-    possible = before**2 - (before - fitted) ** 2 - basis.shape[1] / len(before)
+    rest = (before - fitted) ** 2
+    possible = before**2 - rest * (1.0 + basis.shape[1] / max(1, len(before) - basis.shape[1]))
     blocks = max(1, len(before) // BLOCK)
     edges = np.arange(0, blocks * BLOCK, BLOCK)
     won, most = (np.add.reduceat(each[: blocks * BLOCK], edges) for each in (before**2 - after**2, possible))
     draws = generator(seed, "bootstrap of the gain").integers(0, blocks, (DRAWS, blocks))
-    bound = max(float(most.sum()), float(np.abs(won.sum())), 1e-9)
-    fractions = won[draws].sum(axis=1) / np.maximum(most[draws].sum(axis=1), 0.1 * bound)
+    bound = max(float(most.sum()), float(won.sum()), 1e-9)
+    drawn, possible_drawn = won[draws].sum(axis=1), most[draws].sum(axis=1)
+    fractions = drawn / np.maximum(np.maximum(possible_drawn, drawn), 0.1 * bound)
     low, high = np.quantile(fractions, [0.025, 0.975])
     return Gain(
         float(won.sum()) / bound,

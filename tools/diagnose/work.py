@@ -99,23 +99,22 @@ def machine_of(experiment: str, gear: float | None = None) -> Machine:
 
 
 def _prepared(dataset: Dataset, machine: Machine, experiment: str) -> tuple[Table, list[Finding]]:
-    """The table of a recording, mended, and what was odd in it."""
+    """The table of a recording, mended, and what was odd in it; UserError for data that are not what they say."""
+    if experiment in MACHINES:
+        dataset = named_for(dataset, experiment)
+    missing = [each.name for each in machine.quantities if each.needed and each.name not in dataset]
+    if missing:
+        there = ", ".join(dataset.channels) or "none"
+        raise UserError(f"{dataset.name}: {machine.name} needs {', '.join(missing)}; there are {there}")
+    names = [each.name for each in machine.quantities if each.name in dataset]
+    dataset.channels = {name: dataset.channels[name] for name in names}
+    dataset.findings = [each for each in dataset.findings if each.channel in ("", *names)]
     findings = sanity.inspect(dataset)
     sanity.stop_if_fatal(dataset.name, findings)
+    for doubt in sanity.doubts(dataset, findings):
+        raise UserError(f"{dataset.name}: {doubt.channel}: {doubt.text}; nothing is concluded from such data")
     mended = repairs.mend(dataset, findings)
-    if experiment in MACHINES:
-        mended = named_for(mended, experiment)
-    for quantity in machine.quantities:
-        if quantity.needed and quantity.name not in mended:
-            raise UserError(
-                f"{dataset.name}: {machine.name} needs {quantity.name}; there are {', '.join(mended.channels)}"
-            )
-    names = [quantity.name for quantity in machine.quantities if quantity.name in mended]
-    table = mended.table(names)
-    wrong = [each for each in findings if each.kind == "wrong_unit" and each.channel in names]
-    if wrong:
-        raise UserError(f"{dataset.name}: {wrong[0].channel}: {wrong[0].text}; nothing is concluded from it")
-    return table, findings
+    return mended.table([name for name in names if name in mended]), findings
 
 
 def _diagnosed(machine: Machine, data: Sequence[tuple], held: Sequence[tuple], seed: int) -> Diagnosis:
