@@ -75,6 +75,7 @@ class Recording:
     # False where what the equations miss is far above the noise: whitening it would weigh frequencies by what is
     # wrong. Then fits are plain least squares, and only the count of samples is that of independent ones.
     whitened: bool = True
+    lags: tuple[int, ...] = (0, 10, 30, 100)  # samples back at which the general tests look at slopes
 
 
 @dataclasses.dataclass(frozen=True)

@@ -18,7 +18,6 @@ from ranger_sim.sysid.regression import Regression, explained, orthonormal
 SINGLE_CELLS = 10
 PAIR_CELLS = 5
 TIME_CELLS = 8
-BACK = (0, 10, 30, 100)  # samples
 
 
 @dataclasses.dataclass(frozen=True)
@@ -61,8 +60,8 @@ def indicator(number: np.ndarray) -> Array:
     return out
 
 
-def features(signals: Mapping[str, Array]) -> dict[str, Array]:
-    """Groups of features (n, k) over an equation's general signals."""
+def features(signals: Mapping[str, Array], lags: Sequence[int]) -> dict[str, Array]:
+    """Groups of features (n, k) over an equation's general signals; lags: how far back slopes are looked at."""
     names = list(signals)
     groups: dict[str, Array] = {}
     for name in names:
@@ -76,7 +75,7 @@ def features(signals: Mapping[str, Array]) -> dict[str, Array]:
         if name == "t":
             continue
         slope = np.gradient(signals[name])
-        back = np.column_stack([np.roll(slope, lag) for lag in BACK])
+        back = np.column_stack([np.roll(slope, lag) for lag in lags])
         groups[f"history of {name}"] = back
     return groups
 
@@ -101,7 +100,7 @@ def general_features(machine: Machine, recordings: Sequence[Recording]) -> Gener
         ends = np.cumsum(
             [0, *(len(recording.table) if each else 0 for recording, each in zip(recordings, signals, strict=True))]
         )
-        for group, matrix in features(together).items():
+        for group, matrix in features(together, recordings[0].lags).items():
             columns = [
                 {equation: matrix[start:stop]} if stop > start else {}
                 for start, stop in zip(ends[:-1], ends[1:], strict=True)

@@ -84,6 +84,8 @@ class MotorBench:
         rough = _rough_electrics(V, I, s["w"])
         s["I"] = _current(signals.smooth(table, V, 1.0), s["w"], *rough)
         s["w_by_voltage"] = signals.smooth(table, V - rough[0] * I - rough[1] * np.sign(s["I"]), SLOW) / rough[2]
+        if not measured:
+            s["dw"] = np.gradient(s["w_by_voltage"], table.step_s)
         s["dI"] = np.gradient(s["I"], table.step_s)
         s["dT"] = signals.derivative(table, T, SLOW)
         s["dV"] = np.gradient(V, table.step_s)
@@ -140,14 +142,19 @@ class MotorBench:
                 "transmission", "T", "transmission", "rad/s", turning - w, {}, everywhere
             )
         regimes = _regimes(s, firm_w)
-        return Recording(table, s, equations, regimes, WIDTH, EVERY)
+        lags = (0, 10, 30, 100) if measured else (0, 100, 250)
+        return Recording(table, s, equations, regimes, WIDTH, EVERY, lags=lags)
 
     def generic(self, recording: Recording) -> dict[str, dict[str, Array]]:
         """Signals over which each equation is looked at without a cause in mind."""
         s = recording.signals
-        calm = {name: signals.smooth(recording.table, s[name], CALM) for name in ("I", "V")}
-        of_voltage = {**calm, "w": s["w"], "t": s["t"]}
+        calm = {name: signals.smooth(recording.table, s[name], CALM) for name in ("I", "V", "w")}
+        of_voltage = {**calm, "t": s["t"]}
         of_torque = {name: s[name] for name in ("I", "w", "V", "t")}
+        if "transmission" in recording.equations:
+            of_voltage["w"] = s["w"]  # by the angle: no noise of the speed's sensor
+        else:
+            of_torque["w"] = s["w_by_voltage"]
         of_speed = {**of_torque, "w": s["w_by_voltage"]}
         made = {"electric": of_voltage, "mechanical": of_torque, "transmission": of_speed}
         return {name: made[name] for name in recording.equations}
@@ -362,13 +369,16 @@ def _sensors(gear: float, top_w: float, top_V: float) -> list[Effect]:
         angle = shape["periods_per_turn"] * r.signals["angle"]
         return {T: column(*(np.gradient(f(angle), r.table.step_s) / gear for f in (np.cos, np.sin)))}
 
-    def over(s: Mapping[str, Array], shape: Shape, _: Values) -> Array:
-        w = s["w_by_voltage"]
+    def over(w: Array, shape: Shape) -> Array:
         return -np.sign(w) * np.maximum(np.abs(w) - shape["speed_rad_s"], 0.0)
 
+    def lost_angle(r: Recording, shape: Shape, _: Values) -> Columns:
+        return {T: column(over(r.signals["w_by_voltage"], shape))}
+
     def lost_speed(r: Recording, shape: Shape, v: Values) -> Columns:
-        lost = over(r.signals, shape, v)
-        return {"electric": column(-v["torque_constant_Nm_per_A"] * lost), T: column(-lost)}
+        s = r.signals
+        in_voltage = -v["torque_constant_Nm_per_A"] * over(s["w"], shape)
+        return {"electric": column(in_voltage), T: column(-over(s["w_by_voltage"], shape))}
 
     def drifting(s: Mapping[str, Array], _: Shape, __: Values) -> Array:
         return s["t"] * s["dT"]
@@ -397,7 +407,7 @@ def _sensors(gear: float, top_w: float, top_V: float) -> list[Effect]:
         Effect("eccentricity", "speed_rad_per_s", S, ("cosine", "sine"), turns, eccentric_speed, phase_is_free=True),
         Effect("eccentricity", "motor_angle_rad", S, ("cosine_rad", "sine_rad"), turns, eccentric_angle, phase_is_free=True),  # noqa: E501
         Effect("lost_counts", "speed_rad_per_s", S, ("share",), fast, lost_speed),
-        Effect("lost_counts", "motor_angle_rad", S, ("share",), fast, _one(T, over)),
+        Effect("lost_counts", "motor_angle_rad", S, ("share",), fast, lost_angle),
         Effect("clock_drift", "torque_Nm", S, ("share",), [{}], _one("mechanical", drifting)),
     ]  # fmt: skip
 
