@@ -16,6 +16,7 @@ PRINTED = {
     # the longest wait of a frame on CAN1, µs
     "docs/timeline.md": (r"^\d{1,3}\.\d+$",),
     "firmware_sim/README.md": (r"^5 1 0$",),
+    "sysid/README.md": (r"^400 1\.0$",),
 }
 
 
