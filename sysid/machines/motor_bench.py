@@ -155,7 +155,8 @@ class MotorBench:
             of_voltage["w"] = s["w"]  # by the angle: no noise of the speed's sensor
         else:
             of_torque["w"] = s["w_by_voltage"]
-        of_speed = {**of_torque, "w": s["w_by_voltage"]}
+        measured_I = signals.smooth(recording.table, recording.table["current_A"], SLOW)
+        of_speed = {**of_torque, "w": s["w_by_voltage"], "I": measured_I}
         made = {"electric": of_voltage, "mechanical": of_torque, "transmission": of_speed}
         return {name: made[name] for name in recording.equations}
 
@@ -518,13 +519,19 @@ def _periodic(gear: float) -> list[Effect]:
 def _transmission() -> list[Effect]:
     T = "transmission"
 
-    def play(r: Recording, shape: Shape, _: Values) -> Columns:
-        load = np.tanh(signals.smooth(r.table, r.table["torque_Nm"], 2.0) / shape["torque_Nm"])
-        return {"transmission": column(np.gradient(load, r.table.step_s))}
+    def play(r: Recording, shape: Shape, v: Values) -> Columns:
+        """The output lies against the flank that carries the load, and crosses the gap in some milliseconds."""
+        s = r.signals
+        load = signals.smooth(r.table, r.table["torque_Nm"], SLOW) + v["inertia_kg_m2"] * s["dw"]
+        flank = np.tanh(load / shape["torque_Nm"])
+        if shape["crossing_s"] > 0.0:
+            flank = signals.lagged(r.table, flank, shape["crossing_s"])
+        return {T: column(np.gradient(flank, r.table.step_s))}
 
+    plays = [{"torque_Nm": load, "crossing_s": time_s} for load in (0.01, 0.03, 0.1) for time_s in (0.0, 0.003, 0.01)]
     return [
         Effect("cable_stiffening", T, T, ("rad_per_Nm",), [{}], _one(T, lambda s, p, _: s["dT"])),
-        Effect("cable_backlash", T, T, ("half_gap_rad",), [{"torque_Nm": x} for x in (0.003, 0.01, 0.03)], play),
+        Effect("cable_backlash", T, T, ("half_gap_rad",), plays, play),
         Effect("pulley_slip", T, T, ("share",), [{}], _one(T, lambda s, p, _: s["w_by_voltage"])),
     ]  # fmt: skip
 
