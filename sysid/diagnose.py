@@ -5,18 +5,16 @@ The answer is a dictionary that `json` writes as it is; its keys are those of `r
 
 import dataclasses
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from scipy import stats
 
-from ranger_sim.foundation.user_error import UserError
 from ranger_sim.sysid import gain, misfit, naming
 from ranger_sim.sysid.dataset import Table
 from ranger_sim.sysid.machine import Effect, Machine, Recording
 from ranger_sim.sysid.naming import Named
-from ranger_sim.sysid.regression import Regression
+from ranger_sim.sysid.regression import Regression, kept_rows
 
 # Of all general tests together. Chosen by us: their chi-squares hold for many samples only, and 0.005 gave 2 alarms
 # in 24 sound recordings of 2000 independent samples.
@@ -73,6 +71,7 @@ def diagnose(
     detected = before.p < GENERAL_LEVEL or bool(named)
     share = _explained(named, after)
     doubtful = detected and (not named or (share < EXPLAINED and after.p < GENERAL_LEVEL))
+    impossible = _impossible(machine, extended)
     answer: dict[str, Any] = {
         "detected": bool(detected),
         "misfit": _channels(plain, extended, recordings),
@@ -96,7 +95,8 @@ def diagnose(
                 for name, value in extended.values.items()
                 if "@" not in name
             },
-            "parameters_are_physical": not doubtful,
+            "parameters_are_physical": not doubtful and not impossible,
+            "impossible": impossible,
             "skew_samples": {
                 each.effect.at: extended.values[each.coefficients[0]] / recordings[0].table.step_s for each in skews
             },
@@ -130,6 +130,17 @@ def _explained(named: Sequence[Named], after: misfit.Misfit) -> float:
     gained = sum(each.chi2 - each.freedom for each in named)
     total = gained + after.excess
     return float(gained / total) if total > 0.0 else 0.0
+
+
+def _impossible(machine: Machine, regression: Regression) -> list[str]:
+    """Parameters that lie outside their limits with their whole interval: no machine has such."""
+    found = []
+    for known in machine.parameters:
+        if known.name in regression.values:
+            value, reach = regression.values[known.name], 1.96 * _error(regression, known.name)
+            if value + reach < known.low or value - reach > known.high:
+                found.append(known.name)
+    return found
 
 
 def _error(regression: Regression, name: str) -> float:
@@ -194,8 +205,6 @@ def _neighbours(each: Named, name: str, value: float) -> tuple[float, float]:
 
 def _channels(plain: Regression, extended: Regression, recordings: Sequence[Recording]) -> list[dict[str, Any]]:
     """Misfit of each equation, in all and in each regime: rms of the residual over its noise, both in deviations."""
-    from ranger_sim.sysid.regression import kept_rows
-
     out = []
     for equation in plain.equations:
         rows, good = plain.rows_of(equation), plain.good[equation]
@@ -283,16 +292,3 @@ def _next(named: Sequence[Named]) -> list[str]:
             if len(pair) == 2:
                 out.append(NEXT.get(pair, f"an experiment in which {each.effect.name} and {tie.name} differ"))
     return list(dict.fromkeys(out))
-
-
-def shared_evidence(p: float) -> float:
-    """Standard deviations of a normal distribution that are as unlikely as `p`, for readers of the report."""
-    return float(stats.norm.isf(max(p, 1e-300) / 2.0))
-
-
-def parameters_of(machine: Machine) -> Mapping[str, Any]:
-    """The machine's parameters by name; UserError when two have the same."""
-    names = [each.name for each in machine.parameters]
-    if len(set(names)) != len(names):
-        raise UserError(f"{machine.name}: two parameters have the same name, of {', '.join(names)}")
-    return {each.name: each for each in machine.parameters}

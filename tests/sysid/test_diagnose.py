@@ -116,6 +116,15 @@ def test_a_small_fault_is_found_as_often_as_its_size_says():
     assert sum(bool(each["causes"]) and each["causes"][0]["name"] == "drag" for each in found) >= 18
 
 
+def test_a_parameter_that_no_machine_can_have_is_told():
+    run = cart_run(1)
+    backwards = Table(run.time_s, {"force_N": -run["force_N"], "v_m_per_s": run["v_m_per_s"]}, run.runs, run.name)
+    found = diagnose(Cart(), [backwards]).answer
+    assert found["evidence"]["impossible"] == ["mass_kg", "damping"]
+    assert found["evidence"]["parameters_are_physical"] is False
+    assert diagnosed(holdout=False)["evidence"]["impossible"] == []
+
+
 def test_the_same_data_have_the_same_answer():
     assert json.dumps(diagnosed(drag=0.02)) == json.dumps(diagnosed(drag=0.02))
 

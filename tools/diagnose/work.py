@@ -132,6 +132,11 @@ def _show(found: Diagnosis, console: Console) -> None:
     """The answer for a person."""
     answer = found.answer
     console.print(sentence(found), highlight=False, soft_wrap=True)
+    for name in answer["evidence"]["impossible"]:
+        value = _figure(answer["evidence"]["parameters"][name]["value"])
+        console.print(f"{name} comes out as {value}, which no machine has", highlight=False, soft_wrap=True)
+    for name in answer["evidence"].get("refused_by_holdout", ()):
+        console.print(f"{name} is in these data and not in the held-out ones: refused", highlight=False, soft_wrap=True)
     for finding in answer["data_findings"]:
         console.print(
             f"data: {finding['recording']}: {finding['channel']}: {finding['text']}", highlight=False, soft_wrap=True
