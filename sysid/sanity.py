@@ -54,6 +54,7 @@ DOUBTED_PART = 0.1  # of the samples; radio links lose a few in a hundred
 GAP_STEPS = 5.0  # of the median step; radio gaps of the robot's logs are 9 to 45 steps of 4 to 6 ms (C6.2)
 NAMED_PLACES = 6  # single findings of a kind in a channel; more of them are one finding together
 SPIKE_STEPS = 12.0  # of the usual second difference; noise reaches 6 in a million samples
+WARMTHS = ("C", "K")  # units of temperatures
 STUCK_SAMPLES = 50  # a fifth of a second of a fast channel of the robot
 STUCK_RATIO = 8.0  # to the longest other stretch: a quantised channel at rest stands still as well
 CLIPPED_SAMPLES = 3  # in a row at the limit
@@ -345,7 +346,8 @@ def _stuck(channel: Channel, all_channels: dict[str, Channel]) -> Iterator[Findi
     moving = []
     for other in all_channels.values():
         inside = other.value[(other.time_s > begin) & (other.time_s < end)]
-        if other.name != channel.name and len(inside) > 3 and not _is_held(other.value):
+        warm = other.unit in WARMTHS and channel.unit not in WARMTHS  # a machine at rest cools and warms as well
+        if other.name != channel.name and len(inside) > 3 and not _is_held(other.value) and not warm:
             if np.ptp(inside) > 0.2 * np.ptp(other.value):
                 moving.append(other.name)
     if moving:

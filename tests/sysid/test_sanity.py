@@ -245,3 +245,21 @@ def test_no_numbers_whatever_break_the_inspection_or_the_repairs(samples, repeat
 def test_the_measured_logs_show_what_is_known_of_them_and_nothing_else(file, experiment, kinds):
     data = channels.named_for(read(DATA / file), experiment)
     assert {each.kind for each in sanity.inspect(data) if each.severity != "note"} == kinds
+
+
+def test_an_angle_at_rest_is_not_stuck_because_a_temperature_moves():
+    time_s = np.arange(4000) * 1e-3
+    angle = np.where(time_s < 1.0, 0.0, np.sin(5.0 * (time_s - 1.0)))
+    warmth = 25.0 + np.round(20.0 * time_s) / 20.0
+
+    def stuck(*more):
+        all_channels = [
+            Channel("motor_angle_rad", "rad", time_s, angle),
+            Channel("temperature_C", "C", time_s, warmth),
+            *more,
+        ]
+        found = sanity.inspect(Dataset("rest", {each.name: each for each in all_channels}))
+        return [each.channel for each in found if each.kind == "stuck"]
+
+    assert stuck() == []
+    assert stuck(Channel("current_A", "A", time_s, np.sin(40.0 * time_s))) == ["motor_angle_rad"]
