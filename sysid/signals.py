@@ -34,18 +34,6 @@ def derivative(table: Table, column: Array, width: float) -> Array:
     return per_run(table, lambda part: ndimage.gaussian_filter1d(part, width, order=1, mode="nearest") / step_s, column)
 
 
-def around(table: Table, column: Array, gap: int, width: int) -> Array:
-    """Mean of `width` samples before and after each, those nearer than `gap` left out.
-
-    What a signal is near a sample, without that sample's own noise: cells made of it do not sort rows by noise that
-    stands in the row's residual too.
-    """
-    reach = gap + width
-    weights = np.zeros(2 * reach + 1)
-    weights[:width] = weights[-width:] = 0.5 / width
-    return per_run(table, lambda part: ndimage.convolve1d(part, weights, mode="nearest"), column)
-
-
 def lagged(table: Table, column: Array, time_constant_s: float) -> Array:
     """Behind a first-order filter that starts at rest in 0."""
     keep = math.exp(-table.step_s / time_constant_s)
@@ -57,18 +45,6 @@ def integral(table: Table, column: Array) -> Array:
     steps = np.diff(table.time_s, prepend=table.time_s[0])
     between = np.concatenate(([column[0]], 0.5 * (column[1:] + column[:-1])))
     return np.cumsum(steps * between)
-
-
-def noise_deviation(table: Table, column: Array, resolution: float = 0.0) -> float:
-    """Standard deviation of white noise in the column, from its third differences, at least that of its rounding.
-
-    Third differences of a smooth signal are small; those of white noise have 20 times its variance. Their median
-    absolute value (0.6745 of a deviation) does not see jumps.
-    """
-    parts = [np.diff(column[run], 3) for run in table.runs if run.stop - run.start > 3]
-    differences = np.concatenate(parts) if parts else np.zeros(1)
-    white = float(np.median(np.abs(differences))) / 0.6745 / math.sqrt(20.0)
-    return max(white, resolution / math.sqrt(12.0))
 
 
 def uniform(table: Table) -> Table:
