@@ -5,11 +5,12 @@ The answer is a dictionary that `json` writes as it is; its keys are those of `r
 
 import dataclasses
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
+from ranger_sim.foundation.user_error import UserError
 from ranger_sim.sysid import gain, misfit, naming
 from ranger_sim.sysid.dataset import Table
 from ranger_sim.sysid.machine import Effect, Machine, Recording
@@ -25,6 +26,18 @@ ROUNDS, MOST = 4, 5  # of naming; effects that are named
 EXPLAINED = 0.7  # of what repeats: a name that explains less is none
 SKEW = 0.5  # samples: stamps of two channels differ by so much in any log
 
+Progress = Callable[[str, float], None]  # (what is done now, share of the work that lies behind)
+
+
+@dataclasses.dataclass(frozen=True)
+class KnownEffect:
+    """An effect that the model has already: its shape, and the coefficients that it was found with."""
+
+    cause: str
+    at: str
+    coefficients: Mapping[str, float]
+    shape: Mapping[str, float]
+
 
 @dataclasses.dataclass
 class Diagnosis:
@@ -34,7 +47,7 @@ class Diagnosis:
     recordings: list[Recording]
     plain: Regression
     extended: Regression
-    skews: list[Named]
+    skews: list[Named]  # stamps that are off, and what the model has already: in the base of both regressions
     named: list[Named]
     before: misfit.Misfit
     after: misfit.Misfit
@@ -47,19 +60,31 @@ def diagnose(
     holdout: Sequence[Table] = (),
     seed: int = 0,
     findings: Sequence[dict] = (),
+    known: Sequence[KnownEffect] = (),
+    progress: Progress = lambda what, share: None,
 ) -> Diagnosis:
-    """What `machine`'s equations get wrong about these recordings. UserError when they cannot be judged at all."""
+    """What `machine`'s equations get wrong about these recordings. UserError when they cannot be judged at all.
+
+    known: effects that the model has already; like the machine's parameters they are fitted anew and are no finding.
+    """
+    progress("equations", 0.0)
     recordings = [machine.prepare(table) for table in tables]
+    progress("general tests", 0.1)
     general = misfit.general_features(machine, recordings)
     whole = Regression(recordings)
     effects = machine.effects(recordings)
-    skews = _skews(effects, whole)
+    had = [_had(each, effects) for each in known]
+    effects = [each for each in effects if all(each is not other.effect for other in had)]
+    whole = naming.refit(whole, had, fresh=True)
+    skews = _skews(effects, whole) + had
+    progress("misfit", 0.2)
     plain = naming.refit(whole, skews)
     before = misfit.look(plain, general)
     named: list[Named] = []
     extended = plain
     rest = [each for each in effects if all(each is not skew.effect for skew in skews)]
-    for _ in range(ROUNDS):
+    for number in range(ROUNDS):
+        progress("causes", 0.25 + 0.5 * number / ROUNDS)
         found = naming.select(rest, extended, NAMED_LEVEL, MOST - len(named))
         if not found:
             break
@@ -67,6 +92,7 @@ def diagnose(
         rest = [each for each in rest if all(each is not other.effect for other in found)]
         # what was named no longer counts as noise, and smaller effects stand out
         extended = naming.refit(plain, named, [*skews, *named], fresh=True)
+    progress("what is left", 0.75)
     after = misfit.look(extended, general)
     detected = before.p < GENERAL_LEVEL or bool(named)
     share = _explained(named, after)
@@ -87,22 +113,19 @@ def diagnose(
             "p_general_after": after.p,
             "explained": share,
             "suspects": [each.effect.name for each in named] if doubtful else [],
-            "parameters": {
-                name: {
-                    "value": value,
-                    "ci95": [value - 1.96 * _error(extended, name), value + 1.96 * _error(extended, name)],
-                }
-                for name, value in extended.values.items()
-                if "@" not in name
-            },
+            "parameters": {name: _value(extended, name) for name in extended.values if "@" not in name},
             "parameters_are_physical": not doubtful and not impossible,
             "impossible": impossible,
             "skew_samples": {
-                each.effect.at: extended.values[each.coefficients[0]] / recordings[0].table.step_s for each in skews
+                each.effect.at: extended.values[each.coefficients[0]] / recordings[0].table.step_s
+                for each in skews
+                if all(each is not other for other in had)
             },
+            "known": [_known(each, was, extended) for each, was in zip(had, known, strict=True)],
         },
     }
     if holdout and detected:
+        progress("gain", 0.85)
         answer["gain"] = _gain(machine, plain, extended, holdout, skews, [] if doubtful else named, seed)
         refused = answer["gain"].pop("refused")
         answer["evidence"]["refused_by_holdout"] = [each.effect.name for each in refused]
@@ -111,6 +134,7 @@ def diagnose(
             extended = naming.refit(plain, named, [*skews, *named], fresh=True)
             answer["causes"] = [_cause(each, extended, before, skews) for each in named]
             answer["abstained"] = not named
+    progress("done", 1.0)
     return Diagnosis(machine, recordings, plain, extended, skews, named, before, after, answer)
 
 
@@ -123,6 +147,33 @@ def _skews(effects: Sequence[Effect], regression: Regression) -> list[Named]:
         return []
     values = naming.refit(regression, found).values
     return [each for each in found if abs(values[each.coefficients[0]]) < SKEW * step_s]
+
+
+def _had(known: KnownEffect, effects: Sequence[Effect]) -> Named:
+    """A known effect among those of the machine; UserError when it has none such with these channels."""
+    for effect in effects:
+        same = (effect.cause, effect.at, set(effect.coefficients)) == (known.cause, known.at, set(known.coefficients))
+        if same and set(effect.shapes[0]) == set(known.shape):
+            return Named(effect, known.shape, 0.0, 0, 1.0, 0.0, [], [])
+    raise UserError(f"the model has {known.cause} at {known.at}, which these channels cannot show")
+
+
+def _known(had: Named, was: KnownEffect, extended: Regression) -> dict[str, Any]:
+    """What the model had, and what these data say of it."""
+    return {
+        "name": was.cause,
+        "at": was.at,
+        "parameters": {
+            name: {"model": was.coefficients[name], **_value(extended, full)}
+            for name, full in zip(had.effect.coefficients, had.coefficients, strict=True)
+        },
+        "shape": dict(was.shape),
+    }
+
+
+def _value(regression: Regression, name: str) -> dict[str, Any]:
+    value, reach = regression.values[name], 1.96 * _error(regression, name)
+    return {"value": value, "ci95": [value - reach, value + reach]}
 
 
 def _explained(named: Sequence[Named], after: misfit.Misfit) -> float:
@@ -166,14 +217,7 @@ def _parameter_names(recordings: Sequence[Recording]) -> list[str]:
 
 def _cause(each: Named, extended: Regression, before: misfit.Misfit, skews: Sequence[Named]) -> dict[str, Any]:
     parameters = {
-        name: {
-            "value": extended.values[full],
-            "ci95": [
-                extended.values[full] - 1.96 * _error(extended, full),
-                extended.values[full] + 1.96 * _error(extended, full),
-            ],
-        }
-        for name, full in zip(each.effect.coefficients, each.coefficients, strict=True)
+        name: _value(extended, full) for name, full in zip(each.effect.coefficients, each.coefficients, strict=True)
     }
     for name, value in each.shape.items():
         low, high = _neighbours(each, name, value)

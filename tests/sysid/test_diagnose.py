@@ -11,7 +11,7 @@ import pytest
 from ranger_sim.foundation.random_arrays import generator
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.sysid.dataset import Table
-from ranger_sim.sysid.diagnose import diagnose
+from ranger_sim.sysid.diagnose import KnownEffect, diagnose
 from ranger_sim.sysid.machine import Effect, Equation, Known, Quantity, Recording
 from ranger_sim.tools.cli import main
 from ranger_sim.tools.diagnose.work import answer, machine_of
@@ -87,6 +87,30 @@ def test_what_the_data_cannot_tell_apart_is_a_tie():
     (cause,) = found["causes"]
     assert {cause["name"], *cause["tied_with"]} == {"floor", "sensor_offset"}
     assert found["next_experiment"]
+
+
+def test_what_the_model_has_already_is_no_finding():
+    known = [KnownEffect("drag", "cart", {"quadratic": 0.021}, {})]
+    found = diagnose(Cart(), [cart_run(1, drag=0.02)], known=known).answer
+    assert not found["detected"] and found["causes"] == []
+    (had,) = found["evidence"]["known"]
+    value = had["parameters"]["quadratic"]
+    assert value["model"] == 0.021 and value["ci95"][0] < 0.02 < value["ci95"][1]
+    both = diagnose(Cart(), [cart_run(1, drag=0.02, slope=0.02)], known=known).answer
+    assert len(both["causes"]) == 1 and both["causes"][0]["name"] in ("floor", "sensor_offset")
+
+
+def test_a_known_effect_that_the_channels_cannot_show_is_a_mistake():
+    with pytest.raises(UserError, match="the model has cogging at cart, which these channels cannot show"):
+        diagnose(Cart(), [cart_run(1)], known=[KnownEffect("cogging", "cart", {"amplitude_Nm": 0.1}, {})])
+
+
+def test_progress_is_told_from_none_to_all():
+    told = []
+    diagnose(Cart(), [cart_run(1, drag=0.02)], [cart_run(2)], progress=lambda what, share: told.append((what, share)))
+    shares = [share for _, share in told]
+    assert shares[0] == 0.0 and shares[-1] == 1.0 and shares == sorted(shares)
+    assert {"misfit", "causes", "gain"} <= {what for what, _ in told}
 
 
 def test_two_causes_are_both_named():
