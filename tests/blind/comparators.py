@@ -203,4 +203,5 @@ def without_balance(diagnose, balance):
     return deaf
 
 
+NEEDS = {"gaussian_process": ("sklearn", "scikit-learn"), "sindy": ("pysindy", "pysindy")}  # import name, package
 COMPARATORS = {f.__name__: f for f in (refit_only, majority_label, gaussian_process, sindy)}

@@ -4,7 +4,8 @@
     DIR/data/ID/a.csv, b.csv  measured; b is held out
     DIR/truth/ID.json         what is hidden there, for the scorer alone (another folder by --truth)
 
-Without --seed one is drawn and printed; the same seed gives the same files.
+Without --seed one is drawn and printed; the same seed gives the same files. --slice makes a part of the cases, by their
+numbers in the truth: 17, or 80:160.
 """
 
 import argparse
@@ -29,6 +30,7 @@ def main(arguments=None):
     parser.add_argument("--check", action="store_true", help="the 60 cases of continuous integration, whatever --count")
     parser.add_argument("--kinds", help="only these, by comma: single,null,pair,outside,confusable")
     parser.add_argument("--causes", help="only these causes as single effects and in pairs, by comma")
+    parser.add_argument("--slice", help="only the cases with these numbers: NUMBER, or FIRST:END")
     options = parser.parse_args(arguments)
     experiment = EXPERIMENTS[options.experiment]
     kinds = options.kinds.split(",") if options.kinds else [kind for kind, _ in experiment.MIX]
@@ -39,6 +41,12 @@ def main(arguments=None):
                 parser.error(f"{name!r} is not one of {', '.join(known)}")
     seed = int.from_bytes(os.urandom(4), "big") if options.seed is None else options.seed
     cases = experiment.check_plan(seed) if options.check else experiment.plan(seed, options.count, kinds, causes)
+    if options.slice:
+        first, colon, end = options.slice.partition(":")
+        if not first.isdigit() or not (end.isdigit() if colon else True):
+            parser.error(f"--slice {options.slice}: NUMBER or FIRST:END")
+        chosen = range(int(first), int(end) if colon else int(first) + 1)
+        cases = [case for case in cases if case.number in chosen]
     print(f"blind cases: experiment {options.experiment}, count {len(cases)}, seed {seed}", flush=True)
     data, truth = options.out / "data", options.truth or options.out / "truth"
     if data.exists():

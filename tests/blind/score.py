@@ -143,6 +143,7 @@ class Answer:
         self.subsystem = data.get("subsystem")
         self.causes = list(data.get("causes") or []) if self.detected and not self.abstained else []
         self.gain = (data.get("gain") or {}).get("fraction_of_achievable")
+        self.suspects = list((data.get("evidence") or {}).get("suspects") or [])
 
     def names(self):
         return [cause["name"] for cause in self.causes]

@@ -61,10 +61,10 @@ class Experiment:
         }
         turns = dict.fromkeys(("null", "pair", *order), 0)
         cases = []
-        for number, (kind, name, strength) in enumerate(wanted):
+        for kind, name, strength in wanted:
             turn = turns[kind]
             turns[kind] += name is None
-            case = Case(number, kind)
+            case = Case(0, kind)
             if kind == "null":
                 case.variant = ("plain", "parameters", "noise")[turn % 3]
             elif kind == "pair":
@@ -80,7 +80,10 @@ class Experiment:
                 case.effects = [(name or order[kind][place], strength or usual[kind])]
                 case.poor = kind == "confusable"
             cases.append(case)
-        return [cases[i] for i in rng.permutation(len(cases))]
+        cases = [cases[i] for i in rng.permutation(len(cases))]
+        for number, case in enumerate(cases):
+            case.number = number
+        return cases
 
     def prepare(self, seed, case):
         """Base parameters, instruments and the conditions of both runs of a case."""
@@ -214,6 +217,7 @@ class Experiment:
             )
         return {
             "experiment": self.NAME,
+            "number": case.number,
             "kind": case.kind,
             "variant": case.variant,
             "causes": causes,
@@ -229,7 +233,6 @@ class Experiment:
 
         Two passes of simulation: without effects, which sets the amplitudes, and with them.
         """
-        names = generator(seed, "names")
         for start in range(0, len(cases), BATCH):
             batch = cases[start : start + BATCH]
             for case in batch:
@@ -244,7 +247,7 @@ class Experiment:
             trajectories = lanes.run()
             tell(f"{len(batch)} cases simulated with effects")
             for number, case in enumerate(batch):
-                key = names.bytes(6).hex()
+                key = generator(seed, f"name of case {case.number}").bytes(6).hex()
                 (data / key).mkdir(parents=True)
                 ran = trajectories[2 * number : 2 * number + 2]
                 for run, trajectory in zip(case.runs, ran, strict=True):
