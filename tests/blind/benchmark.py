@@ -9,10 +9,10 @@
 The generator and each diagnosis run in processes of their own. Measured data lie in a folder of their own elsewhere and
 are gone when they are answered; `tests.blind.generate` with the same seed and --count makes them again.
 
-Fixed, as a benchmark of system identification fixes it: a.csv of a case is the training run and b.csv the test run, another
-trajectory, supply, room and state of warming. Training and test each begin at rest: the first 0.5 s, in which nothing
-moves, are the window in which initial states may be estimated; no other sample of b.csv may be used for anything but the
-score (generator/excitation.py STILL_S, experiment.py prepare).
+Fixed, as a benchmark of system identification fixes it: a.csv of a case is the training run, b.csv the test run, with
+another trajectory, supply, room and state of warming (experiment.py `prepare`). Both begin at rest: the first 0.5 s
+(excitation.py STILL_S) are the window in which initial states may be estimated; no other sample of b.csv may serve for
+anything but the gain.
 """
 
 import argparse
@@ -36,8 +36,9 @@ from tests.blind.score import read_folder, score, table
 
 DIAGNOSIS = "ranger_sim.tools.diagnose.work:answer"
 ANCHOR = (
-    "Published for another task (the competition of DX 2025 on the LiU-ICE engine, 25 cycles at 20 Hz): the winner detected "
-    "87 % at no false alarm, with 73.8 % mean probability on the right fault; on an unseen cycle 100 % and 66.2 %."
+    "Published for another task (the competition of DX 2025 on the LiU-ICE engine, 25 cycles at 20 Hz): the winner "
+    "detected 87 % at no false alarm, with 73.8 % mean probability on the right fault; on an unseen cycle 100 % and "
+    "66.2 %."
 )
 
 
@@ -63,15 +64,16 @@ def methods_of(names):
 
 
 class Benchmark:
-    """One run in its folder."""
+    """One run in its folder. seconds: length of the recordings, None for the experiment's own."""
 
-    def __init__(self, folder, experiment, cases, seed, methods):
+    def __init__(self, folder, experiment, cases, seed, methods, seconds=None):
         self.folder, self.experiment, self.cases, self.seed, self.methods = folder, experiment, cases, seed, methods
+        self.seconds = seconds
         self.truth, self.answers = folder / "truth", folder / "answers"
 
     def open(self):
         """Makes the folder, or checks that it is of this run. ValueError when it is of another."""
-        said = {"experiment": self.experiment, "cases": self.cases, "seed": self.seed}
+        said = {"experiment": self.experiment, "cases": self.cases, "seed": self.seed, "seconds": self.seconds}
         path = self.folder / "run.json"
         if path.exists():
             was = json.loads(path.read_text(encoding="utf-8"))
@@ -95,19 +97,33 @@ class Benchmark:
         folder = self.answers / method.name
         return (folder / f"{key}.json").exists() or (folder / f"{key}.txt").exists()
 
-    def generate(self, part, folder):
-        """Data of a part, made by another process; the truth goes where no diagnosis is told of."""
+    def generation(self, part, folder):
+        """The command that makes a part's data; the truth goes where no diagnosis is told of."""
         command = [sys.executable, "-m", "tests.blind.generate", "--experiment", self.experiment]
         command += ["--count", str(self.cases), "--seed", str(self.seed), "--slice", f"{part[0]}:{part[1]}"]
-        command += ["--out", str(folder), "--truth", str(self.truth)]
-        subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+        command += ["--seconds", str(self.seconds)] if self.seconds else []
+        return [*command, "--out", str(folder), "--truth", str(self.truth)]
+
+    def generate(self, part, folder):
+        """Folder with the data of a part, made by another process."""
+        subprocess.run(self.generation(part, folder), check=True, stdout=subprocess.DEVNULL)
         return folder / "data"
 
-    def run(self, pool, tell):
-        """Every part that is not done yet."""
-        for part in self.parts():
-            if self.is_done(part):
-                continue
+    def run(self, jobs, tell):
+        """Every part that is not done yet, `jobs` diagnoses at once."""
+        missing = [part for part in self.parts() if not self.is_done(part)]
+        if missing:
+            self.in_processes(missing, jobs, tell)
+
+    def in_processes(self, missing, jobs, tell):
+        """Has `missing` parts answered by a pool of processes."""
+        context = multiprocessing.get_context("spawn")
+        with concurrent.futures.ProcessPoolExecutor(jobs, mp_context=context) as pool:
+            self.answer(missing, pool, tell)
+
+    def answer(self, missing, pool, tell):
+        """Parts one after the other, so that only the data of one are there at a time."""
+        for part in missing:
             with tempfile.TemporaryDirectory(prefix="blind-") as folder:
                 data = self.generate(part, pathlib.Path(folder))
                 cases = json.loads((data / "cases.json").read_text(encoding="utf-8"))
@@ -174,11 +190,14 @@ def main(arguments=None):
     parser = argparse.ArgumentParser(prog="python -m tests.blind.benchmark", description=__doc__.splitlines()[0])
     parser.add_argument("--experiment", choices=EXPERIMENTS, default="motor-bench")
     parser.add_argument("--cases", type=int, default=1000)
+    parser.add_argument("--seconds", type=float, help="length of a recording (default: the experiment's own)")
     parser.add_argument("--seed", type=int, help="drawn from the system when left out; of an interrupted run its own")
     parser.add_argument("--jobs", type=int, default=1, help="diagnoses at once")
     parser.add_argument("--out", type=pathlib.Path, required=True)
     every = ["diagnosis", *COMPARATORS]
-    parser.add_argument("--methods", default=",".join(every), help=f"of {', '.join(every)}, or module:function, by comma")
+    parser.add_argument(
+        "--methods", default=",".join(every), help=f"of {', '.join(every)}, or module:function, by comma"
+    )
     options = parser.parse_args(arguments)
     if options.cases < 1 or options.jobs < 1:
         parser.error("--cases and --jobs: 1 or more")
@@ -191,16 +210,14 @@ def main(arguments=None):
     seed, was = options.seed, options.out / "run.json"
     if seed is None:
         seed = json.loads(was.read_text())["seed"] if was.exists() else int.from_bytes(os.urandom(4), "big")
-    benchmark = Benchmark(options.out, options.experiment, options.cases, seed, methods)
+    benchmark = Benchmark(options.out, options.experiment, options.cases, seed, methods, options.seconds)
     try:
         benchmark.open()
     except ValueError as error:
         parser.error(str(error))
     print(f"blind benchmark: experiment {options.experiment}, cases {options.cases}, seed {seed}", flush=True)
     said = (lambda text: print(text, file=sys.stderr, flush=True)) if sys.stderr.isatty() else (lambda text: None)
-    context = multiprocessing.get_context("spawn")
-    with concurrent.futures.ProcessPoolExecutor(options.jobs, mp_context=context) as pool:
-        benchmark.run(pool, said)
+    benchmark.run(options.jobs, said)
     print(benchmark.write(left_out))
 
 

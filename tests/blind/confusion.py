@@ -1,8 +1,8 @@
 """Which causes are missed, and what they are taken for: the score's cases one cause at a time.
 
 A cell of the table is `first set seen / cases` for one strength: in how many of the cases the cause was named first,
-was in the reported set, and anything was detected at all. Beside it stand the answers that were wrong, with their strength
-and the case's number: `python -m tests.blind.generate --seed S --count N --slice NUMBER` makes that case again.
+was in the reported set, and anything was detected at all. Below stand the answers that were wrong, with strength and
+number of the case: `python -m tests.blind.generate --seed S --count N --slice NUMBER` makes that case again.
 """
 
 import collections
@@ -29,7 +29,7 @@ class Cell:
 
 @dataclasses.dataclass
 class Row:
-    """One cause: a Cell for each strength, and (strength, number of the case, what was answered) where that was wrong."""
+    """One cause: a Cell for each strength, and where it was not named first (strength, case's number, the answer)."""
 
     cause: str
     cells: dict
@@ -111,7 +111,9 @@ def text(truths, answers):
     """Both tables for a terminal."""
     rows = singles(truths, answers)
     width = max((len(row.cause) for row in rows), default=10) + 2
-    lines = ["Single effects: named first, in the set, detected / cases, by strength; then wrong answers, strength and case"]
+    lines = [
+        "Single effects: named first, in the set, detected / cases, by strength; then wrong answers, strength and case"
+    ]
     lines.append("cause".ljust(width) + "".join(f"{strength:g}".ljust(12) for strength in STRENGTHS))
     for row in rows:
         lines.append(row.cause.ljust(width) + "".join(str(row.cells[s]).ljust(12) for s in STRENGTHS).rstrip())
@@ -120,7 +122,11 @@ def text(truths, answers):
             by_answer[said].append(f"{strength:g} #{number}")
         for said, where in sorted(by_answer.items(), key=lambda item: -len(item[1])):
             lines.append(f"    {said}: {', '.join(where)}")
-    titles = {"null": "False alarms", "pair": "Pairs that are not exact", "outside": "Outside the catalogue, not abstained"}
+    titles = {
+        "null": "False alarms",
+        "pair": "Pairs that are not exact",
+        "outside": "Outside the catalogue, not abstained",
+    }
     for kind, entries in others(truths, answers).items():
         cases = sum(truth["kind"] == kind for truth in truths.values())
         lines += ["", f"{titles[kind]}: {sum(len(numbers) for _, _, numbers in entries)} of {cases}"]

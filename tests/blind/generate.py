@@ -17,6 +17,7 @@ import sys
 from tests.blind.generator.leg_swing import LEG_SWING
 from tests.blind.generator.motor_bench import MOTOR_BENCH
 
+SHORTEST_S, LONGEST_S = 1.0, 60.0  # the first half second stands still; longer ones want more memory than a batch may
 EXPERIMENTS = {experiment.NAME: experiment for experiment in (MOTOR_BENCH, LEG_SWING)}
 
 
@@ -28,11 +29,16 @@ def main(arguments=None):
     parser.add_argument("--out", type=pathlib.Path, required=True)
     parser.add_argument("--truth", type=pathlib.Path, help="folder of the truth (default OUT/truth)")
     parser.add_argument("--check", action="store_true", help="the 60 cases of continuous integration, whatever --count")
+    parser.add_argument("--seconds", type=float, help="length of a run (default 20)")
     parser.add_argument("--kinds", help="only these, by comma: single,null,pair,outside,confusable")
     parser.add_argument("--causes", help="only these causes as single effects and in pairs, by comma")
     parser.add_argument("--slice", help="only the cases with these numbers: NUMBER, or FIRST:END")
     options = parser.parse_args(arguments)
     experiment = EXPERIMENTS[options.experiment]
+    if options.seconds is not None:
+        if not SHORTEST_S <= options.seconds <= LONGEST_S:
+            parser.error(f"--seconds {options.seconds:g}: allowed are {SHORTEST_S:g} to {LONGEST_S:g}")
+        experiment = experiment.lasting(options.seconds)
     kinds = options.kinds.split(",") if options.kinds else [kind for kind, _ in experiment.MIX]
     causes = options.causes.split(",") if options.causes else list(experiment.CAUSES)
     for wanted, known in ((kinds, dict(experiment.MIX)), (causes, experiment.CAUSES)):

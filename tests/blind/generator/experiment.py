@@ -1,10 +1,13 @@
 """What is common to the experiments: which effects are hidden where, how strongly, and the files that are measured."""
 
+import copy
+
 import numpy as np
 
 from ranger_sim.foundation.random_arrays import generator
 from tests.blind.generator.bench import Lanes
 from tests.blind.generator.case import Case
+from tests.blind.generator.excitation import STEP_S
 from tests.blind.generator.instruments import Instruments, write
 from tests.blind.generator.strength import Scale
 
@@ -29,6 +32,12 @@ class Experiment:
     MOVES_RAD_S         speed below which friction takes what it must, so that the torque balance says nothing
     excite              (rng, supply_V, poor) -> voltage and brake torque
     """
+
+    def lasting(self, seconds):
+        """The same experiment with runs of another length; strengths keep their meaning, for N_eff goes with it."""
+        other = copy.copy(self)
+        other.SAMPLES = round(seconds / STEP_S)
+        return other
 
     def plan(self, seed, count, kinds, causes):
         """Cases without files: kinds in the shares of MIX, causes in turn, strengths in turn for each kind."""
