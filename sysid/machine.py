@@ -103,7 +103,10 @@ class Effect:
 
 
 class Machine(Protocol):
-    """What can be diagnosed."""
+    """What can be diagnosed.
+
+    A machine may have more: `labels`, {signal: how the report calls it on an axis}.
+    """
 
     name: str
     quantities: tuple[Quantity, ...]

@@ -9,6 +9,7 @@ its limit (eq. 35), and near zero current so may the brushes' drop: rows whose s
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from typing import ClassVar
 
 import numpy as np
 
@@ -50,6 +51,14 @@ class MotorBench:
         Quantity("temperature_C", "C", "of the motor's housing", needed=False),
         Quantity("motor_angle_rad", "rad", "of the rotor", needed=False),
     )
+
+    labels: ClassVar = {
+        "V": "voltage, V",
+        "I": "current, A",
+        "w": "speed of the output, rad/s",
+        "angle": "angle of the rotor, rad",
+        "t": "time, s",
+    }
 
     def __init__(self, gear: float = 14.0) -> None:
         self.gear = gear

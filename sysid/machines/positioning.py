@@ -10,6 +10,7 @@ error of that run rises from 4.6 to 6.6 %).
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from typing import ClassVar
 
 import numpy as np
 
@@ -42,6 +43,8 @@ class Positioning:
         Known("coulomb_friction_N", "N", 20.39, 0.0, 1e4, "of the guide"),
         Known("force_offset_N", "N", 0.0, -1e3, 1e3, "of drive and guide"),
     )
+
+    labels: ClassVar = {"v": "speed, m/s", "a": "acceleration, m/s^2", "x": "position, m", "t": "time, s"}
 
     def __init__(self, force_N_per_V: float = FORCE_N_PER_V) -> None:
         self.force_N_per_V = force_N_per_V

@@ -183,6 +183,8 @@ def test_a_machine_of_the_users_own_is_diagnosed_by_the_command(own_machine, cap
     told = json.loads((own_machine / "a.json").read_text(encoding="utf-8"))
     assert told["causes"][0]["name"] == "drag"
     assert told["model_file"] == "found/extended.toml"
+    assert json.loads((own_machine / "found" / "diagnosis.json").read_text(encoding="utf-8")) == told
+    assert "drag at cart" in (own_machine / "found" / "report.html").read_text(encoding="utf-8")
     assert 'cause = "drag"' in (own_machine / "found" / "extended.toml").read_text(encoding="utf-8")
     assert main(["diagnose", cart_file(own_machine / "sound.csv"), "--experiment", "my_cart:Cart"]) == 0
     assert "nothing that these data could show is missing" in capsys.readouterr().out

@@ -6,11 +6,14 @@ import argparse
 import dataclasses
 import importlib
 import json
+import pathlib
+import shlex
 import sys
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 from rich.console import Console
+from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table as RichTable
 
 from ranger_sim.foundation.user_error import UserError
@@ -18,10 +21,12 @@ from ranger_sim.sysid import repairs, sanity
 from ranger_sim.sysid.channels import named_for
 from ranger_sim.sysid.dataset import Dataset, Finding, Table
 from ranger_sim.sysid.diagnose import Diagnosis, diagnose
+from ranger_sim.sysid.diagnose import Progress as Progressed
 from ranger_sim.sysid.machine import Machine
 from ranger_sim.sysid.machines import MACHINES, made
 from ranger_sim.sysid.model_file import model_text
 from ranger_sim.tools import recordings, terminal
+from ranger_sim.tools.diagnose import words
 from ranger_sim.tools.files import json_target, replace_file, writable_folder
 
 EXIT_CLEAN, EXIT_FOUND = 0, 1
@@ -31,13 +36,22 @@ def run(options: argparse.Namespace) -> int:
     """The command."""
     target = json_target(options.json)
     folder = writable_folder(options.out) if options.out else None
-    found = of_options(options)
-    if folder is not None:
-        if found.named and not found.answer["abstained"]:
-            path = folder / "extended.toml"
-            replace_file(path, model_text(found).encode())
-            found.answer["model_file"] = str(path)
-        replace_file(folder / "diagnosis.json", _json(found.answer).encode())
+    screen = terminal.console(stderr=True)
+    bar = Progress(
+        SpinnerColumn(),
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TimeElapsedColumn(),
+        console=screen,
+        transient=True,
+        disable=not screen.is_terminal,  # a file or a pipe gets the answer and nothing else
+    )
+    with bar:
+        task = bar.add_task("recordings", total=1.0)
+        found = of_options(options, lambda what, share: bar.update(task, description=what, completed=share))
+        if folder is not None:
+            bar.update(task, description="report")
+            write(found, folder, shlex.join(["ranger-sim", *sys.argv[1:]]))
     if options.json == "-":
         print(_json(found.answer))
     else:
@@ -47,12 +61,26 @@ def run(options: argparse.Namespace) -> int:
     return EXIT_FOUND if found.answer["detected"] else EXIT_CLEAN
 
 
-def of_options(options: argparse.Namespace) -> Diagnosis:
+def write(found: Diagnosis, folder: pathlib.Path, command: str) -> None:
+    """The folder of `--out`: page, answer, and the extended model where there is one."""
+    from ranger_sim.tools.diagnose import page  # with plotly, which is slow to load
+
+    files = {"diagnosis.json": "the answer for programs"}
+    if found.named and not found.answer["abstained"]:
+        path = folder / "extended.toml"
+        replace_file(path, model_text(found).encode())
+        found.answer["model_file"] = str(path)
+        files["extended.toml"] = "the extended model"
+    replace_file(folder / "diagnosis.json", _json(found.answer).encode())
+    replace_file(folder / "report.html", page.render(found, command, files).encode())
+
+
+def of_options(options: argparse.Namespace, progress: Progressed = lambda what, share: None) -> Diagnosis:
     """The diagnosis that a command line asks for."""
     machine = machine_of(options.experiment, options.gear)
     data = [_prepared(recordings.open_with(options, path), machine, options.experiment) for path in options.data]
     held = [_prepared(recordings.open_with(options, path), machine, options.experiment) for path in options.holdout]
-    return _diagnosed(machine, data, held, options.seed)
+    return _diagnosed(machine, data, held, options.seed, progress)
 
 
 def answer(files: Sequence[str], holdout: Sequence[str], experiment: str) -> dict[str, Any]:
@@ -117,11 +145,19 @@ def _prepared(dataset: Dataset, machine: Machine, experiment: str) -> tuple[Tabl
     return mended.table([name for name in names if name in mended]), findings
 
 
-def _diagnosed(machine: Machine, data: Sequence[tuple], held: Sequence[tuple], seed: int) -> Diagnosis:
+def _diagnosed(
+    machine: Machine,
+    data: Sequence[tuple],
+    held: Sequence[tuple],
+    seed: int,
+    progress: Progressed = lambda what, share: None,
+) -> Diagnosis:
     findings = [
         {**dataclasses.asdict(finding), "recording": table.name} for table, found in (*data, *held) for finding in found
     ]
-    return diagnose(machine, [table for table, _ in data], [table for table, _ in held], seed, findings)
+    return diagnose(
+        machine, [table for table, _ in data], [table for table, _ in held], seed, findings, progress=progress
+    )
 
 
 def _json(answer: Mapping[str, Any]) -> str:
@@ -131,7 +167,7 @@ def _json(answer: Mapping[str, Any]) -> str:
 def _show(found: Diagnosis, console: Console) -> None:
     """The answer for a person."""
     answer = found.answer
-    console.print(sentence(found), highlight=False, soft_wrap=True)
+    console.print(words.sentence(found), highlight=False, soft_wrap=True)
     for name in answer["evidence"]["impossible"]:
         value = _figure(answer["evidence"]["parameters"][name]["value"])
         console.print(f"{name} comes out as {value}, which no machine has", highlight=False, soft_wrap=True)
@@ -172,24 +208,6 @@ def _show(found: Diagnosis, console: Console) -> None:
         )
     for each in answer["next_experiment"]:
         console.print(f"next: {each}", highlight=False, soft_wrap=True)
-
-
-def sentence(found: Diagnosis) -> str:
-    """What is wrong, in one sentence."""
-    answer = found.answer
-    name = found.machine.name
-    if not answer["detected"]:
-        p = answer["evidence"]["p_general"]
-        return f"{name}: nothing that these data could show is missing from the equations (p {p:.2g})."
-    if answer["abstained"]:
-        suspects = answer["evidence"]["suspects"]
-        also = f"; {', '.join(suspects)} would explain {answer['evidence']['explained']:.0%} of it" if suspects else ""
-        return (
-            f"{name}: something is wrong in the {answer['subsystem']} part, and no cause of the catalogue explains it"
-            f"{also}. Fitted parameters are not physical while this stands."
-        )
-    names = " and ".join(f"{each['name']} at {each['at']}" for each in answer["causes"])
-    return f"{name}: the {answer['subsystem']} part is wrong: {names}."
 
 
 def _figure(value: float) -> str:

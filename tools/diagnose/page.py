@@ -1,0 +1,152 @@
+"""The page of `ranger-sim diagnose`: what is wrong, where it shows, how sure that is, and what to look at."""
+
+from __future__ import annotations
+
+import math
+import pathlib
+from typing import Any
+
+import jinja2
+import numpy as np
+from markupsafe import Markup
+from plotly.offline import get_plotlyjs
+
+from ranger_sim.sysid import inspection
+from ranger_sim.sysid.diagnose import Diagnosis
+from ranger_sim.sysid.naming import Named
+from ranger_sim.tools.diagnose import figures, words
+from ranger_sim.tools.report.figures import Figure
+
+HERE = pathlib.Path(__file__).parent
+MOST_RIVALS = 6
+NOTABLE = 0.02  # of a regime's residual that repeats: what lies below is one of the many that chance makes
+
+
+def render(found: Diagnosis, command: str = "", files: dict[str, str] | None = None) -> str:
+    """The page as text. command: that repeats it; files: {name: what it is} that stand beside the page."""
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(HERE),
+        autoescape=jinja2.select_autoescape(["j2"]),
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters["figure"] = lambda value: f"{value:.4g}"
+    environment.filters["share"] = lambda value: f"{100.0 * value:.0f} %"
+    environment.filters["small"] = lambda value: "below 1e-300" if value == 0.0 else f"{value:.2g}"
+    answer = found.answer
+    sides = figures.sides(found)
+    kind, headline = words.verdict(answer)
+    telling = figures.telling(found, sides) if answer["detected"] else None
+    over_time = [figures.two_sides(found, side) for side in list(sides.values())[: figures.MOST_EQUATIONS]]
+    return environment.get_template("template.html.j2").render(
+        answer=answer,
+        evidence=answer["evidence"],
+        name=found.machine.name,
+        recordings=[recording.table.name for recording in found.recordings],
+        samples=sum(len(recording.table) for recording in found.recordings),
+        kind=kind,
+        headline=headline,
+        told=words.told(found),
+        causes=[cause_of(found, each, cause, sides) for each, cause in named(found)],
+        telling=marked(telling),
+        over_time=[marked(each) for each in over_time],
+        parameters=parameters(found),
+        notable=[each for each in answer["misfit"] if each["regime"] == "all" or each["repeatable_fraction"] > NOTABLE],
+        gain=gain_of(answer),
+        steps=words.next_steps(found),
+        command=command,
+        files=files or {},
+        plotly_js=Markup(get_plotlyjs()),
+    )
+
+
+def marked(figure: Figure | None) -> Figure | None:
+    """A figure whose HTML is taken as it is."""
+    if figure is not None:
+        figure.html = Markup(figure.html)
+    return figure
+
+
+def named(found: Diagnosis) -> list[tuple[Named, dict[str, Any]]]:
+    """The named effects with what the answer says of each; none when it abstains."""
+    causes = found.answer["causes"]
+    return list(zip(found.named, causes, strict=True)) if len(found.named) == len(causes) else []
+
+
+def cause_of(found: Diagnosis, each: Named, cause: dict[str, Any], sides: dict[str, figures.Sides]) -> dict[str, Any]:
+    """Everything that the page tells of one cause."""
+    rivals = sorted(cause["evidence"]["behind"].items(), key=lambda pair: pair[1])[:MOST_RIVALS]
+    tied = {tie.name: tie for tie in each.tied}
+    looks = {each.effect.name: inspection.look_at(cause["name"], cause["at"])}
+    looks |= {name: inspection.look_at(tie.cause, tie.at) for name, tie in tied.items()}
+    return {
+        "name": cause["name"],
+        "at": cause["at"],
+        "balance": cause["balance"],
+        "meaning": words.meaning(found, cause),
+        "parameters": cause["parameters"],
+        "amplitude": amplitude(found, each),
+        "chi2": cause["evidence"]["chi2"],
+        "p": cause["evidence"]["p"],
+        "bic": cause["evidence"]["bic"],
+        "rivals": [
+            {"name": name, "behind": behind, "standing": "a tie" if name in tied else words.standing(behind)}
+            for name, behind in rivals
+        ],
+        "figure": marked(figures.of_cause(found, each, sides)),
+        "looks": {name: text for name, text in looks.items() if text},
+    }
+
+
+def amplitude(found: Diagnosis, each: Named) -> dict[str, float] | None:
+    """Amplitude with interval and phase of an effect that is given by cosine and sine."""
+    names = each.effect.coefficients
+    if len(names) != 2 or not (names[0].startswith("cosine") and names[1].startswith("sine")):
+        return None
+    values = np.array([found.extended.values[name] for name in each.coefficients])
+    size = float(np.hypot(*values))
+    if size == 0.0:
+        return None
+    place = [found.extended.names.index(name) for name in each.coefficients]
+    spread = found.extended.covariance[np.ix_(place, place)]
+    reach = 1.96 * math.sqrt(max(0.0, float(values @ spread @ values))) / size
+    # size cos(x - lead): the phase at which it is largest
+    return {
+        "value": size,
+        "low": max(0.0, size - reach),
+        "high": size + reach,
+        "phase_rad": math.atan2(values[1], values[0]),
+    }
+
+
+def parameters(found: Diagnosis) -> list[dict[str, Any]]:
+    """The machine's own parameters: as the simulation has them and as fitted."""
+    values = found.answer["evidence"]["parameters"]
+    known = {each.name: each for each in found.machine.parameters}
+    impossible = found.answer["evidence"]["impossible"]
+    rows = []
+    for name, fitted in values.items():
+        each = known.get(name)
+        rows.append(
+            {
+                "name": name,
+                "unit": each.unit if each else "",
+                "meaning": each.meaning if each else "",
+                "simulation": each.value if each else None,
+                **fitted,
+                "differs": each is not None and not fitted["ci95"][0] <= each.value <= fitted["ci95"][1],
+                "impossible": name in impossible,
+            }
+        )
+    return rows
+
+
+def gain_of(answer: dict[str, Any]) -> dict[str, Any] | None:
+    """The gain with the ends of its bar, all within 0 and 1; None when nothing was named that could gain."""
+    gain = answer["gain"]
+    if gain is None or not answer["causes"]:
+        return None
+    low, high = gain["ci95"]
+    ends = [min(1.0, max(0.0, each)) for each in (low, high, gain["fraction_of_achievable"])]
+    return {**gain, "low": low, "high": high, "left": ends[0], "width": max(0.004, ends[1] - ends[0]), "at": ends[2]}

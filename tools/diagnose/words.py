@@ -1,0 +1,104 @@
+"""What a diagnosis says, in sentences: the same on the console, in the page, and for whoever repairs the machine."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ranger_sim.sysid import inspection
+from ranger_sim.sysid.diagnose import Diagnosis
+from ranger_sim.sysid.naming import PAYS, TIE
+
+
+def sentence(found: Diagnosis) -> str:
+    """What is wrong, in one sentence."""
+    answer = found.answer
+    name = found.machine.name
+    if not answer["detected"]:
+        p = answer["evidence"]["p_general"]
+        return f"{name}: nothing that these data could show is missing from the equations (p {p:.2g})."
+    if answer["abstained"]:
+        suspects = answer["evidence"]["suspects"]
+        also = f"; {', '.join(suspects)} would explain {answer['evidence']['explained']:.0%} of it" if suspects else ""
+        return (
+            f"{name}: something is wrong in the {answer['subsystem']} part, and no cause of the catalogue explains it"
+            f"{also}. Fitted parameters are not physical while this stands."
+        )
+    names = " and ".join(f"{each['name']} at {each['at']}" for each in answer["causes"])
+    return f"{name}: the {answer['subsystem']} part is wrong: {names}."
+
+
+def verdict(answer: dict[str, Any]) -> tuple[str, str]:
+    """(class, headline) of the page."""
+    if not answer["detected"]:
+        return "sound", "Nothing found"
+    if answer["abstained"]:
+        return "unknown", "Something is wrong, and it is not known what"
+    count = len(answer["causes"])
+    return "found", "One cause found" if count == 1 else f"{count} causes found"
+
+
+def told(found: Diagnosis) -> str:
+    """What is wrong in one sentence of plain words, for the top of the page."""
+    answer = found.answer
+    if not answer["detected"]:
+        return "The equations miss nothing that these data could show."
+    if answer["abstained"]:
+        also = ""
+        if answer["evidence"]["suspects"]:
+            share = answer["evidence"]["explained"]
+            also = f"; the nearest, {', '.join(answer['evidence']['suspects'])}, would explain {share:.0%} of it"
+        refused = answer["evidence"].get("refused_by_holdout", ())
+        if refused and not also:
+            also = f"; {', '.join(refused)} fits these data and not the held-out ones"
+        part = answer["subsystem"]
+        return f"The {part} part behaves otherwise than its equations, and no cause of the catalogue explains it{also}."
+    parts = []
+    for each in answer["causes"]:
+        ties = each["evidence"]["ties"]
+        tied = f" (or {', '.join(ties)}: these data cannot tell)" if ties else ""
+        words = meaning(found, each)
+        parts.append(f"{words[0].upper()}{words[1:]}: {each['name']} at {each['at']}{tied}.")
+    return " ".join(parts)
+
+
+def meaning(found: Diagnosis, cause: dict[str, Any]) -> str:
+    """A named cause in words."""
+    for each in found.named:
+        if (each.effect.cause, each.effect.at) == (cause["name"], cause["at"]) and each.effect.meaning:
+            return each.effect.meaning
+    return inspection.meaning(cause["name"], cause["at"])
+
+
+def standing(behind: float) -> str:
+    """How far a rival that is no tie is behind, in words; the limits are those of the naming."""
+    if behind < TIE:  # and no tie: the naming asks whether the value can be
+        return "as near, with a value that no machine has"
+    return "close" if behind < PAYS else "behind"
+
+
+def next_steps(found: Diagnosis) -> list[str]:
+    """What to measure next; where the diagnosis proposes nothing of its own, what its outcome asks for."""
+    answer = found.answer
+    steps = list(answer["next_experiment"])
+    if steps and not answer["abstained"]:
+        return steps
+    if not answer["detected"]:
+        return [
+            "Nothing is asked for. What other channels or another motion could show: "
+            f"ranger-sim causes --experiment {found.machine.name}."
+        ]
+    if answer["abstained"]:
+        worst = max(
+            (each for each in answer["misfit"] if each["regime"] != "all"),
+            key=lambda each: each["repeatable_fraction"],
+            default=None,
+        )
+        where = f" with more of the regime '{worst['regime']}', where most of it shows," if worst else ""
+        return [
+            f"The same run once more{where}: what repeats is the machine's, what does not is noise.",
+            "Each part alone: what still shows with the load off, or with the motor off and the load moved by hand?",
+            *steps,
+        ]
+    if answer["gain"] is None:
+        return ["Another run, given as --holdout: a cause that is real makes the model better there as well."]
+    return ["Nothing more is needed to tell this cause from its rivals."]
