@@ -135,7 +135,8 @@ class Quirks:
     """Firmware: the first look at the serial line finds its receive transfer off and reports an error."""
 
     heel_strike: str = switch("baseline", "filtered_sum", ("baseline", "filtered_sum"))
-    """Appendix 4.3: voltage above its swing baseline for 2 ms. Firmware: two filtered sensors above 850."""
+    """Appendix 4.3: voltage above its swing baseline for 2 ms. Firmware: two filtered sensors above 850
+    together; twice that here, as the emulated sensors read twice as much."""
 
     rate_filter: str = switch("10_hz", "20_hz", ("10_hz", "20_hz"))
     """Appendix 4.3: Butterworth 10 Hz on all rates (iterated per ms). Firmware: 20 Hz, once per 2 ms."""

@@ -14,6 +14,7 @@ from ranger_sim.boards.hip import HipBoard
 from ranger_sim.boards.inner_feet import InnerFeetBoard
 from ranger_sim.boards.main_brain import controllers
 from ranger_sim.boards.main_brain.board import MainBrainBoard
+from ranger_sim.boards.main_brain.programs import program
 from ranger_sim.boards.modules.ssp_link import EXCHANGE_NS, empty_segment
 from ranger_sim.boards.outer_feet import OuterFeetBoard
 from ranger_sim.boards.quirks import Quirks
@@ -72,8 +73,9 @@ class Ranger:
         profile: Profile | None = None,  # its bit rates and schedules; boards that it has outside are emulated here
     ) -> None:
         self.scenario = scenario if scenario is not None else Scenario()
-        self.quirks = quirks if quirks is not None else Quirks()
         self.controller = controllers.load(self.scenario.controller)
+        # the controller's program brings its estimator with it
+        self.quirks = program(self.controller.program).switches(quirks if quirks is not None else Quirks())
         self.start_ns = self.scenario.start_uptime_ms * 1_000_000
         seed = self.scenario.seed
 

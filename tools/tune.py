@@ -90,7 +90,16 @@ REFLEX_STEPS = {
     "R_F_FD_KP": 1.2,
     "R_F_FD_KV": 0.1,
 }
-DEFAULT_STEPS = {"record": RECORD_STEPS, "reflex": REFLEX_STEPS}
+HEAD_STEPS = {
+    "CTRL_HIP_KP": 2.0,
+    "CTRL_HIP_KD": 0.3,
+    "CTRL_WALK_SCISSOR_GAIN": 0.1,
+    "CTRL_WALK_SCISSOR_OFFSET": 0.02,
+    "HD_H_HOLD": 0.03,
+    "HD_F_PUSH": 0.1,
+    "HD_TRANS_ANG": 0.01,
+}
+DEFAULT_STEPS = {"record": RECORD_STEPS, "reflex": REFLEX_STEPS, "head-2015": HEAD_STEPS}
 # Both foot pairs have their own trigger; the plant's legs are alike, so these move together.
 TOGETHER = {"P_FO_PP_THEIGHT": "P_FI_PP_THEIGHT"}
 

@@ -20,6 +20,7 @@ from ranger_sim.boards.main_brain.error_distribution import ErrorDistribution
 from ranger_sim.boards.main_brain.estimator import Estimator
 from ranger_sim.boards.main_brain.io_data import IoData
 from ranger_sim.boards.main_brain.mode_machine import ModeMachine
+from ranger_sim.boards.main_brain.programs import program
 from ranger_sim.boards.modules.ssp_link import MainBrainSspLink
 from ranger_sim.datatable.generated import errors as codes
 from ranger_sim.datatable.generated import mb as table
@@ -68,6 +69,9 @@ class MainBrainBoard(FirmwareBoard):
 
     def __init__(self, crystal, quirks, phase_ns=0, controller="record-2011") -> None:
         board: object = self  # a compiled class would hand out wrappers of inherited methods
+        if not isinstance(controller, controllers.Controller):
+            controller = controllers.load(controller)
+        quirks = program(controller.program).switches(quirks)
         FirmwareBoard.__init__(self, table, crystal, quirks, quirks.errors_reported_one_late)
         self.store = DataStore(TABLE_SIZE)
         self.memory = self.store.words
@@ -92,8 +96,6 @@ class MainBrainBoard(FirmwareBoard):
             dma_off_at_start=quirks.serial_dma_off_at_start,
         )
         self.estimator = Estimator(self.store, quirks, board.report)
-        if not isinstance(controller, controllers.Controller):
-            controller = controllers.load(controller)
         self.program = controller.program
         self.modes = ModeMachine(self.store, quirks, self.estimator, self.program)
         self.distribution = ErrorDistribution(self.store, self.errors, quirks.error_distribution_inverted)

@@ -16,12 +16,14 @@ puts a function of yours in the machines' place.
 
 import functools
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 from ranger_sim.boards.main_brain import (
     estimator,
     foot_machines,
+    head_joints,
+    head_walk,
     hip_machine,
     leg_machine,
     reflex_feet,
@@ -29,10 +31,13 @@ from ranger_sim.boards.main_brain import (
     reflex_leg,
     steering_machine,
 )
+from ranger_sim.boards.quirks import Quirks
 from ranger_sim.datatable.loader import load_table
 from ranger_sim.foundation.user_error import UserError
 
-FIRST_OWN_ID = 314  # ids below are the robot's of 2016; its CTRL_ parameters belong to another controller
+FIRST_OWN_ID = 314  # ids below are the robot's of 2016
+# What the controller of 2015 reads of the robot's own parameters; the rest belongs to parts that are not emulated.
+OF_THE_ROBOT = tuple(name for name in head_joints.READS if name.startswith("CTRL_"))
 # What the mode machine reads for every program: display, song, light, fall.
 SHARED_BY_ALL = ("P_UI_LCD_TIME", "P_UI_SONG_STEPS", "P_UI_PP2HS_TTIME", "D_UI_STOP_ON_FALL")
 
@@ -52,12 +57,20 @@ class Machines(NamedTuple):
 
 @dataclass(frozen=True)
 class Program:
-    """One program. `reads`: names of variables, its parameters among them; `build(store, quirks)`: its machines."""
+    """One program. `reads`: names of variables, its parameters among them; `build(store, quirks)`: its machines.
+
+    quirks: switches that belong to the program, as its estimator does; they hold whatever the robot's others are.
+    """
 
     name: str
     description: str
     reads: tuple
     build: Callable[[Any, Any], Machines]
+    quirks: dict = field(default_factory=dict)
+
+    def switches(self, quirks: Quirks) -> Quirks:
+        """These switches with the program's own."""
+        return replace(quirks, **self.quirks)
 
     def parameters(self) -> frozenset:
         """Names of the parameters that a set for this program has to give."""
@@ -84,6 +97,16 @@ def reflex_machines(store: Any, quirks: Any) -> Machines:
     )
 
 
+def head_machines(store: Any, _quirks: Any) -> Machines:
+    """The machine of August 2015 and its three trackers (robot.md C2, C6.3 C)."""
+    return Machines(
+        head_walk.HeadWalkMachine(store),
+        head_joints.HeadHip(store),
+        head_joints.HeadAnkle(store, True),
+        head_joints.HeadAnkle(store, False),
+    )
+
+
 PROGRAMS = {
     each.name: each
     for each in (
@@ -99,17 +122,30 @@ PROGRAMS = {
             reflex_leg.READS + reflex_hip.READS + reflex_feet.READS,
             reflex_machines,
         ),
+        Program(
+            "head-2015",
+            "the controller of August 2015: one machine of six states, trackers at hip and ankles",
+            head_walk.READS + head_joints.READS,
+            head_machines,
+            # its estimator (robot.md C3.2), and the sensor's packets that carry the roll
+            {
+                "leg_angle": "imu_roll",
+                "heel_strike": "filtered_sum",
+                "rate_filter": "20_hz",
+                "imu_packets": "euler_and_rates",
+            },
+        ),
     )
 }
 
 
 @functools.cache
 def parameter_rows() -> dict:
-    """Rows of the master table that are parameters of our programs, by name."""
+    """Rows of the master table that are parameters of the programs, by name."""
     return {
         row.name: row
         for row in load_table().variables
-        if row.id >= FIRST_OWN_ID and row.publisher == "PC" and "MB" in row.subscribers
+        if (row.id >= FIRST_OWN_ID or row.name in OF_THE_ROBOT) and row.publisher == "PC" and "MB" in row.subscribers
     }
 
 

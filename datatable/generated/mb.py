@@ -484,6 +484,18 @@ R_F_FD_I0 = 459
 R_F_FD_KP = 460
 R_F_FD_KV = 461
 E_R_DW = 462
+HD_TRANS_ANG = 463
+HD_H_HOLD = 464
+HD_H_SPRING = 465
+HD_H_GRAVITY = 466
+HD_F_SPRING = 467
+HD_F_ZERO = 468
+HD_F_HOLD = 469
+HD_F_PUSH = 470
+HD_F_FLIP = 471
+HD_CONTACT = 472
+HD_FLIGHT_TICKS = 473
+HD_SETUP_TIME = 474
 
 # what the board sends and hears, by id
 SEND: tuple[int, ...] = (
@@ -980,6 +992,18 @@ TYPES: dict[int, str] = {
     460: "f32",
     461: "f32",
     462: "f32",
+    463: "f32",
+    464: "f32",
+    465: "f32",
+    466: "f32",
+    467: "f32",
+    468: "f32",
+    469: "f32",
+    470: "f32",
+    471: "f32",
+    472: "f32",
+    473: "f32",
+    474: "f32",
 }
 INITIAL: dict[int, float] = {
     0: 0,
@@ -1445,6 +1469,18 @@ INITIAL: dict[int, float] = {
     460: -13.210000038146973,
     461: -1.097000002861023,
     462: 0.0,
+    463: 0.07999999821186066,
+    464: 0.20000000298023224,
+    465: 8.045000076293945,
+    466: 0.0,
+    467: 0.1340000033378601,
+    468: 1.7999999523162842,
+    469: 0.0,
+    470: -0.8999999761581421,
+    471: 1.5499999523162842,
+    472: 850.0,
+    473: 200.0,
+    474: 500.0,
 }
 NAMES: dict[int, str] = {
     0: "TIMESTAMP",
@@ -1910,6 +1946,18 @@ NAMES: dict[int, str] = {
     460: "R_F_FD_KP",
     461: "R_F_FD_KV",
     462: "E_R_DW",
+    463: "HD_TRANS_ANG",
+    464: "HD_H_HOLD",
+    465: "HD_H_SPRING",
+    466: "HD_H_GRAVITY",
+    467: "HD_F_SPRING",
+    468: "HD_F_ZERO",
+    469: "HD_F_HOLD",
+    470: "HD_F_PUSH",
+    471: "HD_F_FLIP",
+    472: "HD_CONTACT",
+    473: "HD_FLIGHT_TICKS",
+    474: "HD_SETUP_TIME",
 }
 
 # error codes that the board can raise

@@ -406,16 +406,17 @@ def test_by_switch_the_leg_angle_is_the_imus_roll():
     assert bench.get("E_LO_ANGLE") == pytest.approx(-0.2, abs=1e-6)
 
 
-def test_by_switch_contact_is_a_filtered_sum_above_850_counts():
+def test_by_switch_contact_is_a_filtered_sum_above_1700_counts():
+    """The robot's 850 counts are for a sum of 700 in swing; the emulated sensors have 700 each."""
     bench = walking(Quirks(heel_strike="filtered_sum"))
-    bench.tick(MCH_ANGLE=0.1, MCFI_MID_ANKLE_ANGLE=0.3, MCFI_LEFT_HEEL_SENSE=350.0, MCFI_RIGHT_HEEL_SENSE=350.0)
+    bench.tick(MCH_ANGLE=0.1, MCFI_MID_ANKLE_ANGLE=0.3, MCFI_LEFT_HEEL_SENSE=700.0, MCFI_RIGHT_HEEL_SENSE=700.0)
     for _ in range(100):
         bench.tick()
     bench.tick(MCH_ANGLE=0.4, MCFI_MID_ANKLE_ANGLE=1.88)
     slots = 0
     while bench.get("E_SWING_LEG") == 1 and slots < 100:
-        bench.tick(MCFI_LEFT_HEEL_SENSE=3500.0, MCFI_RIGHT_HEEL_SENSE=3500.0)
+        bench.tick(MCFI_LEFT_HEEL_SENSE=7000.0, MCFI_RIGHT_HEEL_SENSE=7000.0)
         slots += 1
-    # 700 -> 7000 counts: 850 is 2.4 % of the rise; the filter's step response is 0.36, 1.75, 4.3 %
+    # 1400 -> 14000 counts: 1700 is 2.4 % of the rise; the filter's step response is 0.36, 1.75, 4.3 %
     assert slots == 3
-    assert bench.get("EST_CONTACT_INNER") > 850.0
+    assert bench.get("EST_CONTACT_INNER") > 1700.0

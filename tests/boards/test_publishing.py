@@ -150,7 +150,7 @@ board = HipBoard()
 board.words[0] = board.encoder.zero + 100
 board.advance(2_000_000)
 while board.outbox.take():
-    if board.outbox.kind == CAN_REQUEST and board.outbox.c == 463:
+    if board.outbox.kind == CAN_REQUEST and board.outbox.c == 475:
         print(board.outbox.time // 500_000, float_of_word(board.outbox.e))
 """
 
@@ -160,7 +160,7 @@ def test_adding_a_variable_takes_a_line_a_name_in_a_row_and_a_send_and_nothing_e
     house = copy_of_the_house(tmp_path)
     generate = ("-m", "ranger_sim", "table", "generate")
     with open(house / "datatable/master/variables.csv", "a", encoding="utf-8") as variables:
-        variables.write("463,MCH_SPIKES,f32,counts,0,MCH,MB,CAN1;SSP,2,0,,joint encoder before its zero is taken off\n")
+        variables.write("475,MCH_SPIKES,f32,counts,0,MCH,MB,CAN1;SSP,2,0,,joint encoder before its zero is taken off\n")
     forgotten = run(house, *generate)
     assert forgotten.returncode != 0 and "no schedule serves 2 ms: MCH never sends it" in forgotten.stderr
     edit(house / "datatable/master/boards.toml", 'rows = [["MCH_ANGLE"],', 'rows = [["MCH_ANGLE", "MCH_SPIKES"],')

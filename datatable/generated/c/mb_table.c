@@ -465,6 +465,18 @@ const struct mb_data mb_initial = {
     .r_f_fd_kp = -13.21f,
     .r_f_fd_kv = -1.097f,
     .e_r_dw = 0.0f,
+    .hd_trans_ang = 0.0799999982f,
+    .hd_h_hold = 0.200000003f,
+    .hd_h_spring = 8.04500008f,
+    .hd_h_gravity = 0.0f,
+    .hd_f_spring = 0.134000003f,
+    .hd_f_zero = 1.79999995f,
+    .hd_f_hold = 0.0f,
+    .hd_f_push = -0.899999976f,
+    .hd_f_flip = 1.54999995f,
+    .hd_contact = 850.0f,
+    .hd_flight_ticks = 200.0f,
+    .hd_setup_time = 500.0f,
 };
 
 const struct ranger_entry mb_send[] = {

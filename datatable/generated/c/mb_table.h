@@ -476,6 +476,18 @@
 #define R_F_FD_KP 460
 #define R_F_FD_KV 461
 #define E_R_DW 462
+#define HD_TRANS_ANG 463
+#define HD_H_HOLD 464
+#define HD_H_SPRING 465
+#define HD_H_GRAVITY 466
+#define HD_F_SPRING 467
+#define HD_F_ZERO 468
+#define HD_F_HOLD 469
+#define HD_F_PUSH 470
+#define HD_F_FLIP 471
+#define HD_CONTACT 472
+#define HD_FLIGHT_TICKS 473
+#define HD_SETUP_TIME 474
 
 /* the board's copy of the values */
 struct mb_data {
@@ -942,6 +954,18 @@ struct mb_data {
     float r_f_fd_kp; /* 460 [A/rad] reflex: ankle, flip-down: current per motor angle */
     float r_f_fd_kv; /* 461 [A s/rad] reflex: ankle, flip-down: current per motor rate */
     float e_r_dw; /* 462 [rad/s] reflex: deviation of the last mid-stance, of the stance leg's rate as of phi */
+    float hd_trans_ang; /* 463 [rad] 2015: lean of the outer leg beyond which a push begins, either way */
+    float hd_h_hold; /* 464 [rad] 2015: hip angle held while a foot pushes */
+    float hd_h_spring; /* 465 [N m/rad] 2015: spring of the hip that its motor makes up for */
+    float hd_h_gravity; /* 466 [N m] 2015: weight moment of the swing leg that the hip's motor makes up for */
+    float hd_f_spring; /* 467 [N m/rad] 2015: return spring of an ankle that its motor makes up for */
+    float hd_f_zero; /* 468 [rad] 2015: ankle angle of a level foot under an upright leg */
+    float hd_f_hold; /* 469 [rad] 2015: foot angle against the floor of a standing foot */
+    float hd_f_push; /* 470 [rad] 2015: foot angle against the floor of a pushing foot */
+    float hd_f_flip; /* 471 [rad] 2015: foot angle against the floor of a flipped foot */
+    float hd_contact; /* 472 [counts] 2015: sum of a pair's two filtered heel sensors that means contact */
+    float hd_flight_ticks; /* 473 2015: ticks of 2 ms without contact that mean flight */
+    float hd_setup_time; /* 474 [ms] 2015: time in setup before the first step */
 };
 
 extern const struct mb_data mb_initial;

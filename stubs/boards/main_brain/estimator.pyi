@@ -9,6 +9,7 @@ SWING_BEHIND: int
 AVERAGING: int
 ARMED: int
 WALKING: int
+CONTACT_SUM: float
 READS: tuple[str, ...]
 WRITES: tuple[str, ...]
 

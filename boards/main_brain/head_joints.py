@@ -1,0 +1,191 @@
+"""The joint trackers of the program "head-2015": hip, and the two ankles from one description.
+
+Source: robot.md C2.2 (laws), C6.3 C (targets of 20 August 2015). A tracker wants the torque kp (ref - x) + kd (rate of
+ref - rate of x), gains in N m; the board's law is I = I0 - K p - D p'. So I0 = (kp ref + kd ref') / c, K = kp / c,
+D = kd / c, with c in N m/A.
+
+Springs across a joint are made up for. At the hip K is less by the spring over c, so that motor and spring together
+are the tracker: read off the log of 20 August 2015 itself, whose hip pulls in the push states like 3.5 - 7.9 h - 2.9 h'
+N m (docs/walk-2015.md). At the ankles the spring comes off kp altogether, as in the commands logged on 19 August: K =
+(10 - 0.134) / 0.612 and I0 = K target + D rate (robot.md C6.3 A).
+
+Leans are the estimator's, positive forward (robot.md C1.1); the firmware's angles th are their opposites.
+"""
+
+import cython
+
+from ranger_sim.boards.main_brain.command import MotorCommand, table_id
+from ranger_sim.boards.main_brain.head_walk import FLIGHT, INNER_PUSH, INNER_SWING, OUTER_PUSH, OUTER_SWING
+from ranger_sim.boards.main_brain.state_machine import ANY, State, StateMachine
+from ranger_sim.datatable.store import DataStore
+
+if not cython.compiled:
+    from math import sin
+
+HIP_NM_PER_A = 1.188  # 0.018 N m/A times 66 (robot.md C2.2)
+ANKLE_NM_PER_A = 0.612  # 0.018 N m/A times 34
+
+HIP_READS = (
+    "E_LO_ANGLE",
+    "E_LI_ANGLE",
+    "E_LO_RATE",
+    "E_LI_RATE",
+    "FSM_LEG",
+    "FSM_RESET",
+    "CTRL_HIP_KP",
+    "CTRL_HIP_KD",
+    "CTRL_WALK_SCISSOR_GAIN",
+    "CTRL_WALK_SCISSOR_OFFSET",
+    "HD_H_HOLD",
+    "HD_H_SPRING",
+    "HD_H_GRAVITY",
+)
+ANKLE_READS = (
+    "FSM_LEG",
+    "FSM_RESET",
+    "CTRL_ANK_PUSH_KP",
+    "CTRL_ANK_PUSH_KD",
+    "CTRL_ANK_STANCE_KP",
+    "CTRL_ANK_STANCE_KD",
+    "CTRL_ANK_SWING_KP",
+    "CTRL_ANK_SWING_KD",
+    "HD_F_SPRING",
+    "HD_F_ZERO",
+    "HD_F_HOLD",
+    "HD_F_PUSH",
+    "HD_F_FLIP",
+)
+READS = HIP_READS + ANKLE_READS
+
+
+class HeadHip:
+    """Scissors while a leg swings, holds an angle while a foot pushes, off in flight."""
+
+    def __init__(self, store) -> None:
+        self.store = store
+        for name in HIP_READS:
+            setattr(self, name, table_id(name))
+        self.state_number = table_id("FSM_HIP")
+        motor: object = MotorCommand(store, "MCH")  # untyped, so that its methods are plain ones
+        self.motor = motor
+        self.machine = StateMachine(
+            "hip",
+            states=(State(0, "reset"), State(1, "track", None, self.track)),
+            transitions=((ANY, "reset", self.reset_wanted), ("reset", "track", self.walking)),
+            on_change=self.publish_state,
+        )
+
+    def publish_state(self, number) -> None:
+        self.store.set_int(self.state_number, number)
+
+    def reset_wanted(self) -> cython.bint:
+        return self.store.get_int(self.FSM_RESET) == 1
+
+    def walking(self) -> cython.bint:
+        return self.store.get_int(self.FSM_RESET) != 1
+
+    def track(self) -> None:
+        """The law of the walk machine's state. Setup: legs held side by side, chosen by us."""
+        store: DataStore = self.store
+        state: cython.longlong = store.get_int(self.FSM_LEG)
+        hold: float = store.get_float(self.HD_H_HOLD)
+        if state == INNER_SWING:
+            self.scissor(1.0, store.get_float(self.E_LO_ANGLE), store.get_float(self.E_LO_RATE))
+        elif state == OUTER_SWING:
+            self.scissor(-1.0, store.get_float(self.E_LI_ANGLE), store.get_float(self.E_LI_RATE))
+        elif state == OUTER_PUSH:
+            self.follow(hold, 0.0, 1.0)
+        elif state == INNER_PUSH:
+            self.follow(-hold, 0.0, -1.0)
+        elif state == FLIGHT:
+            self.motor.off()
+        else:
+            self.follow(0.0, 0.0, 0.0)
+
+    def scissor(self, sign: float, lean: float, rate: float) -> None:
+        """The swing leg mirrors the standing one. `sign`: 1 while the outer legs stand; `lean`, `rate`: of those that
+        stand. h_ref = sign (offset + (gain + 1) lean)."""
+        store: DataStore = self.store
+        gain: float = sign * (store.get_float(self.CTRL_WALK_SCISSOR_GAIN) + 1.0)
+        self.follow(sign * store.get_float(self.CTRL_WALK_SCISSOR_OFFSET) + gain * lean, gain * rate, sign)
+
+    def follow(self, target: float, rate: float, sign: float) -> None:
+        """Track a hip angle. `sign`: 1 while the inner legs swing, -1 while the outer ones do, 0 for none."""
+        store: DataStore = self.store
+        kp: float = store.get_float(self.CTRL_HIP_KP)
+        kd: float = store.get_float(self.CTRL_HIP_KD)
+        swing_lean: float = store.get_float(self.E_LI_ANGLE) if sign > 0.0 else store.get_float(self.E_LO_ANGLE)
+        weight_Nm: float = -sign * store.get_float(self.HD_H_GRAVITY) * sin(swing_lean)
+        self.motor.send(
+            (kp * target + kd * rate + weight_Nm) / HIP_NM_PER_A,
+            (kp - store.get_float(self.HD_H_SPRING)) / HIP_NM_PER_A,
+            kd / HIP_NM_PER_A,
+        )
+
+
+class HeadAnkle:
+    """Foot angles against the floor: a = zero - target - lean. Stands, pushes, or is flipped up."""
+
+    def __init__(self, store, inner) -> None:
+        self.store = store
+        for name in ANKLE_READS:
+            setattr(self, name, table_id(name))
+        own = "FI" if inner else "FO"
+        self.own_swing = INNER_SWING if inner else OUTER_SWING
+        self.own_push = INNER_PUSH if inner else OUTER_PUSH
+        self.flips_in_flight = inner
+        self.own_lean = table_id("E_LI_ANGLE" if inner else "E_LO_ANGLE")
+        self.own_rate = table_id("E_LI_RATE" if inner else "E_LO_RATE")
+        self.state_number = table_id(f"FSM_{own}")
+        motor: object = MotorCommand(store, "MCFI" if inner else "MCFO")  # untyped, so that its methods are plain ones
+        self.motor = motor
+        self.machine = StateMachine(
+            "inner foot" if inner else "outer foot",
+            states=(State(0, "reset"), State(1, "track", None, self.track)),
+            transitions=((ANY, "reset", self.reset_wanted), ("reset", "track", self.walking)),
+            on_change=self.publish_state,
+        )
+
+    def publish_state(self, number) -> None:
+        self.store.set_int(self.state_number, number)
+
+    def reset_wanted(self) -> cython.bint:
+        return self.store.get_int(self.FSM_RESET) == 1
+
+    def walking(self) -> cython.bint:
+        return self.store.get_int(self.FSM_RESET) != 1
+
+    def track(self) -> None:
+        """The law of the walk machine's state. Setup: the foot stands, chosen by us."""
+        store: DataStore = self.store
+        state: cython.longlong = store.get_int(self.FSM_LEG)
+        if state == self.own_push:
+            self.follow(
+                store.get_float(self.HD_F_PUSH),
+                store.get_float(self.CTRL_ANK_PUSH_KP),
+                store.get_float(self.CTRL_ANK_PUSH_KD),
+            )
+        elif state == self.own_swing or (state == FLIGHT and self.flips_in_flight):
+            self.follow(
+                store.get_float(self.HD_F_FLIP),
+                store.get_float(self.CTRL_ANK_SWING_KP),
+                store.get_float(self.CTRL_ANK_SWING_KD),
+            )
+        else:
+            self.follow(
+                store.get_float(self.HD_F_HOLD),
+                store.get_float(self.CTRL_ANK_STANCE_KP),
+                store.get_float(self.CTRL_ANK_STANCE_KD),
+            )
+
+    def follow(self, foot_target: float, kp: float, kd: float) -> None:
+        """Track the foot's angle against the floor, positive with the toe up."""
+        store: DataStore = self.store
+        target: float = store.get_float(self.HD_F_ZERO) - foot_target - store.get_float(self.own_lean)
+        stiffness: float = (kp - store.get_float(self.HD_F_SPRING)) / ANKLE_NM_PER_A
+        dampness: float = kd / ANKLE_NM_PER_A
+        self.motor.send(
+            stiffness * target - dampness * store.get_float(self.own_rate),
+            stiffness,
+            dampness,
+        )
