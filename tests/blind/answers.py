@@ -24,7 +24,7 @@ def method(name):
 
 
 def answer(name, data, case):
-    """(id, answer or None, what went wrong)."""
+    """(id, answer or None, what went wrong). case: an entry of cases.json."""
     try:
         files, holdout = ([str(data / path) for path in case[role]] for role in ("files", "holdout"))
         return case["id"], json.loads(json.dumps(method(name)(files, holdout, case["experiment"]))), ""
@@ -32,10 +32,16 @@ def answer(name, data, case):
         return case["id"], None, traceback.format_exc()
 
 
-def answer_all(name, data, out, processes=1):
-    """Answers every case of a folder; returns {id: answer}."""
+def answer_all(name, data, out, processes=1, holdout=True, only=None):
+    """Answers every case of a folder, or those with an id in `only`; returns {id: answer}.
+
+    holdout: False keeps the held-out files back.
+    """
     out.mkdir(parents=True, exist_ok=True)
     cases = json.loads((data / "cases.json").read_text(encoding="utf-8"))
+    cases = [case for case in cases if only is None or case["id"] in only]
+    if not holdout:
+        cases = [case | {"holdout": []} for case in cases]
     answers, errors = {}, []
     if processes > 1:
         context = multiprocessing.get_context("spawn")

@@ -14,6 +14,7 @@ import os
 import pathlib
 import sys
 
+from tests.blind.generator.experiment import STRENGTHS
 from tests.blind.generator.leg_swing import LEG_SWING
 from tests.blind.generator.motor_bench import MOTOR_BENCH
 
@@ -32,6 +33,7 @@ def main(arguments=None):
     parser.add_argument("--seconds", type=float, help="length of a run (default 20)")
     parser.add_argument("--kinds", help="only these, by comma: single,null,pair,outside,confusable")
     parser.add_argument("--causes", help="only these causes as single effects and in pairs, by comma")
+    parser.add_argument("--strength", type=float, choices=STRENGTHS, help="of every single effect")
     parser.add_argument("--slice", help="only the cases with these numbers: NUMBER, or FIRST:END")
     options = parser.parse_args(arguments)
     experiment = EXPERIMENTS[options.experiment]
@@ -47,6 +49,10 @@ def main(arguments=None):
                 parser.error(f"{name!r} is not one of {', '.join(known)}")
     seed = int.from_bytes(os.urandom(4), "big") if options.seed is None else options.seed
     cases = experiment.check_plan(seed) if options.check else experiment.plan(seed, options.count, kinds, causes)
+    if options.strength:
+        for case in cases:
+            if case.kind == "single":
+                case.effects = [(name, options.strength) for name, _ in case.effects]
     if options.slice:
         first, colon, end = options.slice.partition(":")
         if not first.isdigit() or not (end.isdigit() if colon else True):

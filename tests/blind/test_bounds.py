@@ -1,10 +1,10 @@
 """The bounds of a blind run: kept by a method that meets the targets, broken by what must not pass.
 
 Here diagnoses are played: an oracle that is right as often as the targets ask, and comparators that need no data. The
-diagnosis itself is held to these bounds on fresh cases when RANGER_SIM_BLIND is set (its value: a seed, or "fresh").
+diagnosis itself is held to these bounds on fresh cases in every run when HELD is true, and when RANGER_SIM_BLIND is set
+(its value: a seed, or "fresh").
 """
 
-import json
 import os
 import subprocess
 import sys
@@ -14,13 +14,18 @@ from scipy import stats
 
 from ranger_sim.foundation.random_arrays import generator
 from tests.blind import answers as answering
+from tests.blind import confusion
 from tests.blind.bounds import BOUNDS, RISK, least, refusals
-from tests.blind.comparators import majority_label, refit_only, said, without_balance
+from tests.blind.comparators import COMPARATORS, NEEDS, majority_label, refit_only, said, without_balance
 from tests.blind.generator.experiment import SUBSYSTEM
 from tests.blind.generator.motor_bench import MOTOR_BENCH
-from tests.blind.score import score, table
+from tests.blind.score import read_folder, score, table
 
 DIAGNOSIS = "ranger_sim.tools.diagnose.work:answer"
+HELD = False  # until the diagnosis meets the targets (docs/diagnose.md has those that it misses)
+GIVEN = os.environ.get("RANGER_SIM_BLIND", "")
+# Of a recording: a strength is in units of what can be detected in it, so a short one is as fair as a long one.
+SECONDS = "5"
 SINGLE_RISK = RISK / len(BOUNDS)
 
 
@@ -190,32 +195,40 @@ def test_comparators_speak_the_form_of_an_answer():
 
 
 def generated(folder, *arguments):
-    """Cases made by the generator in a process of its own; returns what it printed."""
+    """(folder of the data, {id: truth}) of cases made in a process of its own, which prints the seed."""
     command = [sys.executable, "-m", "tests.blind.generate", "--out", str(folder), *arguments]
-    return subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    print(subprocess.run(command, capture_output=True, text=True, check=True).stdout)
+    return folder / "data", read_folder(folder / "truth")
 
 
 wanted = pytest.mark.skipif(
-    not os.environ.get("RANGER_SIM_BLIND"), reason="minutes: set RANGER_SIM_BLIND to a seed or to fresh"
+    not (HELD or GIVEN), reason=f"minutes: set RANGER_SIM_BLIND to a seed or to fresh (or HELD in {__name__})"
 )
 
 
 @pytest.fixture(scope="module")
 def fresh_cases(tmp_path_factory):
-    """(folder of the data, {id: truth}) of the sixty cases; the seed is printed."""
-    folder = tmp_path_factory.mktemp("blind")
-    seed = os.environ["RANGER_SIM_BLIND"]
-    print(generated(folder, "--check", *([] if seed == "fresh" else ["--seed", seed])))
-    hidden = {path.stem: json.loads(path.read_text(encoding="utf-8")) for path in (folder / "truth").glob("*.json")}
-    return folder / "data", hidden
+    """The sixty cases with a seed of this run, or the given one."""
+    seed = [] if GIVEN in ("", "fresh") else ["--seed", GIVEN]
+    return generated(tmp_path_factory.mktemp("blind"), "--check", "--seconds", SECONDS, *seed)
 
 
 @wanted
-@pytest.mark.parametrize("name", ["refit_only", "majority_label", "gaussian_process", "sindy"])
+def test_the_diagnosis_keeps_the_bounds_on_fresh_cases(fresh_cases, tmp_path):
+    data, hidden = fresh_cases
+    found = answering.answer_all(DIAGNOSIS, data, tmp_path, processes=2)
+    figures = score(hidden, found)
+    said = "\n".join((table(figures), confusion.text(hidden, found), (tmp_path / "errors.txt").read_text()))
+    print(said)
+    assert not refusals(figures), said
+
+
+@wanted
+@pytest.mark.skipif(not GIVEN, reason="beside the diagnosis: set RANGER_SIM_BLIND to a seed or to fresh")
+@pytest.mark.parametrize("name", COMPARATORS)
 def test_comparators_are_refused_on_the_cases(name, fresh_cases, tmp_path):
-    library = {"gaussian_process": "sklearn", "sindy": "pysindy"}.get(name)
-    if library:
-        pytest.importorskip(library)
+    if name in NEEDS:
+        pytest.importorskip(NEEDS[name][0])
     data, hidden = fresh_cases
     figures = score(hidden, answering.answer_all(name, data, tmp_path))
     print(table(figures))
@@ -224,12 +237,29 @@ def test_comparators_are_refused_on_the_cases(name, fresh_cases, tmp_path):
 
 
 @wanted
-def test_the_diagnosis_keeps_the_bounds_on_fresh_cases(fresh_cases, tmp_path):
+@pytest.mark.parametrize("letter", "EMT")
+def test_the_diagnosis_with_a_balance_taken_out_of_the_machine_is_refused(letter, fresh_cases, tmp_path):
+    """It sees none of the eight cases at strength 4 that show in that balance alone, but for a false alarm: four of
+    these, at 2 % each, have a probability of 1e-5.
+    """
     data, hidden = fresh_cases
-    found = answering.answer_all(DIAGNOSIS, data, tmp_path, processes=os.cpu_count() or 1)
-    figures = score(hidden, found)
-    print(table(figures))
-    assert not refusals(figures), table(figures) + "\n" + (tmp_path / "errors.txt").read_text()
+    there = {key: truth for key, truth in hidden.items() if in_one_balance(truth, letter)}
+    assert len(there) == MOTOR_BENCH.CHECK_AT_4
+    found = answering.answer_all(
+        f"tests.blind.deaf:without_{letter}", data, tmp_path, processes=2, holdout=False, only=there
+    )
+    assert len(found) == len(there), (tmp_path / "errors.txt").read_text()
+    refusal = refusals(score(there, found))
+    assert any(text.startswith("detection at 4:") for text in refusal), (refusal, confusion.text(there, found))
+
+
+def in_one_balance(truth, letter):
+    """Whether a case is one of those that show in that balance alone."""
+    return (
+        truth["kind"] == "single"
+        and truth["causes"][0]["strength"] == 4.0
+        and truth["causes"][0]["name"] in MOTOR_BENCH.ONLY_IN[letter]
+    )
 
 
 def test_the_refit_reads_the_files_and_finds_nothing(tmp_path, monkeypatch):

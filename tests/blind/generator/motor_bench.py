@@ -31,7 +31,7 @@ class MotorBench(Experiment):
     CONFUSABLE = ("current_step_at_zero_duty", "sensor_offset")
     MIX = (("single", 0.46), ("null", 0.20), ("pair", 0.12), ("outside", 0.14), ("confusable", 0.08))
     ONLY_IN = {
-        "E": ("contact_drop_change", "resistance_temperature", "voltage_clip", "commutation_ripple"),
+        "E": ("contact_drop_change", "resistance_temperature", "voltage_clip"),
         "M": ("cogging", "once_per_turn", "stribeck", "direction_friction", "friction_warm_up", "drag"),
         "T": ("eccentricity", "lost_counts"),
     }
