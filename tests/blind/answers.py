@@ -65,10 +65,12 @@ def main(arguments=None):
     parser.add_argument("--by", required=True, help=f"{', '.join(COMPARATORS)} or module:function")
     parser.add_argument("--out", type=pathlib.Path, required=True)
     parser.add_argument("--processes", type=int, default=1)
+    parser.add_argument("--no-holdout", action="store_true", help="keep the held-out files back")
+    parser.add_argument("--only", nargs="+", metavar="ID", help="these cases")
     options = parser.parse_args(arguments)
     if ":" not in options.by and options.by not in COMPARATORS:
         parser.error(f"--by {options.by}: there are {', '.join(COMPARATORS)}, or module:function")
-    answers = answer_all(options.by, options.data, options.out, options.processes)
+    answers = answer_all(options.by, options.data, options.out, options.processes, not options.no_holdout, options.only)
     print(f"{len(answers)} answers, errors in {options.out / 'errors.txt'}")
 
 

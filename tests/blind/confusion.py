@@ -16,9 +16,10 @@ TELLING = 1.0  # below this strength a miss is what theory expects and is not li
 
 @dataclasses.dataclass
 class Cell:
-    """Outcomes of one cause at one strength."""
+    """Outcomes of one cause at one strength. right: named first, or in the set where it has a tie in the truth."""
 
     cases: int = 0
+    right: int = 0
     first: int = 0
     in_set: int = 0
     seen: int = 0
@@ -29,7 +30,7 @@ class Cell:
 
 @dataclasses.dataclass
 class Row:
-    """One cause: a Cell for each strength, and where it was not named first (strength, case's number, the answer)."""
+    """One cause: a Cell for each strength, and where that was wrong (strength, case's number, the answer)."""
 
     cause: str
     cells: dict
@@ -37,8 +38,8 @@ class Row:
 
     @property
     def lost(self):
-        """Cases at strength 2 and 4 in which it was not named first: what is to be won here."""
-        return sum(cell.cases - cell.first for strength, cell in self.cells.items() if strength >= 2.0)
+        """Cases at strength 2 and 4 in which it was not found: what is to be won here."""
+        return sum(cell.cases - cell.right for strength, cell in self.cells.items() if strength >= 2.0)
 
 
 def outcome(answer):
@@ -63,11 +64,14 @@ def singles(truths, answers):
         row = rows.setdefault(label, Row(label, {strength: Cell() for strength in STRENGTHS}, []))
         cell = row.cells[cause["strength"]]
         first = answer.names()[:1] == [cause["name"]]
+        in_set = cause["name"] in answer.reported()
+        right = in_set if truth["ties"] else first
         cell.cases += 1
+        cell.right += right
         cell.first += first
-        cell.in_set += cause["name"] in answer.reported()
+        cell.in_set += in_set
         cell.seen += answer.detected
-        if not first and cause["strength"] >= TELLING:
+        if not right and cause["strength"] >= TELLING:
             row.wrong.append((cause["strength"], truth["number"], outcome(answer)))
     return sorted(rows.values(), key=lambda row: (-row.lost, row.cause))
 
@@ -144,6 +148,6 @@ def markdown(truths, answers):
     for row in singles(truths, answers):
         wrong = collections.Counter(said for strength, _, said in row.wrong if strength >= 2.0)
         taken = ", ".join(f"{said}{f' ({count})' if count > 1 else ''}" for said, count in wrong.most_common())
-        cells = (f"{c.first} of {c.cases}" if (c := row.cells[s]).cases else "" for s in STRENGTHS)
+        cells = (f"{c.right} of {c.cases}" if (c := row.cells[s]).cases else "" for s in STRENGTHS)
         lines.append(f"| {row.cause} | {' | '.join(cells)} | {taken} |")
     return "\n".join(lines)

@@ -13,7 +13,6 @@ import pytest
 from scipy import stats
 
 from ranger_sim.foundation.random_arrays import generator
-from tests.blind import answers as answering
 from tests.blind import confusion
 from tests.blind.bounds import BOUNDS, RISK, least, refusals
 from tests.blind.comparators import COMPARATORS, NEEDS, majority_label, refit_only, said, without_balance
@@ -201,6 +200,13 @@ def generated(folder, *arguments):
     return folder / "data", read_folder(folder / "truth")
 
 
+def answered(name, data, out, *arguments):
+    """{id: answer} of a method, asked in processes of their own."""
+    command = [sys.executable, "-m", "tests.blind.answers", "--data", str(data), "--by", name, "--out", str(out)]
+    subprocess.run([*command, "--processes", "2", *arguments], capture_output=True, check=True)
+    return read_folder(out)
+
+
 wanted = pytest.mark.skipif(
     not (HELD or GIVEN), reason=f"minutes: set RANGER_SIM_BLIND to a seed or to fresh (or HELD in {__name__})"
 )
@@ -216,7 +222,7 @@ def fresh_cases(tmp_path_factory):
 @wanted
 def test_the_diagnosis_keeps_the_bounds_on_fresh_cases(fresh_cases, tmp_path):
     data, hidden = fresh_cases
-    found = answering.answer_all(DIAGNOSIS, data, tmp_path, processes=2)
+    found = answered(DIAGNOSIS, data, tmp_path)
     figures = score(hidden, found)
     said = "\n".join((table(figures), confusion.text(hidden, found), (tmp_path / "errors.txt").read_text()))
     print(said)
@@ -230,7 +236,7 @@ def test_comparators_are_refused_on_the_cases(name, fresh_cases, tmp_path):
     if name in NEEDS:
         pytest.importorskip(NEEDS[name][0])
     data, hidden = fresh_cases
-    figures = score(hidden, answering.answer_all(name, data, tmp_path))
+    figures = score(hidden, answered(name, data, tmp_path))
     print(table(figures))
     assert (tmp_path / "errors.txt").read_text() == ""
     assert refusals(figures)
@@ -245,9 +251,7 @@ def test_the_diagnosis_with_a_balance_taken_out_of_the_machine_is_refused(letter
     data, hidden = fresh_cases
     there = {key: truth for key, truth in hidden.items() if in_one_balance(truth, letter)}
     assert len(there) == MOTOR_BENCH.CHECK_AT_4
-    found = answering.answer_all(
-        f"tests.blind.deaf:without_{letter}", data, tmp_path, processes=2, holdout=False, only=there
-    )
+    found = answered(f"tests.blind.deaf:without_{letter}", data, tmp_path, "--no-holdout", "--only", *there)
     assert len(found) == len(there), (tmp_path / "errors.txt").read_text()
     refusal = refusals(score(there, found))
     assert any(text.startswith("detection at 4:") for text in refusal), (refusal, confusion.text(there, found))
