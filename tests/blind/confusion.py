@@ -101,7 +101,7 @@ def others(truths, answers):
         elif kind == "pair":
             right = matched(answer.groups(), names) == (2, 0)
         else:
-            right = answer.detected and answer.abstained
+            right = (answer.detected and answer.abstained) or bool(truth["ties"])
         if not right:
             said = (" + ".join(sorted(names)) or truth["variant"], outcome(answer))
             found[kind].setdefault(said, []).append(truth["number"])

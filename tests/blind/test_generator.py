@@ -12,6 +12,7 @@ import pytest
 from tests.blind import generate
 from tests.blind.generator.case import Case
 from tests.blind.generator.effects import rate
+from tests.blind.generator.experiment import TIE
 from tests.blind.generator.leg_swing import LEG_SWING
 from tests.blind.generator.motor_bench import MOTOR_BENCH
 from tests.blind.generator.strength import FLOWS_A
@@ -207,3 +208,18 @@ def test_an_experiment_without_effects_keeps_its_own_balances(experiment, monkey
     assert scale.strength(balances_of(trajectory, experiment.true_channels(trajectory))) < 0.5
     assert np.mean(np.abs(trajectory.w) > experiment.MOVES_RAD_S) > 0.5
     assert np.mean(np.abs(trajectory.I) > FLOWS_A) > 0.4
+
+
+def test_what_no_recording_can_tell_apart_is_a_tie_of_the_truth(monkeypatch):
+    """Friction by direction is an offset of the load cell, also where only the current's offset is hidden; a torque
+    ripple that goes with the voltage is no cogging, though both have the same period and phase.
+    """
+    monkeypatch.setattr(MOTOR_BENCH, "SAMPLES", 2000)
+    for name, other, tied in (
+        ("direction_friction", "sensor_offset", True),
+        ("voltage_ripple_torque", "cogging", False),
+    ):
+        case = clean(MOTOR_BENCH, 4, name, 0.02)
+        trajectory = MOTOR_BENCH.lanes_of([(case, case.runs[0])]).run(fine=2)[0]
+        cosines = MOTOR_BENCH.rivals(4, case, MOTOR_BENCH.scale(case, trajectory))
+        assert (cosines[other] > TIE) is tied

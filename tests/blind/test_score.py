@@ -182,6 +182,18 @@ def test_outside_the_catalogue_an_answer_abstains_or_names_wrongly_or_sees_nothi
     assert found["outside: detection"].value == 0.5
 
 
+def test_an_effect_outside_that_looks_like_a_cause_is_not_asked_for():
+    """With a cosine above 0.95 to a cause of the catalogue nobody could know; nearer than 0.84 it is told apart."""
+    twin, near = hidden("eddy", kind="outside", ties=["stribeck"]), hidden("eddy", kind="outside")
+    twin["cosines"], near["cosines"] = {"stribeck": 0.97}, {"stribeck": 0.90}
+    named_one = named(("stribeck", ()))
+    found = figures([(twin, named_one), (near, named_one), (hidden("mains_pickup", kind="outside"), UNSURE)])
+    assert (found["outside: wrong name"].value, found["outside: wrong name"].cases) == (0.5, 2)
+    assert found["outside: abstains"].value == 0.5
+    assert found["outside, apart from all: abstains"].value == 1.0
+    assert found["outside, apart from all: abstains"].cases == 1
+
+
 def test_intervals_are_the_published_ones():
     """Clopper-Pearson 8 of 10 and 0 of 20 (any table): 0.4439-0.9748, 0-0.1684."""
     assert scoring.share_interval(8, 10) == pytest.approx((0.4439, 0.9748), abs=1e-4)

@@ -458,4 +458,17 @@ _ALL = (
     Effect("rattling_coupling", "M", _pick("hertz", 60.0, 140.0), **_measured("T", _rattle), known=False),
     Effect("load_cell_creep", "M", _nothing, **_measured("T", _cell_creep), known=False),
 )
+
+
+def _at(channel, value):
+    return lambda t, h: seen(t, **{channel: value(t, channel)})
+
+
+# Causes at places where none is hidden: an answer may name them where they look alike.
+OTHER_PLACES = {
+    **{("sensor_offset", channel): _at(channel, lambda t, _: np.ones_like(t.I)) for channel in "VwT"},
+    **{("sensor_scale", channel): _at(channel, getattr) for channel in "VwT"},
+    **{("sensor_lag", channel): _at(channel, lambda t, channel: -rate(getattr(t, channel))) for channel in "VIwT"},
+    ("direction_friction", "viscous"): lambda t, h: resisting(np.abs(t.w)),
+}
 EFFECTS = {effect.name: effect for effect in _ALL}

@@ -13,8 +13,15 @@ from tests.blind.generator.strength import Scale
 
 BATCH = 80  # cases simulated side by side: memory, not speed, sets it
 STRENGTHS = (0.5, 1.0, 2.0, 4.0)
+WITH_ONE = ("single", "confusable", "outside")  # kinds with one effect, whose likeness to causes is told
 TIE = 0.95  # of the cosine of two effects' parts outside the base model
 SUBSYSTEM = {"E": "electrical", "M": "mechanical", "EM": "current_sensing", "T": "transmission", "t": "timing"}
+
+
+def cosine(one, other):
+    """Of the angle between two vectors, without sign."""
+    length = np.linalg.norm(one) * np.linalg.norm(other)
+    return float(abs(one @ other) / length) if length > 0.0 else 0.0
 
 
 class Experiment:
@@ -24,6 +31,8 @@ class Experiment:
     NOMINAL, FIXED      base parameters that are shifted in every case, and those that are known
     NOISE               standard deviations by channel
     EFFECTS             {name: Effect} that this experiment can hide: CAUSES of the catalogue and OUTSIDE it
+    SHADOWS             ((cause, show), ...): causes of the catalogue at other places, which are not hidden here but may
+                        look like what is; show as an Effect's
     CONFUSABLE          causes that the poor experiment cannot tell apart
     MIX                 shares of the kinds in a set of cases
     ONLY_IN             {balance: causes that show in it alone, or nearly}; CHECK_AT_4 of each, and CHECK_KINDS, are
@@ -32,6 +41,8 @@ class Experiment:
     MOVES_RAD_S         speed below which friction takes what it must, so that the torque balance says nothing
     excite              (rng, supply_V, poor) -> voltage and brake torque
     """
+
+    SHADOWS = ()
 
     def lasting(self, seconds):
         """The same experiment with runs of another length; strengths keep their meaning, for N_eff goes with it."""
@@ -167,10 +178,13 @@ class Experiment:
             effect = self.EFFECTS[other]
             drawn = effect.draw(generator(seed, f"case {case.number} {other}"))
             turns = "once_per_turn" in (name, other)  # its period is its own
-            drawn |= {key: shape[key] for key in drawn if key in shape and not (turns and key == "periods")}
+            own_keys = {"by_V"} | ({"periods"} if turns else set())  # these make them two different causes
+            drawn |= {key: shape[key] for key in drawn if key in shape and key not in own_keys}
             theirs = scale.outside(self.balances(other, scale.trajectory, drawn, effect.start))
-            length = np.linalg.norm(own) * np.linalg.norm(theirs)
-            found[other] = float(abs(own @ theirs) / length) if length > 0.0 else 0.0
+            found[other] = cosine(own, theirs)
+        for other, show in self.SHADOWS:
+            if other != name:
+                found[other] = max(found.get(other, 0.0), cosine(own, scale.outside(show(scale.trajectory, {}))))
         return found
 
     def scale(self, case, trajectory):
@@ -262,5 +276,5 @@ class Experiment:
                 for run, trajectory in zip(case.runs, ran, strict=True):
                     write(data / key / f"{run[0]}.csv", self.measure(seed, case, run, trajectory))
                 scale = self.scale(case, ran[0])
-                cosines = self.rivals(seed, case, scale) if case.kind in ("single", "confusable") else {}
+                cosines = self.rivals(seed, case, scale) if case.kind in WITH_ONE else {}
                 yield key, [f"{key}/a.csv"], [f"{key}/b.csv"], self.truth(case, scale, cosines)

@@ -3,6 +3,7 @@
 import dataclasses
 
 from tests.blind.generator.effects import EFFECTS as ALL
+from tests.blind.generator.effects import OTHER_PLACES
 from tests.blind.generator.excitation import STEP_S, swing
 from tests.blind.generator.experiment import Experiment
 
@@ -76,6 +77,8 @@ class LegSwing(Experiment):
     )
     CAUSES = tuple(name for name, effect in EFFECTS.items() if effect.known)
     OUTSIDE = tuple(name for name, effect in EFFECTS.items() if not effect.known)
+    # neither speed nor torque is measured on a leg
+    SHADOWS = tuple((cause, show) for (cause, place), show in OTHER_PLACES.items() if place not in "wT")
     CONFUSABLE = ()
     MIX = (("single", 0.50), ("null", 0.22), ("pair", 0.13), ("outside", 0.15))
     ONLY_IN = {

@@ -1,6 +1,6 @@
 """The motor bench: a motor with a 14:1 gearbox against a brake motor."""
 
-from tests.blind.generator.effects import EFFECTS
+from tests.blind.generator.effects import EFFECTS, OTHER_PLACES
 from tests.blind.generator.excitation import STEP_S, one_sided, rich
 from tests.blind.generator.experiment import Experiment
 
@@ -27,6 +27,7 @@ class MotorBench(Experiment):
     EFFECTS = {name: effect for name, effect in EFFECTS.items() if name != "hip_spring_bend"}
     CAUSES = tuple(name for name, effect in EFFECTS.items() if effect.known)
     OUTSIDE = tuple(name for name, effect in EFFECTS.items() if not effect.known)
+    SHADOWS = tuple((cause, show) for (cause, _), show in OTHER_PLACES.items())
     # With a supply of one sign these two are one: the sensor's step at zero duty is never crossed.
     CONFUSABLE = ("current_step_at_zero_duty", "sensor_offset")
     MIX = (("single", 0.46), ("null", 0.20), ("pair", 0.12), ("outside", 0.14), ("confusable", 0.08))
