@@ -219,7 +219,7 @@ def test_what_no_recording_can_tell_apart_is_a_tie_of_the_truth(monkeypatch):
         ("direction_friction", "sensor_offset", True),
         ("voltage_ripple_torque", "cogging", False),
     ):
-        case = clean(MOTOR_BENCH, 4, name, 0.02)
+        case = clean(MOTOR_BENCH, 5, name, 0.02)  # a run in both directions
         trajectory = MOTOR_BENCH.lanes_of([(case, case.runs[0])]).run(fine=2)[0]
-        cosines = MOTOR_BENCH.rivals(4, case, MOTOR_BENCH.scale(case, trajectory))
+        cosines = MOTOR_BENCH.rivals(5, case, MOTOR_BENCH.scale(case, trajectory))
         assert (cosines[other] > TIE) is tied
