@@ -8,6 +8,8 @@ A model file is TOML, one table per term:
     amplitude_Nm = 0.05
     periods_per_turn = 12
 
+A file that a diagnosis wrote says in [diagnosis] what it was found by (sysid/model_file.py).
+
 `FORMS` says which forms there are, where each may stand, and its parameters with unit and limits. Everything a
 file can get wrong is a UserError that names file, term, field and limit. A plant without terms does no extra work:
 torques are asked for only when there are any, and sensors and windings keep their neutral numbers.
@@ -202,6 +204,12 @@ _FORMS = (
         "more resistance in series with the winding",
     ),
     Form(
+        "torque_constant_change",
+        MOTORS,
+        (Parameter("factor", "1", 0.5, 2.0),),
+        "a torque constant that is this multiple of the base model's",
+    ),
+    Form(
         "contact_drop_change",
         MOTORS,
         (Parameter("change_V", "V", -0.7, 10.0),),
@@ -336,6 +344,7 @@ class Model:
 
     def __init__(self, tables: Any, source: str = "model") -> None:
         self.source = source
+        self.left_out: list[str] = []  # what a diagnosis found, and the user leaves out
         self.terms = [_check(f"{source}: term {number}", table) for number, table in enumerate(tables, 1)]
 
     def apply(self, plant: Any) -> None:
@@ -381,6 +390,11 @@ def _apply_electric(unit: Any, term: Term) -> None:
         unit.heat_matters = True
     elif name == "resistance_change":
         unit.series_ohm += value
+    elif name == "torque_constant_change":
+        unit.K *= value
+        # heat makes K anew from the parameters
+        constant = value * unit.parameters.torque_constant_Nm_per_A
+        unit.parameters = dataclasses.replace(unit.parameters, torque_constant_Nm_per_A=constant)
     elif name == "contact_drop_change":
         unit.contact_drop_V += value
     else:
@@ -435,7 +449,26 @@ def _apply_gyro(imu: Any, term: Term) -> None:
 
 
 def load(path: str | pathlib.Path) -> Model:
-    """The model of a TOML file; UserError with file, term, field and limit for everything wrong in it."""
+    """The model of a TOML file; UserError with file, term, field and limit for everything wrong in it.
+
+    What a diagnosis found and no form can be is refused, unless the file says that it is left out.
+    """
+    content = content_of(path)
+    model = Model(content.get("term", []), str(path))
+    for effect in content.get("diagnosis", {}).get("effect", []):
+        if isinstance(effect, dict) and "no_form" in effect:
+            name = f"{effect.get('cause')} at {effect.get('at')}"
+            if effect.get("left_out") is not True:
+                raise UserError(
+                    f"{path}: {name} cannot be simulated: {effect['no_form']}; "
+                    "with left_out = true in its table the simulator runs without it"
+                )
+            model.left_out.append(name)
+    return model
+
+
+def content_of(path: str | pathlib.Path) -> dict[str, Any]:
+    """The tables of a model file, unchecked but for their kind."""
     path = pathlib.Path(path)
     try:
         with path.open("rb") as file:
@@ -444,10 +477,18 @@ def load(path: str | pathlib.Path) -> Model:
         raise UserError(f"{path}: the model file cannot be read ({error.strerror or error})") from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise UserError(f"{path}: this is no TOML file ({error})") from None
-    unknown = [key for key in content if key not in ("term", "title")]
+    unknown = [key for key in content if key not in ("term", "title", "diagnosis")]
     if unknown:
-        raise UserError(f"{path}: {unknown[0]} is not known here; a model file holds [[term]] tables and a title")
-    tables = content.get("term", [])
-    if not isinstance(tables, list):
+        raise UserError(
+            f"{path}: {unknown[0]} is not known here; a model file holds [[term]] tables, a title, and [diagnosis]"
+        )
+    if not isinstance(content.get("term", []), list):
         raise UserError(f"{path}: term is written [[term]], once per term")
-    return Model(tables, str(path))
+    told = content.get("diagnosis", {})
+    if not isinstance(told, dict) or not isinstance(told.get("effect", []), list):
+        raise UserError(f"{path}: [diagnosis] is a table, its effects are written [[diagnosis.effect]]")
+    if not isinstance(told.get("parameters", {}), dict) or not all(
+        isinstance(each, int | float) for each in told.get("parameters", {}).values()
+    ):
+        raise UserError(f"{path}: [diagnosis.parameters] holds numbers")
+    return content

@@ -105,7 +105,8 @@ class Effect:
 class Machine(Protocol):
     """What can be diagnosed.
 
-    A machine may have more: `labels`, {signal: how the report calls it on an axis}.
+    A machine may have more: `labels`, {signal: how the report calls it on an axis}; `gear`, of its gearbox, and
+    `motor`, which of the simulator's motors is measured (plant/terms.py), for the model file.
     """
 
     name: str

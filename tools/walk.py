@@ -20,6 +20,7 @@ from ranger_sim.harness.faults import catalogue
 from ranger_sim.harness.profile import Profile
 from ranger_sim.harness.profile import load as load_profile
 from ranger_sim.harness.scenario import Scenario, StopRule
+from ranger_sim.plant import terms
 from ranger_sim.plant.electronics import SWITCHES
 from ranger_sim.tools import faults, serial_options, terminal, trace
 from ranger_sim.tools.files import json_target, replace_file, writable_folder
@@ -196,6 +197,9 @@ def run_scenario(scenario: Scenario, stop: StopRule, options: argparse.Namespace
     quirks = serial_options.quirks_of(options)
     profile = profile_of(options, console)
     faults.load_modules(options)
+    if scenario.model_file is not None:
+        for name in terms.load(scenario.model_file).left_out:
+            console.print(f"{scenario.model_file}: {name} is left out", highlight=False, soft_wrap=True)
     wanted = [catalogue.typed(text) for text in options.fault]
     log = options.log if folder else "none"
     with contextlib.closing(Ranger(scenario, log=log, quirks=quirks, profile=profile)) as robot:

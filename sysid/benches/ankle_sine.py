@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from ranger_sim.plant.motor_parameters import ANKLE_MOTOR, MotorParameters
 from ranger_sim.plant.motor_unit import MotorUnit
 from ranger_sim.plant.parameters import BodyParameters
+from ranger_sim.sysid.benches.bench_terms import NOTHING, BenchTerms
 from ranger_sim.sysid.dataset import Channel, Dataset
 from ranger_sim.sysid.instruments import BOARD_CURRENT, JOINT_ENCODER, Instrument
 
@@ -48,7 +49,9 @@ def sine(times: Array, frequency_hz: float) -> tuple[Array, Array]:
     return CENTRE_rad + AMPLITUDE_rad * np.sin(w * times), AMPLITUDE_rad * w * np.cos(w * times)
 
 
-def tracked(body: BodyParameters, motor: MotorParameters, frequency_hz: float, seconds: float) -> Array:
+def tracked(
+    body: BodyParameters, motor: MotorParameters, frequency_hz: float, seconds: float, terms: BenchTerms = NOTHING
+) -> Array:
     """Rows of (time, motor angle, joint angle, joint rate, target, its rate, current) every STEP_S, settled at first.
 
     One period goes before, so that nothing of the start is left.
@@ -63,7 +66,13 @@ def tracked(body: BodyParameters, motor: MotorParameters, frequency_hz: float, s
         current = STIFFNESS_A_per_rad * (CENTRE_rad + AMPLITUDE_rad * math.sin(w * t) - p)
         current += DAMPING_As_per_rad * (AMPLITUDE_rad * w * math.cos(w * t) - u)
         cable = k_s * (p - a)
-        return (unit.torque_Nm(current, u) - cable) / J_A, (cable - k_r * (a - a_0)) / J_f, current
+        on_motor, on_foot = unit.torque_Nm(current, u) - cable, cable - k_r * (a - a_0)
+        if terms.places:
+            drive = motor.gear * unit.K * current
+            stretch = terms.torque_Nm("inner_cable", p - a, u - v)
+            on_motor += terms.torque_Nm("inner_motor", p, u, drive) - stretch
+            on_foot += terms.torque_Nm("inner_ankle", a, v, drive) + stretch
+        return on_motor / J_A, on_foot / J_f, current
 
     h = STEP_S
     p, a, u, v = CENTRE_rad, CENTRE_rad, AMPLITUDE_rad * w, AMPLITUDE_rad * w
@@ -93,10 +102,12 @@ def ankle_sine(
     seed: int = 1,
     frequency_hz: float = 1.0,
     seconds: float = 4.0,
+    terms: BenchTerms = NOTHING,
 ) -> Dataset:
     """One run at one frequency, as the robot would log it."""
     name = f"ankle-sine {frequency_hz:g} Hz"
-    rows = tracked(body, motor, frequency_hz, seconds)
+    terms = terms.of_bench("ankle-sine")
+    rows = tracked(body, terms.motor("inner_motor", motor), frequency_hz, seconds, terms)
     kept = rows[:: round(LOG_S / STEP_S)]
     sparse = rows[:: round(CURRENT_S / STEP_S)]
     time_s = kept[:, 0]

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from ranger_sim.plant.motor_parameters import MotorParameters
 from ranger_sim.plant.motor_unit import MotorUnit
+from ranger_sim.sysid.benches.bench_terms import NOTHING, BenchTerms
 from ranger_sim.sysid.dataset import Channel, Dataset
 from ranger_sim.sysid.instruments import CURRENT_SENSOR, SHAFT_SPEED, TORQUE_CELL, VOLTMETER, Instrument
 
@@ -42,7 +43,9 @@ LARGEST_SPEED = 80.0  # rad/s, where the search for a steady speed ends
 class SuppliedMotor:
     """A motor at a DC supply: what it carries and gives at a voltage and an output speed."""
 
-    def __init__(self, parameters: MotorParameters) -> None:
+    def __init__(self, parameters: MotorParameters, terms: BenchTerms = NOTHING) -> None:
+        parameters = terms.motor("hip_motor", parameters)
+        self.terms = terms
         self.unit = MotorUnit("bench", dataclasses.replace(parameters, watchdog_ns=10**18))
         self.unit.drive.watchdog_edge(0)
         self.now = 0
@@ -57,7 +60,9 @@ class SuppliedMotor:
         self.unit.step_electrical(self.now, self.now + SETTLED_NS, speed_rad_per_s, abs(voltage_V))
         self.now += SETTLED_NS
         current = float(self.unit.current_A)
-        return current, float(self.unit.torque_Nm(current, speed_rad_per_s))
+        gear = self.unit.gear
+        more = self.terms.output_Nm(0.0, speed_rad_per_s, gear * self.unit.K * current, gear)
+        return current, float(self.unit.torque_Nm(current, speed_rad_per_s)) + more
 
     def steady_speed(self, voltage_V: float, load_Nm: float) -> float:
         """Output speed at which the motor carries `load_Nm`: torque falls with speed, so halving finds it."""
@@ -87,17 +92,17 @@ def readings(name: str, seed: int, measured: dict[str, tuple[Array, Instrument |
     return Dataset(name, channels)
 
 
-def stall(parameters: MotorParameters = BENCH_MOTOR, seed: int = 1) -> Dataset:
+def stall(parameters: MotorParameters = BENCH_MOTOR, seed: int = 1, terms: BenchTerms = NOTHING) -> Dataset:
     """The shaft held, voltages of both signs from above the contact drop up."""
-    motor = SuppliedMotor(parameters)
+    motor = SuppliedMotor(parameters, terms.of_bench("stall"))
     voltages = np.array(STALL_VOLTAGES)
     currents = np.array([motor.settle(voltage, 0.0)[0] for voltage in STALL_VOLTAGES])
     return readings("stall", seed, {"voltage_V": (voltages, VOLTMETER), "current_A": (currents, CURRENT_SENSOR)})
 
 
-def cantilever(parameters: MotorParameters = BENCH_MOTOR, seed: int = 1) -> Dataset:
+def cantilever(parameters: MotorParameters = BENCH_MOTOR, seed: int = 1, terms: BenchTerms = NOTHING) -> Dataset:
     """Every voltage, the brake from driving to braking and back, each reading at its steady speed."""
-    motor = SuppliedMotor(parameters)
+    motor = SuppliedMotor(parameters, terms.of_bench("cantilever"))
     up = np.linspace(-BRAKES_Nm, BRAKES_Nm, BRAKE_STEPS)
     rows = []
     for voltage in VOLTAGES:

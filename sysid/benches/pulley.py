@@ -17,6 +17,7 @@ import numpy as np
 
 from ranger_sim.foundation.random_arrays import generator
 from ranger_sim.plant.motor_parameters import MotorParameters
+from ranger_sim.sysid.benches.bench_terms import NOTHING, BenchTerms
 from ranger_sim.sysid.benches.motor import BENCH_MOTOR, readings
 from ranger_sim.sysid.dataset import Dataset
 from ranger_sim.sysid.instruments import CURRENT_SENSOR, SHAFT_SPEED
@@ -82,8 +83,14 @@ def first_mass_kg(friction: StickFriction, drive_Nm: float, side: float, tapped:
     return float("nan")  # no mass at all was still too much for the motor to lift
 
 
-def pulley(motor: MotorParameters = BENCH_MOTOR, seed: int = 1, friction: StickFriction | None = None) -> Dataset:
+def pulley(
+    motor: MotorParameters = BENCH_MOTOR,
+    seed: int = 1,
+    friction: StickFriction | None = None,
+    terms: BenchTerms = NOTHING,
+) -> Dataset:
     """All trials of appendix 8.4.1 to 8.4.5."""
+    motor = terms.of_bench("pulley").motor("hip_motor", motor)
     friction = friction if friction is not None else StickFriction.of(motor)
     GK = motor.gear * motor.torque_constant_Nm_per_A
     trials = [(0.0, 1.0), *((current, side) for current in CURRENTS_A for side in (1.0, -1.0))]

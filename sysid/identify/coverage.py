@@ -15,6 +15,7 @@ from ranger_sim.foundation.random_arrays import generator
 from ranger_sim.plant.motor_parameters import MotorParameters
 from ranger_sim.plant.parameters import BodyParameters
 from ranger_sim.sysid.benches import ankle_sine, leg, motor, pulley, springs
+from ranger_sim.sysid.benches.bench_terms import NOTHING, BenchTerms
 from ranger_sim.sysid.fit import Fit
 from ranger_sim.sysid.identify import legs as identify_legs
 from ranger_sim.sysid.identify import motor as identify_motor
@@ -41,14 +42,15 @@ BODY_NUMBERS = (
 
 @dataclasses.dataclass(frozen=True)
 class Machine:
-    """What is measured."""
+    """What is measured. terms: what a model file adds to motor and body."""
 
     motor: MotorParameters
     body: BodyParameters
+    terms: BenchTerms = NOTHING
 
     def truth(self) -> dict[str, float]:
         """The numbers of tables 2 and 3, and of the ankle that hangs, by the names of the fits."""
-        m, b, a = self.motor, self.body, ankle_sine.HANGING
+        m, b, a = self.terms.motor("hip_motor", self.motor), self.body, ankle_sine.HANGING
         outer, inner = leg.legs_of(b)
         return {
             "R": m.loop_resistance_ohm,

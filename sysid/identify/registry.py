@@ -45,7 +45,7 @@ BENCHES = {
             "8.3.1, figure 28",
             ("voltage_V", "current_A"),
             ("R", "V_c"),
-            lambda machine, seed: motor.stall(machine.motor, seed),
+            lambda machine, seed: motor.stall(machine.motor, seed, machine.terms),
             lambda data, gear: [fit_motor.stalled_block(data)],
         ),
         Bench(
@@ -54,7 +54,7 @@ BENCHES = {
             "8.2, 8.3.2, figures 26, 29, 31",
             ("voltage_V", "current_A", "speed_rad_per_s", "torque_Nm"),
             fit_motor.TABLE_3,
-            lambda machine, seed: motor.cantilever(machine.motor, seed),
+            lambda machine, seed: motor.cantilever(machine.motor, seed, machine.terms),
             lambda data, gear: [fit_motor.cantilever_block(data, gear)],
         ),
         Bench(
@@ -63,7 +63,7 @@ BENCHES = {
             "8.4, figure 30",
             ("current_A", "mass_kg", "side", "tapped", "speed_rad_per_s"),
             ("K", "C_1", "C_0", "mu"),
-            lambda machine, seed: pulley.pulley(machine.motor, seed),
+            lambda machine, seed: pulley.pulley(machine.motor, seed, terms=machine.terms),
             lambda data, gear: [fit_motor.pulley_block(data, gear)],
         ),
         Bench(
@@ -101,7 +101,7 @@ BENCHES = {
             "7.3, figure 25 a",
             ("angle_rad", "force_N", "side", "outward"),
             ("k_h",),
-            lambda machine, seed: springs.hip_spring(machine.body, seed),
+            lambda machine, seed: springs.hip_spring(machine.body, seed, terms=machine.terms),
             lambda data, gear: [fit_springs.hip_block(data)],
         ),
         Bench(
@@ -110,7 +110,7 @@ BENCHES = {
             "7.3, figure 25 b",
             ("angle_rad", "force_N", "side"),
             ("k_s",),
-            lambda machine, seed: springs.ankle_spring(machine.body, seed),
+            lambda machine, seed: springs.ankle_spring(machine.body, seed, machine.terms),
             lambda data, gear: [fit_springs.ankle_block(data)],
         ),
         Bench(
@@ -119,7 +119,7 @@ BENCHES = {
             "the robot's logs of 2015",
             fit_ankle.COLUMNS + ("motor_current_A",),
             ("J_foot", "k_r", "return_Nm", "ankle_C_0"),
-            lambda machine, seed: ankle_sine.ankle_sine(seed=seed),
+            lambda machine, seed: ankle_sine.ankle_sine(seed=seed, terms=machine.terms),
             lambda data, gear: fit_ankle.sine_blocks(data),
         ),
     )

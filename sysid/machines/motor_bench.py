@@ -52,6 +52,7 @@ class MotorBench:
         Quantity("motor_angle_rad", "rad", "of the rotor", needed=False),
     )
 
+    motor = "hip_motor"  # of the simulator, whose winding and magnets are measured here
     labels: ClassVar = {
         "V": "voltage, V",
         "I": "current, A",

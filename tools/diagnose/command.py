@@ -15,8 +15,9 @@ def register(commands: Any) -> None:
         "diagnose",
         help="what the simulation gets wrong about measured data",
         description="Looks for a misfit between measured data and the equations of an experiment, names its cause or "
-        "says that it cannot, and measures what the extended model gains on held-out data. Exit code 1 when something "
-        "was found.",
+        "says that it cannot, and measures what the extended model gains on held-out data. Exit code 0: nothing was "
+        "found; 1: something was; 2: a mistake, or data that are not what they say they are.",
+        epilog="ranger-sim diagnose run1.csv --holdout run2.csv --experiment motor-bench --out found",
     )
     command.add_argument("data", nargs="+", metavar="DATA", help="recordings: CSV, MF4, a run's folder, CAN logs")
     command.add_argument(
@@ -28,9 +29,17 @@ def register(commands: Any) -> None:
         metavar="NAME",
         help=f"{', '.join(MACHINES)}, or a machine of your own as module:object",
     )
+    command.add_argument(
+        "--model",
+        metavar="FILE",
+        help="model to start from: the extended.toml of an earlier diagnosis, or [[term]] tables; what it has already "
+        "is no finding",
+    )
     command.add_argument("--gear", type=float, metavar="N", help="of the motor bench's gearbox (14)")
     command.add_argument("--seed", type=int, default=0, metavar="N", help="of the bootstrap (0)")
-    command.add_argument("--out", metavar="DIR", help="folder for the extended model and the answer")
+    command.add_argument(
+        "--out", metavar="DIR", help="folder for report.html, diagnosis.json and extended.toml, made if missing"
+    )
     command.add_argument("--json", metavar="FILE|-", help="the answer as JSON; - prints it and nothing else")
     recordings.add_options(command)
     command.set_defaults(run=run)

@@ -17,14 +17,13 @@ from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeEl
 from rich.table import Table as RichTable
 
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.sysid import repairs, sanity
+from ranger_sim.sysid import model_file, repairs, sanity
 from ranger_sim.sysid.channels import named_for
 from ranger_sim.sysid.dataset import Dataset, Finding, Table
-from ranger_sim.sysid.diagnose import Diagnosis, diagnose
+from ranger_sim.sysid.diagnose import Diagnosis, KnownEffect, diagnose
 from ranger_sim.sysid.diagnose import Progress as Progressed
 from ranger_sim.sysid.machine import Machine
 from ranger_sim.sysid.machines import MACHINES, made
-from ranger_sim.sysid.model_file import model_text
 from ranger_sim.tools import recordings, terminal
 from ranger_sim.tools.diagnose import words
 from ranger_sim.tools.files import json_target, replace_file, writable_folder
@@ -66,10 +65,15 @@ def write(found: Diagnosis, folder: pathlib.Path, command: str) -> None:
     from ranger_sim.tools.diagnose import page  # with plotly, which is slow to load
 
     files = {"diagnosis.json": "the answer for programs"}
-    if found.named and not found.answer["abstained"]:
+    if (found.named or found.answer["evidence"]["known"]) and not found.answer["abstained"]:
         path = folder / "extended.toml"
-        replace_file(path, model_text(found).encode())
+        replace_file(path, model_file.model_text(found).encode())
         found.answer["model_file"] = str(path)
+        for each in model_file.effects_found(found):
+            if each.term is None:
+                found.answer["evidence"].setdefault("without_form", []).append(
+                    {"name": each.known.cause, "at": each.known.at, "reason": each.no_form}
+                )
         files["extended.toml"] = "the extended model"
     replace_file(folder / "diagnosis.json", _json(found.answer).encode())
     replace_file(folder / "report.html", page.render(found, command, files).encode())
@@ -78,9 +82,10 @@ def write(found: Diagnosis, folder: pathlib.Path, command: str) -> None:
 def of_options(options: argparse.Namespace, progress: Progressed = lambda what, share: None) -> Diagnosis:
     """The diagnosis that a command line asks for."""
     machine = machine_of(options.experiment, options.gear)
+    known = model_file.read(options.model, machine).effects if options.model else []
     data = [_prepared(recordings.open_with(options, path), machine, options.experiment) for path in options.data]
     held = [_prepared(recordings.open_with(options, path), machine, options.experiment) for path in options.holdout]
-    return _diagnosed(machine, data, held, options.seed, progress)
+    return _diagnosed(machine, data, held, options.seed, known, progress)
 
 
 def answer(files: Sequence[str], holdout: Sequence[str], experiment: str) -> dict[str, Any]:
@@ -150,6 +155,7 @@ def _diagnosed(
     data: Sequence[tuple],
     held: Sequence[tuple],
     seed: int,
+    known: Sequence[KnownEffect] = (),
     progress: Progressed = lambda what, share: None,
 ) -> Diagnosis:
     findings = [
@@ -177,6 +183,13 @@ def _show(found: Diagnosis, console: Console) -> None:
         console.print(
             f"data: {finding['recording']}: {finding['channel']}: {finding['text']}", highlight=False, soft_wrap=True
         )
+    for each in answer["evidence"]["known"]:
+        values = ", ".join(
+            f"{name} {_figure(value['value'])} ({_figure(value['ci95'][0])} to {_figure(value['ci95'][1])}; "
+            f"in the model {_figure(value['model'])})"
+            for name, value in each["parameters"].items()
+        )
+        console.print(f"known: {each['name']} at {each['at']}: {values}", highlight=False, soft_wrap=True)
     if not answer["detected"]:
         return
     table = RichTable("equation", "regime", "misfit", "noise", "repeatable", box=None)
@@ -203,6 +216,12 @@ def _show(found: Diagnosis, console: Console) -> None:
         console.print(
             f"gain on {gain['holdout']}: {gain['fraction_of_achievable']:.0%} of what can be achieved "
             f"({low:.0%} to {high:.0%})",
+            highlight=False,
+            soft_wrap=True,
+        )
+    for each in answer["evidence"].get("without_form", ()):
+        console.print(
+            f"{each['name']} at {each['at']} is not in the simulator's terms: {each['reason']}",
             highlight=False,
             soft_wrap=True,
         )

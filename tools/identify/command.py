@@ -40,6 +40,9 @@ def register(commands: Any) -> None:
     )
     command.add_argument("--gear", type=float, default=GEAR, help="of the bench's gearbox (default 14)")
     command.add_argument("--seed", type=int, default=1, help="of the virtual instruments (default 1)")
+    command.add_argument(
+        "--model", metavar="FILE", help="model file whose terms and motor the virtual bench has (of `diagnose --out`)"
+    )
     command.add_argument("--json", metavar="FILE|-", help="everything as JSON; - prints it and nothing else")
     command.add_argument("--out", metavar="DIR", help="page with figures 28, 29, 31, the recordings, and the JSON")
     command.add_argument(

@@ -4,6 +4,7 @@ Without --data the virtual bench records, and the truth stands beside what was f
 """
 
 import argparse
+import dataclasses
 import json
 import math
 import pathlib
@@ -18,7 +19,9 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.table import Table
 
 from ranger_sim.foundation.user_error import UserError
+from ranger_sim.plant import terms
 from ranger_sim.sysid import readers, sanity
+from ranger_sim.sysid.benches.bench_terms import BenchTerms
 from ranger_sim.sysid.dataset import Dataset
 from ranger_sim.sysid.fit import Fit, Parameter
 from ranger_sim.sysid.identify import coverage, legs, motor
@@ -51,12 +54,13 @@ def run(options: argparse.Namespace) -> int:
         write(told, options, target)
         return EXIT_DONE
     known = [known_of(text) for text in options.known]
+    machine = machine_with(options, console)
     if options.bench == ALL:
         if known:
             raise UserError("--known belongs to a single bench")
-        recordings, told, fits = identify_all(options, console)
+        recordings, told, fits = identify_all(options, machine, console)
     else:
-        recordings, told, fits = identify_one(options, known, console)
+        recordings, told, fits = identify_one(options, machine, known, console)
     truth = told["truth"]
     for title, found in fits.items():
         console.print(f"\n[bold]{escape(title)}[/bold]")
@@ -101,6 +105,24 @@ def known_of(text: str) -> Parameter:
     return Parameter(name.strip(), "", number, uncertainty=sd)
 
 
+def machine_with(options: argparse.Namespace, console: Console) -> coverage.Machine:
+    """The robot that the virtual benches measure, with the terms of --model; what a bench does not have is told."""
+    if options.model is None:
+        return coverage.ROBOT
+    if options.data is not None:
+        raise UserError("--model is what a virtual bench has; with --data use `ranger-sim diagnose --model`")
+    model, told = terms.load(options.model), terms.content_of(options.model).get("diagnosis", {})
+    fitted = told.get("parameters", {}) if told.get("experiment") == "motor-bench" else {}
+    made = BenchTerms(model.terms, fitted, float(told.get("gear", options.gear)))
+    for name in model.left_out:
+        console.print(escape(f"{options.model}: {name} is left out"))
+    benches = OF_TABLES if options.bench == ALL else (bench_of(options.bench).name,)
+    for each in dict.fromkeys(each for bench in benches for each in made.not_of_bench(bench)):
+        missing = [bench for bench in benches if each in made.not_of_bench(bench)]
+        console.print(escape(f"{options.model}: {each} has no part in {', '.join(missing)}"))
+    return dataclasses.replace(coverage.ROBOT, terms=made)
+
+
 def recorded(name: str, path: pathlib.Path, mapping: dict[str, str], console: Console) -> Dataset:
     """A user's recording of a bench; what is odd in a series of samples is told."""
     data = readers.read(path, mapping)
@@ -114,7 +136,7 @@ def recorded(name: str, path: pathlib.Path, mapping: dict[str, str], console: Co
 
 
 def identify_one(
-    options: argparse.Namespace, known: list[Parameter], console: Console
+    options: argparse.Namespace, machine: coverage.Machine, known: list[Parameter], console: Console
 ) -> tuple[dict[str, Dataset], dict, dict[str, Fit]]:
     """One bench: recordings, what to tell, fits by title."""
     bench = bench_of(options.bench)
@@ -128,11 +150,11 @@ def identify_one(
         if options.map:
             raise UserError("--map names columns of a file: --data is needed")
         if known:
-            recordings = {bench.name: bench.record(coverage.ROBOT, options.seed)}
+            recordings = {bench.name: bench.record(machine, options.seed)}
             fits = {bench.name: alone(bench, recordings[bench.name], known, gear=options.gear, tell=tell)}
         else:
-            recordings, fits = by_virtual_benches(bench, coverage.ROBOT, options.seed, options.gear, tell)
-        truth = coverage.ROBOT.truth()
+            recordings, fits = by_virtual_benches(bench, machine, options.seed, options.gear, tell)
+        truth = machine.truth()
     titled = {}
     for name, found in fits.items():
         source = BENCHES[name].appendix
@@ -140,11 +162,13 @@ def identify_one(
     return recordings, told_of(options, titled, truth), titled
 
 
-def identify_all(options: argparse.Namespace, console: Console) -> tuple[dict[str, Dataset], dict, dict[str, Fit]]:
+def identify_all(
+    options: argparse.Namespace, machine: coverage.Machine, console: Console
+) -> tuple[dict[str, Dataset], dict, dict[str, Fit]]:
     """Tables 2 and 3 in steps and jointly."""
     if options.data is None:
-        recordings = {name: BENCHES[name].record(coverage.ROBOT, options.seed) for name in OF_TABLES}
-        truth = coverage.ROBOT.truth()
+        recordings = {name: BENCHES[name].record(machine, options.seed) for name in OF_TABLES}
+        truth = machine.truth()
     else:
         folder, truth = pathlib.Path(options.data), {}
         lacking = [name for name in OF_TABLES if not (folder / f"{name}.csv").is_file()]
@@ -274,8 +298,8 @@ def csv_of(data: Dataset) -> str:
 
 def run_coverage(options: argparse.Namespace, console: Console) -> dict:
     """N machines by the virtual benches: intervals counted, beside what a binomial allows."""
-    if options.coverage < 1 or options.data is not None or options.bench != ALL:
-        raise UserError("--coverage N: N must be 1 or more, of the bench all, without --data")
+    if options.coverage < 1 or options.data is not None or options.model is not None or options.bench != ALL:
+        raise UserError("--coverage N: N must be 1 or more, of the bench all, without --data and --model")
     bar = Progress(
         TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn(), console=console
     )
