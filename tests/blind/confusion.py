@@ -57,7 +57,7 @@ def singles(truths, answers):
     """[Row], the one with most to be won first. Causes of single and of confusable cases."""
     rows = {}
     for key, truth in truths.items():
-        if truth["kind"] not in ("single", "confusable"):
+        if truth["kind"] not in ("single", "confusable") or truth["causes"][0]["strength"] not in STRENGTHS:
             continue
         answer, (cause,) = Answer(answers.get(key)), truth["causes"]
         label = _label(truth)

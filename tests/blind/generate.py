@@ -14,12 +14,13 @@ import os
 import pathlib
 import sys
 
+from tests.blind.generator.ankle import ANKLE
 from tests.blind.generator.experiment import STRENGTHS
 from tests.blind.generator.leg_swing import LEG_SWING
 from tests.blind.generator.motor_bench import MOTOR_BENCH
 
 SHORTEST_S, LONGEST_S = 1.0, 60.0  # the first half second stands still; longer ones want more memory than a batch may
-EXPERIMENTS = {experiment.NAME: experiment for experiment in (MOTOR_BENCH, LEG_SWING)}
+EXPERIMENTS = {experiment.NAME: experiment for experiment in (MOTOR_BENCH, LEG_SWING, ANKLE)}
 
 
 def main(arguments=None):

@@ -38,6 +38,8 @@ LETTER = {
     "sensors": "S",
     "angle_sensing": "S",
     "current_sensing": "E",
+    "firmware": "C",
+    "command": "C",
     "power": "P",
     "timing": "t",
     "time": "t",

@@ -18,3 +18,4 @@ class Case:
     instruments: object = None
     runs: list = dataclasses.field(default_factory=list)
     poor: bool = False  # a poor experiment, in which causes cannot be told apart
+    reached: list = dataclasses.field(default_factory=list)  # (r, N_eff, strength) of each effect, where simulated

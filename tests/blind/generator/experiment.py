@@ -16,6 +16,7 @@ STRENGTHS = (0.5, 1.0, 2.0, 4.0)
 WITH_ONE = ("single", "confusable", "outside")  # kinds with one effect, whose likeness to causes is told
 TIE = 0.95  # of the cosine of two effects' parts outside the base model
 SUBSYSTEM = {"E": "electrical", "M": "mechanical", "EM": "current_sensing", "T": "transmission", "t": "timing"}
+SUBSYSTEM |= {"S": "angle_sensing", "C": "firmware"}
 
 
 def cosine(one, other):

@@ -19,7 +19,7 @@ FINE = round(ROW_S / DT_S)
 BOARD = 2  # steps between two looks of the board
 TARGET = 8  # steps between two targets
 CURRENT_LAG_S = 0.5e-3
-LEAST_A, MOST_A = -1.0, 6.0  # the board's limits: robot.md's table of the motor boards
+LEAST_A, MOST_A = -1.0, 6.0  # the board's limits: robot.md C4
 COUNT_RAD = 2.0 * np.pi / (2048.0 * 34.0)
 WARM_RAD = 12.0  # of travel: the grease
 
@@ -60,7 +60,8 @@ def run(lanes, rows, before_rows, counted=True):
     base = s.base
     laws = [LAWS[name](s, lanes, name) for name in sorted({name for lane in lanes for name in lane.acts})]
     hooks = {hook: [getattr(law, hook) for law in laws if hasattr(law, hook)] for hook in HOOKS}
-    K, D = (np.array([getattr(lane.drive, name) for lane in lanes]) for name in _GAINS)
+    asked = Drive(*(np.array([getattr(lane.drive, each.name) for lane in lanes]) for each in dataclasses.fields(Drive)))
+    K, D = asked.stiffness_A_per_rad, asked.damping_As_per_rad
     keep = np.exp(-DT_S / CURRENT_LAG_S)
     m_dt, f_dt = base["J_m"] / DT_S, base["J_f"] / DT_S
     out = {name: np.zeros((rows, len(lanes))) for name in "pquvI"}
@@ -70,8 +71,7 @@ def run(lanes, rows, before_rows, counted=True):
     for k in range((before_rows + rows) * FINE):
         s.t = start_s + k * DT_S
         if k % TARGET == 0:
-            late_s = s.t - TARGET * DT_S
-            angle, rate = np.array([lane.drive.target(late_s) for lane in lanes]).T
+            angle, rate = asked.target(s.t - TARGET * DT_S)
             command = K * angle + D * rate
             s.command = command
             for hook in hooks["order"]:
@@ -106,7 +106,6 @@ def run(lanes, rows, before_rows, counted=True):
     return out
 
 
-_GAINS = ("stiffness_A_per_rad", "damping_As_per_rad")
 HOOKS = ("order", "look", "cable", "act")
 
 
@@ -176,20 +175,6 @@ class SoftBristles(Bristles):
         self.way, self.excess = np.maximum(np.abs(self.a), 1e-5), 0.0
 
 
-class Direction(Law):
-    def act(self, s):
-        s.on_motor[self.lane] -= self.a * np.tanh(np.abs(s.u[self.lane]) / 0.1)
-
-
-class LoadSide(Law):
-    """Gears lose more where the foot drives the motor."""
-
-    def act(self, s):
-        u, load = s.u[self.lane], s.cable[self.lane]
-        back = 1.0 / (1.0 + np.exp(np.clip(load * u / self.soft_W, -40.0, 40.0)))
-        s.on_motor[self.lane] -= self.a * np.abs(load) * np.tanh(u / 0.05) * back
-
-
 class Warming(Law):
     """Cold grease: friction that is gone after some travel."""
 
@@ -221,21 +206,6 @@ class Play(Law):
         x = s.stretch[self.lane]
         gap = np.maximum(self.a, 1e-9)
         s.cable[self.lane] = self.base["k_s"] * (x - gap * np.tanh(x / gap))
-
-
-class Stiffening(Law):
-    def cable(self, s):
-        x = s.stretch[self.lane] / 0.02
-        s.cable[self.lane] += self.a * (np.sinh(x) - x)
-
-
-class Creep(Law):
-    """A part of the stretch that comes slowly and goes slowly."""
-
-    def cable(self, s):
-        x = s.stretch[self.lane]
-        self.state += DT_S / self.slow_s * (self.a * x - self.state)
-        s.cable[self.lane] = self.base["k_s"] * (x - self.state)
 
 
 class Slip(Law):
@@ -279,15 +249,6 @@ class EddyBrake(Law):
         s.on_motor[self.lane] -= self.a * u / (1.0 + (u / self.peak_rad_s) ** 2)
 
 
-class Hysteresis(Law):
-    """Iron remembers: a part of the torque follows the current with play."""
-
-    def act(self, s):
-        current = s.I[self.lane]
-        self.state = np.clip(self.state, current - self.play_A, current + self.play_A)
-        s.on_motor[self.lane] -= self.a * (current - self.state)
-
-
 class LooseMass(Law):
     """Something on the foot that swings on a soft spring of its own."""
 
@@ -314,20 +275,15 @@ LAWS = {
     "return_spring": Bend,
     "stribeck": Bristles,
     "presliding": SoftBristles,
-    "direction_friction": Direction,
-    "load_friction": LoadSide,
     "friction_warm_up": Warming,
     "drag": Drag,
     "cogging": Cogging,
     "cable_backlash": Play,
-    "cable_stiffening": Stiffening,
-    "cable_creep": Creep,
     "pulley_slip": Slip,
     "lost_counts": LostCounts,
     "firmware_parameter": WrongTarget,
     "tight_arc_friction": TightArc,
     "eddy_brake_saturating": EddyBrake,
-    "magnetic_hysteresis": Hysteresis,
     "loose_mass": LooseMass,
     "sway": Sway,
 }
