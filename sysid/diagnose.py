@@ -203,7 +203,11 @@ def _subsystem(plain: Regression, before: misfit.Misfit, named: Sequence[Named])
     if named:
         return named[0].effect.subsystem
     telling = before.telling.equation
-    return next(e.subsystem for r in plain.recordings for e in r.equations.values() if e.name == telling)
+    parts: dict[str, str] = {}
+    for recording in plain.recordings:
+        parts |= {name: each.subsystem for name, each in recording.equations.items()}
+        parts |= {name: each.subsystem for name, each in recording.entries.items()}
+    return parts[telling]
 
 
 def _letters(each: Named, recordings: Sequence[Recording]) -> str:

@@ -62,6 +62,17 @@ class Equation:
     stand_ins: dict[str, Array] = dataclasses.field(default_factory=dict)
 
 
+@dataclasses.dataclass(frozen=True)
+class Entry:
+    """A place where something unknown may enter and pass through the machine's dynamics before an equation sees it.
+
+    respond: columns (n, k) there -> columns (n, k) of the equations, to first order.
+    """
+
+    subsystem: str
+    respond: Callable[[Array], Columns]
+
+
 @dataclasses.dataclass
 class Recording:
     """A table made ready: even stamps, the machine's derived signals (n,) by name, its equations."""
@@ -76,6 +87,7 @@ class Recording:
     # wrong. Then fits are plain least squares, and only the count of samples is that of independent ones.
     whitened: bool = True
     lags: tuple[int, ...] = (0, 10, 30, 100)  # samples back at which the general tests look at slopes
+    entries: dict[str, Entry] = dataclasses.field(default_factory=dict)  # none where equations are instantaneous
 
 
 @dataclasses.dataclass(frozen=True)
@@ -120,4 +132,7 @@ class Machine(Protocol):
         """Everything that could be wrong, with grids that suit these recordings."""
 
     def generic(self, recording: Recording) -> dict[str, dict[str, Array]]:
-        """For each equation the signals over which a misfit is looked for without any cause in mind, by name (n,)."""
+        """The signals over which a misfit is looked for without any cause in mind, by name (n,).
+
+        For each equation, or for an entry of the recordings: then what depends on the signals goes through it.
+        """

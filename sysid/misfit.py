@@ -80,16 +80,17 @@ def features(signals: Mapping[str, Array], lags: Sequence[int]) -> dict[str, Arr
     return groups
 
 
-General = list[tuple[str, str, list[Columns]]]  # (equation, group, one {equation: (n, k)} per recording)
+General = list[tuple[str, str, list[Columns]]]  # (equation or entry, group, one {equation: (n, k)} per recording)
 
 
 def general_features(machine: Machine, recordings: Sequence[Recording]) -> General:
-    """All groups of features of all equations."""
+    """All groups of features of all equations and entries."""
     found: General = []
-    for equation in dict.fromkeys(name for recording in recordings for name in recording.equations):
+    looked_over = [machine.generic(recording) for recording in recordings]
+    for equation in dict.fromkeys(name for r in recordings for name in (*r.equations, *r.entries)):
         signals = [
-            machine.generic(recording).get(equation, {}) if equation in recording.equations else {}
-            for recording in recordings
+            each.get(equation, {}) if equation in recording.equations or equation in recording.entries else {}
+            for recording, each in zip(recordings, looked_over, strict=True)
         ]
         together = {
             name: np.concatenate([each[name] for each in signals if name in each])
@@ -102,11 +103,18 @@ def general_features(machine: Machine, recordings: Sequence[Recording]) -> Gener
         )
         for group, matrix in features(together, recordings[0].lags).items():
             columns = [
-                {equation: matrix[start:stop]} if stop > start else {}
-                for start, stop in zip(ends[:-1], ends[1:], strict=True)
+                _seen(recording, equation, matrix[start:stop]) if stop > start else {}
+                for recording, start, stop in zip(recordings, ends[:-1], ends[1:], strict=True)
             ]
             found.append((equation, group, columns))
     return found
+
+
+def _seen(recording: Recording, place: str, columns: Array) -> Columns:
+    """What the equations see of columns in one of them, or at an entry."""
+    if place in recording.entries:
+        return recording.entries[place].respond(columns)
+    return {place: columns}
 
 
 def look(regression: Regression, general: General) -> Misfit:

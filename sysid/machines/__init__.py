@@ -5,6 +5,7 @@ from typing import Any
 
 MACHINES = {
     "motor-bench": "motor_bench:MotorBench",
+    "leg-swing": "leg_swing:LegSwing",
     "positioning": "positioning:Positioning",
 }
 

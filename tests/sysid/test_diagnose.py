@@ -196,7 +196,7 @@ def test_a_machine_of_the_users_own_is_diagnosed_by_the_command(own_machine, cap
         (["none.csv", "--experiment", "motor-bench"], "none.csv: there is no such file"),
         (
             ["data.csv", "--experiment", "moon"],
-            "--experiment moon: there are motor-bench, positioning; a machine of yours",
+            "--experiment moon: there are motor-bench, leg-swing, positioning; a machine of yours",
         ),
         (["data.csv", "--experiment", "nowhere:Cart"], "--experiment nowhere:Cart: No module named 'nowhere'"),
         (["data.csv", "--experiment", "json:dumps"], "--experiment json:dumps: it has no name, quantities"),
@@ -273,5 +273,5 @@ def test_the_positioning_machine_is_wrong_where_its_literature_says():
 
 
 def test_an_unknown_machine_is_refused():
-    with pytest.raises(UserError, match="there are motor-bench, positioning"):
+    with pytest.raises(UserError, match="there are motor-bench, leg-swing, positioning"):
         machine_of("mars")

@@ -1,0 +1,623 @@
+"""A machine told by its simulator: fitted in the simulation, handed to the diagnosis as a linear regression.
+
+An equation error needs every derivative of what was measured, and a noisy column leaves its shadow in the residual.
+Here nothing measured is differentiated. The simulator's trajectory is fitted to the recording, parameters and all;
+along it the simulator is linearised, for all samples together:
+
+    x[k+1] = f(x[k], u[k], p) + noise of the inputs          states, measured inputs, parameters
+    y[k]   = h(x[k], u[k], p) + noise of the sensors         outputs that were measured
+
+    response   what the simulation misses of the outputs, one step ahead
+    columns    the outputs' sensitivities to the parameters: the forward sensitivity equations
+    effects    the outputs' first-order response to an extra torque, voltage or sensor's error at a port
+
+All three pass one linear, time-varying filter, the Kalman predictor of the linearised simulator. It is what makes the
+residual white: a sensor's noise stays as it is, an input's noise is followed through the machine, and an initial state
+is projected out. With exact inputs it is the output error of multiple shooting, segment by segment (`horizon_s`) with
+free initial states; the trajectory itself is found by multiple shooting with segments of one sample (Bock 1987), whose
+gaps are closed as far as the inputs' noise does not explain them. So a start far off converges, and a machine that
+forgets nothing does not carry its errors along.
+
+A user's machine is a subclass of `SimulatedMachine`; `examples/servo_arm.py` is a complete one.
+"""
+
+import abc
+import dataclasses
+from collections.abc import Callable, Mapping, Sequence
+from typing import cast
+
+import numpy as np
+from scipy.linalg import lapack
+from scipy.signal import savgol_filter
+
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.sysid import signals
+from ranger_sim.sysid.dataset import Array, Table
+from ranger_sim.sysid.machine import Columns, Effect, Entry, Equation, Known, Quantity, Recording, Values
+
+ROUNDS = 30  # of Gauss and Newton, at most
+RENEWED = 2  # times that the sensors' noise is found anew, each time when the rounds have come to rest
+WORSE = 4.0  # times the least sum of squares: a round that ended there went too far
+STEADY = 0.1  # standard errors of a parameter: a smaller step of all of them ends the rounds
+LAGS_S = (0.0, 0.01, 0.03, 0.1)  # back at which the general tests look at slopes
+NUDGE = 1e-6  # of a quantity's size: step of a central difference
+ROUGH_S = 0.1  # window in which a channel's own noise is told from its course, by a parabola
+MOST_ROWS = 12000  # of a recording; a longer one is averaged over neighbours
+AWAY = 30.0  # a free initial state's deviation, in rms of the state: as good as unknown
+STRETCH = 400  # samples of a stretch whose covariances are found side by side with the others'
+SILENT = 1e-6  # share of an effect's length below which an equation does not have it
+
+Quantities = Mapping[str, Array]  # by name, all of one shape
+Shape = Mapping[str, float]
+Ports = Mapping[str, Array]  # by port, (n,) or (n, k): what an effect puts in
+
+
+@dataclasses.dataclass(frozen=True)
+class Output:
+    """A measured channel that the simulator predicts. letter, subsystem: of the balance that its misfit accuses."""
+
+    channel: str
+    letter: str
+    subsystem: str
+    unit: str
+
+
+@dataclasses.dataclass(frozen=True)
+class Port:
+    """Where something that the simulator lacks can enter: an input that is 0 as long as nothing is wrong.
+
+    where: name of a signal, 0 ... 1, by which everything that enters is weighed; "": it enters at all times. A torque
+    does nothing where dry friction holds.
+    """
+
+    name: str
+    unit: str
+    subsystem: str
+    where: str = ""
+
+
+@dataclasses.dataclass(frozen=True)
+class Term:
+    """A candidate cause, as `Effect`, told by what it puts into the ports.
+
+    make(signals, shape, values) -> by port (n,) for one coefficient or (n, k) for k. signals: states, inputs, outputs
+    and `t` along the fitted trajectory, (n,) by name, and what `SimulatedMachine.signals` adds.
+    """
+
+    cause: str
+    at: str
+    subsystem: str
+    coefficients: tuple[str, ...]
+    make: Callable[["SimulatedRecording", Shape, Values], Ports]
+    shapes: Sequence[Shape] = ({},)
+    admissible: Callable[[Mapping[str, float]], bool] = lambda found: True
+    meaning: str = ""
+    phase_is_free: bool = False
+
+
+def held(rate: Array, braking: Array) -> Array:
+    """A rate after dry friction that can take `braking` of it in this step: it comes to rest and does not turn round.
+
+    This is the implicit step of Coulomb's law: true standstill, without a smoothed sign that creeps.
+    """
+    return cast(Array, np.sign(rate) * np.maximum(np.abs(rate) - braking, 0.0))
+
+
+def runge_kutta(
+    rates: Callable[[Quantities, Quantities, Quantities], Quantities],
+    x: Quantities,
+    u: Quantities,
+    p: Quantities,
+    step_s: float,
+) -> dict[str, Array]:
+    """One step of the classical fourth-order method; inputs stay as they are in its middle. For `step`."""
+
+    def at(rate: Quantities, part_s: float) -> dict[str, Array]:
+        return {name: x[name] + part_s * rate[name] for name in x}
+
+    first = rates(x, u, p)
+    second = rates(at(first, 0.5 * step_s), u, p)
+    third = rates(at(second, 0.5 * step_s), u, p)
+    fourth = rates(at(third, step_s), u, p)
+    return {
+        name: x[name] + step_s / 6.0 * (first[name] + 2.0 * (second[name] + third[name]) + fourth[name]) for name in x
+    }
+
+
+@dataclasses.dataclass
+class Jacobians:
+    """The simulator about a trajectory. n samples, s states, i noisy inputs, p parameters, o outputs, q ports.
+
+    next_state: (n, s) f; output: (n, o) h; the rest: their derivatives, `f_x` (n, s, s) to `h_q` (n, o, q).
+    """
+
+    next_state: Array
+    output: Array
+    f_x: Array
+    f_u: Array
+    f_p: Array
+    f_q: Array
+    h_x: Array
+    h_u: Array
+    h_p: Array
+    h_q: Array
+
+
+class Predictor:
+    """The Kalman predictor of a linearised simulator: takes forcings in, gives white prediction errors.
+
+    A forcing has a part in the states, (n, s, k), and a part in the outputs, (n, o, k).
+    """
+
+    def __init__(self, lin: Jacobians, noise_u: Array, noise_y: Array, loose: Array, starts: np.ndarray, away: Array,
+                 before: "Predictor | None" = None) -> None:  # fmt: skip
+        """noise_u: (i,), noise_y: (o,) standard deviations; loose: (n, s) of each step; starts: samples at which the
+        state is free, with standard deviations `away` (s,). before: of the last round of a fit."""
+        n, s = lin.next_state.shape
+        o = lin.output.shape[1]
+        self.n, self.s, self.o = n, s, o
+        self.h_x = lin.h_x
+        self.ends: Array  # (stretches, s, s) covariances behind each stretch
+        self.gain = np.empty((n, s, o))
+        self.spread = np.empty((n, o, o))  # Cholesky factor of the prediction error's covariance
+        self.covariance = np.empty((n, s, s))
+        variance = noise_u**2
+        state_noise = (lin.f_u * variance) @ lin.f_u.transpose(0, 2, 1)
+        state_noise[:, np.arange(s), np.arange(s)] += loose**2
+        output_noise = (lin.h_u * variance) @ lin.h_u.transpose(0, 2, 1)
+        output_noise[:, np.arange(o), np.arange(o)] += noise_y**2
+        both_noise = (lin.f_u * variance) @ lin.h_u.transpose(0, 2, 1)
+        is_start = np.zeros(n, dtype=bool)
+        is_start[starts] = True
+        # Side by side in stretches, each from the covariance that the one before ended with in the last round; in the
+        # first round a stretch knows nothing, which is multiple shooting as it stands in the books.
+        free = np.asarray(np.diag(away**2), dtype=float)
+        length = min(n, STRETCH)
+        P: Array = np.tile(free, (-(-n // length), 1, 1))
+        if before is not None:
+            P[1:] = before.ends[:-1]
+        self.ends = P.copy()
+        for k in range(length):
+            at = np.arange(k, n, length)
+            P = P[: len(at)]
+            P[is_start[at]] = free
+            A, C = lin.f_x[at], lin.h_x[at]
+            PC = P @ C.transpose(0, 2, 1)
+            error = C @ PC + output_noise[at]
+            K = np.linalg.solve(error, (A @ PC + both_noise[at]).transpose(0, 2, 1)).transpose(0, 2, 1)
+            self.covariance[at], self.gain[at], self.spread[at] = P, K, error
+            P = A @ P @ A.transpose(0, 2, 1) + state_noise[at] - K @ error @ K.transpose(0, 2, 1)
+            P = np.asarray(0.5 * (P + P.transpose(0, 2, 1)), dtype=float)
+            self.ends[: len(at)] = P
+        self.spread = np.linalg.cholesky(self.spread)
+        self.unspread = np.linalg.inv(self.spread)
+        self.inner = lin.f_x - self.gain @ lin.h_x
+        self.inner[starts[1:] - 1] = 0.0
+        self.into = np.ones((n, 1, 1))  # what is forced in the last sample before a start is forgotten
+        self.into[starts[1:] - 1] = 0.0
+        # Rows of the recursion x[k+1] - inner[k] x[k] = forcing[k] as a banded lower triangle
+        self.band = np.zeros((2 * s, n * s))
+        self.band[0] = 1.0
+        for row in range(s):
+            for column in range(s):
+                place = np.arange(n - 1) * s + column
+                self.band[s + row - column, place] = -self.inner[:-1, row, column]
+        # in units of the channels: the errors are white, and as large as the middle one
+        self.unit = np.median(np.abs(self.spread[:, np.arange(o), np.arange(o)]), axis=0)
+
+    def _march(self, forcing: Array, backward: bool = False) -> Array:
+        """x (n, s, k) with x[0] = forcing[0] and x[k] = inner[k-1] x[k-1] + forcing[k]; or its transpose."""
+        k = forcing.shape[2]
+        flat = forcing.reshape(self.n * self.s, k)
+        out, info = lapack.dtbtrs(self.band, flat, uplo="L", trans="T" if backward else "N", diag="U")
+        if info:
+            raise AssertionError(f"dtbtrs: {info}")
+        return np.asarray(out, dtype=float).reshape(self.n, self.s, k)
+
+    def errors(self, state: Array, output: Array) -> Array:
+        """(n, o, k) prediction errors of forcings, not whitened."""
+        driven = self.into * (state - self.gain @ output)
+        x = self._march(np.concatenate((np.zeros_like(driven[:1]), driven[:-1])))
+        return self.h_x @ x + output
+
+    def white(self, errors: Array) -> Array:
+        """(n, o, k) of one deviation each, in the channels' units."""
+        return (self.unspread @ errors) * self.unit[None, :, None]
+
+    def smoothed(self, state: Array, output: Array, f_u: Array, h_u: Array, noise_u: Array) -> tuple[Array, Array]:
+        """(n, s) and (n, i): the most probable deviations of states and noisy inputs, all samples taken together.
+
+        state, output: (n, s), (n, o), forcings of the response (Bryson and Frazier's form of the smoother).
+        """
+        driven = self.into * (state[:, :, None] - self.gain @ output[:, :, None])
+        x = self._march(np.concatenate((np.zeros_like(driven[:1]), driven[:-1])))
+        error = self.h_x @ x + output[:, :, None]
+        weighed = self.unspread.transpose(0, 2, 1) @ (self.unspread @ error)
+        adjoint = self._march(self.h_x.transpose(0, 2, 1) @ weighed, backward=True)
+        after = self.into * np.concatenate((adjoint[1:], np.zeros_like(adjoint[:1])))
+        states = -x + self.covariance @ adjoint
+        weighed_less = weighed - self.gain.transpose(0, 2, 1) @ after
+        inputs = h_u.transpose(0, 2, 1) @ weighed_less + f_u.transpose(0, 2, 1) @ after
+        return states[:, :, 0], noise_u**2 * inputs[:, :, 0]
+
+
+@dataclasses.dataclass
+class SimulatedRecording(Recording):
+    """A recording with its linearised simulator. fitted: parameters with which it was linearised."""
+
+    fitted: dict[str, float] = dataclasses.field(default_factory=dict)
+    linear: Jacobians | None = None
+    predictor: Predictor | None = None
+    ports: tuple[Port, ...] = ()
+    outputs: tuple[str, ...] = ()
+
+    def respond(self, entries: Ports) -> Columns:
+        """What the equations see, to first order, of something at the ports: (n, k) each."""
+        lin, predictor = self.linear, self.predictor
+        assert lin is not None and predictor is not None
+        columns = {name: each[:, None] if each.ndim == 1 else each for name, each in entries.items()}
+        width = next(iter(columns.values())).shape[1]
+        state = np.zeros((predictor.n, predictor.s, width))
+        output = np.zeros((predictor.n, predictor.o, width))
+        numbers = {port.name: number for number, port in enumerate(self.ports)}
+        for name, each in columns.items():
+            number = numbers[name]
+            where = self.ports[number].where
+            each = self.signals[where][:, None] * each if where else each  # noqa: PLW2901
+            state += lin.f_q[:, :, number, None] * _between(each)[:, None, :]
+            output += lin.h_q[:, :, number, None] * each[:, None, :]
+        white = predictor.white(predictor.errors(state, output))
+        power = (white**2).sum(axis=(0, 2)) / predictor.unit**2
+        return {
+            name: white[:, number] for number, name in enumerate(self.outputs) if power[number] > SILENT * power.sum()
+        }
+
+
+def _between(column: Array) -> Array:
+    """Middle values of a sample and the next, in which a step is taken."""
+    return np.asarray(0.5 * (column + np.concatenate((column[1:], column[-1:]))), dtype=float)
+
+
+def roughness(table: Table, column: Array) -> float:
+    """Deviation of a channel's own noise: what a parabola over a tenth of a second does not follow, but for jumps."""
+    size = max(7, 2 * round(0.5 * ROUGH_S / table.step_s) + 1)
+    parts = [savgol_filter(column[run], size, 2) - column[run] for run in table.runs if run.stop - run.start > size]
+    if not parts:
+        return 0.0
+    rest = np.concatenate(parts)
+    # the parabola takes up three of so many degrees of freedom
+    return float(np.median(np.abs(rest))) / 0.6745 * float(np.sqrt(size / (size - 3.0)))
+
+
+def averaged(table: Table, count: int) -> Table:
+    """The table with every `count` samples of a run averaged into one."""
+    if count == 1:
+        return table
+    runs, start = [], 0
+    stamps: list[Array] = []
+    columns: dict[str, list[Array]] = {name: [] for name in table.columns}
+    for run in table.runs:
+        size = (run.stop - run.start) // count
+        if not size:
+            continue
+        inside = slice(run.start, run.start + size * count)
+        stamps.append(table.time_s[inside].reshape(size, count).mean(axis=1))
+        for name, column in table.columns.items():
+            columns[name].append(column[inside].reshape(size, count).mean(axis=1))
+        runs.append(slice(start, start + size))
+        start += size
+    return Table(
+        np.concatenate(stamps),
+        {name: np.concatenate(parts) for name, parts in columns.items()},
+        tuple(runs),
+        table.name,
+        table.resolution,
+    )
+
+
+class SimulatedMachine(abc.ABC):
+    """A `Machine` (sysid/machine.py) that is an ordinary differential equation with measured inputs.
+
+    A subclass says the names below and the methods `inputs`, `first_guess`, `step`, `observe`, `terms`; `loose`,
+    `extra_signals` and `looked_over` when it needs them. All of these get and give arrays of any one shape: samples,
+    and samples beside samples for the differences; they must work element by element.
+    """
+
+    name: str
+    quantities: tuple[Quantity, ...]
+    parameters: tuple[Known, ...]
+    states: tuple[str, ...]
+    outputs: tuple[Output, ...]
+    ports: tuple[Port, ...]
+    # Inputs with noise, by name: its standard deviation, or None for what the channel itself shows
+    noisy_inputs: Mapping[str, float | None] = {}
+    horizon_s: float = float("inf")  # after so long the state is free again: shorter for a model that is far off
+    shortest_s: float = 2.0  # of a recording that says anything
+
+    @abc.abstractmethod
+    def inputs(self, table: Table) -> dict[str, Array]:
+        """What drives the simulator, (n,) by name: measured channels, or a target that its law follows."""
+
+    @abc.abstractmethod
+    def first_guess(self, table: Table) -> dict[str, Array]:
+        """The states, (n,) by name, roughly: a measured angle and its smoothed slope will do."""
+
+    @abc.abstractmethod
+    def step(self, x: Quantities, u: Quantities, p: Quantities, step_s: float) -> Quantities:
+        """The states one sample later. u: inputs and ports in the middle of the step."""
+
+    @abc.abstractmethod
+    def observe(self, x: Quantities, u: Quantities, p: Quantities) -> Quantities:
+        """The outputs, by channel."""
+
+    @abc.abstractmethod
+    def terms(self, recordings: Sequence[SimulatedRecording]) -> list[Term]:
+        """Everything that could be wrong, with grids that suit these recordings."""
+
+    def loose(self, x: Quantities, u: Quantities, p: Quantities, step_s: float) -> Quantities:
+        """Deviations of states per step that the law leaves open, by name: where dry friction holds, for example."""
+        return {}
+
+    def extra_signals(self, along: dict[str, Array], table: Table) -> dict[str, Array]:
+        """More signals along the trajectory for `terms`."""
+        return {}
+
+    def looked_over(self, recording: SimulatedRecording) -> dict[str, dict[str, Array]]:
+        """For ports and equations the signals over which a misfit is looked for without a cause in mind."""
+        everything = {name: recording.signals[name] for name in (*self.states, "t")}
+        return {each.name: everything for each in self.ports}
+
+    # --- what the diagnosis calls --------------------------------------------------------------------------------
+
+    def prepare(self, table: Table) -> SimulatedRecording:
+        """Fit the simulator to one recording and linearise it there."""
+        missing = [each.name for each in self.quantities if each.needed and each.name not in table]
+        if missing:
+            there = ", ".join(table.columns)
+            raise UserError(f"{table.name}: {self.name} needs {', '.join(missing)}; there are {there}")
+        table = signals.uniform(table)
+        longest_s = max((run.stop - run.start) * table.step_s for run in table.runs)
+        if longest_s < self.shortest_s:
+            raise UserError(
+                f"{table.name}: the longest stretch without a gap is {longest_s:.3g} s, "
+                f"{self.name} needs {self.shortest_s:g} s"
+            )
+        return _Fit(self, table, -(-len(table) // MOST_ROWS)).recording()
+
+    def effects(self, recordings: Sequence[Recording]) -> list[Effect]:
+        """The terms, as what the outputs make of them."""
+        made = []
+        for term in self.terms(cast(Sequence[SimulatedRecording], recordings)):
+
+            def columns(recording: Recording, shape: Shape, values: Values, term: Term = term) -> Columns:
+                simulated = cast(SimulatedRecording, recording)
+                return simulated.respond(term.make(simulated, shape, values))
+
+            made.append(
+                Effect(
+                    term.cause,
+                    term.at,
+                    term.subsystem,
+                    term.coefficients,
+                    term.shapes,
+                    columns,
+                    term.admissible,
+                    term.meaning,
+                    term.phase_is_free,
+                )
+            )
+        return made
+
+    def generic(self, recording: Recording) -> dict[str, dict[str, Array]]:
+        """The signals of `looked_over`."""
+        return self.looked_over(cast(SimulatedRecording, recording))
+
+
+class _Fit:
+    """Trajectory and parameters of one recording, by Gauss and Newton."""
+
+    def __init__(self, machine: SimulatedMachine, table: Table, count: int = 1) -> None:
+        """count: so many samples are averaged into one, what the machine makes of them too."""
+        given, guess = machine.inputs(table), machine.first_guess(table)
+        if count > 1:
+            whole = dataclasses.replace(table, columns=table.columns | given | {f"first {n}": guess[n] for n in guess})
+            table = averaged(whole, count)
+            given = {name: table[name] for name in given}
+            guess = {name: table[f"first {name}"] for name in guess}
+        self.machine, self.table, self.step_s = machine, table, table.step_s
+        self.inputs = given
+        self.names = [known.name for known in machine.parameters]
+        self.x = np.column_stack([guess[name] for name in machine.states])
+        self.p = np.array([known.value for known in machine.parameters])
+        self.low = np.array([known.low for known in machine.parameters])
+        self.high = np.array([known.high for known in machine.parameters])
+        self.y = np.column_stack([table[each.channel] for each in machine.outputs])
+        for number, each in enumerate(machine.outputs):
+            if np.ptp(self.y[:, number]) == 0.0:
+                raise UserError(
+                    f"{table.name}: {each.channel} never changes; {machine.name} can be judged in motion only"
+                )
+        self.noisy = list(machine.noisy_inputs)
+        self.noise_u = np.array(
+            [
+                roughness(table, self.inputs[name]) if given is None else given
+                for name, given in machine.noisy_inputs.items()
+            ]
+        )
+        steps = np.array([table.resolution.get(each.channel, 0.0) for each in machine.outputs])
+        rough = np.array([roughness(table, column) for column in self.y.T])
+        self.noise_y = np.maximum(np.hypot(rough, steps / np.sqrt(12.0)), 1e-9 * np.ptp(self.y, axis=0))
+        self.u = (
+            np.column_stack([self.inputs[name] for name in self.noisy]) if self.noisy else np.zeros((len(table), 0))
+        )
+        self.measured_u = self.u.copy()
+        self.size_x, self.size_u = (np.maximum(np.sqrt(np.mean(each**2, axis=0)), 1e-9) for each in (self.x, self.u))
+        self.size_p = np.where(self.p != 0.0, np.abs(self.p), 0.01 * np.minimum(self.high - self.low, 1e6))
+        self.predictor: Predictor | None = None
+        self.came_from = (self.x, self.u, self.p)
+        reach = len(table) if not np.isfinite(machine.horizon_s) else max(2, round(machine.horizon_s / self.step_s))
+        self.starts = np.array([k for run in table.runs for k in range(run.start, run.stop, reach)])
+        self.ends = np.zeros(len(table), dtype=bool)  # no step leads from here to the next sample
+        self.ends[[run.stop - 1 for run in table.runs]] = True
+
+    def _at(self, x: Array, u: Array, p: Array, ports: Array) -> tuple[Array, Array]:
+        """(f, h) as (m, n, s) and (m, n, o). x: (m, n, s), u: (m, n, i), p: (m, n or 1, p), ports: (m, n or 1, q)."""
+        machine = self.machine
+        shape = np.broadcast_shapes(x.shape[:2], u.shape[:2], p.shape[:2], ports.shape[:2])
+        states = {name: x[..., i] for i, name in enumerate(machine.states)}
+        values = {name: p[..., i] for i, name in enumerate(self.names)}
+        given = {name: column[None] for name, column in self.inputs.items()}
+        given |= {name: u[..., i] for i, name in enumerate(self.noisy)}
+        middle = {
+            name: np.asarray(0.5 * (c + np.concatenate((c[:, 1:], c[:, -1:]), axis=1))) for name, c in given.items()
+        }
+        entering = {each.name: ports[..., i] for i, each in enumerate(machine.ports)}
+        after = machine.step(states, middle | entering, values, self.step_s)
+        seen = machine.observe(states, given | entering, values)
+        f = np.stack([np.broadcast_to(after[name], shape) for name in machine.states], axis=-1)
+        h = np.stack([np.broadcast_to(seen[each.channel], shape) for each in machine.outputs], axis=-1)
+        return f, h
+
+    def linearise(self) -> Jacobians:
+        """By central differences, all samples at once."""
+        x, u, p = self.x[None], self.u[None], self.p[None, None]
+        none = np.zeros((1, 1, len(self.machine.ports)))
+        f, h = self._at(x, u, p, none)
+
+        def derivative(which: int, sizes: Array) -> tuple[Array, Array]:
+            columns = []
+            for number, size in enumerate(sizes):
+                arguments = [x, u, p, none]
+                up, down = arguments[which].copy(), arguments[which].copy()
+                up[..., number] += NUDGE * size
+                down[..., number] -= NUDGE * size
+                high = self._at(*(up if i == which else each for i, each in enumerate(arguments)))
+                low = self._at(*(down if i == which else each for i, each in enumerate(arguments)))
+                columns.append([(a[0] - b[0]) / (2.0 * NUDGE * size) for a, b in zip(high, low, strict=True)])
+            if not columns:
+                return np.zeros((*f.shape[1:], 0)), np.zeros((*h.shape[1:], 0))
+            return np.stack([a for a, _ in columns], axis=-1), np.stack([b for _, b in columns], axis=-1)
+
+        f_x, h_x = derivative(0, self.size_x)
+        f_u, h_u = derivative(1, self.size_u)
+        f_p, h_p = derivative(2, self.size_p)
+        f_q, h_q = derivative(3, np.ones(len(self.machine.ports)))
+        if not all(np.all(np.isfinite(each)) for each in (f, h, f_x, h_x, f_p, h_p)):
+            raise UserError(
+                f"{self.table.name}: the simulator of {self.machine.name} gives no numbers on this recording"
+            )
+        return Jacobians(f[0], h[0], f_x, f_u, f_p, f_q, h_x, h_u, h_p, h_q)
+
+    def _loose(self) -> Array:
+        machine = self.machine
+        states = {name: self.x[:, i] for i, name in enumerate(machine.states)}
+        values = {name: np.full(len(self.x), self.p[i]) for i, name in enumerate(self.names)}
+        given = self.inputs | {name: self.u[:, i] for i, name in enumerate(self.noisy)}
+        given |= {each.name: np.zeros(len(self.x)) for each in machine.ports}
+        found = machine.loose(states, given, values, self.step_s)
+        nothing = np.zeros(len(self.x))
+        # a trace of noise keeps the predictor from being certain of what it has never seen
+        return np.column_stack([found.get(name, nothing) for name in machine.states]) + 1e-9 * self.size_x
+
+    def round(self) -> float:
+        """One round; returns the largest step of a parameter in its standard errors."""
+        self.lin = lin = self.linearise()
+        self.predictor = Predictor(
+            lin, self.noise_u, self.noise_y, self._loose(), self.starts, AWAY * self.size_x, self.predictor
+        )
+        wide = self.predictor
+        assert wide is not None
+        offset = self.measured_u - self.u  # what the inputs' noise has to explain already
+        gap = lin.next_state - np.concatenate((self.x[1:], self.x[-1:]))
+        gap[self.ends] = 0.0
+        self.state = -(gap + (lin.f_u @ offset[:, :, None])[:, :, 0])
+        self.output = self.y - lin.output - (lin.h_u @ offset[:, :, None])[:, :, 0]
+        errors = wide.errors(self.state[:, :, None], self.output[:, :, None])
+        moved = wide.errors(lin.f_p, lin.h_p)
+        self.response, self.columns = wide.white(errors)[:, :, 0], wide.white(moved)
+        n = self.response.size
+        self.cost = float(np.mean((self.response / wide.unit) ** 2))
+        a = (self.columns / wide.unit[None, :, None]).reshape(n, len(self.p)) * self.size_p
+        b = (self.response / wide.unit).reshape(n)
+        length = np.maximum(np.linalg.norm(a, axis=0), 1e-30)
+        u, sv, vt = np.linalg.svd(a / length, full_matrices=False)
+        strong = sv > 1e-6 * sv[0]
+        change = (vt[strong].T @ ((u.T @ b)[strong] / sv[strong])) / length * self.size_p
+        error = np.sqrt(((vt[strong] / sv[strong, None]) ** 2).sum(axis=0)) / length * self.size_p
+        change = np.clip(self.p + change, self.low, self.high) - self.p
+        # what must be positive is a divisor, far from linear: nothing moves farther than halves or doubles it
+        ratio = np.divide(self.p + change, self.p, out=np.ones_like(self.p), where=self.low > 0.0)
+        change *= min(1.0, *(0.5 / (1.0 - r) if r < 0.5 else 1.0 / (r - 1.0) if r > 2.0 else 1.0 for r in ratio))
+        # the rest of the response, after the parameters have moved, tells trajectory and inputs
+        state = self.state - (lin.f_p @ change)
+        output = self.output - (lin.h_p @ change)
+        dx, du = wide.smoothed(state, output, lin.f_u, lin.h_u, self.noise_u)
+        self.x, self.u, self.p = self.x + dx, self.u + offset + du, self.p + change
+        self.rest = wide.errors(state[:, :, None], output[:, :, None])[:, :, 0]
+        return float(np.max(np.abs(change) / np.maximum(error, 1e-30)))
+
+    def _renew_noise(self) -> None:
+        """The sensors' noise is what is left; what was wrong for a while has no say in a median."""
+        left = np.median(np.abs(self.rest), axis=0) / 0.6745
+        self.noise_y = np.maximum(left, 1e-9 * np.ptp(self.y, axis=0))
+
+    def recording(self) -> SimulatedRecording:
+        """Fitted and linearised."""
+        renewed, best = 0, np.inf
+        for _ in range(ROUNDS):
+            accepted = (self.x, self.u, self.p)
+            step = self.round()
+            if not self.cost < WORSE * best:
+                # too far: a quarter of the way
+                old = self.came_from
+                self.x, self.u, self.p = (b + 0.25 * (a - b) for a, b in zip(accepted, old, strict=True))
+                continue
+            self.came_from = accepted
+            best = min(best, self.cost)
+            if step > STEADY:
+                continue
+            if renewed == RENEWED:
+                break
+            self._renew_noise()
+            renewed, best = renewed + 1, np.inf
+        self.round_again()
+        machine, table = self.machine, self.table
+        along = {name: self.x[:, i] for i, name in enumerate(machine.states)}
+        along |= self.inputs | {name: self.u[:, i] for i, name in enumerate(self.noisy)}
+        along |= {each.channel: self.lin.output[:, i] for i, each in enumerate(machine.outputs)}
+        along["t"] = table.time_s - table.time_s[0]
+        along |= machine.extra_signals(along, table)
+        valid = np.ones(len(table), dtype=bool)
+        equations = {}
+        for number, each in enumerate(machine.outputs):
+            columns = {name: self.columns[:, number, i] for i, name in enumerate(self.names)}
+            response = self.response[:, number] + self.columns[:, number] @ self.p_at
+            equations[each.channel] = Equation(
+                each.channel, each.letter, each.subsystem, each.unit, response, columns, valid
+            )
+        fitted = dict(zip(self.names, (float(each) for each in self.p_at), strict=True))
+        lags = tuple(round(time_s / self.step_s) for time_s in LAGS_S)
+        made = SimulatedRecording(
+            table,
+            along,
+            equations,
+            lags=lags,
+            fitted=fitted,
+            linear=self.lin,
+            predictor=self.predictor,
+            ports=machine.ports,
+            outputs=tuple(each.channel for each in machine.outputs),
+        )
+
+        def entry(port: Port) -> Entry:
+            return Entry(port.subsystem, lambda columns: made.respond({port.name: columns}))
+
+        made.entries = {each.name: entry(each) for each in machine.ports}
+        return made
+
+    def round_again(self) -> None:
+        """Linearise where the last round ended, and stay there."""
+        self.p_at = self.p.copy()
+        x, u = self.x, self.u
+        self.round()
+        self.x, self.u = x, u
