@@ -187,7 +187,7 @@ class Predictor:
             K = np.linalg.solve(error, (A @ PC + both_noise[at]).transpose(0, 2, 1)).transpose(0, 2, 1)
             self.covariance[at], self.gain[at], self.spread[at] = P, K, error
             P = A @ P @ A.transpose(0, 2, 1) + state_noise[at] - K @ error @ K.transpose(0, 2, 1)
-            P = np.asarray(0.5 * (P + P.transpose(0, 2, 1)), dtype=float)
+            P[:] = 0.5 * (P + P.transpose(0, 2, 1))
             self.ends[: len(at)] = P
         self.spread = np.linalg.cholesky(self.spread)
         self.unspread = np.linalg.inv(self.spread)
