@@ -89,7 +89,7 @@ def diagnose(
         if not found:
             break
         named += found
-        rest = [each for each in rest if all(each is not other.effect for other in found)]
+        rest = [each for each in rest if not any(other.effect.excludes(each) for other in found)]
         # what was named no longer counts as noise, and smaller effects stand out
         extended = naming.refit(plain, named, [*skews, *named], fresh=True)
     progress("what is left", 0.75)
@@ -229,6 +229,7 @@ def _cause(each: Named, extended: Regression, before: misfit.Misfit, skews: Sequ
     return {
         "name": each.effect.cause,
         "at": each.effect.at,
+        **({"form": each.effect.form} if each.effect.form else {}),
         "balance": _letters(each, extended.recordings),
         "parameters": parameters,
         "tied_with": list(dict.fromkeys(tie.cause for tie in each.tied if tie.cause != each.effect.cause)),

@@ -107,11 +107,17 @@ class Effect:
     columns: Callable[[Recording, Mapping[str, float], Values], Columns]
     admissible: Callable[[Mapping[str, float]], bool] = lambda found: True
     meaning: str = ""
+    form: str = ""  # of several forms of one cause at one place: only one of them is named, the others may be its ties
     phase_is_free: bool = False  # two coefficients, cosine and sine, of an angle whose zero another run does not share
 
     @property
     def name(self) -> str:
-        return f"{self.cause} at {self.at}"
+        return f"{self.cause} at {self.at}" + (f" ({self.form})" if self.form else "")
+
+    def excludes(self, other: "Effect") -> bool:
+        """True when both cannot be named: the same effect, or another form of it."""
+        same = (self.cause, self.at) == (other.cause, other.at)
+        return self is other or (same and bool(self.form) and bool(other.form))
 
 
 class Machine(Protocol):

@@ -75,7 +75,7 @@ def select(effects: Sequence[Effect], regression: Regression, level: float = LEV
     while len(taken) < most:
         scored = []
         for trial in all_trials:
-            if any(trial.effect is each.effect for each in taken):
+            if any(each.effect.excludes(trial.effect) for each in taken):
                 continue
             chi2, freedom = explained(trial.columns, residual)
             chi2 /= trial.inflation

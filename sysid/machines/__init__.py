@@ -7,6 +7,7 @@ MACHINES = {
     "motor-bench": "motor_bench:MotorBench",
     "leg-swing": "leg_swing:LegSwing",
     "positioning": "positioning:Positioning",
+    "ankle": "ankle:Ankle",
 }
 
 

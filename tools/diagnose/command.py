@@ -24,6 +24,12 @@ def register(commands: Any) -> None:
         "--holdout", nargs="+", default=[], metavar="DATA", help="recordings that only measure the gain"
     )
     command.add_argument(
+        "--holdout-part",
+        type=float,
+        metavar="P",
+        help="instead of --holdout: the last part of each DATA by time, above 0 and below 1",
+    )
+    command.add_argument(
         "--experiment",
         required=True,
         metavar="NAME",

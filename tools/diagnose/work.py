@@ -12,6 +12,7 @@ import sys
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import numpy as np
 from rich.console import Console
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table as RichTable
@@ -85,15 +86,39 @@ def of_options(options: argparse.Namespace, progress: Progressed = lambda what, 
     known = model_file.read(options.model, machine).effects if options.model else []
     data = [_prepared(recordings.open_with(options, path), machine, options.experiment) for path in options.data]
     held = [_prepared(recordings.open_with(options, path), machine, options.experiment) for path in options.holdout]
+    if options.holdout_part is not None:
+        if held:
+            raise UserError(f"--holdout-part {options.holdout_part:g}: there are files to hold out already (--holdout)")
+        data, held = _parted(data, options.holdout_part)
     return _diagnosed(machine, data, held, options.seed, known, progress)
 
 
-def answer(files: Sequence[str], holdout: Sequence[str], experiment: str) -> dict[str, Any]:
-    """What `--json` prints, for programs: files and held-out files of one experiment."""
+def _parted(data: Sequence[tuple], part: float) -> tuple[list[tuple], list[tuple]]:
+    """The first and the last part of each recording by time; what was odd in it is told once."""
+    if not 0.0 < part < 1.0:
+        raise UserError(f"--holdout-part {part:g}: allowed is what lies between 0 and 1")
+    first: list[tuple] = []
+    last: list[tuple] = []
+    for table, findings in data:
+        begin, end = float(table.time_s[0]), float(table.time_s[-1])
+        row = int(np.searchsorted(table.time_s, end - part * (end - begin)))
+        first.append((table.part(slice(0, row)), findings))
+        rest = table.part(slice(row, None))
+        rest.name = f"{table.name} from {table.time_s[row]:.1f} s on"
+        last.append((rest, []))
+    return first, last
+
+
+def answer(
+    files: Sequence[str], holdout: Sequence[str], experiment: str, holdout_part: float | None = None
+) -> dict[str, Any]:
+    """What `--json` prints, for programs: files and held-out files, or a part of each, of one experiment."""
     machine = machine_of(experiment)
     data, held = (
         [_prepared(recordings.open_recording(path), machine, experiment) for path in each] for each in (files, holdout)
     )
+    if holdout_part is not None:
+        data, held = _parted(data, holdout_part)
     return _diagnosed(machine, data, held, 0).answer
 
 
