@@ -478,6 +478,10 @@ def _periodic() -> list[Effect]:
         return made
 
     turns = [{"periods_per_turn": float(n)} for n in range(1, 9)]
+    waves = (
+        lambda m, p: np.cos(p["periods_per_turn"] * m.a),
+        lambda m, p: np.sin(p["periods_per_turn"] * m.a),
+    )
     M, at = "mechanical", "inner_motor"
     made = [
         _effect("cogging", at, M, ("cosine_Nm", "sine_Nm"), wave(lambda m: 1.0), turns),
@@ -487,7 +491,7 @@ def _periodic() -> list[Effect]:
     return [
         *made,
         _effect("once_per_turn", "inner_ankle", M, ("cosine_Nm", "sine_Nm"),
-                _at_foot(lambda m, p: np.cos(p["periods_per_turn"] * m.a), lambda m, p: np.sin(p["periods_per_turn"] * m.a)),
+                _at_foot(*waves),
                 [{"periods_per_turn": n} for n in (1.0, 2.0, 3.0)]),
     ]  # fmt: skip
 
