@@ -229,7 +229,7 @@ _FORMS = (
     ),
     Form(
         "sensor_offset",
-        ANALOG_NAMES + ENCODER_NAMES + WORD_NAMES + ("gyro",),
+        ANALOG_NAMES + ENCODER_NAMES + WORD_NAMES + ("gyro", "roll"),
         (Parameter("value", "unit of the sensor: A, V, rad or rad/s", -100.0, 100.0),),
         "a sensor that shows its quantity plus this",
     ),
@@ -374,7 +374,7 @@ class Model:
             elif term.at in ENCODER_NAMES:
                 _apply_angle(plant.encoders[ENCODER_NAMES.index(term.at)], term)
             else:
-                _apply_gyro(plant.imu, term)
+                _apply_imu(plant.imu, term)
         if rows is not None:
             plant.body.terms = rows
 
@@ -435,10 +435,12 @@ def _apply_angle(encoder: Any, term: Term) -> None:
         encoder.eccentricity_1, encoder.phase_1, encoder.eccentricity_2, encoder.phase_2 = values
 
 
-def _apply_gyro(imu: Any, term: Term) -> None:
-    """A term of the inertial sensor's rate about the hip."""
+def _apply_imu(imu: Any, term: Term) -> None:
+    """A term of the inertial sensor: its rate about the hip, or its roll (outer legs', positive leaning back)."""
     name, (value,) = term.form.name, term.values.values()
-    if name == "sensor_scale":
+    if term.at == "roll":
+        imu.roll_bias_rad += value
+    elif name == "sensor_scale":
         imu.rate_scale *= value
     elif name == "sensor_offset":
         imu.bias_rad_s += value

@@ -42,6 +42,7 @@ def parser() -> argparse.ArgumentParser:
     )
     from ranger_sim.tools.bench import command as bench
     from ranger_sim.tools.campaign import command as campaign
+    from ranger_sim.tools.compare_walk import command as compare_walk
     from ranger_sim.tools.diagnose import command as diagnose
     from ranger_sim.tools.fuzz import command as fuzz
     from ranger_sim.tools.identify import command as identify
@@ -73,6 +74,7 @@ def parser() -> argparse.ArgumentParser:
     causes.register(commands)
     diagnose.register(commands)
     identify.register(commands)
+    compare_walk.register(commands)
     return top
 
 

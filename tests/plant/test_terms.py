@@ -163,6 +163,7 @@ def test_sensor_terms_change_what_the_boards_see():
         dict(form="bit_flip", at="hip_absolute", probability=0.5),
         dict(form="sensor_lag", at="gyro", time_constant_s=0.004),
         dict(form="gyro_misalignment", at="gyro", yaw_rad=0.02),
+        dict(form="sensor_offset", at="roll", value=-0.03),
     )
     for p in (plain, plant):
         p.step()
@@ -177,6 +178,8 @@ def test_sensor_terms_change_what_the_boards_see():
     assert plant.inner_motor.has_errors and plant.inner_motor.threshold(3) == pytest.approx(3.03)
     assert plant.hip_word.bit_flip == 0.5
     assert plant.imu.lag_s == 0.004 and plant.imu.cross_x_from_z == 0.02
+    assert plant.imu.roll_bias_rad == pytest.approx(plain.imu.roll_bias_rad - 0.03, abs=1e-15)
+    assert plant.imu.bias_rad_s == plain.imu.bias_rad_s
 
 
 def test_a_lagging_voltage_follows_with_its_time_constant():
