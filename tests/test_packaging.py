@@ -358,7 +358,10 @@ def test_every_dependency_has_its_reason_beside_it():
     text = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
     listed = re.findall(r'^  "[A-Za-z][\w.-]*>=[^"]*",(.*)$', text, re.MULTILINE)
     dependencies, more = wanted_packages()
-    assert len(listed) == len(dependencies + more) + len(PROJECT["build-system"]["requires"])
+    grouped = [
+        each for group in PROJECT["dependency-groups"].values() for each in group
+    ]  # not in the lock, reasoned too
+    assert len(listed) == len(dependencies + more + grouped) + len(PROJECT["build-system"]["requires"])
     assert all(re.fullmatch(r"\s+# \w.{10,}", rest) for rest in listed)
 
 

@@ -57,7 +57,7 @@ def methods_of(names):
         call = DIAGNOSIS if name == "diagnosis" else name
         library, package = NEEDS.get(call, ("", ""))
         if library and importlib.util.find_spec(library) is None:
-            left_out.append(f"{name}: not run, {package} is not installed (pip install ranger-sim[comparators])")
+            left_out.append(f"{name}: not run, {package} is not installed (pip install --group comparators)")
         else:
             chosen.append(Method(name.replace(":", "."), call))
     return chosen, left_out

@@ -35,10 +35,10 @@ def said(detected=False, subsystem=None, causes=(), abstained=False, gain=None, 
 
 
 def read(path):
-    """{column: values} of a file of numbers with a head."""
+    """{column: values} of a file of numbers with a head; NaN where a cell is empty."""
     with open(path, encoding="ascii") as file:
         names = file.readline().strip().split(",")
-        values = np.loadtxt(file, delimiter=",")
+        values = np.genfromtxt(file, delimiter=",")
     return dict(zip(names, values.T, strict=True))
 
 
@@ -75,7 +75,31 @@ def leg_swing(t):
     return {"E": (inputs, V, electric, flows), "M": (inputs, current, torque, moves)}
 
 
-BALANCES = {"motor-bench": motor_bench, "leg-swing": leg_swing}
+def ankle(t):
+    """As above; the current that the board's law asks for, from the angles that are logged. One balance."""
+    target, rate, q, time_s = (t[n] for n in ("target_angle_rad", "target_rate_rad_per_s", "joint_angle_rad", "t_s"))
+    p = t.get("motor_angle_rad", q)
+    w = smooth_rate(time_s, p, 3)
+    K, D = t["command_stiffness_A_per_rad"], t["command_dampness_A_s_per_rad"]
+    asked = np.clip(K * (target - p) + D * (rate - w), -1.0, 6.0)
+    moves = np.abs(w) > 0.3
+    moves[:30] = moves[-30:] = False
+    torque = np.column_stack((smooth_rate(time_s, w, 3), q, np.ones(len(q)), np.sign(w), w))
+    return {"M": (np.column_stack((q, asked, w)), asked, torque, moves)}
+
+
+def walk(t):
+    """As above; the hip's current from its motion, apart for each leg's stance. One balance of many."""
+    q, w, current, time_s = (t[n] for n in ("hip_angle_rad", "hip_rate_rad_per_s", "hip_current_A", "t_s"))
+    lean, outer = t["outer_leg_rate_rad_per_s"], t["outer_contact"] > 0.5
+    parts = (np.gradient(w, time_s), q, np.ones(len(q)), np.sign(w), w, lean)
+    rows = np.abs(w) > 0.1
+    rows[:30] = rows[-30:] = False
+    torque = np.column_stack([part * where for part in parts for where in (outer, ~outer)])
+    return {"M": (np.column_stack((q, current, w)), current, torque, rows)}
+
+
+BALANCES = {"motor-bench": motor_bench, "leg-swing": leg_swing, "ankle": ankle, "walk": walk}
 
 
 def residuals(files, holdout, experiment):

@@ -18,9 +18,10 @@ from tests.blind.generator.ankle import ANKLE
 from tests.blind.generator.experiment import STRENGTHS
 from tests.blind.generator.leg_swing import LEG_SWING
 from tests.blind.generator.motor_bench import MOTOR_BENCH
+from tests.blind.generator.walk import WALK
 
 SHORTEST_S, LONGEST_S = 1.0, 60.0  # the first half second stands still; longer ones want more memory than a batch may
-EXPERIMENTS = {experiment.NAME: experiment for experiment in (MOTOR_BENCH, LEG_SWING, ANKLE)}
+EXPERIMENTS = {experiment.NAME: experiment for experiment in (MOTOR_BENCH, LEG_SWING, ANKLE, WALK)}
 
 
 def main(arguments=None):
@@ -41,7 +42,10 @@ def main(arguments=None):
     if options.seconds is not None:
         if not SHORTEST_S <= options.seconds <= LONGEST_S:
             parser.error(f"--seconds {options.seconds:g}: allowed are {SHORTEST_S:g} to {LONGEST_S:g}")
-        experiment = experiment.lasting(options.seconds)
+        try:
+            experiment = experiment.lasting(options.seconds)
+        except ValueError as error:
+            parser.error(f"--seconds: {error}")
     kinds = options.kinds.split(",") if options.kinds else [kind for kind, _ in experiment.MIX]
     causes = options.causes.split(",") if options.causes else list(experiment.CAUSES)
     for wanted, known in ((kinds, dict(experiment.MIX)), (causes, experiment.CAUSES)):

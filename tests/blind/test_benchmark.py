@@ -175,7 +175,7 @@ def test_a_library_that_is_not_there_is_told(monkeypatch):
     monkeypatch.setattr(benchmark.importlib.util, "find_spec", lambda name: None)
     methods, left_out = benchmark.methods_of(["refit_only", "sindy"])
     assert [method.name for method in methods] == ["refit_only"]
-    assert left_out == ["sindy: not run, pysindy is not installed (pip install ranger-sim[comparators])"]
+    assert left_out == ["sindy: not run, pysindy is not installed (pip install --group comparators)"]
 
 
 def test_a_slice_of_the_cases_is_the_same_as_in_the_whole(tmp_path):
