@@ -44,6 +44,7 @@ def parser() -> argparse.ArgumentParser:
     from ranger_sim.tools.campaign import command as campaign
     from ranger_sim.tools.compare_walk import command as compare_walk
     from ranger_sim.tools.diagnose import command as diagnose
+    from ranger_sim.tools.figures import command as figures
     from ranger_sim.tools.fuzz import command as fuzz
     from ranger_sim.tools.identify import command as identify
     from ranger_sim.tools.vm import command as vm
@@ -73,6 +74,7 @@ def parser() -> argparse.ArgumentParser:
     campaign.register(commands)
     causes.register(commands)
     diagnose.register(commands)
+    figures.register(commands)
     identify.register(commands)
     compare_walk.register(commands)
     return top
