@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.sysid import gain, misfit, naming
+from ranger_sim.sysid import gain, misfit, naming, plausibility
 from ranger_sim.sysid.dataset import Table
 from ranger_sim.sysid.machine import Effect, Machine, Recording
 from ranger_sim.sysid.naming import Named
@@ -94,9 +94,10 @@ def diagnose(
         extended = naming.refit(plain, named, [*skews, *named], fresh=True)
     progress("what is left", 0.75)
     after = misfit.look(extended, general)
-    detected = before.p < GENERAL_LEVEL or bool(named)
+    doubts = plausibility.look(machine, extended)
+    detected = before.p < GENERAL_LEVEL or bool(named) or doubts.forbid
     share = _explained(named, after)
-    doubtful = detected and (not named or (share < EXPLAINED and after.p < GENERAL_LEVEL))
+    doubtful = detected and (not named or doubts.forbid or (share < EXPLAINED and after.p < GENERAL_LEVEL))
     impossible = _impossible(machine, extended)
     answer: dict[str, Any] = {
         "detected": bool(detected),
@@ -107,7 +108,13 @@ def diagnose(
         "gain": None,
         "next_experiment": _next(named),
         "model_file": None,
-        "data_findings": list(findings),
+        "data_findings": [
+            *findings,
+            *(
+                {**dataclasses.asdict(each), "recording": ", ".join(table.name for table in tables)}
+                for each in doubts.findings
+            ),
+        ],
         "evidence": {
             "p_general": before.p,
             "p_general_after": after.p,
@@ -258,6 +265,8 @@ def _channels(plain: Regression, extended: Regression, recordings: Sequence[Reco
     for equation in plain.equations:
         rows, good = plain.rows_of(equation), plain.good[equation]
         residual = plain.residual[rows]
+        if not len(residual):
+            continue
         scale = plain.whitening[equation].deviation
         better = extended.residual[rows] * (extended.whitening[equation].deviation / scale)
         noise = float(np.sqrt(np.mean(better**2)))

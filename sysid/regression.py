@@ -116,7 +116,8 @@ class Regression:
         self.parts = {name: self._part(name, extra, list(extra_names)) for name in self.equations}
         counted = sum(int(np.count_nonzero(self._good(name))) for name in self.equations)
         if counted <= 10 * self.count:
-            raise UserError(f"{counted} samples count, too few for {self.count} parameters")
+            names = ", ".join(recording.table.name for recording in self.recordings)
+            raise UserError(f"{names}: {counted} samples count, too few for {self.count} parameters")
         if noise is None:
             self.whitening: dict[str, Whitening] = {}
             self.shared: dict[tuple[str, str], float] = {}

@@ -29,6 +29,8 @@ HEAT_TIMES_S = (3.0, 10.0, 30.0, 100.0, 300.0)
 SPEED_SHARES = (0.01, 0.02, 0.04, 0.08, 0.16, 0.3, 0.5)
 CURRENT_SHARES = (0.1, 0.3, 1.0)
 LAGS_S = (0.0005, 0.001, 0.002, 0.004, 0.01, 0.03)
+SAME_MOTION = 0.7  # correlation of angle and speed; slip and lost counts leave more
+SAME_SPEED = 2.0  # times: rpm, degrees and thousands are more
 MOST_PERIODS = 60  # per turn of the rotor
 
 Shape = Mapping[str, float]
@@ -88,6 +90,8 @@ class MotorBench:
         s: dict[str, Array] = {"V": V, "t": table.time_s - table.time_s[0]}
         measured = "motor_angle_rad" in table
         s["angle"] = table["motor_angle_rad"] if measured else self.gear * signals.integral(table, w)
+        if measured:
+            _same_motion(table, s["angle"] / self.gear, w)
         # stand-ins: speed by the angle, current by voltage and speed; neither has the noise of what it stands for
         s["w"] = signals.derivative(table, s["angle"], SLOW) / self.gear if measured else signals.smooth(table, w, SLOW)
         s["dw"] = np.gradient(s["w"], table.step_s)
@@ -182,6 +186,29 @@ class MotorBench:
         if all("transmission" in r.equations for r in recordings):
             made += _transmission()
         return made
+
+
+def _same_motion(table: Table, angle: Array, w: Array) -> None:
+    """UserError when the rotor's angle over the gear and the speed are not the same motion, or not in one unit.
+
+    Twist, slip and lost counts are a part of it; what moves otherwise, or some times as fast, is no fault of a machine.
+    """
+    turning, speed = signals.derivative(table, angle, CALM), signals.smooth(table, w, CALM)
+    if len(table) < 10 * CALM or not np.std(turning) > 0.0 or not np.std(speed) > 0.0:
+        return
+    factor = float(np.std(turning) / np.std(speed))
+    alike = float(np.corrcoef(turning, speed)[0, 1])
+    if abs(alike) < SAME_MOTION:
+        raise UserError(
+            f"{table.name}: motor_angle_rad and speed_rad_per_s are not the same motion (correlation {alike:.2f}); "
+            "nothing is concluded from such data"
+        )
+    if alike < 0.0 or not 1.0 / SAME_SPEED < factor < SAME_SPEED:
+        told = f"{factor:.3g} times as fast" if alike > 0.0 else "the other way round"
+        raise UserError(
+            f"{table.name}: motor_angle_rad over the gear turns {told} as speed_rad_per_s: another gear (--gear), or "
+            "one of the two in another unit; nothing is concluded from such data"
+        )
 
 
 def _away(values: Array, limit: float, reach: int) -> np.ndarray:

@@ -64,6 +64,8 @@ class Positioning:
         s = {"x": q, "v": v, "F": force, "t": table.time_s - table.time_s[0], "a": np.gradient(v, table.step_s)}
         s["dF"] = np.gradient(force, table.step_s)
         top = float(np.quantile(np.abs(v), 0.98))
+        if top <= 0.0:
+            raise UserError(f"{table.name}: position_m does not move")
         s["sgn_v"] = np.tanh(v / (0.25 * NEAR_STANDSTILL * top))
         equation = Equation(
             "force",

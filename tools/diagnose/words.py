@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from ranger_sim.sysid import inspection
+from ranger_sim.sysid import inspection, plausibility
 from ranger_sim.sysid.diagnose import Diagnosis
 from ranger_sim.sysid.naming import PAYS, TIE
 
@@ -13,6 +13,8 @@ def sentence(found: Diagnosis) -> str:
     """What is wrong, in one sentence."""
     answer = found.answer
     name = found.machine.name
+    if doubts(answer):
+        return f"{name}: {doubted(answer)}."
     if not answer["detected"]:
         p = answer["evidence"]["p_general"]
         return f"{name}: nothing that these data could show is missing from the equations (p {p:.2g})."
@@ -27,10 +29,23 @@ def sentence(found: Diagnosis) -> str:
     return f"{name}: the {answer['subsystem']} part is wrong: {names}."
 
 
+def doubts(answer: dict[str, Any]) -> list[dict[str, Any]]:
+    """The findings after which no cause is named."""
+    return [each for each in answer["data_findings"] if each["kind"] in plausibility.FORBID]
+
+
+def doubted(answer: dict[str, Any]) -> str:
+    """These in a sentence."""
+    told = "; ".join(f"{each['channel']}: {each['text']}" for each in doubts(answer))
+    return f"no cause is named: {told}"
+
+
 def verdict(answer: dict[str, Any]) -> tuple[str, str]:
     """(class, headline) of the page."""
     if not answer["detected"]:
         return "sound", "Nothing found"
+    if doubts(answer):
+        return "unknown", "These data and this model do not belong together"
     if answer["abstained"]:
         return "unknown", "Something is wrong, and it is not known what"
     count = len(answer["causes"])
@@ -40,6 +55,9 @@ def verdict(answer: dict[str, Any]) -> tuple[str, str]:
 def told(found: Diagnosis) -> str:
     """What is wrong in one sentence of plain words, for the top of the page."""
     answer = found.answer
+    if doubts(answer):
+        text = doubted(answer)
+        return f"{text[0].upper()}{text[1:]}."
     if not answer["detected"]:
         return "The equations miss nothing that these data could show."
     if answer["abstained"]:

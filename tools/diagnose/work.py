@@ -30,6 +30,7 @@ from ranger_sim.tools.diagnose import words
 from ranger_sim.tools.files import json_target, replace_file, writable_folder
 
 EXIT_CLEAN, EXIT_FOUND = 0, 1
+LEAST_ROWS = 50  # below, filters are longer than the data; what says anything has some hundreds
 
 
 def run(options: argparse.Namespace) -> int:
@@ -170,9 +171,17 @@ def _prepared(dataset: Dataset, machine: Machine, experiment: str) -> tuple[Tabl
     findings = sanity.inspect(dataset)
     sanity.stop_if_fatal(dataset.name, findings)
     for doubt in sanity.doubts(dataset, findings):
-        raise UserError(f"{dataset.name}: {doubt.channel}: {doubt.text}; nothing is concluded from such data")
+        place = f"{doubt.channel}: " if doubt.channel else ""
+        raise UserError(f"{dataset.name}: {place}{doubt.text}; nothing is concluded from such data")
+    if experiment in MACHINES:  # a user's own machine may have a setting for a channel
+        for each in machine.quantities:
+            if each.needed and np.ptp(dataset[each.name].value[np.isfinite(dataset[each.name].value)]) == 0.0:
+                raise UserError(f"{dataset.name}: {each.name}: one value all the time; nothing is concluded from that")
     mended = repairs.mend(dataset, findings)
-    return mended.table([name for name in names if name in mended]), findings
+    table = mended.table([name for name in names if name in mended])
+    if len(table) < LEAST_ROWS:
+        raise UserError(f"{dataset.name}: {len(table)} rows with all channels, at least {LEAST_ROWS} are needed")
+    return table, findings
 
 
 def _diagnosed(
@@ -205,9 +214,8 @@ def _show(found: Diagnosis, console: Console) -> None:
     for name in answer["evidence"].get("refused_by_holdout", ()):
         console.print(f"{name} is in these data and not in the held-out ones: refused", highlight=False, soft_wrap=True)
     for finding in answer["data_findings"]:
-        console.print(
-            f"data: {finding['recording']}: {finding['channel']}: {finding['text']}", highlight=False, soft_wrap=True
-        )
+        place = ": ".join(each for each in (finding["recording"], finding["channel"]) if each)
+        console.print(f"data: {place}: {finding['text']}", highlight=False, soft_wrap=True)
     for each in answer["evidence"]["known"]:
         values = ", ".join(
             f"{name} {_figure(value['value'])} ({_figure(value['ci95'][0])} to {_figure(value['ci95'][1])}; "

@@ -1,0 +1,102 @@
+"""Whether the numbers that a fit gives can be those of the machine at all, before any cause is named.
+
+A channel in another unit, another channel under its name, or one that does not belong to the others, gives a fit as
+any: its parameters tell. A doubt forbids a name, a warning is only told.
+"""
+
+import dataclasses
+
+import numpy as np
+
+from ranger_sim.sysid.dataset import Finding
+from ranger_sim.sysid.machine import Known, Machine
+from ranger_sim.sysid.regression import Regression
+
+SURE = 5.0  # standard errors beyond a limit: chance and a small model error do not reach there
+OTHER_WAY = 0.5  # of its known value: so far on the other side of zero a sign is wrong, in the data or in the model
+FACTOR = 5.0  # to the simulation's value: between a machine of the same kind and rpm taken for rad/s (9.5)
+CLEAR = 0.2  # relative error up to which a factor is told
+EXPLAINED = 0.2  # of what an equation balances: below it the channels do not belong together
+FEWEST = 100  # rows
+FEW = 0.02  # of the rows
+FORBID = ("impossible", "unexplained")  # kinds of findings after which no cause is named
+
+
+@dataclasses.dataclass(frozen=True)
+class Doubts:
+    """findings: for the answer; forbid: True when no cause may be named."""
+
+    findings: list[Finding]
+    forbid: bool
+
+
+def look(machine: Machine, regression: Regression) -> Doubts:
+    """What is odd in a fit. regression: with everything in it that was named."""
+    findings: list[Finding] = []
+    for known in machine.parameters:
+        if known.name not in regression.values:
+            continue
+        value = regression.values[known.name]
+        number = regression.names.index(known.name)
+        error = float(np.sqrt(max(0.0, float(regression.covariance[number, number]))))
+        if absurd(known, value, error):
+            text = f"it comes out as {value:.4g} {known.unit}, which no machine has"
+            findings.append(_finding(known.name, "impossible", value, known.unit, text))
+        elif known.value != 0.0 and error < CLEAR * abs(value) and abs(value / known.value) > FACTOR:
+            findings.append(_factor(known, value, value / known.value))
+        elif value != 0.0 and error < CLEAR * abs(value) and abs(known.value / value) > FACTOR:
+            findings.append(_factor(known, value, value / known.value))
+    for name in regression.equations:
+        counted, rows = int(np.count_nonzero(regression.good[name])), len(regression.parts[name].valid)
+        if counted < FEW * rows:
+            text = f"{counted} of {rows} rows of this equation count: next to nothing is said of it"
+            findings.append(_finding(name, "few_rows", counted, "rows", text))
+        share = explained(regression, name)
+        if share is not None and share < EXPLAINED:
+            text = (
+                f"the equation explains {max(0.0, share):.0%} of what was measured: the channels do not belong together"
+            )
+            findings.append(_finding(name, "unexplained", share, "", text))
+    return Doubts(findings, any(each.kind in FORBID for each in findings))
+
+
+def absurd(known: Known, value: float, error: float) -> bool:
+    """True for what lies surely beyond the limits; a little below zero is not absurd where little is usual."""
+    reach = SURE * error
+    if known.low >= 0.0 and known.value > 0.0 and value < 0.0:
+        return value + reach < -OTHER_WAY * known.value
+    return value + reach < known.low or value - reach > known.high
+
+
+def explained(regression: Regression, name: str) -> float | None:
+    """Share of what an equation balances that it explains: of its response and of what its parameters add to it.
+
+    None for an equation with fewer than two parameters of its own or few rows, and for a machine told by its
+    simulator, whose response is already what the simulation misses.
+    """
+    own: dict[str, None] = {}
+    for recording in regression.recordings:
+        if getattr(recording, "entries", None):
+            return None
+        if name in recording.equations:
+            own |= dict.fromkeys(recording.equations[name].columns)
+    part = regression.parts[name]
+    rows = part.valid
+    if np.count_nonzero(rows) < FEWEST or len(own) < 2:
+        return None
+    added = part.measured[rows] * np.array([regression.values[each] for each in regression.names])
+    left = float(np.mean((part.response[rows] - added.sum(axis=1)) ** 2))
+    balanced = float(np.mean(part.response[rows] ** 2)) + float(np.sum(np.mean(added**2, axis=0)))
+    return 1.0 - left / max(balanced, 1e-300)
+
+
+def _factor(known: Known, value: float, factor: float) -> Finding:
+    text = (
+        f"it comes out as {value:.4g} {known.unit}, {factor:.3g} times the simulation's {known.value:.4g}: "
+        "another machine, or a channel in another unit"
+    )
+    return _finding(known.name, "far_off", factor, "", text)
+
+
+def _finding(channel: str, kind: str, size: float, unit: str, text: str) -> Finding:
+    return Finding(channel, kind, 0.0, 0.0, float(size), unit, text)

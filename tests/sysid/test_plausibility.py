@@ -1,0 +1,94 @@
+"""Fits of data that are not what they say: told by their parameters, and no cause is named from them."""
+
+import numpy as np
+import pytest
+
+from ranger_sim.foundation.random_arrays import generator
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.sysid import plausibility
+from ranger_sim.sysid.benches.motor_run import motor_run
+from ranger_sim.sysid.dataset import Table
+from ranger_sim.sysid.diagnose import diagnose
+from ranger_sim.sysid.machine import Known
+from ranger_sim.sysid.machines.motor_bench import MotorBench
+from tests.sysid.test_diagnose import SIZE, Cart, cart_run
+
+
+def changed(**columns):
+    run = cart_run(1, drag=0.02)
+    return Table(run.time_s, {**run.columns, **columns}, run.runs, "changed")
+
+
+def kinds(answer):
+    return [each["kind"] for each in answer["data_findings"]]
+
+
+def test_a_sound_run_raises_no_doubt():
+    assert kinds(diagnose(Cart(), [cart_run(1, drag=0.02)]).answer) == []
+
+
+def test_a_sign_turned_round_is_no_machine_and_no_cause():
+    found = diagnose(Cart(), [changed(force_N=-cart_run(1, drag=0.02)["force_N"])]).answer
+    assert "impossible" in kinds(found)
+    assert found["detected"] and found["abstained"] and found["causes"] == []
+    assert found["evidence"]["parameters_are_physical"] is False
+
+
+def test_a_channel_that_does_not_belong_to_the_others_is_told():
+    noise = generator(3, "another channel").normal(size=SIZE)
+    found = diagnose(Cart(), [changed(force_N=noise)]).answer
+    assert "unexplained" in kinds(found) and found["abstained"] and found["causes"] == []
+
+
+def test_a_channel_in_another_unit_is_told_by_the_parameters():
+    """Force in mN under the name of N: a mass of 1.1 t, within no limit of 10 kg; in units of 0.1 N: 11 kg, told."""
+    force = cart_run(1, drag=0.02)["force_N"]
+    assert "impossible" in kinds(diagnose(Cart(), [changed(force_N=1000.0 * force)]).answer)
+    found = diagnose(Cart(), [changed(force_N=6.0 * force)]).answer
+    (told,) = [each for each in found["data_findings"] if each["channel"] == "mass_kg"]
+    assert told["kind"] == "far_off" and told["size"] == pytest.approx(6.6, rel=0.01)
+    assert found["causes"]  # told, and no reason to be silent: it may be another machine
+
+
+@pytest.mark.parametrize(
+    ("value", "error", "expected"),
+    [
+        (-0.4, 0.01, False),  # a little below zero: what the model misses may have done it
+        (-0.6, 0.01, True),
+        (-0.6, 0.05, False),  # within five standard errors of what may be
+        (11.0, 0.1, True),
+        (10.4, 0.1, False),
+        (1.0, 0.1, False),
+    ],
+)
+def test_absurd_is_what_lies_surely_beyond_the_limits(value, error, expected):
+    assert plausibility.absurd(Known("mass", "kg", 1.0, 0.0, 10.0, ""), value, error) is expected
+
+
+def test_an_equation_without_rows_that_count_is_told():
+    recorded = motor_run(seed=1, seconds=4.0)
+    table = recorded.table(list(recorded.channels))
+    still = Table(table.time_s, {**table.columns, "voltage_V": -table["voltage_V"]}, table.runs, "turned")
+    found = diagnose(MotorBench(), [still]).answer
+    assert "few_rows" in kinds(found) or "impossible" in kinds(found) or "unexplained" in kinds(found)
+    assert found["causes"] == []
+
+
+@pytest.mark.parametrize(
+    ("factor", "line"),
+    [
+        (57.3, "0.0174 times as fast as speed_rad_per_s: another gear"),
+        (-1.0, "turns the other way round"),
+        (1e-3, "turns 999 times as fast"),
+    ],
+)
+def test_a_speed_in_another_unit_than_the_angle_is_no_slipping_pulley(factor, line):
+    recorded = motor_run(seed=1, seconds=3.0)
+    table = recorded.table(list(recorded.channels))
+    wrong = Table(table.time_s, {**table.columns, "speed_rad_per_s": factor * table["speed_rad_per_s"]}, table.runs)
+    with pytest.raises(UserError, match=line):
+        MotorBench().prepare(wrong)
+    noise = generator(1, "noise").normal(size=len(table))
+    with pytest.raises(UserError, match="not the same motion"):
+        MotorBench().prepare(Table(table.time_s, {**table.columns, "speed_rad_per_s": noise}, table.runs))
+    assert np.all(np.isfinite(MotorBench().prepare(table).signals["w"]))
