@@ -14,6 +14,7 @@ from ranger_sim.foundation.user_error import UserError
 from ranger_sim.plant import terms
 from ranger_sim.plant.battery import BatteryParameters
 from ranger_sim.plant.motor_parameters import ANKLE_MOTOR, HIP_MOTOR, MotorParameters
+from ranger_sim.sysid.causes import CAUSES
 from ranger_sim.sysid.machine import Machine
 
 Numbers = Mapping[str, float]
@@ -79,6 +80,7 @@ def _dead_time(numbers: Numbers, _: Context) -> dict[str, float]:
     return {"fraction": numbers["drop_V"] / nominal_V}
 
 
+FORM_OF = {cause.identifier: cause.form for cause in CAUSES.values() if cause.form}
 # by cause; each takes coefficients and shape, and gives the form's parameters
 TO_TERM: dict[str, Made] = {
     "stribeck": lambda n, c: {"excess_Nm": n["excess_Nm"] * c.ratio, "speed_rad_s": n["speed_rad_s"] / c.ratio},
@@ -97,6 +99,7 @@ TO_TERM: dict[str, Made] = {
     # above the current of its shape the drop is all there, and so it is in the simulator at every current
     "contact_drop_change": lambda n, c: {"change_V": n["change_V"]},
     "dead_time": _dead_time,
+    "cable_backlash": lambda n, c: {"gap_rad": n["half_gap_rad"]},
     "sensor_scale": lambda n, c: {"factor": 1.0 + n["change"]},
     "sensor_offset": lambda n, c: {"value": next(v for k, v in n.items() if k.startswith("offset"))},
     "sensor_lag": lambda n, c: {"time_constant_s": n["time_constant_s"]},
@@ -121,7 +124,8 @@ def term_of(machine: Machine, cause: str, at: str, numbers: Numbers, values: Num
 
     NoFormError with the reason when the simulator has none.
     """
-    form = terms.FORMS.get(cause)
+    name = FORM_OF.get(cause, cause)
+    form = terms.FORMS.get(name)
     if form is None:
         raise NoFormError("the simulator has no form for it")
     if at not in form.places:
@@ -136,7 +140,7 @@ def term_of(machine: Machine, cause: str, at: str, numbers: Numbers, values: Num
             raise NoFormError(f"its coefficients {', '.join(numbers)} are not those of the form") from None
     else:
         raise NoFormError("the simulator's form of it has other parameters")
-    return _checked({"form": cause, "at": at, **made})
+    return _checked({"form": name, "at": at, **made})
 
 
 def parameter_terms(machine: Machine, values: Numbers, intervals: Mapping[str, tuple[float, float]]) -> list[dict]:

@@ -14,7 +14,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.sysid import causes, channels
+from ranger_sim.sysid import causes, channels, inspection
 from ranger_sim.tools import terminal
 
 REASONS = {
@@ -53,7 +53,8 @@ def run(options: argparse.Namespace) -> int:
         return 0
     chosen = list(causes.CAUSES.values()) if options.cause is None else [causes.find(options.cause)]
     if options.json:
-        print(json.dumps([causes.as_json(cause) for cause in chosen], indent=2))
+        told_causes = [{**causes.as_json(cause), "look_at": inspection.LOOK_AT[cause.key]} for cause in chosen]
+        print(json.dumps(told_causes, indent=2))
     elif options.cause is None:
         print_catalogue()
     else:
@@ -80,6 +81,7 @@ def print_cause(cause: causes.Cause) -> None:
     print(f"{cause.key} (number {cause.number}): {cause.meaning}")
     print(f"balances: {'; '.join(causes.BALANCES[letter] for letter in cause.balances)}")
     print(f"signature: {cause.signature}")
+    print(f"look at: {inspection.LOOK_AT[cause.key]}")
     print(f"similar: {', '.join(causes.rivals(cause)) or 'nothing that is known'}")
     print(f"in a model file: {f'form = {cause.form!r}' if cause.form else 'there is no form for it yet'}")
     from ranger_sim.sysid import isolability  # with scipy, which a first `make walk` does without

@@ -69,6 +69,13 @@ def test_electrical_effects_become_terms_of_the_winding():
     assert ripple["fraction"] == pytest.approx(0.05) and ripple["phase_rad"] == pytest.approx(math.atan2(3.0, 4.0))
 
 
+def test_springs_and_gaps_are_terms_under_the_forms_name():
+    table = term_of(BENCH, "return_spring", "inner_ankle", {"cubic_Nm_per_rad3": 0.03}, VALUES)
+    assert table == {"form": "spring", "at": "inner_ankle", "cubic_Nm_per_rad3": 0.03}
+    table = term_of(BENCH, "cable_backlash", "inner_cable", {"half_gap_rad": 0.01, "torque_Nm": 0.03}, VALUES)
+    assert table == {"form": "cable_backlash", "at": "inner_cable", "gap_rad": 0.01}
+
+
 @pytest.mark.parametrize(
     ("cause", "at", "numbers", "reason"),
     [

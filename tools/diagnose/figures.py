@@ -202,7 +202,7 @@ def phase_of(found: Diagnosis, each: Named, equation: str) -> Array | None:
 
 def candidates(found: Diagnosis, side: Sides) -> dict[str, Array]:
     """Signals over which an equation may be drawn, at its rows: those of the general tests, and other channels."""
-    general = [found.machine.generic(recording).get(side.name, {}) for recording in found.recordings]
+    general = [of_equation(found.machine.generic(recording), side.name) for recording in found.recordings]
     made = {}
     for name in general[0]:
         if all(name in each for each in general):
@@ -215,6 +215,11 @@ def candidates(found: Diagnosis, side: Sides) -> dict[str, Array]:
     if not any(name in made for name in ("t", "time", "t_s")):
         made["t"] = side.time_s
     return made
+
+
+def of_equation(generic: Mapping[str, Mapping[str, Array]], name: str) -> dict[str, Array]:
+    """The signals of an equation; of all entries where a machine tells its signals by entry."""
+    return dict(generic[name]) if name in generic else {k: v for each in generic.values() for k, v in each.items()}
 
 
 def kept(recordings: Sequence[Recording], columns: Sequence[Array]) -> Array:
@@ -237,10 +242,10 @@ def explained(x: Array, y: Array) -> float:
 
 def telling(found: Diagnosis, made: Mapping[str, Sides]) -> Figure | None:
     """The residual where the general tests saw it: over one signal, over two of them as a map, over a signal's past."""
-    if not found.before.tests or found.before.telling.equation not in made:
+    if not found.before.tests or not made:
         return None
     test = found.before.telling
-    side = made[test.equation]
+    side = made.get(test.equation, next(iter(made.values())))  # an entry's misfit shows in the equations behind it
     over = candidates(found, side)
     left = side.measured - side.before
     title = f"Where the {side.name} equation is off"
