@@ -90,6 +90,39 @@ def test_every_effect_changes_what_is_asked_of_the_robot(name):
     assert effect.tell(effect.largest, effect.places[0])
 
 
+def test_a_case_is_two_logs_and_a_truth_whose_strength_is_measured(tmp_path, monkeypatch):
+    """On made-up walks, whose hip is tilted by what the effect does to the body's feet: 0.5 of it is many deviations. A
+    robot that falls of it is tried again with half of it and other crystals.
+    """
+    fallen = []
+
+    def made_up(asked, steps):
+        tilt = asked.body.get("outer_ankle_offset_m", 0.146) - 0.146
+        if abs(tilt) > 0.008 and not fallen:
+            fallen.append(asked.seed)
+            return None
+        return record(asked.seed, bias=100.0 * tilt)
+
+    monkeypatch.setattr(walks, "walk", made_up)
+    cases = WALK.plan(9, 2, ["single"], ["geometry"]) + WALK.plan(9, 1, ["null"], ["geometry"])
+    cases[0].effects, cases[1].effects, cases[2].number = [("geometry", 4.0)], [("geometry", 0.5)], 2
+    made = list(WALK.generate(9, cases, tmp_path))
+    assert fallen
+    for key, files, holdout, truth in made:
+        for name in (*files, *holdout):
+            head, *rows = (tmp_path / name).read_text().splitlines()
+            assert head == ",".join(("t_s", *VARIABLES))
+            assert len(rows) > 2000
+        assert files == [f"{key}/a.csv"] and holdout == [f"{key}/b.csv"]
+        assert truth["kind"] == ("single" if truth["causes"] else "null")
+    strong, weak, null = (truth for _, _, _, truth in made)
+    (cause,) = strong["causes"]
+    assert cause["strength"] == 4.0 and cause["at"] == "foot_height" and abs(cause["amplitude"]) < 0.008
+    assert cause["parameters"]["ankle_offset_m"] == pytest.approx(0.146 + cause["amplitude"])
+    assert cause["strength_reached"] > weak["causes"][0]["strength_reached"]
+    assert null["causes"] == []
+
+
 @pytest.mark.skipif(loading.interpreted_is_forced(), reason="a walk is compiled or takes minutes")
 def test_the_emulated_robot_walks_with_another_body_and_a_term_and_leaves_what_its_brain_knew():
     asked = Asked(3, 0.8, dict(NOMINAL))
