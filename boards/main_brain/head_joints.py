@@ -5,8 +5,8 @@ ref - rate of x), gains in N m; the board's law is I = I0 - K p - D p'. So I0 = 
 D = kd / c, with c in N m/A.
 
 Springs across a joint are made up for. At the hip K is less by the spring over c, so that motor and spring together
-are the tracker: read off the log of 20 August 2015 itself, whose hip pulls in the push states like 3.5 - 7.9 h - 2.9 h'
-N m (docs/walk-2015.md). At the ankles the spring comes off kp altogether, as in the commands logged on 19 August: K =
+are the tracker: read off the log of 20 August 2015 itself, whose hip motor makes up for a spring in its pushes
+(docs/walk-2015.md). At the ankles the spring comes off kp altogether, as in the commands logged on 19 August: K =
 (10 - 0.134) / 0.612 and I0 = K target + D rate (robot.md C6.3 A).
 
 Leans are the estimator's, positive forward (robot.md C1.1); the firmware's angles th are their opposites.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import dataclasses
 import json
 import math
 import pathlib
@@ -18,13 +19,15 @@ from rich.table import Table
 from scipy.stats import f as f_distribution
 from scipy.stats import t as t_distribution
 
+from ranger_sim.boards.main_brain import controllers
 from ranger_sim.foundation.random_arrays import generator
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.scenario import Scenario
+from ranger_sim.plant import body_files
 from ranger_sim.sysid import channels, inspection, sanity
 from ranger_sim.sysid.dataset import Array, Finding
 from ranger_sim.tools import recordings, terminal
-from ranger_sim.tools.compare_walk import emulate, figure, gait, naming
+from ranger_sim.tools.compare_walk import emulate, figure, gait, hip_law, naming
 from ranger_sim.tools.compare_walk.candidates import BY_NAME
 from ranger_sim.tools.files import json_target, replace_file, writable_folder
 
@@ -111,6 +114,11 @@ def compare(log: str, measured: gait.Walk, emulator: emulate.Emulator, causes: b
         "strides_s": [round(each.duration_s, 4) for each in every],
         "steady": [each.number for each in chosen],
         **misfit(chosen, features, scatter, degrees),
+        "hip_makes_up_for": {
+            "measured": hip_law_of(measured, emulator),
+            "emulated": hip_law_of(walk, emulator),
+            "parameter": controllers.load(emulator.scenario.controller).values["HD_H_SPRING"],
+        },
         "causes": [],
         "trajectories": {
             "measured": [trajectory(each) for each in chosen],
@@ -120,6 +128,13 @@ def compare(log: str, measured: gait.Walk, emulator: emulate.Emulator, causes: b
     if causes:
         answer |= named(chosen, scatter, degrees, emulator, progress, answer["trajectories"])
     return answer
+
+
+def hip_law_of(walk: gait.Walk, emulator: emulate.Emulator) -> dict[str, Any] | None:
+    """What the hip's motor makes up for in a walk, with body and gains of the emulated one."""
+    body = body_files.load(emulator.scenario.body).parameters
+    law = hip_law.of_walk(walk, body, controllers.load(emulator.scenario.controller).values)
+    return None if law is None else {**dataclasses.asdict(law), "ci95": list(law.ci95)}
 
 
 def misfit(chosen: Sequence[gait.Stride], features: Array, scatter: Array, degrees: int) -> dict[str, Any]:
@@ -294,6 +309,14 @@ def tell(answer: dict[str, Any], console: Console) -> None:
         f"(p {answer['p']:.2g}); {many} are few: intervals rest on their scatter, pooled over features of a unit.",
         highlight=False,
     )
+    laws = [f"{name} {law['made_up_for_Nm_per_rad']:.1f} ({law['ci95'][0]:.1f} to {law['ci95'][1]:.1f})"
+            for name in ("measured", "emulated") if (law := answer["hip_makes_up_for"][name])]  # fmt: skip
+    if laws:
+        console.print(
+            f"In its pushes the hip's motor makes up for a spring of, N m/rad: {', '.join(laws)}; the emulated "
+            f"controller's number is {answer['hip_makes_up_for']['parameter']:g}.",
+            highlight=False,
+        )
     if "stopped" not in answer:
         return
     for cause in answer["causes"]:
