@@ -403,7 +403,7 @@ class SimulatedMachine(abc.ABC):
                     columns,
                     term.admissible,
                     term.meaning,
-                    term.phase_is_free,
+                    phase_is_free=term.phase_is_free,
                 )
             )
         return made

@@ -164,7 +164,7 @@ def of_cause(found: Diagnosis, each: Named, made: Mapping[str, Sides]) -> Figure
     means(figure, x, with_it, "with it", AFTER)
     figure.update_yaxes(title_text=f"what is left of {side.name}, {side.unit}", range=reach_of(figure))
     figure.update_xaxes(title_text=label)
-    note = "Dots: single samples; lines: means of cells with their 95 % interval. With the effect they lie at zero."
+    note = "Dots: single samples; lines: means with their 95 % interval. A model that misses nothing lies at zero."
     return finished(figure, f"Where {each.effect.cause} shows", note, 380)
 
 
