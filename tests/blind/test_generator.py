@@ -228,3 +228,20 @@ def test_what_no_recording_can_tell_apart_is_a_tie_of_the_truth(monkeypatch):
         trajectory = MOTOR_BENCH.lanes_of([(case, case.runs[0])]).run(fine=2)[0]
         cosines = MOTOR_BENCH.rivals(5, case, MOTOR_BENCH.scale(case, trajectory))
         assert (cosines[other] > TIE) is tied
+
+
+def test_a_size_is_told_in_the_catalogue_s_form(monkeypatch):
+    """Drag with the square is the catalogue's own; friction by bristles is near a Gaussian of about its size."""
+    monkeypatch.setattr(MOTOR_BENCH, "SAMPLES", 2000)
+    told = {}
+    for name, shape, amplitude in (
+        ("drag", {"power": 2.0}, 3e-4),
+        ("stribeck", {"speed_rad_s": 2.0, "stretch_rad": 2e-4}, 0.1),
+    ):
+        case = clean(MOTOR_BENCH, 5, name, amplitude)
+        case.shapes = [shape]
+        trajectory = MOTOR_BENCH.lanes_of([(case, case.runs[0])]).run(fine=2)[0]
+        told[name] = MOTOR_BENCH.truth(case, MOTOR_BENCH.scale(case, trajectory), {})["causes"][0]["parameters"]
+    assert told["drag"] == {"quadratic_Nms2": pytest.approx(3e-4)}
+    assert told["stribeck"]["excess_Nm"] == pytest.approx(0.1, rel=0.3)
+    assert told["stribeck"]["speed_rad_s"] == pytest.approx(2.0, rel=0.5)

@@ -34,6 +34,10 @@ class Effect:
     start: float = 1.0  # where the search for the amplitude of another begins
     sign: bool = False  # may be negative
     known: bool = True  # in the catalogue
+    # (trajectory) -> [(shape, balances)]: the catalogue's own form at unit size and the name of that size. What is
+    # hidden has another form, so the size that a right answer finds is that of the form that comes nearest.
+    like: Callable | None = None
+    size: str = ""
 
 
 def rate(values):
@@ -142,6 +146,15 @@ def _bristles(t, stretch):
 
 def _stribeck(t, h):
     return resisting(t.sign() * np.exp(-(np.abs(t.w / h["speed_rad_s"]) ** 1.5)))
+
+
+def _gaussian_stribeck(t):
+    speeds = np.geomspace(0.02, 0.5, 25) * max(np.quantile(np.abs(t.w), 0.98), 1e-6)
+    return [({"speed_rad_s": float(v)}, resisting(t.sign() * np.exp(-((t.w / v) ** 2)))) for v in speeds]
+
+
+def _quadratic_drag(t):
+    return [({}, resisting(t.w * np.abs(t.w)))]
 
 
 def _presliding(t, h, a):
@@ -343,7 +356,8 @@ _ALL = (
         lambda rng: {"speed_rad_s": float(rng.uniform(1.0, 3.0)), "stretch_rad": 2e-4},
         _stribeck,
         "Bristles",
-        tell=lambda a, h, p: {"excess_Nm": a, "speed_rad_s": h["speed_rad_s"]},
+        like=_gaussian_stribeck,
+        size="excess_Nm",
     ),
     Effect(
         "presliding",
@@ -418,7 +432,8 @@ _ALL = (
         _pick("power", 1.85, 2.15),
         lambda t, h: resisting(t.sign() * np.abs(t.w) ** h["power"]),
         "Drag",
-        tell=lambda a, h, p: {"quadratic_Nms2": a * 15.0 ** (h["power"] - 2.0)},  # equal at 15 rad/s
+        like=_quadratic_drag,
+        size="quadratic_Nms2",
     ),
     Effect(
         "hip_spring_bend",

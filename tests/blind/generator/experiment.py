@@ -217,6 +217,21 @@ class Experiment:
         self.apply_instruments(case, trajectory, true)
         return case.instruments.show(generator(seed, f"case {case.number} noise {run[0]}"), true)
 
+    def parameters(self, case, effect, scale, shown, amplitude, shape):
+        """What a right answer finds: the effect's own numbers, or those of the catalogue's form that comes nearest.
+
+        shown: the effect's balances.
+        """
+        if effect.like is None:
+            return effect.tell(amplitude, shape, case.base)
+        own, best = scale.outside(shown), (-1.0, {})
+        for others, unit in effect.like(scale.trajectory):
+            column = scale.outside(unit)
+            square, product = float(column @ column), float(own @ column)
+            if square > 0.0 and product * abs(product) / square > best[0]:
+                best = product * abs(product) / square, {effect.size: product / square, **others}
+        return best[1]
+
     def truth(self, case, scale, cosines):
         """What only the scorer may know."""
         causes = []
@@ -236,7 +251,7 @@ class Experiment:
                     "share_by_balance": scale.shares(shown),
                     "amplitude": amplitude,
                     "shape": shape,
-                    "parameters": effect.tell(amplitude, shape, case.base),
+                    "parameters": self.parameters(case, effect, scale, shown, amplitude, shape),
                 }
             )
         return {

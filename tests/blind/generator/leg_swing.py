@@ -52,6 +52,7 @@ class LegSwing(Experiment):
             "commutation_ripple",
             "presliding",
             "friction_warm_up",
+            "drag",
             "hip_spring_bend",
             "magnetic_hysteresis",
             "voltage_ripple_torque",
@@ -62,10 +63,6 @@ class LegSwing(Experiment):
     # slower than the bench: shapes over the speeds and angles that a leg reaches
     EFFECTS["stribeck"] = dataclasses.replace(
         ALL["stribeck"], draw=lambda rng: {"speed_rad_s": float(rng.uniform(0.1, 0.4)), "stretch_rad": 2e-4}
-    )
-    EFFECTS["drag"] = dataclasses.replace(
-        ALL["drag"],
-        tell=lambda a, h, p: {"quadratic_Nms2": a * 1.5 ** (h["power"] - 2.0)},  # equal at 1.5 rad/s
     )
     EFFECTS["sensor_lag"] = dataclasses.replace(ALL["sensor_lag"], draw=lambda rng: {"channel": "I"})
     EFFECTS["eddy_brake_saturating"] = dataclasses.replace(
