@@ -184,6 +184,20 @@ def test_the_figure_of_the_timeline_is_drawn_out_of_the_step_that_is_kept():
     assert order == sorted(order) and len(order) == 17  # nothing comes before what it comes of
 
 
+def test_the_figure_and_the_table_of_the_walk_of_2015_are_those_of_the_answer_that_is_kept():
+    program = runpy.run_path(str(ROOT / "docs" / "walk_2015_figure.py"))
+    assert program["FIGURE"].read_text(encoding="utf-8") == program["draw"]()
+    answer = json.loads(program["ANSWER"].read_text(encoding="utf-8"))
+    page = (ROOT / "docs" / "walk-2015.md").read_text(encoding="utf-8")
+    for row, extended in zip(answer["misfit"], answer["extended_features"], strict=True):
+        low, high = row["ci95"]
+        told = f"| {row['measured']:.3f} ({low:.3f} to {high:.3f}) | {row['emulated']:.3f} | {extended:.3f} |"
+        assert told in page
+    (cause,) = answer["causes"]
+    value = cause["parameters"]["term"]
+    assert f"{value['value']:.3f} rad ({value['ci95'][0]:.3f} to {value['ci95'][1]:.3f})" in page
+
+
 def test_the_tables_of_the_marathon_are_those_of_the_walks_that_are_kept():
     program = runpy.run_path(str(ROOT / "docs" / "marathon_tables.py"))
     page = program["PAGE"].read_text(encoding="utf-8")

@@ -17,7 +17,7 @@ PANELS = {
     "hip_rad": ("Hip angle, rad (inner legs ahead)", 60, 260),
     "lean_rad": ("Lean of the outer leg, rad", 310, 490),
 }
-LIMITS = {"hip_rad": (-0.5, 0.4), "lean_rad": (-0.25, 0.25)}
+LIMITS = {"hip_rad": (-0.5, 0.4), "lean_rad": (-0.3, 0.3)}
 BARS_TOP = 530
 DOTS = (770, 970)  # of the features
 SHADES = ("#eef1f4", "#dfe5eb", "#eef1f4", "#dfe5eb")
