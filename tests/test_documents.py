@@ -176,6 +176,11 @@ def test_the_figure_of_the_record_walk_is_drawn_out_of_the_walks_that_are_kept()
     assert all(row["steps"] == program["STEPS"] and row["body"] == "ranger" for row in level)
 
 
+def test_the_figure_of_the_foot_that_stood_too_high_is_drawn_out_of_the_answers_that_are_kept():
+    program = runpy.run_path(str(ROOT / "docs" / "foot_too_high_figure.py"))
+    assert program["FIGURE"].read_text(encoding="utf-8") == program["drawn"]()
+
+
 def test_the_figure_of_the_timeline_is_drawn_out_of_the_step_that_is_kept():
     program = runpy.run_path(str(ROOT / "docs" / "timeline_figure.py"))
     assert program["FIGURE"].read_text(encoding="utf-8") == program["drawn"]()

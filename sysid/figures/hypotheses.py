@@ -182,7 +182,10 @@ class Judge:
             deviance = deviance - 2.0 * evidence.log_endurance(places, self.endurance)
         spread = np.linalg.solve(whole, slopes) if others else slopes
         sds = np.zeros_like(places)
-        left = prior - prior**2 * np.einsum("mfo,mfo->mo", slopes, spread)
+        told = np.einsum("mfo,mfo->mo", slopes, spread)
+        known = self.known[others] ** 2
+        # what stands on a limit has no part in V, so that its own share is put in here
+        left = np.where(prior > 0.0, prior - prior**2 * told, known / (1.0 + known * told))
         sds[:, others] = np.sqrt(np.maximum(left, 0.0))
         mean, variance = self.simulated(evidence, places)
         return deviance, places, sds, misfit, self.measured - mean, np.sqrt(self.variance + variance)

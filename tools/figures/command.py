@@ -39,6 +39,12 @@ def register(commands: Any) -> None:
         "NAME=+0.02 for a candidate) in place of the measured ones, and see whether it is named; may be given several "
         "times",
     )
+    command.add_argument(
+        "--rounds",
+        type=whole_number(0),
+        metavar="N",
+        help="how often the best hypotheses are walked where they are best (4, or until none is left)",
+    )
     command.add_argument("--jobs", type=whole_number(1), default=2, metavar="N", help="walks at a time (2)")
     command.add_argument(
         "--out", metavar="DIR", help="folder for the answer, the corrected body, and the walks: it goes on from those"

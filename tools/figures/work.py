@@ -17,7 +17,7 @@ from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.campaigns.cases import written
 from ranger_sim.plant import body_files
 from ranger_sim.sysid.figures import file
-from ranger_sim.sysid.figures.diagnose import Diagnosis, diagnose, values_of
+from ranger_sim.sysid.figures.diagnose import ROUNDS, Diagnosis, diagnose, values_of
 from ranger_sim.sysid.figures.question import Candidate, Figure, Question
 from ranger_sim.tools import terminal
 from ranger_sim.tools.figures.walks import FIGURES, Setup, Walks
@@ -25,6 +25,7 @@ from ranger_sim.tools.files import json_target, replace_file, writable_folder
 
 EXIT_CLEAN, EXIT_FOUND = 0, 1
 OURS = pathlib.Path(__file__).parent
+FEW = 3  # suspects that a sentence names
 HIDDEN_SEEDS = range(1001, 1005)  # of the walks whose figures a blind check takes as measured: not those of the search
 
 
@@ -37,11 +38,12 @@ def run(options: argparse.Namespace) -> int:
     if not loading.RUNS_COMPILED and options.json != "-":
         console.print(f"running interpreted, slowly: {loading.RUNS_INTERPRETED_BECAUSE}", soft_wrap=True)
     walks = Walks(setup, question.candidates, options.jobs, folder)
+    rounds = ROUNDS if options.rounds is None else options.rounds
     if options.hide:
-        answer: dict[str, Any] = {"blind": [blind(walks, question, each, console) for each in options.hide]}
+        answer: dict[str, Any] = {"blind": [blind(walks, question, each, rounds, console) for each in options.hide]}
         detected = any(each["answer"]["detected"] for each in answer["blind"])
     else:
-        found = with_progress(walks, question, console, question.title)
+        found = with_progress(walks, question, rounds, console, question.title)
         answer, detected = found.answer, found.answer["detected"]
         if folder is not None and answer["causes"]:
             answer["model_file"] = corrected(folder, walks, values_of(answer))
@@ -108,7 +110,7 @@ def _within(key: body_files.Key, number: float) -> bool:
     return bool(low <= number <= high)
 
 
-def with_progress(walks: Walks, question: Question, console: Console, title: str) -> Diagnosis:
+def with_progress(walks: Walks, question: Question, rounds: int, console: Console, title: str) -> Diagnosis:
     """The diagnosis, with a bar on the screen."""
     with Progress(
         TextColumn("{task.description}"),
@@ -125,7 +127,7 @@ def with_progress(walks: Walks, question: Question, console: Console, title: str
             progress.update(task, completed=done, total=foreseen, description=f"{title}: {what}")
 
         seeds = range(1, walks.setup.seeds + 1)
-        return told_of_starts(diagnose(question, walks, seeds, tell))
+        return told_of_starts(diagnose(question, walks, seeds, tell, rounds))
 
 
 def told_of_starts(found: Diagnosis) -> Diagnosis:
@@ -140,7 +142,7 @@ def told_of_starts(found: Diagnosis) -> Diagnosis:
     return found
 
 
-def blind(walks: Walks, question: Question, text: str, console: Console) -> dict[str, Any]:
+def blind(walks: Walks, question: Question, text: str, rounds: int, console: Console) -> dict[str, Any]:
     """A wrong number hidden in the body that walks, and what the figures of that walk say of it.
 
     The figures keep the errors of their measurement. The simulator errs nowhere else here, so model_sd is left out; the
@@ -156,12 +158,14 @@ def blind(walks: Walks, question: Question, text: str, console: Console) -> dict
             continue
         values = [outcome.figures[each.name] for outcome in outcomes if each.name in outcome.figures]
         if len(values) < 2:
-            raise UserError(f"--hide {text}: the robot falls while it starts, it has no {each.name}")
+            raise UserError(
+                f"--hide {text}: the robot does not walk {walks.setup.steps} steps with it, there is no {each.name}"
+            )
         scatter = float(np.std(values, ddof=1)) / len(values) ** 0.5
         figures.append(
             dataclasses.replace(each, value=float(np.mean(values)), model_sd=scatter, source=f"of a robot with {text}")
         )
-    found = with_progress(walks, dataclasses.replace(question, figures=tuple(figures)), console, text)
+    found = with_progress(walks, dataclasses.replace(question, figures=tuple(figures)), rounds, console, text)
     return {"hidden": text, "candidate": name, "truth": value, "answer": found.answer}
 
 
@@ -262,7 +266,10 @@ def sentence(answer: Mapping[str, Any]) -> str:
     values = " and ".join(
         value_text(name, value) for cause in answer["causes"] for name, value in cause["parameters"].items()
     )
-    also = f" Perhaps also {', '.join(answer['suspects'])}." if answer["suspects"] else ""
+    also = ""
+    if answer["suspects"]:
+        few = len(answer["suspects"]) <= FEW
+        also = f" Perhaps also {', '.join(answer['suspects'])}." if few else " What else may be wrong, they do not say."
     return f"Wrong is {values}.{also}{sharper}"
 
 
