@@ -26,6 +26,7 @@ CLOCKS = ("datetime", "date_time", "date", "utc")  # columns that hold ISO dates
 SNIFFED_CELLS = 50
 NAMED_LINES = 3  # of the places of a finding, so many are named
 LARGEST_BYTES = 2_000_000_000
+MOST_LINES = 3_000_000  # each is kept as text while it is read: some hundred bytes a line
 
 
 def read(path: str | pathlib.Path, mapping: Mapping[str, str] | None = None, time_unit: str | None = None) -> Dataset:
@@ -74,6 +75,11 @@ def _lines(dataset: Dataset, path: pathlib.Path) -> list[tuple[int, str]]:
         content = path.read_bytes()
     except OSError as error:
         raise UserError(f"{path}: the table cannot be read ({error.strerror or error})") from None
+    lines = content.count(b"\n")
+    if lines > MOST_LINES:
+        raise UserError(
+            f"{path}: {lines} lines, a text table may have {MOST_LINES}: thin it out or split it, or use MF4 (.mf4)"
+        )
     encoding = "utf-16" if content[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig"
     try:
         text = content.decode(encoding)

@@ -135,7 +135,7 @@ def test_a_torque_constant_that_was_changed_stays_so_when_the_motor_warms():
 def cogging(tmp_path_factory):
     """(hidden terms, the recording, its diagnosis, the model file) of an emulated bench whose rotor cogs."""
     truth = hidden(form="cogging", amplitude_Nm=0.02 * R, periods_per_turn=7.0, phase_rad=0.7)
-    recorded = motor_run(seed=1, terms=truth, seconds=10.0)
+    recorded = motor_run(seed=1, terms=truth, seconds=6.0)
     found = diagnose(BENCH, [recorded.table(list(recorded.channels))])
     path = tmp_path_factory.mktemp("model") / "extended.toml"
     path.write_text(model_file.model_text(found), encoding="utf-8")
@@ -149,7 +149,7 @@ def test_a_term_hidden_in_the_emulated_bench_is_found_and_the_benchs_error_falls
     assert term["amplitude_Nm"] == pytest.approx(0.02 * R, rel=0.05)
     assert term["phase_rad"] == pytest.approx(0.7, abs=0.05)
     read = model_file.read(path, BENCH)
-    other = motor_run(seed=2, terms=cogging[0], seconds=4.0)  # another course of voltage and brake
+    other = motor_run(seed=2, terms=cogging[0], seconds=3.0)  # another course of voltage and brake
     before = error(other, BENCH_MOTOR, 2, BenchTerms())
     after = error(other, BENCH_MOTOR, 2, BenchTerms(read.model.terms, read.parameters))
     # what is left are the instruments, 2 mN m of the load cell and 0.03 rad/s of the speed, and at 4 s the angle that

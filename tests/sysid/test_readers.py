@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.sysid import channels, repairs, units
-from ranger_sim.sysid.readers import columns, read
+from ranger_sim.sysid.readers import columns, csv_file, read
 from ranger_sim.tools.recordings import open_recording
 from tests.boards.original_images import DATA
 
@@ -338,3 +338,12 @@ def test_a_needed_channel_that_is_missing_is_told_with_what_names_it(table):
         channels.named_for(data, "leg-swing")
     with pytest.raises(UserError, match="'bench': no such experiment; there are motor-bench, leg-swing"):
         channels.named_for(data, "bench")
+
+
+def test_a_table_of_more_lines_than_are_kept_in_memory_is_told_before_they_are(tmp_path, monkeypatch):
+    path = tmp_path / "long.csv"
+    path.write_text("t_s,x_m\n" + "".join(f"{n},1.5\n" for n in range(50)), encoding="utf-8")
+    assert len(csv_file.read(path)["x_m"].value) == 50
+    monkeypatch.setattr(csv_file, "MOST_LINES", 50)
+    with pytest.raises(UserError, match="51 lines, a text table may have 50: thin it out"):
+        csv_file.read(path)
