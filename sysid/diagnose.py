@@ -114,6 +114,7 @@ def diagnose(
                 {**dataclasses.asdict(each), "recording": ", ".join(table.name for table in tables)}
                 for each in doubts.findings
             ),
+            *({**dataclasses.asdict(each), "recording": r.table.name} for r in recordings for each in r.findings),
         ],
         "evidence": {
             "p_general": before.p,

@@ -15,7 +15,7 @@ from typing import Protocol
 
 import numpy as np
 
-from ranger_sim.sysid.dataset import Array, Table
+from ranger_sim.sysid.dataset import Array, Finding, Table
 
 Values = Mapping[str, float]
 Columns = dict[str, Array]  # by equation, each of shape (n, k): k coefficients
@@ -87,6 +87,7 @@ class Recording:
     # wrong. Then fits are plain least squares, and only the count of samples is that of independent ones.
     whitened: bool = True
     lags: tuple[int, ...] = (0, 10, 30, 100)  # samples back at which the general tests look at slopes
+    findings: list[Finding] = dataclasses.field(default_factory=list)  # what the machine noticed about the data
     entries: dict[str, Entry] = dataclasses.field(default_factory=dict)  # none where equations are instantaneous
 
 

@@ -18,11 +18,12 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
+from scipy.signal import lfilter
 
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.plant.motor_parameters import ANKLE_MOTOR
 from ranger_sim.sysid import signals
-from ranger_sim.sysid.dataset import Array, Table
+from ranger_sim.sysid.dataset import Array, Finding, Table
 from ranger_sim.sysid.machine import Columns, Effect, Equation, Known, Quantity, Recording, Values
 from ranger_sim.sysid.machines import ankle_motion
 from ranger_sim.sysid.machines.ankle_motion import (
@@ -45,8 +46,14 @@ FEWEST = 50  # rows of a run
 SMOOTH = 3.0  # samples; Gaussian under which a run's start and the rate of a measured angle are taken
 EVERY, WIDTH = 3, 1.5  # samples: rows that count, and the Gaussian over both sides
 MOST_STEPS, MOST_TRIES = 25, 8  # of the fit, and of one step's damping
+# The robot's program limits the target from below and feeds forward the return spring that it believes in: the sine
+# logs hold I_0 (docs/ankle-measured.md). A log with targets only may come of it, or of the plain law.
+FLOOR_rad, FORWARD_A_per_rad, FORWARD_REST_rad = 0.3, 0.134 / (34.0 * 0.018), 1.662
 KNOWN = 1.0  # of its value: a parameter whose error is larger is not told by these angles
 INERTIA_STARTS = (1.0, 2.5)  # of its value: the cable's ringing makes the sum of squares rugged along the inertia
+# Chosen by us: a motor's ripple is a part of its torque, cogging is of the size of its friction, and an encoder whose
+# disc is out of centre by more than 2 % of its radius does not read.
+LARGEST_RIPPLE, LARGEST_COGGING_Nm, LARGEST_ECCENTRICITY_rad = 0.5, 0.1, 0.02
 MEMORY = 10.0  # samples of a misfit that tell the same
 JOINT, MOTOR, TRANSMISSION, RATE = "joint", "motor", "transmission", "joint rate"
 ZERO = "joint_zero_rad"
@@ -77,6 +84,7 @@ class AnkleRecording(Recording):
 # torques (m,) at motor and foot of a run, for one coefficient; or what motor and joint show beside it, (m,) each
 Pair = tuple[Array, Array]
 Make = Callable[[Run, Table, Shape], list[Pair]]
+Torque = Callable[[Motion], Array]
 
 
 class Ankle:
@@ -109,7 +117,14 @@ class Ankle:
         table = signals.uniform(table)
         fit = _Fit(table, self.parameters)
         fit.improve()
+        if "command_current_A" not in table and float(np.min(table["target_angle_rad"])) < FLOOR_rad:
+            other = _Fit(table, self.parameters, of_program=True)
+            other.improve()
+            if float(other.missed @ other.missed) < float(fit.missed @ fit.missed):
+                fit = other
         recording = AnkleRecording(table, {}, {}, width=WIDTH, every=EVERY, simulated=fit.runs, values=dict(fit.values))
+        if fit.of_program:
+            recording.findings.append(_program_found(table))
         s = recording.signals = _signals(table, fit.runs)
         valid = fit.valid
         sensitivity = np.zeros((len(table), 4, len(PARAMETERS)))
@@ -154,6 +169,67 @@ class Ankle:
         ]  # fmt: skip
 
 
+@dataclasses.dataclass(frozen=True)
+class Prediction:
+    """A held-out recording in free simulation with values of another. angle, simulated, law_rad: (n,) of each row that
+    counts; law_rad: where the law alone would hold a motor without load. channel: whose angle."""
+
+    channel: str
+    time_s: Array
+    angle: Array
+    simulated: Array
+    law_rad: Array
+
+    @property
+    def rms(self) -> float:
+        """Of what the simulation misses, rad."""
+        return float(np.sqrt(np.mean((self.angle - self.simulated) ** 2)))
+
+    @property
+    def nrmse(self) -> float:
+        """That over the standard deviation of what the law leaves to explain."""
+        return self.rms / float(np.std(self.angle - self.law_rad))
+
+
+def predicted(
+    training: Table, held: Table, extra: Mapping[str, Torque] | None = None, of_program: bool = False
+) -> tuple[dict[str, float], list[Prediction]]:
+    """Values of the base and of `extra` by least squares of free simulation of `training`, and `held` with them."""
+    fit = _Fit(signals.uniform(training), Ankle.parameters, of_program, extra)
+    fit.improve()
+    other = _Fit(signals.uniform(held), Ankle.parameters, of_program, extra)
+    other.held(fit.values)
+    table, found = other.table, []
+    for channel in ("motor_angle_rad", "joint_angle_rad"):
+        if channel not in table:
+            continue
+        parts = []
+        for run in other.runs:
+            good, motion, drive = other.valid[run.rows], run.motion, run.drive
+            way = motion.p if channel == "motor_angle_rad" else motion.a
+            keep = math.exp(-table.step_s * drive.stiffness_A_per_rad / drive.dampness_As_per_rad)
+            asked = drive.command_A / drive.stiffness_A_per_rad
+            begin = [keep * float(table[channel][run.rows][0])]
+            law, _ = lfilter([1.0 - keep], [1.0, -keep], asked, zi=begin)
+            parts.append((drive.time_s, table[channel][run.rows], way[motion.rows], law, good))
+        time_s, angle, way, law, good = (np.concatenate(each) for each in zip(*parts, strict=True))
+        good = good.astype(bool)
+        zero = (
+            float(np.mean((angle - way)[good])) if "motor_angle_rad" in table and channel == "joint_angle_rad" else 0.0
+        )
+        found.append(Prediction(channel, time_s[good], angle[good], way[good] + zero, law[good]))
+    return fit.values, found
+
+
+def _program_found(table: Table) -> Finding:
+    return Finding(
+        "target_angle_rad", "law", float(table.time_s[0]), float(table.time_s[-1]), FLOOR_rad, "rad",
+        f"the law that fits has its target limited to {FLOOR_rad:g} rad from below, and {FORWARD_A_per_rad:.3f} A/rad "
+        f"of it fed forward about {FORWARD_REST_rad:g} rad, as the robot's program",
+        "note",
+    )  # fmt: skip
+
+
 def _check(table: Table) -> None:
     """UserError when the channels do not tell what the ankle was to do."""
     if "joint_angle_rad" not in table:
@@ -186,10 +262,21 @@ def _gains(table: Table) -> tuple[float, float]:
 class _Fit:
     """The base fitted to one recording: Gauss and Newton in free simulation, damped (Levenberg and Marquardt)."""
 
-    def __init__(self, table: Table, parameters: Sequence[Known]) -> None:
-        self.table, self.both = table, "motor_angle_rad" in table
+    def __init__(
+        self,
+        table: Table,
+        parameters: Sequence[Known],
+        of_program: bool = False,
+        extra: Mapping[str, "Torque"] | None = None,
+    ) -> None:
+        """extra: more torques on the foot, for one of their coefficients, by the coefficient's name."""
+        self.extra = dict(extra or {})
+        self.table, self.both, self.of_program = table, "motor_angle_rad" in table, of_program
         self.limits = {each.name: (each.low, each.high) for each in parameters}
         self.usual = {each.name: each.value for each in parameters if each.name in PARAMETERS}
+        self.usual |= {name: 0.0 for name in self.extra}
+        self.limits |= {name: (-math.inf, math.inf) for name in self.extra}
+        self.all = [*PARAMETERS, *self.extra]
         self.values = dict(self.usual)
         K, D = _gains(table)
         self.valid = np.zeros(len(table), dtype=bool)
@@ -202,14 +289,19 @@ class _Fit:
             if "command_current_A" in table:
                 command = table["command_current_A"][rows]
             else:
-                command = K * table["target_angle_rad"][rows] + D * table["target_rate_rad_per_s"][rows]
+                target = table["target_angle_rad"][rows]
+                if of_program:
+                    target = np.maximum(target, FLOOR_rad)
+                command = K * target + D * table["target_rate_rad_per_s"][rows]
+                if of_program:
+                    command = command + FORWARD_A_per_rad * (target - FORWARD_REST_rad)
             drive = Drive(t, command, K, D)
             motion = ankle_motion.simulated(drive, self.values, self._at_rest(rows, self._guess(rows), self.values))
             target, target_rate = self._target(rows, command / K)
             self.runs.append(Run(rows, drive, motion, *(np.interp(motion.time_s, t, x) for x in (target, target_rate))))
         if not self.runs:
             raise UserError(f"{table.name}: ankle needs a stretch of {SHORTEST_S:g} s without a gap")
-        self.free = list(PARAMETERS)
+        self.free = list(self.all)
         self.missed = self._missed([run.motion for run in self.runs])
 
     def _guess(self, rows: slice) -> Array:
@@ -266,6 +358,9 @@ class _Fit:
         def part(number: int) -> tuple[Array, Array]:
             motion = self.runs[number].motion
             slopes = ankle_motion.sensitivities(motion)[motion.rows]
+            if self.extra:
+                pushed = np.column_stack([torque(motion) for torque in self.extra.values()])
+                slopes = np.concatenate([slopes, motion.answer(np.zeros_like(pushed), pushed)[motion.rows]], axis=2)
             return slopes[:, 0], slopes[:, 2]
 
         return self._stacked(part)
@@ -286,7 +381,7 @@ class _Fit:
             self._take(*min(starts, key=lambda each: each[0])[1:])
         blind = self._untold()
         if blind:
-            self.free = [name for name in PARAMETERS if name not in blind]
+            self.free = [name for name in self.all if name not in blind]
             self.values = dict(self.usual)
             moved = self._moved(self.values)
             if moved is not None:
@@ -295,7 +390,7 @@ class _Fit:
 
     def _settle(self) -> None:
         damping = 1e-3
-        which = [PARAMETERS.index(name) for name in self.free]
+        which = [self.all.index(name) for name in self.free]
         for _ in range(MOST_STEPS):
             slopes = self._slopes()[:, which]
             lengths = np.maximum(np.linalg.norm(slopes, axis=0), 1e-12)
@@ -323,13 +418,28 @@ class _Fit:
         try:
             motions = [
                 ankle_motion.simulated(
-                    run.drive, values, self._at_rest(run.rows, run.motion.states[:, run.motion.rows], values)
+                    run.drive,
+                    values,
+                    self._at_rest(run.rows, run.motion.states[:, run.motion.rows], values),
+                    self._torques(values),
                 )
                 for run in self.runs
             ]
         except UserError:
             return None
         return motions, self._missed(motions)
+
+    def _torques(self, values: Values) -> ankle_motion.Torques | None:
+        if not any(values[name] for name in self.extra):
+            return None
+        return lambda m: (_none(m), sum((values[name] * torque(m) for name, torque in self.extra.items()), _none(m)))
+
+    def held(self, values: Values) -> None:
+        """Takes these values as they are."""
+        moved = self._moved(values)
+        if moved is None:
+            raise UserError(f"{self.table.name}: the ankle cannot be simulated with these values")
+        self._take(values, *moved)
 
     def _take(self, values: Mapping[str, float], motions: Sequence[Motion], missed: Array) -> None:
         self.values, self.missed = dict(values), missed
@@ -345,7 +455,7 @@ class _Fit:
         error = level / (lengths * beside)
         return [
             name
-            for name, each in zip(PARAMETERS, error, strict=True)
+            for name, each in zip(self.all, error, strict=True)
             if name == INERTIA and each > KNOWN * self.usual[name]
         ]
 
@@ -409,6 +519,11 @@ def _effect(
 ) -> Effect:
     key = f"{cause} at {at}: {', '.join(coefficients)}"
     return Effect(cause, at, subsystem, coefficients, shapes, _columns(key, make, shown), admissible, meaning, form)
+
+
+def _below(limit: float) -> Callable[[Mapping[str, float]], bool]:
+    """Amplitude of a cosine and a sine within a limit."""
+    return lambda found: math.hypot(*(v for k, v in found.items() if k.startswith(("cosine", "sine")))) < limit
 
 
 def _none(m: Motion) -> Array:
@@ -484,8 +599,24 @@ def _periodic() -> list[Effect]:
     )
     M, at = "mechanical", "inner_motor"
     made = [
-        _effect("cogging", at, M, ("cosine_Nm", "sine_Nm"), wave(lambda m: 1.0), turns),
-        _effect("commutation_ripple", at, M, ("cosine", "sine"), wave(lambda m: ankle_motion.GEAR_K * m.I), turns),
+        _effect(
+            "cogging",
+            at,
+            M,
+            ("cosine_Nm", "sine_Nm"),
+            wave(lambda m: 1.0),
+            turns,
+            admissible=_below(LARGEST_COGGING_Nm),
+        ),
+        _effect(
+            "commutation_ripple",
+            at,
+            M,
+            ("cosine", "sine"),
+            wave(lambda m: ankle_motion.GEAR_K * m.I),
+            turns,
+            admissible=_below(LARGEST_RIPPLE),
+        ),
     ]
     made = [dataclasses.replace(each, phase_is_free=True) for each in made]
     return [
@@ -542,7 +673,8 @@ def _sensors(both: bool, rate: bool) -> list[Effect]:
     found = [
         _effect("sensor_scale", "joint_angle_rad", S, ("change",), joint(lambda m, _: m.a), shown=True),
         _effect("sensor_lag", "joint_angle_rad", S, ("time_constant_s",), joint(lambda m, _: -m.w), shown=True),
-        _effect("eccentricity", "joint_angle_rad", S, ("cosine_rad", "sine_rad"), joint(*waves), turns, shown=True),
+        _effect("eccentricity", "joint_angle_rad", S, ("cosine_rad", "sine_rad"), joint(*waves), turns, shown=True,
+                admissible=_below(LARGEST_ECCENTRICITY_rad)),
         _effect("clock_drift", "joint_angle_rad", S, ("share",),
                 joint(lambda m, _: -m.w * (m.time_s - m.time_s[0])), shown=True),
     ]  # fmt: skip
