@@ -95,8 +95,17 @@ def cause_of(found: Diagnosis, each: Named, cause: dict[str, Any], sides: dict[s
             for name, behind in rivals
         ],
         "figure": marked(figures.of_cause(found, each, sides)),
-        "looks": {name: text for name, text in looks.items() if text},
+        "looks": once(looks),
     }
+
+
+def once(texts: dict[str, str]) -> dict[str, str]:
+    """Each text under the first of its names; empty ones left out."""
+    first: dict[str, str] = {}
+    for name, text in texts.items():
+        if text and text not in first.values():
+            first[name] = text
+    return first
 
 
 def amplitude(found: Diagnosis, each: Named) -> dict[str, float] | None:
