@@ -4,8 +4,8 @@
     J_A p'' = T(I, p') - k_s (p - a) + m      T of EQUATIONS 2.1; m, f: torques of effects beside the base model
     J_f a'' = k_s (p - a) - k_r a + b + f     EQUATIONS 2.3, 2.7 with b = k_r a_0
 
-The whole motion is one system of equations (trapezoids, EQUATIONS nothing else): Newton's method finds it, and the
-factors of its matrix answer what any small torque beside the base would do to every angle. The law's damping on the
+The whole motion is one system of equations, one trapezoid for every step: Newton's method finds it, and the factors of
+its matrix answer what any small torque beside the base would do to every angle. The law's damping on the
 rotor is faster (540 1/s) than a log is dense, so explicit steps would have to be far smaller.
 """
 
@@ -51,8 +51,8 @@ class Drive:
 
 @dataclasses.dataclass
 class Motion:
-    """A simulated run. p, u, a, w: angle and rate of motor and joint; I: current; friction: its tanh, all of shape (m,)
-    at every step; slopes: their rates, (4, m); rows: the steps that the log has."""
+    """A simulated run. p, u, a, w: angle and rate of motor and joint; I: current; sliding: the friction's tanh,
+    all of shape (m,) at every step; slopes: rates of the four states; rows: the steps that the log has."""
 
     time_s: Array
     states: Array  # (4, m)
