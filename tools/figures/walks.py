@@ -64,13 +64,14 @@ class Setup:
     @classmethod
     def of(cls, path: pathlib.Path, table: Mapping[str, Any]) -> "Setup":
         """From the [run] of a file. UserError for what it does not have."""
-        kinds = {field.name: field.type for field in dataclasses.fields(cls)}
+        defaults = dataclasses.asdict(cls())
         for key, value in table.items():
-            if key not in kinds:
-                raise UserError(f"{path}: [run] {key}: there is no such key, but {', '.join(kinds)}")
-            wanted = {str: str, int: int, float: (int, float)}[kinds[key]]  # type: ignore[index]
+            if key not in defaults:
+                raise UserError(f"{path}: [run] {key}: there is no such key, but {', '.join(defaults)}")
+            kind = type(defaults[key])
+            wanted = (int, float) if kind is float else (kind,)
             if not isinstance(value, wanted) or isinstance(value, bool):
-                raise UserError(f"{path}: [run] {key} = {value!r}: {kinds[key].__name__} is expected")  # type: ignore[union-attr]
+                raise UserError(f"{path}: [run] {key} = {value!r}: {kind.__name__} is expected")
         setup = cls(**table)
         if setup.steps < LEAST_STEPS or setup.seeds < 2 or not 0 <= setup.settle_steps < setup.steps:
             raise UserError(

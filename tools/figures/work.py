@@ -71,9 +71,9 @@ def asked(options: argparse.Namespace) -> tuple[Setup, Question]:
     setup = Setup.of(path, {**data.get("run", {}), **{key: value for key, value in changes.items() if value}})
     question = file.question(path, data, setup.number)
     question = dataclasses.replace(question, figures=(*question.figures, *map(typed_figure, options.also)))
-    for each in (*question.gait, *question.measurements):
-        if each.name not in FIGURES:
-            raise UserError(f"{path}: figure {each.name}: a walk has none of this name, but {', '.join(FIGURES)}")
+    for each in [*(figure.name for figure in question.gait), *(wanted.name for wanted in question.measurements)]:
+        if each not in FIGURES:
+            raise UserError(f"{path}: figure {each}: a walk has none of this name, but {', '.join(FIGURES)}")
     limits_met(path, setup, question.candidates)
     return setup, question
 
