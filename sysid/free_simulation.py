@@ -362,6 +362,10 @@ class SimulatedMachine(abc.ABC):
         """More signals along the trajectory for `terms`."""
         return {}
 
+    def counts(self, along: Quantities, table: Table) -> dict[str, np.ndarray]:
+        """By output, (n,): False for samples that say nothing of it; an output that is not told counts always."""
+        return {}
+
     def looked_over(self, recording: SimulatedRecording) -> dict[str, dict[str, Array]]:
         """For ports and equations the signals over which a misfit is looked for without a cause in mind."""
         everything = {name: recording.signals[name] for name in (*self.states, "t")}
@@ -587,10 +591,11 @@ class _Fit:
         along |= {each.channel: self.lin.output[:, i] for i, each in enumerate(machine.outputs)}
         along["t"] = table.time_s - table.time_s[0]
         along |= machine.extra_signals(along, table)
-        valid = np.ones(len(table), dtype=bool)
+        counts = machine.counts(along, table)
         equations = {}
         for number, each in enumerate(machine.outputs):
             columns = {name: self.columns[:, number, i] for i, name in enumerate(self.names)}
+            valid = counts.get(each.channel, np.ones(len(table), dtype=bool))
             response = self.response[:, number] + self.columns[:, number] @ self.p_at
             equations[each.channel] = Equation(
                 each.channel, each.letter, each.subsystem, each.unit, response, columns, valid

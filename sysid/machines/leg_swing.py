@@ -42,14 +42,17 @@ GRAVITY_M_PER_S2 = 9.81
 HIP_GEAR = 66.0
 GUESS_S = 0.02  # Gaussian under which the angle's first guess lies: ten times faster than the leg's own swing
 CURRENT_S = 0.003  # Gaussian under the measured current whose slope the inductance is multiplied with
+CALM_S = 0.04  # Gaussian under the current by which a misfit is sorted: four times the memory of a converter's noise
 FINE_S = 0.002  # longest step of the integration: friction settles in some milliseconds where it holds
 # Where friction holds it may be anything up to its limit (eq. 35). Below this rate it is open, with a memory of OPEN_S:
 # such stretches tell little of torques. One count of the encoder (0.77 mrad) takes 0.08 s there. Chosen by us.
 STANDSTILL_RAD_S = 0.01
 OPEN_S = 0.01
 MOVES_RAD_S = 0.03
+JUMP_SHARE, JUMP_ROWS = 0.03, 4  # of the voltage's range within a sample; samples before and after. Chosen by us
+LARGEST_ECCENTRICITY_RAD = 0.01  # a disc of 10 mm radius that lies 0.1 mm beside its axis; chosen by us
 SLIDES_RAD = (0.0001, 0.0003, 0.001, 0.003, 0.01, 0.03, 0.1)
-AHEAD_OF_COMMUTATOR = 0.02  # of the largest voltage, within which a sensor's step at duty zero is passed
+NEAR_ZERO_DUTY = 0.02  # of the largest voltage, within which a sensor's step at duty zero is passed
 
 M, E, S = "mechanical", "electrical", "sensor"
 Made = Callable[[SimulatedRecording, Shape, Values], Ports]
@@ -210,10 +213,22 @@ class _Leg(SimulatedMachine):
             made["dV"] = signals.derivative(table, along["V"], slope_s)
         return made
 
+    def counts(self, along: Quantities, table: Table) -> dict[str, np.ndarray]:
+        """Not the current about a jump of the voltage or a turn of its sign: nobody knows when between two samples."""
+        if not self.with_voltage:
+            return {}
+        V, sign = along["V"], along["sgn_I"]
+        jump = np.abs(np.diff(V, prepend=V[0])) > JUMP_SHARE * np.ptp(V)
+        turn = np.diff(sign, prepend=sign[0]) != 0.0
+        near = np.convolve(jump | turn, np.ones(2 * JUMP_ROWS + 1), mode="same")
+        return {"current_A": near < 0.5}
+
     def looked_over(self, recording: SimulatedRecording) -> dict[str, dict[str, Array]]:
         """An unknown torque that depends on the motion, and an unknown drop."""
         s = recording.signals
-        motion = {"q": s["q"], "w": s["w_moving"], "I": s["I"], "t": s["t"]}
+        # A level held has no cells of its own noise, which is in the residual as well
+        calm = signals.smooth(recording.table, s["I"], CALM_S / recording.table.step_s)
+        motion = {"q": s["q"], "w": s["w_moving"], "I": calm, "t": s["t"]}
         found = {"torque_Nm": motion}
         if self.with_voltage:
             found["drop_V"] = {name: motion[name] for name in ("I", "w", "t")}
@@ -338,7 +353,8 @@ def _angle() -> list[Term]:
     return [
         Term("sensor_lag", angle, S, ("time_constant_s",), lambda r, *_: {"angle_shown_rad": -r.signals["w"]}),
         Term("eccentricity", angle, S, ("cosine_rad", "sine_rad"), eccentric,
-             [{"periods_per_turn": n} for n in (1.0, 2.0)]),
+             [{"periods_per_turn": n} for n in (1.0, 2.0)],
+             lambda found: np.hypot(found["cosine_rad"], found["sine_rad"]) < LARGEST_ECCENTRICITY_RAD),
     ]  # fmt: skip
 
 
@@ -355,7 +371,7 @@ def _current_shown(top_V: float | None) -> list[Term]:
     ]
     if top_V is None:
         return [*made, Term("current_step_at_zero_duty", at, S, ("offset_A",), shown(lambda s: s["sgn_I"]))]
-    near_V = AHEAD_OF_COMMUTATOR * top_V
+    near_V = NEAR_ZERO_DUTY * top_V
     return [
         *made,
         Term("sensor_offset", at, S, ("offset_A",), shown(lambda s: np.ones_like(s["I"]))),

@@ -1,5 +1,6 @@
 """The free simulation against another integrator, and a user's arm whose data come from that integrator as well."""
 
+import json
 import pathlib
 import sys
 
@@ -12,6 +13,7 @@ from ranger_sim.foundation.user_error import UserError
 from ranger_sim.sysid.dataset import Table
 from ranger_sim.sysid.diagnose import diagnose
 from ranger_sim.sysid.free_simulation import Predictor, _Fit
+from ranger_sim.tools.cli import main
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "examples"))
@@ -109,3 +111,19 @@ def test_a_recording_that_says_nothing_is_told_in_a_sentence():
         ServoArm().prepare(run.part(slice(0, 200)))
     with pytest.raises(UserError, match="no voltage: servo-arm needs voltage_V; there are angle_rad"):
         ServoArm().prepare(Table(run.time_s, {"angle_rad": run["angle_rad"]}, run.runs, "no voltage"))
+
+
+def test_a_users_arm_is_diagnosed_by_the_command(tmp_path, monkeypatch, capsys):
+    """The example as its document has it: a supply that sags, by name, with its size, on two runs."""
+    monkeypatch.chdir(ROOT)
+    for seed in (7, 8):
+        run = log(seed, lost=lambda v: 0.004 * v * abs(v))
+        rows = np.column_stack((run.time_s, run["voltage_V"], run["angle_rad"]))
+        np.savetxt(tmp_path / f"{seed}.csv", rows, "%.9g", ",", header="t_s,voltage_V,angle_rad", comments="")
+    one, other = str(tmp_path / "7.csv"), str(tmp_path / "8.csv")
+    arguments = ["--experiment", "examples.servo_arm:ServoArm", "--json", str(tmp_path / "found.json")]
+    assert main(["diagnose", one, "--holdout", other, *arguments]) == 1
+    assert "servo-arm: the electrical part is wrong: supply_sag at supply." in capsys.readouterr().out
+    (cause,) = json.loads((tmp_path / "found.json").read_text(encoding="utf-8"))["causes"]
+    low, high = cause["parameters"]["per_V"]["ci95"]
+    assert low < 0.004 < high
