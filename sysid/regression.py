@@ -114,13 +114,13 @@ class Regression:
         self.names += list(extra_names)
         self.count = len(self.names)
         self.parts = {name: self._part(name, extra, list(extra_names)) for name in self.equations}
+        self.whitening: dict[str, Whitening] = {}
+        self.shared: dict[tuple[str, str], float] = {}
         counted = sum(int(np.count_nonzero(self._good(name))) for name in self.equations)
         if counted <= 10 * self.count:
             names = ", ".join(recording.table.name for recording in self.recordings)
             raise UserError(f"{names}: {counted} samples count, too few for {self.count} parameters")
         if noise is None:
-            self.whitening: dict[str, Whitening] = {}
-            self.shared: dict[tuple[str, str], float] = {}
             self._find_whitening()
         else:
             self.whitening, self.shared = noise.whitening, noise.shared
@@ -159,15 +159,15 @@ class Regression:
                 coefficients = autoregression(np.where(part.valid, residual, 0.0), part.valid)
                 memory = 1.0
                 if not all(recording.whitened for recording in self.recordings):
-                    # N_eff = N (1 - rho) / (1 + rho) with the first autocorrelation
-                    both = part.valid[1:] & part.valid[:-1]
-                    total = float(np.mean(residual[part.valid] ** 2)) if np.any(part.valid) else 1.0
-                    rho = float(np.mean(residual[1:][both] * residual[:-1][both])) / total if np.any(both) else 0.0
+                    # N_eff = N (1 - rho) / (1 + rho) with the first autocorrelation, of rows that count one after another
+                    kept = residual[part.valid]
+                    total = float(np.mean(kept**2)) if len(kept) else 1.0
+                    rho = float(np.mean(kept[1:] * kept[:-1])) / total if len(kept) > 1 and total > 0.0 else 0.0
                     rho = min(max(rho, 0.0), 0.99)
                     memory = float(np.sqrt((1.0 + rho) / (1.0 - rho)))
                     coefficients = np.zeros(ORDER)
                 white = lfilter(np.concatenate(([1.0], -coefficients)), [1.0], residual)
-                good = self._good(name)
+                good = self._good(name, coefficients)
                 deviation = float(np.sqrt(np.mean(white[good] ** 2))) if np.any(good) else 1.0
                 least = LEAST * float(np.max(np.abs(part.response), initial=0.0)) or 1.0
                 self.whitening[name] = Whitening(coefficients, max(memory * deviation, least))
@@ -178,13 +178,16 @@ class Regression:
                     a, b = self._scaled(one, residuals[one])[both], self._scaled(other, residuals[other])[both]
                     self.shared[one, other] = float(np.clip(np.mean(a * b), -0.98, 0.98))
 
-    def _good(self, equation: str) -> np.ndarray:
-        """Rows that count: valid with everything before them that the whitening looks at."""
+    def _good(self, equation: str, coefficients: Array | None = None) -> np.ndarray:
+        """Rows that count: valid with everything before them that the whitening looks at, none when it looks at none."""
         part = self.parts[equation]
         good = part.valid & ~part.starts
-        for lag in range(1, ORDER + 1):
-            good[lag:] &= part.valid[:-lag]
-        good[:ORDER] = False
+        if coefficients is None and equation in self.whitening:
+            coefficients = self.whitening[equation].coefficients
+        if coefficients is not None and np.any(coefficients):
+            for lag in range(1, ORDER + 1):
+                good[lag:] &= part.valid[:-lag]
+            good[:ORDER] = False
         return good
 
     def _scaled(self, equation: str, column: Array) -> Array:

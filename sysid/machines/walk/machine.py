@@ -1,0 +1,432 @@
+"""Whole walking logs: balances of single stance and swing, closures at strikes, encoders, drives; as channels allow.
+
+    floor       0 = ankle's torque - C dF - moments of everything about the contact point        EQUATIONS 5, 9.1
+    legs        0 = both legs about the stance ankle, which needs no torque of the hip
+    hip         what the hip's motor must do = K I - mu K |I| sgn w - C_0 sgn w
+    outer foot, inner foot   foot in the air: its inertia against cable and return spring
+    closure     at a strike both soles are on the floor: slope of what the gyro adds up to
+    hip drive, ...           stage's power = R I^2 + V_c |I| + K w I + gates
+    hip winding, ...         V = R I + V_c sgn I + K w
+    hip encoders, ...        rate against the angle's derivative
+
+What differs from robot to robot is fitted (a drive's R, K and friction, zeros of motor encoders, the gyro's lag and the
+constant of its integral); what the body file knows is not: its deviation is a cause. `Numbers` says what that is.
+"""
+
+import dataclasses
+import functools
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+from scipy import ndimage
+
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.plant import body_files
+from ranger_sim.sysid import channels, signals
+from ranger_sim.sysid.dataset import Array, Dataset, Table
+from ranger_sim.sysid.machine import Columns, Effect, Equation, Known, Quantity, Recording, Values
+from ranger_sim.sysid.machines.walk import mechanics, strikes
+from ranger_sim.sysid.machines.walk.mechanics import LEGS, Course, Left, Motion, Numbers
+from ranger_sim.sysid.machines.walk.timebase import even_table, freshness
+
+SMOOTH_S = 0.020  # Gaussian of all courses: stamps of 2 ms leave 0.3 rad/s^2 of noise in the hip's acceleration
+SPACING_S = 2.0 * SMOOTH_S  # of rows that count: nearer ones say the same
+AFTER_S, BEFORE_S = 0.150, 0.070  # of a strike that do not count: three Gaussians, and the trailing foot's push before
+UNSURE_S = 0.040  # more on either side where strikes are told by the hip alone
+STEADY_A = 0.6  # between neighbouring samples of a slow current: more, and nobody knows when it changed
+GYRO_BIAS_RAD_S = -0.004  # as the firmware of 2011 takes it off (robot.md C3.1); the leg's rate counts the other way
+GYRO_BIAS_REACH_RAD_S = 0.02  # of any sound gyro: its log at rest spans -0.006 to 0.024 (robot.md C6.2)
+LOAD_FRICTION = 0.1  # mu of the hip's gearhead: appendix table 3; the constant itself is fitted
+SIGN_RAD_S = 0.1  # rate over which a sign goes over, twice the friction smoothing of the plant
+FEWEST_ROWS = 60  # of an equation that says anything
+
+ANGLES = ("hip_angle_rad", "outer_ankle_angle_rad", "inner_ankle_angle_rad", "outer_motor_angle_rad",
+          "inner_motor_angle_rad")  # fmt: skip
+LEAN = ("outer_leg_angle_rad", "outer_leg_rate_rad_per_s")
+MOTORS = {"hip": "hip", "outer_ankle": "outer", "inner_ankle": "inner"}
+NEEDS = {
+    "hip (spring, masses)": "hip_angle_rad, outer_leg_rate_rad_per_s or outer_leg_angle_rad, both ankle angles, "
+    "hip_current_A",
+    "floor and legs (geometry, masses, zeros)": "hip_angle_rad, outer_leg_rate_rad_per_s or outer_leg_angle_rad, both "
+    "ankle angles, outer_motor_angle_rad and inner_motor_angle_rad",
+    "a foot in the air (cable)": "its ankle's and its motor's angle, and the above",
+    "a drive (resistance, constant)": "its battery power, current, and rate or angle",
+    "a winding": "its voltage, current, and rate or angle",
+    "encoders": "an angle and its rate",
+}
+
+
+@dataclasses.dataclass
+class Rows:
+    """One equation before it is linear: response(numbers) -> (k,) at the rows `where`, and columns that are measured."""
+
+    name: str
+    letter: str
+    subsystem: str
+    unit: str
+    where: np.ndarray
+    left: Callable[[Numbers], Array]
+    base: tuple[str, ...] = ()  # fields of Numbers that are fitted
+    columns: dict[str, Array] = dataclasses.field(default_factory=dict)  # (n,), by parameter
+
+
+@dataclasses.dataclass
+class WalkRecording(Recording):
+    """A recording with its equations as functions of `Numbers`, for the effects' columns."""
+
+    rows: list[Rows] = dataclasses.field(default_factory=list)
+    numbers: Numbers = dataclasses.field(default_factory=lambda: _numbers("ranger")[0])
+    gyro_bias_rad_s: float = 0.0  # beyond the known one, by closures
+    loads: dict[str, Array] = dataclasses.field(default_factory=dict)  # N m, of the cable, by equation
+    seen: dict[str, Array] = dataclasses.field(default_factory=dict)
+
+    def slope(self, equation: str, changes: tuple[tuple[str, float], ...]) -> Array:
+        """(n,) minus the derivative of what an equation leaves, on a change of numbers: {field: weight}."""
+        key = f"{equation} by {changes}"
+        if key not in self.seen:
+            rows = next(each for each in self.rows if each.name == equation)
+            steps = {field: weight * STEP for field, weight in changes}
+            up, down = (_moved(self.numbers, steps, sign) for sign in (1.0, -1.0))
+            out = np.zeros(len(self.table))
+            out[rows.where] = -(rows.left(up) - rows.left(down)) / (2.0 * STEP)
+            self.seen[key] = out
+        return self.seen[key]
+
+
+STEP = 1e-4  # of differences; all numbers are between 0.001 and 20 in SI, and residuals nearly linear in them
+
+
+def _moved(numbers: Numbers, steps: Mapping[str, float], sign: float) -> Numbers:
+    return dataclasses.replace(
+        numbers, **{field: getattr(numbers, field) + sign * step for field, step in steps.items()}
+    )
+
+
+@functools.cache
+def _numbers(body: str) -> tuple[Numbers, float]:
+    """Numbers of a body by name or file, and the joint angle of its sweet spot."""
+    p = body_files.load(body).parameters
+    return Numbers.of(p), p.ankle_zero_rad
+
+
+class Walk:
+    """body: the model that is diagnosed, by name or as a .toml file."""
+
+    name = "walk"
+    quantities = tuple(
+        Quantity(each.name, each.unit, each.meaning, needed=False) for each in channels.EXPERIMENTS["walk"].channels
+    )
+
+    def __init__(self, body: str = "ranger") -> None:
+        self.numbers, self.ankle_zero_rad = _numbers(body)
+        self.parameters = tuple(_known())
+
+    def table(self, dataset: Dataset, names: Sequence[str]) -> Table:
+        """The channels, which come at rates of their own, on one time base."""
+        return even_table(dataset, list(names), (*ANGLES, *LEAN))
+
+    def prepare(self, table: Table) -> Recording:
+        """Courses, strikes and every equation whose channels are there; UserError when there is none."""
+        table = signals.uniform(table)
+        recording = WalkRecording(table, {"t": table.time_s - table.time_s[0]}, {}, whitened=False, lags=(0,))
+        recording.numbers = self.numbers
+        motion, stands, single = self._motion(table, recording)
+        rows: list[Rows] = []
+        if motion is not None:
+            rows += _stance_rows(table, motion, stands, single, recording)
+        rows += _drive_rows(table, single)
+        rows += _encoder_rows(table, single)
+        recording.rows = [each for each in rows if len(each.where) >= (8 if each.name == "closure" else FEWEST_ROWS)]
+        if not recording.rows:
+            raise UserError(_nothing(table))
+        for each in recording.rows:
+            recording.equations[each.name] = _equation(recording, each, self.numbers)
+        return recording
+
+    def _motion(self, table: Table, recording: WalkRecording) -> tuple[Motion | None, np.ndarray, np.ndarray]:
+        """Smoothed courses; which leg stands; single stance. No motion without hip, lean and both ankles."""
+        everywhere = np.ones(len(table), dtype=bool)
+        nobody = np.full(len(table), -1)
+        if "hip_angle_rad" not in table:
+            return None, nobody, everywhere
+        touches = strikes.find(table)
+        unsure = 0.0 if strikes.by_contact(table) else UNSURE_S
+        stands, single = strikes.standing(table, touches, AFTER_S + unsure, BEFORE_S + unsure)
+        single &= _inside(table, 3.0 * SMOOTH_S)
+        both = all(name in table for name in ANGLES[1:3])
+        lean = [name for name in LEAN if name in table]
+        hip = _course(table, table["hip_angle_rad"])
+        recording.signals |= {"hip": hip[0], "hip_rate": hip[1], "stands": stands.astype(float)}
+        recording.regimes = {"on outer feet": stands == 0, "on inner feet": stands == 1, "swing": single}
+        if not (both and lean and np.any(single)):
+            return None, stands, single
+        joints = [table[name] - self.ankle_zero_rad for name in ANGLES[1:3]]
+        if "outer_leg_angle_rad" in table:
+            leg = _course(table, table["outer_leg_angle_rad"])
+            if "outer_leg_rate_rad_per_s" in table:
+                rate = table["outer_leg_rate_rad_per_s"] + GYRO_BIAS_RAD_S
+                leg = _course(table, table["outer_leg_angle_rad"], rate)
+        else:
+            leg = self._integrated(table, touches, joints, recording)
+        ankles = tuple(_course(table, joint) for joint in joints)
+        motors = tuple(
+            _course(table, table[name] - self.ankle_zero_rad) if name in table else None for name in ANGLES[3:]
+        )
+        motion = Motion(hip, leg, (ankles[0], ankles[1]), (motors[0], motors[1]))
+        recording.signals |= {"lean": leg[0] - np.where(stands == 1, hip[0], 0.0), "lean_rate": leg[1]}
+        return motion, stands, single
+
+    def _integrated(
+        self, table: Table, touches: Sequence[strikes.Strike], joints: Sequence[Array], recording: WalkRecording
+    ) -> Course:
+        """The outer leg's lean by the gyro: in each run a constant, and one bias in all, by the closures at strikes."""
+        rate = table["outer_leg_rate_rad_per_s"] + GYRO_BIAS_RAD_S
+        lean = np.zeros(len(table))
+        for run in table.runs:
+            steps = 0.5 * (rate[run][1:] + rate[run][:-1]) * table.step_s
+            lean[run] = np.concatenate(([0.0], np.cumsum(steps)))
+        places = np.array([int(np.searchsorted(table.time_s, each.time_s)) for each in touches], dtype=int)
+        kept = [number for number, place in enumerate(places) if place < len(table)]
+        runs = np.array([touches[number].run for number in kept], dtype=int)
+        places = places[kept]
+        offsets = _closing(self.numbers, table, lean, joints, places)
+        good = np.isfinite(offsets) & (np.abs(offsets - np.nanmedian(offsets)) < 3.0)
+        runs, places, offsets = runs[good], places[good], offsets[good]
+        time_s = table.time_s - 0.5 * (table.time_s[0] + table.time_s[-1])
+        if len(places) < 6:
+            return _course(table, lean, rate)
+        numbers = np.unique(runs)
+        basis = np.column_stack([*(runs == number for number in numbers), time_s[places]]).astype(float)
+        found = np.linalg.lstsq(basis, offsets, rcond=None)[0]
+        left = offsets - basis @ found
+        near = np.abs(left) < 3.0 * max(float(np.median(np.abs(left))) / 0.6745, 1e-4)
+        found = np.linalg.lstsq(basis[near], offsets[near], rcond=None)[0]
+        drift = float(found[-1])
+        recording.gyro_bias_rad_s = -drift
+        lean += drift * time_s
+        rate = rate + drift
+        for number, constant in zip(numbers, found[:-1], strict=True):
+            lean[table.runs[number]] += constant
+        return _course(table, lean, rate)
+
+    def generic(self, recording: Recording) -> dict[str, dict[str, Array]]:
+        """Signals over which each equation is looked at without a cause in mind."""
+        s = recording.signals
+        out: dict[str, dict[str, Array]] = {}
+        for name, equation in recording.equations.items():
+            wanted = ["hip", "lean", "t"] if equation.letter == "M" else ["t"]
+            wanted += [name] if name in s else []
+            out[name] = {each: s[each] for each in wanted if each in s}
+        return out
+
+    def effects(self, recordings: Sequence[Recording]) -> list[Effect]:
+        """The catalogue's causes that such a log can have."""
+        from ranger_sim.sysid.machines.walk import causes
+
+        walks = [each for each in recordings if isinstance(each, WalkRecording)]
+        return causes.made(walks)
+
+
+def _known() -> list[Known]:
+    """Base parameters of all equations, with limits beyond which no robot is (chosen by us: ten times either way)."""
+    from ranger_sim.sysid.machines.walk.base import PARAMETERS
+
+    return list(PARAMETERS)
+
+
+def _slope(table: Table, column: Array) -> Array:
+    """Rate of a column, run by run."""
+    return signals.per_run(
+        table, lambda part: np.gradient(part, table.step_s) if len(part) > 1 else 0.0 * part, column
+    )
+
+
+def _course(table: Table, column: Array, rate: Array | None = None) -> Course:
+    """A column under the Gaussian, with rate, acceleration and that one's rate; `rate`: measured, in place of its slope."""
+    width = SMOOTH_S / table.step_s
+    smooth = signals.smooth(table, column, width)
+    first = _slope(table, smooth) if rate is None else signals.smooth(table, rate, width)
+    second = _slope(table, first)
+    return smooth, first, second, _slope(table, second)
+
+
+def _inside(table: Table, reach_s: float) -> np.ndarray:
+    """True farther than reach_s from both ends of a run."""
+    out = np.zeros(len(table), dtype=bool)
+    for run in table.runs:
+        time_s = table.time_s[run]
+        out[run] = (time_s > time_s[0] + reach_s) & (time_s < time_s[-1] - reach_s)
+    return out
+
+
+def _closing(numbers: Numbers, table: Table, lean: Array, joints: Sequence[Array], places: np.ndarray) -> Array:
+    """What must be added to the outer leg's lean at each strike for both soles to be on the floor, (k,); nan: nothing."""
+    zeros = np.zeros(len(places))
+    hip = (table["hip_angle_rad"][places], zeros, zeros, zeros)
+    ankles = tuple((joint[places], zeros, zeros, zeros) for joint in joints)
+    offset = 0.5 * hip[0] - lean[places]  # legs alike: the outer leg leans by half of the angle between them
+    for _ in range(12):
+        gaps = []
+        for change in (0.0, 1e-5):
+            leg = (lean[places] + offset + change, zeros, zeros, zeros)
+            motion = Motion(hip, leg, (ankles[0], ankles[1]), (None, None))
+            gaps.append(mechanics.height_difference(numbers, motion))
+        slope = (gaps[1] - gaps[0]) / 1e-5
+        step = np.where(np.abs(slope) > 0.02, -gaps[0] / np.where(slope == 0.0, 1.0, slope), np.nan)
+        offset = offset + np.clip(step, -0.2, 0.2)
+    return offset
+
+
+def _thinned(mask: np.ndarray, time_s: Array, spacing_s: float) -> np.ndarray:
+    """Numbers of rows that are True and at least so far from each other."""
+    kept: list[int] = []
+    last = -np.inf
+    for number in np.flatnonzero(mask).tolist():
+        if time_s[number] - last >= spacing_s - 1e-9:
+            kept.append(number)
+            last = time_s[number]
+    return np.asarray(kept, dtype=int)
+
+
+def _stance_rows(
+    table: Table, motion: Motion, stands: np.ndarray, single: np.ndarray, recording: WalkRecording
+) -> list[Rows]:
+    """floor, legs, hip and both feet in the air."""
+    shared: tuple[str, ...] = ("leg_lag_s",)
+    if "outer_leg_angle_rad" not in table:
+        shared += ("leg_zero_rad",)
+    where = _thinned(single, table.time_s, SPACING_S)
+    rows = []
+
+    def of(what: Callable[[Left], Array | None], chosen: np.ndarray) -> Callable[[Numbers], Array]:
+        parts = [np.flatnonzero(stands[chosen] == leg) for leg in (0, 1)]
+        motions = [motion.part(chosen[part]) for part in parts]
+
+        def left(numbers: Numbers) -> Array:
+            out = np.zeros(len(chosen))
+            for leg, part, moving in zip((0, 1), parts, motions, strict=True):
+                made = what(mechanics.stance(numbers, moving, leg))
+                assert made is not None
+                out[part] = made
+            return out
+
+        return left
+
+    zeros = tuple(f"motor_zero_{name}_rad" for name in LEGS)
+    if all(each is not None for each in motion.motor):
+        for leg, name in enumerate(LEGS):
+            chosen = where[stands[where] == leg]
+            base = (*shared, zeros[leg])
+            rows.append(Rows(f"floor, {name}", "M", "mechanical", "N m", chosen, of(lambda e: e.floor, chosen), base))
+            rows.append(Rows(f"legs, {name}", "M", "mechanical", "N m", chosen, of(lambda e: e.legs, chosen), base))
+    if "hip_current_A" in table:
+        current, steady = _current(table, "hip_current_A")
+        chosen = _thinned(single & steady, table.time_s, 0.5 * SPACING_S)
+        sign = np.tanh(motion.hip[1] / SIGN_RAD_S)
+        recording.signals["hip_current"] = current
+        columns = {
+            "hip_torque_constant_Nm_per_A": current - LOAD_FRICTION * np.abs(current) * sign,
+            "hip_constant_friction_Nm": -sign,
+        }
+        left = of(lambda e: e.hip_torque, chosen)
+        rows.append(Rows("hip", "M", "mechanical", "N m", chosen, left, shared, columns))
+    for leg, name in enumerate(LEGS):
+        if motion.motor[leg] is None:
+            continue
+        chosen = _thinned(single & (stands == 1 - leg), table.time_s, SPACING_S)
+        part = motion.part(chosen)
+        left = functools.partial(_foot_left, motion=part, leg=leg)
+        rows.append(Rows(f"{name} foot", "M", "transmission", "N m", chosen, left, (zeros[leg],)))
+        recording.loads[f"{name} foot"] = mechanics.cable_torque(recording.numbers, motion, leg)
+    return rows
+
+
+def _foot_left(numbers: Numbers, motion: Motion, leg: int) -> Array:
+    return mechanics.swing_foot(numbers, motion, leg)
+
+
+def _current(table: Table, name: str) -> tuple[Array, np.ndarray]:
+    """(current, rows where it is known and steady); a fast one under the Gaussian, a slow one where it was sampled."""
+    value, fresh = table[name], freshness(table, name)
+    if np.mean(fresh) > 0.4:
+        return signals.smooth(table, value, SMOOTH_S / table.step_s), np.ones(len(value), dtype=bool)
+    places = np.flatnonzero(fresh)
+    steps = np.abs(np.diff(value[places]))
+    near = np.diff(table.time_s[places]) < 0.1
+    calm = (steps < STEADY_A) & near
+    steady = np.zeros(len(value), dtype=bool)
+    steady[places[1:-1][calm[:-1] & calm[1:]]] = True
+    return value, steady
+
+
+def _drive_rows(table: Table, single: np.ndarray) -> list[Rows]:
+    """Each stage's power, each winding's voltage; outside strikes, where a current is known."""
+    rows = []
+    for motor, joint in MOTORS.items():
+        names = (f"{joint}_motor_rate_rad_per_s", f"{joint}_motor_angle_rad", f"{motor}_angle_rad")
+        angle = next((name for name in names[1:] if name in table), None)
+        if f"{motor}_current_A" not in table or angle is None:
+            continue
+        rate = _course(table, table[angle])[1]
+        current, fresh = table[f"{motor}_current_A"], freshness(table, f"{motor}_current_A")
+        calm = np.abs(_course(table, table[angle])[2]) < 60.0  # a rate that is known to 1 rad/s in 20 ms
+        where = _thinned(single & fresh & calm, table.time_s, table.step_s)
+        label = motor.replace("_", " ")
+        if f"{motor}_battery_power_W" in table:
+            columns = {
+                f"{motor}_resistance_ohm": current**2,
+                f"{motor}_contact_drop_V": np.abs(current),
+                f"{motor}_torque_constant_Nm_per_A": current * rate,
+                f"{motor}_gates_W": np.ones(len(table)),
+            }
+            power = table[f"{motor}_battery_power_W"]
+            rows.append(Rows(f"{label} drive", "P", "supply", "W", where, _fixed(power[where]), (), columns))
+        if f"{motor}_voltage_V" in table:
+            columns = {
+                f"{motor}_resistance_ohm": current,
+                f"{motor}_contact_drop_V": np.tanh(current / 0.05),
+                f"{motor}_torque_constant_Nm_per_A": rate,
+            }
+            volts = table[f"{motor}_voltage_V"]
+            rows.append(Rows(f"{label} winding", "E", "electrical", "V", where, _fixed(volts[where]), (), columns))
+    return rows
+
+
+def _fixed(values: Array) -> Callable[[Numbers], Array]:
+    return lambda _: values
+
+
+def _encoder_rows(table: Table, single: np.ndarray) -> list[Rows]:
+    """A rate as its sensor gives it against the derivative of the angle; its lag is of the sensor."""
+    rows = []
+    for joint, name in (("hip", "hip"), ("outer_ankle", "outer ankle"), ("inner_ankle", "inner ankle")):
+        angle, rate = f"{joint}_angle_rad", f"{joint}_rate_rad_per_s"
+        if angle not in table or rate not in table or np.mean(freshness(table, rate)) < 0.3:
+            continue
+        course = _course(table, table[angle])
+        given = signals.smooth(table, table[rate], SMOOTH_S / table.step_s)
+        columns = {
+            f"{joint}_rate_scale": course[1],
+            f"{joint}_rate_lag_s": -course[2],
+            f"{joint}_rate_filter_s2": course[3],
+        }
+        where = _thinned(single, table.time_s, SPACING_S)
+        rows.append(Rows(f"{name} encoders", "S", "sensor", "rad/s", where, _fixed(given[where]), (), columns))
+    return rows
+
+
+def _equation(recording: WalkRecording, rows: Rows, numbers: Numbers) -> Equation:
+    response = np.zeros(len(recording.table))
+    response[rows.where] = rows.left(numbers)
+    valid = np.zeros(len(recording.table), dtype=bool)
+    valid[rows.where] = True
+    columns = dict(rows.columns)
+    for field in rows.base:
+        columns[field] = recording.slope(rows.name, ((field, 1.0),))
+    return Equation(rows.name, rows.letter, rows.subsystem, rows.unit, response, columns, valid)
+
+
+def _nothing(table: Table) -> str:
+    there = ", ".join(name for name in table.columns if not name.endswith(" fresh"))
+    needs = "; ".join(f"{what} needs {which}" for what, which in NEEDS.items())
+    return f"{table.name}: no equation of a walk can be made of {there}: {needs}"
