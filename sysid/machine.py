@@ -86,6 +86,7 @@ class Recording:
     # False where what the equations miss is far above the noise: whitening it would weigh frequencies by what is
     # wrong. Then fits are plain least squares, and only the count of samples is that of independent ones.
     whitened: bool = True
+    margin: float = 1.0  # noise is taken larger by this: what is no noise and no effect either, such as late stamps
     lags: tuple[int, ...] = (0, 10, 30, 100)  # samples back at which the general tests look at slopes
     findings: list[Finding] = dataclasses.field(default_factory=list)  # what the machine noticed about the data
     entries: dict[str, Entry] = dataclasses.field(default_factory=dict)  # none where equations are instantaneous
@@ -124,8 +125,9 @@ class Effect:
 class Machine(Protocol):
     """What can be diagnosed.
 
-    A machine may have more: `labels`, {signal: how the report calls it on an axis}; `gear`, of its gearbox, and
-    `motor`, which of the simulator's motors is measured (plant/terms.py), for the model file.
+    A machine may have more: `table(dataset, names)`, a time base of its own for channels that come at rates of their
+    own; `labels`, {signal: how the report calls it on an axis}; `gear`, of its gearbox, and `motor`, which of the
+    simulator's motors is measured (plant/terms.py), for the model file.
     """
 
     name: str

@@ -159,7 +159,7 @@ class Regression:
                 coefficients = autoregression(np.where(part.valid, residual, 0.0), part.valid)
                 memory = 1.0
                 if not all(recording.whitened for recording in self.recordings):
-                    # N_eff = N (1 - rho) / (1 + rho) with the first autocorrelation, of rows that count one after another
+                    # N_eff = N (1 - rho) / (1 + rho) with the first autocorrelation, of rows that count
                     kept = residual[part.valid]
                     total = float(np.mean(kept**2)) if len(kept) else 1.0
                     rho = float(np.mean(kept[1:] * kept[:-1])) / total if len(kept) > 1 and total > 0.0 else 0.0
@@ -170,7 +170,8 @@ class Regression:
                 good = self._good(name, coefficients)
                 deviation = float(np.sqrt(np.mean(white[good] ** 2))) if np.any(good) else 1.0
                 least = LEAST * float(np.max(np.abs(part.response), initial=0.0)) or 1.0
-                self.whitening[name] = Whitening(coefficients, max(memory * deviation, least))
+                margin = max(recording.margin for recording in self.recordings)
+                self.whitening[name] = Whitening(coefficients, max(margin * memory * deviation, least))
         for first, one in enumerate(self.equations):
             for other in self.equations[first + 1 :]:
                 both = self._good(one) & self._good(other)
@@ -179,7 +180,7 @@ class Regression:
                     self.shared[one, other] = float(np.clip(np.mean(a * b), -0.98, 0.98))
 
     def _good(self, equation: str, coefficients: Array | None = None) -> np.ndarray:
-        """Rows that count: valid with everything before them that the whitening looks at, none when it looks at none."""
+        """Rows that count: valid with everything before them that the whitening looks at, if it looks back."""
         part = self.parts[equation]
         good = part.valid & ~part.starts
         if coefficients is None and equation in self.whitening:

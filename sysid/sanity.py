@@ -203,7 +203,8 @@ def _stamps(channel: Channel) -> Iterator[Finding]:
         yield Finding(name, "duplicate_stamps", *ends, len(same), "samples", text)
     usual = float(np.median(steps[steps > 0.0])) if (steps > 0.0).any() else 0.0
     yield from _gaps(name, finite, steps, usual)
-    if usual > LONGEST_STEP_S and len(finite) >= FEWEST:
+    states = np.all(channel.value == np.round(channel.value))  # numbers of states are written when they change
+    if usual > LONGEST_STEP_S and len(finite) >= FEWEST and not states:
         text = f"samples are {usual:.4g} s apart: the stamps are probably in ms"
         yield Finding(name, "wrong_unit", float(finite[0]), float(finite[-1]), usual, "s", text)
 

@@ -8,6 +8,7 @@ MACHINES = {
     "leg-swing": "leg_swing:LegSwing",
     "positioning": "positioning:Positioning",
     "ankle": "ankle:Ankle",
+    "walk": "walk:Walk",
 }
 
 

@@ -178,7 +178,9 @@ def _prepared(dataset: Dataset, machine: Machine, experiment: str) -> tuple[Tabl
             if each.needed and np.ptp(dataset[each.name].value[np.isfinite(dataset[each.name].value)]) == 0.0:
                 raise UserError(f"{dataset.name}: {each.name}: one value all the time; nothing is concluded from that")
     mended = repairs.mend(dataset, findings)
-    table = mended.table([name for name in names if name in mended])
+    names = [name for name in names if name in mended]
+    own = getattr(machine, "table", None)  # of a machine whose channels come at rates of their own
+    table = own(mended, names) if own is not None else mended.table(names)
     if len(table) < LEAST_ROWS:
         raise UserError(f"{dataset.name}: {len(table)} rows with all channels, at least {LEAST_ROWS} are needed")
     return table, findings

@@ -1,4 +1,4 @@
-"""The causes that a walking log can show: wrong numbers of body and sensors, and effects that the model does not have."""
+"""The causes that a walking log can show: wrong numbers of body and sensors, and effects beside them."""
 
 from collections.abc import Callable, Mapping, Sequence
 
@@ -79,7 +79,9 @@ def made(recordings: Sequence[WalkRecording]) -> list[Effect]:
             for cause, at, name, part, change, meaning in numbers
         ]
     if any(abs(each.gyro_bias_rad_s) > GYRO_BIAS_REACH_RAD_S for each in recordings) and "closure" in there:
-        out.append(Effect("sensor_offset", "gyro", "sensor", ("offset_rad_s",), [{}], _closure, meaning="a rate at rest"))
+        out.append(
+            Effect("sensor_offset", "gyro", "sensor", ("offset_rad_s",), [{}], _closure, meaning="a rate at rest")
+        )
     if "hip" in there:
         out += _hip()
     for leg in ("outer", "inner"):
@@ -130,14 +132,10 @@ def _hip() -> list[Effect]:
         Effect("stribeck", "hip_motor", M, ("excess_Nm",), speeds,
                of(lambda s, p: -sign(s) * np.exp(-((s["hip_rate"] / p["speed_rad_s"]) ** 2))),
                lambda found: found["excess_Nm"] > 0.0, "friction that is larger at low speed"),
-        Effect("viscous_friction", "hip_motor", M, ("change_Nms",), [{}], of(lambda s, p: -s["hip_rate"])),
         Effect("drag", "hip_motor", M, ("quadratic_Nms2",), [{}],
                of(lambda s, p: -s["hip_rate"] * np.abs(s["hip_rate"])), lambda found: found["quadratic_Nms2"] > 0.0),
         Effect("load_friction", "hip_motor", M, ("per_A",), [{}],
                of(lambda s, p: -np.abs(s["hip_current"]) * sign(s)), meaning="friction that grows with the current"),
-        Effect("direction_friction", "hip_motor", M, ("coulomb_Nm",), [{}], of(lambda s, p: -np.ones_like(s["hip"]))),
-        Effect("sensor_offset", "hip_current_A", "sensor", ("offset_A",), [{}],
-               lambda r, _, v: {"hip": np.full((len(r.table), 1), -v["hip_torque_constant_Nm_per_A"])}),
     ]  # fmt: skip
 
 
@@ -149,7 +147,9 @@ def _play(leg: str) -> Effect:
         assert isinstance(recording, WalkRecording)
         if equation not in recording.equations:
             return {}
-        stiffness = recording.numbers.cable_outer_Nm_per_rad if leg == "outer" else recording.numbers.cable_inner_Nm_per_rad
+        stiffness = (
+            recording.numbers.cable_outer_Nm_per_rad if leg == "outer" else recording.numbers.cable_inner_Nm_per_rad
+        )
         return {equation: -stiffness * np.tanh(recording.loads[equation] / shape["torque_Nm"])[:, None]}
 
     return Effect(

@@ -4,7 +4,7 @@
     legs        0 = both legs about the stance ankle, which needs no torque of the hip
     hip         what the hip's motor must do = K I - mu K |I| sgn w - C_0 sgn w
     outer foot, inner foot   foot in the air: its inertia against cable and return spring
-    closure     at a strike both soles are on the floor: slope of what the gyro adds up to
+    closure     at strikes both soles are on the floor: what the gyro gained from one to the next, its bias
     hip drive, ...           stage's power = R I^2 + V_c |I| + K w I + gates
     hip winding, ...         V = R I + V_c sgn I + K w
     hip encoders, ...        rate against the angle's derivative
@@ -24,20 +24,25 @@ from ranger_sim.foundation.user_error import UserError
 from ranger_sim.plant import body_files
 from ranger_sim.sysid import channels, signals
 from ranger_sim.sysid.dataset import Array, Dataset, Table
-from ranger_sim.sysid.machine import Columns, Effect, Equation, Known, Quantity, Recording, Values
+from ranger_sim.sysid.machine import Effect, Equation, Known, Quantity, Recording
 from ranger_sim.sysid.machines.walk import mechanics, strikes
 from ranger_sim.sysid.machines.walk.mechanics import LEGS, Course, Left, Motion, Numbers
 from ranger_sim.sysid.machines.walk.timebase import even_table, freshness
 
 SMOOTH_S = 0.020  # Gaussian of all courses: stamps of 2 ms leave 0.3 rad/s^2 of noise in the hip's acceleration
-SPACING_S = 2.0 * SMOOTH_S  # of rows that count: nearer ones say the same
+SPACING_S = 3.0 * SMOOTH_S  # of rows that count: nearer ones say the same
 AFTER_S, BEFORE_S = 0.150, 0.070  # of a strike that do not count: three Gaussians, and the trailing foot's push before
 UNSURE_S = 0.040  # more on either side where strikes are told by the hip alone
 STEADY_A = 0.6  # between neighbouring samples of a slow current: more, and nobody knows when it changed
+JUMP_REACH = 1.5  # Gaussians about such a jump that do not count
 GYRO_BIAS_RAD_S = -0.004  # as the firmware of 2011 takes it off (robot.md C3.1); the leg's rate counts the other way
 GYRO_BIAS_REACH_RAD_S = 0.02  # of any sound gyro: its log at rest spans -0.006 to 0.024 (robot.md C6.2)
 LOAD_FRICTION = 0.1  # mu of the hip's gearhead: appendix table 3; the constant itself is fitted
-SIGN_RAD_S = 0.1  # rate over which a sign goes over, twice the friction smoothing of the plant
+SIGN_RAD_S = 0.05  # rate over which a sign goes over, as in the plant (EQUATIONS 2.1)
+SIGN_A = 0.05  # current over which the brushes' drop goes over; chosen by us: a few counts of the sensors
+STICKS_RAD_S = 0.3  # about standstill friction may be anything up to its limit (appendix eq. 35)
+MARGIN = 1.5  # found on eight sound walks: lags of channels wander by 2 ms as crystals drift
+SPIKE, FEW = 6.0, 0.05  # deviations beyond which single rows do not count, where they are no larger a part than this
 FEWEST_ROWS = 60  # of an equation that says anything
 
 ANGLES = ("hip_angle_rad", "outer_ankle_angle_rad", "inner_ankle_angle_rad", "outer_motor_angle_rad",
@@ -58,7 +63,7 @@ NEEDS = {
 
 @dataclasses.dataclass
 class Rows:
-    """One equation before it is linear: response(numbers) -> (k,) at the rows `where`, and columns that are measured."""
+    """One equation before it is linear: left(numbers) -> (k,) at the rows `where`, and columns that are measured."""
 
     name: str
     letter: str
@@ -77,6 +82,7 @@ class WalkRecording(Recording):
     rows: list[Rows] = dataclasses.field(default_factory=list)
     numbers: Numbers = dataclasses.field(default_factory=lambda: _numbers("ranger")[0])
     gyro_bias_rad_s: float = 0.0  # beyond the known one, by closures
+    closures: tuple[np.ndarray, Array] | None = None  # rows of strikes, and what the gyro gained since the last, rad/s
     loads: dict[str, Array] = dataclasses.field(default_factory=dict)  # N m, of the cable, by equation
     seen: dict[str, Array] = dataclasses.field(default_factory=dict)
 
@@ -128,12 +134,19 @@ class Walk:
     def prepare(self, table: Table) -> Recording:
         """Courses, strikes and every equation whose channels are there; UserError when there is none."""
         table = signals.uniform(table)
-        recording = WalkRecording(table, {"t": table.time_s - table.time_s[0]}, {}, whitened=False, lags=(0,))
+        recording = WalkRecording(
+            table, {"t": table.time_s - table.time_s[0]}, {}, whitened=False, margin=MARGIN, lags=(0,)
+        )
         recording.numbers = self.numbers
         motion, stands, single = self._motion(table, recording)
         rows: list[Rows] = []
         if motion is not None:
             rows += _stance_rows(table, motion, stands, single, recording)
+        if recording.closures is not None:
+            places, rates = recording.closures
+            sound = abs(recording.gyro_bias_rad_s) < GYRO_BIAS_REACH_RAD_S
+            columns = {"gyro_bias_rad_s": np.ones(len(table))} if sound else {}
+            rows.append(Rows("closure", "S", "sensor", "rad/s", places, _fixed(rates), (), columns))
         rows += _drive_rows(table, single)
         rows += _encoder_rows(table, single)
         recording.rows = [each for each in rows if len(each.where) >= (8 if each.name == "closure" else FEWEST_ROWS)]
@@ -172,7 +185,7 @@ class Walk:
         motors = tuple(
             _course(table, table[name] - self.ankle_zero_rad) if name in table else None for name in ANGLES[3:]
         )
-        motion = Motion(hip, leg, (ankles[0], ankles[1]), (motors[0], motors[1]))
+        motion = Motion(hip, leg, (ankles[0], ankles[1]), (motors[0], motors[1]), np.linspace(-1.0, 1.0, len(table)))
         recording.signals |= {"lean": leg[0] - np.where(stands == 1, hip[0], 0.0), "lean_rate": leg[1]}
         return motion, stands, single
 
@@ -202,6 +215,9 @@ class Walk:
         near = np.abs(left) < 3.0 * max(float(np.median(np.abs(left))) / 0.6745, 1e-4)
         found = np.linalg.lstsq(basis[near], offsets[near], rcond=None)[0]
         drift = float(found[-1])
+        steps, same = np.diff(table.time_s[places[near]]), np.diff(runs[near]) == 0
+        rates = -np.diff(offsets[near])[same] / steps[same]
+        recording.closures = (places[near][1:][same], rates)
         recording.gyro_bias_rad_s = -drift
         lean += drift * time_s
         rate = rate + drift
@@ -236,13 +252,11 @@ def _known() -> list[Known]:
 
 def _slope(table: Table, column: Array) -> Array:
     """Rate of a column, run by run."""
-    return signals.per_run(
-        table, lambda part: np.gradient(part, table.step_s) if len(part) > 1 else 0.0 * part, column
-    )
+    return signals.per_run(table, lambda part: np.gradient(part, table.step_s) if len(part) > 1 else 0.0 * part, column)
 
 
 def _course(table: Table, column: Array, rate: Array | None = None) -> Course:
-    """A column under the Gaussian, with rate, acceleration and that one's rate; `rate`: measured, in place of its slope."""
+    """A column under the Gaussian, with rate, acceleration and that one's rate; `rate`: measured, not its slope."""
     width = SMOOTH_S / table.step_s
     smooth = signals.smooth(table, column, width)
     first = _slope(table, smooth) if rate is None else signals.smooth(table, rate, width)
@@ -260,7 +274,7 @@ def _inside(table: Table, reach_s: float) -> np.ndarray:
 
 
 def _closing(numbers: Numbers, table: Table, lean: Array, joints: Sequence[Array], places: np.ndarray) -> Array:
-    """What must be added to the outer leg's lean at each strike for both soles to be on the floor, (k,); nan: nothing."""
+    """What must be added to the outer leg's lean at each strike so that both soles are on the floor, (k,), or nan."""
     zeros = np.zeros(len(places))
     hip = (table["hip_angle_rad"][places], zeros, zeros, zeros)
     ankles = tuple((joint[places], zeros, zeros, zeros) for joint in joints)
@@ -269,7 +283,7 @@ def _closing(numbers: Numbers, table: Table, lean: Array, joints: Sequence[Array
         gaps = []
         for change in (0.0, 1e-5):
             leg = (lean[places] + offset + change, zeros, zeros, zeros)
-            motion = Motion(hip, leg, (ankles[0], ankles[1]), (None, None))
+            motion = Motion(hip, leg, (ankles[0], ankles[1]), (None, None), zeros)
             gaps.append(mechanics.height_difference(numbers, motion))
         slope = (gaps[1] - gaps[0]) / 1e-5
         step = np.where(np.abs(slope) > 0.02, -gaps[0] / np.where(slope == 0.0, 1.0, slope), np.nan)
@@ -292,7 +306,7 @@ def _stance_rows(
     table: Table, motion: Motion, stands: np.ndarray, single: np.ndarray, recording: WalkRecording
 ) -> list[Rows]:
     """floor, legs, hip and both feet in the air."""
-    shared: tuple[str, ...] = ("leg_lag_s",)
+    shared: tuple[str, ...] = ("leg_lag_s", "leg_lag_drift_s")
     if "outer_leg_angle_rad" not in table:
         shared += ("leg_zero_rad",)
     where = _thinned(single, table.time_s, SPACING_S)
@@ -312,21 +326,25 @@ def _stance_rows(
 
         return left
 
-    zeros = tuple(f"motor_zero_{name}_rad" for name in LEGS)
+    of_leg = [(f"motor_zero_{name}_rad", f"motor_lag_{name}_s") for name in LEGS]
     if all(each is not None for each in motion.motor):
         for leg, name in enumerate(LEGS):
             chosen = where[stands[where] == leg]
-            base = (*shared, zeros[leg])
+            base = (*shared, *of_leg[leg])
             rows.append(Rows(f"floor, {name}", "M", "mechanical", "N m", chosen, of(lambda e: e.floor, chosen), base))
             rows.append(Rows(f"legs, {name}", "M", "mechanical", "N m", chosen, of(lambda e: e.legs, chosen), base))
     if "hip_current_A" in table:
         current, steady = _current(table, "hip_current_A")
-        chosen = _thinned(single & steady, table.time_s, 0.5 * SPACING_S)
-        sign = np.tanh(motion.hip[1] / SIGN_RAD_S)
+        width = SMOOTH_S / table.step_s
+        slow = ndimage.binary_dilation(np.abs(motion.hip[1]) < STICKS_RAD_S, iterations=round(width))
+        chosen = _thinned(single & steady & ~slow, table.time_s, SPACING_S)
+        sign = signals.smooth(table, np.tanh(_course(table, table["hip_angle_rad"])[1] / SIGN_RAD_S), width)
         recording.signals["hip_current"] = current
         columns = {
             "hip_torque_constant_Nm_per_A": current - LOAD_FRICTION * np.abs(current) * sign,
             "hip_constant_friction_Nm": -sign,
+            "hip_viscous_friction_Nms": -motion.hip[1],
+            "hip_current_offset_Nm": np.ones(len(table)),
         }
         left = of(lambda e: e.hip_torque, chosen)
         rows.append(Rows("hip", "M", "mechanical", "N m", chosen, left, shared, columns))
@@ -336,7 +354,7 @@ def _stance_rows(
         chosen = _thinned(single & (stands == 1 - leg), table.time_s, SPACING_S)
         part = motion.part(chosen)
         left = functools.partial(_foot_left, motion=part, leg=leg)
-        rows.append(Rows(f"{name} foot", "M", "transmission", "N m", chosen, left, (zeros[leg],)))
+        rows.append(Rows(f"{name} foot", "M", "transmission", "N m", chosen, left, of_leg[leg]))
         recording.loads[f"{name} foot"] = mechanics.cable_torque(recording.numbers, motion, leg)
     return rows
 
@@ -346,17 +364,17 @@ def _foot_left(numbers: Numbers, motion: Motion, leg: int) -> Array:
 
 
 def _current(table: Table, name: str) -> tuple[Array, np.ndarray]:
-    """(current, rows where it is known and steady); a fast one under the Gaussian, a slow one where it was sampled."""
+    """(current under the Gaussian, rows where it is known): none near a jump between two samples of a slow one."""
     value, fresh = table[name], freshness(table, name)
-    if np.mean(fresh) > 0.4:
-        return signals.smooth(table, value, SMOOTH_S / table.step_s), np.ones(len(value), dtype=bool)
-    places = np.flatnonzero(fresh)
-    steps = np.abs(np.diff(value[places]))
-    near = np.diff(table.time_s[places]) < 0.1
-    calm = (steps < STEADY_A) & near
-    steady = np.zeros(len(value), dtype=bool)
-    steady[places[1:-1][calm[:-1] & calm[1:]]] = True
-    return value, steady
+    known = np.ones(len(value), dtype=bool)
+    if np.mean(fresh) < 0.4:
+        places = np.flatnonzero(fresh)
+        unknown = (np.abs(np.diff(value[places])) > STEADY_A) | (np.diff(table.time_s[places]) > 0.1)
+        for start, stop in zip(places[:-1][unknown], places[1:][unknown], strict=True):
+            known[start : stop + 1] = False
+        reach = round(JUMP_REACH * SMOOTH_S / table.step_s)
+        known = ~ndimage.binary_dilation(~known, iterations=reach)
+    return signals.smooth(table, value, SMOOTH_S / table.step_s), known
 
 
 def _drive_rows(table: Table, single: np.ndarray) -> list[Rows]:
@@ -368,26 +386,30 @@ def _drive_rows(table: Table, single: np.ndarray) -> list[Rows]:
         if f"{motor}_current_A" not in table or angle is None:
             continue
         rate = _course(table, table[angle])[1]
-        current, fresh = table[f"{motor}_current_A"], freshness(table, f"{motor}_current_A")
-        calm = np.abs(_course(table, table[angle])[2]) < 60.0  # a rate that is known to 1 rad/s in 20 ms
-        where = _thinned(single & fresh & calm, table.time_s, table.step_s)
+        width = SMOOTH_S / table.step_s
+        current, known = _current(table, f"{motor}_current_A")
+        raw = table[f"{motor}_current_A"]
+        squares, sizes = signals.smooth(table, raw**2, width), signals.smooth(table, np.abs(raw), width)
+        where = _thinned(single & known, table.time_s, SPACING_S)
         label = motor.replace("_", " ")
         if f"{motor}_battery_power_W" in table:
+            power = signals.smooth(table, table[f"{motor}_battery_power_W"], width)
             columns = {
-                f"{motor}_resistance_ohm": current**2,
-                f"{motor}_contact_drop_V": np.abs(current),
+                f"{motor}_resistance_ohm": squares,
+                f"{motor}_contact_drop_V": sizes,
                 f"{motor}_torque_constant_Nm_per_A": current * rate,
                 f"{motor}_gates_W": np.ones(len(table)),
+                f"{motor}_power_lag_s": -_slope(table, power),
             }
-            power = table[f"{motor}_battery_power_W"]
             rows.append(Rows(f"{label} drive", "P", "supply", "W", where, _fixed(power[where]), (), columns))
         if f"{motor}_voltage_V" in table:
+            volts = signals.smooth(table, table[f"{motor}_voltage_V"], width)
             columns = {
                 f"{motor}_resistance_ohm": current,
-                f"{motor}_contact_drop_V": np.tanh(current / 0.05),
+                f"{motor}_contact_drop_V": signals.smooth(table, np.tanh(raw / SIGN_A), width),
                 f"{motor}_torque_constant_Nm_per_A": rate,
+                f"{motor}_voltage_lag_s": -_slope(table, volts),
             }
-            volts = table[f"{motor}_voltage_V"]
             rows.append(Rows(f"{label} winding", "E", "electrical", "V", where, _fixed(volts[where]), (), columns))
     return rows
 
@@ -423,7 +445,21 @@ def _equation(recording: WalkRecording, rows: Rows, numbers: Numbers) -> Equatio
     columns = dict(rows.columns)
     for field in rows.base:
         columns[field] = recording.slope(rows.name, ((field, 1.0),))
+    used = np.column_stack([column[rows.where] for column in columns.values()]) if columns else None
+    valid[rows.where[_spikes(response[rows.where], used)]] = False
     return Equation(rows.name, rows.letter, rows.subsystem, rows.unit, response, columns, valid)
+
+
+def _spikes(response: Array, columns: Array | None) -> np.ndarray:
+    """Numbers of single rows far outside all others after a fit of the base: lost or late samples, and no effect."""
+    left = response
+    if columns is not None:
+        scale = np.linalg.norm(columns, axis=0)
+        scaled = columns / np.where(scale > 0.0, scale, 1.0)
+        left = response - scaled @ np.linalg.lstsq(scaled, response, rcond=1e-9)[0]
+    left = left - np.median(left)
+    far = np.flatnonzero(np.abs(left) > SPIKE * float(np.median(np.abs(left))) / 0.6745)
+    return far if len(far) <= FEW * len(response) else far[:0]
 
 
 def _nothing(table: Table) -> str:

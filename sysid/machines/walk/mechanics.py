@@ -54,8 +54,11 @@ class Numbers:
     leg_zero_rad: float = 0.0
     leg_scale: float = 1.0
     leg_lag_s: float = 0.0
+    leg_lag_drift_s: float = 0.0  # by which the lag is longer at the recording's end, and shorter at its start
     ankle_zero_outer_rad: float = 0.0
     ankle_zero_inner_rad: float = 0.0
+    motor_lag_outer_s: float = 0.0
+    motor_lag_inner_s: float = 0.0
     motor_zero_outer_rad: float = 0.0
     motor_zero_inner_rad: float = 0.0
 
@@ -96,12 +99,13 @@ Course = tuple[Array, Array, Array, Array]  # a quantity (n,), its rate, its acc
 @dataclasses.dataclass
 class Motion:
     """Measured courses: hip, outer leg, each ankle joint and ankle motor (less the zero of the sweet spot); None: no
-    such channel."""
+    such channel. along: the recording, from -1 at its start to 1 at its end."""
 
     hip: Course
     leg: Course
     ankle: tuple[Course | None, Course | None]
     motor: tuple[Course | None, Course | None]
+    along: Array
 
     def part(self, rows: Array) -> "Motion":
         """Some rows of it."""
@@ -113,7 +117,7 @@ class Motion:
             return (course[0][rows], course[1][rows], course[2][rows], course[3][rows])
 
         ankle, motor = (cut(self.ankle[0]), cut(self.ankle[1])), (cut(self.motor[0]), cut(self.motor[1]))
-        return Motion(sure(self.hip), sure(self.leg), ankle, motor)
+        return Motion(sure(self.hip), sure(self.leg), ankle, motor, self.along[rows])
 
 
 @dataclasses.dataclass
@@ -126,7 +130,7 @@ class _Pose:
     hip: Course
 
 
-def _corrected(course: Course, scale: float, zero: float, lag_s: float) -> Course:
+def _corrected(course: Course, scale: float, zero: float, lag_s: Array | float) -> Course:
     """What a sensor should have shown that shows scale x quantity + zero, lag_s late."""
     x, v, a, j = course
     return ((x - zero) / scale + lag_s * v, v / scale + lag_s * a, a / scale + lag_s * j, j)
@@ -134,7 +138,7 @@ def _corrected(course: Course, scale: float, zero: float, lag_s: float) -> Cours
 
 def _pose(n: Numbers, m: Motion) -> _Pose:
     hip = _corrected(m.hip, n.hip_scale, n.hip_zero_rad, n.hip_lag_s)
-    outer = _corrected(m.leg, n.leg_scale, n.leg_zero_rad, n.leg_lag_s)
+    outer = _corrected(m.leg, n.leg_scale, n.leg_zero_rad, n.leg_lag_s + n.leg_lag_drift_s * m.along)
     th = [outer, (outer[0] - hip[0], outer[1] - hip[1], outer[2] - hip[2], outer[3] - hip[3])]
     feet: list[Course | None] = []
     torques: list[Array | None] = []
@@ -144,12 +148,13 @@ def _pose(n: Numbers, m: Motion) -> _Pose:
             feet.append(None)
             torques.append(None)
             continue
-        joint = ankle[0] - getattr(n, f"ankle_zero_{name}_rad")
-        feet.append((th[leg][0] + joint, th[leg][1] + ankle[1], th[leg][2] + ankle[2], th[leg][3] + ankle[3]))
+        joint, lean = ankle[0] - getattr(n, f"ankle_zero_{name}_rad"), th[leg]
+        feet.append((lean[0] + joint, lean[1] + ankle[1], lean[2] + ankle[2], lean[3] + ankle[3]))
         if motor is None:
             torques.append(None)
             continue
-        stretch = motor[0] - getattr(n, f"motor_zero_{name}_rad") - joint
+        turned = motor[0] + getattr(n, f"motor_lag_{name}_s") * motor[1]
+        stretch = turned - getattr(n, f"motor_zero_{name}_rad") - joint
         rest = n.ankle_return_rest_rad
         cable = getattr(n, f"cable_{name}_Nm_per_rad")
         torques.append(cable * stretch - n.ankle_return_Nm_per_rad * (joint - rest))
@@ -168,7 +173,7 @@ def _first_moments(n: Numbers, leg: int, th: Array) -> tuple[Array, Array]:
 
 
 def height_difference(n: Numbers, m: Motion) -> Array:
-    """Outer sole's lowest point above the inner's: 0 while both stand (closure; angles are against the floor's normal)."""
+    """Outer sole's lowest point above the inner's, 0 while both stand; angles are against the floor's normal."""
     pose = _pose(n, m)
     heights = []
     for leg, name in enumerate(LEGS):
@@ -183,8 +188,11 @@ def height_difference(n: Numbers, m: Motion) -> Array:
 
 @dataclasses.dataclass
 class Left:
-    """What is left over in single stance on one leg. floor: moments about the contact point; legs: of both legs about the
-    stance ankle; hip_torque: what the hip's motor must do, on h; None where channels are missing. All (n,), N m."""
+    """What is left over in single stance on one leg, all (n,), N m; None where channels are missing.
+
+    floor: moments about the contact point; legs: of both legs about the stance ankle; hip_torque: what the hip's motor
+    must do, on h.
+    """
 
     floor: Array | None
     legs: Array | None

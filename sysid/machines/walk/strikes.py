@@ -40,7 +40,7 @@ def by_contact(table: Table) -> bool:
 
 
 def standing(table: Table, strikes: list[Strike], after_s: float, before_s: float) -> tuple[np.ndarray, np.ndarray]:
-    """(leg that stands, -1 where nobody knows; True in single stance `after_s` after and `before_s` before a strike)."""
+    """(leg that stands, -1: unknown; True in single stance, so long after and before strikes), both (n,)."""
     stands = np.full(len(table), -1)
     single = np.zeros(len(table), dtype=bool)
     for one, other in zip(strikes[:-1], strikes[1:], strict=True):
@@ -67,7 +67,7 @@ def _by_contact(table: Table, run: slice) -> list[tuple[float, int]]:
 
 
 def _by_hip(time_s: Array, hip: Array, step_s: float) -> list[tuple[float, int]]:
-    """(time, leg) of the sharpest jump of the hip's rate in each of its half swings; the foot ahead is that of its sign."""
+    """(time, leg) of the sharpest jump of the hip's rate in each half swing; its sign tells the foot that is ahead."""
     rate = np.gradient(ndimage.gaussian_filter1d(hip, SMOOTH_S / step_s), step_s)
     reach = max(1, round(0.012 / step_s))
     jump = np.zeros_like(rate)

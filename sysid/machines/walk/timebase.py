@@ -1,8 +1,8 @@
 """Channels that come at rates of their own, on one even time base, with flags for what was measured there.
 
-A run's log writes a value when it changes, the robot's boards send currents every 22 to 68 ms, a radio link is silent for
-a while: between two samples a value is either held, or it went a straight way, or nobody knows. A table holds beside each
-slow channel a column "NAME fresh", 1.0 where a sample lies and 0.0 elsewhere.
+A run's log writes a value when it changes, the robot's boards send currents every 22 to 68 ms, a radio link is silent
+for a while: between two samples a value is either held, or it went a straight way, or nobody knows. A table holds
+beside each slow channel a column "NAME fresh", 1.0 where a sample lies and 0.0 elsewhere.
 """
 
 import numpy as np

@@ -1,0 +1,125 @@
+"""A short emulated walk, diagnosed with the right model, with a wrong one, and with a wrong sensor."""
+
+import numpy as np
+import pytest
+
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.plant.parameters import BodyParameters
+from ranger_sim.sysid.channels import named_for
+from ranger_sim.sysid.dataset import Channel, Dataset, Table
+from ranger_sim.sysid.diagnose import diagnose
+from ranger_sim.sysid.machines.walk import Walk, mechanics, strikes, timebase
+from ranger_sim.sysid.machines.walk.mechanics import Motion, Numbers
+from ranger_sim.tools import recordings
+from ranger_sim.tools.cli import main
+
+STEPS = 30
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    out = tmp_path_factory.mktemp("walk")
+    assert main(["walk", "--steps", str(STEPS), "--seed", "4", "--log", "full", "--out", str(out / "run")]) == 0
+    return out / "run"
+
+
+@pytest.fixture(scope="module")
+def table(folder):
+    machine = Walk()
+    dataset = named_for(recordings.open_recording(folder), "walk")
+    return machine.table(dataset, [each.name for each in machine.quantities if each.name in dataset])
+
+
+def with_column(table, name, change):
+    columns = {**table.columns, name: change(table[name])}
+    return Table(table.time_s, columns, table.runs, table.name)
+
+
+def body(path, **numbers):
+    lines = ['title = "wrong"', 'description = "for a test"', 'base = "ranger"', "[parameters]"]
+    lines += [f"{name} = {value}" for name, value in numbers.items()]
+    lines += ["[sources]", *(f'{name} = "chosen for this test"' for name in numbers)]
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return str(path)
+
+
+def test_a_sound_walk_raises_no_alarm_and_shows_its_motors(table):
+    found = diagnose(Walk(), [table]).answer
+    assert not found["detected"]
+    parameters = found["evidence"]["parameters"]
+    # the emulated gyro's packets come 2 to 3 ms behind the boards' angles
+    assert 0.001 < parameters["leg_lag_s"]["value"] < 0.004
+    # 66:1 times 0.018 N m/A; the intervals are 0.1 wide and the load friction is taken as 0.1
+    assert parameters["hip_torque_constant_Nm_per_A"]["value"] == pytest.approx(1.188, abs=0.15)
+
+
+def test_a_model_whose_feet_stand_too_high_is_named_with_the_height(table, tmp_path):
+    """The robot's 0.146 m against a model of 0.136 m: the change that is asked for is 10 mm."""
+    wrong = Walk(body(tmp_path / "low.toml", outer_ankle_offset_m=0.136, inner_ankle_offset_m=0.136))
+    found = diagnose(wrong, [table]).answer
+    assert found["detected"]
+    first = found["causes"][0]
+    assert (first["name"], first["at"]) == ("geometry", "feet")
+    low, high = first["parameters"]["foot_height_m"]["ci95"]
+    assert low < 0.010 < high and high - low < 0.006
+
+
+def test_a_model_with_a_wrong_hip_spring_is_named_with_the_stiffness(table, tmp_path):
+    found = diagnose(Walk(body(tmp_path / "soft.toml", hip_spring_Nm_per_rad=5.6)), [table]).answer
+    assert found["detected"]
+    spring = next(each for each in found["causes"] if each["name"] == "spring_value")
+    assert spring["at"] == "hip_spring"
+    low, high = spring["parameters"]["stiffness_Nm_per_rad"]["ci95"]
+    assert low < 2.0 < high
+
+
+def test_a_wrong_zero_of_the_inner_ankle_is_detected_and_named_or_tied(table):
+    shifted = with_column(table, "inner_ankle_angle_rad", lambda angle: angle + 0.03)
+    found = diagnose(Walk(), [shifted]).answer
+    assert found["detected"]
+    named = {name for each in found["causes"] for name in (each["name"], *each["tied_with"])}
+    assert found["abstained"] or "sensor_offset" in named
+
+
+def test_a_gyro_that_shows_a_rate_at_rest_is_named_with_the_rate(table):
+    drifting = with_column(table, "outer_leg_rate_rad_per_s", lambda rate: rate + 0.05)
+    found = diagnose(Walk(), [drifting]).answer
+    gyro = next(each for each in found["causes"] if each["at"] == "gyro")
+    low, high = gyro["parameters"]["offset_rad_s"]["ci95"]
+    assert gyro["name"] == "sensor_offset" and low < 0.05 < high
+
+
+def test_few_channels_are_told_what_they_lack():
+    time_s = np.arange(0.0, 5.0, 0.004)
+    columns = {"hip_angle_rad": 0.3 * np.sin(5.0 * time_s), "outer_leg_angle_rad": 0.2 * np.sin(5.0 * time_s)}
+    few = Table(time_s, columns, (slice(0, len(time_s)),), "few.csv")
+    with pytest.raises(UserError, match=r"few\.csv: no equation of a walk can be made of hip_angle_rad.*hip_current_A"):
+        Walk().prepare(few)
+
+
+def test_what_was_lost_is_cut_out_and_what_stood_still_is_held():
+    time_s = np.arange(0.0, 2.0, 0.002)
+    value = np.where(time_s < 1.0, np.sin(time_s), np.sin(1.0))
+    kept = ~((time_s > 0.5) & (time_s < 0.6)) & ~((time_s > 1.2) & (time_s < 1.4))
+    dataset = Dataset("log", {"hip_angle_rad": Channel("hip_angle_rad", "rad", time_s[kept], value[kept])})
+    table = timebase.even_table(dataset, ["hip_angle_rad"], ("hip_angle_rad",))
+    assert len(table.runs) == 2
+    assert not np.any((table.time_s > 0.505) & (table.time_s < 0.595))
+    assert np.any((table.time_s > 1.25) & (table.time_s < 1.35))
+
+
+def test_strikes_are_found_by_the_contact_sensors_and_legs_take_turns(table):
+    found = strikes.find(table)
+    assert len(found) >= STEPS - 2
+    assert all(one.leg != other.leg for one, other in zip(found[:-1], found[1:], strict=True))
+
+
+def test_a_robot_at_rest_on_its_sweet_spots_is_in_balance():
+    """Upright, legs together, centres of mass on the legs: nothing turns."""
+    numbers = Numbers.of(BodyParameters())
+    still = (np.zeros(3),) * 4
+    motion = Motion(still, still, (still, still), (still, still), np.zeros(3))
+    left = mechanics.stance(numbers, motion, 0)
+    assert left.hip_torque == pytest.approx(np.zeros(3), abs=1e-12)
+    assert left.floor == pytest.approx(np.zeros(3), abs=1e-12)
+    assert mechanics.height_difference(numbers, motion) == pytest.approx(np.zeros(3), abs=1e-12)
