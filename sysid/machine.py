@@ -86,6 +86,7 @@ class Recording:
     # False where what the equations miss is far above the noise: whitening it would weigh frequencies by what is
     # wrong. Then fits are plain least squares, and only the count of samples is that of independent ones.
     whitened: bool = True
+    memory: float = 0.99  # largest autocorrelation from row to row that is taken for noise's, and not for an effect's
     margin: float = 1.0  # noise is taken larger by this: what is no noise and no effect either, such as late stamps
     lags: tuple[int, ...] = (0, 10, 30, 100)  # samples back at which the general tests look at slopes
     findings: list[Finding] = dataclasses.field(default_factory=list)  # what the machine noticed about the data

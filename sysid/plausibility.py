@@ -18,7 +18,7 @@ FACTOR = 5.0  # to the simulation's value: between a machine of the same kind an
 CLEAR = 0.2  # relative error up to which a factor is told
 EXPLAINED = 0.2  # of what an equation balances: below it the channels do not belong together
 FEWEST = 100  # rows
-FEW = 0.02  # of the rows
+FEW, FEWEST_AT_ALL = 0.02, 50  # of the rows; what is thinned to rows that are independent may be a small part
 FORBID = ("impossible", "unexplained")  # kinds of findings after which no cause is named
 
 
@@ -48,7 +48,7 @@ def look(machine: Machine, regression: Regression) -> Doubts:
             findings.append(_factor(known, value, value / known.value))
     for name in regression.equations:
         counted, rows = int(np.count_nonzero(regression.good[name])), len(regression.parts[name].valid)
-        if counted < FEW * rows:
+        if counted < FEW * rows and counted < FEWEST_AT_ALL:
             text = f"{counted} of {rows} rows of this equation count: next to nothing is said of it"
             findings.append(_finding(name, "few_rows", counted, "rows", text))
         share = explained(regression, name)

@@ -163,7 +163,7 @@ class Regression:
                     kept = residual[part.valid]
                     total = float(np.mean(kept**2)) if len(kept) else 1.0
                     rho = float(np.mean(kept[1:] * kept[:-1])) / total if len(kept) > 1 and total > 0.0 else 0.0
-                    rho = min(max(rho, 0.0), 0.99)
+                    rho = min(max(rho, 0.0), *(recording.memory for recording in self.recordings))
                     memory = float(np.sqrt((1.0 + rho) / (1.0 - rho)))
                     coefficients = np.zeros(ORDER)
                 white = lfilter(np.concatenate(([1.0], -coefficients)), [1.0], residual)

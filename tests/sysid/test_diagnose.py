@@ -274,5 +274,5 @@ def test_the_positioning_machine_is_wrong_where_its_literature_says():
 
 
 def test_an_unknown_machine_is_refused():
-    with pytest.raises(UserError, match="there are motor-bench, leg-swing, positioning, ankle"):
+    with pytest.raises(UserError, match="there are motor-bench, leg-swing, positioning, ankle, walk"):
         machine_of("mars")

@@ -65,12 +65,12 @@ def test_a_model_whose_feet_stand_too_high_is_named_with_the_height(table, tmp_p
 
 
 def test_a_model_with_a_wrong_hip_spring_is_named_with_the_stiffness(table, tmp_path):
-    found = diagnose(Walk(body(tmp_path / "soft.toml", hip_spring_Nm_per_rad=5.6)), [table]).answer
+    found = diagnose(Walk(body(tmp_path / "soft.toml", hip_spring_Nm_per_rad=6.6)), [table]).answer
     assert found["detected"]
     spring = next(each for each in found["causes"] if each["name"] == "spring_value")
     assert spring["at"] == "hip_spring"
     low, high = spring["parameters"]["stiffness_Nm_per_rad"]["ci95"]
-    assert low < 2.0 < high
+    assert low < 1.0 < high
 
 
 def test_a_wrong_zero_of_the_inner_ankle_is_detected_and_named_or_tied(table):

@@ -36,7 +36,7 @@ PARAMETERS = (
                 10.0 * k,
                 "at the joint: of torque and of voltage",
             ),
-            (f"{motor}_power_lag_s", "s", 0.0, -0.02, 0.02, "of the current behind the power"),
+            (f"{motor}_power_lag_s", "s", 0.0, -0.05, 0.05, "of the current behind the power"),
             (f"{motor}_voltage_lag_s", "s", 0.0, -0.02, 0.02, "of the current behind the voltage"),
             (f"{motor}_gates_W", "W", 0.3, -1.0, 3.0, "of the bridge's gates"),
             (f"{motor}_rate_scale", "1", 1.0, 0.1, 10.0, "of the rate as its board computes it"),

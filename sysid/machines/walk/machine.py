@@ -83,6 +83,7 @@ class WalkRecording(Recording):
     numbers: Numbers = dataclasses.field(default_factory=lambda: _numbers("ranger")[0])
     gyro_bias_rad_s: float = 0.0  # beyond the known one, by closures
     closures: tuple[np.ndarray, Array] | None = None  # rows of strikes, and what the gyro gained since the last, rad/s
+    entries: tuple[str, ...] = LEGS  # truthy: responses are what the model leaves over (plausibility.explained)
     loads: dict[str, Array] = dataclasses.field(default_factory=dict)  # N m, of the cable, by equation
     seen: dict[str, Array] = dataclasses.field(default_factory=dict)
 
@@ -388,7 +389,9 @@ def _drive_rows(table: Table, single: np.ndarray) -> list[Rows]:
         rate = _course(table, table[angle])[1]
         width = SMOOTH_S / table.step_s
         current, known = _current(table, f"{motor}_current_A")
-        raw = table[f"{motor}_current_A"]
+        raw, fresh = table[f"{motor}_current_A"], freshness(table, f"{motor}_current_A")
+        if table.step_s / max(float(np.mean(fresh)), 1e-9) > 2.0 * SMOOTH_S:
+            continue  # sampled more slowly than it changes: every 60 ms and more of an ankle's push
         squares, sizes = signals.smooth(table, raw**2, width), signals.smooth(table, np.abs(raw), width)
         where = _thinned(single & known, table.time_s, SPACING_S)
         label = motor.replace("_", " ")
