@@ -185,7 +185,8 @@ class Regression:
         good = part.valid & ~part.starts
         if coefficients is None and equation in self.whitening:
             coefficients = self.whitening[equation].coefficients
-        if coefficients is not None and np.any(coefficients):
+        whitened = all(recording.whitened for recording in self.recordings)
+        if whitened or (coefficients is not None and np.any(coefficients)):
             for lag in range(1, ORDER + 1):
                 good[lag:] &= part.valid[:-lag]
             good[:ORDER] = False
