@@ -25,6 +25,7 @@ class Gain:
     rms_after: float
     holdout: str
     chi2_won: float = 0.0  # by which the extended model is nearer
+    chi2_expected: float = 0.0  # what it would win were the effects there as training has them
 
     @property
     def worse(self) -> bool:
@@ -55,13 +56,28 @@ def measure(
         if each.effect.phase_is_free and len(coefficients) == 2:
             here = coefficients_of(white, before)
             coefficients = here * (np.linalg.norm(coefficients) / max(float(np.linalg.norm(here)), 1e-300))
+        free = [name in each.effect.free for name in each.effect.coefficients]
+        if any(free):
+            fixed = np.where(free, 0.0, coefficients)
+            coefficients = fixed.copy()
+            coefficients[free] = coefficients_of(white[:, free], after - white @ fixed)
         after = after - white @ coefficients
-    features = [plain.beside(plain.whitened(each)) for _, _, each in general]
-    basis = orthonormal(np.hstack([*columns, *features]))
-    fitted = basis @ (basis.T @ before)
+    seen = [plain.whitened(made) for _, _, made in general]
+    fitted, freedom = np.zeros_like(before), 0
+    for equation in plain.equations:
+        rows = plain.rows[equation]
+        parts = [column[rows] for column in columns]
+        white = [each for each in seen if equation in each]
+        if white:
+            shadow = np.hstack([plain.shadow(each) for each in white])
+            parts.append(np.hstack([each[equation] for each in white]) - plain.z[rows] @ shadow)
+        if parts:
+            basis = orthonormal(np.hstack(parts))
+            fitted[rows] = basis @ (basis.T @ before[rows])
+            freedom += basis.shape[1]
     # per row: what could be taken out, less what noise alone gives to so many columns
     rest = (before - fitted) ** 2
-    possible = before**2 - rest * (1.0 + basis.shape[1] / max(1, len(before) - basis.shape[1]))
+    possible = before**2 - rest * (1.0 + freedom / max(1, len(before) - freedom))
     blocks = max(1, len(before) // BLOCK)
     edges = np.arange(0, blocks * BLOCK, BLOCK)
     won, most = (np.add.reduceat(each[: blocks * BLOCK], edges) for each in (before**2 - after**2, possible))
@@ -77,4 +93,5 @@ def measure(
         float(np.sqrt(np.mean(after**2))),
         ", ".join(recording.table.name for recording in plain.recordings),
         float(np.sum(before**2 - after**2)),
+        float(np.sum((before - after) ** 2)),
     )

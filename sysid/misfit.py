@@ -6,18 +6,21 @@ fires without a cause at the level asked for.
 """
 
 import dataclasses
+import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from scipy import stats
+from scipy import ndimage, stats
 
 from ranger_sim.sysid.dataset import Array
 from ranger_sim.sysid.machine import Columns, Machine, Recording
-from ranger_sim.sysid.regression import Regression, explained, orthonormal
+from ranger_sim.sysid.regression import Regression, explained
 
 SINGLE_CELLS = 10
 PAIR_CELLS = 5
 TIME_CELLS = 8
+BESIDE = 201  # lines of the spectrum whose median is the level of one
+FASTEST = 0.2  # of the spectrum: above it the counts of an encoder at a steady speed are lines of their own
 
 
 @dataclasses.dataclass(frozen=True)
@@ -38,7 +41,6 @@ class Misfit:
     tests: list[Test]
     p: float
     excess: float
-    basis: Array  # (N, m) orthonormal: all features together
 
     @property
     def telling(self) -> Test:
@@ -83,10 +85,15 @@ def features(signals: Mapping[str, Array], lags: Sequence[int]) -> dict[str, Arr
 General = list[tuple[str, str, list[Columns]]]  # (equation or entry, group, one {equation: (n, k)} per recording)
 
 
+def _none(_: Recording) -> dict[str, dict[str, Array]]:
+    return {}
+
+
 def general_features(machine: Machine, recordings: Sequence[Recording]) -> General:
     """All groups of features of all equations and entries."""
     found: General = []
     looked_over = [machine.generic(recording) for recording in recordings]
+    more = [getattr(machine, "features", _none)(recording) for recording in recordings]
     for equation in dict.fromkeys(name for r in recordings for name in (*r.equations, *r.entries)):
         signals = [
             each.get(equation, {}) if equation in recording.equations or equation in recording.entries else {}
@@ -101,7 +108,12 @@ def general_features(machine: Machine, recordings: Sequence[Recording]) -> Gener
         ends = np.cumsum(
             [0, *(len(recording.table) if each else 0 for recording, each in zip(recordings, signals, strict=True))]
         )
-        for group, matrix in features(together, recordings[0].lags).items():
+        groups = features(together, recordings[0].lags)
+        here = [each.get(equation, {}) for each in more]
+        for name in dict.fromkeys(name for each in here for name in each):
+            if all(name in each or not signal for each, signal in zip(here, signals, strict=True)):
+                groups[name] = np.concatenate([each[name] for each in here if name in each])
+        for group, matrix in groups.items():
             columns = [
                 _seen(recording, equation, matrix[start:stop]) if stop > start else {}
                 for recording, start, stop in zip(recordings, ends[:-1], ends[1:], strict=True)
@@ -118,19 +130,55 @@ def _seen(recording: Recording, place: str, columns: Array) -> Columns:
 
 
 def look(regression: Regression, general: General) -> Misfit:
-    """Test the residual of a regression on general features."""
-    groups = [(equation, group, regression.whitened(columns)) for equation, group, columns in general]
-    tests, everything = [], []
-    for equation, group, white in groups:
-        beside = regression.beside(white)
-        chi2, freedom = explained(beside, regression.residual)
-        if freedom:
-            tests.append(Test(equation, group, chi2, freedom, float(stats.chi2.sf(chi2, freedom))))
-            everything.append(beside)
+    """Test the residual of a regression on general features, and on lines in its spectrum."""
+    places: dict[tuple[str, ...], list[tuple[str, str, dict[str, Array]]]] = {}
+    for place, group, columns in general:
+        white = regression.whitened(columns)
+        if white:
+            places.setdefault(tuple(white), []).append((place, group, white))
+    tests: list[Test] = []
+    if all(recording.whitened for recording in regression.recordings):
+        tests += [_line(equation, regression) for equation in regression.equations]
+    excess = 0.0
+    for groups in places.values():
+        gram, product = _beside([white for *_, white in groups], regression)
+        start = 0
+        for place, group, white in groups:
+            part = slice(start, start + next(iter(white.values())).shape[1])
+            start = part.stop
+            chi2, freedom = explained(gram[part, part], product[part])
+            if freedom:
+                tests.append(Test(place, group, chi2, freedom, float(stats.chi2.sf(chi2, freedom))))
+        gained, freedom = explained(gram, product)
+        excess += gained - freedom
     if not tests:
-        return Misfit([], 1.0, 0.0, np.zeros((regression.size, 0)))
-    ordered = sorted(test.p for test in tests)
-    p = min(1.0, ordered[0] * len(ordered))
-    basis = orthonormal(np.hstack(everything))
-    gained = float(((basis.T @ regression.residual) ** 2).sum())
-    return Misfit(tests, p, max(0.0, gained - basis.shape[1]), basis)
+        return Misfit([], 1.0, 0.0)
+    p = min(1.0, min(test.p for test in tests) * len(tests))
+    return Misfit(tests, p, max(0.0, excess))
+
+
+def _beside(groups: Sequence[Mapping[str, Array]], regression: Regression) -> tuple[Array, Array]:
+    """(m, m) products of all columns of these groups, put beside the base, and (m,) of them with the residual."""
+    together = {name: np.hstack([white[name] for white in groups]) for name in groups[0]}
+    shadow = regression.shadow(together)
+    straight = sum((columns.T @ columns for columns in together.values()), 0.0)
+    across = sum((c.T @ regression.z[regression.rows[name]] for name, c in together.items()), 0.0) @ shadow
+    gram = straight - across - across.T + shadow.T @ (regression.z.T @ regression.z) @ shadow
+    return np.asarray(gram), regression.product(together, shadow, regression.residual)
+
+
+def _line(equation: str, regression: Regression) -> Test:
+    """The strongest line in the spectrum of one equation's residual, above what stands on either side of it."""
+    good = regression.good[equation]
+    even = np.zeros(len(good))
+    even[good] = regression.residual[regression.rows[equation]]
+    power = np.abs(np.fft.rfft(even))[1:-1] ** 2
+    if np.count_nonzero(good) < 100 or len(power) < 10 * BESIDE:
+        return Test(equation, "a line in time", 0.0, 2, 1.0)
+    level = ndimage.median_filter(power, BESIDE, mode="nearest") / np.log(2.0)
+    ratio = power / np.maximum(level, 1e-300)
+    low, high = BESIDE, max(BESIDE + 1, int(FASTEST * len(power)))
+    place = low + int(np.argmax(ratio[low:high]))
+    chi2 = 2.0 * float(ratio[place])
+    p = -math.expm1((high - low) * math.log1p(-math.exp(-min(0.5 * chi2, 700.0))))
+    return Test(equation, f"a line at {place + 1} periods of the data", chi2, 2, max(p, 0.0))

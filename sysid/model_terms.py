@@ -60,7 +60,7 @@ def _periodic(name: str, with_gear: bool) -> Made:
 def _resistance(numbers: Numbers, context: Context) -> dict[str, float]:
     """Ohm per kelvin of the measured temperature, or per A^2 of a filter that the simulator's winding has as well."""
     ohm = context.values["resistance_ohm"]
-    time_s = numbers["time_constant_s"]
+    time_s = numbers.get("time_constant_s", 0.0)  # none beside the winding's own
     if time_s == 0.0:
         return {"per_K": numbers["ohm_per_heat"] / ohm}
     if not WINDING_S[0] <= time_s <= WINDING_S[1]:
@@ -143,6 +143,9 @@ def term_of(machine: Machine, cause: str, at: str, numbers: Numbers, values: Num
     return _checked({"form": name, "at": at, **made})
 
 
+SAME = 0.005  # of a parameter: nearer than that to the simulator's own it stays as it is
+
+
 def parameter_terms(machine: Machine, values: Numbers, intervals: Mapping[str, tuple[float, float]]) -> list[dict]:
     """Terms that give the simulator's motor the fitted parameters that differ from its own.
 
@@ -155,7 +158,8 @@ def parameter_terms(machine: Machine, values: Numbers, intervals: Mapping[str, t
         if at is None or known.name not in PARAMETER_TERMS or known.name not in values:
             continue
         low, high = intervals[known.name]
-        if not low <= known.value <= high:
+        # what a fit misses of its own model is some thousandths; a motor's parts differ by more
+        if not low <= known.value <= high and abs(values[known.name] - known.value) > SAME * abs(known.value):
             form, change = PARAMETER_TERMS[known.name]
             try:
                 made.append(_checked({"form": form, "at": at, **change(values[known.name], known.value)}))

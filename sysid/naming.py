@@ -24,12 +24,17 @@ MOST = 4  # effects that are taken
 
 @dataclasses.dataclass
 class Trial:
-    """One effect at one shape: its whitened columns, orthogonal to the base."""
+    """One effect at one shape, beside the base: white, shadow as `Regression.product` takes them; gram (k, k); product
+    (k,) with the residual; taken (k, m): its coordinates among what was taken before it."""
 
     effect: Effect
     shape: Mapping[str, float]
-    columns: Array
+    white: dict[str, Array]
+    shadow: Array
+    gram: Array
+    product: Array
     inflation: float
+    taken: Array
 
 
 @dataclasses.dataclass
@@ -59,16 +64,22 @@ def trials(effects: Sequence[Effect], regression: Regression) -> list[Trial]:
             columns = [effect.columns(recording, shape, regression.values) for recording in regression.recordings]
             if not any(columns):
                 continue
-            white = regression.columns(columns)
-            if np.linalg.norm(white) > 1e-6:
-                made.append(Trial(effect, shape, white, regression.inflation(white)))
+            white = regression.whitened(columns)
+            if not white:
+                continue
+            shadow = regression.shadow(white)
+            beside = regression.full(white) - regression.z @ shadow
+            gram = beside.T @ beside
+            if np.sqrt(np.trace(gram)) > 1e-6:
+                product, inflation = beside.T @ regression.residual, regression.inflation(beside)
+                nothing = np.zeros((len(product), 0))
+                made.append(Trial(effect, shape, white, shadow, gram, product, inflation, nothing))
     return made
 
 
 def select(effects: Sequence[Effect], regression: Regression, level: float = LEVEL, most: int = MOST) -> list[Named]:
     """The effects that the data ask for, the most telling first."""
     all_trials = trials(effects, regression)
-    residual = regression.residual.copy()
     taken: list[Named] = []
     count = max(1, len(all_trials))
     size = regression.size
@@ -77,7 +88,7 @@ def select(effects: Sequence[Effect], regression: Regression, level: float = LEV
         for trial in all_trials:
             if any(each.effect.excludes(trial.effect) for each in taken):
                 continue
-            chi2, freedom = explained(trial.columns, residual)
+            chi2, freedom = explained(trial.gram, trial.product)
             chi2 /= trial.inflation
             if freedom:
                 shapes = len(trial.effect.shapes)
@@ -93,7 +104,7 @@ def select(effects: Sequence[Effect], regression: Regression, level: float = LEV
             if key not in best or each[0] > best[key][0]:
                 best[key] = each
         ranking = sorted(best.values(), key=lambda each: -each[0])
-        chosen = next((each for each in ranking if _possible(each[3], residual)), None)
+        chosen = next((each for each in ranking if _possible(each[3])), None)
         if chosen is None:
             break
         bic, chi2, freedom, trial = chosen
@@ -104,14 +115,27 @@ def select(effects: Sequence[Effect], regression: Regression, level: float = LEV
         tied = [
             each[3].effect
             for each in ranking
-            if each[3].effect is not trial.effect and bic - each[0] < TIE and _possible(each[3], residual)
+            if each[3].effect is not trial.effect and bic - each[0] < TIE and _possible(each[3])
         ]
         taken.append(Named(trial.effect, trial.shape, chi2, freedom, p, bic, tied, rivals[:6]))
-        basis = _basis(trial.columns)
-        residual = residual - basis @ (basis.T @ residual)
-        for other in all_trials:
-            other.columns = other.columns - basis @ (basis.T @ other.columns)
+        _take(trial, all_trials, regression)
     return taken
+
+
+def _take(chosen: Trial, trials: Sequence[Trial], regression: Regression) -> None:
+    """Put every trial beside the chosen one as well."""
+    beside = regression.full(chosen.white) - regression.z @ chosen.shadow
+    values, vectors = np.linalg.eigh(chosen.gram)
+    strong = values > 1e-9 * max(float(values[-1]), 1e-300)
+    turn = vectors[:, strong] / np.sqrt(values[strong])  # (k, m): to orthonormal columns
+    won = turn.T @ chosen.product
+    coordinates = chosen.taken
+    for trial in trials:
+        across = regression.product(trial.white, trial.shadow, beside) - trial.taken @ coordinates.T
+        new = across @ turn
+        trial.gram = trial.gram - new @ new.T
+        trial.product = trial.product - new @ won
+        trial.taken = np.hstack([trial.taken, new])
 
 
 def coefficients(columns: Array, residual: Array) -> Array:
@@ -119,14 +143,10 @@ def coefficients(columns: Array, residual: Array) -> Array:
     return np.asarray(np.linalg.lstsq(columns, residual, rcond=1e-9)[0], dtype=float)
 
 
-def _possible(trial: Trial, residual: Array) -> bool:
-    found = coefficients(trial.columns, residual)
-    return trial.effect.admissible({**dict(zip(trial.effect.coefficients, found, strict=True)), **trial.shape})
-
-
-def _basis(columns: Array) -> Array:
-    q, r = np.linalg.qr(columns)
-    return q[:, np.abs(np.diag(r)) > 1e-9 * max(1e-300, np.max(np.abs(np.diag(r))))]
+def _possible(trial: Trial) -> bool:
+    found = np.linalg.lstsq(trial.gram, trial.product, rcond=1e-12)[0]
+    numbers = dict(zip(trial.effect.coefficients, (float(each) for each in found), strict=True))
+    return trial.effect.admissible({**numbers, **trial.shape})
 
 
 def refit(

@@ -18,7 +18,7 @@ from ranger_sim.sysid.machine import Columns, Equation, Recording
 
 LEAST = 1e-9  # of the largest response: noise below it is rounding
 RANK = 1e-8  # a parameter whose column the others have to this part is not separable from them
-ORDER = 3  # of the autoregression: two for a filter, one more
+ORDER = 8  # of the autoregression at most
 
 
 def reduced(recording: Recording, column: Array) -> Array:
@@ -61,17 +61,27 @@ def _starts(recording: Recording) -> np.ndarray:
 
 
 def autoregression(residual: Array, valid: np.ndarray) -> Array:
-    """Coefficients (ORDER,) that predict a residual from those before it, over rows that are valid throughout."""
+    """Coefficients (0 ... ORDER,) that predict a residual from those before it, over rows that are valid throughout.
+
+    As many as the Bayesian information criterion asks for.
+    """
     n = len(residual)
     if np.count_nonzero(valid) < 20 * ORDER:
-        return np.zeros(ORDER)
+        return np.zeros(0)
     lags = np.column_stack([residual[ORDER - lag : n - lag] for lag in range(1, ORDER + 1)])
     whole = np.logical_and.reduce([valid[ORDER - lag : n - lag] for lag in range(ORDER + 1)])
-    if np.count_nonzero(whole) < 10 * ORDER:
-        return np.zeros(ORDER)
-    found, *_ = np.linalg.lstsq(lags[whole], residual[ORDER:][whole], rcond=None)
-    roots = np.roots(np.concatenate(([1.0], -found)))
-    return np.asarray(found, dtype=float) if np.all(np.abs(roots) < 0.999) else np.zeros(ORDER)
+    rows = np.count_nonzero(whole)
+    if rows < 10 * ORDER:
+        return np.zeros(0)
+    lags, now = lags[whole], residual[ORDER:][whole]
+    best, found = rows * np.log(max(float(np.mean(now**2)), 1e-300)), np.zeros(0)
+    for order in range(1, ORDER + 1):
+        tried, *_ = np.linalg.lstsq(lags[:, :order], now, rcond=None)
+        left = float(np.mean((now - lags[:, :order] @ tried) ** 2))
+        criterion = rows * np.log(max(left, 1e-300)) + order * np.log(rows)
+        if criterion < best and np.all(np.abs(np.roots(np.concatenate(([1.0], -tried)))) < 0.999):
+            best, found = criterion, np.asarray(tried, dtype=float)
+    return found
 
 
 @dataclasses.dataclass
@@ -114,16 +124,14 @@ class Regression:
         self.names += list(extra_names)
         self.count = len(self.names)
         self.parts = {name: self._part(name, extra, list(extra_names)) for name in self.equations}
-        self.whitening: dict[str, Whitening] = {}
-        self.shared: dict[tuple[str, str], float] = {}
+        self.whitening: dict[str, Whitening] = dict(noise.whitening) if noise else {}
+        self.shared: dict[tuple[str, str], float] = dict(noise.shared) if noise else {}
         counted = sum(int(np.count_nonzero(self._good(name))) for name in self.equations)
         if counted <= 10 * self.count:
             names = ", ".join(recording.table.name for recording in self.recordings)
             raise UserError(f"{names}: {counted} samples count, too few for {self.count} parameters")
         if noise is None:
             self._find_whitening()
-        else:
-            self.whitening, self.shared = noise.whitening, noise.shared
         self._whiten()
 
     def _part(self, equation: str, extra: Sequence[Columns], extra_names: list[str]) -> Part:
@@ -165,7 +173,7 @@ class Regression:
                     rho = float(np.mean(kept[1:] * kept[:-1])) / total if len(kept) > 1 and total > 0.0 else 0.0
                     rho = min(max(rho, 0.0), *(recording.memory for recording in self.recordings))
                     memory = float(np.sqrt((1.0 + rho) / (1.0 - rho)))
-                    coefficients = np.zeros(ORDER)
+                    coefficients = np.zeros(0)
                 white = lfilter(np.concatenate(([1.0], -coefficients)), [1.0], residual)
                 good = self._good(name, coefficients)
                 deviation = float(np.sqrt(np.mean(white[good] ** 2))) if np.any(good) else 1.0
@@ -185,11 +193,8 @@ class Regression:
         good = part.valid & ~part.starts
         if coefficients is None and equation in self.whitening:
             coefficients = self.whitening[equation].coefficients
-        whitened = all(recording.whitened for recording in self.recordings)
-        if whitened or (coefficients is not None and np.any(coefficients)):
-            for lag in range(1, ORDER + 1):
-                good[lag:] &= part.valid[:-lag]
-            good[:ORDER] = False
+        for lag in range(1, 1 + (0 if coefficients is None else len(coefficients))):
+            good[lag:] &= part.valid[:-lag]
         return good
 
     def _scaled(self, equation: str, column: Array) -> Array:
@@ -221,6 +226,12 @@ class Regression:
         self.measured = self._stack({name: part.measured for name, part in self.parts.items()})
         self.stand_in = self._stack({name: part.stand_in for name, part in self.parts.items()})
         self.size = len(self.response)
+        self.rows: dict[str, slice] = {}
+        start = 0
+        for name in self.equations:
+            stop = start + int(np.count_nonzero(self.good[name]))
+            self.rows[name] = slice(start, stop)
+            start = stop
         self.both: dict[tuple[str, str], tuple[np.ndarray, np.ndarray]] = {}
         for one, other in self.shared:
             both = self.good[one] & self.good[other]
@@ -258,7 +269,7 @@ class Regression:
 
     def columns(self, made: Sequence[Columns]) -> Array:
         """An effect's columns, one {equation: (n, k)} per recording, whitened and orthogonal to the base: (N, k)."""
-        return self.beside(self.whitened(made))
+        return self.beside(self.full(self.whitened(made)))
 
     def beside(self, stacked: Array) -> Array:
         """What of whitened columns (N, k) the base does not have.
@@ -282,29 +293,43 @@ class Regression:
             worst += 2.0 * abs(correlation) * product * columns.shape[1] / max(total, 1e-300)
         return worst
 
-    def whitened(self, made: Sequence[Columns]) -> Array:
-        """The same, not made orthogonal to anything."""
+    def whitened(self, made: Sequence[Columns]) -> dict[str, Array]:
+        """An effect's columns as they are, whitened: by equation (n, k), only where the effect stands."""
         width = next(column.shape[1] for each in made for column in each.values())
-        unwhitened = {}
+        out = {}
         for name in self.equations:
+            if not any(name in each and name in r.equations for r, each in zip(self.recordings, made, strict=True)):
+                continue
             parts = []
             for recording, each in zip(self.recordings, made, strict=True):
                 if name in each and name in recording.equations:
                     parts.append(reduced(recording, each[name]))
                 else:
                     parts.append(np.zeros((len(_rows(recording)), width)))
-            unwhitened[name] = np.vstack(parts)
-        return self._stack(unwhitened)
+            out[name] = self._scaled(name, np.vstack(parts))[self.good[name]]
+        return out
+
+    def full(self, white: Mapping[str, Array]) -> Array:
+        """(N, k) from whitened columns by equation."""
+        width = next(iter(white.values())).shape[1]
+        out = np.zeros((self.size, width))
+        for name, columns in white.items():
+            out[self.rows[name]] = columns
+        return out
+
+    def shadow(self, white: Mapping[str, Array]) -> Array:
+        """(p, k): how much of z is taken off whitened columns when they are put beside the base."""
+        together = sum((self.phi[self.rows[name]].T @ columns for name, columns in white.items()), 0.0)
+        return np.asarray(self.inverse.T @ together)
+
+    def product(self, white: Mapping[str, Array], shadow: Array, other: Array) -> Array:
+        """(k, m): whitened columns, put beside the base, times rows (N, m)."""
+        straight = sum((columns.T @ other[self.rows[name]] for name, columns in white.items()), 0.0)
+        return np.asarray(straight - shadow.T @ (self.z.T @ other))
 
     def rows_of(self, equation: str) -> slice:
         """Where an equation stands in the stacked rows."""
-        start = 0
-        for name in self.equations:
-            stop = start + int(np.count_nonzero(self.good[name]))
-            if name == equation:
-                return slice(start, stop)
-            start = stop
-        raise KeyError(equation)
+        return self.rows[equation]
 
 
 def orthonormal(columns: Array) -> Array:
@@ -316,15 +341,17 @@ def orthonormal(columns: Array) -> Array:
     return (scaled @ vectors[:, strong]) / np.sqrt(values[strong])
 
 
-def explained(columns: Array, residual: Array) -> tuple[float, int]:
-    """(chi-square that these columns (N, k) take out of the residual, how many of them are independent)."""
-    lengths = np.linalg.norm(columns, axis=0)
+def explained(gram: Array, product: Array) -> tuple[float, int]:
+    """(chi-square that columns take out of a residual, how many of them are independent).
+
+    gram: (k, k) of the columns; product: (k,) of them with the residual.
+    """
+    lengths = np.sqrt(np.maximum(np.diag(gram), 0.0))
     kept = lengths > 1e-9
     if not np.any(kept):
         return 0.0, 0
-    scaled = columns[:, kept] / lengths[kept]
-    gram = scaled.T @ scaled
-    values, vectors = np.linalg.eigh(gram)
+    scaled = gram[np.ix_(kept, kept)] / np.outer(lengths[kept], lengths[kept])
+    values, vectors = np.linalg.eigh(scaled)
     strong = values > 1e-6
-    projected = (vectors[:, strong].T @ (scaled.T @ residual)) ** 2 / values[strong]
+    projected = (vectors[:, strong].T @ (product[kept] / lengths[kept])) ** 2 / values[strong]
     return float(projected.sum()), int(np.count_nonzero(strong))

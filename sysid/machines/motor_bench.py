@@ -18,11 +18,10 @@ from ranger_sim.sysid import signals
 from ranger_sim.sysid.dataset import Array, Table
 from ranger_sim.sysid.machine import Columns, Effect, Equation, Known, Quantity, Recording, Values
 
-CALM = 20.0  # samples; Gaussian of a signal whose own noise stands in the residual that it is to sort
+CALM = 20.0  # samples; Gaussian of two speeds that are held against each other
 SLOW = 5.0  # samples; Gaussian of what must not have the noise of a derivative
-WIDTH = 2.0  # samples; Gaussian over both sides of each equation
-EVERY = 3  # rows that count after it
-REACH = 16  # samples about a jump or a change of sign that do not count: what is smoothed slowly is smeared so far
+FINE = 2.0  # samples; Gaussian of the speed by the angle: its counts are small, and a reversal stays where it was
+REACH = 4  # samples about a jump or a standstill that do not count: two deviations of the finer Gaussian
 JUMP_IN_STEPS = 0.06  # of the whole range, within one sample
 SIGN_IN_NOISE = 4.0  # deviations of noise within which a sign means nothing
 HEAT_TIMES_S = (3.0, 10.0, 30.0, 100.0, 300.0)
@@ -31,6 +30,9 @@ CURRENT_SHARES = (0.1, 0.3, 1.0)
 LAGS_S = (0.0005, 0.001, 0.002, 0.004, 0.01, 0.03)
 SAME_MOTION = 0.7  # correlation of angle and speed; slip and lost counts leave more
 SAME_SPEED = 2.0  # times: rpm, degrees and thousands are more
+DEFLECTIONS_RAD = (1e-4, 2e-4, 4e-4, 8e-4, 1.6e-3, 3.2e-3, 6.4e-3, 0.0128, 0.03, 0.1)
+SAMPLES_A_WAVE = 4.0  # with fewer a sample's own interval and differences of samples change what a wave shows
+MOST_WAVES = 24  # per turn of the rotor, of the general look
 MOST_PERIODS = 60  # per turn of the rotor
 
 Shape = Mapping[str, float]
@@ -93,10 +95,10 @@ class MotorBench:
         if measured:
             _same_motion(table, s["angle"] / self.gear, w)
         # stand-ins: speed by the angle, current by voltage and speed; neither has the noise of what it stands for
-        s["w"] = signals.derivative(table, s["angle"], SLOW) / self.gear if measured else signals.smooth(table, w, SLOW)
-        s["dw"] = np.gradient(s["w"], table.step_s)
+        s["w"] = signals.derivative(table, s["angle"], FINE) / self.gear if measured else signals.smooth(table, w, FINE)
+        s["dw"] = np.gradient(signals.smooth(table, s["w"], SLOW), table.step_s)
         rough = _rough_electrics(V, I, s["w"])
-        s["I"] = _current(signals.smooth(table, V, 1.0), s["w"], *rough)
+        s["I"] = _current(V, s["w"], *rough)
         s["w_by_voltage"] = signals.smooth(table, V - rough[0] * I - rough[1] * np.sign(s["I"]), SLOW) / rough[2]
         if not measured:
             s["dw"] = np.gradient(s["w_by_voltage"], table.step_s)
@@ -105,11 +107,14 @@ class MotorBench:
         s["dV"] = np.gradient(V, table.step_s)
         steady = _no_jump(V, JUMP_IN_STEPS, REACH)
         noise_I, noise_w = _spread(I - s["I"], steady), _spread(w - s["w"], steady)
-        s["sgn_I"], s["sgn_w"] = np.tanh(s["I"] / max(noise_I, 1e-9)), np.tanh(s["w"] / max(noise_w, 1e-9))
+        s["sgn_I"], s["sgn_w"] = _mean_sign(s["I"]), _mean_sign(s["w"])
+        # what the electric balance is sorted by must not have the voltage's or the current's own noise
+        s["I_by_torque"] = signals.smooth(table, _current_by_torque(T, I, s), SLOW)
+        s["V_by_torque"] = rough[0] * s["I_by_torque"] + rough[1] * s["sgn_I"] + rough[2] * s["w"]
         if "temperature_C" in table:
             s["warmth"] = signals.smooth(table, table["temperature_C"], 50.0) - 25.0
-        firm_I = steady & _away(s["I"], SIGN_IN_NOISE * noise_I, REACH)
-        firm_w = steady & _away(s["w"], SIGN_IN_NOISE * noise_w, REACH)
+        firm_I = steady & _away(s["I"], SIGN_IN_NOISE * noise_I, REACH) & _one_sign(s["I"])
+        firm_w = steady & _away(s["w"], SIGN_IN_NOISE * noise_w, 2) & _one_sign(s["w"])
         loaded = -s["sgn_w"] * np.sign(s["I"])
         equations = {
             "electric": Equation(
@@ -125,7 +130,7 @@ class MotorBench:
                     "inductance_H": s["dI"],
                 },
                 firm_I,
-                {"resistance_ohm": s["I"], "torque_constant_Nm_per_A": s["w"]},
+                {"resistance_ohm": s["I_by_torque"], "torque_constant_Nm_per_A": s["w"]},
             ),
             "mechanical": Equation(
                 "mechanical",
@@ -157,22 +162,31 @@ class MotorBench:
             )
         regimes = _regimes(s, firm_w)
         lags = (0, 10, 30, 100) if measured else (0, 100, 250)
-        return Recording(table, s, equations, regimes, WIDTH, EVERY, lags=lags)
+        return Recording(table, s, equations, regimes, lags=lags)
 
     def generic(self, recording: Recording) -> dict[str, dict[str, Array]]:
         """Signals over which each equation is looked at without a cause in mind."""
         s = recording.signals
-        calm = {name: signals.smooth(recording.table, s[name], CALM) for name in ("I", "V", "w")}
-        of_voltage = {**calm, "t": s["t"]}
-        of_torque = {name: s[name] for name in ("I", "w", "V", "t")}
-        if "transmission" in recording.equations:
-            of_voltage["w"] = s["w"]  # by the angle: no noise of the speed's sensor
-        else:
+        of_voltage = {"I": s["I_by_torque"], "V": s["V_by_torque"], "w": s["w"], "t": s["t"]}
+        turn = np.remainder(s["angle"] / self.gear, 2.0 * np.pi)
+        of_torque = {**{name: s[name] for name in ("I", "w", "V", "t")}, "angle": turn}
+        if "transmission" not in recording.equations:
             of_torque["w"] = s["w_by_voltage"]
         measured_I = signals.smooth(recording.table, recording.table["current_A"], SLOW)
         of_speed = {**of_torque, "w": s["w_by_voltage"], "I": measured_I}
         made = {"electric": of_voltage, "mechanical": of_torque, "transmission": of_speed}
         return {name: made[name] for name in recording.equations}
+
+    def features(self, recording: Recording) -> dict[str, dict[str, Array]]:
+        """More groups of columns (n, k) for that look: waves over the rotor's angle, also as large as V or I."""
+        s = recording.signals
+        groups = {}
+        sizes = {"": np.ones_like(s["V"]), " as large as the voltage": s["V"], " as large as the current": s["I"]}
+        for kind, size in sizes.items():
+            for low in range(1, MOST_WAVES + 1, 4):
+                each = [wave * size for n in range(low, low + 4) for wave in waves(recording, self.gear, n)]
+                groups[f"{low} to {low + 3} waves a turn of the rotor{kind}"] = column(*each)
+        return {"mechanical": groups}
 
     def effects(self, recordings: Sequence[Recording]) -> list[Effect]:
         """The catalogue's causes that such a bench can have."""
@@ -215,6 +229,33 @@ def _away(values: Array, limit: float, reach: int) -> np.ndarray:
     """True where the values stay `limit` away from 0, also `reach` samples before and after."""
     near = np.abs(values) < limit
     return np.convolve(near, np.ones(2 * reach + 1), mode="same") < 0.5
+
+
+def _one_sign(values: Array) -> np.ndarray:
+    """False for the two samples on either side of a change of sign: within them the acceleration jumps."""
+    crossed = np.zeros(len(values), dtype=bool)
+    crossed[1:] = values[1:] * values[:-1] < 0.0
+    crossed[:-1] |= crossed[1:]
+    return np.convolve(crossed, np.ones(3), mode="same") < 0.5
+
+
+def _mean_sign(values: Array) -> Array:
+    """(n,) mean sign over each sample, the values being straight lines between."""
+    ends = np.concatenate((values[:1], 0.5 * (values[1:] + values[:-1]), values[-1:]))
+    rise = np.diff(ends)
+    crossing = ends[1:] * ends[:-1] < 0.0
+    mean = np.divide(np.diff(np.abs(ends)), rise, out=np.zeros_like(values), where=crossing)
+    return np.where(crossing, mean, np.sign(values))
+
+
+def _current_by_torque(T: Array, I: Array, s: Mapping[str, Array]) -> Array:  # noqa: E741
+    """Current that the measured torque asks for, by a rough fit of the mechanical balance."""
+    loaded = -s["sgn_w"] * np.sign(s["I"])
+    rest = np.column_stack([s["sgn_w"], s["w"], s["dw"]])
+    found = np.linalg.lstsq(np.column_stack([s["I"], loaded * s["I"], rest]), T, rcond=None)[0]
+    per_ampere = found[0] + found[1] * loaded
+    least = 0.2 * max(abs(float(found[0])), 1e-9)
+    return (T - rest @ found[2:]) / np.where(np.abs(per_ampere) > least, per_ampere, least)
 
 
 def _rough_electrics(V: Array, I: Array, w: Array) -> tuple[float, float, float]:  # noqa: E741
@@ -276,6 +317,11 @@ def _ones(s: Mapping[str, Array], _: Shape, __: Values) -> Array:
     return np.ones_like(s["V"])
 
 
+def over(values: Array, limit: float) -> Array:
+    """What of the values lies beyond the limit, either way."""
+    return np.sign(values) * np.maximum(np.abs(values) - limit, 0.0)
+
+
 def _minus(name: str) -> Callable[[Mapping[str, Array], Shape, Values], Array]:
     return lambda s, _, __: -s[name]
 
@@ -295,6 +341,27 @@ def _electric(top_I: float, top_V: float, warmth: bool) -> list[Effect]:
         heat = _heat(r, shape)
         return {"electric": column(r.signals["w"] * heat), "mechanical": column(r.signals["I"] * heat)}
 
+    def two_heats(r: Recording, shape: Shape, _: Values) -> Columns:
+        """The winding is as warm as its housing, and warmer by its own losses and by what was left from before."""
+        current = r.signals["I_by_torque"]
+        own = signals.lagged(r.table, r.signals["I"] ** 2, shape["winding_time_s"])
+        left = np.exp(-r.signals["t"] / shape["winding_time_s"])
+        return {"electric": column(current * r.signals["warmth"], current * own, current * left)}
+
+    above_housing = [
+        Effect(
+            "resistance_temperature",
+            "hip_motor",
+            E,
+            ("ohm_per_heat", "ohm_per_A2", "ohm_at_start"),
+            [{"winding_time_s": time_s} for time_s in HEAT_TIMES_S if warmth],
+            two_heats,
+            lambda found: found["ohm_per_heat"] > 0.0 and found["ohm_per_A2"] > 0.0,
+            "resistance that grows with the winding's temperature",
+            form="winding and housing",
+            free=("ohm_at_start",),
+        )
+    ]
     return [
         Effect(
             "contact_drop_change",
@@ -302,7 +369,7 @@ def _electric(top_I: float, top_V: float, warmth: bool) -> list[Effect]:
             E,
             ("change_V",),
             [{"current_A": share * top_I} for share in CURRENT_SHARES],
-            _one("electric", lambda s, p, _: s["sgn_I"] * (1.0 - np.exp(-np.abs(s["I"]) / p["current_A"]))),
+            _one("electric", lambda s, p, _: s["sgn_I"] * (1.0 - np.exp(-np.abs(s["I_by_torque"]) / p["current_A"]))),
             meaning="a drop at the brushes that depends on the current",
         ),
         Effect(
@@ -311,9 +378,12 @@ def _electric(top_I: float, top_V: float, warmth: bool) -> list[Effect]:
             E,
             ("ohm_per_heat",),
             heats,
-            lambda r, p, _: {"electric": column(r.signals["I"] * _heat(r, p))},
-            meaning="resistance that grows with the winding's temperature",
+            lambda r, p, _: {"electric": column(r.signals["I_by_torque"] * _heat(r, p))},
+            lambda found: found["ohm_per_heat"] > 0.0,
+            "resistance that grows with the winding's temperature",
+            form="one heat",
         ),
+        *above_housing,
         Effect("torque_constant_temperature", "hip_motor", E, ("per_heat",), heats, torque_constant),
         Effect(
             "dead_time",
@@ -321,17 +391,26 @@ def _electric(top_I: float, top_V: float, warmth: bool) -> list[Effect]:
             E,
             ("drop_V",),
             [{}],
-            _one("electric", lambda s, p, _: s["sgn_I"] * (np.abs(s["V"]) > 0.02 * top_V)),
+            _one("electric", lambda s, p, _: s["sgn_I"] * (np.abs(s["V_by_torque"]) > 0.02 * top_V)),
             meaning="a drop against the current while the bridge switches",
         ),
-        Effect("battery_sag", "supply", E, ("per_A",), [{}], _one("electric", lambda s, p, _: s["V"] * np.abs(s["I"]))),
+        Effect(
+            "battery_sag",
+            "supply",
+            E,
+            ("per_A",),
+            [{}],
+            _one("electric", lambda s, p, _: s["V_by_torque"] * np.abs(s["I_by_torque"])),
+        ),
         Effect(
             "charge_drift",
             "supply",
             E,
             ("per_As",),
             [{}],
-            lambda r, p, _: {"electric": column(r.signals["V"] * signals.integral(r.table, np.abs(r.signals["I"])))},
+            lambda r, p, _: {
+                "electric": column(r.signals["V_by_torque"] * signals.integral(r.table, np.abs(r.signals["I"])))
+            },
         ),
         Effect(
             "voltage_clip",
@@ -339,7 +418,7 @@ def _electric(top_I: float, top_V: float, warmth: bool) -> list[Effect]:
             E,
             ("share",),
             [{"limit_V": share * top_V} for share in (0.5, 0.6, 0.7, 0.8, 0.9, 0.95)],
-            _one("electric", lambda s, p, _: np.sign(s["V"]) * np.maximum(np.abs(s["V"]) - p["limit_V"], 0.0)),
+            _one("electric", lambda s, p, _: over(s["V_by_torque"], p["limit_V"])),
         ),
         Effect(
             "pwm_ripple",
@@ -347,7 +426,7 @@ def _electric(top_I: float, top_V: float, warmth: bool) -> list[Effect]:
             E,
             ("V_per_V",),
             [{}],
-            _one("electric", lambda s, p, _: s["V"] * (1.0 - np.abs(s["V"]) / top_V)),
+            _one("electric", lambda s, p, _: s["V_by_torque"] * (1.0 - np.abs(s["V_by_torque"]) / top_V)),
         ),
     ]
 
@@ -355,11 +434,11 @@ def _electric(top_I: float, top_V: float, warmth: bool) -> list[Effect]:
 def _sensors(gear: float, top_w: float, top_V: float) -> list[Effect]:
     S = "sensor"
 
-    def current_offset(mask: Callable[[Mapping[str, Array]], Array]) -> Made:
+    def current_offset(mask: Callable[[Array], Array]) -> Made:
         def made(r: Recording, _: Shape, v: Values) -> Columns:
-            where = mask(r.signals)
+            where = mask(r.signals["V"])
             return {
-                "electric": column(-v["resistance_ohm"] * where),
+                "electric": column(-v["resistance_ohm"] * mask(r.signals["V_by_torque"])),
                 "mechanical": column(
                     -(
                         v["torque_constant_Nm_per_A"]
@@ -407,16 +486,13 @@ def _sensors(gear: float, top_w: float, top_V: float) -> list[Effect]:
         angle = shape["periods_per_turn"] * r.signals["angle"]
         return {T: column(*(np.gradient(f(angle), r.table.step_s) / gear for f in (np.cos, np.sin)))}
 
-    def over(w: Array, shape: Shape) -> Array:
-        return -np.sign(w) * np.maximum(np.abs(w) - shape["speed_rad_s"], 0.0)
-
     def lost_angle(r: Recording, shape: Shape, _: Values) -> Columns:
-        return {T: column(over(r.signals["w_by_voltage"], shape))}
+        return {T: column(-over(r.signals["w_by_voltage"], shape["speed_rad_s"]))}
 
     def lost_speed(r: Recording, shape: Shape, v: Values) -> Columns:
         s = r.signals
-        in_voltage = -v["torque_constant_Nm_per_A"] * over(s["w"], shape)
-        return {"electric": column(in_voltage), T: column(-over(s["w_by_voltage"], shape))}
+        in_voltage = v["torque_constant_Nm_per_A"] * over(s["w"], shape["speed_rad_s"])
+        return {"electric": column(in_voltage), T: column(over(s["w_by_voltage"], shape["speed_rad_s"]))}
 
     def drifting(s: Mapping[str, Array], _: Shape, __: Values) -> Array:
         return s["t"] * s["dT"]
@@ -427,7 +503,7 @@ def _sensors(gear: float, top_w: float, top_V: float) -> list[Effect]:
     return [
         Effect("sensor_scale", "current_A", S, ("change",), [{}], _one("mechanical", lambda s, p, _: s["I"])),
         Effect("sensor_offset", "voltage_V", S, ("offset_V",), [{}], _one("electric", _ones)),
-        Effect("sensor_offset", "current_A", S, ("offset_A",), [{}], current_offset(lambda s: np.ones_like(s["V"]))),
+        Effect("sensor_offset", "current_A", S, ("offset_A",), [{}], current_offset(np.ones_like)),
         Effect("sensor_offset", "torque_Nm", S, ("offset_Nm",), [{}], _one("mechanical", _ones)),
         Effect("sensor_offset", "speed_rad_per_s", S, ("offset_rad_s",), [{}], speed_offset),
         Effect(
@@ -436,7 +512,7 @@ def _sensors(gear: float, top_w: float, top_V: float) -> list[Effect]:
             S,
             ("offset_A",),
             [{}],
-            current_offset(lambda s: np.tanh(s["V"] / (0.02 * top_V))),
+            current_offset(lambda voltage: np.tanh(voltage / (0.02 * top_V))),
         ),
         Effect("sensor_lag", "voltage_V", S, ("time_constant_s",), [{}], _one("electric", _minus("dV"))),
         Effect("sensor_lag", "current_A", S, ("time_constant_s",), [{}], current_lag),
@@ -454,8 +530,10 @@ def _friction(top_w: float) -> list[Effect]:
     M = "mechanical"
     speeds = [{"speed_rad_s": share * top_w} for share in SPEED_SHARES]
 
-    def presliding(r: Recording, shape: Shape, _: Values) -> Columns:
-        return {"mechanical": column(r.signals["sgn_w"] - bristles(r, r.signals["w"], shape["slide_rad"]))}
+    def presliding(r: Recording, shape: Shape, v: Values) -> Columns:
+        s = r.signals
+        limit = v["constant_friction_Nm"] + v["load_friction_Nm_per_A"] * np.abs(s["I"])
+        return {"mechanical": column(limit * (s["sgn_w"] - bristles(r, s["w"], shape["deflection_rad"])))}
 
     def warm_up(r: Recording, shape: Shape, _: Values) -> Columns:
         s = r.signals
@@ -483,10 +561,10 @@ def _friction(top_w: float) -> list[Effect]:
             "presliding",
             "hip_motor",
             M,
-            ("friction_Nm",),
-            [{"slide_rad": slide} for slide in (0.003, 0.01, 0.03, 0.1, 0.3)],
+            ("share_of_friction",),
+            [{"deflection_rad": way} for way in DEFLECTIONS_RAD],
             presliding,
-            lambda found: found["friction_Nm"] > 0.0,
+            lambda found: 0.3 < found["share_of_friction"] < 3.0,
             "friction that builds up over a way after a reversal",
         ),
         Effect(
@@ -522,13 +600,19 @@ def _friction(top_w: float) -> list[Effect]:
     ]
 
 
+def waves(r: Recording, gear: float, periods_per_turn: float) -> tuple[Array, Array]:
+    """Cosine and sine of so many periods a turn of the rotor; nothing where samples do not follow them."""
+    follows = np.abs(periods_per_turn * gear * r.signals["w"]) * r.table.step_s < 2.0 * np.pi / SAMPLES_A_WAVE
+    angle = periods_per_turn * r.signals["angle"]
+    return follows * np.cos(angle), follows * np.sin(angle)
+
+
 def _periodic(gear: float) -> list[Effect]:
     M = "mechanical"
     each = [{"periods_per_turn": float(n)} for n in range(1, MOST_PERIODS + 1)]
 
     def wave(r: Recording, shape: Shape) -> tuple[Array, Array]:
-        angle = shape["periods_per_turn"] * r.signals["angle"]
-        return np.cos(angle), np.sin(angle)
+        return waves(r, gear, shape["periods_per_turn"])
 
     def cogging(r: Recording, shape: Shape, _: Values) -> Columns:
         return {"mechanical": column(*wave(r, shape))}
@@ -559,13 +643,24 @@ def _transmission() -> list[Effect]:
     def play(r: Recording, shape: Shape, v: Values) -> Columns:
         """The output lies against the flank that carries the load, and crosses the gap in some milliseconds."""
         s = r.signals
-        load = signals.smooth(r.table, r.table["torque_Nm"], SLOW) + v["inertia_kg_m2"] * s["dw"]
-        flank = np.tanh(load / shape["torque_Nm"])
-        if shape["crossing_s"] > 0.0:
-            flank = signals.lagged(r.table, flank, shape["crossing_s"])
-        return {T: column(np.gradient(flank, r.table.step_s))}
+        pulls = (v["torque_constant_Nm_per_A"] - v["load_friction_Nm_per_A"] * s["sgn_w"] * np.sign(s["I"])) * s["I"]
+        rest = v["constant_friction_Nm"] * s["sgn_w"] + v["viscous_friction_Nms"] * s["w"]
+        load = pulls - rest - shape["share_of_inertia"] * v["inertia_kg_m2"] * s["dw"]
+        flank = signals.lagged(r.table, np.tanh(load / shape["torque_Nm"]), shape["crossing_s"])
+        rate = np.gradient(flank, r.table.step_s)
+        jerk = np.gradient(rate, r.table.step_s)
+        return {
+            "electric": column(v["torque_constant_Nm_per_A"] * rate),
+            "mechanical": column(-v["viscous_friction_Nms"] * rate - v["inertia_kg_m2"] * jerk),
+            T: column(rate),
+        }
 
-    plays = [{"torque_Nm": load, "crossing_s": time_s} for load in (0.01, 0.03, 0.1) for time_s in (0.0, 0.003, 0.01)]
+    plays = [
+        {"share_of_inertia": share, "torque_Nm": load, "crossing_s": time_s}
+        for share in (0.0, 0.5, 1.0)
+        for load in (0.02, 0.05)
+        for time_s in (0.002, 0.004, 0.008)
+    ]
     return [
         Effect("cable_stiffening", T, T, ("rad_per_Nm",), [{}], _one(T, lambda s, p, _: s["dT"])),
         Effect("cable_backlash", T, T, ("half_gap_rad",), plays, play),

@@ -31,8 +31,13 @@ def recording(response, columns, stand_ins=None, **more):
 def test_an_autoregression_is_found():
     rng = generator(1, "noise")
     noise = lfilter([1.0], [1.0, -1.2, 0.5], rng.normal(size=200_000))
-    # deviation of a coefficient: at most 1 / sqrt(N) = 0.0022; five
-    assert autoregression(noise, np.ones(len(noise), dtype=bool)) == pytest.approx([1.2, -0.5, 0.0], abs=0.012)
+    # deviation of a coefficient: at most 1 / sqrt(N) = 0.0022; five. Two and no more: a third does not pay for itself
+    assert autoregression(noise, np.ones(len(noise), dtype=bool)) == pytest.approx([1.2, -0.5], abs=0.012)
+
+
+def test_white_noise_has_no_autoregression():
+    noise = generator(2, "noise").normal(size=20_000)
+    assert len(autoregression(noise, np.ones(len(noise), dtype=bool))) == 0
 
 
 def test_intervals_hold_with_noise_that_remembers():
@@ -69,7 +74,7 @@ def test_what_chance_explains_is_a_chi_square():
         x = np.cumsum(rng.normal(size=1500)) * 0.03
         made = Regression([recording(x + coloured(rng, 1500), {"slope": x})])
         columns = made.columns([{"one": np.column_stack([np.sin(x), np.cos(x), x**2])}])
-        chi2, freedom = explained(columns, made.residual)
+        chi2, freedom = explained(columns.T @ columns, columns.T @ made.residual)
         assert freedom == 3
         found.append(chi2)
     assert np.mean(found) == pytest.approx(3.0, abs=0.7)
@@ -83,10 +88,21 @@ def test_the_chi_square_of_a_real_column_is_its_size_over_its_noise():
     extra = np.sign(np.sin(np.arange(SIZE) * 0.013))
     made = Regression([recording(x + 0.2 * extra + rng.normal(size=SIZE), {"slope": x})])
     columns = made.columns([{"one": extra[:, None]}])
-    chi2, _ = explained(columns, made.residual)
+    chi2, _ = explained(columns.T @ columns, columns.T @ made.residual)
     # 0.2^2 * 4000 = 160, deviation 2 * sqrt(160) = 25; five
     assert chi2 == pytest.approx(160.0, abs=126.0)
     assert chi2 > 60.0
+
+
+def test_products_beside_the_base_are_those_of_the_whole_columns():
+    rng = generator(8, "products")
+    x, other = np.sin(np.arange(SIZE) * 0.1), rng.normal(size=SIZE)
+    made = Regression([recording(x + rng.normal(size=SIZE), {"slope": x}, {"slope": x + 0.1 * other})])
+    columns = [{"one": np.column_stack([other, np.cos(np.arange(SIZE) * 0.1)])}]
+    white = made.whitened(columns)
+    whole = made.columns(columns)
+    assert made.product(white, made.shadow(white), made.residual) == pytest.approx(whole.T @ made.residual)
+    assert made.product(white, made.shadow(white), whole) == pytest.approx(whole.T @ whole)
 
 
 def test_equations_that_share_noise_tell_by_how_much():
@@ -101,9 +117,9 @@ def test_equations_that_share_noise_tell_by_how_much():
     made = Regression([Recording(table, {}, both)])
     assert made.shared["one", "other"] == pytest.approx(0.5, abs=0.06)
     ones = np.ones((SIZE, 1))
-    assert made.inflation(made.whitened([{"one": ones}])) == 1.0
+    assert made.inflation(made.full(made.whitened([{"one": ones}]))) == 1.0
     # the same column in both: variance of the sum is 1 + correlation
-    assert made.inflation(made.whitened([{"one": ones, "other": ones}])) == pytest.approx(1.5, abs=0.1)
+    assert made.inflation(made.full(made.whitened([{"one": ones, "other": ones}]))) == pytest.approx(1.5, abs=0.1)
 
 
 def test_columns_that_are_the_same_are_named_and_not_separated():
