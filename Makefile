@@ -12,7 +12,7 @@ walk: $(VENV)/.walk
 	$(RUN) -m ranger_sim walk --steps $(STEPS) --out runs/walk
 
 test: $(VENV)/.all
-	$(RUN) -m pytest -q -rs
+	$(RUN) -m pytest -q -rs -n 2 --dist loadfile
 
 test-vm: $(VENV)/.all
 	$(RUN) -m tests.vm.run

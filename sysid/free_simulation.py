@@ -189,7 +189,7 @@ class Predictor:
             P = A @ P @ A.transpose(0, 2, 1) + state_noise[at] - K @ error @ K.transpose(0, 2, 1)
             P[:] = 0.5 * (P + P.transpose(0, 2, 1))
             self.ends[: len(at)] = P
-        self.spread = np.linalg.cholesky(self.spread)
+        self.spread = np.asarray(np.linalg.cholesky(self.spread), dtype=float)
         self.unspread = np.linalg.inv(self.spread)
         self.inner = lin.f_x - self.gain @ lin.h_x
         self.inner[starts[1:] - 1] = 0.0

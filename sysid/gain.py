@@ -50,18 +50,18 @@ def measure(
         made = [each.effect.columns(recording, each.shape, plain.values) for recording in plain.recordings]
         if not any(made):
             continue
-        white = plain.columns(made)
-        columns.append(white)
+        beside = plain.columns(made)
+        columns.append(beside)
         coefficients = np.array([values[name] for name in each.coefficients])
         if each.effect.phase_is_free and len(coefficients) == 2:
-            here = coefficients_of(white, before)
+            here = coefficients_of(beside, before)
             coefficients = here * (np.linalg.norm(coefficients) / max(float(np.linalg.norm(here)), 1e-300))
         free = [name in each.effect.free for name in each.effect.coefficients]
         if any(free):
             fixed = np.where(free, 0.0, coefficients)
             coefficients = fixed.copy()
-            coefficients[free] = coefficients_of(white[:, free], after - white @ fixed)
-        after = after - white @ coefficients
+            coefficients[free] = coefficients_of(beside[:, free], after - beside @ fixed)
+        after = after - beside @ coefficients
     seen = [plain.whitened(made) for _, _, made in general]
     fitted, freedom = np.zeros_like(before), 0
     for equation in plain.equations:

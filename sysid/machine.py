@@ -90,6 +90,7 @@ class Recording:
     margin: float = 1.0  # noise is taken larger by this: what is no noise and no effect either, such as late stamps
     lags: tuple[int, ...] = (0, 10, 30, 100)  # samples back at which the general tests look at slopes
     findings: list[Finding] = dataclasses.field(default_factory=list)  # what the machine noticed about the data
+    left_over: bool = False  # responses are what a simulation leaves over, not what was measured
     entries: dict[str, Entry] = dataclasses.field(default_factory=dict)  # none where equations are instantaneous
 
 

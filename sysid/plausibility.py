@@ -76,7 +76,7 @@ def explained(regression: Regression, name: str) -> float | None:
     """
     own: dict[str, None] = {}
     for recording in regression.recordings:
-        if getattr(recording, "entries", None):
+        if recording.left_over or recording.entries:
             return None
         if name in recording.equations:
             own |= dict.fromkeys(recording.equations[name].columns)

@@ -604,7 +604,7 @@ def waves(r: Recording, gear: float, periods_per_turn: float) -> tuple[Array, Ar
     """Cosine and sine of so many periods a turn of the rotor; nothing where samples do not follow them."""
     follows = np.abs(periods_per_turn * gear * r.signals["w"]) * r.table.step_s < 2.0 * np.pi / SAMPLES_A_WAVE
     angle = periods_per_turn * r.signals["angle"]
-    return follows * np.cos(angle), follows * np.sin(angle)
+    return np.where(follows, np.cos(angle), 0.0), np.where(follows, np.sin(angle), 0.0)
 
 
 def _periodic(gear: float) -> list[Effect]:

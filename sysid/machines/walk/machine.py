@@ -41,7 +41,7 @@ LOAD_FRICTION = 0.1  # mu of the hip's gearhead: appendix table 3; the constant 
 SIGN_RAD_S = 0.05  # rate over which a sign goes over, as in the plant (EQUATIONS 2.1)
 SIGN_A = 0.05  # current over which the brushes' drop goes over; chosen by us: a few counts of the sensors
 STICKS_RAD_S = 0.3  # about standstill friction may be anything up to its limit (appendix eq. 35)
-MARGIN = 1.5  # found on eight sound walks: lags of channels wander by 2 ms as crystals drift
+MARGIN = 1.5  # found on four sound walks: lags of channels wander by 2 ms as crystals drift
 SPIKE, FEW = 6.0, 0.05  # deviations beyond which single rows do not count, where they are no larger a part than this
 FEWEST_ROWS = 60  # of an equation that says anything
 
@@ -75,15 +75,21 @@ class Rows:
     columns: dict[str, Array] = dataclasses.field(default_factory=dict)  # (n,), by parameter
 
 
+@functools.cache
+def numbers_of(body: str) -> tuple[Numbers, float]:
+    """Numbers of a body by name or file, and the joint angle of its sweet spot."""
+    p = body_files.load(body).parameters
+    return Numbers.of(p), p.ankle_zero_rad
+
+
 @dataclasses.dataclass
 class WalkRecording(Recording):
     """A recording with its equations as functions of `Numbers`, for the effects' columns."""
 
     rows: list[Rows] = dataclasses.field(default_factory=list)
-    numbers: Numbers = dataclasses.field(default_factory=lambda: _numbers("ranger")[0])
+    numbers: Numbers = dataclasses.field(default_factory=lambda: numbers_of("ranger")[0])
     gyro_bias_rad_s: float = 0.0  # beyond the known one, by closures
     closures: tuple[np.ndarray, Array] | None = None  # rows of strikes, and what the gyro gained since the last, rad/s
-    entries: tuple[str, ...] = LEGS  # truthy: responses are what the model leaves over (plausibility.explained)
     loads: dict[str, Array] = dataclasses.field(default_factory=dict)  # N m, of the cable, by equation
     seen: dict[str, Array] = dataclasses.field(default_factory=dict)
 
@@ -109,13 +115,6 @@ def _moved(numbers: Numbers, steps: Mapping[str, float], sign: float) -> Numbers
     )
 
 
-@functools.cache
-def _numbers(body: str) -> tuple[Numbers, float]:
-    """Numbers of a body by name or file, and the joint angle of its sweet spot."""
-    p = body_files.load(body).parameters
-    return Numbers.of(p), p.ankle_zero_rad
-
-
 class Walk:
     """body: the model that is diagnosed, by name or as a .toml file."""
 
@@ -125,7 +124,7 @@ class Walk:
     )
 
     def __init__(self, body: str = "ranger") -> None:
-        self.numbers, self.ankle_zero_rad = _numbers(body)
+        self.numbers, self.ankle_zero_rad = numbers_of(body)
         self.parameters = tuple(_known())
 
     def table(self, dataset: Dataset, names: Sequence[str]) -> Table:
@@ -136,7 +135,7 @@ class Walk:
         """Courses, strikes and every equation whose channels are there; UserError when there is none."""
         table = signals.uniform(table)
         recording = WalkRecording(
-            table, {"t": table.time_s - table.time_s[0]}, {}, whitened=False, margin=MARGIN, lags=(0,)
+            table, {"t": table.time_s - table.time_s[0]}, {}, whitened=False, margin=MARGIN, lags=(0,), left_over=True
         )
         recording.numbers = self.numbers
         motion, stands, single = self._motion(table, recording)

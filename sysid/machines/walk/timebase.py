@@ -30,7 +30,8 @@ def even_table(dataset: Dataset, names: list[str], carrying: tuple[str, ...]) ->
     stop = min(float(channel.time_s[-1]) for channel in carriers)
     if stop - start < 20.0 * step_s:
         raise UserError(f"{dataset.name}: {', '.join(each.name for each in carriers)} have no time in common")
-    time_s = start + step_s * np.arange(int((stop - start) / step_s + 1e-9) + 1)
+    count = int((stop - start) / step_s + 1e-9) + 1
+    time_s = np.asarray(start + step_s * np.arange(count), dtype=np.float64)
     columns: dict[str, Array] = {}
     lost = np.zeros(len(time_s), dtype=bool)
     for name in names:
