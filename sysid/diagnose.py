@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.sysid import gain, misfit, naming, plausibility
+from ranger_sim.sysid import gain, misfit, naming, plausibility, residual_term
 from ranger_sim.sysid.dataset import Table
 from ranger_sim.sysid.machine import Effect, Machine, Recording
 from ranger_sim.sysid.naming import Named
@@ -22,6 +22,7 @@ from ranger_sim.sysid.regression import Regression, kept_rows
 GENERAL_LEVEL = 0.0001
 NAMED_LEVEL = 0.005  # of the whole selection
 HOLDS_OUT = 0.0  # chi-square that a further effect must win on held-out data
+REFUSES = 2.33  # deviations, 1 % on one side, below what is expected: held-out data that refuse an effect
 TELLS = 9.0  # chi-square of an effect on held-out data, three deviations: below it these say nothing of it
 ROUNDS, MOST = 4, 5  # of naming; effects that are named
 EXPLAINED = 0.7  # of what repeats: a name that explains less is none
@@ -133,6 +134,8 @@ def diagnose(
             "known": [_known(each, was, extended) for each, was in zip(had, known, strict=True)],
         },
     }
+    term = residual_term.learn(machine, recordings, plain, before) if doubtful and not doubts.forbid else None
+    answer["evidence"]["residual_term"] = term.told() if term is not None else None
     if holdout and detected:
         progress("gain", 0.85)
         answer["gain"] = _gain(machine, plain, extended, holdout, skews, [] if doubtful else named, seed)
@@ -141,6 +144,8 @@ def diagnose(
         answer["evidence"]["holdout_excites_it"] = tells
         if not tells:
             answer["gain"] = None
+        if term is not None:
+            answer["evidence"]["residual_term"]["holdout_rms"] = _left(machine, term, holdout)
         if refused:
             named = [each for each in named if each not in refused]
             extended = naming.refit(plain, named, [*skews, *named], fresh=True)
@@ -313,15 +318,15 @@ def _gain(
     base = naming.refit(Regression(recordings, noise=plain), skews, values=plain.values)
     kept: list[Named] = []
     refused: list[Named] = []
-    found = None
+    found, tells = None, False
     for each in named:
         tried = gain.measure(base, [*kept, each], extended.values, general, seed)
-        won, expected = tried.chi2_won, tried.chi2_expected
-        if found is not None:
-            won, expected = won - found.chi2_won, expected - found.chi2_expected
-        # what the held-out data hardly excite they cannot refuse
-        if won > HOLDS_OUT or expected < TELLS:
+        won = tried.chi2_won - (found.chi2_won if found is not None else 0.0)
+        # were the effect there as in training, it would win about what is expected, by twice its root either way
+        expected = tried.chi2_expected
+        if won > HOLDS_OUT or won > expected - REFUSES * 2.0 * math.sqrt(expected):
             kept, found = [*kept, each], tried
+            tells = tells or expected >= TELLS
         else:
             refused.append(each)
     return {
@@ -330,8 +335,14 @@ def _gain(
         "holdout": ", ".join(table.name for table in holdout),
         "worse": found is not None and found.worse,
         "refused": refused,
-        "tells": found is None or found.chi2_expected >= TELLS,
+        "tells": found is None or tells,
     }
+
+
+def _left(machine: Machine, term: residual_term.ResidualTerm, holdout: Sequence[Table]) -> list[float]:
+    """What the equation leaves of held-out data without and with the learned term: rms in its unit."""
+    recordings = [machine.prepare(table) for table in holdout]
+    return list(term.left(machine, recordings, Regression(recordings)))
 
 
 NEXT = {

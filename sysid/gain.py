@@ -25,7 +25,7 @@ class Gain:
     rms_after: float
     holdout: str
     chi2_won: float = 0.0  # by which the extended model is nearer
-    chi2_expected: float = 0.0  # what it would win were the effects there as training has them
+    chi2_expected: float = 0.0  # what the last of the effects would win were it there as training has it
 
     @property
     def worse(self) -> bool:
@@ -46,6 +46,7 @@ def measure(
     before = plain.residual
     after = before.copy()
     columns = []
+    expected = 0.0
     for each in named:
         made = [each.effect.columns(recording, each.shape, plain.values) for recording in plain.recordings]
         if not any(made):
@@ -62,6 +63,7 @@ def measure(
             coefficients = fixed.copy()
             coefficients[free] = coefficients_of(beside[:, free], after - beside @ fixed)
         after = after - beside @ coefficients
+        expected = float(np.sum((beside @ coefficients) ** 2))
     seen = [plain.whitened(made) for _, _, made in general]
     fitted, freedom = np.zeros_like(before), 0
     for equation in plain.equations:
@@ -93,5 +95,5 @@ def measure(
         float(np.sqrt(np.mean(after**2))),
         ", ".join(recording.table.name for recording in plain.recordings),
         float(np.sum(before**2 - after**2)),
-        float(np.sum((before - after) ** 2)),
+        expected,
     )

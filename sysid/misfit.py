@@ -48,10 +48,14 @@ class Misfit:
         return min(self.tests, key=lambda test: (test.p, -test.chi2))
 
 
+def edges(signal: Array, count: int) -> Array:
+    """(count - 1,) or fewer inner borders of cells that hold equally many samples."""
+    return np.unique(np.quantile(signal, np.linspace(0.0, 1.0, count + 1)[1:-1]))
+
+
 def cells(signal: Array, count: int) -> np.ndarray:
     """(n,) number of the cell, 0 ... count-1; the cells hold equally many samples; equal values share a cell."""
-    edges = np.unique(np.quantile(signal, np.linspace(0.0, 1.0, count + 1)[1:-1]))
-    return np.searchsorted(edges, signal, side="right")
+    return np.searchsorted(edges(signal, count), signal, side="right")
 
 
 def indicator(number: np.ndarray) -> Array:

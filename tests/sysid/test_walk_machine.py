@@ -60,6 +60,7 @@ def test_a_model_whose_feet_stand_too_high_is_named_with_the_height(table, tmp_p
 
 
 def test_a_model_with_a_wrong_hip_spring_is_named_with_the_stiffness(table, tmp_path):
+    """1 N m/rad too soft. 2 N m/rad is not found: so large a misfit counts as noise of long memory (docs)."""
     found = diagnose(Walk(body(tmp_path / "soft.toml", hip_spring_Nm_per_rad=6.6)), [table]).answer
     assert found["detected"]
     spring = next(each for each in found["causes"] if each["name"] == "spring_value")

@@ -23,10 +23,20 @@ def sentence(found: Diagnosis) -> str:
         also = f"; {', '.join(suspects)} would explain {answer['evidence']['explained']:.0%} of it" if suspects else ""
         return (
             f"{name}: something is wrong in the {answer['subsystem']} part, and no cause of the catalogue explains it"
-            f"{also}. Fitted parameters are not physical while this stands."
+            f"{also}.{learned(answer)} Fitted parameters are not physical while this stands."
         )
     names = " and ".join(f"{each['name']} at {each['at']}" for each in answer["causes"])
     return f"{name}: the {answer['subsystem']} part is wrong: {names}."
+
+
+def learned(answer: dict[str, Any]) -> str:
+    """The learned term in a sentence that begins with a space, or nothing."""
+    term = answer["evidence"].get("residual_term")
+    if term is None:
+        return ""
+    size = max(abs(each) for row in term["value"] for each in row)
+    over = " and ".join(term["over"])
+    return f" A term learned over {over} is up to {size:.3g} {term['unit']} in the {term['equation']} equation."
 
 
 def doubts(answer: dict[str, Any]) -> list[dict[str, Any]]:
@@ -114,6 +124,7 @@ def next_steps(found: Diagnosis) -> list[str]:
         where = f" with more of the regime '{worst['regime']}', where most of it shows," if worst else ""
         return [
             f"The same run once more{where}: what repeats is the machine's, what does not is noise.",
+            *([f"What the learned term says:{learned(answer)}"] if learned(answer) else []),
             "Each part alone: what still shows with the load off, or with the motor off and the load moved by hand?",
             *steps,
         ]
