@@ -73,9 +73,12 @@ def test_twenty_four_seeds_start_with_the_same_bytes_compiled_and_interpreted():
     assert compiled == outcomes_elsewhere(cases, interpreted=True, hash_seed=2)
 
 
+FIRST_STEP_S = {"head-2015": ONE_STEP_S + 0.5}  # from its set-up it swings later
 STEPS = {
     **{
-        f"{name} on a rough floor": Case(ONE_STEP_S, seed, controller=name, floor_roughness_m=0.001)
+        f"{name} on a rough floor": Case(
+            FIRST_STEP_S.get(name, ONE_STEP_S), seed, controller=name, floor_roughness_m=0.001
+        )
         for seed, name in enumerate(controllers.available(), 2)
     },
     "the firmware of 2016, downhill": Case(ONE_STEP_S, 5, firmware_2016=True, slope_rad=0.01),
