@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.sysid import gain, misfit, naming, plausibility, residual_term
+from ranger_sim.sysid import gain, intervals, misfit, naming, plausibility, residual_term
 from ranger_sim.sysid.dataset import Table
 from ranger_sim.sysid.machine import Effect, Machine, Recording
 from ranger_sim.sysid.naming import Named
@@ -95,6 +95,13 @@ def diagnose(
         # what was named no longer counts as noise, and smaller effects stand out
         extended = naming.refit(plain, named, [*skews, *named], fresh=True)
     progress("what is left", 0.75)
+    known_to: dict[str, intervals.Intervals] = {}
+    for each in named:
+        others = [*skews, *(other for other in named if other is not each)]
+        base = naming.refit(extended, others) if others else Regression(recordings, noise=extended)
+        each.shape, known_to[each.effect.name] = intervals.profile(each, base)
+    if named:
+        extended = naming.refit(plain, named, [*skews, *named], fresh=True)
     after = misfit.look(extended, general)
     doubts = plausibility.look(machine, extended)
     detected = before.p < GENERAL_LEVEL or bool(named) or doubts.forbid
@@ -105,7 +112,7 @@ def diagnose(
         "detected": bool(detected),
         "misfit": _channels(plain, extended, recordings),
         "subsystem": _subsystem(plain, before, named) if detected else None,
-        "causes": [_cause(each, extended, before, skews) for each in named] if detected and not doubtful else [],
+        "causes": [_cause(each, extended, known_to) for each in named] if detected and not doubtful else [],
         "abstained": bool(doubtful),
         "gain": None,
         "next_experiment": _next(named),
@@ -149,7 +156,7 @@ def diagnose(
         if refused:
             named = [each for each in named if each not in refused]
             extended = naming.refit(plain, named, [*skews, *named], fresh=True)
-            answer["causes"] = [_cause(each, extended, before, skews) for each in named]
+            answer["causes"] = [_cause(each, extended, known_to) for each in named]
             answer["abstained"] = not named
     progress("done", 1.0)
     return Diagnosis(machine, recordings, plain, extended, skews, named, before, after, answer)
@@ -236,13 +243,14 @@ def _parameter_names(recordings: Sequence[Recording]) -> list[str]:
     return [name for e in recordings[0].equations.values() for name in e.columns]
 
 
-def _cause(each: Named, extended: Regression, before: misfit.Misfit, skews: Sequence[Named]) -> dict[str, Any]:
+def _cause(each: Named, extended: Regression, known_to: Mapping[str, intervals.Intervals]) -> dict[str, Any]:
     parameters = {
         name: _value(extended, full) for name, full in zip(each.effect.coefficients, each.coefficients, strict=True)
     }
-    for name, value in each.shape.items():
-        low, high = _neighbours(each, name, value)
-        parameters[name] = {"value": value, "ci95": [low, high]}
+    parameters |= {name: {"value": value, "ci95": [value, value]} for name, value in each.shape.items()}
+    for name, (low, high) in known_to[each.effect.name].items():
+        near = parameters[name]["ci95"]
+        parameters[name]["ci95"] = [min(low, near[0]), max(high, near[1])]
     return {
         "name": each.effect.cause,
         "at": each.effect.at,
@@ -258,15 +266,6 @@ def _cause(each: Named, extended: Regression, before: misfit.Misfit, skews: Sequ
             "behind": {effect.name: behind for effect, behind in each.rivals},
         },
     }
-
-
-def _neighbours(each: Named, name: str, value: float) -> tuple[float, float]:
-    """A shape is known to the middle of its neighbours on the grid."""
-    grid = sorted({shape[name] for shape in each.effect.shapes})
-    place = grid.index(value)
-    low = 0.5 * (grid[place - 1] + value) if place else value
-    high = 0.5 * (grid[place + 1] + value) if place + 1 < len(grid) else value
-    return low, high
 
 
 def _channels(plain: Regression, extended: Regression, recordings: Sequence[Recording]) -> list[dict[str, Any]]:

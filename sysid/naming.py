@@ -56,11 +56,13 @@ class Named:
         return tuple(f"{self.effect.cause}@{self.effect.at}:{name}" for name in self.effect.coefficients)
 
 
-def trials(effects: Sequence[Effect], regression: Regression) -> list[Trial]:
-    """Every effect at every shape."""
+def trials(
+    effects: Sequence[Effect], regression: Regression, shapes: Sequence[Mapping[str, float]] | None = None
+) -> list[Trial]:
+    """Every effect at every shape, of its own grid or of `shapes`."""
     made = []
     for effect in effects:
-        for shape in effect.shapes:
+        for shape in effect.shapes if shapes is None else shapes:
             columns = [effect.columns(recording, shape, regression.values) for recording in regression.recordings]
             if not any(columns):
                 continue

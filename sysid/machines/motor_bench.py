@@ -371,6 +371,7 @@ def _electric(top_I: float, top_V: float, warmth: bool) -> list[Effect]:
             [{"current_A": share * top_I} for share in CURRENT_SHARES],
             _one("electric", lambda s, p, _: s["sgn_I"] * (1.0 - np.exp(-np.abs(s["I_by_torque"]) / p["current_A"]))),
             meaning="a drop at the brushes that depends on the current",
+            scale="current_A",
         ),
         Effect(
             "resistance_temperature",
@@ -419,6 +420,7 @@ def _electric(top_I: float, top_V: float, warmth: bool) -> list[Effect]:
             ("share",),
             [{"limit_V": share * top_V} for share in (0.5, 0.6, 0.7, 0.8, 0.9, 0.95)],
             _one("electric", lambda s, p, _: over(s["V_by_torque"], p["limit_V"])),
+            scale="limit_V",
         ),
         Effect(
             "pwm_ripple",
@@ -520,8 +522,8 @@ def _sensors(gear: float, top_w: float, top_V: float) -> list[Effect]:
         Effect("sensor_lag", "torque_Nm", S, ("time_constant_s",), [{}], _one("mechanical", _minus("dT"))),
         Effect("eccentricity", "speed_rad_per_s", S, ("cosine", "sine"), turns, eccentric_speed, phase_is_free=True),
         Effect("eccentricity", "motor_angle_rad", S, ("cosine_rad", "sine_rad"), turns, eccentric_angle, phase_is_free=True),  # noqa: E501
-        Effect("lost_counts", "speed_rad_per_s", S, ("share",), fast, lost_speed),
-        Effect("lost_counts", "motor_angle_rad", S, ("share",), fast, lost_angle),
+        Effect("lost_counts", "speed_rad_per_s", S, ("share",), fast, lost_speed, scale="speed_rad_s"),
+        Effect("lost_counts", "motor_angle_rad", S, ("share",), fast, lost_angle, scale="speed_rad_s"),
         Effect("clock_drift", "torque_Nm", S, ("share",), [{}], _one("mechanical", drifting)),
     ]  # fmt: skip
 
@@ -556,6 +558,7 @@ def _friction(top_w: float) -> list[Effect]:
             _one("mechanical", lambda s, p, _: -s["sgn_w"] * np.exp(-((s["w"] / p["speed_rad_s"]) ** 2))),
             lambda found: found["excess_Nm"] > 0.0,
             "friction that is larger at low speed",
+            scale="speed_rad_s",
         ),
         Effect(
             "presliding",
@@ -566,6 +569,7 @@ def _friction(top_w: float) -> list[Effect]:
             presliding,
             lambda found: 0.3 < found["share_of_friction"] < 3.0,
             "friction that builds up over a way after a reversal",
+            scale="deflection_rad",
         ),
         Effect(
             "load_friction",

@@ -1,0 +1,80 @@
+"""Intervals of a named effect by its profile: every shape that explains the data nearly as well widens them.
+
+A coefficient at the best shape of a grid is known better than the coefficient: another shape would have another. So the
+95 % interval is all values that some shape takes with a chi-square at most 3.84 below the best (profile likelihood).
+"""
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+
+from ranger_sim.sysid.naming import Named, trials
+from ranger_sim.sysid.regression import Regression
+
+CHI2 = 3.84  # 95 % of one degree of freedom
+BETWEEN = 6  # shapes between two neighbours of the grid, where a shape is on a scale
+
+Intervals = dict[str, tuple[float, float]]
+
+
+def profile(each: Named, base: Regression) -> tuple[Mapping[str, float], Intervals]:
+    """(best shape, interval of every coefficient and shape by name). base: the regression with all but this effect."""
+    found = []
+    for trial in trials([each.effect], base, _shapes(each)):
+        inverse = np.linalg.pinv(trial.gram, rcond=1e-12)
+        values = inverse @ trial.product
+        chi2 = float(values @ trial.product) / trial.inflation
+        numbers = dict(zip(each.effect.coefficients, (float(value) for value in values), strict=True))
+        if each.effect.admissible({**numbers, **trial.shape}):
+            spread = np.sqrt(np.maximum(np.diag(inverse), 0.0) * trial.inflation)
+            found.append((chi2, trial.shape, numbers, dict(zip(numbers, spread, strict=True))))
+    if not found:
+        return each.shape, {}
+    best = max(found, key=lambda one: one[0])
+    intervals: Intervals = {}
+    for chi2, shape, numbers, deviations in found:
+        left = CHI2 - (best[0] - chi2)
+        if left < 0.0:
+            continue
+        reach = math.sqrt(left)
+        for name, value in numbers.items():
+            _widen(intervals, name, value - reach * float(deviations[name]), value + reach * float(deviations[name]))
+        for name, value in shape.items():
+            _widen(intervals, name, value, value)
+    return best[1], {name: _to_neighbours(name, ends, found) for name, ends in intervals.items()}
+
+
+def _widen(intervals: Intervals, name: str, low: float, high: float) -> None:
+    was = intervals.get(name, (low, high))
+    intervals[name] = (min(was[0], low), max(was[1], high))
+
+
+def _to_neighbours(name: str, ends: tuple[float, float], found: list) -> tuple[float, float]:
+    """A shape is known no better than to the middle of the next that was tried."""
+    if name not in found[0][1]:
+        return ends
+    tried = sorted({shape[name] for _, shape, _, _ in found})
+    low, high = tried.index(ends[0]), tried.index(ends[1])
+    return (
+        0.5 * (tried[low] + tried[low - 1]) if low else ends[0],
+        0.5 * (tried[high] + tried[high + 1]) if high + 1 < len(tried) else ends[1],
+    )
+
+
+def _shapes(each: Named) -> list[Mapping[str, float]]:
+    """The grid, and between the best and its neighbours more of it where the shape is on a scale."""
+    grid = list(each.effect.shapes)
+    if each.effect.scale is None:
+        return grid
+    name = each.effect.scale
+    values = sorted({shape[name] for shape in grid})
+    place = values.index(each.shape[name])
+    near = values[max(0, place - 1) : place + 2]
+    more = [
+        low * (high / low) ** (number / (BETWEEN + 1))
+        for low, high in zip(near[:-1], near[1:], strict=True)
+        if low > 0.0
+        for number in range(1, BETWEEN + 1)
+    ]
+    return [*grid, *({**each.shape, name: value} for value in more)]
