@@ -11,8 +11,12 @@ SOURCES := $(shell find ranger_sim foundation datatable can_bus plant firmware_s
 walk: $(VENV)/.walk
 	$(RUN) -m ranger_sim walk --steps $(STEPS) --out runs/walk
 
+# Tests that need no clock and no other process go side by side; the others have both cores to themselves.
+ALONE = tests/blind tests/boards tests/datatable tests/plant tests/sysid
+
 test: $(VENV)/.all
-	$(RUN) -m pytest -q -rs -n 2 --dist loadfile
+	$(RUN) -m pytest -q -rs -n 2 --dist loadfile $(ALONE)
+	$(RUN) -m pytest -q -rs $(addprefix --ignore=,$(ALONE))
 
 test-vm: $(VENV)/.all
 	$(RUN) -m tests.vm.run
