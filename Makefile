@@ -12,11 +12,11 @@ walk: $(VENV)/.walk
 	$(RUN) -m ranger_sim walk --steps $(STEPS) --out runs/walk
 
 # Tests that need no clock and no other process go side by side; the others have both cores to themselves.
-ALONE = tests/blind tests/boards tests/datatable tests/plant tests/sysid
+SIDE_BY_SIDE = tests/blind tests/boards tests/datatable tests/plant tests/sysid
 
 test: $(VENV)/.all
-	$(RUN) -m pytest -q -rs -n 2 --dist loadfile $(ALONE)
-	$(RUN) -m pytest -q -rs $(addprefix --ignore=,$(ALONE))
+	$(RUN) -m pytest -q -rs -n 2 --dist loadfile $(SIDE_BY_SIDE)
+	$(RUN) -m pytest -q -rs $(addprefix --ignore=,$(SIDE_BY_SIDE))
 
 test-vm: $(VENV)/.all
 	$(RUN) -m tests.vm.run
