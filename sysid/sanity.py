@@ -57,6 +57,10 @@ SPIKE_STEPS = 12.0  # of the usual second difference; noise reaches 6 in a milli
 WARMTHS = ("C", "K")  # units of temperatures
 STUCK_SAMPLES = 50  # a fifth of a second of a fast channel of the robot
 STUCK_RATIO = 8.0  # to the longest other stretch: a quantised channel at rest stands still as well
+MOVES_PART = 0.2  # of a channel's whole range, within a stretch: less is rest
+# Deviation of values to that of neighbours' differences over root 2, squared: 1 for white noise at rest, 2 for one
+# with a correlation of 0.5 from sample to sample; a sine of 10 samples a period has 2.6, slower ones have more.
+MOVES_RATIO = 2.25
 CLIPPED_SAMPLES = 3  # in a row at the limit
 CLIPPED_RUNS = 2
 FLAT_PART = 0.5  # of the steps are zero in commands that are held, which cannot be told from cut-off ones
@@ -98,6 +102,8 @@ REDUNDANT = (
     ("outer_ankle_angle_rad", "outer_motor_angle_rad"),
     ("inner_ankle_angle_rad", "inner_motor_angle_rad"),
 )
+# the same motion by angle and rate, beside those above: one stands where the other does
+TOGETHER = (*DERIVATIVES, *REDUNDANT, ("motor_angle_rad", "speed_rad_per_s"))
 JOINTS = ("hip_angle", "joint_angle", "ankle_angle", "leg_angle")
 # (end of a name, largest value that is likely, what it would rather be): a machine of this size has no more
 LARGEST = (
@@ -338,7 +344,10 @@ def equal_runs(value: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
 
 
 def _stuck(channel: Channel, all_channels: dict[str, Channel]) -> Iterator[Finding]:
-    """The longest stretch of one value, when it is far longer than all others and other channels move in it."""
+    """The longest stretch of one value, when it is far longer than all others and other channels move in it.
+
+    A second sensor of the same motion that stands there as well tells rest: friction holds, whatever drives.
+    """
     starts, lengths = equal_runs(channel.value)
     longest = int(np.argmax(lengths))
     length = int(lengths[longest])
@@ -349,19 +358,34 @@ def _stuck(channel: Channel, all_channels: dict[str, Channel]) -> Iterator[Findi
     if length < STUCK_SAMPLES or length < STUCK_RATIO * others.max():
         return
     begin, end = channel.time_s[starts[longest]], channel.time_s[starts[longest] + length - 1]
+    partners = {name for pair in TOGETHER if channel.name in pair for name in pair} & set(all_channels)
+    if any(_rests(all_channels[name], begin, end) for name in partners - {channel.name}):
+        return
     moving = []
     for other in all_channels.values():
-        inside = other.value[(other.time_s > begin) & (other.time_s < end)]
         warm = other.unit in WARMTHS and channel.unit not in WARMTHS  # a machine at rest cools and warms as well
-        if other.name != channel.name and len(inside) > 3 and not _is_held(other.value) and not warm:
-            if np.ptp(inside) > 0.2 * np.ptp(other.value):
-                moving.append(other.name)
+        if other.name != channel.name and not _is_held(other.value) and not warm and _moves(other, begin, end):
+            moving.append(other.name)
     if moving:
         text = (
             f"it stands at {channel.value[starts[longest]]:.6g} {channel.unit} for {end - begin:.4g} s "
             f"while {', '.join(moving[:3])} move"
         )
         yield Finding(channel.name, "stuck", float(begin), float(end), float(end - begin), "s", text)
+
+
+def _moves(channel: Channel, begin: float, end: float) -> bool:
+    """True when it goes through a part of its range within these stamps, and not as noise does."""
+    inside = channel.value[(channel.time_s > begin) & (channel.time_s < end)]
+    if len(inside) <= 3 or np.ptp(inside) <= MOVES_PART * np.ptp(channel.value):
+        return False
+    return bool(np.var(inside) > MOVES_RATIO * 0.5 * np.mean(np.diff(inside) ** 2))
+
+
+def _rests(channel: Channel, begin: float, end: float) -> bool:
+    """True when it has samples within these stamps, and does not move."""
+    count = np.count_nonzero((channel.time_s > begin) & (channel.time_s < end))
+    return bool(count >= FEWEST) and not _moves(channel, begin, end)
 
 
 def _is_held(value: Array) -> bool:

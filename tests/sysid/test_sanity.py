@@ -263,3 +263,42 @@ def test_an_angle_at_rest_is_not_stuck_because_a_temperature_moves():
 
     assert stuck() == []
     assert stuck(Channel("current_A", "A", time_s, np.sin(40.0 * time_s))) == ["motor_angle_rad"]
+
+
+def bench_at_first_at_rest(**changes):
+    """A motor that stands for half a second of five and then turns to and fro; torque by a noisy load cell."""
+    time_s = np.arange(2500) * 0.002
+    noise = generator(5, "a load cell").normal(size=(3, len(time_s)))
+    turning = np.where(time_s < 0.508, 0.0, np.sin(3.0 * (time_s - 0.508)))
+    columns = {
+        "voltage_V": (3.0 * turning + 0.01 * noise[0], "V"),
+        "current_A": (turning + 0.02 * noise[0], "A"),
+        "speed_rad_per_s": (10.0 * turning + 0.03 * noise[1], "rad/s"),
+        "torque_Nm": (0.1 * turning + 0.1 * noise[2], "N m"),  # its noise has most of the whole range
+        "motor_angle_rad": (np.cumsum(140.0 * turning) * 0.002, "rad"),
+    }
+    columns |= {name: (value, columns[name][1]) for name, value in changes.items()}
+    return Dataset("bench", {name: Channel(name, unit, time_s, value) for name, (value, unit) in columns.items()})
+
+
+def test_an_angle_is_not_stuck_because_another_sensor_is_noisy():
+    data = bench_at_first_at_rest()
+    del data.channels["speed_rad_per_s"]
+    assert found(data, "stuck") == []
+    assert found(bench_at_first_at_rest(), "stuck") == []
+
+
+def test_a_motor_that_friction_holds_is_at_rest_when_angle_and_speed_say_so():
+    time_s = np.arange(2500) * 0.002
+    from_the_start = 3.0 * np.sin(3.0 * (time_s - 0.508))  # drives below what breaks it loose, for us to see the rule
+    assert found(bench_at_first_at_rest(voltage_V=from_the_start), "stuck") == []
+    alone = bench_at_first_at_rest(voltage_V=from_the_start)
+    del alone.channels["speed_rad_per_s"]
+    assert [each.channel for each in found(alone, "stuck")] == ["motor_angle_rad"]
+
+
+def test_an_angle_that_stands_while_its_own_rate_moves_is_stuck():
+    turning = 10.0 * np.sin(3.0 * (np.arange(2500) * 0.002 - 0.508))
+    (told,) = found(bench_at_first_at_rest(speed_rad_per_s=turning), "stuck")
+    assert told.channel == "motor_angle_rad" and told.size == pytest.approx(0.508, abs=0.004)
+    assert "while speed_rad_per_s move" in told.text
