@@ -165,10 +165,7 @@ def _beside(groups: Sequence[Mapping[str, Array]], regression: Regression) -> tu
     """(m, m) products of all columns of these groups, put beside the base, and (m,) of them with the residual."""
     together = {name: np.hstack([white[name] for white in groups]) for name in groups[0]}
     shadow = regression.shadow(together)
-    straight = sum((columns.T @ columns for columns in together.values()), 0.0)
-    across = sum((c.T @ regression.z[regression.rows[name]] for name, c in together.items()), 0.0) @ shadow
-    gram = straight - across - across.T + shadow.T @ (regression.z.T @ regression.z) @ shadow
-    return np.asarray(gram), regression.product(together, shadow, regression.residual)
+    return regression.gram(together, shadow), regression.product(together, shadow, regression.residual)
 
 
 def _line(equation: str, regression: Regression) -> Test:

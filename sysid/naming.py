@@ -70,10 +70,10 @@ def trials(
             if not white:
                 continue
             shadow = regression.shadow(white)
-            beside = regression.full(white) - regression.z @ shadow
-            gram = beside.T @ beside
+            gram = regression.gram(white, shadow)
             if np.sqrt(np.trace(gram)) > 1e-6:
-                product, inflation = beside.T @ regression.residual, regression.inflation(beside)
+                product = regression.product(white, shadow, regression.residual)
+                inflation = regression.inflation(white, shadow, gram)
                 nothing = np.zeros((len(product), 0))
                 made.append(Trial(effect, shape, white, shadow, gram, product, inflation, nothing))
     return made

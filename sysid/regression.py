@@ -10,7 +10,6 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 from scipy import linalg, ndimage
-from scipy.signal import lfilter
 
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.sysid.dataset import Array
@@ -18,6 +17,7 @@ from ranger_sim.sysid.machine import Columns, Equation, Recording
 
 LEAST = 1e-9  # of the largest response: noise below it is rounding
 RANK = 1e-8  # a parameter whose column the others have to this part is not separable from them
+NOTHING = 1e-9  # of a column's square beside the base: rounding, with columns of up to 1e7 deviations
 ORDER = 8  # of the autoregression at most
 
 
@@ -174,7 +174,7 @@ class Regression:
                     rho = min(max(rho, 0.0), *(recording.memory for recording in self.recordings))
                     memory = float(np.sqrt((1.0 + rho) / (1.0 - rho)))
                     coefficients = np.zeros(0)
-                white = lfilter(np.concatenate(([1.0], -coefficients)), [1.0], residual)
+                white = innovations(coefficients, residual)
                 good = self._good(name, coefficients)
                 deviation = float(np.sqrt(np.mean(white[good] ** 2))) if np.any(good) else 1.0
                 least = LEAST * float(np.max(np.abs(part.response), initial=0.0)) or 1.0
@@ -199,8 +199,7 @@ class Regression:
 
     def _scaled(self, equation: str, column: Array) -> Array:
         whitening = self.whitening[equation]
-        white = lfilter(np.concatenate(([1.0], -whitening.coefficients)), [1.0], column, axis=0)
-        return white / whitening.deviation
+        return innovations(whitening.coefficients, column) / whitening.deviation
 
     def _quick(self) -> Array:
         """Parameters with the whitening known so far."""
@@ -255,11 +254,21 @@ class Regression:
         solved = np.zeros(self.count)
         solved[kept] = self.inverse @ (self.z.T @ self.response) / scale[kept]
         covariance = np.zeros((self.count, self.count))
-        spread = self.inverse @ (self.z.T @ self.z) @ self.inverse.T
+        self.own = self.z.T @ self.z
+        spread = self.inverse @ self.own @ self.inverse.T
         covariance[np.ix_(kept, kept)] = spread / np.outer(scale[kept], scale[kept])
         self.covariance = covariance
         self.values = dict(zip(self.names, (float(each) for each in solved), strict=True))
         self.residual = self.response - self.measured @ solved
+        # of equations that share noise: z^T z between them, and for the rows of each the z of the other's
+        self.across: dict[tuple[str, str], Array] = {}
+        self.facing: dict[tuple[tuple[str, str], str], Array] = {}
+        for pair, rows in self.both.items():
+            self.across[pair] = self.z[rows[0]].T @ self.z[rows[1]]
+            for name, own, others in zip(pair, rows, rows[::-1], strict=True):
+                facing = np.zeros((self.rows[name].stop - self.rows[name].start, self.z.shape[1]))
+                facing[own - self.rows[name].start] = self.z[others]
+                self.facing[pair, name] = facing
         self.chi2 = float(self.residual @ self.residual)
 
     def _stack(self, columns: Mapping[str, Array]) -> Array:
@@ -279,18 +288,23 @@ class Regression:
         """
         return stacked - self.z @ (self.inverse.T @ (self.phi.T @ stacked))
 
-    def inflation(self, columns: Array) -> float:
-        """How much larger than chance alone the chi-square of whitened columns (N, k) is, at least 1.
+    def inflation(self, white: Mapping[str, Array], shadow: Array, gram: Array) -> float:
+        """How much larger than chance alone the chi-square of whitened columns, put beside the base, is; at least 1.
 
         Equations that share a noisy channel have correlated residuals. It matters only to a column that stands in
         both; there the variance of its product with the residual grows by the correlation.
         """
-        total = float(np.sum(columns**2))
+        total = max(float(np.trace(gram)), 1e-300)
         worst = 1.0
-        for (one, other), correlation in self.shared.items():
-            here, there = self.both[one, other]
-            product = float(np.max(np.abs(np.sum(columns[here] * columns[there], axis=0)), initial=0.0))
-            worst += 2.0 * abs(correlation) * product * columns.shape[1] / max(total, 1e-300)
+        for pair, correlation in self.shared.items():
+            product = np.sum(shadow * (self.across[pair] @ shadow), axis=0)
+            for name in pair:
+                if name in white:
+                    product -= np.sum((white[name].T @ self.facing[pair, name]).T * shadow, axis=0)
+            if pair[0] in white and pair[1] in white:
+                here, there = (rows - self.rows_of(name).start for rows, name in zip(self.both[pair], pair, strict=True))
+                product += np.sum(white[pair[0]][here] * white[pair[1]][there], axis=0)
+            worst += 2.0 * abs(correlation) * float(np.max(np.abs(product), initial=0.0)) * len(gram) / total
         return worst
 
     def whitened(self, made: Sequence[Columns]) -> dict[str, Array]:
@@ -327,9 +341,27 @@ class Regression:
         straight = sum((columns.T @ other[self.rows[name]] for name, columns in white.items()), 0.0)
         return np.asarray(straight - shadow.T @ (self.z.T @ other))
 
+    def gram(self, white: Mapping[str, Array], shadow: Array) -> Array:
+        """(k, k): products of whitened columns among themselves, put beside the base."""
+        straight = sum((columns.T @ columns for columns in white.values()), 0.0)
+        across = sum((columns.T @ self.z[self.rows[name]] for name, columns in white.items()), 0.0) @ shadow
+        gram = np.asarray(straight - across - across.T + shadow.T @ self.own @ shadow)
+        # what the base has to the last digits leaves only rounding
+        nothing = np.diag(gram) < NOTHING * np.diag(straight)
+        gram[nothing, :] = gram[:, nothing] = 0.0
+        return gram
+
     def rows_of(self, equation: str) -> slice:
         """Where an equation stands in the stacked rows."""
         return self.rows[equation]
+
+
+def innovations(coefficients: Array, column: Array) -> Array:
+    """What a column (n,) or columns (n, k) add to their forecast from the rows before; zeros stand before the first."""
+    out = column.copy()
+    for lag, coefficient in enumerate(coefficients, 1):
+        out[lag:] -= coefficient * column[:-lag]
+    return out
 
 
 def orthonormal(columns: Array) -> Array:

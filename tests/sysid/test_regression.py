@@ -117,9 +117,35 @@ def test_equations_that_share_noise_tell_by_how_much():
     made = Regression([Recording(table, {}, both)])
     assert made.shared["one", "other"] == pytest.approx(0.5, abs=0.06)
     ones = np.ones((SIZE, 1))
-    assert made.inflation(made.full(made.whitened([{"one": ones}]))) == 1.0
+
+    def inflation(columns):
+        white = made.whitened([columns])
+        shadow = made.shadow(white)
+        return made.inflation(white, shadow, made.gram(white, shadow))
+
+    # what the base takes of a column in one equation stands in the other, but is little
+    assert inflation({"one": ones}) == pytest.approx(1.0, abs=0.01)
     # the same column in both: variance of the sum is 1 + correlation
-    assert made.inflation(made.full(made.whitened([{"one": ones, "other": ones}]))) == pytest.approx(1.5, abs=0.1)
+    assert inflation({"one": ones, "other": ones}) == pytest.approx(1.5, abs=0.1)
+    # the same number, from the rows themselves
+    columns = {"one": np.column_stack([x**2, ones]), "other": np.column_stack([x**3 + 1.0, -ones])}
+    beside = made.columns([columns])
+    here, there = made.both["one", "other"]
+    worst = np.max(np.abs(np.sum(beside[here] * beside[there], axis=0)))
+    known = 1.0 + 2.0 * made.shared["one", "other"] * worst * 2 / np.sum(beside**2)
+    assert inflation(columns) == pytest.approx(known, rel=1e-9)
+
+
+def test_products_of_columns_beside_the_base_are_those_of_the_rows():
+    rng = generator(5, "gram")
+    x, other = np.sin(np.arange(SIZE) * 0.1), np.sin(np.arange(SIZE) * 0.23)
+    made = Regression([recording(x + rng.normal(size=SIZE), {"slope": x}, {"slope": x + 0.1 * other})])
+    columns = [{"one": np.column_stack([other, np.cos(np.arange(SIZE) * 0.1), x + 0.1 * other])}]
+    white, whole = made.whitened(columns), made.columns(columns)
+    gram = made.gram(white, made.shadow(white))
+    assert gram == pytest.approx(whole.T @ whole, rel=1e-9, abs=1e-6)
+    # a column of the stand-ins leaves nothing, not rounding
+    assert not gram[2].any() and not gram[:, 2].any()
 
 
 def test_columns_that_are_the_same_are_named_and_not_separated():
