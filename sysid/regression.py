@@ -302,7 +302,9 @@ class Regression:
                 if name in white:
                     product -= np.sum((white[name].T @ self.facing[pair, name]).T * shadow, axis=0)
             if pair[0] in white and pair[1] in white:
-                here, there = (rows - self.rows_of(name).start for rows, name in zip(self.both[pair], pair, strict=True))
+                here, there = (
+                    rows - self.rows_of(name).start for rows, name in zip(self.both[pair], pair, strict=True)
+                )
                 product += np.sum(white[pair[0]][here] * white[pair[1]][there], axis=0)
             worst += 2.0 * abs(correlation) * float(np.max(np.abs(product), initial=0.0)) * len(gram) / total
         return worst
