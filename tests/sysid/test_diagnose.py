@@ -189,6 +189,10 @@ def test_a_machine_of_the_users_own_is_diagnosed_by_the_command(own_machine, cap
     assert 'cause = "drag"' in (own_machine / "found" / "extended.toml").read_text(encoding="utf-8")
     assert main(["diagnose", cart_file(own_machine / "sound.csv"), "--experiment", "my_cart:Cart"]) == 0
     assert "nothing that these data could show is missing" in capsys.readouterr().out
+    # what the model has already is no finding
+    model = ["--model", str(own_machine / "found" / "extended.toml")]
+    assert main(["diagnose", other, "--experiment", "my_cart:Cart", *model]) == 0
+    assert "known: drag at cart: quadratic 0.0" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(

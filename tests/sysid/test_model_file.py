@@ -1,5 +1,6 @@
 """What a diagnosis writes is what simulators and diagnoses read: terms at the robot's joint, effects as measured."""
 
+import json
 import math
 import tomllib
 
@@ -204,7 +205,7 @@ def test_a_bench_has_the_models_motor_and_tells_what_has_no_part_in_it(tmp_path,
     assert main(["identify", "stall", "--model", str(path), "--json", str(tmp_path / "found.json")]) == 0
     said = capsys.readouterr().out
     assert "cogging at hip_motor has no part in stall" in said and "resistance_change" not in said
-    (fit,) = __import__("json").loads((tmp_path / "found.json").read_text(encoding="utf-8"))["fits"]
+    (fit,) = json.loads((tmp_path / "found.json").read_text(encoding="utf-8"))["fits"]
     low, high = fit["parameters"]["R"]["ci95"]
     assert low < 1.6 < high and high - low < 0.1
 
@@ -219,7 +220,7 @@ def test_a_bench_with_drag_gives_less_torque_at_speed():
 
 
 def test_springs_and_cables_of_a_model_are_felt_where_they_are_pulled():
-    """0.5 N m/rad^3 in the hip at 0.5 rad: 0.0625 N m more, against eq. 1's spring alone."""
+    """5 N m/rad^3 in the hip at 0.5 rad: 0.625 N m more, against eq. 1's spring alone."""
     from ranger_sim.sysid.benches import springs
 
     bent = BenchTerms(terms.Model([{"form": "spring", "at": "hip_joint", "cubic_Nm_per_rad3": 5.0}]).terms)

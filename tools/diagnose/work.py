@@ -198,7 +198,7 @@ def _diagnosed(
         {**dataclasses.asdict(finding), "recording": table.name} for table, found in (*data, *held) for finding in found
     ]
     return diagnose(
-        machine, [table for table, _ in data], [table for table, _ in held], seed, findings, progress=progress
+        machine, [table for table, _ in data], [table for table, _ in held], seed, findings, known, progress
     )
 
 
