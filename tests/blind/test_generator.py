@@ -13,6 +13,7 @@ from tests.blind import generate
 from tests.blind.generator.case import Case
 from tests.blind.generator.effects import rate
 from tests.blind.generator.experiment import TIE
+from tests.blind.generator.instruments import LSB
 from tests.blind.generator.leg_swing import LEG_SWING
 from tests.blind.generator.motor_bench import MOTOR_BENCH
 from tests.blind.generator.strength import FLOWS_A
@@ -125,7 +126,7 @@ LARGE = {
     "eccentricity": 0.005,
     "lost_counts": 0.01,
     "sensor_lag": 0.0004,
-    "clock_drift": 0.001,
+    "clock_drift": 0.0012,
     "drag": 3e-4,
     "tight_arc_friction": 0.1,
     "eddy_brake_saturating": 0.05,
@@ -245,3 +246,17 @@ def test_a_size_is_told_in_the_catalogue_s_form(monkeypatch):
     assert told["drag"] == {"quadratic_Nms2": pytest.approx(3e-4)}
     assert told["stribeck"]["excess_Nm"] == pytest.approx(0.1, rel=0.3)
     assert told["stribeck"]["speed_rad_s"] == pytest.approx(2.0, rel=0.5)
+
+
+def test_a_fast_effect_counts_less_where_the_speed_is_differentiated_and_a_slow_one_as_much():
+    """The noise in balance M at a frequency is that of its channels and of the inertia times the speed's derivative."""
+    case = clean(MOTOR_BENCH, 23)
+    base, noise = case.base, case.instruments.noise
+    v = {name: deviation**2 + LSB[name] ** 2 / 12.0 for name, deviation in noise.items()}
+    count = 4000
+    deviations = case.instruments.balance_deviations(base, count)
+    flat = v["T"] + (base["G"] * base["K"]) ** 2 * v["I"] + base["C1"] ** 2 * v["w"]
+    for place, omega in ((0, 0.0), (8, 2.0 * np.pi * 2.0), (400, 2.0 * np.pi * 100.0)):  # 1 ms samples
+        grows = base["J"] ** 2 * omega**2 * v["w"]
+        # 2 %: a difference over a sample has less than the derivative at 100 Hz
+        assert deviations[1][place] == pytest.approx(np.sqrt(flat + grows), rel=0.02)

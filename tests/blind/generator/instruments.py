@@ -34,19 +34,24 @@ class Instruments:
     memory: float
     columns: dict
 
-    def balance_deviation(self, base):
-        """Standard deviation of the noise in balances E, M, T, from the channels; of the slow part of it.
+    def balance_deviations(self, base, count):
+        """(3, count // 2 + 1): standard deviation of the noise in balances E, M, T at the frequencies of a run's FFT.
 
-        The inertia times the speed's noise and the angle's counts over a sample are left out: both grow with frequency
-        and are little where the effects are. Without a second angle there is no balance T.
+        From the channels. Derivatives of a measured current (inductance), speed (inertia) and angle grow with
+        frequency: they drown what an effect does within a few samples, and nothing slow. A rate that is made from a
+        joint's angle counts with what of it matters to a leg. Without a second angle there is no balance T.
         """
         v = {name: deviation**2 + LSB[name] ** 2 / 12.0 for name, deviation in self.noise.items()}
+        turn = (2.0 * np.sin(np.pi * np.fft.rfftfreq(count)) / STEP_S) ** 2  # of a difference over one sample
         angle, torque = v.get("q", 0.0), v.get("T", 0.0)
         speed = v.get("w", angle * SLOW_RAD_S**2)
         back = (base["G"] * base["K"]) ** 2
-        E = v["V"] + base["R"] ** 2 * v["I"] + back * speed
+        E = v["V"] + (base["R"] ** 2 + base["L"] ** 2 * turn) * v["I"] + back * speed
         M = torque + back * v["I"] + base["C1"] ** 2 * speed + (base["kh"] + base["mgc"]) ** 2 * angle
-        return np.sqrt((E, M, v["w"] if "w" in v else np.inf))
+        M = M + base["J"] ** 2 * turn * v.get("w", 0.0)
+        counts = LSB["theta"] ** 2 / 12.0 / base["G"] ** 2
+        T = v["w"] + turn * counts if "w" in v else np.full(len(turn), np.inf)
+        return np.sqrt((E, M, T))
 
     def show(self, rng, true):
         """Columns of a file from the true channels."""

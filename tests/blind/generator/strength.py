@@ -1,6 +1,7 @@
 """How strong an effect is in given data: what of it the base parameters cannot take up, over the noise.
 
-    r       rms, over the run, of that part over the noise's standard deviation; balances are added in squares
+    r       rms, over the run, of that part over the noise's standard deviation at its frequencies; balances are added
+            in squares
     N_eff   samples that count: N (1 - rho) / (1 + rho), where rho is the memory of the instruments' noise
 
 A strength of 1 is r = 4.85 / sqrt(N_eff): 90 % detection by a test among 28 candidates. From the truth alone.
@@ -20,9 +21,8 @@ class Scale:
     def __init__(self, trajectory, instruments, moves_rad_s):
         t = self.trajectory = trajectory
         self.n_eff = len(t.time_s) * (1.0 - instruments.memory) / (1.0 + instruments.memory)
-        sigma = instruments.balance_deviation(t.base)
-        weights = (np.abs(t.I) > FLOWS_A, np.abs(t.w) > moves_rad_s, np.ones(len(t.w)))
-        self.weights = [weight / deviation for weight, deviation in zip(weights, sigma, strict=True)]
+        self.deviations = instruments.balance_deviations(t.base, len(t.w))
+        self.counts = np.array((np.abs(t.I) > FLOWS_A, np.abs(t.w) > moves_rad_s, np.ones(len(t.w))))
         tangent = [self.vector(column) for column in self.sensitivities()]
         self.tangent = np.linalg.qr(np.array(tangent).T)[0]
 
@@ -47,7 +47,8 @@ class Scale:
 
     def vector(self, balances):
         """Balances over their noise, one after the other."""
-        return np.concatenate([part * weight for part, weight in zip(balances, self.weights, strict=True)])
+        seen = np.fft.rfft(np.array(balances) * self.counts) / self.deviations
+        return np.fft.irfft(seen, n=self.counts.shape[1]).ravel()
 
     def outside(self, balances):
         """What of an effect the base parameters leave."""
