@@ -73,6 +73,14 @@ COMPONENTS = {
     "fraction": ("cosine", "sine"),
     "once_rad": ("cosine_rad", "sine_rad"),
 }
+# The generator's coefficient of temperature is relative, per kelvin: R (1 + per_K (T - 25)), and K alike. An answer gives
+# the slope itself, per kelvin of the housing's temperature where that is measured: ohm or N m/A per kelvin. The base
+# model's own R and K hold at 25 C in both, so that per_K is the slope over them: {cause: (slope, base parameter)}. An
+# answer whose heat is the current squared (a time constant above 0) knows no kelvin, and is not compared.
+PER_KELVIN = {
+    "resistance_temperature": ("ohm_per_heat", "resistance_ohm"),
+    "torque_constant_temperature": ("per_heat", "torque_constant_Nm_per_A"),
+}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -148,7 +156,9 @@ class Answer:
         self.subsystem = data.get("subsystem")
         self.causes = list(data.get("causes") or []) if self.detected and not self.abstained else []
         self.gain = (data.get("gain") or {}).get("fraction_of_achievable")
-        self.suspects = list((data.get("evidence") or {}).get("suspects") or [])
+        evidence = data.get("evidence") or {}
+        self.suspects = list(evidence.get("suspects") or [])
+        self.base = evidence.get("parameters") or {}
 
     def names(self):
         return [cause["name"] for cause in self.causes]
@@ -170,10 +180,22 @@ class Answer:
         if other in given and (found := _value(given[other])):
             value, interval = found
             return factor * value + summand, interval and [factor * end + summand for end in interval]
+        if name == "per_K":
+            return self._per_kelvin(cause, given)
         parts = [_value(given[part]) for part in COMPONENTS.get(name, ()) if part in given]
         if len(parts) == 2 and all(parts):
             return float(np.hypot(parts[0][0], parts[1][0])), None
         return None
+
+    def _per_kelvin(self, cause, given):
+        """A slope over its base parameter, whose own error (of tenths of a per cent) is nothing beside the slope's."""
+        slope, base = PER_KELVIN.get(cause, ("", ""))
+        heat = _value(given.get("time_constant_s", {"value": 0.0}))
+        found, over = _value(given.get(slope, {})), _value(self.base.get(base, {}))
+        if found is None or over is None or not over[0] > 0.0 or heat is None or heat[0] != 0.0:
+            return None
+        value, interval = found
+        return value / over[0], interval and [end / over[0] for end in interval]
 
 
 def _value(entry):

@@ -218,3 +218,35 @@ def test_the_command_reads_folders_and_prints_the_table(tmp_path, capsys):
         "false alarms                               0.000  0.000 ... 0.975       1  <= 0.02" in capsys.readouterr().out
     )
     assert json.loads(out.read_text())[1]["value"] == 0.0
+
+
+@pytest.mark.parametrize(
+    ("cause", "true", "given", "base", "error"),
+    [
+        # 1.3 ohm that grow by 0.0044 ohm per kelvin of the housing: 0.00338 per kelvin, for 0.0039
+        ("resistance_temperature", 0.0039, {"ohm_per_heat": 0.004394, "time_constant_s": 0.0}, "resistance_ohm", 2 / 15),
+        # winding and housing told apart: no time constant of that name, and still per kelvin
+        ("resistance_temperature", 0.0039, {"ohm_per_heat": 0.00507, "winding_time_s": 10.0}, "resistance_ohm", 0.0),
+        ("torque_constant_temperature", -0.002, {"per_heat": -0.00234, "time_constant_s": 0.0},
+         "torque_constant_Nm_per_A", 0.1),
+    ],
+)  # fmt: skip
+def test_a_coefficient_of_temperature_is_the_slope_over_its_base_parameter(cause, true, given, base, error):
+    slope = next(iter(given))
+    parameters = {name: (value, value, value) for name, value in given.items()}
+    reach = (0.8 * given[slope], 1.3 * given[slope])
+    parameters[slope] = (given[slope], min(reach), max(reach))
+    answer = named((cause, (), parameters)) | {"evidence": {"parameters": {base: {"value": 1.3}}}}
+    found = figures([(hidden(cause, balance="E", parameters={"per_K": true}), answer)])
+    assert found["parameter error at 4, median"].value == pytest.approx(error, abs=1e-9)
+    assert found["coverage of 95 % intervals"].value == 1.0  # both signs of the coefficient: the ends stay in order
+
+
+def test_a_slope_over_the_current_squared_is_no_coefficient_of_temperature():
+    given = {"ohm_per_heat": (0.02, 0.01, 0.03), "time_constant_s": (30.0, 30.0, 30.0)}
+    answer = named(("resistance_temperature", (), given))
+    answer["evidence"] = {"parameters": {"resistance_ohm": {"value": 1.3}}}
+    truth = hidden("resistance_temperature", balance="E", parameters={"per_K": 0.0039})
+    assert figures([(truth, answer)])["parameter error at 4, median"].cases == 0
+    kelvin = named(("resistance_temperature", (), given | {"time_constant_s": (0.0, 0.0, 0.0)}))
+    assert figures([(truth, kelvin)])["parameter error at 4, median"].cases == 0  # without a base parameter
