@@ -126,7 +126,7 @@ def in_air(body, h: cython.double, stages: cython.longlong) -> cython.void:
         if not locked:
             Th = joint.drive - joint.coulomb * smoothed_sign(hd * eps) - joint.viscous * hd - spring
         if with_terms:
-            Th += terms.torque_on_hip(th - tw, hd, joint.drive)
+            Th += terms.torque_on_hip(th - tw, hd)
             terms.act_on_ankle(o, a_s, uF - us, p, up)
             terms.act_on_ankle(i, a_w, uG - uw, n, un)
             mp += o.extra_motor

@@ -21,7 +21,7 @@ cdef class Electrics:
     cdef public list motors
     cdef public NoiseSource noise
     cdef public double lag_h, lag_factor, pwm_offset_A, voltage_clip_V, steering_rad, steering_shown_rad
-    cdef public bint has_terms
+    cdef public bint has_terms, has_ripple
     # as long as there are motors and analog wiring points
     cdef public double[4] battery_A
     cdef public double[19] values, zero_V, slope_V, noise_V
@@ -32,6 +32,10 @@ cdef class Electrics:
     cpdef void step_motors(
         self, long long t0, long long t1, double hip_rate, double outer_rate, double inner_rate, double steering_rate,
         bint jumped=*,
+    ) noexcept
+    cpdef void turn_motors(
+        self, long long t0, long long t1, double hip_rad, double outer_rad, double inner_rad, double hip_rate,
+        double outer_rate, double inner_rate,
     ) noexcept
     cpdef void sense(
         self, long long t0, long long t1, bint outer_contact, double outer_load_N,

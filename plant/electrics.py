@@ -136,6 +136,7 @@ class Electrics:
         self.zero_V = [0.0] * 19
         self.slope_V = [0.0] * 19  # volts per ampere, volt or rad
         self.noise_V = [0.0] * 19
+        self.has_ripple = False  # of a model file, in a motor's torque constant
         # additional terms of a model file, in the unit of the quantity
         self.has_terms = False
         self.scale = [1.0] * 19
@@ -216,6 +217,23 @@ class Electrics:
         self.motor_current_A = total
         self.electronics_J += self.electronics_W * h
         self.battery.step(h, total, self.electronics_W)
+
+    def turn_motors(
+        self,
+        t0: cython.longlong,
+        t1: cython.longlong,
+        hip_rad: cython.double,
+        outer_rad: cython.double,
+        inner_rad: cython.double,
+        hip_rate: cython.double,
+        outer_rate: cython.double,
+        inner_rate: cython.double,
+    ) -> cython.void:
+        """Before `step_motors`, where a torque constant ripples: joint (motor over gear) angles and rates at t0."""
+        h: cython.double = (t1 - t0) * 1e-9
+        self.hip.turn(hip_rad, hip_rate, h)
+        self.outer_ankle.turn(outer_rad, outer_rate, h)
+        self.inner_ankle.turn(inner_rad, inner_rate, h)
 
     def sense(
         self,

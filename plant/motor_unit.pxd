@@ -1,6 +1,6 @@
 cimport cython
 
-from libc.math cimport exp, log
+from libc.math cimport exp, log, sin
 from ranger_sim.plant.friction cimport smoothed_sign
 from ranger_sim.plant.drive cimport Drive
 
@@ -8,7 +8,7 @@ from ranger_sim.plant.drive cimport Drive
 cdef class MotorUnit:
     # what every step looks at stands first, beside each other
     cdef public Drive drive
-    cdef public double mounting, gear, K, winding_ohm, series_ohm, contact_drop_V, dead_time_fraction
+    cdef public double mounting, gear, K, angle_factor, winding_ohm, series_ohm, contact_drop_V, dead_time_fraction
     cdef public double bridge_current_A, known_s, known_ohm, per_s, per_ohm, decay, decay_s, decay_squared_s
     cdef public double gate_W_per_V, ripple_per_ohm2, mu, C0
     # what a step leaves behind
@@ -21,10 +21,12 @@ cdef class MotorUnit:
     cdef public double resistance_per_K, torque_constant_per_K, G_wh, G_ha, inverse_C_w, inverse_C_h
     cdef public double air_C, rotor_temperature_C, housing_temperature_C, heat_W
     cdef public double drawn_before_J, warmed_As, warmed_A2s, warmed_J, warmed_ripple_J
+    cdef public double[::1] ripples
     cdef public str name
     cdef public object parameters
     cpdef double magnetic_J(self) noexcept
     cpdef double battery_J(self) noexcept
+    cpdef void turn(self, double angle_rad, double rate_rad_s, double seconds) noexcept
     cpdef double torque_Nm(self, double current_A, double rate_rad_s) noexcept
     cpdef void load(self, double current_A) noexcept
     cpdef void step_electrical(self, long long t0, long long t1, double rate_rad_s, double battery_V) noexcept

@@ -10,6 +10,9 @@ Electrical (appendix eq. 32 with the inductance added; EQUATIONS 10.1-10.7):
 
     V = L dI/dt + R I + V_c sgn(I) + K G w
 
+K may ripple with the rotor's angle: then it does on both sides, in V as in T, or the shaft would take another power
+than the winding gives (EQUATIONS 10.10). `turn` sets its mean over the coming step.
+
 On one side of zero this is linear, so the current is an exponential towards (V - K G w -/+ V_c) / R and is
 integrated exactly, together with its square, until it reaches zero; there it stays while |V - K G w| < V_c.
 The speed w is constant over a call. An open bridge is the same equation with V = 0 and the drop
@@ -28,11 +31,12 @@ are drawn from the battery here.
 
 import cython
 
+from ranger_sim.foundation.numbers import reals
 from ranger_sim.plant.drive import Drive
 from ranger_sim.plant.motor_parameters import MotorParameters
 
 if not cython.compiled:
-    from math import exp, log
+    from math import exp, log, sin
 
     from ranger_sim.plant.friction import smoothed_sign
 
@@ -60,7 +64,8 @@ class MotorUnit:
         self.contact_drop_V = p.contact_drop_V
         self.winding_ohm = p.resistance_ohm  # at the present temperature
         self.series_ohm = p.series_resistance_ohm + p.bridge_resistance_ohm
-        self.K = p.torque_constant_Nm_per_A  # at the present temperature
+        self.K = p.torque_constant_Nm_per_A  # at the present temperature, its mean over a turn of the rotor
+        self.angle_factor = 1.0  # of K: where the rotor stands, 1 for a motor without ripple
         self.inductance_H = p.inductance_H(p.settling_frequency_hz)
         # of EQUATIONS 10.6, without voltage, resistance and duty
         self.ripple_per_ohm2 = 1.0 / (12.0 * (p.inductance_H(p.pwm_frequency_hz) * p.pwm_frequency_hz) ** 2)
@@ -73,6 +78,7 @@ class MotorUnit:
         self.inverse_smoothing = 1.0 / p.friction_smoothing_rad_s
         self.resistance_per_K = p.resistance_per_K
         self.torque_constant_per_K = p.torque_constant_per_K
+        self.ripples = reals([])  # of each: part of K, periods per turn of the rotor, phase (rad)
         self.heat_matters = p.resistance_per_K != 0.0 or p.torque_constant_per_K != 0.0
         self.G_wh = 1.0 / p.winding_to_housing_K_per_W
         self.G_ha = 1.0 / p.housing_to_air_K_per_W
@@ -127,9 +133,29 @@ class MotorUnit:
         """Energy taken from the battery since power-up, less what was given back."""
         return self.drawn_J - self.returned_J
 
+    def add_ripple(self, fraction, periods_per_turn, phase_rad) -> None:
+        """K is so much more and less of itself, with this phase where the rotor's angle is 0."""
+        self.ripples = reals(list(self.ripples) + [fraction, periods_per_turn, phase_rad])
+
+    def turn(self, angle_rad: cython.double, rate_rad_s: cython.double, seconds: cython.double) -> cython.void:
+        """Set K for a step that begins at this angle of the joint: its mean over what the rotor goes through."""
+        half: cython.double = 0.5 * self.gear * rate_rad_s * seconds
+        middle: cython.double = self.gear * angle_rad + half
+        factor: cython.double = 1.0
+        part: cython.double
+        x: cython.double
+        i: cython.Py_ssize_t
+        for i in range(0, len(self.ripples), 3):
+            part = self.ripples[i]
+            x = self.ripples[i + 1] * half
+            if x > 1e-4 or x < -1e-4:  # below, the mean of a sine about its middle is the middle, to 1e-9
+                part *= sin(x) / x
+            factor += part * sin(self.ripples[i + 1] * middle + self.ripples[i + 2])
+        self.angle_factor = factor
+
     def torque_Nm(self, current_A: cython.double, rate_rad_s: cython.double) -> cython.double:
         """Torque at the joint for a current and a joint rate, without the rotor's inertia."""
-        GKI: cython.double = self.gear * self.K * current_A
+        GKI: cython.double = self.gear * self.K * self.angle_factor * current_A
         load: cython.double = GKI if GKI > 0.0 else -GKI
         return (
             GKI - (self.mu * load + self.C0) * smoothed_sign(rate_rad_s * self.inverse_smoothing) - self.C1 * rate_rad_s
@@ -137,7 +163,7 @@ class MotorUnit:
 
     def load(self, current_A: cython.double) -> cython.void:
         """Set the three torque numbers for the body from a current in the joint's sense."""
-        GKI: cython.double = self.gear * self.K * current_A
+        GKI: cython.double = self.gear * self.K * self.angle_factor * current_A
         self.drive_Nm = GKI
         self.coulomb_Nm = self.mu * (GKI if GKI > 0.0 else -GKI) + self.C0
         self.viscous_Nms = self.C1
@@ -161,7 +187,7 @@ class MotorUnit:
             drive.apply(t0)
         h: cython.double = (t1 - t0) * 1e-9
         R: cython.double = self.winding_ohm + self.series_ohm
-        GK: cython.double = self.mounting * self.gear * self.K
+        GK: cython.double = self.mounting * self.gear * self.K * self.angle_factor
         contact_V: cython.double = self.contact_drop_V
         back_emf_V: cython.double = GK * rate_rad_s
         amps: cython.double = self.bridge_current_A
@@ -370,7 +396,7 @@ class MotorUnit:
     @property
     def mean_current_A(self):
         """Mean of the last step, in the joint's sense."""
-        return self.drive_Nm / (self.gear * self.K)
+        return self.drive_Nm / (self.gear * self.K * self.angle_factor)
 
     @property
     def contact_J(self):

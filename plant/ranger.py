@@ -256,6 +256,8 @@ class RangerPlant:
         inner_stands: cython.bint
         yaw0: cython.double = s.yaw
 
+        if e.has_ripple:
+            e.turn_motors(t0, t1, h0, p0, n0, h0_rate, p0_rate, n0_rate)
         e.step_motors(t0, t1, h0_rate, p0_rate, n0_rate, s.rate, self.jumped)
         if e.battery.cut_off and b.mode != FALLEN:
             # neither motors nor computers have power: the walk ends here, before the robot falls of it

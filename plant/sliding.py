@@ -126,7 +126,7 @@ def write_forces(body) -> cython.void:
     hip = joint.drive - joint.coulomb * smoothed_sign(rate * body.inverse_smoothing) - joint.viscous * rate
     hip -= joint.spring_torque(o.angle - i.angle)
     if terms is not None:
-        hip += terms.torque_on_hip(o.angle - i.angle, rate, joint.drive)
+        hip += terms.torque_on_hip(o.angle - i.angle, rate)
     write_leg(body, o)
     write_leg(body, i)
     for n in range(4):

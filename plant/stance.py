@@ -213,7 +213,7 @@ def on_feet(body, h: cython.double, stages: cython.longlong) -> cython.void:
         TG = Tw
         if with_terms:
             # EQUATIONS 12
-            Th += hip_sign * terms.torque_on_hip(hip_sign * hip, hip_sign * hd, joint.drive)
+            Th += hip_sign * terms.torque_on_hip(hip_sign * hip, hip_sign * hd)
             terms.act_on_ankle(s, a_s, uF - us, p, up)
             terms.act_on_ankle(w, a_w, uG - uw, n, un)
             mp += s.extra_motor

@@ -12,12 +12,11 @@ cpdef enum:
     DRAG = 4
     SPRING = 5
     COGGING = 6
-    COMMUTATION = 7
-    TURN = 8
-    STIFFENING = 9
-    BACKLASH = 10
-    SLACK = 11
-    CABLE_DAMPING = 12
+    TURN = 7
+    STIFFENING = 8
+    BACKLASH = 9
+    SLACK = 10
+    CABLE_DAMPING = 11
     HIP_JOINT = 0
     HIP_MOTOR = 1
     ANKLE_JOINT = 2
@@ -30,6 +29,6 @@ cdef class TermTorques:
     cdef public double zero_rad, hip_gear, ankle_gear, inverse_smoothing
     cdef public long long[::1] forms, places, sides
     cdef public double[::1] parameters
-    cpdef double torque(self, long long i, double q, double w, double gear, double drive)
-    cpdef double torque_on_hip(self, double h, double h_rate, double drive)
+    cpdef double torque(self, long long i, double q, double w, double gear)
+    cpdef double torque_on_hip(self, double h, double h_rate)
     cpdef int act_on_ankle(self, Leg leg, double angle, double rate, double motor, double motor_rate) except -1

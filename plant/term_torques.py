@@ -4,7 +4,7 @@ A term is a row of numbers: form, place, up to four parameters. The forms' formu
 plant/terms.py names them, their parameters and limits, and builds the rows from a model file.
 
 With w the rate and q the angle at the place (joints: as the joint sensor measures; motors: over the gear), s the
-stretch of a cable (motor less joint), I K G the drive torque, G the gear, epsilon the friction smoothing:
+stretch of a cable (motor less joint), G the gear, epsilon the friction smoothing:
 
     STRIBECK      -p0 exp(-(w / p1)^2) tanh(w / epsilon)
     COULOMB       -p0 tanh(w / epsilon)
@@ -13,7 +13,6 @@ stretch of a cable (motor less joint), I K G the drive torque, G the gear, epsil
     DRAG          -p0 w |w|
     SPRING        -(p0 x + p1 x^2 + p2 x^3), x = q - p3
     COGGING       p0 sin(p1 G q + p2)                       periods per turn of the rotor
-    COMMUTATION   p0 (G K I) sin(p1 G q + p2)
     TURN          p0 sin(p1 q + p2)                         periods per turn of the joint
     STIFFENING    p0 s^3 on the joint, the opposite on the motor; so the next three
     BACKLASH      -p1 clip(s, -p0, p0)                      p1: stiffness of the cable, taken away inside the gap
@@ -40,12 +39,11 @@ if not cython.compiled:
     DRAG = 4
     SPRING = 5
     COGGING = 6
-    COMMUTATION = 7
-    TURN = 8
-    STIFFENING = 9
-    BACKLASH = 10
-    SLACK = 11
-    CABLE_DAMPING = 12
+    TURN = 7
+    STIFFENING = 8
+    BACKLASH = 9
+    SLACK = 10
+    CABLE_DAMPING = 11
     # Places of a torque; the hip's motor and joint share an angle but not the gear of periodic terms.
     HIP_JOINT = 0
     HIP_MOTOR = 1
@@ -91,9 +89,8 @@ class TermTorques:
         q: cython.double,
         w: cython.double,
         gear: cython.double,
-        drive: cython.double,
     ) -> cython.double:
-        """Torque (N m) of row i at an angle (rad), rate (rad/s) and drive torque; cables: q stretch, w its rate."""
+        """Torque (N m) of row i at an angle (rad) and rate (rad/s); cables: q stretch, w its rate."""
         form: cython.longlong = self.forms[i]
         p0: cython.double = self.parameters[4 * i]
         p1: cython.double = self.parameters[4 * i + 1]
@@ -122,8 +119,6 @@ class TermTorques:
             return -x * (p0 + x * (p1 + x * p2))
         if form == COGGING:
             return p0 * sin(p1 * gear * q + p2)
-        if form == COMMUTATION:
-            return p0 * drive * sin(p1 * gear * q + p2)
         if form == TURN:
             return p0 * sin(p1 * q + p2)
         if form == STIFFENING:
@@ -139,15 +134,15 @@ class TermTorques:
             return -p0 * q if q < 0.0 else 0.0
         return p0 * w
 
-    def torque_on_hip(self, h: cython.double, h_rate: cython.double, drive: cython.double) -> cython.double:
-        """Additional torque on the hip angle h (N m), at h (rad), its rate (rad/s) and the motor's drive torque."""
+    def torque_on_hip(self, h: cython.double, h_rate: cython.double) -> cython.double:
+        """Additional torque on the hip angle h (N m), at h (rad) and its rate (rad/s)."""
         i: cython.longlong
         total: cython.double = 0.0
         for i in range(self.count):
             if self.places[i] == HIP_JOINT:
-                total += self.torque(i, h, h_rate, 1.0, drive)
+                total += self.torque(i, h, h_rate, 1.0)
             elif self.places[i] == HIP_MOTOR:
-                total += self.torque(i, h, h_rate, self.hip_gear, drive)
+                total += self.torque(i, h, h_rate, self.hip_gear)
         return total
 
     def act_on_ankle(
@@ -172,11 +167,11 @@ class TermTorques:
             if self.sides[i] != leg.side:
                 continue
             if place == ANKLE_JOINT:
-                joint_T += self.torque(i, angle + self.zero_rad, rate, 1.0, leg.drive)
+                joint_T += self.torque(i, angle + self.zero_rad, rate, 1.0)
             elif place == ANKLE_MOTOR:
-                motor_T += self.torque(i, motor + self.zero_rad, motor_rate, self.ankle_gear, leg.drive)
+                motor_T += self.torque(i, motor + self.zero_rad, motor_rate, self.ankle_gear)
             elif place == ANKLE_CABLE:
-                T = self.torque(i, motor - angle, motor_rate - rate, 1.0, leg.drive)
+                T = self.torque(i, motor - angle, motor_rate - rate, 1.0)
                 joint_T += T
                 motor_T -= T
         leg.extra_ankle = joint_T

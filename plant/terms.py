@@ -140,8 +140,7 @@ _FORMS = (
             Parameter("periods_per_turn", "1", 1.0, 1000.0),
             _phase(),
         ),
-        "a part of the motor's torque that is periodic in the rotor's angle",
-        torques.COMMUTATION,
+        "a part of the torque constant that is periodic in the rotor's angle: of torque and back-EMF alike",
     ),
     Form(
         "once_per_turn",
@@ -357,6 +356,9 @@ class Model:
                     p = plant.parameters
                     rows = torques.TermTorques(p.ankle_zero_rad, p.hip_gear, p.ankle_gear, p.friction_smoothing_rad_s)
                 rows.add(term.form.torque, *ROW_PLACES[term.at], list(term.values.values()))
+            elif term.form.name == "commutation_ripple":
+                electrics.motors[MOTORS.index(term.at)].add_ripple(*term.values.values())
+                electrics.has_ripple = True
             elif term.form.places is MOTORS:  # an encoder may have the same name
                 motors = (electrics.hip, electrics.outer_ankle, electrics.inner_ankle, electrics.steering)
                 unit = motors[MOTORS.index(term.at)]
@@ -375,8 +377,22 @@ class Model:
                 _apply_angle(plant.encoders[ENCODER_NAMES.index(term.at)], term)
             else:
                 _apply_imu(plant.imu, term)
+        self._ripples_are_possible()
         if rows is not None:
             plant.body.terms = rows
+
+    def _ripples_are_possible(self) -> None:
+        """UserError where ripples together would turn a motor's torque constant round."""
+        sums: dict[str, float] = {}
+        for term in self.terms:
+            if term.form.name == "commutation_ripple":
+                sums[term.at] = sums.get(term.at, 0.0) + term.values["fraction"]
+        for at, total in sums.items():
+            if total >= 1.0:
+                raise UserError(
+                    f"{self.source}: the commutation ripples at {at} together are {total:g} of its torque constant; "
+                    "allowed is what lies below 1"
+                )
 
 
 def _apply_electric(unit: Any, term: Term) -> None:

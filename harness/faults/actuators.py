@@ -61,7 +61,7 @@ class MotorFault(Fault):
         """The current, in the joint's sense, that voltage and rate of now lead to (EQUATIONS 10.2)."""
         motor, drive = self.motor, self.motor.drive
         battery_V = self.robot.plant.electrics.battery.voltage_V
-        back_V = motor.mounting * motor.gear * motor.K * self.rate_rad_s()
+        back_V = motor.mounting * motor.gear * motor.K * motor.angle_factor * self.rate_rad_s()
         if drive.is_open:
             volts, drop = -back_V, motor.contact_drop_V + battery_V + 2.0 * motor.diode_drop_V
         else:

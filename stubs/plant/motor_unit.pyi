@@ -1,5 +1,6 @@
 # Generated from plant/motor_unit.py and plant/motor_unit.pxd (python -m ranger_sim.tools.stubs); do not edit.
 
+from collections.abc import MutableSequence
 from ranger_sim.plant.drive import Drive
 from typing import Any
 from typing import final
@@ -10,6 +11,7 @@ class MotorUnit:
     mounting: float
     gear: float
     K: float
+    angle_factor: float
     winding_ohm: float
     series_ohm: float
     contact_drop_V: float
@@ -63,11 +65,14 @@ class MotorUnit:
     warmed_A2s: float
     warmed_J: float
     warmed_ripple_J: float
+    ripples: MutableSequence[float]
     name: str
     parameters: Any
     def __init__(self, name: str, parameters: Any = None, mounting: float = 1) -> None: ...
     def magnetic_J(self) -> float: ...
     def battery_J(self) -> float: ...
+    def add_ripple(self, fraction: Any, periods_per_turn: Any, phase_rad: Any) -> None: ...
+    def turn(self, angle_rad: float, rate_rad_s: float, seconds: float) -> None: ...
     def torque_Nm(self, current_A: float, rate_rad_s: float) -> float: ...
     def load(self, current_A: float) -> None: ...
     def step_electrical(self, t0: int, t1: int, rate_rad_s: float, battery_V: float) -> None: ...

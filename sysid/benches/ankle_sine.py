@@ -17,7 +17,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ranger_sim.plant.motor_parameters import ANKLE_MOTOR, MotorParameters
-from ranger_sim.plant.motor_unit import MotorUnit
 from ranger_sim.plant.parameters import BodyParameters
 from ranger_sim.sysid.benches.bench_terms import NOTHING, BenchTerms
 from ranger_sim.sysid.dataset import Channel, Dataset
@@ -56,7 +55,7 @@ def tracked(
 
     One period goes before, so that nothing of the start is left.
     """
-    unit = MotorUnit("ankle", motor)
+    unit = terms.unit("inner_motor", motor, "ankle")
     J_A, J_f = motor.reflected_inertia_kg_m2, body.foot_inertia_kg_m2
     k_s, k_r, a_0 = body.ankle_spring_Nm_per_rad, body.ankle_return_Nm_per_rad, body.ankle_return_rest_rad
     before = 1.0 / frequency_hz
@@ -66,12 +65,12 @@ def tracked(
         current = STIFFNESS_A_per_rad * (CENTRE_rad + AMPLITUDE_rad * math.sin(w * t) - p)
         current += DAMPING_As_per_rad * (AMPLITUDE_rad * w * math.cos(w * t) - u)
         cable = k_s * (p - a)
+        unit.turn(p, 0.0, 0.0)
         on_motor, on_foot = unit.torque_Nm(current, u) - cable, cable - k_r * (a - a_0)
         if terms.places:
-            drive = motor.gear * unit.K * current
             stretch = terms.torque_Nm("inner_cable", p - a, u - v)
-            on_motor += terms.torque_Nm("inner_motor", p, u, drive) - stretch
-            on_foot += terms.torque_Nm("inner_ankle", a, v, drive) + stretch
+            on_motor += terms.torque_Nm("inner_motor", p, u) - stretch
+            on_foot += terms.torque_Nm("inner_ankle", a, v) + stretch
         return on_motor / J_A, on_foot / J_f, current
 
     h = STEP_S

@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 
 from ranger_sim.plant import terms
 from ranger_sim.plant.motor_parameters import MotorParameters
+from ranger_sim.plant.motor_unit import MotorUnit
 from ranger_sim.plant.parameters import BodyParameters
 from ranger_sim.plant.term_torques import TermTorques
 
@@ -24,7 +25,8 @@ ELECTRIC = (
 )
 FRICTION = ("coulomb_friction", "viscous_friction")  # changes of the motor's own parameters
 STEADY = ("stribeck", "direction_friction", "drag")
-PERIODIC = ("cogging", "commutation_ripple")
+RIPPLE = "commutation_ripple"  # of the torque constant, in torque and back-EMF alike
+PERIODIC = ("cogging", RIPPLE)
 TURN = "once_per_turn"
 # what each bench can have, by place; a reading of a turning shaft is a mean over its turns
 TAKES: dict[str, dict[str, tuple[str, ...]]] = {
@@ -72,24 +74,32 @@ class BenchTerms:
         held = self.of_bench(bench).terms
         return [f"{term.form.name} at {term.at}" for term in self.terms if term not in held]
 
-    def torque_Nm(self, place: str, angle_rad: float, rate_rad_s: float, drive_Nm: float = 0.0) -> float:
+    def unit(self, place: str, parameters: MotorParameters, name: str) -> MotorUnit:
+        """A motor of these parameters with the ripples that stand there; its K follows the rotor by `turn`."""
+        made = MotorUnit(name, parameters)
+        for term in self.terms:
+            if term.at == place and term.form.name == RIPPLE:
+                made.add_ripple(*term.values.values())
+        return made
+
+    def torque_Nm(self, place: str, angle_rad: float, rate_rad_s: float) -> float:
         """Torque of all terms at a place of the robot, at its joint; for a cable: on the joint, angle its stretch."""
         total = 0.0
         for number, at in enumerate(self.places):
             if at == place:
-                total += self.rows.torque(number, angle_rad, rate_rad_s, GEARS.get(place, 1.0), drive_Nm)
+                total += self.rows.torque(number, angle_rad, rate_rad_s, GEARS.get(place, 1.0))
         return total
 
-    def output_Nm(self, angle_rad: float, rate_rad_s: float, drive_Nm: float, gear: float) -> float:
-        """The hip motor's terms at the output of a bench's gearbox: torque there, of angle, rate and torque there.
+    def output_Nm(self, angle_rad: float, rate_rad_s: float, gear: float) -> float:
+        """The hip motor's terms at the output of a bench's gearbox: torque there, of angle and rate there.
 
         What goes once per turn of the robot's joint goes once per turn of the bench's output.
         """
         if not self.places:
             return 0.0
         r = BODY.hip_gear / gear
-        at_motor = self.torque_Nm("hip_motor", angle_rad / r, rate_rad_s / r, drive_Nm * r) / r
-        return at_motor + self.torque_Nm("hip_joint", angle_rad, rate_rad_s, drive_Nm)
+        at_motor = self.torque_Nm("hip_motor", angle_rad / r, rate_rad_s / r) / r
+        return at_motor + self.torque_Nm("hip_joint", angle_rad, rate_rad_s)
 
     def motor(self, place: str, parameters: MotorParameters) -> MotorParameters:
         """The motor with the electrical terms that stand there, and with the friction of the model."""

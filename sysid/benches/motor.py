@@ -60,8 +60,7 @@ class SuppliedMotor:
         self.unit.step_electrical(self.now, self.now + SETTLED_NS, speed_rad_per_s, abs(voltage_V))
         self.now += SETTLED_NS
         current = float(self.unit.current_A)
-        gear = self.unit.gear
-        more = self.terms.output_Nm(0.0, speed_rad_per_s, gear * self.unit.K * current, gear)
+        more = self.terms.output_Nm(0.0, speed_rad_per_s, self.unit.gear)
         return current, float(self.unit.torque_Nm(current, speed_rad_per_s)) + more
 
     def steady_speed(self, voltage_V: float, load_Nm: float) -> float:

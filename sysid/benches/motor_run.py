@@ -15,7 +15,6 @@ import numpy as np
 from ranger_sim.foundation.random_arrays import generator
 from ranger_sim.plant.friction import smoothed_sign
 from ranger_sim.plant.motor_parameters import MotorParameters
-from ranger_sim.plant.motor_unit import MotorUnit
 from ranger_sim.sysid.benches.bench_terms import NOTHING, BenchTerms
 from ranger_sim.sysid.benches.motor import BENCH_MOTOR, Array
 from ranger_sim.sysid.dataset import Channel, Dataset
@@ -52,7 +51,7 @@ def simulated(
     voltage, brake = course(seed, fine)
     terms = terms.of_bench("motor-run")
     motor = terms.motor("hip_motor", motor)
-    unit = MotorUnit("bench", dataclasses.replace(motor, watchdog_ns=10**18))
+    unit = terms.unit("hip_motor", dataclasses.replace(motor, watchdog_ns=10**18), "bench")
     unit.drive.watchdog_edge(0)
     all_inertia = motor.reflected_inertia_kg_m2 + LOAD_kg_m2
     step_ns = round(STEP_S * 1e9)
@@ -63,7 +62,8 @@ def simulated(
 
     def slope(angle: float, w: float, current: float, most: float) -> tuple[float, float]:
         held = most * smoothed_sign(w / motor.friction_smoothing_rad_s)
-        torque = unit.torque_Nm(current, w) + terms.output_Nm(angle, w, motor.gear * unit.K * current, motor.gear)
+        unit.turn(angle, 0.0, 0.0)
+        torque = unit.torque_Nm(current, w) + terms.output_Nm(angle, w, motor.gear)
         return (torque - held) / all_inertia, held
 
     for number, (V, most) in enumerate(zip(voltage.tolist(), brake.tolist(), strict=True)):
@@ -77,8 +77,9 @@ def simulated(
             cell = LOAD_kg_m2 * rate + held
             rows.append((V, unit.current_A, w, cell, motor.gear * angle, unit.housing_temperature_C))
         # at the speed of the step's middle
+        unit.turn(angle, w + 0.5 * STEP_S * rate, STEP_S)
         unit.step_electrical(now, now + step_ns, w + 0.5 * STEP_S * rate, abs(V))
-        current = unit.drive_Nm / (motor.gear * unit.K)  # its mean over the step
+        current = unit.mean_current_A
         middle, _ = slope(angle + 0.5 * STEP_S * w, w + 0.5 * STEP_S * rate, current, most)
         angle += STEP_S * (w + 0.5 * STEP_S * rate)
         w += STEP_S * middle

@@ -73,10 +73,10 @@ COMPONENTS = {
     "fraction": ("cosine", "sine"),
     "once_rad": ("cosine_rad", "sine_rad"),
 }
-# The generator's coefficient of temperature is relative, per kelvin: R (1 + per_K (T - 25)), and K alike. An answer gives
-# the slope itself, per kelvin of the housing's temperature where that is measured: ohm or N m/A per kelvin. The base
-# model's own R and K hold at 25 C in both, so that per_K is the slope over them: {cause: (slope, base parameter)}. An
-# answer whose heat is the current squared (a time constant above 0) knows no kelvin, and is not compared.
+# The generator's coefficient of temperature is relative, per kelvin: R (1 + per_K (T - 25)), and K alike. An answer
+# gives the slope itself, per kelvin of the housing where that is measured: ohm or N m/A per kelvin. R and K of the base
+# model hold at 25 C in both, so that per_K is the slope over them: {cause: (slope, base parameter)}. An answer whose
+# heat is the current squared (a time constant above 0) knows no kelvin, and is not compared.
 PER_KELVIN = {
     "resistance_temperature": ("ohm_per_heat", "resistance_ohm"),
     "torque_constant_temperature": ("per_heat", "torque_constant_Nm_per_A"),

@@ -224,7 +224,8 @@ def test_the_command_reads_folders_and_prints_the_table(tmp_path, capsys):
     ("cause", "true", "given", "base", "error"),
     [
         # 1.3 ohm that grow by 0.0044 ohm per kelvin of the housing: 0.00338 per kelvin, for 0.0039
-        ("resistance_temperature", 0.0039, {"ohm_per_heat": 0.004394, "time_constant_s": 0.0}, "resistance_ohm", 2 / 15),
+        ("resistance_temperature", 0.0039, {"ohm_per_heat": 0.004394, "time_constant_s": 0.0}, "resistance_ohm",
+         2 / 15),
         # winding and housing told apart: no time constant of that name, and still per kelvin
         ("resistance_temperature", 0.0039, {"ohm_per_heat": 0.00507, "winding_time_s": 10.0}, "resistance_ohm", 0.0),
         ("torque_constant_temperature", -0.002, {"per_heat": -0.00234, "time_constant_s": 0.0},

@@ -14,14 +14,13 @@ from ranger_sim.plant.term_torques import TermTorques
 STEP = 125_000
 
 
-def torques(form, at, state=(0.0,) * 10, outer_drive=0.0, **values):
+def torques(form, at, state=(0.0,) * 10, **values):
     """The five torques of one term at a state: h, outer, inner angle and rate, outer, inner motor angle and rate."""
     term = terms.Model([dict(form=form, at=at, **values)]).terms[0]
     rows = TermTorques(1.68, 66.0, 34.0, 0.05)
     rows.add(term.form.torque, *terms.ROW_PLACES[at], list(term.values.values()))
     outer, inner = Leg(OUTER, BodyParameters()), Leg(INNER, BodyParameters())
-    outer.drive = outer_drive
-    hip = rows.torque_on_hip(state[0], state[1], 0.0)
+    hip = rows.torque_on_hip(state[0], state[1])
     rows.act_on_ankle(outer, *state[2:4], *state[6:8])
     rows.act_on_ankle(inner, *state[4:6], *state[8:10])
     return (hip, outer.extra_ankle, inner.extra_ankle, outer.extra_motor, inner.extra_motor)
@@ -74,9 +73,23 @@ def test_cogging_repeats_with_the_rotor():
     assert later == pytest.approx(first)
 
 
-def test_commutation_ripple_goes_with_the_current():
-    shown = torques("commutation_ripple", "outer_motor", MOVING, 3.0, fraction=0.1, periods_per_turn=14)
-    assert shown[3] == pytest.approx(0.3 * math.sin(14 * 34 * (0.35 + 1.68)))
+def test_a_commutation_ripple_is_one_of_torque_and_back_emf_where_the_motor_stands():
+    plant = built(dict(form="commutation_ripple", at="outer_motor", fraction=0.1, periods_per_turn=14))
+    plant.hold("outer", 0.1, 0.3)
+    motor = plant.outer_ankle
+    angle = plant.body.outer.motor_angle + plant.parameters.ankle_zero_rad
+    plant.step()
+    expected = 1.0 + 0.1 * math.sin(14 * 34 * angle)  # at rest: no mean over what the rotor goes through
+    assert motor.angle_factor == pytest.approx(expected) and abs(expected - 1.0) > 0.01
+    assert motor.torque_Nm(2.0, 0.0) == pytest.approx(34 * 0.018 * 2.0 * expected)
+    assert plant.inner_ankle.angle_factor == plant.hip.angle_factor == 1.0 and plant.body.terms is None
+
+
+def test_ripples_that_would_turn_the_torque_constant_round_are_refused():
+    half = dict(form="commutation_ripple", at="hip_motor", fraction=0.5, periods_per_turn=7)
+    with pytest.raises(UserError, match="ripples at hip_motor together are 1 of its torque constant"):
+        built(half, half)
+    assert len(built(half, half | dict(at="outer_motor")).hip.ripples) == 3
 
 
 @pytest.mark.parametrize(

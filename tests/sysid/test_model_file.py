@@ -52,7 +52,7 @@ def test_a_torque_of_the_rotor_is_the_same_work_at_either_gear(cause, numbers, t
         at_joint = on.torque_Nm("hip_motor", angle / R, rate / R)
         # the simulator's sign is tanh(rate / 0.05 rad/s): 1 - 6e-6 at the slowest of these
         assert at_joint / R == pytest.approx(at_bench, rel=1e-5)
-        assert on.output_Nm(angle, rate, 0.0, BENCH.gear) == pytest.approx(at_joint / R, rel=1e-12)
+        assert on.output_Nm(angle, rate, BENCH.gear) == pytest.approx(at_joint / R, rel=1e-12)
 
 
 def test_electrical_effects_become_terms_of_the_winding():
