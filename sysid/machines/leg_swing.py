@@ -41,7 +41,11 @@ FIRST_MOMENT_KG_M = 0.72  # c m of a leg, appendix table 2
 GRAVITY_M_PER_S2 = 9.81
 HIP_GEAR = 66.0
 GUESS_S = 0.02  # Gaussian under which the angle's first guess lies: ten times faster than the leg's own swing
-CURRENT_S = 0.003  # Gaussian under the measured current whose slope the inductance is multiplied with
+CURRENT_S = 0.003  # Gaussian under a current or a voltage whose slope a sensor's lag is multiplied with
+# Gaussian under what drives the current, whose slope the inductance is multiplied with. Without it the slope is mostly
+# the voltage's noise: L came out as 0, and what it should have taken of every jump went into V_c. Chosen by us: half
+# of a laboratory supply's own lag, so that jumps keep their shape to a seventh.
+SLOPE_S = 0.004
 CALM_S = 0.04  # Gaussian under the current by which a misfit is sorted: four times the memory of a converter's noise
 FINE_S = 0.002  # longest step of the integration: friction settles in some milliseconds where it holds
 # Where friction holds it may be anything up to its limit (eq. 35). Below this rate it is open, with a memory of OPEN_S:
@@ -140,7 +144,7 @@ class _Leg(SimulatedMachine):
             return {"I": table["current_A"]}
         turning = signals.derivative(table, table["hip_angle_rad"], GUESS_S / table.step_s)
         driving = table["voltage_V"] - self.parameters[0].value * turning
-        return {"V": table["voltage_V"], "slope": np.gradient(driving, table.step_s)}
+        return {"V": table["voltage_V"], "slope": signals.derivative(table, driving, SLOPE_S / table.step_s)}
 
     def first_guess(self, table: Table) -> dict[str, Array]:
         """Angle and rate by a Gaussian."""
