@@ -24,6 +24,7 @@ def drawn(found):
 
 def text_of(html):
     """What a reader sees: no scripts, no styles, no tags."""
+    html = html.replace("<wbr>", "")
     html = re.sub(r"<(script|style).*?</\1>", " ", html, flags=re.DOTALL)
     return " ".join(re.sub(r"<[^>]+>", " ", html).split())
 

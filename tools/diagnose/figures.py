@@ -53,7 +53,7 @@ def sides(found: Diagnosis) -> dict[str, Sides]:
     made = {}
     for name in found.plain.equations:
         part = found.plain.parts[name]
-        rows = np.flatnonzero(part.valid)
+        rows = np.flatnonzero(part.valid & ~part.starts)
         if len(rows) < 10:
             continue
         unit = next(r.equations[name].unit for r in found.recordings if name in r.equations)
@@ -151,9 +151,13 @@ def of_cause(found: Diagnosis, each: Named, made: Mapping[str, Sides]) -> Figure
     _, side, signature = shown
     with_it = side.measured - side.after
     without = with_it + signature
+    note = "Dots: single samples; lines: means with their 95 % interval. A model that misses nothing lies at zero."
     phase = phase_of(found, each, side.name)
     if phase is not None:
-        x, label = phase[side.rows], f"phase of {each.effect.cause}, periods ({shape_text(each.shape)})"
+        told = np.isfinite(phase[side.rows])
+        x, with_it, without = (values[told] for values in (phase[side.rows], with_it, without))
+        label = f"phase of {each.effect.cause}, in periods"
+        note += f" At {shape_text(each.shape)}."
     else:
         over = candidates(found, side)
         # the course of time tells everything of a short recording: it must tell twice as much as any signal does
@@ -165,7 +169,6 @@ def of_cause(found: Diagnosis, each: Named, made: Mapping[str, Sides]) -> Figure
     means(figure, x, with_it, "with it", AFTER)
     figure.update_yaxes(title_text=f"what is left of {side.name}, {side.unit}", range=reach_of(figure))
     figure.update_xaxes(title_text=label)
-    note = "Dots: single samples; lines: means with their 95 % interval. A model that misses nothing lies at zero."
     return finished(figure, f"Where {each.effect.cause} shows", note, 380)
 
 
@@ -188,7 +191,10 @@ def beside(found: Diagnosis, each: Named, equation: str) -> Array | None:
 
 
 def phase_of(found: Diagnosis, each: Named, equation: str) -> Array | None:
-    """Phase of a periodic effect in periods, 0 to 1, at all kept rows; None for an effect that is none."""
+    """Phase of a periodic effect in periods, 0 to 1, at all kept rows; None for an effect that is none.
+
+    Not a number where the effect adds nothing: there the samples do not follow it.
+    """
     if not each.effect.phase_is_free and set(each.shape) != {"pitch_m"} or len(each.effect.coefficients) != 2:
         return None
     parts = []
@@ -197,7 +203,8 @@ def phase_of(found: Diagnosis, each: Named, equation: str) -> Array | None:
         if made is None:
             return None
         both = kept_rows(recording, made)
-        parts.append((np.arctan2(both[:, 1], both[:, 0]) / (2.0 * np.pi)) % 1.0)
+        phase = (np.arctan2(both[:, 1], both[:, 0]) / (2.0 * np.pi)) % 1.0
+        parts.append(np.where(np.any(both != 0.0, axis=1), phase, np.nan))
     return np.concatenate(parts)
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import jinja2
 import numpy as np
-from markupsafe import Markup
+from markupsafe import Markup, escape
 from plotly.offline import get_plotlyjs
 
 from ranger_sim.sysid import inspection
@@ -33,6 +33,7 @@ def render(found: Diagnosis, command: str = "", files: dict[str, str] | None = N
     )
     environment.filters["figure"] = lambda value: f"{value:.4g}"
     environment.filters["share"] = lambda value: f"{100.0 * value:.0f} %"
+    environment.filters["breakable"] = breakable
     environment.filters["small"] = lambda value: "below 1e-300" if value == 0.0 else f"{value:.2g}"
     answer = found.answer
     sides = figures.sides(found)
@@ -59,6 +60,11 @@ def render(found: Diagnosis, command: str = "", files: dict[str, str] | None = N
         files=files or {},
         plotly_js=Markup(get_plotlyjs()),
     )
+
+
+def breakable(identifier: str) -> Markup:
+    """An identifier that may go on in the next line after each of its underscores."""
+    return Markup(str(escape(identifier)).replace("_", "_<wbr>"))
 
 
 def marked(figure: Figure | None) -> Figure | None:
