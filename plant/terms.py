@@ -486,7 +486,7 @@ def load(path: str | pathlib.Path) -> Model:
 
 
 def content_of(path: str | pathlib.Path) -> dict[str, Any]:
-    """The tables of a model file, unchecked but for their kind."""
+    """The tables of a model file; of [diagnosis] kinds are checked, and that numbers are finite."""
     path = pathlib.Path(path)
     try:
         with path.open("rb") as file:
@@ -505,8 +505,17 @@ def content_of(path: str | pathlib.Path) -> dict[str, Any]:
     told = content.get("diagnosis", {})
     if not isinstance(told, dict) or not isinstance(told.get("effect", []), list):
         raise UserError(f"{path}: [diagnosis] is a table, its effects are written [[diagnosis.effect]]")
-    if not isinstance(told.get("parameters", {}), dict) or not all(
-        isinstance(each, int | float) for each in told.get("parameters", {}).values()
-    ):
+    parameters = told.get("parameters", {})
+    if not isinstance(parameters, dict) or not all(map(is_number, parameters.values())):
         raise UserError(f"{path}: [diagnosis.parameters] holds numbers")
+    if not isinstance(told.get("experiment", ""), str):
+        raise UserError(f"{path}: diagnosis.experiment is {told['experiment']!r}, a name is expected")
+    gear = told.get("gear", 1.0)
+    if not is_number(gear) or gear <= 0.0:
+        raise UserError(f"{path}: diagnosis.gear is {gear!r}, a number above 0 is expected")
     return content
+
+
+def is_number(value: Any) -> bool:
+    """True for a finite number of a TOML file."""
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)

@@ -141,9 +141,7 @@ def _effect(path: str, number: int, table: Any) -> KnownEffect:
     if not all(isinstance(text, str) for text in texts):
         raise UserError(f"{place}: cause and at are texts")
     for each in numbers:
-        if not isinstance(each, dict) or not all(
-            isinstance(value, int | float) and not isinstance(value, bool) for value in each.values()
-        ):
+        if not isinstance(each, dict) or not all(map(terms.is_number, each.values())):
             raise UserError(f"{place}: coefficients and shape are tables of numbers")
     made = [{name: float(value) for name, value in each.items()} for each in numbers]
     return KnownEffect(str(texts[0]), str(texts[1]), made[0], made[1])

@@ -1,10 +1,13 @@
 """Whether the numbers that a fit gives can be those of the machine at all, before any cause is named.
 
 A channel in another unit, another channel under its name, or one that does not belong to the others, gives a fit as
-any: its parameters tell. A doubt forbids a name, a warning is only told.
+any: its parameters tell, and equations that share one contradict each other. A doubt forbids a name, a warning is only
+told.
 """
 
 import dataclasses
+import itertools
+import math
 
 import numpy as np
 
@@ -19,7 +22,9 @@ CLEAR = 0.2  # relative error up to which a factor is told
 EXPLAINED = 0.2  # of what an equation balances: below it the channels do not belong together
 FEWEST = 100  # rows
 FEW, FEWEST_AT_ALL = 0.02, 50  # of the rows; what is thinned to rows that are independent may be a small part
-FORBID = ("impossible", "unexplained")  # kinds of findings after which no cause is named
+APART = 0.25  # of the mean square: equations leave less than so much of it when a parameter may differ between them
+TELLS = 0.05  # of a column's length: what the others leave of it, when the equation alone tells its parameter
+FORBID = ("impossible", "unexplained", "contradiction")  # kinds of findings after which no cause is named
 
 
 @dataclasses.dataclass(frozen=True)
@@ -57,6 +62,7 @@ def look(machine: Machine, regression: Regression) -> Doubts:
                 f"the equation explains {max(0.0, share):.0%} of what was measured: the channels do not belong together"
             )
             findings.append(_finding(name, "unexplained", share, "", text))
+    findings += _contradictions(machine, regression)
     return Doubts(findings, any(each.kind in FORBID for each in findings))
 
 
@@ -81,13 +87,68 @@ def explained(regression: Regression, name: str) -> float | None:
         if name in recording.equations:
             own |= dict.fromkeys(recording.equations[name].columns)
     part = regression.parts[name]
-    rows = part.valid
+    rows = part.valid & ~part.starts
     if np.count_nonzero(rows) < FEWEST or len(own) < 2:
         return None
     added = part.measured[rows] * np.array([regression.values[each] for each in regression.names])
     left = float(np.mean((part.response[rows] - added.sum(axis=1)) ** 2))
     balanced = float(np.mean(part.response[rows] ** 2)) + float(np.sum(np.mean(added**2, axis=0)))
     return 1.0 - left / max(balanced, 1e-300)
+
+
+@dataclasses.dataclass(frozen=True)
+class _Alone:
+    """A parameter by one equation alone. better: what the equation then leaves, of what it leaves with the others."""
+
+    equation: str
+    value: float
+    better: float
+
+
+def _contradictions(machine: Machine, regression: Regression) -> list[Finding]:
+    """Parameters that two equations have, with opposite signs or far apart: a channel has another sign or unit."""
+    findings = []
+    for known in machine.parameters:
+        if known.low < 0.0 or known.name not in regression.values:
+            continue
+        found = [one for name in regression.equations if (one := _alone(regression, name, known.name)) is not None]
+        for first, second in itertools.combinations(found, 2):
+            apart = min(abs(first.value), abs(second.value)) * FACTOR < max(abs(first.value), abs(second.value))
+            if (apart or first.value * second.value < 0.0) and min(first.better, second.better) < APART:
+                text = (
+                    f"it is {first.value:.4g} {known.unit} by the {first.equation} equation and {second.value:.4g} by "
+                    f"the {second.equation} one: a channel of one of the two has another sign or unit"
+                )
+                findings.append(_finding(known.name, "contradiction", second.value, known.unit, text))
+    return findings
+
+
+def _alone(regression: Regression, equation: str, name: str) -> _Alone | None:
+    """None where the equation alone does not surely tell the parameter: without it, or beside columns much like it."""
+    part = regression.parts[equation]
+    rows = part.valid & ~part.starts
+    measured, response = part.measured[rows], part.response[rows]
+    lengths = np.linalg.norm(measured, axis=0)
+    number = regression.names.index(name)
+    kept = np.flatnonzero(lengths > 0.0)
+    if number not in kept or len(kept) < 2 or len(response) < FEWEST:
+        return None
+    own = measured[:, number] / lengths[number]
+    others = measured[:, kept[kept != number]] / lengths[kept[kept != number]]
+    fitted = np.linalg.lstsq(others, np.column_stack([own, response]), rcond=1e-9)[0]
+    rest, left = (np.column_stack([own, response]) - others @ fitted).T
+    if np.linalg.norm(rest) < TELLS:
+        return None
+    value = float(rest @ left) / float(rest @ rest)
+    left = left - value * rest
+    square = float(np.mean(left**2))
+    rho = min(max(float(np.mean(left[1:] * left[:-1])) / max(square, 1e-300), 0.0), 0.99)
+    error = math.sqrt(square * (1.0 + rho) / (1.0 - rho) / float(rest @ rest))
+    if abs(value) < SURE * error:
+        return None
+    together = response - measured @ np.array([regression.values[each] for each in regression.names])
+    better = square / max(float(np.mean(together**2)), 1e-300)
+    return _Alone(equation, value / float(lengths[number]), better)
 
 
 def _factor(known: Known, value: float, factor: float) -> Finding:

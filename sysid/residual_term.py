@@ -15,7 +15,7 @@ from ranger_sim.sysid import misfit
 from ranger_sim.sysid.dataset import Array
 from ranger_sim.sysid.machine import Machine, Recording
 from ranger_sim.sysid.misfit import Misfit
-from ranger_sim.sysid.regression import Regression, kept_rows, reduced
+from ranger_sim.sysid.regression import Part, Regression, kept_rows, reduced
 
 SMALL = 1e-6  # of the largest: directions of the table that the base has
 
@@ -57,8 +57,9 @@ class ResidualTerm:
     def left(self, machine: Machine, recordings: Sequence[Recording], regression: Regression) -> tuple[float, float]:
         """(rms without, with the term) of what the equation leaves, the machine's parameters fitted anew both times."""
         part = regression.parts[self.equation]
-        column = np.concatenate([reduced(r, self.column(machine, r)) for r in recordings])[part.valid, 0]
-        base, response = part.measured[part.valid], part.response[part.valid]
+        rows = _counting(part)
+        column = np.concatenate([reduced(r, self.column(machine, r)) for r in recordings])[rows, 0]
+        base, response = part.measured[rows], part.response[rows]
         without, rest = (
             each - base @ np.linalg.lstsq(base, each, rcond=None)[0] for each in (response, response - column)
         )
@@ -93,14 +94,15 @@ def learn(
     table = ResidualTerm(test.equation, unit, over, edges, low, high, empty, empty)
     numbers = [kept_rows(recording, _cells(each, table)[0]) for recording, each in zip(recordings, looked, strict=True)]
     part = regression.parts[test.equation]
-    cells = np.eye(empty.size)[np.concatenate(numbers)[part.valid]]
-    base = part.measured[part.valid]
+    rows = _counting(part)
+    cells = np.eye(empty.size)[np.concatenate(numbers)[rows]]
+    base = part.measured[rows]
     lengths = np.linalg.norm(base, axis=0)
     columns = np.hstack([base[:, lengths > 0.0] / lengths[lengths > 0.0], cells])
     values, vectors = np.linalg.eigh(columns.T @ columns)
     strong = values > SMALL * max(float(values[-1]), 1e-300)
     inverse = (vectors[:, strong] / values[strong]) @ vectors[:, strong].T
-    response = part.response[part.valid]
+    response = part.response[rows]
     fitted = inverse @ (columns.T @ response)
     left = response - columns @ fitted
     rho = min(max(float(np.mean(left[1:] * left[:-1]) / max(float(np.mean(left**2)), 1e-300)), 0.0), 0.99)
@@ -108,6 +110,11 @@ def learn(
     value = fitted[-empty.size :].reshape(empty.shape)
     error = np.sqrt(spread * np.maximum(np.diag(inverse)[-empty.size :], 0.0)).reshape(empty.shape)
     return dataclasses.replace(table, value=value, error=error)
+
+
+def _counting(part: Part) -> np.ndarray:
+    """(n,) rows that count, as in the tests: none at a run's start, where a machine may be switched on."""
+    return part.valid & ~part.starts
 
 
 def _over(features: str) -> tuple[str, ...]:

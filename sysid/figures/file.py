@@ -10,13 +10,13 @@
 All that is wrong with a file is a UserError of one line: file, place, value, what is allowed.
 """
 
-import math
 import pathlib
 import tomllib
 from collections.abc import Callable, Mapping
 from typing import Any
 
 from ranger_sim.foundation.user_error import UserError
+from ranger_sim.plant.terms import is_number
 from ranger_sim.sysid.causes import CAUSES
 from ranger_sim.sysid.figures.question import Candidate, Figure, Measurement, Question
 
@@ -97,14 +97,10 @@ def _check(path: pathlib.Path, table: str, number: int, entry: Any) -> None:
             if not isinstance(value, bool):
                 raise UserError(f"{place}: {key} = {value!r}: true or false is expected")
         elif key == "moves":
-            if not isinstance(value, dict) or not value or not all(map(_is_number, value.values())):
+            if not isinstance(value, dict) or not value or not all(map(is_number, value.values())):
                 raise UserError(f"{place}: moves = {value!r}: a table of names and factors is expected")
-        elif not _is_number(value):
+        elif not is_number(value):
             raise UserError(f"{place}: {key} = {value!r}: a finite number is expected")
     causes = {each.identifier for each in CAUSES.values()}
     if table == "candidate" and entry["cause"] not in causes:
         raise UserError(f"{place}: cause {entry['cause']!r}: not in the catalogue (`ranger-sim causes` lists it)")
-
-
-def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)

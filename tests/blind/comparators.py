@@ -212,9 +212,9 @@ def _learner(files, holdout, experiment, learned):
 
 
 def without_balance(diagnose, balance):
-    """A diagnosis that knows nothing of one balance: where that is all there is to see, it sees nothing.
+    """A diagnosis deaf to one balance, by its answers: where that is all there is to see, it sees nothing.
 
-    A door for the day when the diagnosis itself can leave a balance out; until then for answers that say theirs.
+    For answers that are made up and say their balance; `deaf.py` takes a balance out of the machine itself.
     """
 
     def deaf(files, holdout, experiment):
