@@ -4,8 +4,10 @@ import dataclasses
 from collections.abc import Mapping, Sequence
 
 import numpy as np
+from scipy import stats
 
 from ranger_sim.foundation.random_arrays import generator
+from ranger_sim.sysid.dataset import Array
 from ranger_sim.sysid.misfit import General
 from ranger_sim.sysid.naming import Named
 from ranger_sim.sysid.naming import coefficients as coefficients_of
@@ -13,6 +15,7 @@ from ranger_sim.sysid.regression import Regression, orthonormal
 
 BLOCK = 50  # rows of one block of the bootstrap: longer than any memory of the residual
 DRAWS = 400
+MORE = 0.01  # chance at which general features count as seeing more than the effects
 
 
 @dataclasses.dataclass(frozen=True)
@@ -40,8 +43,7 @@ def measure(
 
     The machine's own parameters are fitted anew, with and without the effects: temperature and wear of another day are
     no fault of the extension. Its coefficients stay those of training; only the phase of a periodic effect is free,
-    for an incremental encoder starts anywhere. What can be achieved is what the effects and all general features
-    together take out of the residual, beyond what so many columns take out of noise.
+    for an incremental encoder starts anywhere.
     """
     before = plain.residual
     after = before.copy()
@@ -64,22 +66,7 @@ def measure(
             coefficients[free] = coefficients_of(beside[:, free], after - beside @ fixed)
         after = after - beside @ coefficients
         expected = float(np.sum((beside @ coefficients) ** 2))
-    seen = [plain.whitened(made) for _, _, made in general]
-    fitted, freedom = np.zeros_like(before), 0
-    for equation in plain.equations:
-        rows = plain.rows[equation]
-        parts = [column[rows] for column in columns]
-        white = [each for each in seen if equation in each]
-        if white:
-            shadow = np.hstack([plain.shadow(each) for each in white])
-            parts.append(np.hstack([each[equation] for each in white]) - plain.z[rows] @ shadow)
-        if parts:
-            basis = orthonormal(np.hstack(parts))
-            fitted[rows] = basis @ (basis.T @ before[rows])
-            freedom += basis.shape[1]
-    # per row: what could be taken out, less what noise alone gives to so many columns
-    rest = (before - fitted) ** 2
-    possible = before**2 - rest * (1.0 + freedom / max(1, len(before) - freedom))
+    possible = _possible(plain, columns, general)
     blocks = max(1, len(before) // BLOCK)
     edges = np.arange(0, blocks * BLOCK, BLOCK)
     won, most = (np.add.reduceat(each[: blocks * BLOCK], edges) for each in (before**2 - after**2, possible))
@@ -97,3 +84,35 @@ def measure(
         float(np.sum(before**2 - after**2)),
         expected,
     )
+
+
+def _possible(plain: Regression, columns: Sequence[Array], general: General) -> Array:
+    """Per row: what could be taken out of the residual, less what noise alone gives to so many columns.
+
+    The effects' columns with coefficients of these data; in an equation where the general features see more than that
+    (F test), they take part. Hundreds of features that see nothing would only add their own scatter.
+    """
+    before = plain.residual
+    seen = [plain.whitened(made) for _, _, made in general]
+    out = np.zeros_like(before)
+    for equation in plain.equations:
+        rows = plain.rows[equation]
+        residual = before[rows]
+        basis = (
+            orthonormal(np.hstack([column[rows] for column in columns])) if columns else np.zeros((len(residual), 0))
+        )
+        rest = residual - basis @ (basis.T @ residual)
+        white = [each for each in seen if equation in each]
+        if white:
+            shadow = np.hstack([plain.shadow(each) for each in white])
+            more = np.hstack([each[equation] for each in white]) - plain.z[rows] @ shadow
+            further = orthonormal(more - basis @ (basis.T @ more))
+            left = rest - further @ (further.T @ rest)
+            freedom, free_rows = further.shape[1], len(residual) - basis.shape[1] - further.shape[1]
+            if freedom and free_rows > 0:
+                ratio = (float(rest @ rest - left @ left) / freedom) / max(float(left @ left) / free_rows, 1e-300)
+                if stats.f.sf(ratio, freedom, free_rows) < MORE:
+                    basis, rest = np.hstack([basis, further]), left
+        count = basis.shape[1]
+        out[rows] = residual**2 - rest**2 * (1.0 + count / max(1, len(residual) - count))
+    return out

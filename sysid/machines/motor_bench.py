@@ -8,6 +8,7 @@ K stands in both: what changes one side of it only is a sensor's scale. Near sta
 its limit (eq. 35), and near zero current so may the brushes' drop: rows whose sign is within the noise do not count.
 """
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import ClassVar
 
@@ -24,6 +25,8 @@ FINE = 2.0  # samples; Gaussian of the speed by the angle: its counts are small,
 REACH = 4  # samples about a jump or a standstill that do not count: two deviations of the finer Gaussian
 JUMP_IN_STEPS = 0.06  # of the whole range, within one sample
 SIGN_IN_NOISE = 4.0  # deviations of noise within which a sign means nothing
+FLOWS = 0.15  # of the largest current: above it current flows, in any recording that excites a motor
+OWN_LEAST = 0.1  # of the difference's variance: less own noise than this three spreads cannot tell
 HEAT_TIMES_S = (3.0, 10.0, 30.0, 100.0, 300.0)
 SPEED_SHARES = (0.01, 0.02, 0.04, 0.08, 0.16, 0.3, 0.5)
 CURRENT_SHARES = (0.1, 0.3, 1.0)
@@ -106,11 +109,12 @@ class MotorBench:
         s["dT"] = signals.derivative(table, T, SLOW)
         s["dV"] = np.gradient(V, table.step_s)
         steady = _no_jump(V, JUMP_IN_STEPS, REACH)
-        noise_I, noise_w = _spread(I - s["I"], steady), _spread(w - s["w"], steady)
         s["sgn_I"], s["sgn_w"] = _mean_sign(s["I"]), _mean_sign(s["w"])
         # what the electric balance is sorted by must not have the voltage's or the current's own noise
         s["I_by_torque"] = signals.smooth(table, _current_by_torque(T, I, s), SLOW)
         s["V_by_torque"] = rough[0] * s["I_by_torque"] + rough[1] * s["sgn_I"] + rough[2] * s["w"]
+        noise_I = _own_noise(s["I"], I, s["I_by_torque"], steady)
+        noise_w = _own_noise(s["w"], w, s["w_by_voltage"], steady) if measured else _spread(w - s["w"], steady)
         if "temperature_C" in table:
             s["warmth"] = signals.smooth(table, table["temperature_C"], 50.0) - 25.0
         firm_I = steady & _away(s["I"], SIGN_IN_NOISE * noise_I, REACH) & _one_sign(s["I"])
@@ -259,8 +263,12 @@ def _current_by_torque(T: Array, I: Array, s: Mapping[str, Array]) -> Array:  # 
 
 
 def _rough_electrics(V: Array, I: Array, w: Array) -> tuple[float, float, float]:  # noqa: E741
-    """(R, V_c, K G) by plain least squares; good enough for a stand-in."""
-    found = np.linalg.lstsq(np.column_stack([I, np.sign(I), w]), V, rcond=None)[0]
+    """(R, V_c, K G) by plain least squares; good enough for a stand-in.
+
+    Only where current surely flows: below the brushes' drop the sign of its noise would make the drop small.
+    """
+    flows = np.abs(I) > FLOWS * float(np.quantile(np.abs(I), 0.98))
+    found = np.linalg.lstsq(np.column_stack([I, np.sign(I), w])[flows], V[flows], rcond=None)[0]
     resistance, drop, constant = (float(each) for each in found)
     return max(resistance, 1e-6), max(drop, 0.0), constant
 
@@ -275,6 +283,15 @@ def _spread(difference: Array, where: np.ndarray) -> float:
     """Standard deviation of most of it: outliers have no say."""
     part = difference[where] if np.any(where) else difference
     return float(np.median(np.abs(part - np.median(part)))) / 0.6745
+
+
+def _own_noise(value: Array, second: Array, third: Array, where: np.ndarray) -> float:
+    """Standard deviation of a value's own noise, from two others of the same quantity whose noises are independent.
+
+    The three-cornered hat of clocks: half of what the value's differences to both have more than theirs to each other.
+    """
+    apart = [_spread(one - other, where) ** 2 for one, other in ((value, second), (value, third), (second, third))]
+    return math.sqrt(max(0.5 * (apart[0] + apart[1] - apart[2]), OWN_LEAST * apart[0]))
 
 
 def _no_jump(values: Array, limit: float, reach: int) -> np.ndarray:
