@@ -21,6 +21,7 @@ from ranger_sim.sysid.machine import Columns, Effect, Equation, Known, Quantity,
 
 CALM = 20.0  # samples; Gaussian of two speeds that are held against each other
 SLOW = 5.0  # samples; Gaussian of what must not have the noise of a derivative
+TORQUE = 7.0  # samples; its derivative at 5 has noise that makes a lag small by a fifth, at 10 loses what is fast
 FINE = 2.0  # samples; Gaussian of the speed by the angle: its counts are small, and a reversal stays where it was
 REACH = 4  # samples about a jump or a standstill that do not count: two deviations of the finer Gaussian
 JUMP_IN_STEPS = 0.06  # of the whole range, within one sample
@@ -106,7 +107,7 @@ class MotorBench:
         if not measured:
             s["dw"] = np.gradient(s["w_by_voltage"], table.step_s)
         s["dI"] = np.gradient(s["I"], table.step_s)
-        s["dT"] = signals.derivative(table, T, SLOW)
+        s["dT"] = signals.derivative(table, T, TORQUE)
         s["dV"] = np.gradient(V, table.step_s)
         steady = _no_jump(V, JUMP_IN_STEPS, REACH)
         s["sgn_I"], s["sgn_w"] = _mean_sign(s["I"]), _mean_sign(s["w"])
@@ -520,7 +521,15 @@ def _sensors(gear: float, top_w: float, top_V: float) -> list[Effect]:
     fast = [{"speed_rad_s": share * top_w} for share in (0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)]
     turns = [{"periods_per_turn": n} for n in (1.0, 2.0)]
     return [
-        Effect("sensor_scale", "current_A", S, ("change",), [{}], _one("mechanical", lambda s, p, _: s["I"])),
+        # I measured = (1 + change) I: the torque constant counts as so much smaller, in this equation alone
+        Effect(
+            "sensor_scale",
+            "current_A",
+            S,
+            ("change",),
+            [{}],
+            _one("mechanical", lambda s, _, v: -v["torque_constant_Nm_per_A"] * s["I"]),
+        ),
         Effect("sensor_offset", "voltage_V", S, ("offset_V",), [{}], _one("electric", _ones)),
         Effect("sensor_offset", "current_A", S, ("offset_A",), [{}], current_offset(np.ones_like)),
         Effect("sensor_offset", "torque_Nm", S, ("offset_Nm",), [{}], _one("mechanical", _ones)),
@@ -658,15 +667,21 @@ def _periodic(gear: float) -> list[Effect]:
     ]  # fmt: skip
 
 
+def _torque(r: Recording, v: Values, share_of_inertia: float = 1.0) -> Array:
+    """Torque behind the gearbox by the model, with so much of the rotor's inertia before it; the load cell's noise is
+    not in it."""
+    s = r.signals
+    pulls = (v["torque_constant_Nm_per_A"] - v["load_friction_Nm_per_A"] * s["sgn_w"] * np.sign(s["I"])) * s["I"]
+    rest = v["constant_friction_Nm"] * s["sgn_w"] + v["viscous_friction_Nms"] * s["w"]
+    return np.asarray(pulls - rest - share_of_inertia * v["inertia_kg_m2"] * s["dw"])
+
+
 def _transmission() -> list[Effect]:
     T = "transmission"
 
     def play(r: Recording, shape: Shape, v: Values) -> Columns:
         """The output lies against the flank that carries the load, and crosses the gap in some milliseconds."""
-        s = r.signals
-        pulls = (v["torque_constant_Nm_per_A"] - v["load_friction_Nm_per_A"] * s["sgn_w"] * np.sign(s["I"])) * s["I"]
-        rest = v["constant_friction_Nm"] * s["sgn_w"] + v["viscous_friction_Nms"] * s["w"]
-        load = pulls - rest - shape["share_of_inertia"] * v["inertia_kg_m2"] * s["dw"]
+        load = _torque(r, v, shape["share_of_inertia"])
         flank = signals.lagged(r.table, np.tanh(load / shape["torque_Nm"]), shape["crossing_s"])
         rate = np.gradient(flank, r.table.step_s)
         jerk = np.gradient(rate, r.table.step_s)
