@@ -49,7 +49,8 @@ class Equation:
 
     The columns are what was measured, noise and all. stand_ins: for a parameter, a column (n,) that moves as its own
     does and has no noise in common with any measurement of this equation; fits and tests go against these
-    (instrumental variables), for a noisy column would leave its shadow in the residual.
+    (instrumental variables), for a noisy column would leave its shadow in the residual. lines: whether a line in the
+    residual's spectrum says anything; a counter's steps beat with the samples.
     """
 
     name: str
@@ -60,6 +61,7 @@ class Equation:
     columns: dict[str, Array]
     valid: np.ndarray
     stand_ins: dict[str, Array] = dataclasses.field(default_factory=dict)
+    lines: bool = True
 
 
 @dataclasses.dataclass(frozen=True)

@@ -142,7 +142,8 @@ def look(regression: Regression, general: General) -> Misfit:
             places.setdefault(tuple(white), []).append((place, group, white))
     tests: list[Test] = []
     if all(recording.whitened for recording in regression.recordings):
-        tests += [_line(equation, regression) for equation in regression.equations]
+        sounds = {name for r in regression.recordings for name, equation in r.equations.items() if equation.lines}
+        tests += [_line(equation, regression) for equation in regression.equations if equation in sounds]
     excess = 0.0
     for groups in places.values():
         gram, product = _beside([white for *_, white in groups], regression)

@@ -6,6 +6,7 @@ told as a tie.
 """
 
 import dataclasses
+import itertools
 import math
 from collections.abc import Mapping, Sequence
 
@@ -19,6 +20,7 @@ from ranger_sim.sysid.regression import Regression, explained
 LEVEL = 0.01  # of the whole selection, shared among all that is tried
 PAYS = 10.0  # difference of the information criterion that an effect must earn
 TIE = 6.0  # within this of the best is a tie
+EITHER_SIGN = 2.0  # standard errors of 0 within which a coefficient may be of either sign
 MOST = 4  # effects that are taken
 
 
@@ -146,9 +148,17 @@ def coefficients(columns: Array, residual: Array) -> Array:
 
 
 def _possible(trial: Trial) -> bool:
+    """Whether a machine can have what was found. What its noise lets be of either sign may be of the possible one."""
     found = np.linalg.lstsq(trial.gram, trial.product, rcond=1e-12)[0]
-    numbers = dict(zip(trial.effect.coefficients, (float(each) for each in found), strict=True))
-    return trial.effect.admissible({**numbers, **trial.shape})
+    errors = np.sqrt(np.diag(np.linalg.pinv(trial.gram, rcond=1e-12)))
+    choices = [
+        (float(value),) if abs(value) > EITHER_SIGN * error else (float(value), 2.0 * error, -2.0 * error)
+        for value, error in zip(found, errors, strict=True)
+    ]
+    return any(
+        trial.effect.admissible({**dict(zip(trial.effect.coefficients, each, strict=True)), **trial.shape})
+        for each in itertools.product(*choices)
+    )
 
 
 def refit(

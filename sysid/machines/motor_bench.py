@@ -163,7 +163,7 @@ class MotorBench:
             turning = np.gradient(s["angle"], table.step_s) / self.gear
             everywhere = np.ones(len(table), dtype=bool)
             equations["transmission"] = Equation(
-                "transmission", "T", "transmission", "rad/s", turning - w, {}, everywhere
+                "transmission", "T", "transmission", "rad/s", turning - w, {}, everywhere, lines=False
             )
         regimes = _regimes(s, firm_w)
         lags = (0, 10, 30, 100) if measured else (0, 100, 250)

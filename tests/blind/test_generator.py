@@ -12,7 +12,7 @@ import pytest
 from tests.blind import generate
 from tests.blind.generator.case import Case
 from tests.blind.generator.effects import rate
-from tests.blind.generator.experiment import TIE
+from tests.blind.generator.experiment import NO_PAIR, TIE
 from tests.blind.generator.instruments import LSB
 from tests.blind.generator.leg_swing import LEG_SWING
 from tests.blind.generator.motor_bench import MOTOR_BENCH
@@ -260,3 +260,31 @@ def test_a_fast_effect_counts_less_where_the_speed_is_differentiated_and_a_slow_
         grows = base["J"] ** 2 * omega**2 * v["w"]
         # 2 %: a difference over a sample has less than the derivative at 100 Hz
         assert deviations[1][place] == pytest.approx(np.sqrt(flat + grows), rel=0.02)
+
+
+def test_two_effects_on_one_quantity_both_act():
+    """A torque constant that is warm and ripples: of a warm magnet's loss as much is left beside the ripple as alone."""
+    amplitudes = {"torque_constant_temperature": 0.005, "commutation_ripple": 0.01}
+    shown = {}
+    for names in (("torque_constant_temperature",), ("commutation_ripple", "torque_constant_temperature"), ()):
+        case = Case(0, "pair", effects=[(name, 1.0) for name in names])
+        MOTOR_BENCH.lasting(3.0).prepare(23, case)
+        case.amplitudes = [amplitudes[name] for name in names]
+        experiment = MOTOR_BENCH.lasting(3.0)
+        lanes = experiment.lanes_of([(case, case.runs[0])])
+        experiment.let_act(lanes, [case])
+        t = lanes.run()[0]
+        # back-EMF per speed, from the voltage balance; where it turns fast nothing else matters
+        fast = (np.abs(t.w) > 3.0) & (np.abs(t.I) > 0.3)
+        drop = t.V - t.base["R"] * t.I - t.base["Vc"] * np.sign(t.I) - t.base["L"] * rate(t.I)
+        shown[names] = float(np.mean(drop[fast] / t.w[fast]))
+    alone, both, none = (shown[names] for names in shown)
+    assert abs(alone - none) > 1e-3 * none
+    assert both - none == pytest.approx(alone - none, rel=0.05)
+
+
+def test_no_pair_is_one_effect_twice():
+    plan = MOTOR_BENCH.plan(7, 400, ("pair",), MOTOR_BENCH.CAUSES)
+    pairs = [{name for name, _ in case.effects} for case in plan]
+    assert len(pairs) == 400
+    assert not any(pair in NO_PAIR for pair in pairs)

@@ -75,7 +75,7 @@ class Lanes:
         torque = [law.torque for law in laws if hasattr(law, "torque")]
         s = self.state = State(n)
         s.GK0 = p["G"] * p["K"]
-        s.GK = s.GK0.copy()
+        s.magnet, s.GK = s.GK0.copy(), s.GK0.copy()  # by its warmth; that and by the rotor's place
         s.drop = p["Vc"].copy()
         s.friction0 = p["C0"].copy()
         s.R = p["R"].copy()
@@ -217,7 +217,8 @@ class HotMagnet(Law):
     """Magnets weaken when hot."""
 
     def slow(self, s):
-        s.GK[self.lane] = s.GK0[self.lane] * (1.0 - self.a * (s.housing_C[self.lane] - 25.0))
+        s.magnet[self.lane] = s.GK0[self.lane] * (1.0 - self.a * (s.housing_C[self.lane] - 25.0))
+        s.GK[self.lane] = s.magnet[self.lane]
 
 
 class Harmonics(Law):
@@ -234,7 +235,7 @@ class Commutation(Law):
 
     def before(self, s):
         x = s.middle[self.lane] * self.periods + self.phase1
-        s.GK[self.lane] = s.GK0[self.lane] * (1.0 + self.a * (np.sin(x) + self.second * np.sin(2.0 * x + self.phase2)))
+        s.GK[self.lane] = s.magnet[self.lane] * (1.0 + self.a * (np.sin(x) + self.second * np.sin(2.0 * x + self.phase2)))
 
 
 class Bristles(Law):

@@ -15,6 +15,8 @@ BATCH = 80  # cases simulated side by side: memory, not speed, sets it
 STRENGTHS = (0.5, 1.0, 2.0, 4.0)
 WITH_ONE = ("single", "confusable", "outside")  # kinds with one effect, whose likeness to causes is told
 TIE = 0.95  # of the cosine of two effects' parts outside the base model
+# One replaces the friction of the other; one shows what the other shows. Such two are not two effects.
+NO_PAIR = ({"presliding", "stribeck"}, {"load_friction", "sensor_scale"})
 SUBSYSTEM = {"E": "electrical", "M": "mechanical", "EM": "current_sensing", "T": "transmission", "t": "timing"}
 SUBSYSTEM |= {"S": "angle_sensing", "C": "firmware"}
 
@@ -89,7 +91,10 @@ class Experiment:
             if kind == "null":
                 case.variant = ("plain", "parameters", "noise")[turn % 3]
             elif kind == "pair":
-                case.effects = [(str(one), 2.0) for one in rng.choice(causes, 2, replace=False)]
+                two = rng.choice(causes, 2, replace=False)
+                while len(causes) > 2 and {*map(str, two)} in NO_PAIR:
+                    two = rng.choice(causes, 2, replace=False)
+                case.effects = [(str(one), 2.0) for one in two]
             else:
                 round_, place = divmod(turn, len(order[kind]))
                 # every strength for every cause after four rounds
