@@ -630,30 +630,35 @@ def _friction(top_w: float) -> list[Effect]:
     ]
 
 
-def waves(r: Recording, gear: float, periods_per_turn: float) -> tuple[Array, Array]:
-    """Cosine and sine of so many periods a turn of the rotor; nothing where samples do not follow them."""
-    follows = np.abs(periods_per_turn * gear * r.signals["w"]) * r.table.step_s < 2.0 * np.pi / SAMPLES_A_WAVE
+def waves(r: Recording, gear: float, periods_per_turn: float, through_speed: bool = True) -> tuple[Array, Array]:
+    """Cosine and sine of so many periods a turn of the rotor; nothing where samples do not follow them.
+
+    As large as samples show them: a sample is the mean over its interval, and what is seen through the speed's
+    difference over two samples is smaller once more (through_speed).
+    """
+    advance = np.abs(periods_per_turn * gear * r.signals["w"]) * r.table.step_s  # rad of the wave in a sample
+    follows = advance < 2.0 * np.pi / SAMPLES_A_WAVE
+    size = np.where(follows, np.sinc(0.5 * advance / np.pi), 0.0)
+    if through_speed:
+        size = size * np.sinc(advance / np.pi)
     angle = periods_per_turn * r.signals["angle"]
-    return np.where(follows, np.cos(angle), 0.0), np.where(follows, np.sin(angle), 0.0)
+    return size * np.cos(angle), size * np.sin(angle)
 
 
 def _periodic(gear: float) -> list[Effect]:
     M = "mechanical"
     each = [{"periods_per_turn": float(n)} for n in range(1, MOST_PERIODS + 1)]
 
-    def wave(r: Recording, shape: Shape) -> tuple[Array, Array]:
-        return waves(r, gear, shape["periods_per_turn"])
-
     def cogging(r: Recording, shape: Shape, _: Values) -> Columns:
-        return {"mechanical": column(*wave(r, shape))}
+        return {"mechanical": column(*waves(r, gear, shape["periods_per_turn"]))}
 
     def commutation(r: Recording, shape: Shape, v: Values) -> Columns:
         """K itself ripples: in the torque and in the voltage that the turning rotor makes."""
         k = v["torque_constant_Nm_per_A"]
-        both = wave(r, shape)
+        periods = shape["periods_per_turn"]
         return {
-            "electric": column(*(k * r.signals["w"] * each for each in both)),
-            "mechanical": column(*(k * r.signals["I"] * each for each in both)),
+            "electric": column(*(k * r.signals["w"] * each for each in waves(r, gear, periods, through_speed=False))),
+            "mechanical": column(*(k * r.signals["I"] * each for each in waves(r, gear, periods))),
         }
 
     def turn(r: Recording, shape: Shape, _: Values) -> Columns:
@@ -693,7 +698,7 @@ def _transmission() -> list[Effect]:
 
     plays = [
         {"share_of_inertia": share, "torque_Nm": load, "crossing_s": time_s}
-        for share in (0.0, 0.5, 1.0)
+        for share in (0.0, 0.25, 0.5, 0.75, 1.0)
         for load in (0.02, 0.05)
         for time_s in (0.002, 0.004, 0.008)
     ]

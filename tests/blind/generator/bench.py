@@ -235,7 +235,9 @@ class Commutation(Law):
 
     def before(self, s):
         x = s.middle[self.lane] * self.periods + self.phase1
-        s.GK[self.lane] = s.magnet[self.lane] * (1.0 + self.a * (np.sin(x) + self.second * np.sin(2.0 * x + self.phase2)))
+        s.GK[self.lane] = s.magnet[self.lane] * (
+            1.0 + self.a * (np.sin(x) + self.second * np.sin(2.0 * x + self.phase2))
+        )
 
 
 class Bristles(Law):
