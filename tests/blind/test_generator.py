@@ -263,7 +263,7 @@ def test_a_fast_effect_counts_less_where_the_speed_is_differentiated_and_a_slow_
 
 
 def test_two_effects_on_one_quantity_both_act():
-    """A torque constant that is warm and ripples: of a warm magnet's loss as much is left beside the ripple as alone."""
+    """Of a warm magnet's loss as much is left beside the ripple of the torque constant as alone."""
     amplitudes = {"torque_constant_temperature": 0.005, "commutation_ripple": 0.01}
     shown = {}
     for names in (("torque_constant_temperature",), ("commutation_ripple", "torque_constant_temperature"), ()):
