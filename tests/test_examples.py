@@ -1,5 +1,6 @@
 """Every Python example of the documents is run as it stands there."""
 
+import importlib
 import pathlib
 import re
 import subprocess
@@ -54,3 +55,21 @@ def test_the_examples_run_without_a_warning_and_print_what_they_promise(name):
     assert (done.returncode, done.stderr) == (0, "")
     for pattern in PRINTED[name]:
         assert re.search(pattern, done.stdout, re.MULTILINE), f"no {pattern!r} in:\n{done.stdout}"
+
+
+def test_recordings_to_try_a_diagnosis_on_are_written_with_the_fault_that_is_chosen(tmp_path, monkeypatch, capsys):
+    monkeypatch.syspath_prepend(str(ROOT / "examples"))
+    bench_recording = importlib.import_module("bench_recording")
+    (tmp_path / "mine.toml").write_text(
+        '[[term]]\nform = "spring"\nat = "hip_joint"\ncubic_Nm_per_rad3 = 1.0\n', encoding="utf-8"
+    )
+    tables = []
+    for arguments in ([], [str(tmp_path / "mine.toml")]):
+        assert bench_recording.main(arguments, tmp_path, 0.5) == 0
+        lines = (tmp_path / "run1.csv").read_text(encoding="utf-8").splitlines()
+        assert lines[0] == "t_s,voltage_V,current_A,speed_rad_per_s,torque_Nm,motor_angle_rad" and len(lines) == 251
+        tables.append(lines)
+    assert tables[0] != tables[1] and (tmp_path / "run2.csv").is_file()
+    assert capsys.readouterr().err == "spring at hip_joint has no part in this bench\n"
+    assert bench_recording.main([str(tmp_path / "none.toml")], tmp_path, 0.5) == 2
+    assert capsys.readouterr().err.count("\n") == 1
