@@ -24,7 +24,8 @@ FEWEST = 100  # rows
 FEW, FEWEST_AT_ALL = 0.02, 50  # of the rows; what is thinned to rows that are independent may be a small part
 APART = 0.25  # of the mean square: equations leave less than so much of it when a parameter may differ between them
 TELLS = 0.05  # of a column's length: what the others leave of it, when the equation alone tells its parameter
-FORBID = ("impossible", "unexplained", "contradiction")  # kinds of findings after which no cause is named
+SLOWEST = 6.0  # a memory of 0.986 from sample to sample; instruments have up to 0.95 (3.2), a voltage 10 ms late has 12
+FORBID = ("impossible", "unexplained", "contradiction", "slow")  # kinds of findings after which no cause is named
 
 
 @dataclasses.dataclass(frozen=True)
@@ -62,6 +63,13 @@ def look(machine: Machine, regression: Regression) -> Doubts:
                 f"the equation explains {max(0.0, share):.0%} of what was measured: the channels do not belong together"
             )
             findings.append(_finding(name, "unexplained", share, "", text))
+        new = slowness(regression, name)
+        if new is not None and new > SLOWEST:
+            text = (
+                f"what the equation leaves is {new:.0f} times what is new in it from sample to sample: no instrument's "
+                "noise is so slow; a channel is late, or is not what its name says"
+            )
+            findings.append(_finding(name, "slow", new, "", text))
     findings += _contradictions(machine, regression)
     return Doubts(findings, any(each.kind in FORBID for each in findings))
 
@@ -94,6 +102,20 @@ def explained(regression: Regression, name: str) -> float | None:
     left = float(np.mean((part.response[rows] - added.sum(axis=1)) ** 2))
     balanced = float(np.mean(part.response[rows] ** 2)) + float(np.sum(np.mean(added**2, axis=0)))
     return 1.0 - left / max(balanced, 1e-300)
+
+
+def slowness(regression: Regression, name: str) -> float | None:
+    """rms of what an equation leaves, over that of what its past does not tell of it: sqrt(1 / (1 - rho^2)) for noise
+    with a memory of rho. None where the residual is not whitened, or for few rows.
+    """
+    if not all(recording.whitened for recording in regression.recordings):
+        return None
+    part = regression.parts[name]
+    rows = part.valid & ~part.starts
+    if np.count_nonzero(rows) < FEWEST:
+        return None
+    values = np.array([regression.values[each] for each in regression.names])
+    return float(np.std(part.response[rows] - part.measured[rows] @ values)) / regression.whitening[name].deviation
 
 
 @dataclasses.dataclass(frozen=True)

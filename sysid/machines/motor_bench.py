@@ -27,7 +27,9 @@ REACH = 4  # samples about a jump or a standstill that do not count: two deviati
 JUMP_IN_STEPS = 0.06  # of the whole range, within one sample
 SIGN_IN_NOISE = 4.0  # deviations of noise within which a sign means nothing
 FLOWS = 0.15  # of the largest current: above it current flows, in any recording that excites a motor
-OWN_LEAST = 0.1  # of the difference's variance: less own noise than this three spreads cannot tell
+# Least own noise of a stand-in, of its difference to what was measured. Three spreads cannot tell less of a current;
+# and a friction that turns its sign within 0.05 rad/s is no cause.
+OWN_I, OWN_W = 0.3, 0.5
 HEAT_TIMES_S = (3.0, 10.0, 30.0, 100.0, 300.0)
 SPEED_SHARES = (0.01, 0.02, 0.04, 0.08, 0.16, 0.3, 0.5)
 CURRENT_SHARES = (0.1, 0.3, 1.0)
@@ -109,13 +111,15 @@ class MotorBench:
         s["dI"] = np.gradient(s["I"], table.step_s)
         s["dT"] = signals.derivative(table, T, TORQUE)
         s["dV"] = np.gradient(V, table.step_s)
-        steady = _no_jump(V, JUMP_IN_STEPS, REACH)
+        steady = _no_jump(V, JUMP_IN_STEPS, REACH) & _inner(table, int(3.0 * SLOW))
         s["sgn_I"], s["sgn_w"] = _mean_sign(s["I"]), _mean_sign(s["w"])
         # what the electric balance is sorted by must not have the voltage's or the current's own noise
         s["I_by_torque"] = signals.smooth(table, _current_by_torque(T, I, s), SLOW)
         s["V_by_torque"] = rough[0] * s["I_by_torque"] + rough[1] * s["sgn_I"] + rough[2] * s["w"]
-        noise_I = _own_noise(s["I"], I, s["I_by_torque"], steady)
-        noise_w = _own_noise(s["w"], w, s["w_by_voltage"], steady) if measured else _spread(w - s["w"], steady)
+        noise_I = _own_noise(s["I"], I, s["I_by_torque"], steady, OWN_I)
+        noise_w = _spread(w - s["w"], steady)
+        if measured:
+            noise_w = _own_noise(s["w"], w, s["w_by_voltage"], steady, OWN_W)
         if "temperature_C" in table:
             s["warmth"] = signals.smooth(table, table["temperature_C"], 50.0) - 25.0
         firm_I = steady & _away(s["I"], SIGN_IN_NOISE * noise_I, REACH) & _one_sign(s["I"])
@@ -161,7 +165,7 @@ class MotorBench:
         }
         if measured:
             turning = np.gradient(s["angle"], table.step_s) / self.gear
-            everywhere = np.ones(len(table), dtype=bool)
+            everywhere = _inner(table, REACH)
             equations["transmission"] = Equation(
                 "transmission", "T", "transmission", "rad/s", turning - w, {}, everywhere, lines=False
             )
@@ -286,13 +290,22 @@ def _spread(difference: Array, where: np.ndarray) -> float:
     return float(np.median(np.abs(part - np.median(part)))) / 0.6745
 
 
-def _own_noise(value: Array, second: Array, third: Array, where: np.ndarray) -> float:
+def _inner(table: Table, reach: int) -> np.ndarray:
+    """False for so many rows at either end of each piece: Gaussians and differences are one-sided there."""
+    inner = np.zeros(len(table), dtype=bool)
+    for run in table.runs:
+        inner[run.start + reach : run.stop - reach] = True
+    return inner
+
+
+def _own_noise(value: Array, second: Array, third: Array, where: np.ndarray, least: float) -> float:
     """Standard deviation of a value's own noise, from two others of the same quantity whose noises are independent.
 
-    The three-cornered hat of clocks: half of what the value's differences to both have more than theirs to each other.
+    The three-cornered hat of clocks: half of what the value's differences to both have more than theirs to each other;
+    at least so much of its difference to the second.
     """
     apart = [_spread(one - other, where) ** 2 for one, other in ((value, second), (value, third), (second, third))]
-    return math.sqrt(max(0.5 * (apart[0] + apart[1] - apart[2]), OWN_LEAST * apart[0]))
+    return math.sqrt(max(0.5 * (apart[0] + apart[1] - apart[2]), least**2 * apart[0]))
 
 
 def _no_jump(values: Array, limit: float, reach: int) -> np.ndarray:
@@ -633,12 +646,10 @@ def _friction(top_w: float) -> list[Effect]:
 def waves(r: Recording, gear: float, periods_per_turn: float, through_speed: bool = True) -> tuple[Array, Array]:
     """Cosine and sine of so many periods a turn of the rotor; nothing where samples do not follow them.
 
-    As large as samples show them: a sample is the mean over its interval, and what is seen through the speed's
-    difference over two samples is smaller once more (through_speed).
+    through_speed: as much smaller as the speed's difference over two samples shows them.
     """
     advance = np.abs(periods_per_turn * gear * r.signals["w"]) * r.table.step_s  # rad of the wave in a sample
-    follows = advance < 2.0 * np.pi / SAMPLES_A_WAVE
-    size = np.where(follows, np.sinc(0.5 * advance / np.pi), 0.0)
+    size = np.where(advance < 2.0 * np.pi / SAMPLES_A_WAVE, 1.0, 0.0)
     if through_speed:
         size = size * np.sinc(advance / np.pi)
     angle = periods_per_turn * r.signals["angle"]

@@ -85,7 +85,18 @@ def doubts(table):
 
 def test_a_voltage_with_its_sign_turned_round_is_no_machine(bench):
     found = doubts(with_factors(bench, voltage_V=-1.0))
-    assert {"few_rows", "impossible"} <= {each.kind for each in found.findings} and found.forbid
+    assert {"contradiction", "unexplained"} <= {each.kind for each in found.findings} and found.forbid
+
+
+@pytest.mark.parametrize(("late", "told"), [(0, False), (10, True)])
+def test_a_voltage_that_is_late_leaves_what_no_noise_leaves(bench, late, told):
+    """A filter that learns the noise learns such a residual as well: nothing would stand out of it."""
+    count = len(bench)
+    columns = {name: values[late:] for name, values in bench.columns.items()}
+    columns["voltage_V"] = bench["voltage_V"][: count - late]
+    found = diagnose(MotorBench(), [Table(bench.time_s[late:], columns, (slice(0, count - late),), "late")]).answer
+    kinds = [each["kind"] for each in found["data_findings"]]
+    assert ("slow" in kinds) is told and found["detected"] is told and found["causes"] == []
 
 
 def test_a_torque_with_its_sign_turned_round_contradicts_the_voltage(bench):
