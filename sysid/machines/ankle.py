@@ -36,7 +36,7 @@ from ranger_sim.sysid.machines.ankle_motion import (
     Drive,
     Motion,
 )
-from ranger_sim.sysid.machines.motor_bench import bristles
+from ranger_sim.sysid.machines.forms import bristles
 
 # of the robot's foot-inertia logs, which do not hold them (robot.md C6.2)
 STIFFNESS_A_per_rad, DAMPNESS_As_per_rad = 11.219, 1.634

@@ -29,7 +29,7 @@ from ranger_sim.sysid.free_simulation import (
     held,
 )
 from ranger_sim.sysid.machine import Effect, Known, Quantity, Recording, Values
-from ranger_sim.sysid.machines.motor_bench import (
+from ranger_sim.sysid.machines.forms import (
     CURRENT_SHARES,
     HEAT_TIMES_S,
     MOST_PERIODS,

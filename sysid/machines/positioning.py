@@ -18,7 +18,7 @@ from ranger_sim.foundation.user_error import UserError
 from ranger_sim.sysid import signals
 from ranger_sim.sysid.dataset import Array, Table
 from ranger_sim.sysid.machine import Columns, Effect, Equation, Known, Quantity, Recording, Values
-from ranger_sim.sysid.machines.motor_bench import Made, bristles
+from ranger_sim.sysid.machines.forms import Made, bristles
 
 FORCE_N_PER_V = 35.15065188  # the drive's gain, published with the data
 WIDTH_S = 0.006  # Gaussian over both sides: -3 dB at 22 Hz, well above the controller's motion and below its noise

@@ -1,8 +1,8 @@
 """The bounds of a blind run: kept by a method that meets the targets, broken by what must not pass.
 
 Here diagnoses are played: an oracle that is right as often as the targets ask, and comparators that need no data. The
-diagnosis itself is held to these bounds on fresh cases in every run when HELD is true, and when RANGER_SIM_BLIND is set
-(its value: a seed, or "fresh").
+diagnosis itself is held to these bounds on fresh cases in every run; RANGER_SIM_BLIND (a seed, or "fresh") has comparators
+beside it, on the cases of that seed.
 """
 
 import os
@@ -21,7 +21,6 @@ from tests.blind.generator.motor_bench import MOTOR_BENCH
 from tests.blind.score import read_folder, score, table
 
 DIAGNOSIS = "ranger_sim.tools.diagnose.work:answer"
-HELD = False  # until the diagnosis meets the targets (docs/diagnose.md has those that it misses)
 GIVEN = os.environ.get("RANGER_SIM_BLIND", "")
 # Of a recording: a strength is in units of what can be detected in it, so a short one is as fair as a long one.
 SECONDS = "5"
@@ -207,11 +206,6 @@ def answered(name, data, out, *arguments):
     return read_folder(out)
 
 
-wanted = pytest.mark.skipif(
-    not (HELD or GIVEN), reason=f"minutes: set RANGER_SIM_BLIND to a seed or to fresh (or HELD in {__name__})"
-)
-
-
 @pytest.fixture(scope="module")
 def fresh_cases(tmp_path_factory):
     """The sixty cases with a seed of this run, or the given one."""
@@ -219,7 +213,6 @@ def fresh_cases(tmp_path_factory):
     return generated(tmp_path_factory.mktemp("blind"), "--check", "--seconds", SECONDS, *seed)
 
 
-@wanted
 def test_the_diagnosis_keeps_the_bounds_on_fresh_cases(fresh_cases, tmp_path):
     data, hidden = fresh_cases
     found = answered(DIAGNOSIS, data, tmp_path)
@@ -229,7 +222,6 @@ def test_the_diagnosis_keeps_the_bounds_on_fresh_cases(fresh_cases, tmp_path):
     assert not refusals(figures), said
 
 
-@wanted
 @pytest.mark.skipif(not GIVEN, reason="beside the diagnosis: set RANGER_SIM_BLIND to a seed or to fresh")
 @pytest.mark.parametrize("name", COMPARATORS)
 def test_comparators_are_refused_on_the_cases(name, fresh_cases, tmp_path):
@@ -242,7 +234,6 @@ def test_comparators_are_refused_on_the_cases(name, fresh_cases, tmp_path):
     assert refusals(figures)
 
 
-@wanted
 @pytest.mark.parametrize("letter", "EMT")
 def test_the_diagnosis_with_a_balance_taken_out_of_the_machine_is_refused(letter, fresh_cases, tmp_path):
     """It sees none of the eight cases at strength 4 that show in that balance alone, but for a false alarm: four of

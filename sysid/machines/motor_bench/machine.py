@@ -1,0 +1,254 @@
+"""A geared brushed motor on the bench: voltage, current, speed and torque at the output of its gearbox.
+
+    electric     V = R I + V_c sgn I + K G w + L dI/dt                                        appendix eq. 32
+    mechanical   T = K G I - C_0 sgn w - C_1 w - mu K G |I| sgn w - J dw/dt                   appendix eq. 33, 35
+    transmission dtheta_m/dt / G = w                            where the motor's angle is measured as well
+
+K stands in both: what changes one side of it only is a sensor's scale. Near standstill friction may be anything up to
+its limit (eq. 35), and near zero current so may the brushes' drop: rows whose sign is within the noise do not count.
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import ClassVar
+
+import numpy as np
+
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.sysid import signals
+from ranger_sim.sysid.dataset import Array, Table
+from ranger_sim.sysid.machine import Effect, Equation, Known, Quantity, Recording
+from ranger_sim.sysid.machines.forms import column
+from ranger_sim.sysid.machines.motor_bench.electrical import electrical
+from ranger_sim.sysid.machines.motor_bench.friction import friction
+from ranger_sim.sysid.machines.motor_bench.rotor import periodic, waves
+from ranger_sim.sysid.machines.motor_bench.sensors import sensors
+from ranger_sim.sysid.machines.motor_bench.stand_ins import (
+    away,
+    current_by_torque,
+    current_by_voltage,
+    inner,
+    mean_sign,
+    no_jump,
+    one_sign,
+    own_noise,
+    rough_electrics,
+    spread,
+)
+from ranger_sim.sysid.machines.motor_bench.transmission import transmission
+
+CALM = 20.0  # samples; Gaussian of two speeds that are held against each other
+SLOW = 5.0  # samples; Gaussian of what must not have the noise of a derivative
+TORQUE = 7.0  # samples; its derivative at 5 has noise that makes a lag small by a fifth, at 10 loses what is fast
+FINE = 2.0  # samples; Gaussian of the speed by the angle: its counts are small, and a reversal stays where it was
+REACH = 4  # samples about a jump or a standstill that do not count: two deviations of the finer Gaussian
+JUMP_IN_STEPS = 0.06  # of the whole range, within one sample
+SIGN_IN_NOISE = 4.0  # deviations of noise within which a sign means nothing
+# Least own noise of a stand-in, of its difference to what was measured. Three spreads cannot tell less of a current;
+# and a friction that turns its sign within 0.05 rad/s is no cause.
+OWN_I, OWN_W = 0.3, 0.5
+SAME_MOTION = 0.7  # correlation of angle and speed; slip and lost counts leave more
+SAME_SPEED = 2.0  # times: rpm, degrees and thousands are more
+MOST_WAVES = 24  # per turn of the rotor, of the general look
+
+
+class MotorBench:
+    """The bench of appendix figure 26. gear: turns of the rotor per turn of the output."""
+
+    name = "motor-bench"
+    quantities = (
+        Quantity("voltage_V", "V", "at the motor's terminals"),
+        Quantity("current_A", "A", "through the winding"),
+        Quantity("speed_rad_per_s", "rad/s", "of the gearbox's output"),
+        Quantity("torque_Nm", "N m", "at the gearbox's output, as the motor drives"),
+        Quantity("temperature_C", "C", "of the motor's housing", needed=False),
+        Quantity("motor_angle_rad", "rad", "of the rotor", needed=False),
+    )
+
+    motor = "hip_motor"  # of the simulator, whose winding and magnets are measured here
+    labels: ClassVar = {
+        "V": "voltage, V",
+        "I": "current, A",
+        "w": "speed of the output, rad/s",
+        "angle": "angle of the rotor, rad",
+        "t": "time, s",
+    }
+
+    def __init__(self, gear: float = 14.0) -> None:
+        self.gear = gear
+        k = 0.018 * gear
+        # values: appendix table 3 at the 14:1 gearbox; limits chosen by us, a hundred times either way
+        self.parameters = (
+            Known("resistance_ohm", "ohm", 1.3, 0.0, 130.0, "winding, brushes and leads"),
+            Known("contact_drop_V", "V", 0.7, 0.0, 70.0, "at the brushes, both together"),
+            Known("torque_constant_Nm_per_A", "N m/A", k, 0.0, 100.0 * k, "at the output, gear included"),
+            Known("inductance_H", "H", 1e-4, -0.01, 0.1, "of the winding; next to nothing at this sampling"),
+            Known("constant_friction_Nm", "N m", 0.01, 0.0, 1.0, "of motor and gearbox"),
+            Known("viscous_friction_Nms", "N m s/rad", 0.0, -0.01, 1.0, "of motor and gearbox"),
+            Known("load_friction_Nm_per_A", "N m/A", 0.1 * k, 0.0, 10.0 * k, "mu K G"),
+            Known("inertia_kg_m2", "kg m^2", 1.6e-6 * gear * gear, 0.0, 1.0, "of the rotor as the output feels it"),
+        )
+
+    def prepare(self, table: Table) -> Recording:
+        """Signals and the two or three equations of one recording."""
+        missing = [each.name for each in self.quantities if each.needed and each.name not in table]
+        if missing:
+            raise UserError(
+                f"{table.name}: {self.name} needs {', '.join(missing)}; there are {', '.join(table.columns)}"
+            )
+        table = signals.uniform(table)
+        V, I, w, T = (table[each.name] for each in self.quantities[:4])  # noqa: E741  (the paper's letters)
+        s: dict[str, Array] = {"V": V, "t": table.time_s - table.time_s[0]}
+        measured = "motor_angle_rad" in table
+        s["angle"] = table["motor_angle_rad"] if measured else self.gear * signals.integral(table, w)
+        if measured:
+            _same_motion(table, s["angle"] / self.gear, w)
+        # stand-ins: speed by the angle, current by voltage and speed; neither has the noise of what it stands for
+        s["w"] = signals.derivative(table, s["angle"], FINE) / self.gear if measured else signals.smooth(table, w, FINE)
+        s["dw"] = np.gradient(signals.smooth(table, s["w"], SLOW), table.step_s)
+        rough = rough_electrics(V, I, s["w"])
+        s["I"] = current_by_voltage(V, s["w"], *rough)
+        s["w_by_voltage"] = signals.smooth(table, V - rough[0] * I - rough[1] * np.sign(s["I"]), SLOW) / rough[2]
+        if not measured:
+            s["dw"] = np.gradient(s["w_by_voltage"], table.step_s)
+        s["dI"] = np.gradient(s["I"], table.step_s)
+        s["dT"] = signals.derivative(table, T, TORQUE)
+        s["dV"] = np.gradient(V, table.step_s)
+        steady = no_jump(V, JUMP_IN_STEPS, REACH) & inner(table, int(3.0 * SLOW))
+        s["sgn_I"], s["sgn_w"] = mean_sign(s["I"]), mean_sign(s["w"])
+        # what the electric balance is sorted by must not have the voltage's or the current's own noise
+        s["I_by_torque"] = signals.smooth(table, current_by_torque(T, I, s), SLOW)
+        s["V_by_torque"] = rough[0] * s["I_by_torque"] + rough[1] * s["sgn_I"] + rough[2] * s["w"]
+        noise_I = own_noise(s["I"], I, s["I_by_torque"], steady, OWN_I)
+        noise_w = spread(w - s["w"], steady)
+        if measured:
+            noise_w = own_noise(s["w"], w, s["w_by_voltage"], steady, OWN_W)
+        if "temperature_C" in table:
+            s["warmth"] = signals.smooth(table, table["temperature_C"], 50.0) - 25.0
+        firm_I = steady & away(s["I"], SIGN_IN_NOISE * noise_I, REACH) & one_sign(s["I"])
+        firm_w = steady & away(s["w"], SIGN_IN_NOISE * noise_w, 2) & one_sign(s["w"])
+        loaded = -s["sgn_w"] * np.sign(s["I"])
+        equations = {
+            "electric": Equation(
+                "electric",
+                "E",
+                "electrical",
+                "V",
+                V,
+                {
+                    "resistance_ohm": I,
+                    "contact_drop_V": s["sgn_I"],
+                    "torque_constant_Nm_per_A": w,
+                    "inductance_H": s["dI"],
+                },
+                firm_I,
+                {"resistance_ohm": s["I_by_torque"], "torque_constant_Nm_per_A": s["w"]},
+            ),
+            "mechanical": Equation(
+                "mechanical",
+                "M",
+                "mechanical",
+                "N m",
+                T,
+                {
+                    "torque_constant_Nm_per_A": I,
+                    "constant_friction_Nm": -s["sgn_w"],
+                    "viscous_friction_Nms": -w,
+                    "load_friction_Nm_per_A": loaded * I,
+                    "inertia_kg_m2": -np.gradient(w, table.step_s),
+                },
+                firm_w,
+                {
+                    "torque_constant_Nm_per_A": s["I"],
+                    "viscous_friction_Nms": -s["w"],
+                    "load_friction_Nm_per_A": loaded * s["I"],
+                    "inertia_kg_m2": -s["dw"],
+                },
+            ),
+        }
+        if measured:
+            turning = np.gradient(s["angle"], table.step_s) / self.gear
+            everywhere = inner(table, REACH)
+            equations["transmission"] = Equation(
+                "transmission", "T", "transmission", "rad/s", turning - w, {}, everywhere, lines=False
+            )
+        regimes = _regimes(s, firm_w)
+        lags = (0, 10, 30, 100) if measured else (0, 100, 250)
+        return Recording(table, s, equations, regimes, lags=lags)
+
+    def generic(self, recording: Recording) -> dict[str, dict[str, Array]]:
+        """Signals over which each equation is looked at without a cause in mind."""
+        s = recording.signals
+        of_voltage = {"I": s["I_by_torque"], "V": s["V_by_torque"], "w": s["w"], "t": s["t"]}
+        turn = np.remainder(s["angle"] / self.gear, 2.0 * np.pi)
+        of_torque = {**{name: s[name] for name in ("I", "w", "V", "t")}, "angle": turn}
+        if "transmission" not in recording.equations:
+            of_torque["w"] = s["w_by_voltage"]
+        measured_I = signals.smooth(recording.table, recording.table["current_A"], SLOW)
+        of_speed = {**of_torque, "w": s["w_by_voltage"], "I": measured_I}
+        made = {"electric": of_voltage, "mechanical": of_torque, "transmission": of_speed}
+        return {name: made[name] for name in recording.equations}
+
+    def features(self, recording: Recording) -> dict[str, dict[str, Array]]:
+        """More groups of columns (n, k) for that look: waves over the rotor's angle, also as large as V or I."""
+        s = recording.signals
+        groups = {}
+        sizes = {"": np.ones_like(s["V"]), " as large as the voltage": s["V"], " as large as the current": s["I"]}
+        for kind, size in sizes.items():
+            for low in range(1, MOST_WAVES + 1, 4):
+                each = [wave * size for n in range(low, low + 4) for wave in waves(recording, self.gear, n)]
+                groups[f"{low} to {low + 3} waves a turn of the rotor{kind}"] = column(*each)
+        return {"mechanical": groups}
+
+    def effects(self, recordings: Sequence[Recording]) -> list[Effect]:
+        """The catalogue's causes that such a bench can have."""
+        top_w = max(float(np.quantile(np.abs(r.signals["w"]), 0.98)) for r in recordings)
+        top_I = max(float(np.quantile(np.abs(r.signals["I"]), 0.98)) for r in recordings)
+        top_V = max(float(np.max(np.abs(r.signals["V"]))) for r in recordings)
+        made = electrical(top_I, top_V, all("warmth" in r.signals for r in recordings))
+        made += sensors(self.gear, top_w, top_V)
+        made += friction(top_w)
+        made += periodic(self.gear)
+        if all("transmission" in r.equations for r in recordings):
+            made += transmission()
+        return made
+
+
+def _same_motion(table: Table, angle: Array, w: Array) -> None:
+    """UserError when the rotor's angle over the gear and the speed are not the same motion, or not in one unit.
+
+    Twist, slip and lost counts are a part of it; what moves otherwise, or some times as fast, is no fault of a machine.
+    """
+    turning, speed = signals.derivative(table, angle, CALM), signals.smooth(table, w, CALM)
+    if len(table) < 10 * CALM or not np.std(turning) > 0.0 or not np.std(speed) > 0.0:
+        return
+    factor = float(np.std(turning) / np.std(speed))
+    alike = float(np.corrcoef(turning, speed)[0, 1])
+    if abs(alike) < SAME_MOTION:
+        raise UserError(
+            f"{table.name}: motor_angle_rad and speed_rad_per_s are not the same motion (correlation {alike:.2f}); "
+            "nothing is concluded from such data"
+        )
+    if alike < 0.0 or not 1.0 / SAME_SPEED < factor < SAME_SPEED:
+        told = f"{factor:.3g} times as fast" if alike > 0.0 else "the other way round"
+        raise UserError(
+            f"{table.name}: motor_angle_rad over the gear turns {told} as speed_rad_per_s: another gear (--gear), or "
+            "one of the two in another unit; nothing is concluded from such data"
+        )
+
+
+def _regimes(s: Mapping[str, Array], moving: np.ndarray) -> dict[str, np.ndarray]:
+    """Rows by what the machine does: standstill, low speed, cruise, accelerating; signs of rate and power."""
+    speed = np.abs(s["w"])
+    top = float(np.quantile(speed, 0.98))
+    changing = np.abs(s["dw"]) > float(np.quantile(np.abs(s["dw"]), 0.8))
+    power = s["I"] * s["w"]
+    return {
+        "standstill": ~moving,
+        "low speed": moving & (speed < 0.2 * top),
+        "cruise": moving & (speed >= 0.2 * top) & ~changing,
+        "accelerating": moving & changing,
+        "forward": moving & (s["w"] > 0),
+        "backward": moving & (s["w"] < 0),
+        "driving": moving & (power > 0),
+        "braking": moving & (power < 0),
+    }
