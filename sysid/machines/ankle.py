@@ -122,7 +122,8 @@ class Ankle:
             other.improve()
             if float(other.missed @ other.missed) < float(fit.missed @ fit.missed):
                 fit = other
-        recording = AnkleRecording(table, {}, {}, width=WIDTH, every=EVERY, simulated=fit.runs, values=dict(fit.values))
+        recording = AnkleRecording(table, {}, {}, width=WIDTH, every=EVERY, left_over=True, simulated=fit.runs)
+        recording.values = dict(fit.values)
         if fit.of_program:
             recording.findings.append(_program_found(table))
         s = recording.signals = _signals(table, fit.runs)

@@ -5,7 +5,9 @@ import pytest
 
 from ranger_sim.foundation.random_arrays import generator
 from ranger_sim.foundation.user_error import UserError
+from ranger_sim.plant.terms import Model
 from ranger_sim.sysid import plausibility
+from ranger_sim.sysid.benches.bench_terms import BenchTerms
 from ranger_sim.sysid.benches.motor_run import motor_run
 from ranger_sim.sysid.dataset import Table
 from ranger_sim.sysid.diagnose import diagnose
@@ -105,6 +107,30 @@ def test_a_torque_with_its_sign_turned_round_contradicts_the_voltage(bench):
     (told,) = [each for each in found["data_findings"] if each["kind"] == "contradiction"]
     assert told["channel"] == "torque_constant_Nm_per_A" and told["size"] == pytest.approx(-0.252, rel=0.1)
     assert found["detected"] and found["abstained"] and found["causes"] == []
+
+
+@pytest.mark.parametrize(
+    ("channel", "equation"), [("voltage_V", "electric"), ("current_A", "electric"), ("torque_Nm", "mechanical")]
+)
+@pytest.mark.parametrize("order", ["half a second late", "reversed"])
+def test_a_channel_of_another_time_does_not_belong_to_the_others(bench, channel, equation, order):
+    """Its equation leaves what moves as slowly as the machine: no noise, though whitening takes it for one."""
+    turned = bench[channel][::-1] if order == "reversed" else np.roll(bench[channel], 250)
+    found = doubts(Table(bench.time_s, {**bench.columns, channel: turned}, bench.runs, "changed", bench.resolution))
+    kinds_of = {each.kind for each in found.findings if each.channel == equation}
+    assert found.forbid and ("unexplained" in kinds_of or "impossible" in {each.kind for each in found.findings})
+
+
+def test_a_strong_fault_and_loud_sensors_are_no_other_time():
+    """Cogging of 20 mN m at the bench's output, and noise of a tenth of the torque."""
+    cogging = {"form": "cogging", "at": "hip_motor", "amplitude_Nm": 0.1, "periods_per_turn": 7.0}
+    recorded = motor_run(seed=2, terms=BenchTerms(Model([cogging]).terms), seconds=3.0)
+    table = recorded.table(list(recorded.channels))
+    assert not doubts(table).findings
+    noise = generator(4, "loud").normal(size=len(table)) * 0.1 * np.std(table["torque_Nm"])
+    assert not doubts(
+        Table(table.time_s, {**table.columns, "torque_Nm": table["torque_Nm"] + noise}, table.runs)
+    ).forbid
 
 
 @pytest.mark.parametrize(
