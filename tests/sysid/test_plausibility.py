@@ -109,16 +109,12 @@ def test_a_torque_with_its_sign_turned_round_contradicts_the_voltage(bench):
     assert found["detected"] and found["abstained"] and found["causes"] == []
 
 
-@pytest.mark.parametrize(
-    ("channel", "equation"), [("voltage_V", "electric"), ("current_A", "electric"), ("torque_Nm", "mechanical")]
-)
+@pytest.mark.parametrize("channel", ["voltage_V", "current_A", "torque_Nm"])
 @pytest.mark.parametrize("order", ["half a second late", "reversed"])
-def test_a_channel_of_another_time_does_not_belong_to_the_others(bench, channel, equation, order):
-    """Its equation leaves what moves as slowly as the machine: no noise, though whitening takes it for one."""
+def test_from_a_channel_of_another_time_no_cause_is_named(bench, channel, order):
+    """Its equation leaves what is large and as slow as the machine; whitening alone would take that for noise."""
     turned = bench[channel][::-1] if order == "reversed" else np.roll(bench[channel], 250)
-    found = doubts(Table(bench.time_s, {**bench.columns, channel: turned}, bench.runs, "changed", bench.resolution))
-    kinds_of = {each.kind for each in found.findings if each.channel == equation}
-    assert found.forbid and ("unexplained" in kinds_of or "impossible" in {each.kind for each in found.findings})
+    assert doubts(Table(bench.time_s, {**bench.columns, channel: turned}, bench.runs, "changed")).forbid
 
 
 def test_a_strong_fault_and_loud_sensors_are_no_other_time():
