@@ -89,7 +89,12 @@ class Recording:
     # wrong. Then fits are plain least squares, and only the count of samples is that of independent ones.
     whitened: bool = True
     memory: float = 0.99  # largest autocorrelation from row to row that is taken for noise's, and not for an effect's
-    margin: float = 1.0  # noise is taken larger by this: what is no noise and no effect either, such as late stamps
+    # by equation, (n,) whole numbers: rows of one number are repeats of each other, as the strides of a walk are. Noise is
+    # then what differs between repeats (pure error), however much the model misses; -1: a row without repeats.
+    repeats: dict[str, np.ndarray] = dataclasses.field(default_factory=dict)
+    floors: dict[str, float] = dataclasses.field(default_factory=dict)  # by equation: least deviation that noise has
+    # parameter -> (value, standard deviation) of sound machines: as good as a measurement of it
+    priors: dict[str, tuple[float, float]] = dataclasses.field(default_factory=dict)
     lags: tuple[int, ...] = (0, 10, 30, 100)  # samples back at which the general tests look at slopes
     findings: list[Finding] = dataclasses.field(default_factory=list)  # what the machine noticed about the data
     left_over: bool = False  # responses are what a simulation leaves over, not what was measured

@@ -9,7 +9,7 @@ import dataclasses
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from scipy import linalg, ndimage
+from scipy import linalg, ndimage, stats
 
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.sysid.dataset import Array
@@ -19,6 +19,9 @@ LEAST = 1e-9  # of the largest response: noise below it is rounding
 RANK = 1e-8  # a parameter whose column the others have to this part is not separable from them
 NOTHING = 1e-9  # of a column's square beside the base: rounding, with columns of up to 1e7 deviations
 ORDER = 8  # of the autoregression at most
+FEWEST_SHARED = 40  # rows of two equations for what they share: its correlation is then known to 0.16
+UPPER = 0.95  # noise found from repeats is taken at the upper limit of this one-sided interval: few repeats, less trust
+FEWEST_REPEATS = 20  # degrees of freedom of pure error; below it the whole residual tells the noise
 
 
 def reduced(recording: Recording, column: Array) -> Array:
@@ -93,6 +96,18 @@ class Part:
     stand_in: Array
     valid: np.ndarray
     starts: np.ndarray
+    repeats: np.ndarray
+
+    def pure_error(self, residual: Array) -> tuple[Array, int]:
+        """(residual less the mean of its repeats (n,), degrees of freedom); 0 of these: too few repeats."""
+        counted = self.valid & (self.repeats >= 0)
+        numbers, place, count = np.unique(self.repeats[counted], return_inverse=True, return_counts=True)
+        freedom = int(np.count_nonzero(counted)) - len(numbers)
+        if freedom < FEWEST_REPEATS:
+            return residual, 0
+        out = np.zeros_like(residual)
+        out[counted] = residual[counted] - (np.bincount(place, residual[counted]) / count)[place]
+        return out, freedom
 
 
 @dataclasses.dataclass
@@ -127,7 +142,7 @@ class Regression:
         self.whitening: dict[str, Whitening] = dict(noise.whitening) if noise else {}
         self.shared: dict[tuple[str, str], float] = dict(noise.shared) if noise else {}
         counted = sum(int(np.count_nonzero(self._good(name))) for name in self.equations)
-        if counted <= 10 * self.count:
+        if counted <= 10 * (self.count - len(self._priors())):
             names = ", ".join(recording.table.name for recording in self.recordings)
             raise UserError(f"{names}: {counted} samples count, too few for {self.count} parameters")
         if noise is None:
@@ -137,13 +152,17 @@ class Regression:
     def _part(self, equation: str, extra: Sequence[Columns], extra_names: list[str]) -> Part:
         """One equation over all recordings, unwhitened."""
         parts = []
+        first_free = 0  # repeats of one recording are none of another's
         for number, recording in enumerate(self.recordings):
             rows = len(_rows(recording))
+            repeats = kept_rows(recording, recording.repeats.get(equation, np.full(len(recording.table), -1)))
+            repeats = np.where(repeats >= 0, repeats + first_free, -1)
+            first_free = max(first_free, int(np.max(repeats, initial=-1)) + 1)
             measured = np.zeros((rows, self.count))
             made: Equation | None = recording.equations.get(equation)
             if made is None:
                 nothing = np.zeros(rows, dtype=bool)
-                parts.append((np.zeros(rows), measured, measured.copy(), nothing, _starts(recording)))
+                parts.append((np.zeros(rows), measured, measured.copy(), nothing, _starts(recording), repeats))
                 continue
             for name, column in made.columns.items():
                 measured[:, self.names.index(name)] = reduced(recording, column)
@@ -154,7 +173,7 @@ class Regression:
                 first = self.count - len(extra_names)
                 measured[:, first:] = stand_in[:, first:] = reduced(recording, extra[number][equation])
             response, valid = reduced(recording, made.response), made.valid[_rows(recording)] & _inside(recording)
-            parts.append((response, measured, stand_in, valid, _starts(recording)))
+            parts.append((response, measured, stand_in, valid, _starts(recording), repeats))
         return Part(*(np.concatenate(each) for each in zip(*parts, strict=True)))
 
     def _find_whitening(self) -> None:
@@ -163,29 +182,37 @@ class Regression:
         for _ in range(2):
             found = self._quick()
             for name, part in self.parts.items():
-                residual = residuals[name] = part.response - part.measured @ found
-                coefficients = autoregression(np.where(part.valid, residual, 0.0), part.valid)
-                memory = 1.0
-                if not all(recording.whitened for recording in self.recordings):
-                    # N_eff = N (1 - rho) / (1 + rho) with the first autocorrelation, of rows that count
-                    kept = residual[part.valid]
-                    total = float(np.mean(kept**2)) if len(kept) else 1.0
-                    rho = float(np.mean(kept[1:] * kept[:-1])) / total if len(kept) > 1 and total > 0.0 else 0.0
-                    rho = min(max(rho, 0.0), *(recording.memory for recording in self.recordings))
-                    memory = float(np.sqrt((1.0 + rho) / (1.0 - rho)))
-                    coefficients = np.zeros(0)
-                white = innovations(coefficients, residual)
-                good = self._good(name, coefficients)
-                deviation = float(np.sqrt(np.mean(white[good] ** 2))) if np.any(good) else 1.0
+                residual = part.response - part.measured @ found
+                residuals[name], freedom = part.pure_error(residual)
                 least = LEAST * float(np.max(np.abs(part.response), initial=0.0)) or 1.0
-                margin = max(recording.margin for recording in self.recordings)
-                self.whitening[name] = Whitening(coefficients, max(margin * memory * deviation, least))
+                if all(recording.whitened for recording in self.recordings):
+                    coefficients = autoregression(np.where(part.valid, residual, 0.0), part.valid)
+                    white = innovations(coefficients, residual)
+                    good = self._good(name, coefficients)
+                    deviation = float(np.sqrt(np.mean(white[good] ** 2))) if np.any(good) else 1.0
+                else:
+                    coefficients = np.zeros(0)
+                    deviation = self._loudness(residuals[name][part.valid & ~part.starts], freedom)
+                floor = max(recording.floors.get(name, 0.0) for recording in self.recordings)
+                self.whitening[name] = Whitening(coefficients, max(float(np.hypot(deviation, floor)), least))
         for first, one in enumerate(self.equations):
             for other in self.equations[first + 1 :]:
                 both = self._good(one) & self._good(other)
-                if np.count_nonzero(both) > 100:
+                if np.count_nonzero(both) > FEWEST_SHARED:
                     a, b = self._scaled(one, residuals[one])[both], self._scaled(other, residuals[other])[both]
                     self.shared[one, other] = float(np.clip(np.mean(a * b), -0.98, 0.98))
+
+    def _loudness(self, noise: Array, freedom: int) -> float:
+        """Deviation of a white noise that says as little as this one, whose samples hang together.
+
+        N_eff = N (1 - rho) / (1 + rho) with the first autocorrelation, of rows that count. freedom: of a pure error.
+        """
+        total = float(np.mean(noise**2)) if len(noise) else 1.0
+        rho = float(np.mean(noise[1:] * noise[:-1])) / total if len(noise) > 1 and total > 0.0 else 0.0
+        rho = min(max(rho, 0.0), *(recording.memory for recording in self.recordings))
+        if freedom:
+            total *= len(noise) / float(stats.chi2.ppf(1.0 - UPPER, freedom))
+        return float(np.sqrt(total * (1.0 + rho) / (1.0 - rho)))
 
     def _good(self, equation: str, coefficients: Array | None = None) -> np.ndarray:
         """Rows that count: valid with everything before them that the whitening looks at, if it looks back."""
@@ -215,6 +242,10 @@ class Regression:
             measured.append(columns[0])
             stand_ins.append(columns[1])
             responses.append(columns[2])
+        known, wanted = self._prior_rows()
+        measured.append(known)
+        stand_ins.append(known)
+        responses.append(wanted)
         stand_in = np.vstack(stand_ins)
         found = np.linalg.lstsq(stand_in.T @ np.vstack(measured), stand_in.T @ np.concatenate(responses), rcond=1e-10)
         return np.asarray(found[0], dtype=float)
@@ -224,6 +255,10 @@ class Regression:
         self.response = self._stack({name: part.response for name, part in self.parts.items()})
         self.measured = self._stack({name: part.measured for name, part in self.parts.items()})
         self.stand_in = self._stack({name: part.stand_in for name, part in self.parts.items()})
+        # known parameters come after the equations; an effect has nothing in these rows
+        known, wanted = self._prior_rows()
+        self.response = np.concatenate([self.response, wanted])
+        self.measured, self.stand_in = (np.vstack([each, known]) for each in (self.measured, self.stand_in))
         self.size = len(self.response)
         self.rows: dict[str, slice] = {}
         start = 0
@@ -239,6 +274,19 @@ class Regression:
                 self.rows_of(other).start + np.flatnonzero(both[self.good[other]]),
             )
         self._solve()
+
+    def _priors(self) -> dict[str, tuple[float, float]]:
+        """(value, standard deviation) of the parameters that sound machines have by and large."""
+        known = {name: prior for recording in self.recordings for name, prior in recording.priors.items()}
+        return {name: prior for name, prior in known.items() if name in self.names}
+
+    def _prior_rows(self) -> tuple[Array, Array]:
+        """(k, p) and (k,): what is known of sound machines as measurements of deviation 1."""
+        known = self._priors()
+        rows = np.zeros((len(known), self.count))
+        for row, (name, (_, deviation)) in enumerate(known.items()):
+            rows[row, self.names.index(name)] = 1.0 / deviation
+        return rows, np.array([value / deviation for value, deviation in known.values()])
 
     def _solve(self) -> None:
         scale = np.linalg.norm(self.stand_in, axis=0)

@@ -20,6 +20,7 @@ PARAMETERS = (
         for leg in ("outer", "inner")
     ),
     Known("hip_current_offset_Nm", "N m", 0.0, -1.0, 1.0, "torque that an offset of the hip's current seems to be"),
+    Known("hip_current_lag_s", "s", 0.0, -0.05, 0.05, "of the hip's current behind its angle"),
     Known("hip_constant_friction_Nm", "N m", 0.1, -1.0, 3.0, "of the hip's motor and gearhead"),
     Known("hip_viscous_friction_Nms", "N m s/rad", 0.01, -0.3, 1.0, "of the hip's motor and gearhead"),
     *(

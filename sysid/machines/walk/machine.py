@@ -37,12 +37,51 @@ STEADY_A = 0.6  # between neighbouring samples of a slow current: more, and nobo
 JUMP_REACH = 1.5  # Gaussians about such a jump that do not count
 GYRO_BIAS_RAD_S = -0.004  # as the firmware of 2011 takes it off (robot.md C3.1); the leg's rate counts the other way
 GYRO_BIAS_REACH_RAD_S = 0.02  # of any sound gyro: its log at rest spans -0.006 to 0.024 (robot.md C6.2)
+HIP_K_Nm_per_A = 66.0 * 0.018  # gear times torque constant: appendix 1.1.2, table 3
 LOAD_FRICTION = 0.1  # mu of the hip's gearhead: appendix table 3; the constant itself is fitted
 SIGN_RAD_S = 0.05  # rate over which a sign goes over, as in the plant (EQUATIONS 2.1)
 SIGN_A = 0.05  # current over which the brushes' drop goes over; chosen by us: a few counts of the sensors
 STICKS_RAD_S = 0.3  # about standstill friction may be anything up to its limit (appendix eq. 35)
-MARGIN = 1.5  # found on four sound walks: lags of channels wander by 2 ms as crystals drift
-SPIKE, FEW = 6.0, 0.05  # deviations beyond which single rows do not count, where they are no larger a part than this
+SLOW_FOOT_RAD_S = 1.5  # faster, and stamps of a millisecond between motor and joint are two counts of the cable
+COUNT_RAD = 2.0 * np.pi / 8192.0  # of a joint's encoder: less than that of a cable's stretch is not known
+# What sound robots differ in, as good as measured: (value, standard deviation); fields of `Numbers` are changes.
+PRIORS = {
+    # a motor's constant within a tenth of its data sheet; a current behind its angle by less than a board's slot of 5 ms
+    "hip_torque_constant_Nm_per_A": (HIP_K_Nm_per_A, 0.1 * HIP_K_Nm_per_A),
+    "hip_current_lag_s": (0.0, 0.005),
+    # what the appendix does not give, or as a guess: a fifth
+    "ankle_return_Nm_per_rad": (0.0, 0.2 * 0.066),
+    "foot_inertia_kg_m2": (0.0, 0.2 * 0.0012),
+    "rolling_outer_Nms": (0.0, 0.2 * 0.05),
+    "rolling_inner_Nms": (0.0, 0.2 * 0.05),
+    # tape, scale and bench, chosen by us: a quarter of a millimetre at a foot, one of a leg, 0.25 % of weights and
+    # moments, 1 % of inertias, 2 % of the hip's spring, a tenth of the cables', 0.1 % of sensors, a quarter of a count
+    # of an absolute encoder. Larger ones hide small faults; a sound robot that is off by more is named.
+    "ankle_offset_outer_m": (0.0, 0.00025),
+    "ankle_offset_inner_m": (0.0, 0.00025),
+    "foot_radius_outer_m": (0.0, 0.0005),
+    "foot_radius_inner_m": (0.0, 0.0005),
+    "leg_length_m": (0.0, 0.001),
+    "total_mass_kg": (0.0, 0.025),
+    "mass_moment_outer_kg_m": (0.0, 0.0025),
+    "mass_moment_inner_kg_m": (0.0, 0.0025),
+    "mass_offset_outer_kg_m": (0.0, 0.001),
+    "mass_offset_inner_kg_m": (0.0, 0.001),
+    "hip_inertia_outer_kg_m2": (0.0, 0.0055),
+    "hip_inertia_inner_kg_m2": (0.0, 0.0055),
+    "hip_spring_Nm_per_rad": (0.0, 0.15),
+    "cable_outer_Nm_per_rad": (0.0, 1.4),
+    "cable_inner_Nm_per_rad": (0.0, 1.4),
+    "hip_scale": (0.0, 0.001),
+    "leg_scale": (0.0, 0.001),
+    "hip_zero_rad": (0.0, 0.0002),
+    "ankle_zero_outer_rad": (0.0, 0.0002),
+    "ankle_zero_inner_rad": (0.0, 0.0002),
+    "slope_rad": (0.0, 0.0002),
+}
+TOLERATED = tuple(name for name in PRIORS if not name.startswith("hip_torque") and not name.startswith("hip_current"))
+ROBUST_ROUNDS = 8
+SPIKE, FEW = 6.0, 0.08  # deviations beyond which single rows do not count, where they are no larger a part than this
 FEWEST_ROWS = 60  # of an equation that says anything
 
 ANGLES = ("hip_angle_rad", "outer_ankle_angle_rad", "inner_ankle_angle_rad", "outer_motor_angle_rad",
@@ -73,6 +112,8 @@ class Rows:
     left: Callable[[Numbers], Array]
     base: tuple[str, ...] = ()  # fields of Numbers that are fitted
     columns: dict[str, Array] = dataclasses.field(default_factory=dict)  # (n,), by parameter
+    repeats: bool = False  # noise is what differs from stride to stride, else all that the equation leaves
+    floor: float = 0.0  # of the noise: what no stride tells, for it is the same in all of them
 
 
 @functools.cache
@@ -91,10 +132,17 @@ class WalkRecording(Recording):
     gyro_bias_rad_s: float = 0.0  # beyond the known one, by closures
     closures: tuple[np.ndarray, Array] | None = None  # rows of strikes, and what the gyro gained since the last, rad/s
     loads: dict[str, Array] = dataclasses.field(default_factory=dict)  # N m, of the cable, by equation
+    places: np.ndarray | None = None  # (n,) of rows that may count: which of its strides' places it is, else -1
     seen: dict[str, Array] = dataclasses.field(default_factory=dict)
 
     def slope(self, equation: str, changes: tuple[tuple[str, float], ...]) -> Array:
-        """(n,) minus the derivative of what an equation leaves, on a change of numbers: {field: weight}."""
+        """(n,) minus the derivative of what an equation leaves, on a change of numbers: {field: weight}.
+
+        As it is in the other strides at the same place: a stride's own would have the noise of its accelerations in
+        common with what the equation leaves, and its square would look like a mass of 3 % too much.
+        """
+        if changes == (("leg_lag_drift_s", 1.0),):  # the lag's, as it grows: no stride has the others'
+            return self.slope(equation, (("leg_lag_s", 1.0),)) * np.linspace(-1.0, 1.0, len(self.table))
         key = f"{equation} by {changes}"
         if key not in self.seen:
             rows = next(each for each in self.rows if each.name == equation)
@@ -102,8 +150,17 @@ class WalkRecording(Recording):
             up, down = (_moved(self.numbers, steps, sign) for sign in (1.0, -1.0))
             out = np.zeros(len(self.table))
             out[rows.where] = -(rows.left(up) - rows.left(down)) / (2.0 * STEP)
+            if self.places is not None:
+                out[rows.where] = _of_others(out[rows.where], self.places[rows.where])
             self.seen[key] = out
         return self.seen[key]
+
+
+def _of_others(values: Array, places: np.ndarray) -> Array:
+    """Mean of the other values at the same place; where there is none, the value itself."""
+    _, place, count = np.unique(places, return_inverse=True, return_counts=True)
+    others = np.bincount(place, values)[place] - values
+    return np.where(count[place] > 1, others / np.maximum(count[place] - 1, 1), values)
 
 
 STEP = 1e-4  # of differences; all numbers are between 0.001 and 20 in SI, and residuals nearly linear in them
@@ -135,7 +192,7 @@ class Walk:
         """Courses, strikes and every equation whose channels are there; UserError when there is none."""
         table = signals.uniform(table)
         recording = WalkRecording(
-            table, {"t": table.time_s - table.time_s[0]}, {}, whitened=False, margin=MARGIN, lags=(0,), left_over=True
+            table, {"t": table.time_s - table.time_s[0]}, {}, whitened=False, lags=(0,), left_over=True
         )
         recording.numbers = self.numbers
         motion, stands, single = self._motion(table, recording)
@@ -147,13 +204,18 @@ class Walk:
             sound = abs(recording.gyro_bias_rad_s) < GYRO_BIAS_REACH_RAD_S
             columns = {"gyro_bias_rad_s": np.ones(len(table))} if sound else {}
             rows.append(Rows("closure", "S", "sensor", "rad/s", places, _fixed(rates), (), columns))
-        rows += _drive_rows(table, single)
-        rows += _encoder_rows(table, single)
+        rows += _drive_rows(table, single, recording)
+        rows += _encoder_rows(table, single, recording)
         recording.rows = [each for each in rows if len(each.where) >= (8 if each.name == "closure" else FEWEST_ROWS)]
         if not recording.rows:
             raise UserError(_nothing(table))
         for each in recording.rows:
             recording.equations[each.name] = _equation(recording, each, self.numbers)
+            if recording.places is not None and each.repeats:
+                recording.repeats[each.name] = recording.places
+            recording.floors[each.name] = each.floor
+        fitted = {name for each in recording.equations.values() for name in each.columns}
+        recording.priors = {name: prior for name, prior in PRIORS.items() if name in fitted}
         return recording
 
     def _motion(self, table: Table, recording: WalkRecording) -> tuple[Motion | None, np.ndarray, np.ndarray]:
@@ -170,6 +232,8 @@ class Walk:
         lean = [name for name in LEAN if name in table]
         hip = _course(table, table["hip_angle_rad"])
         recording.signals |= {"hip": hip[0], "hip_rate": hip[1], "stands": stands.astype(float)}
+        if np.any(single):
+            recording.places = strikes.places(table, touches, stands, AFTER_S, SPACING_S)
         recording.regimes = {"on outer feet": stands == 0, "on inner feet": stands == 1, "swing": single}
         if not (both and lean and np.any(single)):
             return None, stands, single
@@ -291,8 +355,11 @@ def _closing(numbers: Numbers, table: Table, lean: Array, joints: Sequence[Array
     return offset
 
 
-def _thinned(mask: np.ndarray, time_s: Array, spacing_s: float) -> np.ndarray:
-    """Numbers of rows that are True and at least so far from each other."""
+def _thinned(mask: np.ndarray, recording: WalkRecording, spacing_s: float = SPACING_S) -> np.ndarray:
+    """Numbers of rows that are True and at least so far from each other: at the same times after each strike."""
+    time_s = recording.table.time_s
+    if recording.places is not None:
+        return np.flatnonzero(mask & (recording.places >= 0))
     kept: list[int] = []
     last = -np.inf
     for number in np.flatnonzero(mask).tolist():
@@ -309,7 +376,7 @@ def _stance_rows(
     shared: tuple[str, ...] = ("leg_lag_s", "leg_lag_drift_s")
     if "outer_leg_angle_rad" not in table:
         shared += ("leg_zero_rad",)
-    where = _thinned(single, table.time_s, SPACING_S)
+    where = _thinned(single, recording)
     rows = []
 
     def of(what: Callable[[Left], Array | None], chosen: np.ndarray) -> Callable[[Numbers], Array]:
@@ -330,14 +397,14 @@ def _stance_rows(
     if all(each is not None for each in motion.motor):
         for leg, name in enumerate(LEGS):
             chosen = where[stands[where] == leg]
-            base = (*shared, *of_leg[leg])
-            rows.append(Rows(f"floor, {name}", "M", "mechanical", "N m", chosen, of(lambda e: e.floor, chosen), base))
-            rows.append(Rows(f"legs, {name}", "M", "mechanical", "N m", chosen, of(lambda e: e.legs, chosen), base))
+            base = (*shared, *of_leg[leg], *TOLERATED)
+            rows.append(Rows(f"floor, {name}", "M", "mechanical", "N m", chosen, of(lambda e: e.floor, chosen), base, repeats=True))
+            rows.append(Rows(f"legs, {name}", "M", "mechanical", "N m", chosen, of(lambda e: e.legs, chosen), base, repeats=True))
     if "hip_current_A" in table:
         current, steady = _current(table, "hip_current_A")
         width = SMOOTH_S / table.step_s
         slow = ndimage.binary_dilation(np.abs(motion.hip[1]) < STICKS_RAD_S, iterations=round(width))
-        chosen = _thinned(single & steady & ~slow, table.time_s, SPACING_S)
+        chosen = _thinned(single & steady & ~slow, recording)
         sign = signals.smooth(table, np.tanh(_course(table, table["hip_angle_rad"])[1] / SIGN_RAD_S), width)
         recording.signals["hip_current"] = current
         columns = {
@@ -345,16 +412,20 @@ def _stance_rows(
             "hip_constant_friction_Nm": -sign,
             "hip_viscous_friction_Nms": -motion.hip[1],
             "hip_current_offset_Nm": np.ones(len(table)),
+            "hip_current_lag_s": HIP_K_Nm_per_A * _slope(table, current),
         }
         left = of(lambda e: e.hip_torque, chosen)
-        rows.append(Rows("hip", "M", "mechanical", "N m", chosen, left, shared, columns))
+        rows.append(Rows("hip", "M", "mechanical", "N m", chosen, left, (*shared, *TOLERATED), columns, True))
     for leg, name in enumerate(LEGS):
         if motion.motor[leg] is None:
             continue
-        chosen = _thinned(single & (stands == 1 - leg), table.time_s, SPACING_S)
+        slow = np.abs(_course(table, table[ANGLES[3 + leg]])[1]) < SLOW_FOOT_RAD_S
+        chosen = _thinned(single & (stands == 1 - leg) & slow, recording)
         part = motion.part(chosen)
         left = functools.partial(_foot_left, motion=part, leg=leg)
-        rows.append(Rows(f"{name} foot", "M", "transmission", "N m", chosen, left, of_leg[leg]))
+        base = (*of_leg[leg], *TOLERATED)
+        cable = getattr(recording.numbers, f"cable_{name}_Nm_per_rad")
+        rows.append(Rows(f"{name} foot", "M", "transmission", "N m", chosen, left, base, floor=COUNT_RAD * cable))
         recording.loads[f"{name} foot"] = mechanics.cable_torque(recording.numbers, motion, leg)
     return rows
 
@@ -377,7 +448,7 @@ def _current(table: Table, name: str) -> tuple[Array, np.ndarray]:
     return signals.smooth(table, value, SMOOTH_S / table.step_s), known
 
 
-def _drive_rows(table: Table, single: np.ndarray) -> list[Rows]:
+def _drive_rows(table: Table, single: np.ndarray, recording: WalkRecording) -> list[Rows]:
     """Each stage's power, each winding's voltage; outside strikes, where a current is known."""
     rows = []
     for motor, joint in MOTORS.items():
@@ -392,7 +463,7 @@ def _drive_rows(table: Table, single: np.ndarray) -> list[Rows]:
         if table.step_s / max(float(np.mean(fresh)), 1e-9) > 2.0 * SMOOTH_S:
             continue  # sampled more slowly than it changes: every 60 ms and more of an ankle's push
         squares, sizes = signals.smooth(table, raw**2, width), signals.smooth(table, np.abs(raw), width)
-        where = _thinned(single & known, table.time_s, SPACING_S)
+        where = _thinned(single & known, recording)
         label = motor.replace("_", " ")
         if f"{motor}_battery_power_W" in table:
             power = signals.smooth(table, table[f"{motor}_battery_power_W"], width)
@@ -420,7 +491,7 @@ def _fixed(values: Array) -> Callable[[Numbers], Array]:
     return lambda _: values
 
 
-def _encoder_rows(table: Table, single: np.ndarray) -> list[Rows]:
+def _encoder_rows(table: Table, single: np.ndarray, recording: WalkRecording) -> list[Rows]:
     """A rate as its sensor gives it against the derivative of the angle; its lag is of the sensor."""
     rows = []
     for joint, name in (("hip", "hip"), ("outer_ankle", "outer ankle"), ("inner_ankle", "inner ankle")):
@@ -434,7 +505,7 @@ def _encoder_rows(table: Table, single: np.ndarray) -> list[Rows]:
             f"{joint}_rate_lag_s": -course[2],
             f"{joint}_rate_filter_s2": course[3],
         }
-        where = _thinned(single, table.time_s, SPACING_S)
+        where = _thinned(single, recording)
         rows.append(Rows(f"{name} encoders", "S", "sensor", "rad/s", where, _fixed(given[where]), (), columns))
     return rows
 
@@ -446,19 +517,37 @@ def _equation(recording: WalkRecording, rows: Rows, numbers: Numbers) -> Equatio
     valid[rows.where] = True
     columns = dict(rows.columns)
     for field in rows.base:
-        columns[field] = recording.slope(rows.name, ((field, 1.0),))
-    used = np.column_stack([column[rows.where] for column in columns.values()]) if columns else None
+        column = recording.slope(rows.name, ((field, 1.0),))
+        if np.any(column) or field not in PRIORS:
+            columns[field] = column
+    used = {name: column[rows.where] for name, column in columns.items()}
     valid[rows.where[_spikes(response[rows.where], used)]] = False
     return Equation(rows.name, rows.letter, rows.subsystem, rows.unit, response, columns, valid)
 
 
-def _spikes(response: Array, columns: Array | None) -> np.ndarray:
-    """Numbers of single rows far outside all others after a fit of the base: lost or late samples, and no effect."""
-    left = response
-    if columns is not None:
-        scale = np.linalg.norm(columns, axis=0)
-        scaled = columns / np.where(scale > 0.0, scale, 1.0)
-        left = response - scaled @ np.linalg.lstsq(scaled, response, rcond=1e-9)[0]
+def _spikes(response: Array, columns: Mapping[str, Array]) -> np.ndarray:
+    """Numbers of single rows far outside all others: a foot that brushes the floor, lost or late samples; no effect.
+
+    They are told after a fit of the base by least absolute deviations, which a single row does not draw to itself.
+    """
+    left = response - np.median(response)
+    names = list(columns)
+    matrix = np.column_stack([columns[name] for name in names]) if names else np.zeros((len(response), 0))
+    length = np.linalg.norm(matrix, axis=0)
+    length = np.where(length > 0.0, length, 1.0)
+    known = [(number, *PRIORS[name]) for number, name in enumerate(names) if name in PRIORS]
+    for _ in range(ROBUST_ROUNDS):
+        level = max(float(np.median(np.abs(left))) / 0.6745, 1e-12)
+        weight = 1.0 / np.sqrt(np.maximum(np.abs(left) / level, 0.1))
+        rows = [(matrix / length) * weight[:, None]]
+        wanted = [response * weight]
+        for number, value, deviation in known:  # in units of the residual
+            row = np.zeros((1, len(names)))
+            row[0, number] = level / (deviation * length[number])
+            rows.append(row)
+            wanted.append(np.array([level * value / deviation]))
+        found = np.linalg.lstsq(np.vstack(rows), np.concatenate(wanted), rcond=1e-9)[0]
+        left = response - (matrix / length) @ found
     left = left - np.median(left)
     far = np.flatnonzero(np.abs(left) > SPIKE * float(np.median(np.abs(left))) / 0.6745)
     return far if len(far) <= FEW * len(response) else far[:0]

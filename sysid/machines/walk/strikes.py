@@ -53,6 +53,23 @@ def standing(table: Table, strikes: list[Strike], after_s: float, before_s: floa
     return stands, single
 
 
+def places(table: Table, strikes: list[Strike], stands: np.ndarray, after_s: float, every_s: float) -> np.ndarray:
+    """(n,) of rows so long after a strike, and every so long after that: a number for this leg and time; -1 elsewhere.
+
+    Rows of one number are repeats: the same place in the strides.
+    """
+    out = np.full(len(table), -1)
+    wait, every = round(after_s / table.step_s), round(every_s / table.step_s)
+    for number, strike in enumerate(strikes):
+        run = table.runs[strike.run]
+        ends_s = strikes[number + 1].time_s if number + 1 < len(strikes) else np.inf
+        first = run.start + int(np.searchsorted(table.time_s[run], strike.time_s - 1e-9))
+        rows = np.arange(first + wait, run.stop, every)
+        rows = rows[(stands[rows] == strike.leg) & (table.time_s[rows] < ends_s)]
+        out[rows] = 2 * ((rows - first - wait) // every) + strike.leg
+    return out
+
+
 def _by_contact(table: Table, run: slice) -> list[tuple[float, int]]:
     """(time, leg) where a contact sensor says so for the first time while the legs are apart."""
     found = []
