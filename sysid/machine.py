@@ -89,8 +89,8 @@ class Recording:
     # wrong. Then fits are plain least squares, and only the count of samples is that of independent ones.
     whitened: bool = True
     memory: float = 0.99  # largest autocorrelation from row to row that is taken for noise's, and not for an effect's
-    # by equation, (n,) whole numbers: rows of one number are repeats of each other, as the strides of a walk are. Noise is
-    # then what differs between repeats (pure error), however much the model misses; -1: a row without repeats.
+    # by equation, (n,) whole numbers: rows of one number are repeats of each other, as the strides of a walk are; -1: a
+    # row without repeats. Noise is then what differs between repeats (pure error), however much the model misses.
     repeats: dict[str, np.ndarray] = dataclasses.field(default_factory=dict)
     floors: dict[str, float] = dataclasses.field(default_factory=dict)  # by equation: least deviation that noise has
     # parameter -> (value, standard deviation) of sound machines: as good as a measurement of it

@@ -159,3 +159,41 @@ def test_columns_that_are_the_same_are_named_and_not_separated():
 def test_too_few_samples_are_refused_in_a_line():
     with pytest.raises(UserError, match="samples count, too few for 1 parameters"):
         Regression([recording(np.ones(12), {"level": np.ones(12)})])
+
+
+def repeated(rng, effect=0.0):
+    """Forty repeats of twelve places; a response of noise 0.1 and of `effect` times a wave over the places."""
+    place = np.tile(np.arange(12), 40)
+    wave = np.sin(2.0 * np.pi * place / 12.0)
+    response = 2.0 + effect * wave + 0.1 * rng.standard_normal(len(place))
+    columns = {"offset": np.ones(len(place))}
+    valid = np.ones(len(place), dtype=bool)
+    equation = Equation("force", "M", "mechanical", "N", response, columns, valid)
+    table = Table(0.01 * np.arange(len(place)), {}, (slice(0, len(place)),), "made up")
+    return Recording(table, {}, {"force": equation}, whitened=False, repeats={"force": place}), wave
+
+
+def test_noise_is_what_differs_between_repeats_however_large_the_misfit_is():
+    """A wave of ten deviations leaves it as it was; the limit of 95 % of 460 degrees of freedom is 1.06 of 0.1."""
+    for effect in (0.0, 1.0):
+        recording, _ = repeated(generator(3, "repeats"), effect)
+        assert Regression([recording]).whitening["force"].deviation == pytest.approx(0.106, rel=0.1)
+    recording.repeats = {}
+    assert Regression([recording]).whitening["force"].deviation > 0.5
+
+
+def test_what_is_known_of_a_parameter_counts_as_a_measurement_of_it():
+    """480 rows of noise 0.106 know the offset to 0.0048; what is known of it as well halves the variance."""
+    recording, _ = repeated(generator(3, "repeats"))
+    free = Regression([recording])
+    error = float(np.sqrt(free.covariance[0, 0]))
+    recording.priors = {"offset": (1.0, error)}
+    known = Regression([recording])
+    assert known.values["offset"] == pytest.approx(0.5 * (1.0 + free.values["offset"]), rel=1e-3)
+    assert np.sqrt(known.covariance[0, 0]) == pytest.approx(error / np.sqrt(2.0), rel=1e-3)
+
+
+def test_an_equation_has_no_less_noise_than_its_floor():
+    recording, _ = repeated(generator(3, "repeats"))
+    recording.floors = {"force": 1.0}
+    assert Regression([recording]).whitening["force"].deviation == pytest.approx(1.0, rel=0.02)

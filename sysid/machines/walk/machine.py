@@ -26,6 +26,7 @@ from ranger_sim.sysid import channels, signals
 from ranger_sim.sysid.dataset import Array, Dataset, Table
 from ranger_sim.sysid.machine import Effect, Equation, Known, Quantity, Recording
 from ranger_sim.sysid.machines.walk import mechanics, strikes
+from ranger_sim.sysid.machines.walk.base import PRIORS, TOLERATED, HIP_K_Nm_per_A
 from ranger_sim.sysid.machines.walk.mechanics import LEGS, Course, Left, Motion, Numbers
 from ranger_sim.sysid.machines.walk.timebase import even_table, freshness
 
@@ -37,49 +38,12 @@ STEADY_A = 0.6  # between neighbouring samples of a slow current: more, and nobo
 JUMP_REACH = 1.5  # Gaussians about such a jump that do not count
 GYRO_BIAS_RAD_S = -0.004  # as the firmware of 2011 takes it off (robot.md C3.1); the leg's rate counts the other way
 GYRO_BIAS_REACH_RAD_S = 0.02  # of any sound gyro: its log at rest spans -0.006 to 0.024 (robot.md C6.2)
-HIP_K_Nm_per_A = 66.0 * 0.018  # gear times torque constant: appendix 1.1.2, table 3
 LOAD_FRICTION = 0.1  # mu of the hip's gearhead: appendix table 3; the constant itself is fitted
 SIGN_RAD_S = 0.05  # rate over which a sign goes over, as in the plant (EQUATIONS 2.1)
 SIGN_A = 0.05  # current over which the brushes' drop goes over; chosen by us: a few counts of the sensors
 STICKS_RAD_S = 0.3  # about standstill friction may be anything up to its limit (appendix eq. 35)
 SLOW_FOOT_RAD_S = 1.5  # faster, and stamps of a millisecond between motor and joint are two counts of the cable
 COUNT_RAD = 2.0 * np.pi / 8192.0  # of a joint's encoder: less than that of a cable's stretch is not known
-# What sound robots differ in, as good as measured: (value, standard deviation); fields of `Numbers` are changes.
-PRIORS = {
-    # a motor's constant within a tenth of its data sheet; a current behind its angle by less than a board's slot of 5 ms
-    "hip_torque_constant_Nm_per_A": (HIP_K_Nm_per_A, 0.1 * HIP_K_Nm_per_A),
-    "hip_current_lag_s": (0.0, 0.005),
-    # what the appendix does not give, or as a guess: a fifth
-    "ankle_return_Nm_per_rad": (0.0, 0.2 * 0.066),
-    "foot_inertia_kg_m2": (0.0, 0.2 * 0.0012),
-    "rolling_outer_Nms": (0.0, 0.2 * 0.05),
-    "rolling_inner_Nms": (0.0, 0.2 * 0.05),
-    # tape, scale and bench, chosen by us: a quarter of a millimetre at a foot, one of a leg, 0.25 % of weights and
-    # moments, 1 % of inertias, 2 % of the hip's spring, a tenth of the cables', 0.1 % of sensors, a quarter of a count
-    # of an absolute encoder. Larger ones hide small faults; a sound robot that is off by more is named.
-    "ankle_offset_outer_m": (0.0, 0.00025),
-    "ankle_offset_inner_m": (0.0, 0.00025),
-    "foot_radius_outer_m": (0.0, 0.0005),
-    "foot_radius_inner_m": (0.0, 0.0005),
-    "leg_length_m": (0.0, 0.001),
-    "total_mass_kg": (0.0, 0.025),
-    "mass_moment_outer_kg_m": (0.0, 0.0025),
-    "mass_moment_inner_kg_m": (0.0, 0.0025),
-    "mass_offset_outer_kg_m": (0.0, 0.001),
-    "mass_offset_inner_kg_m": (0.0, 0.001),
-    "hip_inertia_outer_kg_m2": (0.0, 0.0055),
-    "hip_inertia_inner_kg_m2": (0.0, 0.0055),
-    "hip_spring_Nm_per_rad": (0.0, 0.15),
-    "cable_outer_Nm_per_rad": (0.0, 1.4),
-    "cable_inner_Nm_per_rad": (0.0, 1.4),
-    "hip_scale": (0.0, 0.001),
-    "leg_scale": (0.0, 0.001),
-    "hip_zero_rad": (0.0, 0.0002),
-    "ankle_zero_outer_rad": (0.0, 0.0002),
-    "ankle_zero_inner_rad": (0.0, 0.0002),
-    "slope_rad": (0.0, 0.0002),
-}
-TOLERATED = tuple(name for name in PRIORS if not name.startswith("hip_torque") and not name.startswith("hip_current"))
 ROBUST_ROUNDS = 8
 SPIKE, FEW = 6.0, 0.08  # deviations beyond which single rows do not count, where they are no larger a part than this
 FEWEST_ROWS = 60  # of an equation that says anything
@@ -113,6 +77,7 @@ class Rows:
     base: tuple[str, ...] = ()  # fields of Numbers that are fitted
     columns: dict[str, Array] = dataclasses.field(default_factory=dict)  # (n,), by parameter
     repeats: bool = False  # noise is what differs from stride to stride, else all that the equation leaves
+    fewest: int = FEWEST_ROWS
     floor: float = 0.0  # of the noise: what no stride tells, for it is the same in all of them
 
 
@@ -203,10 +168,10 @@ class Walk:
             places, rates = recording.closures
             sound = abs(recording.gyro_bias_rad_s) < GYRO_BIAS_REACH_RAD_S
             columns = {"gyro_bias_rad_s": np.ones(len(table))} if sound else {}
-            rows.append(Rows("closure", "S", "sensor", "rad/s", places, _fixed(rates), (), columns))
+            rows.append(Rows("closure", "S", "sensor", "rad/s", places, _fixed(rates), (), columns, fewest=8))
         rows += _drive_rows(table, single, recording)
         rows += _encoder_rows(table, single, recording)
-        recording.rows = [each for each in rows if len(each.where) >= (8 if each.name == "closure" else FEWEST_ROWS)]
+        recording.rows = [each for each in rows if len(each.where) >= each.fewest]
         if not recording.rows:
             raise UserError(_nothing(table))
         for each in recording.rows:
@@ -398,8 +363,23 @@ def _stance_rows(
         for leg, name in enumerate(LEGS):
             chosen = where[stands[where] == leg]
             base = (*shared, *of_leg[leg], *TOLERATED)
-            rows.append(Rows(f"floor, {name}", "M", "mechanical", "N m", chosen, of(lambda e: e.floor, chosen), base, repeats=True))
-            rows.append(Rows(f"legs, {name}", "M", "mechanical", "N m", chosen, of(lambda e: e.legs, chosen), base, repeats=True))
+            rows.append(
+                Rows(
+                    f"floor, {name}",
+                    "M",
+                    "mechanical",
+                    "N m",
+                    chosen,
+                    of(lambda e: e.floor, chosen),
+                    base,
+                    repeats=True,
+                )
+            )
+            rows.append(
+                Rows(
+                    f"legs, {name}", "M", "mechanical", "N m", chosen, of(lambda e: e.legs, chosen), base, repeats=True
+                )
+            )
     if "hip_current_A" in table:
         current, steady = _current(table, "hip_current_A")
         width = SMOOTH_S / table.step_s
@@ -425,7 +405,9 @@ def _stance_rows(
         left = functools.partial(_foot_left, motion=part, leg=leg)
         base = (*of_leg[leg], *TOLERATED)
         cable = getattr(recording.numbers, f"cable_{name}_Nm_per_rad")
-        rows.append(Rows(f"{name} foot", "M", "transmission", "N m", chosen, left, base, floor=COUNT_RAD * cable))
+        rows.append(
+            Rows(f"{name} foot", "M", "transmission", "N m", chosen, left, base, fewest=20, floor=COUNT_RAD * cable)
+        )
         recording.loads[f"{name} foot"] = mechanics.cable_torque(recording.numbers, motion, leg)
     return rows
 
@@ -470,7 +452,7 @@ def _drive_rows(table: Table, single: np.ndarray, recording: WalkRecording) -> l
             columns = {
                 f"{motor}_resistance_ohm": squares,
                 f"{motor}_contact_drop_V": sizes,
-                f"{motor}_torque_constant_Nm_per_A": current * rate,
+                f"{motor}_generator_constant_Vs_per_rad": current * rate,
                 f"{motor}_gates_W": np.ones(len(table)),
                 f"{motor}_power_lag_s": -_slope(table, power),
             }
@@ -480,7 +462,7 @@ def _drive_rows(table: Table, single: np.ndarray, recording: WalkRecording) -> l
             columns = {
                 f"{motor}_resistance_ohm": current,
                 f"{motor}_contact_drop_V": signals.smooth(table, np.tanh(raw / SIGN_A), width),
-                f"{motor}_torque_constant_Nm_per_A": rate,
+                f"{motor}_generator_constant_Vs_per_rad": rate,
                 f"{motor}_voltage_lag_s": -_slope(table, volts),
             }
             rows.append(Rows(f"{label} winding", "E", "electrical", "V", where, _fixed(volts[where]), (), columns))
