@@ -116,3 +116,11 @@ def test_a_robot_at_rest_on_its_sweet_spots_is_in_balance():
     assert left.hip_torque == pytest.approx(np.zeros(3), abs=1e-12)
     assert left.floor == pytest.approx(np.zeros(3), abs=1e-12)
     assert mechanics.height_difference(numbers, motion) == pytest.approx(np.zeros(3), abs=1e-12)
+
+
+def test_no_stiffness_or_weight_is_named_that_would_be_negative(table):
+    """The return springs have 0.066 N m/rad to lose, the legs' centre of mass may lie behind as well as ahead."""
+    effects = {(each.cause, each.at, each.coefficients[0]): each for each in Walk().effects([Walk().prepare(table)])}
+    spring = effects["spring_value", "ankle_return", "stiffness_Nm_per_rad"]
+    assert spring.admissible({"stiffness_Nm_per_rad": -0.06}) and not spring.admissible({"stiffness_Nm_per_rad": -0.07})
+    assert effects["inertia", "legs", "offset_kg_m"].admissible({"offset_kg_m": -0.2})

@@ -19,6 +19,7 @@ Change = tuple[tuple[str, float], ...]  # fields of Numbers with weights
 HEAT_TIMES_S = (3.0, 10.0, 30.0, 100.0)
 SPEEDS_RAD_S = (0.1, 0.2, 0.4, 0.8, 1.6)
 PLAY_NM = (0.01, 0.03, 0.1)
+EITHER_SIGN = ("mass_offset_outer_kg_m", "mass_offset_inner_kg_m")
 
 
 def _both(name: str) -> Change:
@@ -75,7 +76,7 @@ def made(recordings: Sequence[WalkRecording]) -> list[Effect]:
         if all("outer_leg_angle_rad" in each.table for each in recordings):
             numbers.append(ABSOLUTE_LEAN)
         out += [
-            Effect(cause, at, part, (name,), [{}], _columns_of(change), meaning=meaning)
+            Effect(cause, at, part, (name,), [{}], _columns_of(change), _keeps_sign(change, recordings[0]), meaning)
             for cause, at, name, part, change, meaning in numbers
         ]
     if any(abs(each.gyro_bias_rad_s) > GYRO_BIAS_REACH_RAD_S for each in recordings) and "closure" in there:
@@ -107,6 +108,17 @@ def _columns_of(change: Change) -> Callable[[Recording, Shape, Values], Columns]
         return found
 
     return columns
+
+
+def _keeps_sign(change: Change, recording: WalkRecording) -> Callable[[Mapping[str, float]], bool]:
+    """False for a change that makes a length, weight, inertia or stiffness negative."""
+    known = [(getattr(recording.numbers, field), weight) for field, weight in change if field not in EITHER_SIGN]
+
+    def admissible(found: Mapping[str, float]) -> bool:
+        (size,) = found.values()
+        return all(value <= 0.0 or value + weight * size > 0.0 for value, weight in known)
+
+    return admissible
 
 
 def _depends(rows: Rows) -> bool:
