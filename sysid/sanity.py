@@ -211,7 +211,7 @@ def _stamps(channel: Channel) -> Iterator[Finding]:
     yield from _gaps(name, finite, steps, usual)
     states = np.all(channel.value == np.round(channel.value))  # numbers of states are written when they change
     if usual > LONGEST_STEP_S and len(finite) >= FEWEST and not states:
-        text = f"samples are {usual:.4g} s apart: the stamps are probably in ms"
+        text = f"samples are {usual:.4g} s apart: the stamps are probably in ms, or readings were taken one by one"
         yield Finding(name, "wrong_unit", float(finite[0]), float(finite[-1]), usual, "s", text)
 
 

@@ -172,7 +172,8 @@ def grouped(helps: list[dict[str, Any]]) -> dict[str, list[str]]:
     for each in helps:
         parts = []
         if each["channels"]:
-            parts.append(f"one of the channels {', '.join(each['channels'])}")
+            which = "the channel" if len(each["channels"]) == 1 else "one of the channels"
+            parts.append(f"{which} {', '.join(each['channels'])}")
         if each["motion"]:
             parts.append(each["motion"])
         if each["experiments"]:

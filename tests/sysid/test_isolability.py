@@ -222,7 +222,7 @@ def test_the_command_prints_the_catalogue_one_cause_and_what_channels_show(capsy
     code, printed = told(capsys, "drag")
     assert code == 0 and "by motor-bench with all its channels: shown" in printed.out
     code, printed = told(capsys, "--experiment", "motor-bench", "--channels", *ELECTRIC)
-    assert code == 0 and "Not shown by these channels" in printed.out and "one of the channels torque_Nm" in printed.out
+    assert code == 0 and "Not shown by these channels" in printed.out and "the channel torque_Nm" in printed.out
     code, printed = told(capsys, "--experiment", "motor-bench", "--channels", *ELECTRIC, "--json")
     analysis = json.loads(printed.out)
     assert analysis["channels"] == list(ELECTRIC)
