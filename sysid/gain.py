@@ -56,9 +56,12 @@ def measure(
         beside = plain.columns(made)
         columns.append(beside)
         coefficients = np.array([values[name] for name in each.coefficients])
-        if each.effect.phase_is_free and len(coefficients) == 2:
-            here = coefficients_of(beside, before)
-            coefficients = here * (np.linalg.norm(coefficients) / max(float(np.linalg.norm(here)), 1e-300))
+        if each.effect.phase_is_free:
+            here = coefficients_of(beside, before).reshape(-1, 2)
+            size = np.linalg.norm(coefficients.reshape(-1, 2), axis=1) / np.maximum(
+                np.linalg.norm(here, axis=1), 1e-300
+            )
+            coefficients = (here * size[:, None]).ravel()
         free = [name in each.effect.free for name in each.effect.coefficients]
         if any(free):
             fixed = np.where(free, 0.0, coefficients)

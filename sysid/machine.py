@@ -121,7 +121,9 @@ class Effect:
     form: str = ""  # of several forms of one cause at one place: only one of them is named, the others may be its ties
     scale: str | None = None  # a shape between whose values others are possible, all above 0: it is refined
     free: tuple[str, ...] = ()  # coefficients that another run does not share, as what was left from before it
-    phase_is_free: bool = False  # two coefficients, cosine and sine, of an angle whose zero another run does not share
+    phase_is_free: bool = (
+        False  # pairs of coefficients, cosine and sine, of an angle whose zero another run does not share
+    )
 
     @property
     def name(self) -> str:

@@ -1,8 +1,8 @@
 """The bounds of a blind run: kept by a method that meets the targets, broken by what must not pass.
 
 Here diagnoses are played: an oracle that is right as often as the targets ask, and comparators that need no data. The
-diagnosis itself is held to these bounds on fresh cases in every run; RANGER_SIM_BLIND (a seed, or "fresh") has comparators
-beside it, on the cases of that seed.
+diagnosis itself is held to these bounds on fresh cases in every run; RANGER_SIM_BLIND (a seed, or "fresh") has the
+comparators beside it, on the cases of that seed.
 """
 
 import os

@@ -9,6 +9,11 @@ from ranger_sim.sysid.machine import Columns, Effect, Recording, Values
 from ranger_sim.sysid.machines.forms import Made, Shape, column, minus, one, ones, over
 
 
+def once_and_twice(angle: Array) -> tuple[Array, ...]:
+    """Cosine and sine of an angle and of its double: what an encoder's disc off its centre, or bent, shows."""
+    return np.cos(angle), np.sin(angle), np.cos(2.0 * angle), np.sin(2.0 * angle)
+
+
 def sensors(gear: float, top_w: float, top_V: float) -> list[Effect]:
     S = "sensor"
 
@@ -51,18 +56,15 @@ def sensors(gear: float, top_w: float, top_V: float) -> list[Effect]:
             "transmission": column(s["dw"]),
         }
 
-    def eccentric_speed(r: Recording, shape: Shape, v: Values) -> Columns:
-        """The output's encoder: once or twice per turn of the output."""
-        s = r.signals
-        angle = shape["periods_per_turn"] * s["angle"] / gear
-        error, other = s["w"] * np.cos(angle), s["w"] * np.sin(angle)
-        k = v["torque_constant_Nm_per_A"]
-        return {"electric": column(-k * error, -k * other), "transmission": column(-error, -other)}
+    def eccentric_speed(r: Recording, _: Shape, v: Values) -> Columns:
+        """The output's encoder: once and twice per turn of the output."""
+        error = column(*(r.signals["w"] * wave for wave in once_and_twice(r.signals["angle"] / gear)))
+        return {"electric": -v["torque_constant_Nm_per_A"] * error, "transmission": -error}
 
-    def eccentric_angle(r: Recording, shape: Shape, _: Values) -> Columns:
-        """The rotor's encoder: once or twice per turn of the rotor."""
-        angle = shape["periods_per_turn"] * r.signals["angle"]
-        return {T: column(*(np.gradient(f(angle), r.table.step_s) / gear for f in (np.cos, np.sin)))}
+    def eccentric_angle(r: Recording, _: Shape, __: Values) -> Columns:
+        """The rotor's encoder: once and twice per turn of the rotor."""
+        waves = once_and_twice(r.signals["angle"])
+        return {T: column(*(np.gradient(wave, r.table.step_s) / gear for wave in waves))}
 
     def lost_angle(r: Recording, shape: Shape, _: Values) -> Columns:
         return {T: column(-over(r.signals["w_by_voltage"], shape["speed_rad_s"]))}
@@ -77,7 +79,6 @@ def sensors(gear: float, top_w: float, top_V: float) -> list[Effect]:
 
     T = "transmission"
     fast = [{"speed_rad_s": share * top_w} for share in (0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)]
-    turns = [{"periods_per_turn": n} for n in (1.0, 2.0)]
     return [
         # I measured = (1 + change) I: the torque constant counts as so much smaller, in this equation alone
         Effect(
@@ -104,8 +105,24 @@ def sensors(gear: float, top_w: float, top_V: float) -> list[Effect]:
         Effect("sensor_lag", "current_A", S, ("time_constant_s",), [{}], current_lag),
         Effect("sensor_lag", "speed_rad_per_s", S, ("time_constant_s",), [{}], speed_lag),
         Effect("sensor_lag", "torque_Nm", S, ("time_constant_s",), [{}], one("mechanical", minus("dT"))),
-        Effect("eccentricity", "speed_rad_per_s", S, ("cosine", "sine"), turns, eccentric_speed, phase_is_free=True),
-        Effect("eccentricity", "motor_angle_rad", S, ("cosine_rad", "sine_rad"), turns, eccentric_angle, phase_is_free=True),  # noqa: E501
+        Effect(
+            "eccentricity",
+            "speed_rad_per_s",
+            S,
+            ("cosine", "sine", "cosine_twice", "sine_twice"),
+            [{}],
+            eccentric_speed,
+            phase_is_free=True,
+        ),
+        Effect(
+            "eccentricity",
+            "motor_angle_rad",
+            S,
+            ("cosine_rad", "sine_rad", "cosine_twice_rad", "sine_twice_rad"),
+            [{}],
+            eccentric_angle,
+            phase_is_free=True,
+        ),
         Effect("lost_counts", "speed_rad_per_s", S, ("share",), fast, lost_speed, scale="speed_rad_s"),
         Effect("lost_counts", "motor_angle_rad", S, ("share",), fast, lost_angle, scale="speed_rad_s"),
         Effect("clock_drift", "torque_Nm", S, ("share",), [{}], one("mechanical", drifting)),
