@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.sysid import gain, intervals, misfit, naming, plausibility, residual_term
+from ranger_sim.sysid import gain, intervals, misfit, naming, plausibility, predicted_ties, residual_term
 from ranger_sim.sysid.dataset import Table
 from ranger_sim.sysid.machine import Effect, Machine, Recording
 from ranger_sim.sysid.naming import Named
@@ -25,6 +25,7 @@ HOLDS_OUT = 0.0  # chi-square that a further effect must win on held-out data
 REFUSES = 2.33  # deviations, 1 % on one side, below what is expected: held-out data that refuse an effect
 TELLS = 9.0  # chi-square of an effect on held-out data, three deviations: below it these say nothing of it
 ROUNDS, MOST = 4, 5  # of naming; effects that are named
+RIVALS = 6  # that an answer lists
 EXPLAINED = 0.7  # of what repeats: a name that explains less is none
 SKEW = 0.5  # samples: stamps of two channels differ by so much in any log
 
@@ -103,7 +104,7 @@ def diagnose(
     if named:
         extended = naming.refit(plain, named, [*skews, *named], fresh=True)
     after = misfit.look(extended, general)
-    doubts = plausibility.look(machine, extended)
+    doubts = plausibility.look(machine, extended, named)
     detected = before.p < GENERAL_LEVEL or bool(named) or doubts.forbid
     share = _explained(named, after)
     doubtful = detected and (not named or doubts.forbid or (share < EXPLAINED and after.p < GENERAL_LEVEL))
@@ -112,7 +113,7 @@ def diagnose(
         "detected": bool(detected),
         "misfit": _channels(plain, extended, recordings),
         "subsystem": _subsystem(plain, before, named) if detected else None,
-        "causes": [_cause(each, extended, known_to) for each in named] if detected and not doubtful else [],
+        "causes": [_cause(machine, each, extended, known_to) for each in named] if detected and not doubtful else [],
         "abstained": bool(doubtful),
         "gain": None,
         "next_experiment": _next(named),
@@ -156,7 +157,7 @@ def diagnose(
         if refused:
             named = [each for each in named if each not in refused]
             extended = naming.refit(plain, named, [*skews, *named], fresh=True)
-            answer["causes"] = [_cause(each, extended, known_to) for each in named]
+            answer["causes"] = [_cause(machine, each, extended, known_to) for each in named]
             answer["abstained"] = not named
     progress("done", 1.0)
     return Diagnosis(machine, recordings, plain, extended, skews, named, before, after, answer)
@@ -243,7 +244,9 @@ def _parameter_names(recordings: Sequence[Recording]) -> list[str]:
     return [name for e in recordings[0].equations.values() for name in e.columns]
 
 
-def _cause(each: Named, extended: Regression, known_to: Mapping[str, intervals.Intervals]) -> dict[str, Any]:
+def _cause(
+    machine: Machine, each: Named, extended: Regression, known_to: Mapping[str, intervals.Intervals]
+) -> dict[str, Any]:
     parameters = {
         name: _value(extended, full) for name, full in zip(each.effect.coefficients, each.coefficients, strict=True)
     }
@@ -263,7 +266,8 @@ def _cause(each: Named, extended: Regression, known_to: Mapping[str, intervals.I
             "p": each.p,
             "bic": each.bic,
             "ties": [tie.name for tie in each.tied],
-            "behind": {effect.name: behind for effect, behind in each.rivals},
+            "behind": {effect.name: behind for effect, behind in each.rivals[:RIVALS]},
+            "predicted": predicted_ties.of(machine, extended.recordings, each),
         },
     }
 

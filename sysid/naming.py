@@ -50,7 +50,7 @@ class Named:
     p: float
     bic: float
     tied: list[Effect]
-    rivals: list[tuple[Effect, float]]  # information criterion behind the best, for the report
+    rivals: list[tuple[Effect, float]]  # all others, and how far the information criterion has each behind
 
     @property
     def coefficients(self) -> tuple[str, ...]:
@@ -121,7 +121,7 @@ def select(effects: Sequence[Effect], regression: Regression, level: float = LEV
             for each in ranking
             if each[3].effect is not trial.effect and bic - each[0] < TIE and _possible(each[3])
         ]
-        taken.append(Named(trial.effect, trial.shape, chi2, freedom, p, bic, tied, rivals[:6]))
+        taken.append(Named(trial.effect, trial.shape, chi2, freedom, p, bic, tied, rivals))
         _take(trial, all_trials, regression)
     return taken
 

@@ -8,11 +8,13 @@ told.
 import dataclasses
 import itertools
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
 from ranger_sim.sysid.dataset import Array, Finding
 from ranger_sim.sysid.machine import Known, Machine
+from ranger_sim.sysid.naming import Named
 from ranger_sim.sysid.regression import Part, Regression
 
 SURE = 5.0  # standard errors beyond a limit: chance and a small model error do not reach there
@@ -29,7 +31,21 @@ FEW, FEWEST_AT_ALL = 0.02, 50  # of the rows; what is thinned to rows that are i
 APART = 0.25  # of the mean square: equations leave less than so much of it when a parameter may differ between them
 TELLS = 0.05  # of a column's length: what the others leave of it, when the equation alone tells its parameter
 SLOWEST = 6.0  # a memory of 0.986 from sample to sample; instruments have up to 0.95 (3.2), a voltage 10 ms late has 12
-FORBID = ("impossible", "unexplained", "contradiction", "slow")  # kinds of findings after which no cause is named
+MOST = 5  # causes at once: where everything seems wrong, it is another machine, or other data
+LARGEST_SCALE = 0.5  # change that a sensor's scale may be: what is beyond is another signal, or another unit
+UNIT_TOLERANCE = 0.05  # of a factor that is told as a unit's: friction and noise move it by per cents
+# kinds of findings after which no cause is named
+FORBID = ("impossible", "unexplained", "contradiction", "slow", "too_many", "other_signal")
+# {unit of a channel: {what may be meant by its numbers instead: how many of them make one of ours}}
+OTHER_UNITS = {
+    "rad/s": {"rpm": 30.0 / np.pi, "deg/s": 180.0 / np.pi, "turns/s": 0.5 / np.pi},
+    "rad": {"deg": 180.0 / np.pi, "turns": 0.5 / np.pi, "mrad": 1e3},
+    "N m": {"lbf ft": 0.73756, "lbf in": 8.8507, "kgf cm": 10.197, "N cm": 100.0, "ozf in": 141.61, "N mm": 1e3},
+    "N": {"lbf": 0.22481, "kgf": 0.10197, "kN": 1e-3, "mN": 1e3},
+    "m": {"mm": 1e3, "cm": 100.0, "inches": 39.370},
+    "A": {"mA": 1e3, "steps of 10 mA": 100.0},
+    "V": {"mV": 1e3},
+}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -40,9 +56,14 @@ class Doubts:
     forbid: bool
 
 
-def look(machine: Machine, regression: Regression) -> Doubts:
+def look(machine: Machine, regression: Regression, named: Sequence[Named] = ()) -> Doubts:
     """What is odd in a fit. regression: with everything in it that was named."""
     findings: list[Finding] = []
+    if len(named) >= MOST:
+        text = f"{len(named)} causes at once explain it: where everything is wrong it is another machine, or other data"
+        findings.append(_finding("", "too_many", len(named), "", text))
+    for each in named:
+        findings += _of_sensor(regression, each)
     for known in machine.parameters:
         if known.name not in regression.values:
             continue
@@ -170,6 +191,8 @@ def _contradictions(machine: Machine, regression: Regression) -> list[Finding]:
                     f"it is {first.value:.4g} {known.unit} by the {first.equation} equation and {second.value:.4g} by "
                     f"the {second.equation} one: a channel of one of the two has another sign or unit"
                 )
+                if meant := other_units(machine, abs(second.value / first.value)):
+                    text += f"; {', or '.join(meant)} would do it"
                 findings.append(_finding(known.name, "contradiction", second.value, known.unit, text))
     return findings
 
@@ -199,6 +222,31 @@ def _alone(regression: Regression, equation: str, name: str) -> _Alone | None:
         return None
     better = square / max(float(np.mean(_left(regression, equation) ** 2)), 1e-300)
     return _Alone(equation, value / float(lengths[number]), better)
+
+
+def other_units(machine: Machine, factor: float) -> list[str]:
+    """Which channels' numbers in which other unit are so many times ours, or ours so many times them."""
+    found = []
+    for channel in machine.quantities:
+        for unit, size in OTHER_UNITS.get(channel.unit, {}).items():
+            if any(abs(factor / each - 1.0) < UNIT_TOLERANCE for each in (size, 1.0 / size)):
+                found.append(f"{channel.name} in {unit}")
+    return found
+
+
+def _of_sensor(regression: Regression, named: Named) -> list[Finding]:
+    """A scale or an offset of a sensor that no sensor has: its channel shows another signal, or in another unit."""
+    value = regression.values[named.coefficients[0]]
+    if named.effect.cause == "sensor_scale" and abs(value) > LARGEST_SCALE:
+        text = f"it would show {1.0 + value:.3g} times its quantity: another signal, or another unit, and no scale"
+        return [_finding(named.effect.at, "other_signal", 1.0 + value, "", text)]
+    tables = [each.table for each in regression.recordings if named.effect.at in each.table]
+    if named.effect.cause == "sensor_offset" and tables:
+        reach = max(float(np.ptp(table[named.effect.at])) for table in tables)
+        if abs(value) > reach:
+            text = f"its offset would be {abs(value):.4g}, more than its whole range of {reach:.4g}: another signal"
+            return [_finding(named.effect.at, "other_signal", value, "", text)]
+    return []
 
 
 def _factor(known: Known, value: float, factor: float) -> Finding:

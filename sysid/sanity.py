@@ -47,8 +47,9 @@ KINDS = {
     "saturation": "values cut off at a limit",
     "lag": "a channel comes later than a redundant one",
     "wrong_unit": "values as of another unit than is told",
+    "noise": "from sample to sample it jumps, and nothing of that is in another channel",
 }
-DOUBTED = ("wrong_unit", "stuck")
+DOUBTED = ("wrong_unit", "stuck", "noise")
 LEFT_OUT = ("ragged", "unreadable", "no_stamp", "not_finite", "duplicate_stamps")  # their sizes count samples
 DOUBTED_PART = 0.1  # of the samples; radio links lose a few in a hundred
 GAP_STEPS = 5.0  # of the median step; radio gaps of the robot's logs are 9 to 45 steps of 4 to 6 ms (C6.2)
@@ -67,6 +68,9 @@ FLAT_PART = 0.5  # of the steps are zero in commands that are held, which cannot
 DRIFT_PPM = 100.0  # quartz crystals differ by less
 LONGEST_LAG_S = 0.25
 LAG_STEPS = 0.5  # of the sampling: what lies below is the stamps' own rounding
+WHITE = 0.8  # half the mean square of neighbours' differences to the variance; 1 for white noise
+COMMON = 6.0  # deviations of a correlation with white noise; some hundred lags of some channels reach 4.5 by chance
+COMMON_LAGS, FEWEST_OF_NOISE = 50, 300  # samples
 FEWEST = 30  # samples below which nothing but stamps is looked at
 SLOPES = {  # what a rate may be as a multiple of the angle's derivative, and what that says
     180.0 / math.pi: "the rate is in deg/s, or the angle in turns of rad",
@@ -113,6 +117,7 @@ LARGEST = (
     ("_Nm", 2000.0, "mNm or N mm"),
 )
 LARGEST_JOINT_RAD = 2.0 * math.pi
+SMALLEST = 1e-12  # largest value of a channel in SI: no instrument of such machines resolves it
 LONGEST_STEP_S = 0.5  # median of the stamps: slower than any experiment here
 
 
@@ -272,6 +277,9 @@ def _size(channel: Channel) -> Iterator[Finding]:
     top = float(np.abs(channel.value).max())
     ends = float(channel.time_s[0]), float(channel.time_s[-1])
     typical = float(np.median(np.abs(channel.value)))
+    if top < SMALLEST:
+        text = f"values up to {top:.4g} {channel.unit}: below what any instrument shows"
+        yield Finding(channel.name, "wrong_unit", *ends, top, channel.unit, text)
     for end, largest, rather in LARGEST:
         if channel.name.endswith(end) and typical > largest:
             text = f"values around {typical:.4g} {channel.unit}: they are probably {rather}"
@@ -442,6 +450,7 @@ def lattice_step(value: Array) -> float:
 def _between(channels: dict[str, Channel]) -> Iterator[Finding]:
     for channel in channels.values():
         yield from _clock(channel)
+    yield from _noise(channels)
     for angle, rate in DERIVATIVES:
         if angle in channels and rate in channels:
             yield from _derivative(channels[angle], channels[rate])
@@ -450,6 +459,46 @@ def _between(channels: dict[str, Channel]) -> Iterator[Finding]:
             late = lag_s(channels[first], channels[second])
             if late is not None:
                 yield from _lag(channels[first], channels[second], late)
+
+
+def _noise(channels: dict[str, Channel]) -> Iterator[Finding]:
+    """Channels that are white noise and have nothing in common with any other; all of them, where rows are in disorder.
+
+    A motor may be driven by white noise: then what it does goes with it, within some samples.
+    """
+    white = [each for each in channels.values() if _is_white(each)]
+    if len(white) > 1 and len(white) == len([each for each in channels.values() if np.ptp(each.value) > 0.0]):
+        text = "every channel jumps from sample to sample as white noise does: nothing in it moves"
+        ends = float(white[0].time_s[0]), float(white[0].time_s[-1])
+        yield Finding(white[0].name, "noise", *ends, 0.0, "", text)
+        return
+    for channel in white:
+        others = [each for each in channels.values() if each.name != channel.name and np.ptp(each.value) > 0.0]
+        if others and not any(_have_in_common(channel, other) for other in others):
+            text = "it is noise from sample to sample, and nothing of it is in any other channel"
+            yield Finding(channel.name, "noise", float(channel.time_s[0]), float(channel.time_s[-1]), 0.0, "", text)
+
+
+def _is_white(channel: Channel) -> bool:
+    value = channel.value
+    if len(value) < FEWEST_OF_NOISE or not np.var(value) > 0.0 or not channel.unit or channel.unit in WARMTHS:
+        return False
+    return bool(0.5 * np.mean(np.diff(value) ** 2) > WHITE * np.var(value))
+
+
+def _have_in_common(channel: Channel, other: Channel) -> bool:
+    """True when a white channel is correlated with another one or its differences, at some lag."""
+    value = (channel.value - channel.value.mean()) / channel.value.std()
+    beside = np.interp(channel.time_s, other.time_s, other.value)
+    for shown in (beside, np.gradient(beside)):
+        if not shown.std() > 0.0:
+            continue
+        shown = (shown - shown.mean()) / shown.std()
+        for lag in range(-COMMON_LAGS, COMMON_LAGS + 1):
+            rows = len(value) - abs(lag)
+            if abs(float(value[max(0, -lag) :][:rows] @ shown[max(0, lag) :][:rows])) > COMMON * math.sqrt(rows):
+                return True
+    return False
 
 
 def _clock(channel: Channel) -> Iterator[Finding]:

@@ -158,6 +158,7 @@ def test_a_term_hidden_in_the_emulated_bench_is_found_and_the_benchs_error_falls
     assert after["torque_Nm"] < 0.003 and before["torque_Nm"] > 4.0 * after["torque_Nm"]
     assert after["speed_rad_per_s"] < 0.033 < 0.04 < before["speed_rad_per_s"]
     assert found.answer["causes"][0]["name"] == "cogging"
+    assert found.answer["causes"][0]["evidence"]["predicted"] == {"status": "shown", "ties": []}
 
 
 def test_a_second_diagnosis_that_starts_from_the_file_finds_nothing_more(cogging):

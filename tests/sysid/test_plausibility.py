@@ -11,8 +11,9 @@ from ranger_sim.sysid.benches.bench_terms import BenchTerms
 from ranger_sim.sysid.benches.motor_run import motor_run
 from ranger_sim.sysid.dataset import Table
 from ranger_sim.sysid.diagnose import diagnose
-from ranger_sim.sysid.machine import Known
+from ranger_sim.sysid.machine import Effect, Known
 from ranger_sim.sysid.machines.motor_bench import MotorBench
+from ranger_sim.sysid.naming import Named
 from ranger_sim.sysid.regression import Regression
 from tests.sysid.test_diagnose import SIZE, Cart, cart_run
 
@@ -164,3 +165,51 @@ def test_a_speed_that_is_another_motion_than_the_angle_is_told(bench):
     with pytest.raises(UserError, match="not the same motion"):
         MotorBench().prepare(Table(bench.time_s, {**bench.columns, "speed_rad_per_s": noise}, bench.runs))
     assert np.all(np.isfinite(MotorBench().prepare(bench).signals["w"]))
+
+
+def of(machine, regression, cause, **coefficients):
+    """A cause as named, with these coefficients put into the regression's values."""
+    effect = Effect(cause, "force_N", "mechanical", tuple(coefficients), [{}], lambda *_: {})
+    made = Named(effect, {}, 100.0, 1, 0.0, 90.0, [], [])
+    regression.values |= dict(zip(made.coefficients, coefficients.values(), strict=True))
+    return made
+
+
+def test_a_machine_in_which_everything_is_wrong_is_another_one():
+    machine = Cart()
+    regression = Regression([machine.prepare(cart_run(1))])
+    causes = [of(machine, regression, "drag", quadratic=0.1)] * plausibility.MOST
+    assert not plausibility.look(machine, regression, causes[1:]).forbid
+    told = plausibility.look(machine, regression, causes)
+    assert told.forbid and [each.kind for each in told.findings] == ["too_many"]
+
+
+@pytest.mark.parametrize(
+    ("cause", "coefficients", "doubted"),
+    [
+        ("sensor_scale", {"change": 0.3}, False),
+        ("sensor_scale", {"change": -0.98}, True),  # it shows next to nothing of its quantity
+        ("sensor_scale", {"change": 8.85}, True),
+        ("sensor_offset", {"offset_N": 0.5}, False),
+        ("sensor_offset", {"offset_N": -1e6}, True),
+        ("drag", {"quadratic": 1e6}, False),  # not a matter of a sensor
+    ],
+)
+def test_a_scale_or_an_offset_that_no_sensor_has_is_another_signal(cause, coefficients, doubted):
+    machine = Cart()
+    regression = Regression([machine.prepare(cart_run(1))])
+    told = plausibility.look(machine, regression, [of(machine, regression, cause, **coefficients)])
+    assert told.forbid is doubted and [each.kind for each in told.findings] == ["other_signal"] * doubted
+
+
+@pytest.mark.parametrize(
+    ("factor", "meant"),
+    [
+        (1.0, []),
+        (8.8507, ["torque_Nm in lbf in"]),
+        (1.0 / 9.6, ["speed_rad_per_s in rpm"]),
+        (2.0, []),
+    ],
+)
+def test_a_factor_between_two_equations_tells_the_units_that_would_do_it(factor, meant):
+    assert plausibility.other_units(MotorBench(), factor) == meant

@@ -89,6 +89,7 @@ CASES = [
     ("lag", lambda: changed("joint_rate_rad_per_s", lambda v: np.roll(v, -5)), "joint_rate_rad_per_s", 0.004, -0.020),
     ("wrong_unit", lambda: changed("joint_rate_rad_per_s", np.degrees), "joint_rate_rad_per_s", None, 57.296),
     ("wrong_unit", lambda: changed("joint_angle_rad", np.degrees), "joint_angle_rad", None, None),
+    ("wrong_unit", lambda: changed("current_A", lambda v: 1e-200 * v), "current_A", None, None),
     ("wrong_unit", lambda: changed("joint_rate_rad_per_s", np.negative), "joint_rate_rad_per_s", None, -1.0),
     ("wrong_unit", lambda: changed("joint_rate_rad_per_s", lambda v: v * 30 / math.pi), "joint_rate_rad_per_s", None,
      9.549),
@@ -302,3 +303,30 @@ def test_an_angle_that_stands_while_its_own_rate_moves_is_stuck():
     (told,) = found(bench_at_first_at_rest(speed_rad_per_s=turning), "stuck")
     assert told.channel == "motor_angle_rad" and told.size == pytest.approx(0.508, abs=0.004)
     assert "while speed_rad_per_s move" in told.text
+
+
+def test_a_channel_of_noise_that_has_nothing_in_common_with_the_others_is_told():
+    noise = generator(6, "nobody's").normal(size=N)
+    (told,) = found(changed("current_A", lambda v: noise), "noise")
+    assert told.channel == "current_A" and "nothing of it is in any other channel" in told.text
+
+
+@pytest.mark.parametrize("late", [0, 3, -20])
+def test_white_noise_that_drives_a_machine_is_none(late):
+    """Its current follows a voltage that jumps at every sample, through a filter and some samples late."""
+    time_s, drive = np.arange(N) * 0.004, generator(8, "a drive").normal(size=N)
+    answer = np.zeros(N)
+    for number in range(1, N):
+        answer[number] = 0.9 * answer[number - 1] + 0.1 * drive[number]
+    answer += 0.1 * generator(9, "its sensor").normal(size=N)
+    data = recording(voltage_V=(time_s, drive, "V"), other_A=(time_s, np.roll(answer, late), "A"))
+    assert found(data, "noise") == []
+
+
+def test_rows_in_disorder_are_told():
+    data = recording()
+    order = generator(10, "disorder").permutation(N)
+    for name, channel in data.channels.items():
+        data.channels[name] = dataclasses.replace(channel, value=channel.value[order])
+    (told,) = found(data, "noise")
+    assert "every channel jumps from sample to sample" in told.text

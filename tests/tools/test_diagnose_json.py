@@ -20,7 +20,12 @@ SCHEMA = {
     ],
     "subsystem": (str, type(None)),
     "causes": [
-        {"name": str, "balance": str, "parameters": {...: VALUE}, "tied_with": [str], "evidence": dict},
+        {"name": str, "balance": str, "parameters": {...: VALUE}, "tied_with": [str], "evidence": {
+            "chi2": NUMBER, "p": NUMBER, "bic": NUMBER, "ties": [str], "behind": {...: NUMBER},
+            "predicted": (type(None), {"status": str, "ties": [{
+                "with": str, "reason": (str, type(None)), "cosine": (float, type(None)), "data": str,
+                "behind": (float, type(None))}]}),
+        }},
     ],
     "abstained": bool,
     "gain": (type(None), {"fraction_of_achievable": NUMBER, "ci95": INTERVAL, "holdout": str}),

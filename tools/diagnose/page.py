@@ -11,7 +11,7 @@ import numpy as np
 from markupsafe import Markup, escape
 from plotly.offline import get_plotlyjs
 
-from ranger_sim.sysid import inspection
+from ranger_sim.sysid import inspection, predicted_ties
 from ranger_sim.sysid.diagnose import Diagnosis
 from ranger_sim.sysid.naming import Named
 from ranger_sim.tools.diagnose import figures, words
@@ -96,6 +96,7 @@ def cause_of(found: Diagnosis, each: Named, cause: dict[str, Any], sides: dict[s
         "chi2": cause["evidence"]["chi2"],
         "p": cause["evidence"]["p"],
         "bic": cause["evidence"]["bic"],
+        "predicted": [f"{line[0].upper()}{line[1:]}" for line in predicted_ties.told(cause["evidence"]["predicted"])],
         "rivals": [
             {"name": name, "behind": behind, "standing": "a tie" if name in tied else words.standing(behind)}
             for name, behind in rivals

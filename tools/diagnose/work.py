@@ -18,7 +18,7 @@ from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeEl
 from rich.table import Table as RichTable
 
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.sysid import model_file, repairs, sanity
+from ranger_sim.sysid import model_file, predicted_ties, repairs, sanity
 from ranger_sim.sysid.channels import named_for
 from ranger_sim.sysid.dataset import Dataset, Finding, Table
 from ranger_sim.sysid.diagnose import Diagnosis, KnownEffect, diagnose
@@ -170,7 +170,10 @@ def _prepared(dataset: Dataset, machine: Machine, experiment: str) -> tuple[Tabl
     dataset.findings = [each for each in dataset.findings if each.channel in ("", *names)]
     findings = sanity.inspect(dataset)
     sanity.stop_if_fatal(dataset.name, findings)
+    needed = [each.name for each in machine.quantities if each.needed]
     for doubt in sanity.doubts(dataset, findings):
+        if doubt.kind == "noise" and doubt.channel not in needed:
+            continue  # a channel at rest; what it is needed for says more
         place = f"{doubt.channel}: " if doubt.channel else ""
         raise UserError(f"{dataset.name}: {place}{doubt.text}; nothing is concluded from such data")
     if experiment in MACHINES:  # a user's own machine may have a setting for a channel
@@ -197,9 +200,26 @@ def _diagnosed(
     findings = [
         {**dataclasses.asdict(finding), "recording": table.name} for table, found in (*data, *held) for finding in found
     ]
-    return diagnose(
-        machine, [table for table, _ in data], [table for table, _ in held], seed, findings, known, progress
-    )
+    tables = [table for table, _ in data]
+    names = ", ".join(table.name for table in tables)
+    try:
+        with np.errstate(over="ignore", invalid="ignore"):  # what overflows ends as no number, which is told below
+            found = diagnose(machine, tables, [table for table, _ in held], seed, findings, known, progress)
+    except (np.linalg.LinAlgError, FloatingPointError) as error:
+        text = f"{names}: no machine can be fitted to these numbers ({error}); nothing is concluded from such data"
+        raise UserError(text) from None
+    wrong = _no_number(found.answer)
+    if wrong:
+        raise UserError(f"{names}: {wrong} comes out as no number; nothing is concluded from such data")
+    return found
+
+
+def _no_number(value: Any, place: str = "") -> str:
+    """Where in an answer the first number is that is none; empty without such."""
+    if isinstance(value, float):
+        return "" if np.isfinite(value) else place
+    inside = value.items() if isinstance(value, Mapping) else enumerate(value) if isinstance(value, list) else ()
+    return next((found for key, each in inside if (found := _no_number(each, f"{place} {key}".strip()))), "")
 
 
 def _json(answer: Mapping[str, Any]) -> str:
@@ -245,6 +265,8 @@ def _show(found: Diagnosis, console: Console) -> None:
         )
         tied = f"; ties with {', '.join(cause['evidence']['ties'])}" if cause["evidence"]["ties"] else ""
         console.print(f"{cause['name']} at {cause['at']}: {values}{tied}", highlight=False, soft_wrap=True)
+        for line in predicted_ties.told(cause["evidence"]["predicted"]):
+            console.print(f"  {line}", highlight=False, soft_wrap=True)
     if answer["gain"] is not None:
         gain = answer["gain"]
         low, high = gain["ci95"]
