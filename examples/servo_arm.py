@@ -11,7 +11,7 @@ arm was weighed. Without one known torque nothing here has a scale. Diagnose a l
 import numpy as np
 
 from ranger_sim.sysid import signals
-from ranger_sim.sysid.free_simulation import Output, Port, SimulatedMachine, Term, runge_kutta
+from ranger_sim.sysid.free_simulation import Output, Port, SimulatedMachine, Term, runge_kutta, standing
 from ranger_sim.sysid.machine import Known, Quantity
 
 WEIGHT_NM = 1.6  # m g l
@@ -61,6 +61,10 @@ class ServoArm(SimulatedMachine):
 
     def step(self, x, u, p, step_s):
         return runge_kutta(self.rates, x, u, p, step_s)
+
+    def loose(self, x, u, p, step_s):
+        """Where the arm stands, its friction takes what comes: nothing is concluded from its torque there."""
+        return {"rate": standing(x["rate"], p["friction_Nm"], 0.02, step_s) / p["inertia_kg_m2"]}
 
     def observe(self, x, u, p):
         return {"angle_rad": x["angle"] + u["angle_error_rad"]}

@@ -26,6 +26,7 @@ REFUSES = 2.33  # deviations, 1 % on one side, below what is expected: held-out 
 TELLS = 9.0  # chi-square of an effect on held-out data, three deviations: below it these say nothing of it
 ROUNDS, MOST = 4, 5  # of naming; effects that are named
 RIVALS = 6  # that an answer lists
+AGAIN = 2  # times that what was named is simulated, and all naming done over
 EXPLAINED = 0.7  # of what repeats: a name that explains less is none
 SKEW = 0.5  # samples: stamps of two channels differ by so much in any log
 
@@ -83,18 +84,17 @@ def diagnose(
     progress("misfit", 0.2)
     plain = naming.refit(whole, skews)
     before = misfit.look(plain, general)
-    named: list[Named] = []
-    extended = plain
-    rest = [each for each in effects if all(each is not skew.effect for skew in skews)]
-    for number in range(ROUNDS):
-        progress("causes", 0.25 + 0.5 * number / ROUNDS)
-        found = naming.select(rest, extended, NAMED_LEVEL, MOST - len(named))
-        if not found:
+    rest, first = [each for each in effects if all(each is not skew.effect for skew in skews)], recordings
+    named, extended = _name(rest, plain, skews, lambda share: progress("causes", 0.25 + 0.25 * share))
+    for number in range(AGAIN if named and hasattr(machine, "again") else 0):
+        progress("simulated again", 0.5 + 0.25 * number / AGAIN)
+        recordings = _simulated_again(machine, recordings, named, extended)
+        plain = naming.refit(Regression(recordings), skews, fresh=True)
+        was, (named, extended) = named, _name(rest, plain, skews)
+        if [each.effect for each in named] == [each.effect for each in was]:
             break
-        named += found
-        rest = [each for each in rest if not any(other.effect.excludes(each) for other in found)]
-        # what was named no longer counts as noise, and smaller effects stand out
-        extended = naming.refit(plain, named, [*skews, *named], fresh=True)
+    if recordings is not first:
+        general = misfit.general_features(machine, recordings)
     progress("what is left", 0.75)
     known_to: dict[str, intervals.Intervals] = {}
     for each in named:
@@ -161,6 +161,39 @@ def diagnose(
             answer["abstained"] = not named
     progress("done", 1.0)
     return Diagnosis(machine, recordings, plain, extended, skews, named, before, after, answer)
+
+
+def _name(
+    effects: Sequence[Effect],
+    plain: Regression,
+    skews: Sequence[Named],
+    progress: Callable[[float], None] = lambda share: None,
+) -> tuple[list[Named], Regression]:
+    """What of the effects is named, the most telling first, and the regression with it."""
+    named: list[Named] = []
+    extended, rest = plain, list(effects)
+    for number in range(ROUNDS):
+        progress(number / ROUNDS)
+        found = naming.select(rest, extended, NAMED_LEVEL, MOST - len(named))
+        if not found:
+            break
+        named += found
+        rest = [each for each in rest if not any(other.effect.excludes(each) for other in found)]
+        # what was named no longer counts as noise, and smaller effects stand out
+        extended = naming.refit(plain, named, [*skews, *named], fresh=True)
+    return named, extended
+
+
+def _simulated_again(
+    machine: Machine,
+    recordings: Sequence[Recording],
+    named: Sequence[Named],
+    extended: Regression,
+    fixed: bool = False,
+) -> list[Recording]:
+    """The recordings of a machine that is told by its simulator, with what was named in the simulation."""
+    acting = [(each.effect, each.shape, [extended.values[name] for name in each.coefficients]) for each in named]
+    return [machine.again(recording, acting, fixed) for recording in recordings]  # type: ignore[attr-defined]
 
 
 def _skews(effects: Sequence[Effect], regression: Regression) -> list[Named]:
@@ -317,6 +350,8 @@ def _gain(
     seed: int,
 ) -> dict[str, Any]:
     recordings = [machine.prepare(table) for table in holdout]
+    if named and hasattr(machine, "again"):
+        recordings = _simulated_again(machine, recordings, named, extended, fixed=True)
     general = misfit.general_features(machine, recordings)
     base = naming.refit(Regression(recordings, noise=plain), skews, values=plain.values)
     kept: list[Named] = []
@@ -332,6 +367,12 @@ def _gain(
             tells = tells or expected >= TELLS
         else:
             refused.append(each)
+    if found is not None and hasattr(machine, "free"):
+        # refused or not is asked of the sharpest equations; how much nearer the simulation comes, of the simulation
+        recordings = [machine.free(recording) for recording in recordings]
+        general = misfit.general_features(machine, recordings)
+        base = naming.refit(Regression(recordings), skews, values=plain.values)
+        found = gain.measure(base, kept, extended.values, general, seed)
     return {
         "fraction_of_achievable": found.fraction if found is not None else 0.0,
         "ci95": list(found.ci95) if found is not None else [0.0, 0.0],

@@ -18,10 +18,15 @@ free initial states; the trajectory itself is found by multiple shooting with se
 gaps are closed as far as the inputs' noise does not explain them. So a start far off converges, and a machine that
 forgets nothing does not carry its errors along.
 
+An effect that is named acts in the simulator from then on (`again`): trajectory, parameters and its own size are fitted
+together, so that a large one is not told by its first order about a model without it. What an extension gains is asked
+of simulations that run freely over windows (`free`).
+
 A user's machine is a subclass of `SimulatedMachine`; `examples/servo_arm.py` is a complete one.
 """
 
 import abc
+import copy
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 from typing import cast
@@ -45,6 +50,9 @@ ROUGH_S = 0.1  # window in which a channel's own noise is told from its course, 
 MOST_ROWS = 12000  # of a recording; a longer one is averaged over neighbours
 AWAY = 30.0  # a free initial state's deviation, in rms of the state: as good as unknown
 STRETCH = 400  # samples of a stretch whose covariances are found side by side with the others'
+LOUDER = 2.0  # times the noise that a channel shows itself (`roughness`), which misses what is slower. Chosen by us
+OPEN_S = 0.01  # memory of what dry friction does where it holds; chosen by us
+AGAIN = 6  # rounds with an effect in the simulator, at most: it starts where the fit without it ended
 SILENT = 1e-6  # share of an effect's length below which an equation does not have it
 
 Quantities = Mapping[str, Array]  # by name, all of one shape
@@ -95,12 +103,37 @@ class Term:
     phase_is_free: bool = False
 
 
+@dataclasses.dataclass(frozen=True)
+class SimulatedEffect(Effect):
+    """A term as an effect on the outputs."""
+
+    term: Term | None = None
+
+
+@dataclasses.dataclass(frozen=True)
+class Acting:
+    """An effect that acts in the simulator: its term at a shape, and coefficients."""
+
+    term: Term
+    shape: Shape
+    coefficients: tuple[float, ...]
+
+
 def held(rate: Array, braking: Array) -> Array:
     """A rate after dry friction that can take `braking` of it in this step: it comes to rest and does not turn round.
 
     This is the implicit step of Coulomb's law: true standstill, without a smoothed sign that creeps.
     """
     return cast(Array, np.sign(rate) * np.maximum(np.abs(rate) - braking, 0.0))
+
+
+def standing(rate: Array, friction: Array, slow: float, step_s: float) -> Array:
+    """Deviation of dry friction's impulse per step near standstill, where it takes what comes (for `loose`).
+
+    rate: (n,); friction: its limit, torque or force; slow: rate about which a smoothed sign turns. A machine that truly
+    stands would otherwise differ from every simulation with a smoothed sign, and that would be called an effect.
+    """
+    return np.asarray(friction * np.exp(-0.5 * (rate / (2.0 * slow)) ** 2) * np.sqrt(2.0 * OPEN_S * step_s))
 
 
 def runge_kutta(
@@ -150,7 +183,7 @@ class Predictor:
     """
 
     def __init__(self, lin: Jacobians, noise_u: Array, noise_y: Array, loose: Array, starts: np.ndarray, away: Array,
-                 before: "Predictor | None" = None) -> None:  # fmt: skip
+                 before: "Predictor | None" = None, stretch: int = STRETCH) -> None:  # fmt: skip
         """noise_u: (i,), noise_y: (o,) standard deviations; loose: (n, s) of each step; starts: samples at which the
         state is free, with standard deviations `away` (s,). before: of the last round of a fit."""
         n, s = lin.next_state.shape
@@ -172,7 +205,7 @@ class Predictor:
         # Side by side in stretches, each from the covariance that the one before ended with in the last round; in the
         # first round a stretch knows nothing, which is multiple shooting as it stands in the books.
         free = np.asarray(np.diag(away**2), dtype=float)
-        length = min(n, STRETCH)
+        length = min(n, stretch)
         P: Array = np.tile(free, (-(-n // length), 1, 1))
         if before is not None:
             P[1:] = before.ends[:-1]
@@ -250,22 +283,28 @@ class SimulatedRecording(Recording):
     predictor: Predictor | None = None
     ports: tuple[Port, ...] = ()
     outputs: tuple[str, ...] = ()
+    fit: "_Fit | None" = None  # where it comes from, and goes on with an effect in the simulator
+
+    def entering(self, entries: Ports) -> Array:
+        """(n, ports, k): what enters at the ports, (n,) or (n, k) by name, weighed by where it can."""
+        columns = {name: each[:, None] if each.ndim == 1 else each for name, each in entries.items()}
+        out = np.zeros((len(self.table), len(self.ports), next(iter(columns.values())).shape[1]))
+        for number, port in enumerate(self.ports):
+            if port.name in columns:
+                out[:, number] = columns[port.name]
+                if port.where:
+                    out[:, number] *= self.signals[port.where][:, None]
+        return out
 
     def respond(self, entries: Ports) -> Columns:
         """What the equations see, to first order, of something at the ports: (n, k) each."""
         lin, predictor = self.linear, self.predictor
         assert lin is not None and predictor is not None
-        columns = {name: each[:, None] if each.ndim == 1 else each for name, each in entries.items()}
-        width = next(iter(columns.values())).shape[1]
-        state = np.zeros((predictor.n, predictor.s, width))
-        output = np.zeros((predictor.n, predictor.o, width))
-        numbers = {port.name: number for number, port in enumerate(self.ports)}
-        for name, each in columns.items():
-            number = numbers[name]
-            where = self.ports[number].where
-            each = self.signals[where][:, None] * each if where else each  # noqa: PLW2901
-            state += lin.f_q[:, :, number, None] * _between(each)[:, None, :]
-            output += lin.h_q[:, :, number, None] * each[:, None, :]
+        unknown = [name for name in entries if name not in {port.name for port in self.ports}]
+        if unknown:
+            raise UserError(f"a term puts something into {', '.join(unknown)}; ports are {_names(self.ports)}")
+        entering = self.entering(entries)
+        state, output = forced(lin.f_q, _between(entering)), forced(lin.h_q, entering)
         white = predictor.white(predictor.errors(state, output))
         power = (white**2).sum(axis=(0, 2)) / predictor.unit**2
         return {
@@ -276,6 +315,19 @@ class SimulatedRecording(Recording):
 def _between(column: Array) -> Array:
     """Middle values of a sample and the next, in which a step is taken."""
     return np.asarray(0.5 * (column + np.concatenate((column[1:], column[-1:]))), dtype=float)
+
+
+def forced(sensitivity: Array, entering: Array) -> Array:
+    """(n, r, k): what enters at the ports, (n, q, k), times sensitivities (n, r, q) to it."""
+    out = np.zeros((len(entering), sensitivity.shape[1], entering.shape[2]))
+    for number in range(entering.shape[1]):
+        if np.any(entering[:, number]):
+            out += sensitivity[:, :, number, None] * entering[:, None, number]
+    return out
+
+
+def _names(ports: Sequence[Port]) -> str:
+    return ", ".join(port.name for port in ports)
 
 
 def roughness(table: Table, column: Array) -> float:
@@ -333,6 +385,7 @@ class SimulatedMachine(abc.ABC):
     noisy_inputs: Mapping[str, float | None] = {}
     horizon_s: float = float("inf")  # after so long the state is free again: shorter for a model that is far off
     shortest_s: float = 2.0  # of a recording that says anything
+    window_s: float = 2.0  # over which a gain is asked of the free simulation
 
     @abc.abstractmethod
     def inputs(self, table: Table) -> dict[str, Array]:
@@ -390,7 +443,7 @@ class SimulatedMachine(abc.ABC):
 
     def effects(self, recordings: Sequence[Recording]) -> list[Effect]:
         """The terms, as what the outputs make of them."""
-        made = []
+        made: list[Effect] = []
         for term in self.terms(cast(Sequence[SimulatedRecording], recordings)):
 
             def columns(recording: Recording, shape: Shape, values: Values, term: Term = term) -> Columns:
@@ -398,7 +451,7 @@ class SimulatedMachine(abc.ABC):
                 return simulated.respond(term.make(simulated, shape, values))
 
             made.append(
-                Effect(
+                SimulatedEffect(
                     term.cause,
                     term.at,
                     term.subsystem,
@@ -408,9 +461,30 @@ class SimulatedMachine(abc.ABC):
                     term.admissible,
                     term.meaning,
                     phase_is_free=term.phase_is_free,
+                    term=term,
                 )
             )
         return made
+
+    def again(
+        self, recording: Recording, effects: Sequence[tuple[Effect, Shape, Sequence[float]]], fixed: bool = False
+    ) -> Recording:
+        """The recording fitted and linearised with these effects in the simulator; fixed: their coefficients stay."""
+        acting = [
+            Acting(effect.term, shape, tuple(coefficients))
+            for effect, shape, coefficients in effects
+            if isinstance(effect, SimulatedEffect) and effect.term is not None
+        ]
+        fit = cast(SimulatedRecording, recording).fit
+        assert fit is not None
+        return fit.acted_on(acting, fixed).recording(AGAIN)
+
+    def free(self, recording: Recording) -> Recording:
+        """The recording with equations that are errors of free simulation: what the simulator, started at the most
+        probable state of each window, misses of the outputs over `window_s`. Inputs count as exact."""
+        fit = cast(SimulatedRecording, recording).fit
+        assert fit is not None
+        return fit.free()
 
     def generic(self, recording: Recording) -> dict[str, dict[str, Array]]:
         """The signals of `looked_over`."""
@@ -451,6 +525,7 @@ class _Fit:
         steps = np.array([table.resolution.get(each.channel, 0.0) for each in machine.outputs])
         rough = np.array([roughness(table, column) for column in self.y.T])
         self.noise_y = np.maximum(np.hypot(rough, steps / np.sqrt(12.0)), 1e-9 * np.ptp(self.y, axis=0))
+        self.shown_y = self.noise_y
         self.u = (
             np.column_stack([self.inputs[name] for name in self.noisy]) if self.noisy else np.zeros((len(table), 0))
         )
@@ -463,6 +538,41 @@ class _Fit:
         self.starts = np.array([k for run in table.runs for k in range(run.start, run.stop, reach)])
         self.ends = np.zeros(len(table), dtype=bool)  # no step leads from here to the next sample
         self.ends[[run.stop - 1 for run in table.runs]] = True
+        self.acting: list[Acting] = []
+        self.moves = np.ones(len(self.p))  # 0 for a parameter that stays
+        self.at_ports = np.zeros((len(table), len(machine.ports), 0))  # of one unit of each coefficient
+
+    def acted_on(self, acting: Sequence[Acting], fixed: bool) -> "_Fit":
+        """A fit that goes on from here with effects in the simulator; their coefficients follow the parameters."""
+        new, count = copy.copy(self), len(self.names)
+        new.acting = list(acting)
+        added = np.array([each for one in acting for each in one.coefficients])
+        new.p = np.concatenate((self.p_at[:count], added))
+        new.low, new.high = (
+            np.concatenate((limit[:count], np.full(len(added), beyond)))
+            for limit, beyond in ((self.low, -np.inf), (self.high, np.inf))
+        )
+        new.size_p = np.concatenate((self.size_p[:count], np.where(added != 0.0, np.abs(added), 1.0)))
+        new.moves = np.concatenate((np.ones(count), np.full(len(added), 0.0 if fixed else 1.0)))
+        new.came_from = (new.x, new.u, new.p)
+        return new
+
+    def _acting_now(self) -> Array:
+        """(n, ports, coefficients): what the effects put into the ports along the trajectory as it is."""
+        if not self.acting:
+            return self.at_ports
+        seen, values = self._seen(), dict(zip(self.names, self.p, strict=False))
+        return np.concatenate([seen.entering(each.term.make(seen, each.shape, values)) for each in self.acting], axis=2)
+
+    def _seen(self) -> SimulatedRecording:
+        """Signals along the trajectory, without equations."""
+        machine, table = self.machine, self.table
+        along = {name: self.x[:, i] for i, name in enumerate(machine.states)}
+        along |= self.inputs | {name: self.u[:, i] for i, name in enumerate(self.noisy)}
+        along |= {each.channel: self.lin.output[:, i] for i, each in enumerate(machine.outputs)}
+        along["t"] = table.time_s - table.time_s[0]
+        along |= machine.extra_signals(along, table)
+        return SimulatedRecording(table, along, {}, ports=machine.ports)
 
     def _at(self, x: Array, u: Array, p: Array, ports: Array) -> tuple[Array, Array]:
         """(f, h) as (m, n, s) and (m, n, o). x: (m, n, s), u: (m, n, i), p: (m, n or 1, p), ports: (m, n or 1, q)."""
@@ -472,26 +582,28 @@ class _Fit:
         values = {name: p[..., i] for i, name in enumerate(self.names)}
         given = {name: column[None] for name, column in self.inputs.items()}
         given |= {name: u[..., i] for i, name in enumerate(self.noisy)}
+        given |= {each.name: ports[..., i] for i, each in enumerate(machine.ports)}
         middle = {
             name: np.asarray(0.5 * (c + np.concatenate((c[:, 1:], c[:, -1:]), axis=1))) for name, c in given.items()
         }
-        entering = {each.name: ports[..., i] for i, each in enumerate(machine.ports)}
-        after = machine.step(states, middle | entering, values, self.step_s)
-        seen = machine.observe(states, given | entering, values)
+        after = machine.step(states, middle, values, self.step_s)
+        seen = machine.observe(states, given, values)
         f = np.stack([np.broadcast_to(after[name], shape) for name in machine.states], axis=-1)
         h = np.stack([np.broadcast_to(seen[each.channel], shape) for each in machine.outputs], axis=-1)
         return f, h
 
     def linearise(self) -> Jacobians:
-        """By central differences, all samples at once."""
+        """By central differences, all samples at once; with the effects that act."""
         x, u, p = self.x[None], self.u[None], self.p[None, None]
-        none = np.zeros((1, 1, len(self.machine.ports)))
-        f, h = self._at(x, u, p, none)
+        count = len(self.names)
+        self.at_ports = self._acting_now()
+        ports = (self.at_ports @ self.p[count:])[None] if self.acting else np.zeros((1, 1, len(self.machine.ports)))
+        f, h = self._at(x, u, p, ports)
 
         def derivative(which: int, sizes: Array) -> tuple[Array, Array]:
             columns = []
             for number, size in enumerate(sizes):
-                arguments = [x, u, p, none]
+                arguments = [x, u, p, ports]
                 up, down = arguments[which].copy(), arguments[which].copy()
                 up[..., number] += NUDGE * size
                 down[..., number] -= NUDGE * size
@@ -504,8 +616,11 @@ class _Fit:
 
         f_x, h_x = derivative(0, self.size_x)
         f_u, h_u = derivative(1, self.size_u)
-        f_p, h_p = derivative(2, self.size_p)
+        f_p, h_p = derivative(2, self.size_p[:count])
         f_q, h_q = derivative(3, np.ones(len(self.machine.ports)))
+        if self.acting:
+            f_p = np.concatenate((f_p, forced(f_q, _between(self.at_ports))), axis=2)
+            h_p = np.concatenate((h_p, forced(h_q, self.at_ports)), axis=2)
         if not all(np.all(np.isfinite(each)) for each in (f, h, f_x, h_x, f_p, h_p)):
             raise UserError(
                 f"{self.table.name}: the simulator of {self.machine.name} gives no numbers on this recording"
@@ -517,7 +632,8 @@ class _Fit:
         states = {name: self.x[:, i] for i, name in enumerate(machine.states)}
         values = {name: np.full(len(self.x), self.p[i]) for i, name in enumerate(self.names)}
         given = self.inputs | {name: self.u[:, i] for i, name in enumerate(self.noisy)}
-        given |= {each.name: np.zeros(len(self.x)) for each in machine.ports}
+        entering = self.at_ports @ self.p[len(self.names) :]
+        given |= {each.name: entering[:, i] for i, each in enumerate(machine.ports)}
         found = machine.loose(states, given, values, self.step_s)
         nothing = np.zeros(len(self.x))
         # a trace of noise keeps the predictor from being certain of what it has never seen
@@ -541,7 +657,7 @@ class _Fit:
         self.response, self.columns = wide.white(errors)[:, :, 0], wide.white(moved)
         n = self.response.size
         self.cost = float(np.mean((self.response / wide.unit) ** 2))
-        a = (self.columns / wide.unit[None, :, None]).reshape(n, len(self.p)) * self.size_p
+        a = (self.columns / wide.unit[None, :, None]).reshape(n, len(self.p)) * (self.size_p * self.moves)
         b = (self.response / wide.unit).reshape(n)
         length = np.maximum(np.linalg.norm(a, axis=0), 1e-30)
         u, sv, vt = np.linalg.svd(a / length, full_matrices=False)
@@ -561,14 +677,18 @@ class _Fit:
         return float(np.max(np.abs(change) / np.maximum(error, 1e-30)))
 
     def _renew_noise(self) -> None:
-        """The sensors' noise is what is left; what was wrong for a while has no say in a median."""
-        left = np.median(np.abs(self.rest), axis=0) / 0.6745
-        self.noise_y = np.maximum(left, 1e-9 * np.ptp(self.y, axis=0))
+        """The sensors' noise is what is left; what was wrong for a while has no say in a median.
 
-    def recording(self) -> SimulatedRecording:
+        What the channels do not show themselves is the model's error and not noise: taken for noise, it would let a
+        model that is far off pull the trajectory away from what was measured, and the fit would not come back.
+        """
+        left = np.median(np.abs(self.rest), axis=0) / 0.6745
+        self.noise_y = np.clip(left, 1e-9 * np.ptp(self.y, axis=0), LOUDER * self.shown_y)
+
+    def recording(self, rounds: int = ROUNDS) -> SimulatedRecording:
         """Fitted and linearised."""
         renewed, best = 0, np.inf
-        for _ in range(ROUNDS):
+        for _ in range(rounds):
             accepted = (self.x, self.u, self.p)
             step = self.round()
             if not self.cost < WORSE * best:
@@ -585,33 +705,48 @@ class _Fit:
             self._renew_noise()
             renewed, best = renewed + 1, np.inf
         self.round_again()
+        assert self.predictor is not None
+        return self._told(self.predictor, self.response, self.columns)
+
+    def free(self) -> SimulatedRecording:
+        """Errors of free simulation over windows, about the same trajectory: no noise drives, each window starts free.
+
+        Where the law is open (`loose`) it stays so. Not whitened: a sum of squares is one of what the outputs miss.
+        """
+        window = max(2, round(self.machine.window_s / self.step_s))
+        starts = np.array([k for run in self.table.runs for k in range(run.start, run.stop, window)])
+        predictor = Predictor(self.lin, np.zeros_like(self.noise_u), self.noise_y, self._loose(), starts,
+                              AWAY * self.size_x, stretch=window)  # fmt: skip
+        missed = predictor.white(predictor.errors(self.state[:, :, None], self.output[:, :, None]))[:, :, 0]
+        columns = predictor.white(predictor.errors(self.lin.f_p, self.lin.h_p))
+        told = self._told(predictor, missed, columns)
+        told.whitened = False
+        return told
+
+    def _told(self, predictor: Predictor, missed: Array, columns: Array) -> SimulatedRecording:
+        """The recording whose equations are what a predictor misses, (n, o), beside its columns (n, o, parameters)."""
         machine, table = self.machine, self.table
-        along = {name: self.x[:, i] for i, name in enumerate(machine.states)}
-        along |= self.inputs | {name: self.u[:, i] for i, name in enumerate(self.noisy)}
-        along |= {each.channel: self.lin.output[:, i] for i, each in enumerate(machine.outputs)}
-        along["t"] = table.time_s - table.time_s[0]
-        along |= machine.extra_signals(along, table)
+        along = self._seen().signals
         counts = machine.counts(along, table)
         equations = {}
         for number, each in enumerate(machine.outputs):
-            columns = {name: self.columns[:, number, i] for i, name in enumerate(self.names)}
+            own = {name: columns[:, number, i] for i, name in enumerate(self.names)}
             valid = counts.get(each.channel, np.ones(len(table), dtype=bool))
-            response = self.response[:, number] + self.columns[:, number] @ self.p_at
+            response = missed[:, number] + columns[:, number] @ self.p_at
             equations[each.channel] = Equation(
-                each.channel, each.letter, each.subsystem, each.unit, response, columns, valid
+                each.channel, each.letter, each.subsystem, each.unit, response, own, valid
             )
-        fitted = dict(zip(self.names, (float(each) for each in self.p_at), strict=True))
-        lags = tuple(round(time_s / self.step_s) for time_s in LAGS_S)
         made = SimulatedRecording(
             table,
             along,
             equations,
-            lags=lags,
-            fitted=fitted,
+            lags=tuple(round(time_s / self.step_s) for time_s in LAGS_S),
+            fitted=dict(zip(self.names, (float(each) for each in self.p_at), strict=False)),
             linear=self.lin,
-            predictor=self.predictor,
+            predictor=predictor,
             ports=machine.ports,
             outputs=tuple(each.channel for each in machine.outputs),
+            fit=self,
         )
 
         def entry(port: Port) -> Entry:

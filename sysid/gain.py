@@ -14,6 +14,7 @@ from ranger_sim.sysid.naming import coefficients as coefficients_of
 from ranger_sim.sysid.regression import Regression, orthonormal
 
 BLOCK = 50  # rows of one block of the bootstrap: longer than any memory of the residual
+LONG_BLOCK = 500  # where the residual is not whitened: chosen by us, a second at 500 Hz, in which a leg forgets
 DRAWS = 400
 MORE = 0.01  # chance at which general features count as seeing more than the effects
 
@@ -70,9 +71,10 @@ def measure(
         after = after - beside @ coefficients
         expected = float(np.sum((beside @ coefficients) ** 2))
     possible = _possible(plain, columns, general)
-    blocks = max(1, len(before) // BLOCK)
-    edges = np.arange(0, blocks * BLOCK, BLOCK)
-    won, most = (np.add.reduceat(each[: blocks * BLOCK], edges) for each in (before**2 - after**2, possible))
+    rows_in = BLOCK if _white(plain) else LONG_BLOCK
+    blocks = max(1, len(before) // rows_in)
+    edges = np.arange(0, blocks * rows_in, rows_in)
+    won, most = (np.add.reduceat(each[: blocks * rows_in], edges) for each in (before**2 - after**2, possible))
     draws = generator(seed, "bootstrap of the gain").integers(0, blocks, (DRAWS, blocks))
     bound = max(float(most.sum()), float(won.sum()), 1e-9)
     drawn, possible_drawn = won[draws].sum(axis=1), most[draws].sum(axis=1)
@@ -114,8 +116,21 @@ def _possible(plain: Regression, columns: Sequence[Array], general: General) -> 
             freedom, free_rows = further.shape[1], len(residual) - basis.shape[1] - further.shape[1]
             if freedom and free_rows > 0:
                 ratio = (float(rest @ rest - left @ left) / freedom) / max(float(left @ left) / free_rows, 1e-300)
-                if stats.f.sf(ratio, freedom, free_rows) < MORE:
+                if stats.f.sf(ratio / _memory(plain, left), freedom, free_rows) < MORE:
                     basis, rest = np.hstack([basis, further]), left
-        count = basis.shape[1]
+        count = min(basis.shape[1] * _memory(plain, rest), 0.5 * len(residual))
         out[rows] = residual**2 - rest**2 * (1.0 + count / max(1, len(residual) - count))
     return out
+
+
+def _white(plain: Regression) -> bool:
+    return all(recording.whitened for recording in plain.recordings)
+
+
+def _memory(plain: Regression, left: Array) -> float:
+    """How many times a column counts in what slow columns take out of noise that was not whitened."""
+    square = float(np.mean(left**2)) if len(left) > 1 else 0.0
+    if _white(plain) or square == 0.0:
+        return 1.0
+    rho = min(max(float(np.mean(left[1:] * left[:-1])) / square, 0.0), 0.95)
+    return (1.0 + rho) / (1.0 - rho)

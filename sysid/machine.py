@@ -140,7 +140,9 @@ class Machine(Protocol):
 
     A machine may have more: `table(dataset, names)`, a time base of its own for channels that come at rates of their
     own; `labels`, {signal: how the report calls it on an axis}; `gear`, of its gearbox, and `motor`, which of the
-    simulator's motors is measured (plant/terms.py), for the model file.
+    simulator's motors is measured (plant/terms.py), for the model file; `again(recording, [(effect, shape,
+    coefficients)], fixed)`, the recording with these effects in its simulation, and `free(recording)`, its equations as
+    errors of free simulation (sysid/free_simulation.py has both).
     """
 
     name: str

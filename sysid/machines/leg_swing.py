@@ -27,6 +27,7 @@ from ranger_sim.sysid.free_simulation import (
     SimulatedRecording,
     Term,
     held,
+    standing,
 )
 from ranger_sim.sysid.machine import Effect, Known, Quantity, Recording, Values
 from ranger_sim.sysid.machines.forms import (
@@ -48,10 +49,9 @@ CURRENT_S = 0.003  # Gaussian under a current or a voltage whose slope a sensor'
 SLOPE_S = 0.004
 CALM_S = 0.04  # Gaussian under the current by which a misfit is sorted: four times the memory of a converter's noise
 FINE_S = 0.002  # longest step of the integration: friction settles in some milliseconds where it holds
-# Where friction holds it may be anything up to its limit (eq. 35). Below this rate it is open, with a memory of OPEN_S:
-# such stretches tell little of torques. One count of the encoder (0.77 mrad) takes 0.08 s there. Chosen by us.
+# Where friction holds it may be anything up to its limit (eq. 35). Below this rate it is open (`standing`): such
+# stretches tell little of torques. One count of the encoder (0.77 mrad) takes 0.08 s there. Chosen by us.
 STANDSTILL_RAD_S = 0.01
-OPEN_S = 0.01
 MOVES_RAD_S = 0.03
 JUMP_SHARE, JUMP_ROWS = 0.03, 4  # of the voltage's range within a sample; samples before and after. Chosen by us
 LARGEST_ECCENTRICITY_RAD = 0.01  # a disc of 10 mm radius that lies 0.1 mm beside its axis; chosen by us
@@ -92,6 +92,16 @@ class LegSwing:
     def generic(self, recording: Recording) -> dict[str, dict[str, Array]]:
         """Signals over which a misfit is looked for without a cause in mind."""
         return self._of(recording).generic(recording)
+
+    def again(
+        self, recording: Recording, effects: Sequence[tuple[Effect, Shape, Sequence[float]]], fixed: bool = False
+    ) -> Recording:
+        """The recording with these effects in the simulated leg."""
+        return self._of(recording).again(recording, effects, fixed)
+
+    def free(self, recording: Recording) -> Recording:
+        """The recording as errors of free simulation."""
+        return self._of(recording).free(recording)
 
     def _of(self, recording: Recording) -> "_Leg":
         return self.by_voltage if "voltage_V" in recording.table else self.by_current
@@ -194,8 +204,7 @@ class _Leg(SimulatedMachine):
     def loose(self, x: Quantities, u: Quantities, p: Quantities, step_s: float) -> Quantities:
         """Near standstill friction is open."""
         _, friction = self._torques(x["q"], x["w"], u, p)
-        near = np.exp(-0.5 * (x["w"] / (2.0 * STANDSTILL_RAD_S)) ** 2)
-        return {"w": friction * near * np.sqrt(2.0 * OPEN_S * step_s) / p["inertia_kg_m2"]}
+        return {"w": standing(x["w"], friction, STANDSTILL_RAD_S, step_s) / p["inertia_kg_m2"]}
 
     def extra_signals(self, along: dict[str, Array], table: Table) -> dict[str, Array]:
         """Current as simulated, signs, slopes, the rotor's angle."""

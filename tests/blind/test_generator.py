@@ -288,3 +288,20 @@ def test_no_pair_is_one_effect_twice():
     pairs = [{name for name, _ in case.effects} for case in plan]
     assert len(pairs) == 400
     assert not any(pair in NO_PAIR for pair in pairs)
+
+
+def test_what_a_leg_does_faster_than_its_angle_tells_is_drowned():
+    """A torque at 0.5 Hz is judged by the current's noise; at 50 Hz by the acceleration, from the quieter of two rates.
+
+    J times a rate's slope: from the angle J (2 pi f)^2 of its noise, from the back-EMF J 2 pi f of R I's noise over K.
+    """
+    case = LEG_SWING.plan(1, 1, ["null"], LEG_SWING.CAUSES)[0]
+    LEG_SWING.prepare(1, case)
+    base, noise, count = case.base, case.instruments.noise, 20000
+    _, torque, _ = case.instruments.balance_deviations(base, count)
+    K, turn = base["G"] * base["K"], 2.0 * np.pi * 50.0
+    assert torque[10] == pytest.approx(K * noise["I"], rel=0.2)
+    by_angle, by_voltage = base["J"] * turn**2 * noise["q"], base["J"] * turn * base["R"] * noise["I"] / K
+    drowned = 1.0 / np.hypot(1.0 / by_angle, 1.0 / by_voltage)
+    # the counts of the angle and the voltage's own noise come on top
+    assert drowned < torque[1000] < 1.3 * drowned

@@ -38,8 +38,9 @@ class Instruments:
         """(3, count // 2 + 1): standard deviation of the noise in balances E, M, T at the frequencies of a run's FFT.
 
         From the channels. Derivatives of a measured current (inductance), speed (inertia) and angle grow with
-        frequency: they drown what an effect does within a few samples, and nothing slow. A rate that is made from a
-        joint's angle counts with what of it matters to a leg. Without a second angle there is no balance T.
+        frequency: they drown what an effect does within a few samples, and nothing slow. A leg's acceleration comes
+        from its angle or from the back-EMF, whichever is quieter; its rate counts with what of it matters to a leg.
+        Without a second angle there is no balance T.
         """
         v = {name: deviation**2 + LSB[name] ** 2 / 12.0 for name, deviation in self.noise.items()}
         turn = (2.0 * np.sin(np.pi * np.fft.rfftfreq(count)) / STEP_S) ** 2  # of a difference over one sample
@@ -48,7 +49,7 @@ class Instruments:
         back = (base["G"] * base["K"]) ** 2
         E = v["V"] + (base["R"] ** 2 + base["L"] ** 2 * turn) * v["I"] + back * speed
         M = torque + back * v["I"] + base["C1"] ** 2 * speed + (base["kh"] + base["mgc"]) ** 2 * angle
-        M = M + base["J"] ** 2 * turn * v.get("w", 0.0)
+        M = M + base["J"] ** 2 * turn * v.get("w", 1.0 / (1.0 / np.maximum(turn * angle, 1e-300) + back / E))
         counts = LSB["theta"] ** 2 / 12.0 / base["G"] ** 2
         T = v["w"] + turn * counts if "w" in v else np.full(len(turn), np.inf)
         return np.sqrt((E, M, T))
