@@ -106,6 +106,7 @@ class MotorBench:
         s["w"] = signals.derivative(table, s["angle"], FINE) / self.gear if measured else signals.smooth(table, w, FINE)
         s["dw"] = np.gradient(signals.smooth(table, s["w"], SLOW), table.step_s)
         rough = rough_electrics(V, I, s["w"])
+        _one_way(table, V - rough[0] * I - rough[1] * np.sign(I), s["w"])
         s["I"] = current_by_voltage(V, s["w"], *rough)
         s["w_by_voltage"] = signals.smooth(table, V - rough[0] * I - rough[1] * np.sign(s["I"]), SLOW) / rough[2]
         if not measured:
@@ -233,6 +234,15 @@ def _same_motion(table: Table, angle: Array, w: Array) -> None:
         raise UserError(
             f"{table.name}: motor_angle_rad over the gear turns {told} as speed_rad_per_s: another gear (--gear), or "
             "one of the two in another unit; nothing is concluded from such data"
+        )
+
+
+def _one_way(table: Table, induced: Array, w: Array) -> None:
+    """UserError when the voltage that the winding's drop leaves goes against the speed: no motor turns so."""
+    if np.std(induced) > 0.0 and np.std(w) > 0.0 and float(np.corrcoef(induced, w)[0, 1]) < -SAME_MOTION:
+        raise UserError(
+            f"{table.name}: voltage_V and speed_rad_per_s have opposite signs: what resistance and brushes leave of the "
+            "voltage goes against the speed; nothing is concluded from such data"
         )
 
 
