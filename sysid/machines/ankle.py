@@ -9,6 +9,11 @@ an equation is one angle, linearised about the motion that fits best:
     transmission  the same of a - p                                                    where both are measured
     joint rate    the same of a', where it is measured
 
+Free in it is what no two ankles share: foot, spring, friction with its part under load, cable, rotor, the zero of one
+angle against the other, the lag of the current. What of these the angles do not tell stays where it is known to be
+(`SPREAD`). The motor creeps inside its friction, as the simulator's does, or stands still, as a machine does: whichever
+fits.
+
 The response is that difference plus the found values times their sensitivities, so that values come out as they are.
 """
 
@@ -17,46 +22,60 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
-from scipy.ndimage import gaussian_filter1d
 from scipy.signal import lfilter
 
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.plant.motor_parameters import ANKLE_MOTOR
-from ranger_sim.sysid import signals
+from ranger_sim.sysid import plausibility, signals
 from ranger_sim.sysid.dataset import Array, Finding, Table
 from ranger_sim.sysid.machine import Columns, Effect, Equation, Known, Quantity, Recording, Values
 from ranger_sim.sysid.machines import ankle_motion
 from ranger_sim.sysid.machines.ankle_motion import (
+    CABLE,
     COULOMB,
     INERTIA,
+    LAG,
+    LOAD,
     PARAMETERS,
+    RATE_FILTER_S,
+    ROTOR,
+    SMOOTHED,
+    STANDING,
     STIFFNESS,
     TORQUE,
+    USUAL,
     VISCOUS,
+    ZERO,
     Drive,
     Motion,
 )
 from ranger_sim.sysid.machines.forms import bristles
+from ranger_sim.sysid.regression import Regression
 
 # of the robot's foot-inertia logs, which do not hold them (robot.md C6.2)
 STIFFNESS_A_per_rad, DAMPNESS_As_per_rad = 11.219, 1.634
 SETTLED_S = 0.5  # from a run's start, which is not known exactly: the law's slow pole is K / D = 7 to 15 1/s
 SHORTEST_S = 1.0  # of a run
 FEWEST = 50  # rows of a run
-SMOOTH = 3.0  # samples; Gaussian under which a run's start and the rate of a measured angle are taken
 EVERY, WIDTH = 3, 1.5  # samples: rows that count, and the Gaussian over both sides
 MOST_STEPS, MOST_TRIES = 25, 8  # of the fit, and of one step's damping
 # The robot's program limits the target from below and feeds forward the return spring that it believes in: the sine
 # logs hold I_0 (docs/ankle-measured.md). A log with targets only may come of it, or of the plain law.
 FLOOR_rad, FORWARD_A_per_rad, FORWARD_REST_rad = 0.3, 0.134 / (34.0 * 0.018), 1.662
-KNOWN = 1.0  # of its value: a parameter whose error is larger is not told by these angles
+ROUGHLY, FULLY = 1e-2, 1e-4  # of the sum of squares that a step must win for another one
 INERTIA_STARTS = (1.0, 2.5)  # of its value: the cable's ringing makes the sum of squares rugged along the inertia
 # Chosen by us: a motor's ripple is a part of its torque, cogging is of the size of its friction, and an encoder whose
 # disc is out of centre by more than 2 % of its radius does not read.
 LARGEST_RIPPLE, LARGEST_COGGING_Nm, LARGEST_ECCENTRICITY_rad = 0.5, 0.1, 0.02
+SLOW = 5.0  # times what is new in it from row to row: noise of these encoders has 1.1 to 1.4, on blind recordings
+SLOWEST_NOISE = 0.9  # memory from row to row (12 ms) of what the base leaves, at most: beyond it, it is an effect's
 MEMORY = 10.0  # samples of a misfit that tell the same
 JOINT, MOTOR, TRANSMISSION, RATE = "joint", "motor", "transmission", "joint rate"
-ZERO = "joint_zero_rad"
+# How well a parameter is known before any data: where the angles do not tell it, the fit stays there. Chosen by us: a
+# motor's torque constant, in whose unit all torques are, is known to 20 %, its friction under load to half; a cable's
+# stiffness depends on how it lies, a foot's inertia on what is screwed to it; the robot's logs have zeros of 0.02 to
+# 0.04 rad (docs/ankle-measured.md); half a slot of the board (0.25 ms) and its current loop are 0.5 to 1 ms.
+SPREAD = {INERTIA: 0.0013, LOAD: 0.05, CABLE: 5.0, ROTOR: 0.0004, ZERO: 0.04, LAG: 0.0005}
 
 Shape = Mapping[str, float]
 
@@ -108,7 +127,11 @@ class Ankle:
         Known(TORQUE, "N m", 0.55, -5.0, 5.0, "of the return spring at angle 0"),
         Known(COULOMB, "N m", 0.06, 0.0, 2.0, "of motor and gearbox"),
         Known(VISCOUS, "N m s/rad", 0.01, -0.5, 1.0, "of motor and gearbox"),
-        Known(ZERO, "rad", 0.0, -0.5, 0.5, "what the joint's encoder shows at the motor's zero"),
+        Known(LOAD, "", USUAL[LOAD], 0.0, 0.9, "part of the motor's torque that friction takes"),
+        Known(CABLE, "N m/rad", USUAL[CABLE], 1.0, 1e3, "of the cable"),
+        Known(ROTOR, "kg m^2", USUAL[ROTOR], 1e-4, 0.1, "of the rotor behind the gear; another torque constant too"),
+        Known(LAG, "s", USUAL[LAG], 0.0, 0.02, "of the current behind the law"),
+        Known(ZERO, "rad", USUAL[ZERO], -0.5, 0.5, "what the joint's encoder shows at the motor's zero"),
     )
 
     def prepare(self, table: Table) -> AnkleRecording:
@@ -124,19 +147,18 @@ class Ankle:
                 fit = other
         recording = AnkleRecording(table, {}, {}, width=WIDTH, every=EVERY, left_over=True, simulated=fit.runs)
         recording.values = dict(fit.values)
+        recording.priors = {name: (fit.usual[name], spread) for name, spread in SPREAD.items()}
         if fit.of_program:
             recording.findings.append(_program_found(table))
         s = recording.signals = _signals(table, fit.runs)
         valid = fit.valid
-        sensitivity = np.zeros((len(table), 4, len(PARAMETERS)))
+        sensitivity = np.zeros((len(table), ankle_motion.STATES, len(PARAMETERS)))
         for run in fit.runs:
             sensitivity[run.rows] = ankle_motion.sensitivities(run.motion)[run.motion.rows]
 
         def equation(name: str, letter: str, subsystem: str, missed: Array, slopes: Array) -> None:
-            columns = {each: slopes[:, PARAMETERS.index(each)] for each in fit.free}
+            columns = {each: slopes[:, PARAMETERS.index(each)] for each in PARAMETERS}
             response = missed + sum(fit.values[each] * column for each, column in columns.items())
-            if name == TRANSMISSION:
-                columns[ZERO] = np.ones(len(table))
             unit = "rad/s" if name == RATE else "rad"
             recording.equations[name] = Equation(name, letter, subsystem, unit, response, columns, valid)
 
@@ -151,7 +173,13 @@ class Ankle:
             equation(RATE, "S", "sensor", table["joint_rate_rad_per_s"] - s["w"], sensitivity[:, 3])
         fast = np.abs(s["u"]) > 0.3 * np.max(np.abs(s["u"][valid]))
         recording.regimes = {"upward": s["u"] > 0.0, "downward": s["u"] < 0.0, "near reversals": ~fast}
-        recording.whitened = True
+        # By the joint alone an error of the model far above the noise is as slow as the foot, and whitening it would
+        # high-pass what is wrong. The joint against the motor tells of faster things.
+        left = Regression([recording])
+        recording.whitened = "motor_angle_rad" in table or all(
+            (plausibility.slowness(left, name) or 0.0) < SLOW for name in left.equations
+        )
+        recording.memory = SLOWEST_NOISE
         return recording
 
     def generic(self, recording: Recording) -> dict[str, dict[str, Array]]:
@@ -199,7 +227,7 @@ def predicted(
     fit = _Fit(signals.uniform(training), Ankle.parameters, of_program, extra)
     fit.improve()
     other = _Fit(signals.uniform(held), Ankle.parameters, of_program, extra)
-    other.held(fit.values)
+    other.held_as(fit)
     table, found = other.table, []
     for channel in ("motor_angle_rad", "joint_angle_rad"):
         if channel not in table:
@@ -277,6 +305,7 @@ class _Fit:
         self.usual = {each.name: each.value for each in parameters if each.name in PARAMETERS}
         self.usual |= {name: 0.0 for name in self.extra}
         self.limits |= {name: (-math.inf, math.inf) for name in self.extra}
+        self.creep_rad_s, self.filter_s = SMOOTHED, 0.0
         self.all = [*PARAMETERS, *self.extra]
         self.values = dict(self.usual)
         K, D = _gains(table)
@@ -297,36 +326,26 @@ class _Fit:
                 if of_program:
                     command = command + FORWARD_A_per_rad * (target - FORWARD_REST_rad)
             drive = Drive(t, command, K, D)
-            motion = ankle_motion.simulated(drive, self.values, self._at_rest(rows, self._guess(rows), self.values))
+            motion = ankle_motion.simulated(drive, self.values, self._start(rows, self.values))
             target, target_rate = self._target(rows, command / K)
             self.runs.append(Run(rows, drive, motion, *(np.interp(motion.time_s, t, x) for x in (target, target_rate))))
         if not self.runs:
             raise UserError(f"{table.name}: ankle needs a stretch of {SHORTEST_S:g} s without a gap")
-        self.free = list(self.all)
         self.missed = self._missed([run.motion for run in self.runs])
 
-    def _guess(self, rows: slice) -> Array:
-        """States as the measured angle has them, motor and joint as one."""
-        measured = self.table["motor_angle_rad" if self.both else "joint_angle_rad"][rows]
-        angle = gaussian_filter1d(measured, SMOOTH, mode="nearest")
-        rate = np.gradient(angle, self.table.step_s)
-        return np.array([angle, rate, angle, rate])
-
-    def _at_rest(self, rows: slice, states: Array, values: Values) -> Array:
-        """`states` with a start whose cable carries what the foot needs: a foot that starts off it would ring on,
+    def _start(self, rows: slice, values: Values) -> tuple[float, float, float, float]:
+        """States at a run's start, whose cable carries what the foot needs: a foot that starts off it would ring on,
         for the base's cable has no damping."""
         measured = self.table["motor_angle_rad" if self.both else "joint_angle_rad"][rows]
         some = slice(0, FEWEST)
         along = np.polynomial.Polynomial.fit(np.arange(FEWEST) * self.table.step_s, measured[some], 3).convert()
         angle, rate, half = along.coef[:3]
         needs = values[STIFFNESS] * angle - values[TORQUE] + values[INERTIA] * 2.0 * half
-        twist = needs / ankle_motion.K_S
-        slower = values[STIFFNESS] * rate / ankle_motion.K_S
-        out = states.copy()
-        out[:, 0] = (
-            (angle, rate, angle - twist, rate - slower) if self.both else (angle + twist, rate + slower, angle, rate)
-        )
-        return out
+        twist = needs / values[CABLE] - values[ZERO]
+        slower = values[STIFFNESS] * rate / values[CABLE]
+        if self.both:
+            return angle, rate, angle - twist, rate - slower
+        return angle + twist, rate + slower, angle, rate
 
     def _target(self, rows: slice, by_command: Array) -> tuple[Array, Array]:
         """Target and its rate; by the command where they are not logged."""
@@ -337,15 +356,14 @@ class _Fit:
         return target, np.gradient(target, table.step_s)
 
     def _stacked(self, part: Callable[[int], tuple[Array, Array]]) -> Array:
-        """Motor and joint of every run one below the other; the joint against the motor with its own zero."""
+        """Motor, and joint against it, of every run one below the other."""
         of_motor, of_joint = [], []
         for number, run in enumerate(self.runs):
             good = self.valid[run.rows]
             p, a = part(number)
             of_motor.append(p[good])
             of_joint.append(a[good] - (p[good] if self.both else 0.0))
-        joint = np.concatenate(of_joint)
-        return np.concatenate([*of_motor, joint - joint.mean(axis=0)]) if self.both else joint
+        return np.concatenate([*of_motor, *of_joint] if self.both else of_joint)
 
     def _missed(self, motions: Sequence[Motion]) -> Array:
         def part(number: int) -> tuple[Array, Array]:
@@ -367,51 +385,84 @@ class _Fit:
         return self._stacked(part)
 
     def improve(self) -> None:
-        """To the least squares; what the angles do not tell keeps its usual value and is not free."""
-        starts = []
+        """To the least squares, with what is known before; friction that creeps or that stands, whichever fits."""
+        found = []
         for factor in INERTIA_STARTS:
-            values = {**self.usual, INERTIA: factor * self.usual[INERTIA]}
+            values = {**self.usual, INERTIA: factor * self.usual[INERTIA], ZERO: self._zero()}
             moved = self._moved(values)
             if moved is not None:
                 self._take(values, *moved)
-                self._settle()
-                starts.append(
-                    (float(self.missed @ self.missed), self.values, [run.motion for run in self.runs], self.missed)
-                )
-        if starts:
-            self._take(*min(starts, key=lambda each: each[0])[1:])
-        blind = self._untold()
-        if blind:
-            self.free = [name for name in self.all if name not in blind]
-            self.values = dict(self.usual)
-            moved = self._moved(self.values)
-            if moved is not None:
-                self._take(self.values, *moved)
-            self._settle()
+                self._settle(ROUGHLY)
+                found.append(self._state())
+        if found:
+            self._take(*min(found, key=lambda each: each[0])[1:])
+        self._if_better(creep_rad_s=STANDING)
+        if self.of_program:
+            self._if_better(filter_s=RATE_FILTER_S)
+        self._settle()
 
-    def _settle(self) -> None:
+    def _if_better(self, creep_rad_s: float | None = None, filter_s: float | None = None) -> None:
+        """Another friction or law where it fits better, each at its best values."""
+        was, old = self._state(), (self.creep_rad_s, self.filter_s)
+        self._made_so(old[0] if creep_rad_s is None else creep_rad_s, old[1] if filter_s is None else filter_s)
+        moved = self._moved(self.values)
+        if moved is not None:
+            self._take(self.values, *moved)
+            self._settle(ROUGHLY)
+        if moved is None or self._state()[0] > was[0]:
+            self._made_so(*old)
+            self._take(*was[1:])
+
+    def _made_so(self, creep_rad_s: float, filter_s: float) -> None:
+        """Friction that changes its sign over a speed, and a law that sees the rate through a filter."""
+        self.creep_rad_s, self.filter_s = creep_rad_s, filter_s
+        for run in self.runs:
+            run.drive = dataclasses.replace(run.drive, filter_s=filter_s)
+
+    def _state(self) -> tuple[float, dict[str, float], list[Motion], Array]:
+        return float(self.missed @ self.missed), self.values, [run.motion for run in self.runs], self.missed
+
+    def _zero(self) -> float:
+        """Joint less motor, on the mean; 0 where the motor is not measured."""
+        if not self.both:
+            return self.usual[ZERO]
+        return float(np.mean((self.table["joint_angle_rad"] - self.table["motor_angle_rad"])[self.valid]))
+
+    def _beside(self, values: Values) -> Array:
+        """How far values are from what is known before, in its spreads."""
+        return np.array([(values[name] - self.usual[name]) / spread for name, spread in SPREAD.items()])
+
+    def _settle(self, enough: float = FULLY) -> None:
         damping = 1e-3
-        which = [self.all.index(name) for name in self.free]
+        pull = np.zeros((len(SPREAD), len(self.all)))
+        for number, (name, spread) in enumerate(SPREAD.items()):
+            pull[number, self.all.index(name)] = 1.0 / spread
+        # what neighbouring rows miss is the same, so that they count for less
+        level = math.sqrt(MEMORY) * float(np.std(self.missed))
         for _ in range(MOST_STEPS):
-            slopes = self._slopes()[:, which]
+            slopes = np.vstack([self._slopes(), level * pull])
+            missed = np.concatenate([self.missed, -level * self._beside(self.values)])
             lengths = np.maximum(np.linalg.norm(slopes, axis=0), 1e-12)
-            least = float(self.missed @ self.missed)
+            least = float(missed @ missed)
             won = 0.0
             for _ in range(MOST_TRIES):
-                left = np.vstack([slopes / lengths, math.sqrt(damping) * np.eye(len(which))])
-                right = np.concatenate([self.missed, np.zeros(len(which))])
+                left = np.vstack([slopes / lengths, math.sqrt(damping) * np.eye(len(lengths))])
+                right = np.concatenate([missed, np.zeros(len(lengths))])
                 step = np.linalg.lstsq(left, right, rcond=None)[0] / lengths
                 tried = dict(self.values)
-                for name, change in zip(self.free, step, strict=True):
+                for name, change in zip(self.all, step, strict=True):
                     tried[name] = float(np.clip(tried[name] + change, *self.limits[name]))
                 moved = self._moved(tried)
-                if moved is not None and float(moved[1] @ moved[1]) < least:
-                    won = least - float(moved[1] @ moved[1])
-                    self._take(tried, *moved)
-                    damping *= 0.1
-                    break
+                if moved is not None:
+                    beside = level * self._beside(tried)
+                    reached = float(moved[1] @ moved[1] + beside @ beside)
+                    if reached < least:
+                        won = least - reached
+                        self._take(tried, *moved)
+                        damping *= 0.1
+                        break
                 damping *= 10.0
-            if won <= 1e-7 * least:
+            if won <= enough * least:
                 return
 
     def _moved(self, values: Values) -> tuple[list[Motion], Array] | None:
@@ -421,8 +472,9 @@ class _Fit:
                 ankle_motion.simulated(
                     run.drive,
                     values,
-                    self._at_rest(run.rows, run.motion.states[:, run.motion.rows], values),
+                    self._start(run.rows, values),
                     self._torques(values),
+                    self.creep_rad_s,
                 )
                 for run in self.runs
             ]
@@ -435,30 +487,18 @@ class _Fit:
             return None
         return lambda m: (_none(m), sum((values[name] * torque(m) for name, torque in self.extra.items()), _none(m)))
 
-    def held(self, values: Values) -> None:
-        """Takes these values as they are."""
-        moved = self._moved(values)
+    def held_as(self, other: "_Fit") -> None:
+        """Takes the values of another fit, with its friction and its law."""
+        self._made_so(other.creep_rad_s, other.filter_s)
+        moved = self._moved(other.values)
         if moved is None:
             raise UserError(f"{self.table.name}: the ankle cannot be simulated with these values")
-        self._take(values, *moved)
+        self._take(other.values, *moved)
 
     def _take(self, values: Mapping[str, float], motions: Sequence[Motion], missed: Array) -> None:
         self.values, self.missed = dict(values), missed
         for run, motion in zip(self.runs, motions, strict=True):
             run.motion = motion
-
-    def _untold(self) -> list[str]:
-        """Inertias whose error is larger than a foot's inertia itself: slow sines do not feel them."""
-        slopes = self._slopes()
-        lengths = np.maximum(np.linalg.norm(slopes, axis=0), 1e-12)
-        beside = 1.0 / np.sqrt(np.maximum(np.diag(np.linalg.pinv((slopes / lengths).T @ (slopes / lengths))), 1e-12))
-        level = math.sqrt(MEMORY) * float(np.std(self.missed))
-        error = level / (lengths * beside)
-        return [
-            name
-            for name, each in zip(self.all, error, strict=True)
-            if name == INERTIA and each > KNOWN * self.usual[name]
-        ]
 
 
 def _signals(table: Table, runs: Sequence[Run]) -> dict[str, Array]:
@@ -571,8 +611,6 @@ def _friction(top: float) -> list[Effect]:
         _effect("presliding", at, M, ("friction_Nm",), presliding,
                 [{"slide_rad": slide} for slide in (0.003, 0.01, 0.03, 0.1)],
                 admissible=lambda found: found["friction_Nm"] > 0.0),
-        _effect("load_friction", at, M, ("change",),
-                _at_motor(lambda m, _: -ankle_motion.GEAR_K * np.abs(m.I) * m.sliding)),
         _effect("direction_friction", at, M, ("viscous_Nms",), _at_motor(lambda m, _: -np.abs(m.u))),
         _effect("friction_warm_up", at, M, ("Nm_s_per_rad",), warm_up,
                 [{"time_constant_s": time_s} for time_s in (3.0, 10.0, 30.0)],
@@ -630,13 +668,12 @@ def _periodic() -> list[Effect]:
 
 def _cable() -> list[Effect]:
     T, at = "transmission", "inner_cable"
-    k_s = ankle_motion.K_S
 
     def twisted(twist: Callable[[Motion, Shape], Array]) -> Make:
         """The cable is longer by an angle: it pulls less by k_s times that."""
 
         def made(run: Run, table: Table, shape: Shape) -> list[Pair]:
-            more = k_s * twist(run.motion, shape)
+            more = run.motion.values[CABLE] * twist(run.motion, shape)
             return [(more, -more)]
 
         return made
@@ -646,8 +683,8 @@ def _cable() -> list[Effect]:
         return signals.lagged(part, m.cable - m.cable.mean(), shape["time_constant_s"])
 
     return [
-        _effect("spring_value", at, T, ("compliance_rad_per_Nm",), twisted(lambda m, _: m.cable)),
-        _effect("cable_stiffening", at, T, ("cubic_Nm_per_rad3",), twisted(lambda m, _: -(m.p - m.a) ** 3 / k_s)),
+        _effect("cable_stiffening", at, T, ("cubic_Nm_per_rad3",),
+                twisted(lambda m, _: -(m.twist ** 3) / m.values[CABLE])),
         _effect("cable_backlash", at, T, ("half_gap_rad",), twisted(lambda m, p: np.tanh(m.cable / p["torque_Nm"])),
                 [{"torque_Nm": load} for load in (0.01, 0.03, 0.1)],
                 admissible=lambda found: found["half_gap_rad"] > 0.0),

@@ -1,16 +1,19 @@
 """An ankle under its board's law, simulated freely: motor and foot as two inertias with the cable between them.
 
-    I = I_0 - K p - D p'                      the board's law, on the motor's angle p; I_0 is what it was told
-    J_A p'' = T(I, p') - k_s (p - a) + m      T of EQUATIONS 2.1; m, f: torques of effects beside the base model
-    J_f a'' = k_s (p - a) - k_r a + b + f     EQUATIONS 2.3, 2.7 with b = k_r a_0
+    I = I_0 - K p - D r, late by a lag        the board's law, on the motor's angle p; I_0 is what it was told
+    r = p', or behind the board's filter      robot.md N4.2: a sixteenth every 0.5 ms
+    J_A p'' = T(I, p') - k_s x + m            T of EQUATIONS 2.1; m, f: torques of effects beside the base model
+    J_f a'' = k_s x - k_r a + b + f           EQUATIONS 2.3, 2.7 with b = k_r a_0
+    x = p + z - a                             z: what the joint's encoder shows at the motor's zero
 
-The whole motion is one system of equations, one trapezoid for every step: Newton's method finds it, and the factors of
-its matrix answer what any small torque beside the base would do to every angle. The law's damping on the
-rotor is faster (540 1/s) than a log is dense, so explicit steps would have to be far smaller.
+The XX
+Torques are in units of the motor's torque constant: were it larger, all of them, inertias included, would be so by the
+same factor. A wrong one is therefore found as a wrong inertia of the rotor.
 """
 
 import dataclasses
-from collections.abc import Callable, Mapping
+import math
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 from scipy.linalg import lapack
@@ -21,20 +24,33 @@ from ranger_sim.plant.parameters import BodyParameters
 from ranger_sim.sysid.dataset import Array
 
 GEAR_K = ANKLE_MOTOR.gear * ANKLE_MOTOR.torque_constant_Nm_per_A
-J_A = ANKLE_MOTOR.reflected_inertia_kg_m2
-MU = ANKLE_MOTOR.load_friction
-EPSILON = ANKLE_MOTOR.friction_smoothing_rad_s
-K_S = BodyParameters().ankle_spring_Nm_per_rad
 STEP_S = 0.002  # longest step: the cable's mode with the foot, 100 1/s, is within 0.4 % of its frequency
-BELOW, ABOVE = 7, 3  # the matrix's bands: four states at two instants
-MOST_STEPS = 60  # of Newton's method; six to eight are usual
-NEAR = 1e-7  # rad, of the last step
-SECANT = 0.3  # rad/s; while the rates move by more, friction's slope is that of its secant
+STATES = 6  # p, u, a, w; the rate r that the law takes, the current I
+BELOW, ABOVE = 2 * STATES - 1, STATES - 1  # the matrix's bands: the states at two instants
+MOST_STEPS = 60  # of one instant's friction
+MOST_ROUNDS = 30  # with torques beside the base: each takes what they move from some per cent to so much of that
+NEAR = 1e-7  # rad, of the last round
+CLEAR = 19.0  # speeds over which friction changes its sign: beyond it tanh is 1
+FASTEST_rad_s, FARTHEST_rad = 1e3, 1e2  # beyond it nothing moves that has gears
 
-INERTIA, STIFFNESS, TORQUE, COULOMB, VISCOUS = (
+INERTIA, STIFFNESS, TORQUE, COULOMB, VISCOUS, LOAD, CABLE, ROTOR, ZERO, LAG = (
     "inertia_kg_m2", "return_stiffness_Nm_per_rad", "return_torque_Nm", "coulomb_friction_Nm", "viscous_friction_Nms",
+    "load_friction", "cable_stiffness_Nm_per_rad", "rotor_inertia_kg_m2", "joint_zero_rad",
+    "law_lag_s",
 )  # fmt: skip
-PARAMETERS = (INERTIA, STIFFNESS, TORQUE, COULOMB, VISCOUS)
+PARAMETERS = (INERTIA, STIFFNESS, TORQUE, COULOMB, VISCOUS, LOAD, CABLE, ROTOR, ZERO, LAG)
+# What the simulator has, for a caller that names only some.
+USUAL = {
+    LOAD: ANKLE_MOTOR.load_friction,
+    CABLE: BodyParameters().ankle_spring_Nm_per_rad,
+    ROTOR: ANKLE_MOTOR.reflected_inertia_kg_m2,
+    ZERO: 0.0,
+    LAG: 0.00075,  # half of the board's slot of 0.5 ms, and its current loop: robot.md N4.3
+}
+RATE_FILTER_S = 0.00775  # of the board's rate: robot.md N4.2
+# Speeds over which friction changes its sign: the simulator's, and next to none, of a motor that stands still inside
+# its friction (chosen by us: 2 mrad/s creep by 0.5 mrad in a quarter of a second, the noise of the robot's encoders).
+SMOOTHED, STANDING = ANKLE_MOTOR.friction_smoothing_rad_s, 0.002
 
 Values = Mapping[str, float]
 
@@ -47,20 +63,22 @@ class Drive:
     command_A: Array
     stiffness_A_per_rad: float
     dampness_As_per_rad: float
+    filter_s: float = 0.0  # time constant of the filter through which the law sees the rate
 
 
 @dataclasses.dataclass
 class Motion:
     """A simulated run. p, u, a, w: angle and rate of motor and joint; I: current; sliding: the friction's tanh,
-    all of shape (m,) at every step; slopes: rates of the four states; rows: the steps that the log has."""
+    all of shape (m,) at every step; slopes: rates of p, u, a, w; rows: the steps that the log has; later: what the
+    current would change by for a lag longer by 1 s."""
 
     time_s: Array
-    states: Array  # (4, m)
+    states: Array  # (6, m)
     slopes: Array  # (4, m)
-    I: Array  # noqa: E741  (the paper's letter)
+    later: Array
     sliding: Array
     rows: slice
-    inertia: float
+    values: dict[str, float]
     factors: tuple
 
     @property
@@ -84,34 +102,61 @@ class Motion:
         return self.states[3]
 
     @property
+    def I(self) -> Array:  # noqa: E743  (the paper's letter)
+        """Motor's current."""
+        return self.states[5]
+
+    @property
     def cable(self) -> Array:
         """Torque in the cable."""
-        return K_S * (self.p - self.a)
+        return self.values[CABLE] * self.twist
 
-    def answer(self, at_motor: Array, at_foot: Array) -> Array:
-        """What small torques (m, k) do to the states: (m, 4, k)."""
+    @property
+    def twist(self) -> Array:
+        """Of the cable, rad."""
+        return self.p + self.values[ZERO] - self.a
+
+    def answer(self, at_motor: Array, at_foot: Array, at_current: Array | None = None) -> Array:
+        """What small torques (m, k), and small changes of the current itself, do to the states: (m, 6, k)."""
         steps, count = at_motor.shape
-        pushed = np.zeros((steps, 4, count))
-        pushed[:, 1] = at_motor / J_A
-        pushed[:, 3] = at_foot / self.inertia
-        right = np.zeros((steps, 4, count))
-        right[1:] = 0.5 * (self.time_s[1] - self.time_s[0]) * (pushed[1:] + pushed[:-1])
-        return _solved(self.factors, right.reshape(4 * steps, count)).reshape(steps, 4, count)
+        right = np.zeros((steps, STATES, count))
+        half = 0.5 * (self.time_s[1] - self.time_s[0])
+        right[1:, 1] = half / self.values[ROTOR] * (at_motor[1:] + at_motor[:-1])
+        right[1:, 3] = half / self.values[INERTIA] * (at_foot[1:] + at_foot[:-1])
+        if at_current is not None:
+            right[1:, 5] = at_current[1:]
+        return _solved(self.factors, right.reshape(STATES * steps, count)).reshape(steps, STATES, count)
 
 
 Torques = Callable[[Motion], tuple[Array, Array]]  # (m,) at the motor and at the foot
 
 
 def sensitivities(motion: Motion) -> Array:
-    """Derivatives of the states by PARAMETERS: (m, 4, 5)."""
+    """Derivatives of the states by PARAMETERS: (m, 6, 10)."""
     none = np.zeros_like(motion.p)
-    at_motor = np.column_stack([none, none, none, -motion.sliding, -motion.u])
-    at_foot = np.column_stack([-motion.slopes[3], -motion.a, none + 1.0, none, none])
-    return motion.answer(at_motor, at_foot)
+    load, k_s = GEAR_K * np.abs(motion.I), none + motion.values[CABLE]
+    pushes = {  # at the motor, at the foot
+        INERTIA: (none, -motion.slopes[3]),
+        STIFFNESS: (none, -motion.a),
+        TORQUE: (none, none + 1.0),
+        COULOMB: (-motion.sliding, none),
+        VISCOUS: (-motion.u, none),
+        LOAD: (-motion.sliding * load, none),
+        CABLE: (-motion.twist, motion.twist),
+        ROTOR: (-motion.slopes[1], none),
+        ZERO: (-k_s, k_s),
+        LAG: (none, none),
+    }
+    at_motor, at_foot = zip(*(pushes[name] for name in PARAMETERS), strict=True)
+    at_current = np.zeros((len(none), len(PARAMETERS)))
+    at_current[:, PARAMETERS.index(LAG)] = motion.later
+    return motion.answer(np.column_stack(at_motor), np.column_stack(at_foot), at_current)
 
 
-def simulated(drive: Drive, values: Values, start: Array, torques: Torques | None = None) -> Motion:
-    """The motion under `drive`. start: (4, n) a guess at the drive's instants, whose first column is where it begins.
+def simulated(
+    drive: Drive, values: Values, start: Sequence[float], torques: Torques | None = None, creep_rad_s: float = SMOOTHED
+) -> Motion:
+    """The motion under `drive` from p, u, a, w = `start`. creep_rad_s: over which friction changes its sign.
 
     UserError when there is no motion that a machine could make with these values.
     """
@@ -119,74 +164,160 @@ def simulated(drive: Drive, values: Values, start: Array, torques: Torques | Non
     step_s = (drive.time_s[-1] - drive.time_s[0]) / (n - 1)
     parts = max(1, round(step_s / STEP_S))
     time_s = drive.time_s[0] + step_s / parts * np.arange((n - 1) * parts + 1)
-    command = np.interp(time_s, drive.time_s, drive.command_A)
-    states = np.array([np.interp(time_s, drive.time_s, each) for each in start])
-    h, moved = step_s / parts, np.inf
-    motion = Motion(time_s, states, states, command, command, slice(None, None, parts), values[INERTIA], ())
-    for _ in range(MOST_STEPS):
-        slopes, jacobian = _slopes(drive, values, motion, command, moved > SECANT, torques)
-        missed = np.zeros_like(motion.states)
-        missed[:, 1:] = np.diff(motion.states) - 0.5 * h * (slopes[:, 1:] + slopes[:, :-1])
-        step = _solved(_factors(jacobian, h), missed.T.reshape(-1, 1)).reshape(-1, 4).T
-        motion.states = motion.states - step
-        moved = float(np.max(np.abs(step[1])))
-        if not np.isfinite(moved):
-            break
-        if np.max(np.abs(step[0])) < NEAR:
-            motion.slopes, jacobian = _slopes(drive, values, motion, command, False, torques)
-            motion.factors = _factors(jacobian, h)
-            return motion
-    raise UserError(
-        "the ankle's motion cannot be simulated with " + ", ".join(f"{k} {v:.3g}" for k, v in values.items())
+    none = np.zeros_like(time_s)
+    steps = _Steps(
+        drive, {**USUAL, **values}, step_s / parts, np.interp(time_s, drive.time_s, drive.command_A), creep_rad_s
     )
+    motion = Motion(
+        time_s, steps.walked(none, none, start), none, none, none, slice(None, None, parts), steps.values, ()
+    )
+    pushed = (none, none)
+    for _ in range(MOST_ROUNDS if torques else 0):
+        assert torques is not None
+        steps.complete(motion, *pushed)
+        pushed, before = torques(motion), motion.states
+        motion.states = steps.walked(*pushed, start)
+        if np.max(np.abs(motion.states[[0, 2]] - before[[0, 2]])) < NEAR:
+            break
+    steps.complete(motion, *pushed)
+    if not np.all(np.isfinite(motion.slopes)) or np.max(np.abs(motion.p)) > FARTHEST_rad:
+        raise UserError(
+            "the ankle's motion cannot be simulated with " + ", ".join(f"{k} {v:.3g}" for k, v in values.items())
+        )
+    motion.factors = steps.factors(motion)
+    return motion
 
 
-def _slopes(
-    drive: Drive, values: Values, motion: Motion, command: Array, secant: bool, torques: Torques | None
-) -> tuple[Array, Array]:
-    """Rates of the states (4, m) and their derivatives by the states (4, 4, m); the motion's current is kept."""
-    p, u, a, w = motion.states
-    K, D = drive.stiffness_A_per_rad, drive.dampness_As_per_rad
-    motion.I = command - K * p - D * u
-    motion.sliding = sliding = np.tanh(u / EPSILON)
-    friction = values[COULOMB] + MU * GEAR_K * np.abs(motion.I)
-    steepness = (1.0 - sliding * sliding) / EPSILON
-    if secant:
-        steepness = np.where(np.abs(u) < 1e-9, 1.0 / EPSILON, sliding / np.where(u == 0.0, 1.0, u))
-    loaded = GEAR_K * (1.0 - MU * np.sign(motion.I) * sliding)
-    cable = K_S * (p - a)
-    at_motor, at_foot = torques(motion) if torques else (0.0, 0.0)
-    inertia, k_r = values[INERTIA], values[STIFFNESS]
-    drives = GEAR_K * motion.I - friction * sliding - values[VISCOUS] * u - cable + at_motor
-    slopes = np.array([u, drives / J_A, w, (cable - k_r * a + values[TORQUE] + at_foot) / inertia])
-    jacobian = np.zeros((4, 4, len(p)))
-    jacobian[0, 1] = jacobian[2, 3] = 1.0
-    jacobian[1, 0] = (-K * loaded - K_S) / J_A
-    jacobian[1, 1] = (-D * loaded - friction * steepness - values[VISCOUS]) / J_A
-    jacobian[1, 2] = K_S / J_A
-    jacobian[3, 0] = K_S / inertia
-    jacobian[3, 2] = (-K_S - k_r) / inertia
-    return slopes, jacobian
+class _Steps:
+    """The equations of one step of h seconds: ends x_1 = starts x_0 + pushed - friction, six states."""
+
+    def __init__(self, drive: Drive, values: dict[str, float], h: float, command: Array, creep_rad_s: float) -> None:
+        self.drive, self.values, self.h, self.command, self.creep_rad_s = drive, values, h, command, creep_rad_s
+        k_s, k_r, rotor, inertia = values[CABLE], values[STIFFNESS], values[ROTOR], values[INERTIA]
+        rates = np.zeros((4, STATES))  # of p, u, a, w by the states, without friction
+        rates[0, 1] = rates[2, 3] = 1.0
+        rates[1] = np.array([-k_s, -values[VISCOUS], k_s, 0.0, 0.0, GEAR_K]) / rotor
+        rates[3] = np.array([k_s, 0.0, -k_s - k_r, 0.0, 0.0, 0.0]) / inertia
+        self.rates = rates
+        self.ends, self.starts = np.eye(STATES), np.zeros((STATES, STATES))
+        self.ends[:4] -= 0.5 * h * rates
+        self.starts[:4] = np.eye(4, STATES) + 0.5 * h * rates
+        # A filter slower than a step by a trapezoid; a faster one, and the current, by the step's end alone, which
+        # delays by the time constant all the same.
+        k = 0.5 * h / max(drive.filter_s, h)
+        keep, was, now = (1.0 - k) / (1.0 + k), k / (1.0 + k), k / (1.0 + k)
+        if drive.filter_s < h:
+            keep, was, now = drive.filter_s / (drive.filter_s + h), 0.0, h / (drive.filter_s + h)
+        self.ends[4, 1], self.starts[4, 1], self.starts[4, 4] = -now, was, keep
+        self.takes = h / (values[LAG] + h)
+        self.ends[5, 0] = self.takes * drive.stiffness_A_per_rad
+        self.ends[5, 4] = self.takes * drive.dampness_As_per_rad
+        self.starts[5, 5] = 1.0 - self.takes
+
+    def pushed(self, at_motor: Array, at_foot: Array) -> Array:
+        """Rates of p, u, a, w (4, m) by what does not depend on the states."""
+        values, none = self.values, np.zeros_like(self.command)
+        zero = values[CABLE] * values[ZERO]
+        return np.array(
+            [none, (at_motor - zero) / values[ROTOR], none, (zero + values[TORQUE] + at_foot) / values[INERTIA]]
+        )
+
+    def walked(self, at_motor: Array, at_foot: Array, start: Sequence[float]) -> Array:
+        """States (6, m), step by step: what they were without friction at a step's end, and then that friction."""
+        values, drive = self.values, self.drive
+        p, u, a, w = start
+        r = u
+        I = float(self.command[0]) - drive.stiffness_A_per_rad * p - drive.dampness_As_per_rad * r  # noqa: E741
+        rates = self.pushed(at_motor, at_foot)
+        right = np.zeros((STATES, len(self.command) - 1))
+        right[:4] = 0.5 * self.h * (rates[:, 1:] + rates[:, :-1])
+        right[5] = self.takes * self.command[1:]
+        inverse = np.linalg.inv(self.ends)
+        forced = (inverse @ right).T.tolist()
+        (p0, p1, p2, p3, p4, p5), (u0, u1, u2, u3, u4, u5), (a0, a1, a2, a3, a4, a5), (w0, w1, w2, w3, w4, w5), (
+            r0, r1, r2, r3, r4, r5), (I0, I1, I2, I3, I4, I5) = (inverse @ self.starts).tolist()  # fmt: skip
+        by_p, by_u, by_a, by_w, by_r, by_I = (self.h / values[ROTOR] * inverse[:, 1]).tolist()  # of a torque there
+        C_0, m, creep_rad_s = values[COULOMB], values[LOAD] * GEAR_K, self.creep_rad_s
+        clear = CLEAR * creep_rad_s
+        out = [(p, u, a, w, r, I)]
+        for f0, f1, f2, f3, f4, f5 in forced:
+            free = u0 * p + u1 * u + u2 * a + u3 * w + u4 * r + u5 * I + f1
+            current = I0 * p + I1 * u + I2 * a + I3 * w + I4 * r + I5 * I + f5
+            # y = (C_0 + m |current - by_I y|) tanh((free - by_u y) / creep): at full slip first
+            way = 1.0 if free > 0.0 else -1.0
+            loads = m if current > by_I * way * C_0 else -m  # by the sign of the current behind that friction
+            y = way * (C_0 + loads * current) / (1.0 + loads * by_I * way)
+            if way * (free - by_u * y) < clear:
+                y = _friction(free, by_u, current, -by_I, C_0, m, creep_rad_s)
+            p, u, a, w, r, I = (  # noqa: E741
+                p0 * p + p1 * u + p2 * a + p3 * w + p4 * r + p5 * I + f0 - by_p * y,
+                free - by_u * y,
+                a0 * p + a1 * u + a2 * a + a3 * w + a4 * r + a5 * I + f2 - by_a * y,
+                w0 * p + w1 * u + w2 * a + w3 * w + w4 * r + w5 * I + f3 - by_w * y,
+                r0 * p + r1 * u + r2 * a + r3 * w + r4 * r + r5 * I + f4 - by_r * y,
+                current - by_I * y,
+            )
+            if not -FASTEST_rad_s < u < FASTEST_rad_s:
+                gone = (math.nan, math.nan, math.nan, math.nan, math.nan, math.nan)
+                out += [gone] * (len(self.command) - len(out))
+                break
+            out.append((p, u, a, w, r, I))
+        return np.array(out).T
+
+    def complete(self, motion: Motion, at_motor: Array, at_foot: Array) -> None:
+        """The motion's friction and rates from its states."""
+        values, drive = self.values, self.drive
+        motion.sliding = np.tanh(motion.u / self.creep_rad_s)
+        bound = values[COULOMB] + values[LOAD] * GEAR_K * np.abs(motion.I)
+        motion.slopes = self.rates @ motion.states + self.pushed(at_motor, at_foot)
+        motion.slopes[1] -= bound * motion.sliding / values[ROTOR]
+        asked = self.command - drive.stiffness_A_per_rad * motion.p - drive.dampness_As_per_rad * motion.states[4]
+        before = np.concatenate([motion.I[:1], motion.I[:-1]])
+        motion.later = self.takes**2 / self.h * (before - asked)
+
+    def factors(self, motion: Motion) -> tuple:
+        """LU factors of all steps' equations: instants one below the other, the first one fixed."""
+        values, steps = self.values, len(motion.p)
+        bound = values[COULOMB] + values[LOAD] * GEAR_K * np.abs(motion.I)
+        ends = np.repeat(self.ends[:, :, None], steps, axis=2)
+        ends[1, 1] += self.h / values[ROTOR] * bound * (1.0 - motion.sliding**2) / self.creep_rad_s
+        ends[1, 5] += self.h / values[ROTOR] * values[LOAD] * GEAR_K * np.sign(motion.I) * motion.sliding
+        bands = np.zeros((2 * BELOW + ABOVE + 1, STATES * steps))
+        diagonal = BELOW + ABOVE
+        for row in range(STATES):
+            for column in range(STATES):
+                at = STATES * np.arange(steps) + column
+                bands[diagonal + row - column, at] = ends[row, column]
+                bands[diagonal + row - column, column] = float(row == column)
+                bands[diagonal + row - column + STATES, at[:-1]] = -self.starts[row, column]
+        factors, pivots, failed = lapack.dgbtrf(bands, BELOW, ABOVE)
+        if failed:
+            raise UserError("the ankle's motion cannot be simulated: its equations have no answer")
+        return factors, pivots
 
 
-def _factors(jacobian: Array, h: float) -> tuple:
-    """LU factors of the trapezoids' matrix: instants one below the other, the first one fixed."""
-    steps = jacobian.shape[2]
-    bands = np.zeros((2 * BELOW + ABOVE + 1, 4 * steps))
-    diagonal = BELOW + ABOVE
-    for row in range(4):
-        for column in range(4):
-            same = float(row == column)
-            part = -0.5 * h * jacobian[row, column]
-            here = part + same
-            here[0] = same
-            at = 4 * np.arange(steps) + column
-            bands[diagonal + row - column, at] = here
-            bands[diagonal + row - column + 4, at[:-1]] = part[:-1] - same
-    factors, pivots, failed = lapack.dgbtrf(bands, BELOW, ABOVE)
-    if failed:
-        raise UserError("the ankle's motion cannot be simulated: its equations have no answer")
-    return factors, pivots
+def _friction(free: float, v: float, current: float, by_r: float, C_0: float, m: float, creep_rad_s: float) -> float:
+    """r = (C_0 + m |current + by_r r|) tanh((free - v r) / creep) by Newton's method, halving where that leaves what
+    is known: the difference of both sides grows with r."""
+    high = (C_0 + m * abs(current)) / (1.0 - abs(m * by_r)) + 1e-12
+    low = -high
+    r = min(max(free / v, low), high)
+    for _ in range(MOST_STEPS):
+        slip = math.tanh((free - v * r) / creep_rad_s)
+        bound = C_0 + m * abs(current + by_r * r)
+        missed = r - bound * slip
+        if missed > 0.0:
+            high = r
+        else:
+            low = r
+        side = m * by_r if current + by_r * r > 0.0 else -m * by_r
+        step = missed / (1.0 - side * slip + bound * (1.0 - slip * slip) * v / creep_rad_s)
+        was, r = r, r - step
+        if not low <= r <= high:
+            r = 0.5 * (low + high)
+        if abs(r - was) < 1e-12:
+            break
+    return r
 
 
 def _solved(factors: tuple, right: Array) -> Array:

@@ -50,6 +50,20 @@ def test_the_foot_stands_inside_its_friction():
     assert np.ptp(out["p"]) == 0.0
 
 
+def test_the_logged_target_is_the_one_in_force():
+    """The law on the logged columns gives the logged current. Targets late by a row of 4 ms would miss it by 0.2 A rms,
+    K times the target's rate; 0.05 A: noise of 0.03 A, the motor's rate by its counts, 0.5 ms."""
+    case = clean("foot")
+    case.instruments["noise"] = dict.fromkeys(ANKLE.NOISE, 0.0) | {"I": 0.03}
+    (seen,) = SHORT.simulate([(case, case.runs[0], case.base, [])], counted=True)
+    found = SHORT.log(generator(1, "log"), case, case.runs[0], seen)
+    p = found["motor_angle_rad"]
+    u = np.gradient(p, ROW_S)
+    law = 12.0 * (found["target_angle_rad"] - p) + 1.6 * (found["target_rate_rad_per_s"] - u)
+    rows = np.flatnonzero(np.isfinite(found["current_A"]))[1:-1]
+    assert np.std(law[rows] - found["current_A"][rows]) < 0.05
+
+
 def clean(kind, name=None):
     """A case at the nominal base with an effect at its start."""
     case = Case(0, "single", base=ANKLE.NOMINAL | ANKLE.FIXED)

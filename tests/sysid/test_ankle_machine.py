@@ -84,15 +84,17 @@ def test_small_torques_answer_as_the_simulation_moves():
     """The linear answer against a second simulation: sensitivities of every parameter, and of a torque."""
     t = np.arange(0.0, 2.0, 0.004)
     drive = ankle_motion.Drive(t, K * (1.05 + 0.85 * np.sin(5.0 * t)) + D * 4.25 * np.cos(5.0 * t), K, D)
-    values = dict(zip(ankle_motion.PARAMETERS, (0.0013, 0.33, 0.55, 0.06, 0.01), strict=True))
-    start = np.array([1.05 + 0.0 * t, 4.25 + 0.0 * t, 1.05 + 0.0 * t, 4.25 + 0.0 * t])
+    values = dict(
+        zip(ankle_motion.PARAMETERS, (0.0013, 0.33, 0.55, 0.06, 0.01, 0.1, 14.0, 0.00185, 0.02, 0.001), strict=True)
+    )
+    start = (1.05, 4.25, 1.085, 4.15)  # the cable carries the return spring: nothing rings
     motion = ankle_motion.simulated(drive, values, start)
     slopes = ankle_motion.sensitivities(motion)
     for number, name in enumerate(ankle_motion.PARAMETERS):
-        change = 0.01 * values[name]
+        change = 0.005 * values[name]
         moved = ankle_motion.simulated(drive, {**values, name: values[name] + change}, start)
         found, said = (moved.a - motion.a) / change, slopes[:, 2, number]
-        # one per cent of the parameter: the second order is some per cent of the first; the iteration ends at 1e-7 rad
+        # half a per cent of the parameter: the second order is a few per cent of the first
         assert np.max(np.abs(found - said)) < 0.05 * np.max(np.abs(said)) + 2e-7 / change
     pushed = ankle_motion.simulated(drive, values, start, lambda m: (0.0 * m.p, -1e-3 * m.a**2))
     said = motion.answer(np.zeros((len(motion.p), 1)), -1e-3 * motion.a[:, None] ** 2)[:, 2, 0]
@@ -103,10 +105,17 @@ def test_the_robot_s_bench_raises_no_alarm_and_its_foot_comes_back():
     data = named_for(bench.ankle_sine(seed=3, seconds=4.0), "ankle")
     found = diagnose(Ankle(), [data.table([each.name for each in Ankle.quantities if each.name in data])]).answer
     assert not found["detected"]
-    values = found["evidence"]["parameters"]
-    assert values["inertia_kg_m2"]["value"] == pytest.approx(0.0013, rel=0.05)
-    assert values["return_stiffness_Nm_per_rad"]["value"] == pytest.approx(0.33, rel=0.02)
-    assert values["coulomb_friction_Nm"]["value"] == pytest.approx(0.06, rel=0.1)
+    # Torques are in units of the motor's torque constant, which is known by the rotor's inertia alone: a tenth here.
+    for name, true, near in (
+        ("inertia_kg_m2", 0.0013, 0.12),
+        ("return_stiffness_Nm_per_rad", 0.33, 0.12),
+        ("coulomb_friction_Nm", 0.06, 0.08),
+        ("load_friction", 0.1, 0.12),
+        ("cable_stiffness_Nm_per_rad", 14.0, 0.12),
+    ):
+        low, high = found["evidence"]["parameters"][name]["ci95"]
+        assert low <= true <= high, name
+        assert 0.5 * (high - low) < near * true, name
 
 
 @pytest.mark.parametrize("seed", [1, 2])
@@ -129,7 +138,8 @@ def test_a_fault_of_the_ankle_is_named(cause, at, fault):
 
 
 def test_by_the_joint_alone_a_return_spring_is_named_with_the_tie_of_its_forms():
-    found = diagnose(Ankle(), [ankle_run(joint_only=True, square=0.1)]).answer
+    # slow: at 1 Hz and by the joint alone, load friction and the joint's zero, which nobody knows, take the square up
+    found = diagnose(Ankle(), [ankle_run(joint_only=True, square=0.1, hertz=0.25, seconds=6.0)]).answer
     forms = {
         found["causes"][0]["form"],
         *(tie.partition("(")[2][:-1] for tie in found["causes"][0]["evidence"]["ties"]),

@@ -356,7 +356,7 @@ class Ankle(Experiment):
             noise = lfilter([1.0], [1.0, -rho], shocks, zi=[rho * rng.standard_normal()])[0]
             value = values + case.instruments["noise"][name] * noise
             shown[name] = (np.floor if name in "qp" else np.round)(value / LSB[name]) * LSB[name]
-        target, rate = asked.drive.target(time_s - TARGET_AGE_S + DT_S)
+        target, rate = asked.drive.target(time_s + ROW_S - TARGET_AGE_S + DT_S)  # rows are taken at their ends
         K, D = asked.drive.stiffness_A_per_rad, asked.drive.damping_As_per_rad
         if asked.kind == "sine":
             return {
