@@ -241,8 +241,8 @@ def _one_way(table: Table, induced: Array, w: Array) -> None:
     """UserError when the voltage that the winding's drop leaves goes against the speed: no motor turns so."""
     if np.std(induced) > 0.0 and np.std(w) > 0.0 and float(np.corrcoef(induced, w)[0, 1]) < -SAME_MOTION:
         raise UserError(
-            f"{table.name}: voltage_V and speed_rad_per_s have opposite signs: what resistance and brushes leave of the "
-            "voltage goes against the speed; nothing is concluded from such data"
+            f"{table.name}: voltage_V and speed_rad_per_s have opposite signs: what resistance and brushes leave of "
+            "the voltage goes against the speed; nothing is concluded from such data"
         )
 
 
