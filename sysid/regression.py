@@ -301,14 +301,22 @@ class Regression:
         self.inverse = np.linalg.inv(self.z.T @ self.phi)
         solved = np.zeros(self.count)
         solved[kept] = self.inverse @ (self.z.T @ self.response) / scale[kept]
+        self._face()
         covariance = np.zeros((self.count, self.count))
-        self.own = self.z.T @ self.z
-        spread = self.inverse @ self.own @ self.inverse.T
+        # equations that share a noisy channel tell less together than as many that do not
+        noise = self.own.copy()
+        for pair, correlation in self.shared.items():
+            noise += correlation * (self.across[pair] + self.across[pair].T)
+        spread = self.inverse @ noise @ self.inverse.T
         covariance[np.ix_(kept, kept)] = spread / np.outer(scale[kept], scale[kept])
         self.covariance = covariance
         self.values = dict(zip(self.names, (float(each) for each in solved), strict=True))
         self.residual = self.response - self.measured @ solved
-        # of equations that share noise: z^T z between them, and for the rows of each the z of the other's
+        self.chi2 = float(self.residual @ self.residual)
+
+    def _face(self) -> None:
+        """Products of z; of equations that share noise also between them, and for the rows of each the other's z."""
+        self.own = self.z.T @ self.z
         self.across: dict[tuple[str, str], Array] = {}
         self.facing: dict[tuple[tuple[str, str], str], Array] = {}
         for pair, rows in self.both.items():
@@ -317,7 +325,6 @@ class Regression:
                 facing = np.zeros((self.rows[name].stop - self.rows[name].start, self.z.shape[1]))
                 facing[own - self.rows[name].start] = self.z[others]
                 self.facing[pair, name] = facing
-        self.chi2 = float(self.residual @ self.residual)
 
     def _stack(self, columns: Mapping[str, Array]) -> Array:
         """One whitened column (N,) or matrix (N, k) from unwhitened ones by equation."""

@@ -136,6 +136,21 @@ def test_equations_that_share_noise_tell_by_how_much():
     assert inflation(columns) == pytest.approx(known, rel=1e-9)
 
 
+def test_a_parameter_of_two_equations_that_share_noise_is_known_as_well_as_they_tell_together():
+    """Of both with noise of variance 2, correlated by 1/2, the mean has (1 + 1/2) / 2 of the variance of one."""
+    rng = generator(8, "together")
+    common, x = rng.normal(size=SIZE), np.sin(np.arange(SIZE) * 0.1)
+    valid = np.ones(SIZE, dtype=bool)
+    table = Table(np.arange(SIZE) * 1e-3, {}, (slice(0, SIZE),), "made")
+    both = {
+        name: Equation(name, "M", "mechanical", "N", x + common + rng.normal(size=SIZE), {"slope": x}, valid)
+        for name in ("one", "other")
+    }
+    made = Regression([Recording(table, {}, both)])
+    # 10 %: both variances and the correlation are estimated from these rows
+    assert made.covariance[0, 0] == pytest.approx(0.75 * 2.0 / np.sum(x**2), rel=0.1)
+
+
 def test_products_of_columns_beside_the_base_are_those_of_the_rows():
     rng = generator(5, "gram")
     x, other = np.sin(np.arange(SIZE) * 0.1), np.sin(np.arange(SIZE) * 0.23)
