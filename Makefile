@@ -19,25 +19,6 @@ test: $(VENV)/.all
 	$(RUN) -m pytest -q -rs -n 2 --dist loadfile $(addprefix --ignore=,$(WITH_A_CLOCK))
 	$(RUN) -m pytest -q -rs $(WITH_A_CLOCK)
 
-test-vm: the tests on real SocketCAN, in a virtual machine where this kernel has none (tools/vm/README.md).
-PYTHON ?= python3
-VENV   ?= .venv
-STEPS  ?= 100
-RUN    := $(VENV)/bin/python
-SOURCES := $(shell find ranger_sim foundation datatable can_bus plant firmware_sim boards harness sysid tools \( -name '*.py' -o -name '*.pxd' \) -not -name '_*' 2>/dev/null)
-
-.PHONY: walk test test-vm lint setup bench lock clean
-
-walk: $(VENV)/.walk
-	$(RUN) -m ranger_sim walk --steps $(STEPS) --out runs/walk
-
-# Tests that need no clock and no other process go side by side; the others have both cores to themselves.
-SIDE_BY_SIDE = tests/blind tests/boards tests/datatable tests/plant tests/sysid
-
-test: $(VENV)/.all
-	$(RUN) -m pytest -q -rs -n 2 --dist loadfile $(SIDE_BY_SIDE)
-	$(RUN) -m pytest -q -rs $(addprefix --ignore=,$(SIDE_BY_SIDE))
-
 test-vm: $(VENV)/.all
 	$(RUN) -m tests.vm.run
 
