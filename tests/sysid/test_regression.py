@@ -105,16 +105,20 @@ def test_products_beside_the_base_are_those_of_the_whole_columns():
     assert made.product(white, made.shadow(white), whole) == pytest.approx(whole.T @ whole)
 
 
-def test_equations_that_share_noise_tell_by_how_much():
-    rng = generator(6, "shared")
+def sharing(seed, parameters):
+    """(regression, their column) of two equations whose noises, of variance 2, have half in common."""
+    rng = generator(seed, "shared")
     common, x = rng.normal(size=SIZE), np.sin(np.arange(SIZE) * 0.1)
-    valid = np.ones(SIZE, dtype=bool)
     table = Table(np.arange(SIZE) * 1e-3, {}, (slice(0, SIZE),), "made")
     both = {
-        name: Equation(name, "M", "mechanical", "N", x + common + rng.normal(size=SIZE), {name: x}, valid)
-        for name in ("one", "other")
+        name: Equation(name, "M", "mechanical", "N", x + common + rng.normal(size=SIZE), {each: x}, np.ones(SIZE, bool))
+        for name, each in zip(("one", "other"), parameters, strict=True)
     }
-    made = Regression([Recording(table, {}, both)])
+    return Regression([Recording(table, {}, both)]), x
+
+
+def test_equations_that_share_noise_tell_by_how_much():
+    made, x = sharing(6, ("one", "other"))
     assert made.shared["one", "other"] == pytest.approx(0.5, abs=0.06)
     ones = np.ones((SIZE, 1))
 
@@ -138,15 +142,7 @@ def test_equations_that_share_noise_tell_by_how_much():
 
 def test_a_parameter_of_two_equations_that_share_noise_is_known_as_well_as_they_tell_together():
     """Of both with noise of variance 2, correlated by 1/2, the mean has (1 + 1/2) / 2 of the variance of one."""
-    rng = generator(8, "together")
-    common, x = rng.normal(size=SIZE), np.sin(np.arange(SIZE) * 0.1)
-    valid = np.ones(SIZE, dtype=bool)
-    table = Table(np.arange(SIZE) * 1e-3, {}, (slice(0, SIZE),), "made")
-    both = {
-        name: Equation(name, "M", "mechanical", "N", x + common + rng.normal(size=SIZE), {"slope": x}, valid)
-        for name in ("one", "other")
-    }
-    made = Regression([Recording(table, {}, both)])
+    made, x = sharing(8, ("slope", "slope"))
     # 10 %: both variances and the correlation are estimated from these rows
     assert made.covariance[0, 0] == pytest.approx(0.75 * 2.0 / np.sum(x**2), rel=0.1)
 
