@@ -9,7 +9,9 @@ statistics for a median and a percentile) beside its target.
 What counts as named: the causes of an answer that does not abstain. A set: the causes with all that they are tied with.
 What theory cannot tell apart is not asked for: a cause with a twin in the truth (`ties`, cosine above 0.95) is outside
 the first cause's figures and inside those of ties; an effect outside the catalogue that looks like a cause is left out.
-Parameters: the first one of a cause, which is its size. The gain is the answer's own word.
+Parameters: the first one of a cause, which is its size. The gain is the answer's own word; beside it stands what the
+truth says of it, for effects that grow with their size: an effect of size s, modelled with s', leaves (1 - s'/s)^2 of its
+square on whatever run. A wrong phase or time constant is not in that figure.
 """
 
 import argparse
@@ -19,6 +21,8 @@ import pathlib
 
 import numpy as np
 from scipy import stats
+
+from tests.blind.generator.effects import EFFECTS
 
 LEVEL = 0.95
 APART = 0.84  # cosine whose square is the 70 % of an effect that a name must explain
@@ -81,6 +85,9 @@ PER_KELVIN = {
     "resistance_temperature": ("ohm_per_heat", "resistance_ohm"),
     "torque_constant_temperature": ("per_heat", "torque_constant_Nm_per_A"),
 }
+
+
+PROPORTIONAL = {name for name, effect in EFFECTS.items() if effect.linear}  # what they add grows with their size
 
 
 @dataclasses.dataclass(frozen=True)
@@ -259,6 +266,13 @@ def score(truths, answers):
     def name(truth):
         return truth["causes"][0]["name"]
 
+    def sized(*strengths):
+        """(truth, answer, size found, its interval, size hidden) of single effects that are named rightly."""
+        for t, a in at(*strengths):
+            for parameter, true in list(t["causes"][0]["parameters"].items())[:1]:
+                if (found := a.parameter(name(t), parameter)) is not None:
+                    yield t, parameter, *found, true
+
     figures = [share("answers missing", [not a.given for _, a in cases], 0.0, False)]
     figures.append(share("false alarms", [a.detected or not a.given for _, a in nulls], 0.02, False))
     for variant in ("plain", "parameters", "noise"):
@@ -279,14 +293,10 @@ def score(truths, answers):
     covered = []
     for strength, target in ((2.0, 0.10), (4.0, 0.05)):
         errors = []
-        for t, a in at(strength):
-            for parameter in list(t["causes"][0]["parameters"])[:1]:
-                found = a.parameter(name(t), parameter)
-                if found is None:
-                    continue
-                errors.append(relative_error(t["causes"][0], parameter, found[0]))
-                if found[1] is not None:
-                    covered.append(found[1][0] <= t["causes"][0]["parameters"][parameter] <= found[1][1])
+        for t, parameter, value, interval, true in sized(strength):
+            errors.append(relative_error(t["causes"][0], parameter, value))
+            if interval is not None:
+                covered.append(interval[0] <= true <= interval[1])
         figures.append(quantile(f"parameter error at {strength:g}, median", errors, 0.5, target, False))
     figures.append(share("coverage of 95 % intervals", covered, 0.90))
     figures.append(share("coverage of 95 % intervals, at most", covered, 0.98, False))
@@ -294,6 +304,13 @@ def score(truths, answers):
     gains = [a.gain for t, a in strong if a.gain is not None and name(t) in a.reported()]
     figures.append(quantile("gain fraction, median", gains, 0.5, 0.90))
     figures.append(quantile("gain fraction, 10th percentile", gains, 0.1, 0.70))
+    by_size = [
+        1.0 - relative_error(t["causes"][0], parameter, value) ** 2
+        for t, parameter, value, _, _ in sized(2.0, 4.0)
+        if name(t) in PROPORTIONAL
+    ]
+    figures.append(quantile("gain by the hidden size, median", by_size, 0.5))
+    figures.append(quantile("gain by the hidden size, 10th percentile", by_size, 0.1))
     every_gain = [a.gain for _, a in cases if a.gain is not None]
     figures.append(share("extended model worse", [gain < 0.0 for gain in every_gain], 0.01, False))
 

@@ -251,3 +251,17 @@ def test_a_slope_over_the_current_squared_is_no_coefficient_of_temperature():
     assert figures([(truth, answer)])["parameter error at 4, median"].cases == 0
     kelvin = named(("resistance_temperature", (), given | {"time_constant_s": (0.0, 0.0, 0.0)}))
     assert figures([(truth, kelvin)])["parameter error at 4, median"].cases == 0  # without a base parameter
+
+
+def test_what_the_truth_says_of_a_gain_is_one_less_the_square_of_the_sizes_error():
+    def case(true, found, name="drag", ties=()):
+        given = named((name, ties, {"coefficient": (found, 0.0, 1.0)}), gain=0.99)
+        return hidden(name, parameters={"coefficient": true}), given
+
+    cases = [case(1.0, 1.0), case(1.0, 0.9), case(2.0, 1.0), case(1.0, -0.5), case(1.0, 9.0, name="presliding")]
+    found = figures(cases)
+    # 1, 1 - 0.1^2, 1 - 0.5^2, and 1 - 1.5^2 for a wrong sign; presliding does not grow with its size
+    assert found["gain by the hidden size, median"].cases == 4
+    assert found["gain by the hidden size, median"].value == pytest.approx((0.99 + 0.75) / 2)
+    assert found["gain by the hidden size, 10th percentile"].value == pytest.approx(-1.25 + 0.3 * (0.75 + 1.25))
+    assert found["gain fraction, median"].value == 0.99
