@@ -10,8 +10,8 @@ What counts as named: the causes of an answer that does not abstain. A set: the 
 What theory cannot tell apart is not asked for: a cause with a twin in the truth (`ties`, cosine above 0.95) is outside
 the first cause's figures and inside those of ties; an effect outside the catalogue that looks like a cause is left out.
 Parameters: the first one of a cause, which is its size. The gain is the answer's own word; beside it stands what the
-truth says of it, for effects that grow with their size: an effect of size s, modelled with s', leaves (1 - s'/s)^2 of its
-square on whatever run. A wrong phase or time constant is not in that figure.
+truth says of it, for effects that grow with their size: an effect of size s, modelled with s', leaves (1 - s'/s)^2 of
+its square on whatever run. A wrong phase or time constant is not in that figure.
 """
 
 import argparse
