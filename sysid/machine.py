@@ -50,7 +50,8 @@ class Equation:
     The columns are what was measured, noise and all. stand_ins: for a parameter, a column (n,) that moves as its own
     does and has no noise in common with any measurement of this equation; fits and tests go against these
     (instrumental variables), for a noisy column would leave its shadow in the residual. lines: whether a line in the
-    residual's spectrum says anything; a counter's steps beat with the samples.
+    residual's spectrum says anything; a counter's steps beat with the samples. few: rows below which it is told that
+    next to nothing is said of the equation, where they are also a small part of the recording.
     """
 
     name: str
@@ -62,6 +63,7 @@ class Equation:
     valid: np.ndarray
     stand_ins: dict[str, Array] = dataclasses.field(default_factory=dict)
     lines: bool = True
+    few: int = 50
 
 
 @dataclasses.dataclass(frozen=True)

@@ -27,7 +27,7 @@ EXPLAINED = 0.2  # of what an equation balances: below it the channels do not be
 # than 0.75; the blind cases' noise has a memory of 0.93 at most from sample to sample.
 COHERENT, SLOW = 0.9, 0.95
 FEWEST = 100  # rows
-FEW, FEWEST_AT_ALL = 0.02, 50  # of the rows; what is thinned to rows that are independent may be a small part
+FEW = 0.02  # of the rows; what is thinned to rows that are independent may be a small part
 APART = 0.25  # of the mean square: equations leave less than so much of it when a parameter may differ between them
 TELLS = 0.05  # of a column's length: what the others leave of it, when the equation alone tells its parameter
 SLOWEST = 6.0  # a memory of 0.986 from sample to sample; instruments have up to 0.95 (3.2), a voltage 10 ms late has 12
@@ -35,7 +35,9 @@ MOST = 5  # causes at once: where everything seems wrong, it is another machine,
 LARGEST_SCALE = 0.5  # change that a sensor's scale may be: what is beyond is another signal, or another unit
 UNIT_TOLERANCE = 0.05  # of a factor that is told as a unit's: friction and noise move it by per cents
 # kinds of findings after which no cause is named
-FORBID = ("impossible", "unexplained", "contradiction", "slow", "too_many", "other_signal")
+FORBID = ("impossible", "unexplained", "contradiction", "slow", "too_many", "other_signal", "other_machine")
+# small beside the rest, or of an instrument: a model error moves them by any factor
+MAY_BE_ANY = ("friction", "inductance", "lag", "filter", "gates", "zero", "offset", "bias")
 # {unit of a channel: {what may be meant by its numbers instead: how many of them make one of ours}}
 OTHER_UNITS = {
     "rad/s": {"rpm": 30.0 / np.pi, "deg/s": 180.0 / np.pi, "turns/s": 0.5 / np.pi},
@@ -73,13 +75,14 @@ def look(machine: Machine, regression: Regression, named: Sequence[Named] = ()) 
         if absurd(known, value, error):
             text = f"it comes out as {value:.4g} {known.unit}, which no machine has"
             findings.append(_finding(known.name, "impossible", value, known.unit, text))
-        elif known.value != 0.0 and error < CLEAR * abs(value) and abs(value / known.value) > FACTOR:
-            findings.append(_factor(known, value, value / known.value))
-        elif value != 0.0 and error < CLEAR * abs(value) and abs(known.value / value) > FACTOR:
-            findings.append(_factor(known, value, value / known.value))
+        elif known.value * value != 0.0 and error < CLEAR * abs(value):
+            factor = value / known.value
+            if not 1.0 / FACTOR <= abs(factor) <= FACTOR:
+                findings.append(_factor(known, value, factor, _of_a_simulator(regression)))
+    few = {name: each.few for recording in regression.recordings for name, each in recording.equations.items()}
     for name in regression.equations:
         counted, rows = int(np.count_nonzero(regression.good[name])), len(regression.parts[name].valid)
-        if counted < FEW * rows and counted < FEWEST_AT_ALL:
+        if counted < FEW * rows and counted < few[name]:
             text = f"{counted} of {rows} rows of this equation count: next to nothing is said of it"
             findings.append(_finding(name, "few_rows", counted, "rows", text))
         share = explained(regression, name)
@@ -249,11 +252,16 @@ def _of_sensor(regression: Regression, named: Named) -> list[Finding]:
     return []
 
 
-def _factor(known: Known, value: float, factor: float) -> Finding:
+def _factor(known: Known, value: float, factor: float, simulated: bool) -> Finding:
+    """A parameter far from the simulation's. simulated: by equations that are linear about where a fit has ended; so
+    far from where it began it may have been fitted to anything.
+    """
     text = (
         f"it comes out as {value:.4g} {known.unit}, {factor:.3g} times the simulation's {known.value:.4g}: "
         "another machine, or a channel in another unit"
     )
+    if simulated and not any(word in known.name for word in MAY_BE_ANY):
+        return _finding(known.name, "other_machine", factor, "", text)
     return _finding(known.name, "far_off", factor, "", text)
 
 

@@ -1,5 +1,7 @@
 """Fits of data that are not what they say: told by their parameters, and no cause is named from them."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -187,6 +189,20 @@ def test_a_machine_in_which_everything_is_wrong_is_another_one():
     assert told.forbid and [each.kind for each in told.findings] == ["too_many"]
 
 
+@pytest.mark.parametrize("factor", [0.15, 0.3, 3.0, 7.0])
+@pytest.mark.parametrize("simulated", [False, True])
+def test_far_from_where_its_fit_began_a_simulation_names_nothing(simulated, factor):
+    machine = Cart()
+    regression = Regression([dataclasses.replace(machine.prepare(cart_run(1)), left_over=simulated)])
+    mass = machine.parameters[0]
+    machine.parameters = (dataclasses.replace(mass, value=regression.values[mass.name] / factor),)
+    told = plausibility.look(machine, regression)
+    far = factor in (0.15, 7.0)
+    assert told.forbid is (far and simulated)
+    found = [each.kind for each in told.findings if each.channel == "mass_kg"]
+    assert found == ["other_machine" if told.forbid else "far_off"] * far
+
+
 @pytest.mark.parametrize(
     ("cause", "coefficients", "doubted"),
     [
@@ -216,3 +232,14 @@ def test_a_scale_or_an_offset_that_no_sensor_has_is_another_signal(cause, coeffi
 )
 def test_a_factor_between_two_equations_tells_the_units_that_would_do_it(factor, meant):
     assert plausibility.other_units(MotorBench(), factor) == meant
+
+
+@pytest.mark.parametrize(("few", "told"), [(20, []), (50, ["few_rows"])])
+def test_few_rows_are_told_below_what_the_machine_says_is_few(few, told):
+    recording = Cart().prepare(cart_run(1))
+    (name, equation), *_ = recording.equations.items()
+    valid = np.zeros_like(equation.valid)
+    valid[100 : len(valid) : len(valid) // 25] = True
+    recording.equations[name] = dataclasses.replace(equation, valid=valid, few=few)
+    found = plausibility.look(Cart(), Regression([dataclasses.replace(recording, whitened=False)])).findings
+    assert [each.kind for each in found if each.kind == "few_rows"] == told

@@ -504,7 +504,7 @@ def _equation(recording: WalkRecording, rows: Rows, numbers: Numbers) -> Equatio
             columns[field] = column
     used = {name: column[rows.where] for name, column in columns.items()}
     valid[rows.where[_spikes(response[rows.where], used)]] = False
-    return Equation(rows.name, rows.letter, rows.subsystem, rows.unit, response, columns, valid)
+    return Equation(rows.name, rows.letter, rows.subsystem, rows.unit, response, columns, valid, few=rows.fewest)
 
 
 def _spikes(response: Array, columns: Mapping[str, Array]) -> np.ndarray:
