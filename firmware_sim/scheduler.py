@@ -402,6 +402,7 @@ class SlotScheduler:
         return SlotCounters(
             count=self.slot_count,
             latest_ns=self.slot_time,
+            finished_ns=self.finished_time,
             overruns=self.overruns,
             dropped_tasks=self.dropped_tasks,
             near_limits=self.near_limits,

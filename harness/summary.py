@@ -168,6 +168,6 @@ def errors(counters: RangerCounters) -> dict:
 
 
 def alive(robot: Any, counters: RangerCounters) -> bool:
-    """True when the board's slots are as recent as they should be."""
-    silent_ns = robot.loop.time - counters.slots.latest_ns
+    """True when the board finished a slot's work lately: a program that hangs has slots that begin, and no others."""
+    silent_ns = robot.loop.time - counters.slots.finished_ns
     return robot.loop.time - robot.start_ns < 20_000_000 or silent_ns < 20 * counters.slots.slot_ns

@@ -32,7 +32,7 @@ cdef class CanLink(Sender):
     cdef public Microcontroller chip
     cdef public ErrorModule errors
     cdef public object controller_errors
-    cdef public bint report_full, full_ring_kills
+    cdef public bint report_full, full_ring_kills, stuck
     cdef public long long receive_lost, send_lost
     cdef public long long code_receive_full, code_send_full
     cdef public bint built

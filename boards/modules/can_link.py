@@ -94,6 +94,7 @@ class CanLink(Sender):
         self.delivered = 0
         self.ignored = 0
         self.receive_lost = 0
+        self.stuck = False  # a frame can no longer be released: the board is dead
         self.queued = 0
         self.send_lost = 0
         self.most_waiting = 0
@@ -136,11 +137,13 @@ class CanLink(Sender):
         row: cython.longlong = RECEIVED * write
         controller: CanController = self.controller
         if after == self.rx_read:
-            self.receive_lost += 1
+            if not self.stuck:  # or it is the same frame once more
+                self.receive_lost += 1
             if self.report_full:
                 self.errors.report(self.code_receive_full)
             if self.full_ring_kills:
                 # the release goes to a wrong address: the buffer stays full and asks again as soon as this ends
+                self.stuck = True
                 self.chip.spend(STORM_CYCLES - RECEIVE_CYCLES)
                 self.chip.request(controller.rx_source)
                 return

@@ -48,6 +48,7 @@ class CanLink(Sender):
     controller_errors: Any
     report_full: bool
     full_ring_kills: bool
+    stuck: bool
     receive_lost: int
     send_lost: int
     code_receive_full: int

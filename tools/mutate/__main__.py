@@ -1,0 +1,153 @@
+"""`python -m ranger_sim.tools.mutate ROOM ...`: what share of small faults in a room its tests notice.
+
+Of all faults that `mutants.py` knows to put into the room's files, so many are drawn with a seed, put one at a time
+into a copy of the repository, and the tests of the room that reach the place are run there, interpreted and cheapest
+first. Verdicts are kept in the work folder: a run that was broken off goes on where it was, and a larger count goes on
+from a smaller one. Survivors are printed with their place and difference.
+
+A verdict holds for the tests of its time. `--again` tries mutants that were not killed once more.
+"""
+
+import argparse
+import json
+import pathlib
+import sys
+from collections import Counter
+from typing import Any
+
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.loading import HOUSE, ROOMS
+from ranger_sim.tools.files import json_target, replace_file
+from ranger_sim.tools.mutate.mutants import Mutant
+from ranger_sim.tools.mutate.work import (
+    KILLED,
+    TIMEOUT,
+    AllOf,
+    Copy,
+    Known,
+    Results,
+    all_mutants,
+    judge,
+    known,
+    reach_of,
+    sample,
+)
+from ranger_sim.tools.units import whole_number
+
+COMMAND = "python -m ranger_sim.tools.mutate"
+COUNT = 30
+LIMIT_S = 60.0
+NOTICED = (KILLED, TIMEOUT)
+
+
+def parser() -> argparse.ArgumentParser:
+    """The options."""
+    command = argparse.ArgumentParser(
+        prog=COMMAND, description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    command.add_argument("room", nargs="+", choices=ROOMS, metavar="ROOM", help=", ".join(ROOMS))
+    command.add_argument(
+        "--count", type=whole_number(1), default=COUNT, metavar="N", help=f"mutants of each room (default {COUNT})"
+    )
+    command.add_argument("--seed", type=int, default=1, metavar="S", help="draws them (default 1)")
+    command.add_argument(
+        "--tests", action="append", default=[], metavar="PATH", help="tests to run (default: tests/ROOM)"
+    )
+    command.add_argument(
+        "--limit",
+        type=whole_number(1),
+        default=int(LIMIT_S),
+        metavar="S",
+        help=f"of the tests that reach a mutant, run the cheapest of so many seconds together (default {LIMIT_S:g})",
+    )
+    command.add_argument(
+        "--work",
+        type=pathlib.Path,
+        default=HOUSE / "build" / "mutate",
+        metavar="DIR",
+        help="copy, map of the tests and verdicts (default build/mutate)",
+    )
+    command.add_argument(
+        "--at",
+        action="append",
+        default=[],
+        metavar="FILE:LINE",
+        help="instead of drawing: every mutant of this line; all of --tests are run, without a map of them",
+    )
+    command.add_argument("--again", action="store_true", help="try what was not killed once more; map the tests anew")
+    command.add_argument("--json", metavar="FILE|-", help="the figures as JSON; - prints them and nothing else")
+    return command
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run the mutants; 0 when every one was noticed or is known to be equivalent, 1 otherwise, 2 for a user's fault."""
+    options = parser().parse_args(arguments)
+    try:
+        return run(options)
+    except UserError as mistake:
+        print(f"{COMMAND}: {mistake}", file=sys.stderr)
+        return 2
+
+
+def run(options: argparse.Namespace) -> int:
+    """The same with options that are right."""
+    json_file = json_target(options.json)
+    say = (lambda _text: None) if options.json == "-" else (lambda text: print(text, flush=True))
+    listed = known()
+    options.work.mkdir(parents=True, exist_ok=True)
+    copy = Copy(options.work / "copy")
+    found = {}
+    for room in dict.fromkeys(options.room):
+        found[room] = of_room(options, copy, room, listed, say)
+    text = json.dumps({"seed": options.seed, "mutate": found}, indent=2)
+    if json_file is not None:
+        replace_file(json_file, (text + "\n").encode())
+    if options.json == "-":
+        print(text)
+    return 1 if any(each["survivors"] for each in found.values()) else 0
+
+
+def of_room(options: argparse.Namespace, copy: Copy, room: str, listed: list[Known], say: Any) -> dict:
+    """Figures of one room, after all its mutants of this run have a verdict."""
+    equivalent = {each.key for each in listed}
+    every = all_mutants(room)
+    drawn = sample(every, room, options.count, options.seed)
+    if options.at:
+        drawn = [mutant for mutant in every if f"{mutant.path}:{mutant.line}" in options.at]
+    results = Results(options.work / f"verdicts-{room}.jsonl")
+    if options.again:
+        (options.work / f"reach-{room}.json").unlink(missing_ok=True)
+    wanted = options.tests or [f"tests/{room}"]
+    tests = AllOf(wanted) if options.at else reach_of(copy, room, wanted, say)
+    for mutant in drawn:
+        old = results.verdicts.get(mutant.key)
+        if mutant.key in equivalent or (old is not None and (old.outcome in NOTICED or not options.again)):
+            continue
+        verdict = judge(copy, mutant, tests, options.limit)
+        results.add(verdict)
+        say(f"{verdict.outcome:11} {verdict.seconds:6.1f} s  {mutant.path}:{mutant.line} {mutant.operator}")
+    return told(room, every, drawn, results, equivalent, say)
+
+
+def told(room: str, every: list[Mutant], drawn: list[Mutant], results: Results, equivalent: set[str], say: Any) -> dict:
+    """Count the verdicts and print what survived."""
+    counts = Counter("equivalent" if each.key in equivalent else results.verdicts[each.key].outcome for each in drawn)
+    judged = len(drawn) - counts["equivalent"]
+    noticed = sum(counts[outcome] for outcome in NOTICED)
+    rate = noticed / judged if judged else None
+    survivors = []
+    for mutant in sorted(drawn, key=lambda each: (each.path, each.line)):
+        outcome = "equivalent" if mutant.key in equivalent else results.verdicts[mutant.key].outcome
+        if outcome in (*NOTICED, "equivalent"):
+            continue
+        source = (HOUSE / mutant.path).read_text(encoding="utf-8")
+        survivors.append({"place": f"{mutant.path}:{mutant.line}", "outcome": outcome, "key": mutant.key})
+        say(f"\n{mutant.path}:{mutant.line}: {outcome}; {mutant.function or 'module'}\n{mutant.difference(source)}")
+    share = "none" if rate is None else f"{100.0 * rate:.0f} %"
+    parts = ", ".join(f"{count} {outcome}" for outcome, count in sorted(counts.items()))
+    say(f"\n{room}: {noticed} of {judged} noticed, {share} ({parts}; {len(every)} mutants in all)")
+    return {"mutants": len(every), "drawn": len(drawn), "rate": rate, **counts, "survivors": survivors}
+
+
+if __name__ == "__main__":
+    sys.exit(main())
