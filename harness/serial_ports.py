@@ -13,11 +13,11 @@ import errno
 import math
 import os
 import select
-import tty
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Protocol
 
 from ranger_sim.foundation.events import NEVER, PIN_EDGE, STAGE_PINS, UART_BYTE
+from ranger_sim.foundation.peers import LIMITS, Terminal, read_ready, write_ready
 from ranger_sim.foundation.random_stream import RandomStream
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness import wiring
@@ -57,28 +57,20 @@ class PtyPort:
     """A pseudo-terminal, raw. Clients come and go; without one at most the kernel's few kilobytes wait."""
 
     def __init__(self) -> None:
-        try:
-            self.master, self.slave = os.openpty()
-        except OSError as error:
-            raise UserError(f"pseudo-terminal: {error.strerror}") from None
-        tty.setraw(self.slave)  # kept open: with the last client's close the settings would be forgotten
-        os.set_blocking(self.master, False)
-        self.path = os.ttyname(self.slave)
+        self.terminal = Terminal()
+        self.path = self.terminal.path
 
     def read(self, limit: int) -> bytes:
-        return read_ready(self.master, limit)
+        return self.terminal.read(limit) or b""
 
     def write(self, data: bytes) -> int:
-        return write_ready(self.master, data)
+        return self.terminal.write(data)
 
     def filenos(self) -> list[int]:
-        return [self.master]
+        return [self.terminal.fileno()]
 
     def close(self) -> None:
-        for number in (self.master, self.slave):
-            if number >= 0:
-                os.close(number)
-        self.master = self.slave = -1
+        self.terminal.close()
 
 
 class RealPort:
@@ -120,27 +112,11 @@ class RealPort:
         self.serial.close()
 
 
-def read_ready(number: int, limit: int) -> bytes:
-    """Bytes that are there, without waiting."""
-    try:
-        return os.read(number, limit) if limit > 0 else b""
-    except (BlockingIOError, InterruptedError):
-        return b""
-
-
 def hung_up(number: int) -> bool:
     """True when the other side of a terminal is gone: reading it then only looks as if nothing came."""
     watch = select.poll()
     watch.register(number, select.POLLIN)
     return any(events & (select.POLLHUP | select.POLLERR | select.POLLNVAL) for _, events in watch.poll(0))
-
-
-def write_ready(number: int, data: bytes) -> int:
-    """How many bytes were taken without waiting."""
-    try:
-        return os.write(number, data)
-    except (BlockingIOError, InterruptedError):
-        return 0
 
 
 def reason_of(error: Exception) -> str:
@@ -258,7 +234,7 @@ class SerialLine:
     def _take_in(self, now_ns: int) -> None:
         """What the port has, as far as it fits on the line in the next milliseconds."""
         start = max(self.line_free_ns, now_ns)
-        data = self.port.read((now_ns + AHEAD_NS - start) // self.byte_ns)
+        data = self.port.read(min((now_ns + AHEAD_NS - start) // self.byte_ns, LIMITS["serial"].read_bytes))
         if not data:
             return
         self.asynchronous = True
@@ -277,7 +253,9 @@ class SerialLine:
             return  # the module keeps it; the board sends no more
         if self.rest:
             self.rest = self.rest[self._write(self.rest) :]
-        while self.outgoing and self.outgoing[0][0] <= now_ns:
+        room = LIMITS["serial"].write_bytes  # the rest waits for the next poll
+        while self.outgoing and self.outgoing[0][0] <= now_ns and room > 0:
+            room -= len(self.outgoing[0][1])
             data = self.outgoing.popleft()[1]
             if silent:
                 self.bytes_unheard += len(data)

@@ -11,7 +11,9 @@ from ranger_sim.can_bus.edge.paced import DEFAULT_BITRATE, PacedBus, speed_of
 from ranger_sim.can_bus.edge.slcan import SlcanServer
 from ranger_sim.can_bus.edge.socketcand import SocketcandServer
 from ranger_sim.foundation import wallclock
+from ranger_sim.foundation.peers import loopback
 from ranger_sim.foundation.user_error import UserError
+from ranger_sim.tools import server_options
 from ranger_sim.tools.units import whole_number
 
 
@@ -34,33 +36,25 @@ def register(commands: Any) -> None:
         "--bit-error-rate", type=float, default=0.0, help="share of disturbed bits, 0 to 0.1 (default 0)"
     )
     command.add_argument("--seed", type=whole_number(0), default=0, help="seed of the disturbances (default 0)")
-    add_server_options(command)
+    server_options.add_options(command)
     command.add_argument("--seconds", type=float, default=math.inf, help="end after so long (default: with Ctrl-C)")
     command.set_defaults(run=run)
 
 
-def add_server_options(command: argparse.ArgumentParser) -> None:
-    """--slcan and --socketcand, which `up` has as well."""
-    command.add_argument(
-        "--slcan",
-        action="append",
-        default=[],
-        metavar="CHANNEL",
-        help="show this bus as a serial-line adapter on a pseudo-terminal (repeatable)",
-    )
-    command.add_argument("--socketcand", metavar="[HOST:]PORT", help="show all buses over TCP (port 0: a free one)")
+def open_servers(buses: dict[str, Any], options: argparse.Namespace, epoch_ns: int = 0) -> tuple[list[Any], list[str]]:
+    """(servers, one line for each that says how to reach it) for buses {channel: Bus or Taps}.
 
-
-def open_servers(
-    buses: dict[str, Any], name: str, slcan: list[str], socketcand: str | None, epoch_ns: int = 0
-) -> tuple[list[Any], list[str]]:
-    """(servers, one line for each that says how to reach it) for buses {channel: Bus or Taps}."""
+    `options`: those of `server_options`, and `name`.
+    """
+    name, socketcand = options.name, options.socketcand
+    if options.allow_network and socketcand is None:
+        raise UserError("--allow-network: nothing would listen there; give --socketcand HOST:PORT with it")
     with ExitStack() as opened:
         first = next(iter(buses))
         servers: list[Any] = [opened.enter_context(closing(AttachServer(name, buses, epoch_ns)))]
         prefix = "" if name == DEFAULT_NAME else f"{name}/"
         lines = [f'python-can: can.Bus(interface="ranger_sim", channel="{prefix}{first}")']
-        for channel in slcan:
+        for channel in options.slcan:
             if channel not in buses:
                 raise UserError(f"--slcan {channel}: no such bus; there are {', '.join(buses)}")
             terminal = opened.enter_context(closing(SlcanServer(channel, buses[channel], epoch_ns)))
@@ -70,9 +64,11 @@ def open_servers(
             host, _, port = socketcand.rpartition(":")
             if not port.isdecimal():
                 raise UserError(f"--socketcand {socketcand}: PORT or HOST:PORT is expected")
-            tcp = opened.enter_context(closing(SocketcandServer(buses, int(port), host or "127.0.0.1", epoch_ns)))
+            server = SocketcandServer(buses, int(port), host or "127.0.0.1", epoch_ns, options.allow_network)
+            tcp = opened.enter_context(closing(server))
             servers.append(tcp)
-            lines.append(f"socketcand: {tcp.host}:{tcp.port}")
+            open_to_all = "" if loopback(tcp.host) else ", open to the network: whoever reaches it may send frames"
+            lines.append(f"socketcand: {tcp.host}:{tcp.port}{open_to_all}")
         opened.pop_all()
         return servers, lines
 
@@ -91,9 +87,7 @@ def run(options: argparse.Namespace) -> int:
         PacedBus(channel, options.bitrate, speed, options.seed, options.bit_error_rate) for channel in options.channel
     ]
     host = BusHost(buses)
-    servers, lines = open_servers(
-        {bus.channel: bus.taps for bus in buses}, options.name, options.slcan, options.socketcand, buses[0].epoch_ns
-    )
+    servers, lines = open_servers({bus.channel: bus.taps for bus in buses}, options, buses[0].epoch_ns)
     for server in servers:
         host.serve(server)
     end = wallclock.monotonic_s() + options.seconds

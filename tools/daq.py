@@ -19,6 +19,7 @@ from rich.table import Table
 from rich.text import Text
 
 from ranger_sim.boards.main_brain import controllers
+from ranger_sim.datatable import parameters
 from ranger_sim.datatable.generated import all_variables
 from ranger_sim.foundation import wallclock
 from ranger_sim.foundation.user_error import UserError
@@ -154,11 +155,11 @@ class Asked:
                 equals = ""
             if not equals:
                 raise UserError(f"--write {text!r}: NAME=VALUE with a number is expected")
-            catalogue.checked_word(catalogue.parameter(name), value)
+            parameters.checked_word(parameters.parameter(name), value)
             self.written[name] = value
-        self.read = list(dict.fromkeys(catalogue.find(name).name for name in options.read))
+        self.read = list(dict.fromkeys(parameters.find(name).name for name in options.read))
         self.save = parameter_files.check_target(options.save) if options.save else None
-        self.saved = [row.name for row in catalogue.parameters()] if self.save else []
+        self.saved = [row.name for row in parameters.parameters()] if self.save else []
         if self.save:
             controllers.load(options.base)
         session.select(self.fast, self.medium)

@@ -14,6 +14,7 @@ from rich.table import Table
 
 from ranger_sim import loading
 from ranger_sim.foundation import wallclock
+from ranger_sim.foundation.peers import told
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness import wiring
 from ranger_sim.harness.conditions import ErrorNoted
@@ -22,12 +23,14 @@ from ranger_sim.harness.processes import control, places
 from ranger_sim.harness.processes.hardware import HardwareInTheLoop
 from ranger_sim.harness.processes.lateness import figures
 from ranger_sim.harness.processes.outside import move_bus
+from ranger_sim.harness.processes.plant_process import sent_away
+from ranger_sim.harness.processes.requests import admitted
 from ranger_sim.harness.processes.settings import NEVER, ON_FAILURE, Settings, one_processor
 from ranger_sim.harness.processes.supervisor import ELSEWHERE, RUNNING, Supervisor, View, check_platform
 from ranger_sim.harness.profile import Profile
 from ranger_sim.harness.profile import load as load_profile
 from ranger_sim.harness.scenario import StopRule
-from ranger_sim.tools import faults, serial_options, terminal, trace, walk
+from ranger_sim.tools import faults, serial_options, server_options, terminal, trace, walk
 from ranger_sim.tools.files import json_target, writable_folder
 
 if TYPE_CHECKING:
@@ -38,6 +41,7 @@ if TYPE_CHECKING:
     from ranger_sim.harness.timeline import Timeline
 
 PLAIN_S = 2.0  # between two lines where there is no terminal
+FIELDS = {"restart": ("board",), "key": ("key",), "set": ("name", "value")}  # of a request, as ctl gives them
 FOREVER = StopRule(steps=1 << 40)
 
 
@@ -96,14 +100,7 @@ def register(commands: Any) -> None:
         metavar="one|all|N",
         help="processors for body and boards. They take turns, so one is the fastest (default; interpreted: all)",
     )
-    group.add_argument(
-        "--slcan",
-        action="append",
-        default=[],
-        metavar="CHANNEL",
-        help="show this bus as a serial-line adapter on a pseudo-terminal (repeatable)",
-    )
-    group.add_argument("--socketcand", metavar="[HOST:]PORT", help="show all buses over TCP (port 0: a free one)")
+    server_options.add_options(group)
     group.add_argument(
         "--bus",
         action="append",
@@ -122,7 +119,7 @@ def register(commands: Any) -> None:
         "ctl",
         help="look at, pause, resume or change a robot that `up` runs",
         description="status, pause, resume; restart BOARD; key N: press a key for 0.2 s (1: walk; 2: stop, and a "
-        "walking robot falls); set NAME VALUE: write a variable of the main brain's table.",
+        "walking robot falls); set NAME VALUE: write a parameter, within its limits (ranger-sim table show NAME).",
     )
     ctl.add_argument(
         "request", choices=("status", "pause", "resume", "restart", "key", "set"), help="what is asked for"
@@ -197,9 +194,7 @@ def run(options: argparse.Namespace) -> int:
     log = options.log if folder else "none"
     with contextlib.closing(Ranger(scenario, log=log, quirks=quirks, profile=profile)) as robot:
         ends, lines = serial_options.connect(robot, options)
-        servers, more = bus.open_servers(
-            {each.name: each for each in robot.buses}, options.name, options.slcan, options.socketcand
-        )
+        servers, more = bus.open_servers({each.name: each for each in robot.buses}, options)
         for server in servers:
             robot.attach(server)
         for line in lines + more:
@@ -284,6 +279,7 @@ def processes_summary(
         "deaths": run.deaths,
         "asynchronous": bool(outside or sent or any(end.asynchronous for end in ends.values())),
         "frames_from_clients": sent,
+        "sent_away": sent_away(servers),
         "outside": {each.name: {**each.counters(), "last_error": each.last_error} for each in outside},
     }
 
@@ -301,6 +297,8 @@ def print_processes(found: dict, console: Console) -> None:
     for name, counts in found["outside"].items():
         used = ", ".join(f"{key.replace('_', ' ')} {value}" for key, value in counts.items() if value)
         console.print(f"{name} outside: {used or 'no traffic'}", highlight=False, soft_wrap=True)
+    for door, counts in found["sent_away"].items():
+        console.print(f"{door}: sent away {told(counts)}", highlight=False, soft_wrap=True)
     for death in found["deaths"]:
         console.print(f"{death['board']} was lost at {death['time_s']:.3f} s", highlight=False)
 
@@ -419,19 +417,14 @@ def run_ctl(options: argparse.Namespace) -> int:
     wanted = {"restart": ("BOARD",), "key": ("N",), "set": ("NAME", "VALUE")}.get(what, ())
     if len(values) != len(wanted):
         raise UserError(f"ctl {what} takes {' '.join(wanted) or 'no value'}, got {' '.join(values) or 'none'}")
-    request: dict = {"do": what}
-    if what == "restart":
-        request["board"] = values[0]
-    elif what == "key":
-        if values[0] not in ("0", "1", "2", "3", "4", "5"):
-            raise UserError(f"ctl key: {values[0]} is not 0 to 5")
-        request["key"] = int(values[0])
-    elif what == "set":
-        request["name"] = values[0]
-        try:
-            request["value"] = float(values[1])
-        except ValueError:
-            raise UserError(f"ctl set: {values[1]} is not a number") from None
+    request: dict = {"do": what, **dict(zip(FIELDS.get(what, ()), values, strict=True))}
+    for name in ("key", "value"):
+        with contextlib.suppress(KeyError, ValueError):  # what is no number is told so by the model of requests
+            request[name] = int(request[name]) if name == "key" else float(request[name])
+    try:
+        admitted(json.dumps(request).encode())  # what the robot would refuse is told without one
+    except UserError as fault:
+        raise UserError(f"ctl {fault}") from None
     answer = control.ask(options.name, request)
     if what == "status":
         print(json.dumps(answer, indent=2))

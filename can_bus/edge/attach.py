@@ -1,11 +1,10 @@
 """Where other processes attach to emulated buses: a server on an abstract unix socket.
 
 It has no thread and never blocks: the process that owns the buses polls it. Nothing a client sends can do more than
-end that client's own connection.
+end that client's own connection; how much it may ask for is in `foundation/peers.py`.
 """
 
 import errno
-import os
 import socket
 import struct
 from collections.abc import Mapping
@@ -13,7 +12,7 @@ from collections.abc import Mapping
 from ranger_sim.can_bus.bus import Bus
 from ranger_sim.can_bus.edge import attach_records as wire
 from ranger_sim.can_bus.edge.attach_records import DEFAULT_NAME, MalformedError
-from ranger_sim.can_bus.edge.stream_server import BACKLOG_LIMIT, CLIENT_LIMIT, Connection, StreamServer
+from ranger_sim.can_bus.edge.stream_server import Connection, StreamServer
 from ranger_sim.can_bus.edge.taps import (
     DROPPED,
     NOT_ON_BUS,
@@ -24,21 +23,23 @@ from ranger_sim.can_bus.edge.taps import (
     Taps,
     fault_of_frame,
 )
+from ranger_sim.foundation.peers import FOREIGN, FULL, LIMITS, MALFORMED, REASONS, SocketStream
 from ranger_sim.foundation.user_error import UserError
 
 __all__ = ["DEFAULT_NAME", "AttachServer"]
 
-EVENT_RECORD = {RECEIVED: wire.FRAME, SENT: wire.SENT, DROPPED: wire.DROPPED}
+EVENT_RECORD = {SENT: wire.SENT, DROPPED: wire.DROPPED}
 
 
 class _Client(Connection):
     """One connection."""
 
     def __init__(self, connection: socket.socket) -> None:
-        super().__init__(connection)
+        super().__init__(SocketStream(connection))
         self.outstanding = 0  # SEND records without an answer yet
         self.missed = 0
         self.overflowing = False
+        self.state = b""  # the latest STATE record, while there is no room for it
 
 
 class AttachServer(StreamServer[_Client]):
@@ -55,7 +56,7 @@ class AttachServer(StreamServer[_Client]):
         try:
             listener.setblocking(False)
             listener.bind(address)
-            listener.listen(CLIENT_LIMIT)
+            listener.listen(LIMITS["attach"].peers)
         except OSError as error:
             listener.close()
             raise UserError(
@@ -63,30 +64,36 @@ class AttachServer(StreamServer[_Client]):
                 if error.errno == errno.EADDRINUSE
                 else f"attaching under the name {name!r}: {error.strerror}"
             ) from None
-        super().__init__(listener, buses, epoch_ns)
+        super().__init__("attach", listener, buses, epoch_ns)
 
-    def _welcomed(self, connection: socket.socket) -> _Client:
-        """Everybody is let in for as long as it takes to say why not."""
-        client = _Client(connection)
-        user = struct.unpack("3i", connection.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, 12))[1]
-        if user not in (os.getuid(), 0):
-            self._refuse(client, f"{self.name!r} belongs to another user")
-        elif len(self.clients) >= CLIENT_LIMIT:
-            self._refuse(client, f"{self.name!r} has {CLIENT_LIMIT} clients already")
-        return client
+    def _welcome(self, connection: socket.socket) -> _Client:
+        return _Client(connection)
 
-    def _understand(self, client: _Client) -> None:
-        """The records that are whole, one after the other."""
+    def _apology(self, reason: str) -> bytes:
+        """A REFUSED."""
+        words = {
+            FOREIGN: f"{self.name!r} belongs to another user",
+            FULL: f"{self.name!r} has {self.limits.peers} clients already",
+        }
+        return self._refused(words.get(reason, f"this client {REASONS[reason]}"))
+
+    def _refused(self, reason: str) -> bytes:
+        self.totals["refused"] += 1
+        return wire.record(wire.REFUSED, reason.encode("utf-8")[: wire.RECORD_LIMIT - 1])
+
+    def _take(self, client: _Client) -> bool:
+        """The next record, if it is whole."""
         try:
-            for kind, body in wire.records_of(client.incoming):
-                self._take(client, kind, body)
-                if client.ending:
-                    return
+            record = wire.next_record(client.incoming)
+            if record is None:
+                return False
+            self._obey(client, *record)
         except MalformedError as fault:
             self.totals["malformed"] += 1
-            self._refuse(client, str(fault))
+            self.send_away(client, MALFORMED, self._refused(str(fault)))
+        return True
 
-    def _take(self, client: _Client, kind: int, body: bytes) -> None:
+    def _obey(self, client: _Client, kind: int, body: bytes) -> None:
         """One record of a client."""
         if kind == wire.HELLO:
             self._greet(client, body)
@@ -130,7 +137,8 @@ class AttachServer(StreamServer[_Client]):
         if magic != wire.MAGIC:
             raise MalformedError("a HELLO without the protocol's name")
         if version != wire.VERSION:
-            self._refuse(client, f"protocol version {version} is asked for, {self.name!r} speaks {wire.VERSION}")
+            reason = f"protocol version {version} is asked for, {self.name!r} speaks {wire.VERSION}"
+            self.send_away(client, MALFORMED, self._refused(reason))
             return
         try:
             channel = body[wire.HELLO_BODY.size :].decode("utf-8")
@@ -141,7 +149,11 @@ class AttachServer(StreamServer[_Client]):
         if channel:
             taps = self.channels.get(channel)
             if taps is None:
-                self._refuse(client, f"{self.name!r} has no channel {channel!r}; it has {known}")
+                reason = f"{self.name!r} has no channel {channel!r}; it has {known}"
+                self.send_away(client, MALFORMED, self._refused(reason))
+                return
+            if taps.full:
+                self.send_away(client, FULL)
                 return
             client.taps = taps
             client.tap = taps.add(f"{channel} client {self.totals['clients_seen']}")
@@ -150,30 +162,31 @@ class AttachServer(StreamServer[_Client]):
             if options & wire.OPTION_LISTEN:
                 client.tap.listen(taps.time)
         names = "\n".join(self.channels).encode("utf-8")
-        client.outgoing += wire.record(
-            wire.WELCOME, wire.WELCOME_BODY.pack(wire.VERSION, window, bitrate, self.epoch_ns) + names
+        client.answer(
+            wire.record(wire.WELCOME, wire.WELCOME_BODY.pack(wire.VERSION, window, bitrate, self.epoch_ns) + names)
         )
 
-    def _refuse(self, client: _Client, reason: str) -> None:
-        """Say why and close."""
-        self.totals["refused"] += 1
-        client.outgoing += wire.record(wire.REFUSED, reason.encode("utf-8")[: wire.RECORD_LIMIT - 1])
-        client.ending = True
-
-    def _answer(self, client: _Client) -> None:
+    def _tell(self, client: _Client) -> None:
         """What happened on the bus, as records. Of a client that is far behind, frames are dropped and counted."""
         tap = client.tap
-        if tap is None or not tap.events:
+        if tap is None or not tap.events and not client.state:
             return
         events, tap.events = tap.events, []
         pack, size = wire.FRAME_RECORD.pack, 1 + wire.FRAME_BODY.size
-        out, epoch = client.outgoing, self.epoch_ns
+        out, epoch, backlog = client.outgoing, self.epoch_ns, self.limits.backlog
+        if client.state and len(out) < backlog:
+            client.answer(client.state)
+            client.state = b""
         for kind, time, a, b, c, d in events:
             if kind == STATE:
-                out += wire.record(wire.STATE, wire.STATE_BODY.pack(time + epoch, a, min(b, 65535), min(c, 65535)))
+                state = wire.record(wire.STATE, wire.STATE_BODY.pack(time + epoch, a, min(b, 65535), min(c, 65535)))
+                if len(out) < backlog:
+                    client.answer(state)
+                else:
+                    client.state = state  # an older one is of no use any more
                 continue
             if kind == RECEIVED:
-                if len(out) >= BACKLOG_LIMIT:
+                if len(out) >= backlog:
                     client.missed += 1
                     self.totals["frames_dropped"] += 1
                     client.overflowing = True
@@ -182,6 +195,7 @@ class AttachServer(StreamServer[_Client]):
                     client.overflowing = False
                     out += wire.record(wire.OVERFLOW, wire.OVERFLOW_BODY.pack(time + epoch, client.missed))
                 self.totals["frames_out"] += 1
+                out += pack(size, wire.FRAME, time + epoch, a, b, c, d)
             else:
                 client.outstanding -= 1
-            out += pack(size, EVENT_RECORD[kind], time + epoch, a, b, c, d)
+                client.answer(pack(size, EVENT_RECORD[kind], time + epoch, a, b, c, d))

@@ -64,7 +64,7 @@ def frame_record(kind: int, time_ns: int, identifier: int, flags: int, lo: int, 
 
 def records_of(buffer: bytearray) -> Iterator[tuple[int, bytes]]:
     """(type, body) of every whole record in the buffer, which they leave. MalformedError for a senseless length."""
-    at = 0
+    at = 0  # the buffer is cut once, at the end: a client hears many at a time
     try:
         while len(buffer) - at >= HEAD.size:
             length, kind = HEAD.unpack_from(buffer, at)
@@ -78,6 +78,21 @@ def records_of(buffer: bytearray) -> Iterator[tuple[int, bytes]]:
             yield kind, body
     finally:
         del buffer[:at]
+
+
+def next_record(buffer: bytearray) -> tuple[int, bytes] | None:
+    """(type, body) of the first record in the buffer, which it leaves; None while it is not whole. As `records_of`."""
+    if len(buffer) < HEAD.size:
+        return None
+    length, kind = HEAD.unpack_from(buffer)
+    if not 1 <= length <= RECORD_LIMIT:
+        raise MalformedError(f"a record of {length} bytes is outside 1 ... {RECORD_LIMIT}")
+    end = LENGTH.size + length
+    if end > len(buffer):
+        return None
+    body = bytes(buffer[HEAD.size : end])
+    del buffer[:end]
+    return kind, body
 
 
 def unpacked(layout: struct.Struct, body: bytes) -> tuple[Any, ...]:

@@ -27,6 +27,7 @@ from ranger_sim.can_bus.edge.taps import (
     overflow_frame,
 )
 from ranger_sim.foundation import wallclock
+from ranger_sim.foundation.peers import connected
 from ranger_sim.foundation.user_error import UserError
 
 HANDSHAKE_S = 60.0  # chosen by us: a robot answers once its boards have started, on a slow machine after half a minute
@@ -221,16 +222,17 @@ def greeted(
 ) -> tuple[socket.socket, Welcome]:
     """A connection to the robot `name` and what it said: version, window, bit rate, epoch, channels, the rest.
 
-    FileNotFoundError when nobody of that name is running; UserError when it refuses or is not understood.
+    FileNotFoundError when nobody of that name is running; UserError when it refuses, is not understood, or belongs to
+    another user.
     """
-    connection = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+    address = wire.address_of(name)
     try:
-        connection.settimeout(patience_s)
-        address = wire.address_of(name)
-        try:
-            connection.connect(address)
-        except ConnectionRefusedError:
-            raise FileNotFoundError(name) from None
+        connection = connected(address, f"the server under the name {name!r}", patience_s)
+    except ConnectionRefusedError:
+        raise FileNotFoundError(name) from None
+    except OSError as error:
+        raise UserError(f"attaching to {name!r}: {error.strerror or error}") from None
+    try:
         hello = wire.HELLO_BODY.pack(wire.MAGIC, wire.VERSION, options) + channel.encode("utf-8")
         connection.sendall(wire.record(wire.HELLO, hello))
         incoming = bytearray()
@@ -256,8 +258,6 @@ def greeted(
         raise UserError(f"{name!r} does not speak the attach protocol: {fault}") from None
     except OSError as error:
         connection.close()
-        if isinstance(error, FileNotFoundError):
-            raise
         raise UserError(f"attaching to {name!r}: {error.strerror or error}") from None
     except UserError:
         connection.close()

@@ -5,22 +5,14 @@ Understood: S and s (bit rate: acknowledged without effect, the bus keeps its ow
 C (close), t T r R (send), F (status), V v N (version, serial number), Z (stamps), X M m (acknowledged, no effect).
 """
 
-import math
-import os
-import sys
-from contextlib import suppress
-
 from ranger_sim.can_bus.bus import Bus
 from ranger_sim.can_bus.edge.messages import data_of_words, words_of_data
-from ranger_sim.can_bus.edge.stream_server import COUNTERS, NEXT_POLL_NS, QUICK_POLL_NS
-from ranger_sim.can_bus.edge.taps import ERROR_PASSIVE, OFF, QUEUED, RECEIVED, Event, Tap, Taps, taps_of
+from ranger_sim.can_bus.edge.stream_server import Connection, StreamServer
+from ranger_sim.can_bus.edge.taps import ERROR_PASSIVE, OFF, QUEUED, RECEIVED, Event, Taps
 from ranger_sim.can_bus.frame import HIGHEST_EXTENDED, HIGHEST_STANDARD, LENGTH_CODE
 from ranger_sim.foundation.events import FLAG_ERROR, FLAG_EXTENDED, FLAG_REMOTE
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.peers import FULL, Terminal
 
-LINE_LIMIT = 32  # characters; the longest command, an extended frame of eight bytes, has 26
-BACKLOG_LIMIT = 1 << 16  # bytes that wait for a slow reader before frames are dropped; chosen by us
-HELD_ABOVE = 1 << 12  # bytes; a bus at full speed waits then
 STAMP_WRAP_MS = 60_000  # LAWICEL: stamps of 16 bits run from 0 to 59999 ms
 OK, BELL = b"\r", b"\a"
 # letter: (digits of the identifier, flags)
@@ -30,97 +22,56 @@ HEXADECIMAL = frozenset("0123456789abcdefABCDEF")
 STATUS_QUEUE_FULL, STATUS_PASSIVE, STATUS_BUS_ERROR = 1 << 0, 1 << 5, 1 << 7
 
 
-class SlcanServer:
+class SlcanServer(StreamServer[Connection]):
     """One bus on one pseudo-terminal; `path` is what a program opens. UserError where there are none.
 
     The program's node joins the bus when it opens the channel, and leaves when it closes it. Non-blocking: poll it.
     """
 
     def __init__(self, channel: str, bus: "Bus | Taps", epoch_ns: int = 0) -> None:
+        super().__init__("slcan", None, {channel: bus}, epoch_ns)
         self.channel = channel
-        self.epoch_ns = epoch_ns
-        self.taps, self.own = taps_of(bus)
-        self.tap: Tap | None = None
-        self.incoming = bytearray()
-        self.outgoing = bytearray()
+        self.taps = self.channels[channel]
+        terminal = Terminal()
+        self.path = terminal.path
+        self.program = Connection(terminal)
+        self.let_in(self.program)
         self.stamps = False
         self.overrun = False
         self.overlong = False
-        self.totals = dict.fromkeys(COUNTERS, 0)
-        try:
-            import tty
-        except ImportError:
-            raise UserError(f"slcan: there are no pseudo-terminals on {sys.platform}") from None
-        # our own hand stays on the program's end too: reading then never fails between two programs
-        self.master, self.slave = os.openpty()
-        tty.setraw(self.slave)
-        os.set_blocking(self.master, False)
-        self.path = os.ttyname(self.slave)
 
-    def poll(self, now_ns: int) -> int:
-        """Commands in, answers and frames out; returns the latest instant for the next poll, ns."""
-        with suppress(BlockingIOError):
-            while data := os.read(self.master, 4096):
-                self._understand(data)
-                if len(data) < 4096:
-                    break
-        if self.own:
-            self.taps.poll(now_ns)
-        if self.tap is not None and self.tap.events:
-            events, self.tap.events = self.tap.events, []
-            for event in events:
-                if event[0] == RECEIVED:
-                    self._show(event)
-        if self.outgoing:
-            with suppress(BlockingIOError):
-                sent = os.write(self.master, self.outgoing[:4096])
-                del self.outgoing[:sent]
-        if self.tap is not None:
-            self.tap.held = len(self.outgoing) > HELD_ABOVE
-        return now_ns + (QUICK_POLL_NS if self.tap is not None and self.tap.queued else NEXT_POLL_NS)
+    def send_away(self, peer: Connection, reason: str, apology: bytes = b"") -> None:
+        """The terminal stays: the next program may be another one. The channel is closed, what waited is forgotten."""
+        self.sent_away[reason] += 1
+        self._closed(peer)
+        peer.incoming.clear()
+        peer.outgoing.clear()
+        peer.answers = 0
+        peer.wants_since_s = None
 
-    def filenos(self) -> list[int]:
-        """Descriptors that become readable when the program wants something."""
-        return [self.master]
+    def _take(self, peer: Connection) -> bool:
+        """The next command, if it has come to its carriage return."""
+        end = peer.incoming.find(b"\r")
+        if end < 0:
+            if len(peer.incoming) >= self.limits.longest:
+                peer.incoming.clear()
+                self.overlong = True
+            return False
+        line = bytes(peer.incoming[:end]).replace(b"\n", b"").decode("latin-1")
+        del peer.incoming[: end + 1]
+        if self.overlong or len(line) > self.limits.longest:
+            self.overlong = False
+            self._refuse()
+        elif line:  # an empty line clears what came before; it is no command
+            self._command(line)
+        return True
 
-    def filenos_to_write(self) -> list[int]:
-        """Descriptors on which something waits until the program takes more."""
-        return [self.master] if self.outgoing else []
-
-    def patience_s(self) -> float:
-        """Wall-clock seconds after which a poll has something to do even if nothing else happens."""
-        return math.inf
-
-    def counters(self) -> dict[str, int]:
-        """Whole numbers by name: clients now, clients seen, frames in, out and dropped, malformed, refused."""
-        return {"clients": int(self.tap is not None), **self.totals}
-
-    def close(self) -> None:
-        """Leave the bus; the pseudo-terminal is gone."""
-        self._close_channel()
-        os.close(self.master)
-        os.close(self.slave)
-
-    def _understand(self, data: bytes) -> None:
-        """Bytes of the program; every carriage return ends a command."""
-        for byte in data:
-            if byte == 0x0D:
-                line = self.incoming.decode("latin-1")
-                self.incoming.clear()
-                if self.overlong:
-                    self.overlong = False
-                    self._refuse()
-                elif line:  # an empty line clears what came before; it is no command
-                    self._command(line)
-            elif byte != 0x0A and not self.overlong:
-                self.incoming.append(byte)
-                if len(self.incoming) > LINE_LIMIT:
-                    self.incoming.clear()
-                    self.overlong = True
+    def _answer(self, text: bytes) -> None:
+        self.program.answer(text)
 
     def _refuse(self) -> None:
         self.totals["malformed"] += 1
-        self.outgoing += BELL
+        self._answer(BELL)
 
     def _command(self, line: str) -> None:
         """One command and its answer."""
@@ -128,44 +79,40 @@ class SlcanServer:
         if letter in FRAMES:
             self._send(letter, rest)
         elif letter in "OL" and not rest:
-            if self.tap is not None:
-                self.outgoing += BELL
+            if self.program.tap is not None or self.taps.full:
+                self._answer(BELL)
                 self.totals["refused"] += 1
+                self.sent_away[FULL] += self.taps.full
                 return
-            self.tap = self.taps.add(f"{self.channel} slcan")
+            self.program.taps = self.taps
+            self.program.tap = self.taps.add(f"{self.channel} slcan")
             self.totals["clients_seen"] += 1
             if letter == "L":
-                self.tap.listen(self.taps.time)
-            self.outgoing += OK
+                self.program.tap.listen(self.taps.time)
+            self._answer(OK)
         elif letter == "C" and not rest:
-            self._close_channel()
-            self.outgoing += OK
+            self._closed(self.program)
+            self._answer(OK)
         elif letter == "F" and not rest:
-            self.outgoing += f"F{self._status():02X}".encode() + OK
+            self._answer(f"F{self._status():02X}".encode() + OK)
         elif letter in "Vv" and not rest:
-            self.outgoing += f"{letter}0101".encode() + OK
+            self._answer(f"{letter}0101".encode() + OK)
         elif letter == "N" and not rest:
-            self.outgoing += b"NRSIM" + OK
+            self._answer(b"NRSIM" + OK)
         elif letter == "Z" and rest in ("0", "1"):
             self.stamps = rest == "1"
-            self.outgoing += OK
+            self._answer(OK)
         elif letter in "SsXMmYUQWP" and rest and all(c in HEXADECIMAL for c in rest):
-            self.outgoing += OK
+            self._answer(OK)
         else:
             self._refuse()
-
-    def _close_channel(self) -> None:
-        if self.tap is not None:
-            self.tap.held = False
-            self.taps.remove(self.tap)
-            self.tap = None
 
     def _status(self) -> int:
         """The flags that F asks for; an overrun is told once."""
         status = STATUS_QUEUE_FULL if self.overrun else 0
         self.overrun = False
-        if self.tap is not None:
-            status |= {ERROR_PASSIVE: STATUS_PASSIVE, OFF: STATUS_BUS_ERROR}.get(self.tap.state, 0)
+        if self.program.tap is not None:
+            status |= {ERROR_PASSIVE: STATUS_PASSIVE, OFF: STATUS_BUS_ERROR}.get(self.program.tap.state, 0)
         return status
 
     def _send(self, letter: str, rest: str) -> None:
@@ -181,19 +128,28 @@ class SlcanServer:
             self._refuse()
             return
         lo, hi = words_of_data(bytes.fromhex(data))
-        if self.tap is None or self.tap.offer(identifier, flags | int(length), lo, hi) != QUEUED:
+        tap = self.program.tap
+        if tap is None or tap.offer(identifier, flags | int(length), lo, hi) != QUEUED:
             self.totals["refused"] += 1
-            self.outgoing += BELL
+            self._answer(BELL)
             return
         self.totals["frames_in"] += 1
-        self.outgoing += (b"Z" if flags & FLAG_EXTENDED else b"z") + OK
+        self._answer((b"Z" if flags & FLAG_EXTENDED else b"z") + OK)
+
+    def _tell(self, client: Connection) -> None:
+        """Frames of the bus, as lines."""
+        if client.tap is not None and client.tap.events:
+            events, client.tap.events = client.tap.events, []
+            for event in events:
+                if event[0] == RECEIVED:
+                    self._show(event)
 
     def _show(self, event: Event) -> None:
         """A frame of the bus, as the adapter's program reads it. Error frames have no line in this protocol."""
         _, time, identifier, flags, lo, hi = event
         if flags & FLAG_ERROR:
             return
-        if len(self.outgoing) >= BACKLOG_LIMIT:
+        if len(self.program.outgoing) >= self.limits.backlog:
             self.totals["frames_dropped"] += 1
             self.overrun = True
             return
@@ -204,5 +160,5 @@ class SlcanServer:
             text += data_of_words(flags, lo, hi).hex().upper()
         if self.stamps:
             text += f"{(time + self.epoch_ns) // 1_000_000 % STAMP_WRAP_MS:04X}"
-        self.outgoing += text.encode() + OK
+        self.program.outgoing += text.encode() + OK
         self.totals["frames_out"] += 1

@@ -1,90 +1,102 @@
 """Emulated buses over TCP in the raw mode of the socketcand protocol, which several CAN programs speak.
 
 `< open can1 >`, `< rawmode >`, then `< send 123 2 11 22 >` in and `< frame 123 1.000000 1122 >` out. Remote frames
-have no text in that mode (they are counted as not carried). Nothing but loopback is listened on unless it is asked for.
+have no text in that mode (they are counted as not carried). On loopback this user's programs and root's are served;
+beyond it, where it must be allowed, everybody is.
 """
 
-import math
-import re
 import socket
 from collections.abc import Mapping
 from contextlib import suppress
 
 from ranger_sim.can_bus.bus import Bus
 from ranger_sim.can_bus.edge.messages import data_of_words, words_of_data
-from ranger_sim.can_bus.edge.stream_server import BACKLOG_LIMIT, CLIENT_LIMIT, Connection, StreamServer
+from ranger_sim.can_bus.edge.stream_server import Connection, StreamServer
 from ranger_sim.can_bus.edge.taps import QUEUED, RECEIVED, Event, Tap, Taps
 from ranger_sim.can_bus.frame import HIGHEST_EXTENDED, HIGHEST_STANDARD
 from ranger_sim.foundation import wallclock
 from ranger_sim.foundation.events import FLAG_ERROR, FLAG_EXTENDED, FLAG_REMOTE
+from ranger_sim.foundation.peers import FULL, LIMITS, MALFORMED, REASONS, SocketStream, listening_address
 from ranger_sim.foundation.user_error import UserError
 
-TEXT_LIMIT = 256  # characters of one message; the longest, a send with eight bytes, has 45
 # Clients take everything that has come in for the answer to `rawmode`; a frame directly behind it confuses them. So
 # nothing follows it for this long (chosen by us: the time in which a client reads its answer on a busy machine).
 QUIET_AFTER_RAWMODE_S = 0.1
+KEPT_LIMIT = 4096  # events kept meanwhile; chosen by us: 0.1 s of a full bus are 2,700 frames
 ERROR_MASK = 0x1FFFFFFF
-MESSAGE = re.compile(rb"\s*<\s*([^<>]*?)\s*>")
 
 
 class _Client(Connection):
     """One connection."""
 
     def __init__(self, connection: socket.socket) -> None:
-        super().__init__(connection)
-        self.outgoing += b"< hi >"
+        super().__init__(SocketStream(connection))
+        with suppress(OSError):
+            connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        self.answer(b"< hi >")
         self.quiet_until = 0.0
         self.kept: list[Event] = []
 
 
 class SocketcandServer(StreamServer[_Client]):
-    """`buses`, {channel: Bus}, on a TCP port (0: a free one; see `port`). UserError when it cannot be had."""
+    """`buses`, {channel: Bus}, on a TCP port (0: a free one; see `port`).
+
+    UserError when it cannot be had, or when it would be open to the network without `allow_network`.
+    """
 
     def __init__(
-        self, buses: "Mapping[str, Bus | Taps]", port: int, host: str = "127.0.0.1", epoch_ns: int = 0
+        self,
+        buses: "Mapping[str, Bus | Taps]",
+        port: int,
+        host: str = "127.0.0.1",
+        epoch_ns: int = 0,
+        allow_network: bool = False,
     ) -> None:
+        address = listening_address(host, f"socketcand on {host}:{port}", allow_network)
         listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
         try:
             listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
             listener.setblocking(False)
-            listener.bind((host, port))
-            listener.listen(CLIENT_LIMIT)
+            listener.bind((address, port))
+            listener.listen(LIMITS["socketcand"].peers)
         except (OSError, OverflowError) as error:
             listener.close()
             reason = error.strerror if isinstance(error, OSError) else "a port is 0 ... 65535"
             raise UserError(f"socketcand on {host}:{port}: {reason}") from None
-        super().__init__(listener, buses, epoch_ns)
+        super().__init__("socketcand", listener, buses, epoch_ns)
         self.totals["not_carried"] = 0
         self.host, self.port = listener.getsockname()
 
     def patience_s(self) -> float:
         """Until kept frames may follow the answer to rawmode."""
-        return QUIET_AFTER_RAWMODE_S if any(client.kept for client in self.clients) else math.inf
+        patience = super().patience_s()
+        return min(patience, QUIET_AFTER_RAWMODE_S) if any(client.kept for client in self.peers) else patience
 
-    def _welcomed(self, connection: socket.socket) -> _Client | None:
-        """The protocol has no word for `no room`."""
-        if len(self.clients) >= CLIENT_LIMIT:
-            self.totals["refused"] += 1
-            connection.close()
-            return None
-        with suppress(OSError):
-            connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    def _welcome(self, connection: socket.socket) -> _Client:
         return _Client(connection)
 
-    def _understand(self, client: _Client) -> None:
-        """The messages that are whole, one after the other."""
-        while not client.ending and (found := MESSAGE.match(client.incoming)):
-            text = found.group(1).decode("latin-1")
-            del client.incoming[: found.end()]
-            self._command(client, text.split())
-        rest = bytes(client.incoming).strip()
-        if not client.ending and (len(client.incoming) > TEXT_LIMIT or rest and not rest.startswith(b"<")):
-            self._refuse(client, "that is no message in angle brackets")
-            client.ending = True
+    def _apology(self, reason: str) -> bytes:
+        return f"< error this client {REASONS[reason]} >".encode()
+
+    def _take(self, client: _Client) -> bool:
+        """The next message, if it has come to its bracket."""
+        incoming = client.incoming
+        del incoming[: len(incoming) - len(incoming.lstrip())]
+        end = incoming.find(b">")
+        text = bytes(incoming[1 : end if end >= 0 else None])
+        if incoming and (not incoming.startswith(b"<") or b"<" in text):
+            self.totals["malformed"] += 1
+            self.send_away(client, MALFORMED, b"< error that is no message in angle brackets >")
+            return False
+        if end < 0:
+            return False
+        del incoming[: end + 1]
+        self._command(client, text.decode("latin-1").split())
+        return True
 
     def _refuse(self, client: _Client, reason: str) -> None:
         self.totals["malformed"] += 1
-        client.outgoing += f"< error {reason} >".encode()
+        client.answer(f"< error {reason} >".encode())
 
     def _command(self, client: _Client, words: list[str]) -> None:
         """One message and its answer."""
@@ -93,17 +105,20 @@ class SocketcandServer(StreamServer[_Client]):
             client.taps = self.channels.get(words[1])
             if client.taps is None:
                 self.totals["refused"] += 1
-                client.outgoing += f"< error could not open bus, there are {' '.join(self.channels)} >".encode()
-                client.ending = True
+                words_told = f"< error could not open bus, there are {' '.join(self.channels)} >"
+                self.send_away(client, MALFORMED, words_told.encode())
                 return
-            client.outgoing += b"< ok >"
+            client.answer(b"< ok >")
         elif order == "rawmode" and len(words) == 1 and client.taps is not None and client.tap is None:
+            if client.taps.full:
+                self.send_away(client, FULL)
+                return
             client.tap = client.taps.add("socketcand client")
             client.quiet_until = wallclock.monotonic_s() + QUIET_AFTER_RAWMODE_S
             self.totals["clients_seen"] += 1
-            client.outgoing += b"< ok >"
+            client.answer(b"< ok >")
         elif order == "echo" and len(words) == 1:
-            client.outgoing += b"< echo >"
+            client.answer(b"< echo >")
         elif order == "send" and client.tap is not None:
             self._send(client, client.tap, words[1:])
         else:
@@ -131,14 +146,16 @@ class SocketcandServer(StreamServer[_Client]):
         else:  # the protocol has no word for a full queue
             self.totals["refused"] += 1
 
-    def _answer(self, client: _Client) -> None:
+    def _tell(self, client: _Client) -> None:
         """Frames of the bus, as text."""
         if client.tap is None or not client.tap.events and not client.kept:
             return
         events, client.tap.events = client.tap.events, []
         if client.quiet_until:
             if wallclock.monotonic_s() < client.quiet_until:
-                client.kept += events
+                room = KEPT_LIMIT - len(client.kept)
+                client.kept += events[:room]
+                self.totals["frames_dropped"] += max(0, len(events) - room)
                 return
             client.quiet_until = 0.0
             events = client.kept + events
@@ -149,7 +166,7 @@ class SocketcandServer(StreamServer[_Client]):
             if flags & FLAG_REMOTE:
                 self.totals["not_carried"] += 1
                 continue
-            if len(client.outgoing) >= BACKLOG_LIMIT:
+            if len(client.outgoing) >= self.limits.backlog:
                 self.totals["frames_dropped"] += 1
                 continue
             seconds, rest = divmod(time + self.epoch_ns, 1_000_000_000)

@@ -42,6 +42,7 @@ FULL = 1
 NOT_ON_BUS = 2  # bus-off or listening only
 
 TRANSMIT_QUEUE = 64  # frames; chosen by us, because at 3 Mbit/s it holds 3 ms: more than a poll every 1 ms needs
+TAP_LIMIT = 64  # clients of one bus, those that left and still send included; chosen by us: each hears every frame
 LINGER_NS = 1_000_000_000  # how long a client that left may still send what it had queued; chosen by us
 ORDER = STAGE_BUS * 256 + 255  # after every board's controller; a tap's inbox has no other source
 
@@ -260,6 +261,11 @@ class Taps:
         self.taps: list[Tap] = []
         self.leaving = 0  # clients that left and still send
         self.spare: list[Tap] = []  # nodes whose clients left: a bus cannot lose a node
+
+    @property
+    def full(self) -> bool:
+        """True while no more clients find a place."""
+        return len(self.taps) >= TAP_LIMIT
 
     def add(self, name: str) -> Tap:
         """A new client; it is on the bus at once, or after 11 recessive bits when it takes the place of another."""

@@ -1,17 +1,17 @@
-"""Requests to a running robot: one line of JSON each, over an abstract unix socket, from the same user only."""
+"""Requests to a running robot: one line of JSON each, over an abstract unix socket, from this user's programs only."""
 
-import contextlib
 import json
-import os
 import socket
-import struct
 from collections.abc import Callable
 from typing import Any
 
+from ranger_sim.foundation import wallclock
+from ranger_sim.foundation.peers import LIMITS, REASONS, Door, Peer, SocketStream, connected
 from ranger_sim.foundation.user_error import UserError
+from ranger_sim.harness.processes.requests import Request, admitted
 
-LONGEST_LINE = 65536
 ANSWER_S = 10.0  # a client waits so long
+LONGEST_ANSWER = 1 << 20  # bytes; a status has below 10,000
 
 
 def address(name: str) -> str:
@@ -19,104 +19,117 @@ def address(name: str) -> str:
     return f"\0ranger-sim-ctl/{name}"
 
 
-class ControlServer:
-    """The supervisor's end. Never blocks: `poll` handles what is there."""
+class Client(Peer):
+    """A connection. Of each, one request is under way at a time, so that answers come in the order of requests."""
 
-    def __init__(self, name: str) -> None:
-        self.listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+    def __init__(self, connection: socket.socket, number: int) -> None:
+        super().__init__(SocketStream(connection))
+        self.number = number
+
+
+class ControlServer(Door[Client]):
+    """The supervisor's end: `obey(number of the client, request)` hears every request that is admitted.
+
+    What is not admitted (`requests.py`) is answered with its fault, and goes no further.
+    """
+
+    def __init__(self, name: str, obey: Callable[[int, Request], None]) -> None:
+        listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
         try:
-            self.listener.bind(address(name))
+            listener.bind(address(name))
         except OSError:
-            self.listener.close()
+            listener.close()
             raise UserError(f"a robot named {name} is already running: give this one another --name") from None
-        self.listener.listen(8)
-        self.listener.setblocking(False)
-        self.clients: dict[int, socket.socket] = {}
-        self.received: dict[int, bytes] = {}
+        listener.listen(LIMITS["control"].peers)
+        listener.setblocking(False)
+        super().__init__("control", listener)
+        self.obey = obey
+        self.clients: dict[int, Client] = {}
+        self.seen = 0
+        self.not_admitted = 0
 
-    def filenos(self) -> list[int]:
-        """What to select on."""
-        return [self.listener.fileno(), *(each.fileno() for each in self.clients.values())]
+    def _welcome(self, connection: socket.socket) -> Client:
+        self.seen += 1
+        client = self.clients[self.seen] = Client(connection, self.seen)
+        return client
 
-    def poll(self, obey: Callable[[int, dict], None]) -> None:
-        """Take new clients, read what they sent, hand whole requests to `obey(number of the client, request)`."""
-        with contextlib.suppress(BlockingIOError):
-            while True:
-                client, _ = self.listener.accept()
-                user = struct.unpack("3i", client.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, 12))[1]
-                if user not in (os.getuid(), 0):  # abstract sockets have no permissions of their own
-                    client.close()
-                    continue
-                client.setblocking(False)
-                self.clients[client.fileno()] = client
-                self.received[client.fileno()] = b""
-        for number in list(self.clients):
-            try:
-                data = self.clients[number].recv(4096)
-            except BlockingIOError:
-                continue
-            except OSError:
-                data = b""
-            self.received[number] += data
-            if not data or len(self.received[number]) > LONGEST_LINE:
-                self.drop(number)
-                continue
-            line, newline, rest = self.received[number].partition(b"\n")
-            if newline:
-                self.received[number] = rest
-                try:
-                    request = json.loads(line)
-                    if not isinstance(request, dict):
-                        raise ValueError
-                except ValueError:
-                    self.answer(number, {"error": "a request is one line with a JSON object"})
-                    continue
-                obey(number, request)
+    def _takes_part(self, peer: Client) -> bool:
+        """Who waits for an answer keeps its place."""
+        return peer.waits
+
+    def _apology(self, reason: str) -> bytes:
+        return line_of({"error": f"this client {REASONS[reason]}"})
+
+    def _take(self, peer: Client) -> bool:
+        """The next request, if its line has ended."""
+        end = peer.incoming.find(b"\n")
+        if end < 0:
+            return False
+        line = bytes(peer.incoming[:end])
+        del peer.incoming[: end + 1]
+        peer.waits = True
+        try:
+            request = admitted(line)
+        except UserError as fault:
+            self.not_admitted += 1
+            self.answer(peer.number, {"error": str(fault)})
+        else:
+            self.obey(peer.number, request)
+        return True
+
+    def _closed(self, peer: Client) -> None:
+        self.clients.pop(peer.number, None)
+
+    def poll(self) -> None:
+        """What has come, as far as the limits allow; answers that wait for a reader."""
+        self.look(0)
+        self.write()
 
     def answer(self, number: int, content: dict) -> None:
         """One line to a client, which may have left."""
         client = self.clients.get(number)
         if client is not None:
-            try:
-                client.sendall((json.dumps(content) + "\n").encode())
-            except OSError:
-                self.drop(number)
+            client.waits = False
+            client.answer(line_of(content))
 
-    def drop(self, number: int) -> None:
-        """A client has left."""
-        self.received.pop(number, None)
-        client = self.clients.pop(number, None)
-        if client is not None:
-            client.close()
+    def counters(self) -> dict[str, int]:
+        """Whole numbers by name: requests carried out and not admitted, clients sent away by reason."""
+        away = {f"sent_away_{reason}": self.sent_away[reason] for reason in REASONS}
+        return {"requests": self.worked, "not_admitted": self.not_admitted, **away}
 
-    def close(self) -> None:
-        """Give the address back."""
-        for number in list(self.clients):
-            self.drop(number)
-        self.listener.close()
+
+def line_of(content: dict) -> bytes:
+    """An answer as it is sent."""
+    return (json.dumps(content) + "\n").encode()
 
 
 def ask(name: str, request: dict) -> Any:
     """Send a request to robot `name` and return its answer; UserError when there is none or it says no."""
-    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as link:
-        link.settimeout(ANSWER_S)
+    try:
+        link = connected(address(name), f"the robot named {name}", ANSWER_S)
+    except OSError:
+        raise UserError(f"no robot named {name} is running here (ranger-sim up --name {name})") from None
+    end = wallclock.monotonic_s() + ANSWER_S
+    with link:
         try:
-            link.connect(address(name))
-        except OSError:
-            raise UserError(f"no robot named {name} is running here (ranger-sim up --name {name})") from None
-        try:
-            link.sendall((json.dumps(request) + "\n").encode())
+            link.sendall(line_of(request))
             data = b""
             while not data.endswith(b"\n"):
                 part = link.recv(65536)
                 if not part:
                     raise UserError(f"robot {name} has ended without an answer")
                 data += part
+                if len(data) > LONGEST_ANSWER or wallclock.monotonic_s() > end:
+                    raise TimeoutError
         except TimeoutError:
             raise UserError(f"robot {name} has not answered for {ANSWER_S:.0f} s") from None
         except OSError as error:
             raise UserError(f"robot {name}: {error.strerror}") from None
-    answer = json.loads(data)
-    if "error" in answer:
-        raise UserError(answer["error"])
+    try:
+        answer = json.loads(data)
+        refused = answer.get("error")
+    except (ValueError, AttributeError, RecursionError):
+        raise UserError(f"robot {name}: its answer is not understood") from None
+    if refused is not None:
+        raise UserError(str(refused))
     return answer

@@ -2,12 +2,10 @@
 
 import json
 import socket
-import struct
 from collections.abc import Callable
 from typing import Any
 
 from ranger_sim.datatable.generated import all_variables
-from ranger_sim.datatable.packing import word_of_value
 from ranger_sim.foundation import descriptors, wallclock
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness import wiring
@@ -24,6 +22,7 @@ FAST_SLICE_S = 0.005  # the same when there is no pace to keep
 STATUS_S = 0.1  # wall clock between two reports to the supervisor
 NAP_S = 0.0005  # after something outside was served, before it is looked at again
 LONGEST_WAIT_S = 0.1  # so that the supervisor sees that the process lives
+ORDERS_LIMIT = 64  # keys and parameters at one instant of the robot's time: a paused robot keeps them; chosen by us
 KEY_HOLD_NS = 200_000_000  # a firm press
 MISUSE = 2  # exit code when something outside cannot be opened
 RESET, OPERATING = 1, 0  # modes of a bus node
@@ -46,6 +45,8 @@ class PlantRun:
         self.mourned: set[str] = set()
         self.deaths: list[dict] = []
         self.next_status_s = 0.0
+        self.orders = 0  # that changed the robot at `orders_ns` of its time
+        self.orders_ns = -1
         self.wall_s = 0.0  # wall clock since the pace began, pauses included
         loop = robot.loop
         show = Stage(words, doubles, robot.plant, loop.step_times, loop.word_wires)
@@ -91,12 +92,13 @@ class PlantRun:
             for each in ends:
                 read += each.filenos()
                 write += each.filenos_to_write() if hasattr(each, "filenos_to_write") else []
-            ready, writable = descriptors.wait(read, write, end - now)
+            left_over = any(getattr(each, "left_over", False) for each in ends)
+            ready, writable = descriptors.wait(read, write, min(end - now, NAP_S) if left_over else end - now)
             if read[0] in ready:
                 self.hear()
                 return
             now = wallclock.monotonic_s()
-            if writable or ready:
+            if writable or ready or left_over:
                 self.robot.poll_now()
                 # what an end cannot take in at this instant of virtual time stays there: no spinning on it
                 if descriptors.wait(read[:1], [], min(NAP_S, end - now))[0]:
@@ -138,7 +140,13 @@ class PlantRun:
     def obey(self, order: dict) -> None:
         """One order; an order that cannot be carried out is answered with its reason."""
         robot, what = self.robot, order["do"]
+        if robot.loop.time != self.orders_ns:
+            self.orders_ns, self.orders = robot.loop.time, 0
         try:
+            if what in ("key", "set"):
+                self.orders += 1
+                if self.orders > ORDERS_LIMIT:
+                    raise UserError(f"{what}: {ORDERS_LIMIT} requests wait for the robot's time to pass")
             if what == "stop":
                 self.stopping = True
             elif what == "pause":
@@ -150,7 +158,7 @@ class PlantRun:
             elif what == "key":
                 robot.operator.press(order["key"], robot.loop.time, KEY_HOLD_NS)
             elif what == "set":
-                self.set_variable(order["name"], order["value"])
+                self.set_parameter(order["name"], order["word"])
             elif what == "make_room":
                 self.make_room(order["board"])
             elif what == "revive":
@@ -161,17 +169,9 @@ class PlantRun:
         if order.get("number") is not None:
             self.tell(**answer)
 
-    def set_variable(self, name: str, value: float) -> None:
-        """Write a variable of the main brain's table at this instant."""
-        number = all_variables.ID_OF.get(name)
-        if number is None:
-            raise UserError(f"set: {name} is no variable of the main brain's table")
-        kind = all_variables.TYPES[number]
-        try:
-            word = word_of_value(kind, value)
-        except (ValueError, OverflowError, struct.error):
-            raise UserError(f"set: {value} does not fit in {name}, which is {kind}") from None
-        self.remotes["MB"].send(SET_WORD, self.robot.loop.time, number, word)
+    def set_parameter(self, name: str, word: int) -> None:
+        """Write a parameter into the main brain's table at this instant; the supervisor's door has checked it."""
+        self.remotes["MB"].send(SET_WORD, self.robot.loop.time, all_variables.ID_OF[name], word)
 
     def status(self) -> dict:
         """What the live view shows."""
@@ -186,6 +186,7 @@ class PlantRun:
             "paused": self.paused,
             "buses": self.loads(),
             "ends": [end.counters() for end in robot.polled],
+            "sent_away": sent_away(robot.polled),
             "damaged": {name: remote.from_board.damaged for name, remote in self.remotes.items()},
             "damage": [remote.from_board.last_damage for remote in self.remotes.values() if remote.from_board.damaged],
         }
@@ -257,6 +258,16 @@ class PlantRun:
             if remote.activity().sinks:
                 remote.activity().flush()
             remote.dismiss()
+
+
+def sent_away(ends: list) -> dict[str, dict[str, int]]:
+    """Clients that were sent away, by door and reason."""
+    found: dict[str, dict[str, int]] = {}
+    for end in ends:
+        for reason, count in getattr(end, "sent_away", {}).items():
+            counts = found.setdefault(end.kind, {})
+            counts[reason] = counts.get(reason, 0) + count
+    return found
 
 
 def serve(

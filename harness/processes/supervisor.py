@@ -18,17 +18,20 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 from ranger_sim.foundation import descriptors, wallclock
+from ranger_sim.foundation.peers import REASONS
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness import wiring
 from ranger_sim.harness.processes import board_process, kernel, places, plant_process
 from ranger_sim.harness.processes.block import Block, new_stage
 from ranger_sim.harness.processes.control import ControlServer
 from ranger_sim.harness.processes.lateness import figures
+from ranger_sim.harness.processes.requests import Request
 from ranger_sim.harness.processes.settings import ON_FAILURE, Settings
 from ranger_sim.harness.scenario import StopRule
 
 PLANT = "plant"
 LOOK_S = 0.2  # between two looks at boards and screen
+ASK_S = 0.005  # between two looks at requests, however many there are: who asks without end gets no more than that
 HANG_S = 1.0  # a board that keeps its turn so long is looked at; named well within 2 s
 RESTART_LIMIT = 5  # per board with --restart on-failure, so that a board that cannot live does not keep us busy
 
@@ -82,7 +85,9 @@ class Supervisor:
         self.stop_rule = stop
         self.finish = finish
         self.view = view
-        self.control = ControlServer(settings.name)
+        self.control = ControlServer(settings.name, self.obey)
+        self.next_ask_s = self.next_look_s = 0.0
+        self.sent_away: dict[str, dict[str, int]] = {}  # clients by door and reason, as far as it was said
         self.stage = new_stage()
         table_words = len(robot.boards["MB"].store.words)
         self.blocks = {
@@ -241,8 +246,13 @@ class Supervisor:
 
     def turn(self) -> None:
         """Wait for something to happen, or a fifth of a second, and see to it."""
-        read = [self.wakeup_read.fileno(), self.link.fileno(), *self.control.filenos()]
-        ready, _ = descriptors.wait(read, [], LOOK_S)
+        read, write = [self.wakeup_read.fileno(), self.link.fileno()], []
+        patience_s = LOOK_S
+        if (wait_s := self.next_ask_s - wallclock.monotonic_s()) > 0.0:
+            patience_s = wait_s
+        else:
+            read, write = read + self.control.filenos(), self.control.filenos_to_write()
+        ready, _ = descriptors.wait(read, write, patience_s)
         if self.wakeup_read.fileno() in ready:
             with contextlib.suppress(BlockingIOError):
                 while self.wakeup_read.recv(4096):
@@ -253,8 +263,13 @@ class Supervisor:
             self.reap()
         if any(number != signal.SIGCHLD for number in signals):
             self.interrupt()
-        self.control.poll(self.obey)
-        self.look()
+        now_s = wallclock.monotonic_s()
+        if now_s >= self.next_ask_s:
+            self.next_ask_s = now_s + ASK_S
+            self.control.poll()
+        if signals or now_s >= self.next_look_s:
+            self.next_look_s = now_s + LOOK_S
+            self.look()
 
     def interrupt(self) -> None:
         """Ctrl-C: once to stop and finish the files, twice to break off."""
@@ -268,13 +283,16 @@ class Supervisor:
             if child.state == STOPPED:
                 os.kill(child.process, signal.SIGCONT)  # it has to finish as well
 
-    def order(self, content: dict, listening: bool = False) -> None:
-        """Tell the plant's process something.
+    def order(self, content: dict, listening: bool = False) -> bool:
+        """Tell the plant's process something; False when it is gone, or has left hundreds of orders unread.
 
         Without waiting, unless it is known to be listening: it may hang, and we are the one that notices.
         """
-        with contextlib.suppress(OSError):  # it is gone (`reap` has the news), or has left hundreds of orders unread
+        try:
             self.link.send(json.dumps(content).encode(), 0 if listening else socket.MSG_DONTWAIT)
+        except OSError:  # `reap` has the news
+            return False
+        return True
 
     def hear_plant(self) -> None:
         """What the plant's process has sent."""
@@ -404,8 +422,18 @@ class Supervisor:
         plant = self.children.get(PLANT)
         if not self.ending and plant is not None and plant.state == RUNNING:
             self.look_at_plant(plant, now)
+        self.say_who_was_sent_away()
         if not self.ending:
             self.view.show(self.state())
+
+    def say_who_was_sent_away(self) -> None:
+        """A line when a door begins to send clients away for a reason; how many it were is told at the end."""
+        doors = {**self.status.get("sent_away", {}), "control": dict(self.control.sent_away)}
+        for door, counts in doors.items():
+            said = self.sent_away.setdefault(door, {})
+            for reason in counts.keys() - said.keys():
+                self.view.say(f"{door}: a client {REASONS[reason]}, and was sent away; others of this kind are counted")
+            said.update(counts)
 
     def look_at_plant(self, plant: Child, now: float) -> None:
         """Name the plant's process when it makes no progress although no board keeps it waiting."""
@@ -442,34 +470,37 @@ class Supervisor:
             "scheduling": self.scheduling,
             "plant": self.children[PLANT].process if PLANT in self.children else 0,
             "boards": boards,
+            "requests": self.control.counters(),
             **self.status,
         }
 
-    def obey(self, number: int, request: dict) -> None:
-        """A request of `ranger-sim ctl`; answered at once, or when the plant's process has answered."""
-        what = request.get("do")
-        if what == "status":
+    def obey(self, number: int, request: Request) -> None:
+        """An admitted request of `ranger-sim ctl`; answered at once, or when the plant's process has answered."""
+        if request.do == "status":
             self.control.answer(number, self.state())
-        elif what in ("pause", "resume", "key", "set"):
+        elif request.do == "restart":
+            self.restart(number, request.board)
+        else:
             stopped = [child.name for child in self.children.values() if child.state == STOPPED]
             if stopped:
                 self.control.answer(number, {"error": f"{', '.join(stopped)} is stopped: all wait for it"})
-            else:
-                self.order({**request, "number": number})
-        elif what == "restart":
-            child = self.children.get(str(request.get("board")))
-            if child is None or child.name == PLANT:
-                known = ", ".join(self.settings.boards)
-                self.control.answer(number, {"error": f"restart: {request.get('board')!r} is none of {known}"})
-                return
+            elif not self.order({**dataclasses.asdict(request), "number": number}):
+                self.control.answer(number, {"error": f"{request.do}: the body's process takes no orders now"})
+
+    def restart(self, number: int, board: str) -> None:
+        """A fresh process for a board."""
+        child = self.children.get(board)
+        if child is None:
+            self.control.answer(number, {"error": f"restart: {board} has no process here"})
+        elif child.state == RESTARTING:
+            self.control.answer(number, {"error": f"restart: {board} is being restarted already"})
+        else:
             if child.state == GONE:
                 self.make_room(child)
             else:
                 child.state = RESTARTING
                 os.kill(child.process, signal.SIGKILL)
             self.control.answer(number, {"restarting": child.name})
-        else:
-            self.control.answer(number, {"error": f"{what!r} is no request"})
 
     def kill_all(self) -> None:
         """Whatever still lives."""

@@ -13,12 +13,13 @@ from ranger_sim.can_bus.bus import Bus
 from ranger_sim.can_bus.edge import attach_records as wire
 from ranger_sim.can_bus.edge import attached_link
 from ranger_sim.can_bus.edge import host as host_module
-from ranger_sim.can_bus.edge.attach import BACKLOG_LIMIT, CLIENT_LIMIT, AttachServer
+from ranger_sim.can_bus.edge.attach import AttachServer
 from ranger_sim.can_bus.edge.host import BusHost
 from ranger_sim.can_bus.edge.paced import PacedBus
 from ranger_sim.can_bus.edge.taps import RECEIVED, TRANSMIT_QUEUE
 from ranger_sim.can_bus.node import RESET
 from ranger_sim.foundation.events import FLAG_ERROR, FLAG_EXTENDED, FLAG_REMOTE, FLAG_SINGLE_SHOT, STAGE_BUS, EventQueue
+from ranger_sim.foundation.peers import LIMITS
 from ranger_sim.foundation.random_stream import RandomStream
 from ranger_sim.foundation.user_error import UserError
 
@@ -212,9 +213,9 @@ def test_a_board_sends_the_same_frames_at_the_same_times_whether_somebody_listen
 
 def test_a_slow_client_loses_frames_is_told_and_holds_up_nobody(owner):
     slow, _ = owner.attached()
-    tap = owner.server.clients[0].tap
+    tap = owner.server.peers[0].tap
     per_frame = len(wire.frame_record(wire.FRAME, 0, 0, 0, 0, 0))
-    flood = [(1, owner.time, 0x77, 8, 0, 0)] * (3 * BACKLOG_LIMIT // per_frame)
+    flood = [(1, owner.time, 0x77, 8, 0, 0)] * (3 * LIMITS["attach"].backlog // per_frame)
     for _ in range(4):  # more than any socket holds
         tap.events += flood
         owner.run()
@@ -264,7 +265,7 @@ def test_a_client_that_breaks_the_rules_is_told_why_and_closed(owner, data, word
     assert kind == wire.REFUSED and words in body
     assert client.recv(1) == b""
     owner.run(50)
-    assert owner.server.counters()["clients"] == 0 and not owner.server.clients
+    assert owner.server.counters()["clients"] == 0 and not owner.server.peers
 
 
 def test_a_name_can_be_had_once_and_again_when_it_is_free():
@@ -287,16 +288,29 @@ def test_elsewhere_than_on_linux_the_reason_is_told(monkeypatch):
         AttachServer("x", {})
 
 
-def test_more_clients_than_there_is_room_for_are_refused(owner):
-    clients = [owner.connect() for _ in range(CLIENT_LIMIT)]
-    owner.run()
+def test_a_client_on_a_bus_keeps_its_place_and_one_more_is_refused(owner):
+    places = LIMITS["attach"].peers
+    clients = []
+    for _ in range(places):
+        owner.run(4)  # a connection and its HELLO cost 5 requests, and there is one in 31 us
+        clients.append(owner.attached()[0])
     extra = owner.connect()
-    owner.run(2)
+    owner.run(10)
     ((kind, body),) = said(extra)
     assert kind == wire.REFUSED and b"has 64 clients already" in body
+    assert owner.server.counters()["sent_away_full"] == 1
     clients[0].close()
-    owner.run()
+    owner.run(10)
     owner.attached()
+
+
+def test_who_has_not_said_hello_makes_room_for_one_more(owner):
+    silent = [owner.connect() for _ in range(LIMITS["attach"].peers)]
+    owner.run(400)
+    owner.attached()
+    assert owner.server.counters()["sent_away_idle"] == 1
+    ((kind, body),) = said(silent[0])
+    assert kind == wire.REFUSED and b"had asked for nothing" in body
 
 
 def test_nothing_is_left_in_the_kernels_list_when_it_ends():

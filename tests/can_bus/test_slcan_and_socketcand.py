@@ -125,7 +125,7 @@ def test_slcan_listen_only_sends_nothing_and_hears_everything(line):
 def test_slcan_a_program_that_does_not_read_loses_frames_and_is_told(line):
     owner, say = line
     say("O\r")
-    tap = owner.server.tap
+    tap = owner.server.program.tap
     tap.events += [(1, 0, 0x123, 8, 0, 0)] * 10_000
     owner.run(1)
     assert owner.server.counters()["frames_dropped"] > 0
@@ -253,7 +253,8 @@ def test_socketcand_nothing_follows_the_answer_to_rawmode_at_once(daemon):
         ("< open can1 >< rawmode >< send x y >", "a send is"),
         ("< open can1 >< rawmode >< send 1 1 100 >", "a send is"),
         ("GET / HTTP/1.1", "no message in angle brackets"),
-        ("< " + "x" * 300, "no message in angle brackets"),
+        ("< " + "x" * 300, "sent a request above the limit"),
+        ("< send < 1 0 >", "no message in angle brackets"),
         ("< >", "an empty message"),
     ],
 )

@@ -346,10 +346,10 @@ def test_a_host_may_command_the_plants_inertial_unit():
 def test_closing_a_robot_closes_its_ends_once():
     robot = Ranger(Scenario())
     line = serial_ports.connect_daq(robot, PtyPort())
-    master = line.port.master
+    master = line.port.terminal.master
     os.fstat(master)
     robot.close()
-    assert (line.port.master, line.port.slave, line.filenos()) == (-1, -1, [])
+    assert (line.port.terminal.master, line.port.terminal.slave, line.filenos()) == (-1, -1, [])
     robot.close()
     assert line.poll(0) == NEVER
 

@@ -13,6 +13,7 @@ import uuid
 import pytest
 
 from ranger_sim.foundation import wallclock
+from ranger_sim.foundation.peers import connected
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness import wiring
 from ranger_sim.harness.processes import control
@@ -312,29 +313,41 @@ def test_a_board_is_restarted_on_request(up):
     assert robot.interrupt() == 130
 
 
-def test_pausing_stops_virtual_time_and_nothing_is_lost(up, command, walked):
+def test_pausing_stops_virtual_time_and_nothing_is_lost(up, walked):
     robot = up("--steps", "2", "--json", "-", speed="0.5")
     robot.running()
-    paused = float(re.search(r"at ([\d.]+) s", command("ctl", "pause", "--name", robot.name).stdout).group(1))
+    paused = control.ask(robot.name, {"do": "pause"})["time_s"]
     status = robot.until(lambda status: status["paused"], "paused")
     for _ in range(50):
-        assert robot.status()["time_s"] == status["time_s"] == pytest.approx(paused, abs=1e-4)
-    resumed = float(re.search(r"at ([\d.]+) s", command("ctl", "resume", "--name", robot.name).stdout).group(1))
-    assert resumed == paused < walked["time_s"]
+        assert robot.status()["time_s"] == status["time_s"] == paused
+    assert control.ask(robot.name, {"do": "resume"})["time_s"] == paused < walked["time_s"]
     assert robot.end() == 0
     assert comparable(summary_of(robot.text)) == comparable(walked)
 
 
-def test_a_variable_is_set_and_a_key_is_pressed_in_the_running_robot(up, command):
+def test_a_parameter_is_set_within_its_limits_a_key_is_pressed_and_nothing_else_ends_the_run(up, command):
+    """What a program that is not `ctl` may send: the review of 22 November 2026, R3."""
     robot = up(script=SCRIPT, speed="0.002")
     robot.running()
-    done = command("ctl", "set", "P_UI_LCD_TIME", "42.5", "--name", robot.name)
+    done = command("ctl", "set", "P_UI_LCD_TIME", "142.5", "--name", robot.name)
     assert done.returncode == 0 and done.stdout.startswith("set: at ")
-    assert command("ctl", "key", "2", "--name", robot.name).stdout.startswith("key: at ")
-    wrong = command("ctl", "set", "NO_SUCH_VARIABLE", "1", "--name", robot.name)
-    assert wrong.returncode == 2 and "NO_SUCH_VARIABLE is no variable" in wrong.stderr
-    assert command("ctl", "key", "9", "--name", robot.name).returncode == 2
-    assert robot.interrupt() == 0 and "P_UI_LCD_TIME is 42.5" in robot.text
+    assert control.ask(robot.name, {"do": "key", "key": 2}).keys() == {"time_s"}
+    wrong = command("ctl", "set", "P_UI_LCD_TIME", "5", "--name", robot.name)
+    assert wrong.returncode == 2 and "P_UI_LCD_TIME = 5 is outside 100 to 60000 ms" in wrong.stderr
+    for request, fault in (
+        ({"do": "set", "name": "P_UI_LCD_TIME", "value": {}}, "P_UI_LCD_TIME = {}: a number is expected"),
+        ({"do": "set", "name": "P_UI_LCD_TIME", "value": 5}, "is outside 100 to 60000 ms"),
+        ({"do": "set", "name": "MCH_ANGLE", "value": 1}, "it is published by MCH"),
+        ({"do": "key", "key": "abc"}, "'abc' is not 0 to 5"),
+    ):
+        with pytest.raises(UserError, match=re.escape(fault)):
+            control.ask(robot.name, request)
+    with connected(control.address(robot.name), "the robot", PATIENCE_S) as client:
+        client.sendall(b"[" * 3000 + b"\n" + b'{"do": "status"}\n' * 2)  # all of it in one packet
+        lines = client.makefile("rb")
+        assert b"one line with a JSON object" in lines.readline()
+        assert b"time_s" in lines.readline() and b"time_s" in lines.readline()
+    assert robot.interrupt() == 0 and "P_UI_LCD_TIME is 142.5" in robot.text
 
 
 def test_a_bus_outside_carries_the_robots_frames_and_the_run_says_that_it_is_asynchronous(up):

@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ranger_sim.boards.main_brain import controllers
+from ranger_sim.datatable import parameters
 from ranger_sim.datatable.generated import all_variables, errors
 from ranger_sim.datatable.packing import error_word
 from ranger_sim.foundation.numbers import word_of_float
@@ -121,7 +122,7 @@ def settle(session, now=0.0):
 
 def test_channels_are_written_as_numbers_time_and_errors_first():
     session = Session()
-    session.select([catalogue.find("MCH_ANGLE")], [catalogue.find("UI_ROLL"), catalogue.find("MCH_ANGLE")])
+    session.select([parameters.find("MCH_ANGLE")], [parameters.find("UI_ROLL"), parameters.find("MCH_ANGLE")])
     sent = session.outgoing(0.0)
     first = packets(sent)
     assert len(first) == 40  # never more under way: the robot has room for 499 bytes
@@ -138,7 +139,7 @@ def test_channels_are_written_as_numbers_time_and_errors_first():
 
 
 def test_more_than_46_channels_are_refused():
-    names = list(catalogue.rows().values())[10:]
+    names = list(parameters.rows().values())[10:]
     Session().select(names[:46], [])
     with pytest.raises(UserError, match="47 channels chosen; the link has 48, 2 of them"):
         Session().select(names[:46], names[46:47])

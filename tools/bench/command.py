@@ -50,6 +50,13 @@ def processes(options: argparse.Namespace, say: Callable[[str], None]) -> list[d
     return part.run(options.seconds, say)
 
 
+def floods(options: argparse.Namespace, say: Callable[[str], None]) -> list[dict]:
+    """The robot under clients that write without end and read nothing."""
+    from ranger_sim.tools.bench import floods as part
+
+    return part.run(options.seconds, say)
+
+
 def walks(options: argparse.Namespace, say: Callable[[str], None]) -> list[dict]:
     """The acceptance walks."""
     from ranger_sim.tools.bench import walks as part
@@ -77,6 +84,9 @@ PARTS = {
         "robot, body and buses from the plain sources", ("robot-interpreted", "plant-interpreted", "bus-interpreted")
     ),
     "processes": Part("the robot with a process for each board: pace, lateness of slots", alone=processes),
+    "floods": Part(
+        "the robot in real time under floods by clients: pace, processor time, memory (minutes)", alone=floods
+    ),
     "interfaces": Part(
         "--frames through python-can's interfaces and ours: lost, reordered, frames/s", alone=interfaces
     ),

@@ -7,6 +7,7 @@ import pathlib
 from collections.abc import Iterator
 from typing import IO, Any, Protocol
 
+from ranger_sim.datatable import parameters
 from ranger_sim.datatable.generated import all_variables
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.tools.files import writable_folder
@@ -70,7 +71,7 @@ class MeasurementLog:
 
         for number in sorted(self.stamps):
             name = all_variables.NAMES[number]
-            row = catalogue.find(name)
+            row = parameters.find(name)
             kind = {"f32": np.float32, "i32": np.int64, "u32": np.int64}[row.type]
             if len(self.stamps[number]):
                 yield (

@@ -9,6 +9,7 @@ import math
 import pathlib
 
 from ranger_sim.boards.main_brain import controllers
+from ranger_sim.datatable import parameters
 from ranger_sim.datatable.packing import word_of_value
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.tools.files import replace_file
@@ -35,7 +36,7 @@ def load(name: str) -> dict[str, float]:
         if len(cells) != 3:
             raise UserError(f"{place}: {line!r}: name, id and value with tabs between them are expected")
         try:
-            row = catalogue.parameter(cells[0])
+            row = parameters.parameter(cells[0])
         except UserError as mistake:
             raise UserError(f"{place}: {mistake}") from None
         if cells[1] != str(row.id):
@@ -48,7 +49,7 @@ def load(name: str) -> dict[str, float]:
             value = math.nan
         if not math.isfinite(value):
             raise UserError(f"{place}: {row.name} = {cells[2]!r}: a number is expected")
-        catalogue.checked_word(row, value, place)
+        parameters.checked_word(row, value, place)
         values[row.name] = value
     if not values:
         raise UserError(f"parameter file {name}: no parameters in it")
@@ -73,7 +74,7 @@ def save(path: pathlib.Path, words: dict[str, int], base: str) -> None:
 
 def as_table(words: dict[str, int]) -> str:
     """One line each: name, id, value."""
-    rows = (catalogue.find(name) for name in words)
+    rows = (parameters.find(name) for name in words)
     return "".join(f"{row.name}\t{row.id}\t{catalogue.text_of(row.id, words[row.name])}\n" for row in rows)
 
 
@@ -81,7 +82,7 @@ def as_controller(words: dict[str, int], base: str) -> str:
     """What differs from the set `base`, each with the reason that the format asks for."""
     values = controllers.load(base).values
     changed = {
-        name: catalogue.text_of(catalogue.find(name).id, word)
+        name: catalogue.text_of(parameters.find(name).id, word)
         for name, word in words.items()
         if name in values and word != word_of_value("f32", values[name])
     }

@@ -11,6 +11,7 @@ import dataclasses
 from collections.abc import Callable, Iterable
 
 from ranger_sim.boards.main_brain.data_link import CHANNELS, FAST, MEDIUM
+from ranger_sim.datatable import parameters
 from ranger_sim.datatable.generated import all_variables
 from ranger_sim.datatable.model import Variable
 from ranger_sim.datatable.packing import parts_of_error_word, word_of_value
@@ -100,8 +101,8 @@ class Session:
 
     def write(self, name: str, value: float, place: str = "") -> None:
         """Set a parameter; UserError when it is none, or the value is outside its limits."""
-        row = catalogue.parameter(name)
-        self._want(row.id, catalogue.checked_word(row, value, place))
+        row = parameters.parameter(name)
+        self._want(row.id, parameters.checked_word(row, value, place))
 
     def _want(self, number: int, word: int) -> None:
         self.writes.pop(number, None)
@@ -110,7 +111,7 @@ class Session:
 
     def read(self, name: str) -> None:
         """Wait for a fresh value of a variable."""
-        self.reads.add(catalogue.find(name).id)
+        self.reads.add(parameters.find(name).id)
 
     def pending(self) -> list[str]:
         """Names that were written or asked for and not answered yet; channels as one."""

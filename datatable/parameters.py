@@ -1,0 +1,91 @@
+"""What may be written into a running robot: the parameters of the master table, each within its limits.
+
+The one check for everybody who writes: `ctl set`, `Ranger.set_parameter`, `daq`, parameter sets. The robot itself keeps
+the same limits for what comes over its serial link (`all_variables.WRITABLE`, generated from the same rows).
+"""
+
+from __future__ import annotations
+
+import difflib
+import functools
+import math
+import numbers
+from typing import Any
+
+from ranger_sim import datatable
+from ranger_sim.datatable.model import LIMITS, Variable
+from ranger_sim.datatable.packing import word_of_value
+from ranger_sim.foundation.user_error import UserError
+
+COMPUTER = "PC"  # the publisher of parameters
+CHANNEL_PREFIX = "LV_"  # the serial link's own variables: channels are chosen, not written
+LONGEST_SHOWN = 60  # characters of a value in a message
+
+
+@functools.cache
+def rows() -> dict[str, Variable]:
+    """Every variable by name."""
+    return {row.name: row for row in datatable.load().variables}
+
+
+def find(name: str) -> Variable:
+    """The variable of this name; UserError with the nearest names when there is none."""
+    row = rows().get(name)
+    if row is None:
+        near = difflib.get_close_matches(name[:LONGEST_SHOWN], rows(), 3)
+        raise UserError(f"{shown(name)}: no such variable" + (f"; did you mean {', '.join(near)}?" if near else ""))
+    return row
+
+
+def is_parameter(row: Variable) -> bool:
+    """True for what the computer publishes, so that it may be written."""
+    return row.publisher == COMPUTER and not row.name.startswith(CHANNEL_PREFIX)
+
+
+@functools.cache
+def parameters() -> tuple[Variable, ...]:
+    """Every parameter, in the order of the table."""
+    return tuple(row for row in rows().values() if is_parameter(row))
+
+
+def parameter(name: str) -> Variable:
+    """The parameter of this name; UserError for everything else."""
+    row = find(name)
+    if row.name.startswith(CHANNEL_PREFIX):
+        raise UserError(f"{name}: not a parameter; --fast and --medium set the channels of the link")
+    if not is_parameter(row):
+        raise UserError(f"{name}: not a parameter, it is published by {row.publisher}; the robot would refuse it")
+    return row
+
+
+def checked_word(row: Variable, value: Any, place: str = "") -> int:
+    """The 32-bit word of a parameter's value; UserError when it is no number, or outside its limits or its type."""
+    what = f"{place}: {row.name}" if place else row.name
+    number = number_of(value)
+    if number is None:
+        raise UserError(f"{what} = {shown(value)}: a number is expected")
+    low, high = row.minimum, row.maximum
+    if (low is not None and number < low) or (high is not None and number > high):
+        allowed = " to ".join("no limit" if each is None else f"{each:g}" for each in (low, high))
+        raise UserError(f"{what} = {number:g} is outside {allowed}{' ' + row.unit if row.unit else ''}")
+    low, high = LIMITS[row.type]
+    if not low <= number <= high or (row.type != "f32" and number != int(number)):
+        raise UserError(f"{what} = {number:g} does not fit into its type, {row.type}")
+    return word_of_value(row.type, number)
+
+
+def number_of(value: Any) -> float | None:
+    """`value` as a finite number; None when it is none (a truth value is none either)."""
+    if isinstance(value, bool) or not isinstance(value, numbers.Real):
+        return None
+    try:
+        number = float(value)
+    except OverflowError:
+        return None
+    return number if math.isfinite(number) else None
+
+
+def shown(value: Any) -> str:
+    """A value that is none, for a message: of ordinary length, nothing in it that a terminal obeys."""
+    text = ascii(value)
+    return text if len(text) <= LONGEST_SHOWN else text[:LONGEST_SHOWN] + "..."

@@ -1,0 +1,491 @@
+"""Peers: programs that connect from outside. One rule says what they may ask of us, and LIMITS is that rule as a table.
+
+Whatever listens keeps it: attach, slcan, socketcand, the supervisor's requests, the serial lines. Nothing here blocks,
+has a thread, or raises because of a peer.
+
+1. A look (`Door.look`) reads at most `read_bytes` of each peer and carries out at most `burst` requests of all, one of
+   each in turn; over time at most `requests` in a millisecond of the robot's. A connection costs ARRIVAL requests.
+2. What does not read is not read: with `unread` bytes of answers waiting for it, nothing more is taken from a peer.
+   What it did not ask for (frames of a bus) is left out, and counted, from `backlog` bytes on.
+3. A look writes at most `write_bytes` to each peer.
+4. A door has room for `peers`. When all places are taken, a peer that has not begun to take part makes room.
+5. A peer that does not keep to this is sent away, and counted by its reason (REASONS), which the user is shown.
+6. Only this user's programs and root's are served, and we trust no other server: SO_PEERCRED on local sockets; on
+   loopback the owner of the other end in the kernel's table of connections. Beyond this machine nobody is known, so
+   listening there must be asked for.
+"""
+
+from __future__ import annotations
+
+import ipaddress
+import os
+import select
+import socket
+import struct
+import sys
+from collections import Counter
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Generic, Protocol, TypeVar
+
+from ranger_sim.foundation import wallclock
+from ranger_sim.foundation.user_error import UserError
+
+
+@dataclass(frozen=True)
+class Limits:
+    """One door's line of the table; the rule above says what each number limits."""
+
+    peers: int
+    requests: int  # in a millisecond of virtual time, of all peers together
+    burst: int  # after a while without any, and per look while virtual time stands still
+    longest: int  # bytes of one request
+    read_bytes: int
+    write_bytes: int
+    unread: int  # bytes of answers
+    backlog: int  # bytes
+
+
+# Chosen by us, for these reasons. peers: what a bus of the robot can serve while the robot keeps its pace. requests: a
+# bus of 3 Mbit/s carries 24 full frames in a millisecond (attach); serial adapters and TCP bridges carry at most the
+# 8 of 1 Mbit/s. One costs 2 to 10 us, so that all doors flooded at once cost a third of the time. burst: a window of
+# the attach protocol. longest: attach, a reason; slcan, an extended frame has 26; socketcand, a send has 45; control,
+# a request has below 100. backlog: frames of 0.4 s of a full bus, and what a pseudo-terminal's program may lag.
+KB = 1024
+LIMITS = {
+    #                    peers  requests  burst  longest  read_bytes  write_bytes  unread    backlog
+    "attach":     Limits(   64,       32,    72,    1028,    4 * KB,     64 * KB,  64 * KB, 1024 * KB),
+    "slcan":      Limits(    1,       16,    32,      32,    4 * KB,      4 * KB,   4 * KB,   64 * KB),
+    "socketcand": Limits(   64,       16,    32,     256,    4 * KB,     64 * KB,  64 * KB, 1024 * KB),
+    "control":    Limits(   32,        4,     8,    4096,    4 * KB,     64 * KB,  64 * KB,   64 * KB),
+    "serial":     Limits(    1,        0,     0,       0,    2 * KB,      4 * KB,        0,         0),
+}  # fmt: skip
+
+ARRIVAL = 4  # requests that a connection counts for: taking it in and looking up whose it is; measured, 15 to 40 us
+PATIENCE_S = 2.0  # with answers untaken for so long and more to say, a peer is sent away; chosen by us
+MS = 1_000_000
+
+# Why a peer is sent away, as it is counted.
+FULL, FOREIGN, MALFORMED, TOO_LONG, STALLED, IDLE = "full", "foreign", "malformed", "too_long", "stalled", "idle"
+REASONS = {
+    FULL: "no place was free",
+    FOREIGN: "belonged to another user",
+    MALFORMED: "did not speak the protocol",
+    TOO_LONG: "sent a request above the limit",
+    STALLED: "went on without taking its answers",
+    IDLE: "had asked for nothing and made room",
+}
+
+
+class Stream(Protocol):
+    """Bytes to and from a peer, without waiting. OSError when it is gone."""
+
+    def fileno(self) -> int:
+        """What to wait on."""
+
+    def read(self, limit: int) -> bytes | None:
+        """Up to `limit` bytes; None when nothing has come, no bytes when nothing will come any more."""
+
+    def write(self, data: bytes | bytearray) -> int:
+        """How many of the bytes were taken."""
+
+    def close(self) -> None:
+        """Give it back."""
+
+
+class SocketStream:
+    """A connection."""
+
+    def __init__(self, connection: socket.socket) -> None:
+        connection.setblocking(False)
+        self.connection = connection
+
+    def fileno(self) -> int:
+        return self.connection.fileno()
+
+    def read(self, limit: int) -> bytes | None:
+        try:
+            return self.connection.recv(limit)
+        except (BlockingIOError, InterruptedError):
+            return None
+
+    def write(self, data: bytes | bytearray) -> int:
+        try:
+            return self.connection.send(data)
+        except (BlockingIOError, InterruptedError):
+            return 0
+
+    def close(self) -> None:
+        with suppress(OSError):
+            self.connection.close()
+
+
+class Terminal:
+    """A pseudo-terminal of ours, raw, for this user alone; `path` is what a program opens. UserError: there are none.
+
+    Programs come and go, and are not told apart. Our own hand stays on their end as well: with the last program's
+    close the settings would be forgotten, and between two of them reading would fail.
+    """
+
+    def __init__(self) -> None:
+        try:
+            import tty
+
+            self.master, self.slave = os.openpty()
+        except ImportError:
+            raise UserError(f"pseudo-terminal: there are none on {sys.platform}") from None
+        except OSError as error:
+            raise UserError(f"pseudo-terminal: {error.strerror}") from None
+        tty.setraw(self.slave)
+        os.fchmod(self.slave, 0o600)
+        os.set_blocking(self.master, False)
+        self.path = os.ttyname(self.slave)
+
+    def fileno(self) -> int:
+        return self.master
+
+    def read(self, limit: int) -> bytes | None:
+        return read_ready(self.master, limit) or None
+
+    def write(self, data: bytes | bytearray) -> int:
+        return write_ready(self.master, data)
+
+    def close(self) -> None:
+        for number in (self.master, self.slave):
+            if number >= 0:
+                os.close(number)
+        self.master = self.slave = -1
+
+
+def read_ready(number: int, limit: int) -> bytes:
+    """Bytes that are there, without waiting."""
+    try:
+        return os.read(number, limit) if limit > 0 else b""
+    except (BlockingIOError, InterruptedError):
+        return b""
+
+
+def write_ready(number: int, data: bytes | bytearray) -> int:
+    """How many bytes were taken without waiting."""
+    try:
+        return os.write(number, data)
+    except (BlockingIOError, InterruptedError):
+        return 0
+
+
+class Peer:
+    """One peer: what it sent and was not understood yet, what it has not taken, and how much of that are answers."""
+
+    def __init__(self, stream: Stream) -> None:
+        self.stream = stream
+        self.incoming = bytearray()
+        self.outgoing = bytearray()
+        self.answers = 0  # bytes of `outgoing` that it asked for
+        self.gone = False  # nothing more will come
+        self.ending = False  # was told why, and is closed when that is out
+        self.waits = False  # its last request is being carried out: the next one has to wait
+        self.wants_since_s: float | None = None  # it has had more to say, and taken nothing
+
+    def answer(self, data: bytes) -> None:
+        """Bytes that the peer asked for."""
+        self.outgoing += data
+        self.answers += len(data)
+
+    def deaf(self, limits: Limits) -> bool:
+        """True while too many of its answers wait: nothing is read of it."""
+        return self.answers >= limits.unread
+
+    def write(self, limit: int) -> None:
+        """As much as the peer takes now, up to `limit` bytes. OSError when it is gone."""
+        if not self.outgoing:
+            return
+        taken = self.stream.write(self.outgoing[:limit])
+        if taken:
+            del self.outgoing[:taken]
+            self.answers = min(self.answers, len(self.outgoing))
+            self.wants_since_s = None
+
+
+P = TypeVar("P", bound=Peer)
+
+
+class Door(Generic[P]):
+    """Something that listens: takes peers in, reads, has their requests carried out, writes; a bounded part per look.
+
+    A protocol adds `_welcome`, `_take`, and if it likes `_takes_part` and `_closed`.
+    """
+
+    def __init__(self, kind: str, listener: socket.socket | None = None) -> None:
+        self.kind = kind
+        self.limits = LIMITS[kind]
+        self.listener = listener
+        self.peers: list[P] = []
+        self.sent_away: Counter[str] = Counter()
+        self.worked = 0  # requests carried out so far
+        self.room = float(self.limits.burst)  # for requests, now
+        self.time_ns = 0
+        self.first = 0  # whose turn it is
+        self.left_over = False  # whole requests wait for the next look
+        self.watch = select.poll()
+        if listener is not None:
+            self.watch.register(listener, select.POLLIN)
+
+    # ---- what a protocol adds
+
+    def _welcome(self, connection: socket.socket) -> P:
+        """The peer of a new connection."""
+        raise NotImplementedError
+
+    def _take(self, peer: P) -> bool:
+        """Carry out one whole request out of `peer.incoming`; False when there is none yet."""
+        raise NotImplementedError
+
+    def _takes_part(self, peer: P) -> bool:
+        """True for a peer that keeps its place, also when others want one."""
+        return False
+
+    def _apology(self, reason: str) -> bytes:
+        """What a peer is told that is sent away."""
+        return b""
+
+    def _closed(self, peer: P) -> None:
+        """A peer has left, or is about to be told why it has to."""
+
+    # ---- for the process that owns it
+
+    def look(self, now_ns: int) -> None:
+        """New peers, what has come, and what is asked for, as far as there is room; `now_ns`: virtual time."""
+        passed, self.time_ns = now_ns - self.time_ns, now_ns
+        # where virtual time stands still, whoever calls waits between two looks
+        fresh = self.limits.requests * passed / MS if passed > 0 else self.limits.burst
+        self.room = min(float(self.limits.burst), self.room + fresh)
+        ready = self._ready()
+        if self.listener is not None and self.listener.fileno() in ready:
+            ready |= self._accept()
+        self.left_over = False
+        peers = self.peers[self.first :] + self.peers[: self.first]
+        waiting = [peer for peer in peers if self._hear(peer, peer.stream.fileno() in ready)]
+        while waiting and self.room >= 1.0:  # one of each in turn
+            waiting = [peer for peer in waiting if self.room >= 1.0 and self._one(peer)]
+        self.left_over = any(self._is_heard(peer) for peer in waiting)
+        self.first = (self.first + 1) % len(self.peers) if self.peers else 0
+
+    def write(self) -> None:
+        """To every peer what it takes now."""
+        for peer in list(self.peers):
+            self._write(peer)
+
+    def filenos(self) -> list[int]:
+        """Descriptors that become readable when a peer wants something that it can have."""
+        found = [] if self.listener is None else [self.listener.fileno()]
+        return found + [peer.stream.fileno() for peer in self.peers if self._is_heard(peer) and not peer.gone]
+
+    def filenos_to_write(self) -> list[int]:
+        """Descriptors on which something waits until the peer takes more."""
+        return [peer.stream.fileno() for peer in self.peers if peer.outgoing]
+
+    def send_away(self, peer: P, reason: str, apology: bytes = b"") -> None:
+        """Count it, tell the peer if it still takes anything, and close."""
+        if peer.ending or peer not in self.peers:
+            return
+        self.sent_away[reason] += 1
+        peer.answer(apology or self._apology(reason))
+        peer.incoming.clear()
+        peer.ending = True
+        self._closed(peer)
+        if reason in (STALLED, IDLE):  # it takes nothing, or its place is wanted now
+            with suppress(OSError):
+                peer.write(self.limits.write_bytes)
+            self.drop(peer)
+
+    def let_in(self, peer: P) -> None:
+        """From now on this peer is heard."""
+        self.peers.append(peer)
+        self.watch.register(peer.stream.fileno(), select.POLLIN)
+
+    def drop(self, peer: P) -> None:
+        """Close."""
+        if peer in self.peers:
+            self.peers.remove(peer)
+            self.watch.unregister(peer.stream.fileno())
+            if not peer.ending:
+                self._closed(peer)
+            peer.stream.close()
+
+    def close(self) -> None:
+        """End every connection, and listen no more."""
+        for peer in list(self.peers):
+            self._write(peer)
+            self.drop(peer)
+        if self.listener is not None:
+            self.listener.close()
+
+    # ---- a look
+
+    def _ready(self) -> set[int]:
+        """Descriptors with something to read."""
+        return {number for number, _ in self.watch.poll(0)}
+
+    def _accept(self) -> set[int]:
+        """Take in who knocks; descriptors of the new peers, which may have said something already."""
+        assert self.listener is not None
+        new = set()
+        while self.room >= 1.0:
+            try:
+                connection, _ = self.listener.accept()
+            except OSError:
+                break
+            self.room -= ARRIVAL
+            self.worked += ARRIVAL
+            peer = self._welcome(connection)
+            idle = next((each for each in self.peers if not self._takes_part(each)), None)
+            full = len(self.peers) >= self.limits.peers
+            if full and idle is not None:
+                self.send_away(idle, IDLE)
+            self.let_in(peer)
+            if not served(connection):
+                self.send_away(peer, FOREIGN)
+            elif full and idle is None:
+                self.send_away(peer, FULL)
+            if peer.ending:  # it does not get a place for as long as it takes to tell it
+                self._write(peer)
+                self.drop(peer)
+            else:
+                new.add(peer.stream.fileno())
+        return new
+
+    def _hear(self, peer: P, comes: bool) -> bool:
+        """Read what is allowed of one peer; True when it may have a request."""
+        if not self._is_heard(peer):
+            if peer.ending or not peer.waits and (comes or peer.incoming):
+                self._wait_for(peer)
+            return False
+        if comes and len(peer.incoming) < self.limits.longest:
+            try:
+                data = peer.stream.read(self.limits.read_bytes)
+            except OSError:
+                data = b""
+            if data is not None:
+                peer.incoming += data
+                peer.gone = not data
+        if peer.gone and not peer.incoming:
+            self.drop(peer)
+        return bool(peer.incoming)
+
+    def _is_heard(self, peer: P) -> bool:
+        """False for who is being sent away, has a request under way, or does not take its answers."""
+        return not (peer.ending or peer.waits or peer.deaf(self.limits))
+
+    def _one(self, peer: P) -> bool:
+        """One request of a peer; True when it may have another."""
+        if not self._is_heard(peer):
+            return False
+        if self._take(peer):
+            self.room -= 1.0
+            self.worked += 1
+            return True
+        if peer.gone and not peer.ending:
+            self.drop(peer)
+        elif len(peer.incoming) >= self.limits.longest:
+            self.send_away(peer, TOO_LONG)
+        return False
+
+    def _wait_for(self, peer: P) -> None:
+        """A peer goes on without taking what waits for it: not for ever."""
+        now_s = wallclock.monotonic_s()
+        if peer.wants_since_s is None:
+            peer.wants_since_s = now_s
+        elif now_s - peer.wants_since_s > PATIENCE_S:
+            if peer.ending:
+                self.drop(peer)
+            else:
+                self.send_away(peer, STALLED)
+
+    def _write(self, peer: P) -> None:
+        try:
+            peer.write(self.limits.write_bytes)
+        except OSError:
+            self.drop(peer)
+            return
+        if peer.ending and not peer.outgoing:
+            self.drop(peer)
+
+
+# ---- whom we serve, and whom we trust
+
+
+def trusted(user: int | None) -> bool:
+    """True for this user and root."""
+    return user in (os.getuid(), 0)
+
+
+def user_behind(connection: socket.socket) -> int | None:
+    """Who owns the other end of a connection on this machine; None when that cannot be told."""
+    if connection.family == socket.AF_UNIX:
+        return int(struct.unpack("3i", connection.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, 12))[1])
+    with suppress(OSError, ValueError):
+        here, there = connection.getsockname()[:2], connection.getpeername()[:2]
+        return _owner_of(there, here, Path("/proc/net/tcp").read_text(encoding="ascii"))
+    return None
+
+
+def _owner_of(end: tuple[str, int], other: tuple[str, int], table: str) -> int | None:
+    """Who owns the end of an established connection, by the kernel's table (proc_net_tcp of its documentation)."""
+    wanted = [_as_in_table(end), _as_in_table(other), "01"]  # 01: TCP_ESTABLISHED
+    for line in table.splitlines()[1:]:
+        cells = line.split()
+        if cells[1:4] == wanted:
+            return int(cells[7])
+    return None
+
+
+def _as_in_table(end: tuple[str, int]) -> str:
+    """127.0.0.1 and a port as 0100007F:1F90, the bytes of the address as this machine keeps a number."""
+    return f"{int.from_bytes(socket.inet_aton(end[0]), sys.byteorder):08X}:{end[1]:04X}"
+
+
+def served(connection: socket.socket) -> bool:
+    """True for a connection of this user or root, and for one over the network, where nobody is known."""
+    if connection.family != socket.AF_UNIX and not loopback(connection.getsockname()[0]):
+        return True
+    return trusted(user_behind(connection))
+
+
+def loopback(address: str) -> bool:
+    """True for an address that only this machine reaches."""
+    return ipaddress.ip_address(address).is_loopback
+
+
+def listening_address(host: str, what: str, allow_network: bool) -> str:
+    """The numeric address of `host`; UserError for one that is none, or beyond this machine without permission."""
+    try:
+        address = socket.gethostbyname(host)
+    except OSError as error:
+        raise UserError(f"{what}: {host!r}: {error.strerror or error}") from None
+    if not loopback(address) and not allow_network:
+        raise UserError(
+            f"{what}: {host} is reached from beyond this machine, by anybody: give --allow-network if that is meant"
+        )
+    return address
+
+
+def connected(address: str, whose: str, patience_s: float | None) -> socket.socket:
+    """A connection to a local server of this user or root. OSError when nobody listens; UserError: it is another's."""
+    connection = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+    try:
+        connection.settimeout(patience_s)
+        connection.connect(address)
+        user = user_behind(connection)
+        if not trusted(user):
+            raise UserError(f"{whose} belongs to user {user}, not to you: it is not trusted")
+    except BaseException:
+        connection.close()
+        raise
+    return connection
+
+
+def told(counts: dict[str, int] | Sequence[tuple[str, int]]) -> str:
+    """`2 did not speak the protocol, 1 ...` for the user; empty when nobody was sent away."""
+    return ", ".join(f"{count} {REASONS[reason]}" for reason, count in dict(counts).items() if count)

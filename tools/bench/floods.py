@@ -1,0 +1,326 @@
+"""`ranger-sim bench floods`: the robot in real time while a client writes as fast as it can and reads nothing.
+
+A flood is one way of using one door (attach, slcan, socketcand, control, the data link) without end. Measured are the
+robot's pace by the wall clock, the processor time of the body's process for a second of the robot, and how much memory
+grew; beside them the same robot left in peace.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import json
+import multiprocessing
+import os
+import re
+import signal
+import socket
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+from ranger_sim.can_bus.edge import attach_records as wire
+from ranger_sim.foundation import descriptors, wallclock
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.harness.processes import control
+from ranger_sim.tools.robodaq.codec import write_packet
+
+PEACE = "nobody"
+CHUNK = 1 << 16  # bytes offered at once: what a socket takes
+PATIENCE_S = 60.0  # for a robot that starts, or ends, on a busy machine
+TICKS_PER_S = os.sysconf("SC_CLK_TCK")
+PAGE_KB = os.sysconf("SC_PAGE_SIZE") // 1024
+
+
+@dataclasses.dataclass(frozen=True)
+class Doors:
+    """Where the robot under test can be reached."""
+
+    name: str
+    terminal: str
+    port: int
+    data_link: str
+
+
+# --- ways in: each gives something with a file number that bytes can be written to -----------------------
+
+
+def attached(doors: Doors) -> socket.socket:
+    """A client of the attach protocol on can1."""
+    hello = wire.record(wire.HELLO, wire.HELLO_BODY.pack(wire.MAGIC, wire.VERSION, 0) + b"can1")
+    return _local(wire.SOCKET_PREFIX + doors.name, hello)
+
+
+def unknown(doors: Doors) -> socket.socket:
+    """A connection to the attach protocol that has not said who it is."""
+    return _local(wire.SOCKET_PREFIX + doors.name, b"")
+
+
+def daemon(doors: Doors) -> socket.socket:
+    """A client of socketcand on can1."""
+    client = socket.create_connection(("127.0.0.1", doors.port))
+    client.sendall(b"< open can1 >< rawmode >")
+    return client
+
+
+def asking(doors: Doors) -> socket.socket:
+    """A client of the supervisor."""
+    return _local(control.address(doors.name), b"")
+
+
+def _local(address: str, greeting: bytes) -> socket.socket:
+    client = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+    client.connect(address)
+    client.sendall(greeting)
+    return client
+
+
+def line(doors: Doors) -> int:
+    """The pseudo-terminal of slcan, its channel open."""
+    return _terminal(doors.terminal, b"O\r")
+
+
+def computer(doors: Doors) -> int:
+    """The pseudo-terminal of the data link."""
+    return _terminal(doors.data_link, b"")
+
+
+def _terminal(path: str, greeting: bytes) -> int:
+    number = os.open(path, os.O_RDWR | os.O_NOCTTY)
+    os.write(number, greeting)
+    return number
+
+
+# --- floods ----------------------------------------------------------------------------------------------
+
+Way = Callable[[Doors], "socket.socket | int"]
+
+
+@dataclasses.dataclass(frozen=True)
+class Flood:
+    """`piece` over and over through `way`; an empty one: connections, opened and kept. clients: as many at once."""
+
+    way: Way
+    piece: bytes
+    clients: int = 1
+
+
+def asked(**request: object) -> bytes:
+    """A line of the supervisor's."""
+    return json.dumps(request).encode() + b"\n"
+
+
+FLOODS = {
+    "attach CONTROL take part": Flood(attached, wire.record(wire.CONTROL, bytes([wire.ACTIVATE]))),
+    "attach CONTROL listen": Flood(attached, wire.record(wire.CONTROL, bytes([wire.LISTEN]))),
+    "attach CONTROL both": Flood(attached, b"".join(wire.record(wire.CONTROL, bytes([wish])) for wish in (2, 1))),
+    "attach CONTROL flush": Flood(attached, wire.record(wire.CONTROL, bytes([wire.FLUSH]))),
+    "attach SEND": Flood(attached, wire.send_record(0x7FF, 8, 1, 2)),
+    "attach HELLO for channels": Flood(
+        unknown, wire.record(wire.HELLO, wire.HELLO_BODY.pack(wire.MAGIC, wire.VERSION, 0))
+    ),
+    "attach connections": Flood(unknown, b""),
+    "attach CONTROL, 64 clients": Flood(attached, wire.record(wire.CONTROL, bytes([wire.ACTIVATE])), 64),
+    "slcan V": Flood(line, b"V\r"),
+    "slcan F": Flood(line, b"F\r"),
+    "slcan O and C": Flood(line, b"C\rO\r"),
+    "slcan t": Flood(line, b"t7FF81122334455667788\r"),
+    "slcan nonsense": Flood(line, b"?" * 40 + b"\r"),
+    "socketcand echo": Flood(daemon, b"< echo >"),
+    "socketcand send": Flood(daemon, b"< send 7ff 8 1 2 3 4 5 6 7 8 >"),
+    "socketcand nonsense": Flood(daemon, b"< x >"),
+    "socketcand connections": Flood(daemon, b""),
+    "control status": Flood(asking, asked(do="status")),
+    "control set": Flood(asking, asked(do="set", name="P_UI_LCD_TIME", value=500)),
+    "control key": Flood(asking, asked(do="key", key=0)),
+    "control resume": Flood(asking, asked(do="resume")),
+    "control nonsense": Flood(asking, b"{}\n"),
+    "control no line": Flood(asking, b"x"),
+    "control connections": Flood(asking, b""),
+    "data link noise": Flood(computer, bytes(range(256))),
+    "data link packets": Flood(computer, write_packet(388, 0x43FA0000)),  # P_UI_LCD_TIME = 500
+}
+
+
+def pour(flood: Flood, doors: Doors) -> None:
+    """Flood until killed. Where a connection is ended or refused, over a new one."""
+    data = flood.piece * (CHUNK // max(1, len(flood.piece)))
+    ends: list[socket.socket | int] = []
+    while True:
+        try:
+            while len(ends) < flood.clients or not data:
+                ends.append(flood.way(doors))
+                os.set_blocking(_number(ends[-1]), False)
+        except OSError:
+            if not ends:
+                continue
+            if not data:
+                _close(ends.pop(0))
+        descriptors.wait([], [_number(each) for each in ends], 1.0)
+        for place, each in enumerate(ends):
+            try:
+                os.write(_number(each), data)
+            except BlockingIOError:
+                continue
+            except OSError:
+                _close(ends.pop(place))
+                break
+
+
+def _number(end: socket.socket | int) -> int:
+    return end if isinstance(end, int) else end.fileno()
+
+
+def _close(end: socket.socket | int) -> None:
+    if isinstance(end, int):
+        os.close(end)
+    else:
+        end.close()
+
+
+# --- the robot -------------------------------------------------------------------------------------------
+
+
+class Robot:
+    """A running `ranger-sim up` with every door open."""
+
+    def __init__(self) -> None:
+        self.name = f"flood-{os.getpid()}"
+        call = [sys.executable, "-m", "ranger_sim", "up", "--name", self.name, "--slcan", "can1", "--socketcand", "0"]
+        self.process = subprocess.Popen(
+            [*call, "--daq-port", "pty"], stderr=subprocess.PIPE, env={**os.environ, "PYTHONUNBUFFERED": "1"}
+        )
+        self.said = ""
+        self.doors = Doors(
+            self.name,
+            self._told(r"slcan: can1 is (\S+)"),
+            int(self._told(r"socketcand: [\d.]+:(\d+)")),
+            self._told(r"data link: ranger-sim daq --port (\S+)"),
+        )
+        self.status: dict = {}
+        end = wallclock.monotonic_s() + PATIENCE_S
+        while "time_s" not in self.status:
+            if wallclock.monotonic_s() > end:
+                raise RuntimeError(f"the robot does not start:\n{self.said}")
+            with contextlib.suppress(UserError):
+                self.status = control.ask(self.name, {"do": "status"})
+            self._hear(0.05)
+
+    def _hear(self, seconds: float) -> None:
+        assert self.process.stderr is not None
+        number = self.process.stderr.fileno()
+        if descriptors.wait([number], [], seconds)[0]:
+            self.said += os.read(number, 1 << 16).decode()
+
+    def _told(self, pattern: str) -> str:
+        end = wallclock.monotonic_s() + PATIENCE_S
+        while not (match := re.search(pattern, self.said)):
+            if self.process.poll() is not None or wallclock.monotonic_s() > end:
+                raise RuntimeError(f"no {pattern!r} in:\n{self.said}")
+            self._hear(0.1)
+        return match.group(1)
+
+    def time_s(self) -> float:
+        """Its virtual time, from the lines it prints every two seconds (a supervisor under a flood may not answer)."""
+        times = re.findall(r"^([\d.]+) s, \d+ steps", self.said, re.MULTILINE)
+        return float(times[-1]) if times else 0.0
+
+    def next_line(self) -> tuple[float, float]:
+        """(wall clock, virtual time) at the next line it prints, s; the last one again when none comes in 10 s."""
+        before, end = self.said.count(" steps, "), wallclock.monotonic_s() + 10.0
+        while self.said.count(" steps, ") == before and wallclock.monotonic_s() < end and self.process.poll() is None:
+            self._hear(0.1)
+        return wallclock.monotonic_s(), self.time_s()
+
+    def memory_kb(self) -> int:
+        """Resident memory of the body's process and the supervisor."""
+        return sum(_statm(number) for number in (self.status["plant"], self.process.pid))
+
+    def body_cpu_s(self) -> float:
+        """Processor time of the body's process so far."""
+        with contextlib.suppress(OSError):
+            fields = Path(f"/proc/{self.status['plant']}/stat").read_text(encoding="ascii").rpartition(")")[2].split()
+            return (int(fields[11]) + int(fields[12])) / TICKS_PER_S
+        return 0.0
+
+    def wait(self, seconds: float) -> None:
+        """Let it run, and read what it says."""
+        end = wallclock.monotonic_s() + seconds
+        while (left := end - wallclock.monotonic_s()) > 0.0:
+            self._hear(left)
+            if self.process.poll() is not None:
+                return
+
+    def close(self) -> None:
+        """End it as Ctrl-C does, or by force."""
+        with contextlib.suppress(ProcessLookupError):
+            self.process.send_signal(signal.SIGINT)
+        end = wallclock.monotonic_s() + PATIENCE_S
+        while self.process.poll() is None and wallclock.monotonic_s() < end:
+            self._hear(0.1)
+        if self.process.poll() is None:
+            self.process.kill()
+            self.process.wait()
+        assert self.process.stderr is not None
+        self.process.stderr.close()
+
+
+def _statm(process: int) -> int:
+    with contextlib.suppress(OSError):
+        return int(Path(f"/proc/{process}/statm").read_text(encoding="ascii").split()[1]) * PAGE_KB
+    return 0
+
+
+@contextlib.contextmanager
+def flooded(flood: Flood | None, doors: Doors) -> Iterator[None]:
+    """While it lasts somebody floods; nobody when there is no flood."""
+    if flood is None:
+        yield
+        return
+    somebody = multiprocessing.get_context("fork").Process(target=pour, args=(flood, doors), daemon=True)
+    somebody.start()
+    try:
+        yield
+    finally:
+        somebody.kill()
+        somebody.join()
+
+
+def measured(name: str, seconds: float) -> dict:
+    """One flood of so many seconds: pace, processor time per second of the robot, memory."""
+    robot = Robot()
+    try:
+        wall, virtual = robot.next_line()
+        memory, cpu = robot.memory_kb(), robot.body_cpu_s()
+        with flooded(FLOODS.get(name), robot.doors):
+            robot.wait(seconds)
+            end_wall, end_virtual = robot.next_line()
+            end_memory, end_cpu = robot.memory_kb(), robot.body_cpu_s()
+        ended = robot.process.poll() is not None
+    finally:
+        robot.close()
+    passed = end_virtual - virtual
+    return {
+        "flood": name,
+        "seconds": end_wall - wall,
+        "pace": passed / (end_wall - wall),
+        "cpu_per_s": (end_cpu - cpu) / passed if passed > 0.0 else None,
+        "memory_mb": end_memory / 1024.0,
+        "memory_growth_mb": (end_memory - memory) / 1024.0,
+        "ended": ended,
+    }
+
+
+def run(seconds: float, say: Callable[[str], None], names: tuple[str, ...] = ()) -> list[dict]:
+    """Nobody, then every flood (or those named); a line each."""
+    rows = []
+    for name in (PEACE, *(names or FLOODS)):
+        row = measured(name, seconds)
+        rows.append(row)
+        cpu = "-" if row["cpu_per_s"] is None else f"{row['cpu_per_s']:.3f}"
+        say(
+            f"{name:28} pace {row['pace']:.3f}, {cpu} s of processor per s of the robot, "
+            f"memory {row['memory_mb']:.0f} MB ({row['memory_growth_mb']:+.1f})" + (", ENDED" if row["ended"] else "")
+        )
+    return rows
