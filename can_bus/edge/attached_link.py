@@ -12,12 +12,14 @@ from ranger_sim.can_bus.edge.links import (
     LISTENING_TEXT,
     RECEIVE_QUEUE,
     STALE_S,
+    UNHEARD_S,
     Link,
     LinkError,
 )
 from ranger_sim.can_bus.edge.taps import (
     DROPPED,
     ERROR_ACTIVE,
+    ERROR_PASSIVE,
     LISTENING,
     OFF,
     RECEIVED,
@@ -59,10 +61,16 @@ class AttachedLink(Link):
             self._understand()  # frames may have come directly behind the welcome
 
     def send(self, identifier: int, flags: int, lo: int, hi: int, timeout: float | None) -> None:
-        """Queue a frame, waiting up to `timeout` s for a place (None: for ever)."""
+        """Queue a frame, waiting up to `timeout` s for a place.
+
+        None: as long as frames go out. Where nobody acknowledges, QueueFullError tells it.
+        """
         with self.changed:
             if self.outstanding >= self.window:
-                self._wait(lambda: self.outstanding < self.window, timeout)
+                if timeout is None:
+                    self._wait_while_heard()
+                else:
+                    self._wait(lambda: self.outstanding < self.window, timeout)
                 if self.outstanding >= self.window:
                     raise self._full()
             self._check()
@@ -71,6 +79,14 @@ class AttachedLink(Link):
                 self._check_state()
             self.outstanding += 1
             self._write(wire.send_record(identifier, flags, lo, hi))
+
+    def _wait_while_heard(self) -> None:
+        """Until there is a place, or the controller is error passive and has been rid of nothing for UNHEARD_S."""
+        while self.outstanding >= self.window and not (self.gone or self.closed):
+            passive = self.state == ERROR_PASSIVE
+            self._wait(lambda: self.outstanding < self.window, UNHEARD_S)
+            if passive and self.state == ERROR_PASSIVE:
+                return
 
     def _check_state(self) -> None:
         if self.state == OFF:

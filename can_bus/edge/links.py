@@ -16,6 +16,10 @@ from ranger_sim.can_bus.edge.taps import DROPPED, ERROR_ACTIVE, SENT, STATE, Eve
 log = logging.getLogger("can.ranger_sim")
 
 RECEIVE_QUEUE = 100_000  # frames kept for a reader; chosen by us: 20 MB, and 4 s of all four of Ranger's buses
+# Without a timeout a sender waits for a place as long as frames go out. Of an error-passive controller whose queue does
+# not move for this long nobody acknowledges anything (SocketCAN says at once that there is no buffer space); chosen by
+# us: hundreds of attempts of the longest frame at 125 kbit/s.
+UNHEARD_S = 1.0
 STALE_S = 60.0  # a wait without a limit is cut into pieces of this length
 FOR_EVER = 1e18
 BUS_OFF_TEXT = "bus-off, nothing can be sent (state = ACTIVE asks for recovery)"
@@ -97,6 +101,7 @@ class Link:
             self.signal = -1
 
     def _full(self) -> QueueFullError:
+        """What is said of a frame that found no place."""
         return QueueFullError(f"{self.label}: the transmit queue stayed full{self._why()}")
 
     def _why(self) -> str:

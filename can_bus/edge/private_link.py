@@ -11,9 +11,8 @@ from ranger_sim.can_bus.edge.links import (
     STALE_S,
     Link,
     LinkError,
-    log,
 )
-from ranger_sim.can_bus.edge.paced import PacedBus
+from ranger_sim.can_bus.edge.paced import PacedBus, alone_and_passive
 from ranger_sim.can_bus.edge.taps import ERROR_PASSIVE, FULL, NOT_ON_BUS, Event
 from ranger_sim.foundation import wallclock
 from ranger_sim.foundation.events import NEVER
@@ -56,7 +55,6 @@ class PrivateLink(Link):
         self.bitrate = bus.paced.bitrate
         self.changed = threading.Condition(bus.lock)
         self.pump: threading.Thread | None = None
-        self.warned = False
         with bus.lock:
             self.tap = bus.paced.add(label)
             if listen_only:
@@ -73,21 +71,17 @@ class PrivateLink(Link):
         self.changed.notify_all()
 
     def send(self, identifier: int, flags: int, lo: int, hi: int, timeout: float | None) -> None:
-        """Queue a frame, waiting up to `timeout` s for a place (None: for ever)."""
+        """Queue a frame, waiting up to `timeout` s for a place.
+
+        None: as long as frames go out. Where nobody is left to acknowledge, QueueFullError tells it.
+        """
         with self.changed:
             self._check()
             if self.bus.paced.speed != 0.0:
                 self.bus.pass_time()
             answer = self.tap.offer(identifier, flags, lo, hi)
             if answer == FULL:
-                if timeout is None and self.tap.state == ERROR_PASSIVE and not self.warned:
-                    self.warned = True
-                    log.warning(
-                        "%s: nobody acknowledges, so sending waits (this bus is private to this process; "
-                        "`ranger-sim bus` shares one)",
-                        self.label,
-                    )
-                self._wait(lambda: self.tap.queued < self.tap.depth, timeout)
+                self._wait(lambda: self.tap.queued < self.tap.depth or timeout is None and self._unheard(), timeout)
                 answer = self.tap.offer(identifier, flags, lo, hi)
             self._check()
             if answer == FULL:
@@ -175,6 +169,10 @@ class PrivateLink(Link):
         if self.pump is not None and self.pump is not threading.current_thread():
             self.pump.join()
         self._close_signal()
+
+    def _unheard(self) -> bool:
+        """True while what waits on the bus cannot be acknowledged, by nobody."""
+        return self.tap.state == ERROR_PASSIVE and alone_and_passive(self.bus.paced.bus)
 
     def _check(self) -> None:
         if self.closed:

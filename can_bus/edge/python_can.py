@@ -103,7 +103,7 @@ class RangerSimBus(can.BusABC):
             self._link = link or self._opened(bus_name, rate, listen, own, limit)
         except (UserError, ValueError, TypeError) as fault:
             raise can.CanInitializationError(str(fault)) from None
-        self.channel = str(channel)
+        self.channel = channel  # as it was given: python-can's users compare messages with it
         self.bitrate = self._link.bitrate
         attached = isinstance(self._link, AttachedLink)
         self.channel_info = (
@@ -171,10 +171,10 @@ class RangerSimBus(can.BusABC):
     # ---- what python-can asks of an interface
 
     def send(self, msg: can.Message, timeout: float | None = None) -> None:
-        """Queue a message; while the queue is full, wait up to `timeout` s (None: for ever).
+        """Queue a message; while the queue is full, wait up to `timeout` s (None: as long as the bus carries frames).
 
-        can.CanOperationError: no place in time, bus-off, listening only, the robot has gone, or a message that
-        classic CAN does not have.
+        can.CanOperationError: no place in time, or nobody there who would acknowledge, bus-off, listening only, the
+        robot has gone, or a message that classic CAN does not have.
         """
         try:
             if msg.is_error_frame:
@@ -303,7 +303,7 @@ class _WhileOpen:
                 raise
 
 
-def message_of_event(event: Event, channel: str) -> can.Message:
+def message_of_event(event: Event, channel: Any) -> can.Message:
     """A python-can message of a frame from a link."""
     kind, time_ns, identifier, flags, lo, hi = event
     if flags & FLAG_ERROR:

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ranger_sim.can_bus.edge import python_can
+from ranger_sim.can_bus.edge import attached_link, python_can
 from ranger_sim.can_bus.edge.private_link import PrivateLink
 from ranger_sim.can_bus.frame import frame_bits
 from ranger_sim.foundation import wallclock
@@ -217,19 +217,32 @@ def test_a_full_queue_blocks_until_the_timeout_and_then_raises(bus):
     assert [each.arbitration_id for each in drained(other)] == list(range(64))
 
 
-def test_a_sender_that_waits_for_room_says_so_and_goes_on_when_there_is_some(bus, caplog):
+def test_without_a_timeout_sending_where_nobody_acknowledges_raises_once_the_queue_is_full(bus):
     alone = bus(speed="max")
-    told = threading.Event()
-    caplog.handler.addFilter(lambda record: told.set() or True)
-    thread = threading.Thread(target=lambda: [alone.send(message(number)) for number in range(100)], daemon=True)
-    thread.start()
-    assert told.wait(60)
+    for number in range(64):
+        alone.send(message(number))
+    with pytest.raises(can.CanOperationError, match="transmit queue stayed full .*does anybody acknowledge"):
+        alone.send(message(0x99))
     other = bus()
-    assert [other.recv(60).arbitration_id for _ in range(100)] == list(range(100))
-    thread.join(60)
-    assert not thread.is_alive(), "the last frame is heard, but sending it does not end"
-    (entry,) = caplog.records
-    assert "nobody acknowledges, so sending waits" in entry.getMessage()
+    for number in range(64, 300):  # there is somebody: sending waits for places again
+        alone.send(message(number))
+    assert [other.recv(60).arbitration_id for _ in range(300)] == list(range(300))
+
+
+def test_attached_sending_where_nobody_acknowledges_raises_as_well(monkeypatch):
+    monkeypatch.setattr(attached_link, "UNHEARD_S", 0.05)
+    with hosted("can1") as (name, _), can.Bus(interface="ranger_sim", channel=f"{name}/can1") as alone:
+        with pytest.raises(can.CanOperationError, match="transmit queue stayed full .*does anybody acknowledge"):
+            for number in range(65):
+                alone.send(message(number))
+
+
+def test_a_channel_comes_back_as_it_was_given():
+    """python-can's users give numbers as well, and compare."""
+    with can.Bus(interface="ranger_sim", channel=0, private=True, speed="max", ignore_config=True) as a:
+        with can.Bus(interface="ranger_sim", channel=0, private=True, ignore_config=True) as b:
+            a.send(message(1))
+            assert b.recv(60).channel == 0 and a.channel == 0
 
 
 def test_what_cannot_be_on_a_classic_bus_is_refused(bus):
