@@ -18,6 +18,7 @@ LIMITS = {
     "i32": (-(1 << 31), (1 << 31) - 1),
     "u32": (0, (1 << 32) - 1),
 }
+COMPUTER = "PC"  # the board that publishes parameters
 ROLES = ("satellite", "router", "main brain", "computer")
 
 

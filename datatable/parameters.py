@@ -13,11 +13,10 @@ import numbers
 from typing import Any
 
 from ranger_sim import datatable
-from ranger_sim.datatable.model import LIMITS, Variable
+from ranger_sim.datatable.model import COMPUTER, LIMITS, Variable
 from ranger_sim.datatable.packing import word_of_value
 from ranger_sim.foundation.user_error import UserError
 
-COMPUTER = "PC"  # the publisher of parameters
 CHANNEL_PREFIX = "LV_"  # the serial link's own variables: channels are chosen, not written
 LONGEST_SHOWN = 60  # characters of a value in a message
 

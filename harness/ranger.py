@@ -21,6 +21,7 @@ from ranger_sim.boards.quirks import Quirks
 from ranger_sim.boards.steering import SteeringBoard
 from ranger_sim.boards.user_interface import UserInterfaceBoard
 from ranger_sim.can_bus.bus import Bus
+from ranger_sim.datatable import parameters
 from ranger_sim.datatable.generated import all_variables
 from ranger_sim.firmware_sim.clock import seeded_crystal
 from ranger_sim.foundation import wallclock
@@ -327,6 +328,19 @@ class Ranger:
         if name not in self.boards:
             raise UserError(f"board {name!r}: there is none of this name, but {', '.join(self.boards)}")
         return self.boards[name]
+
+    def set_parameter(self, name: str, value: float) -> None:
+        """Write a parameter into the main brain's table now, as the computer's link would.
+
+        UserError for what is no parameter, and for a value beyond its limits or that is no number.
+        """
+        row = parameters.parameter(name)
+        self._write_word(row.id, parameters.checked_word(row, value))
+
+    def _write_word(self, number: int, word: int) -> None:
+        """Into the main brain's table, as of its own clock."""
+        board = self.boards["MB"]
+        board.store.set_word(number, word, board.time.ms)
 
     def variable(self, name: str) -> float:
         """Value of a variable as the main brain's data table has it. UserError for a name that is not in the table."""

@@ -15,6 +15,7 @@ from typing import Any
 
 from ranger_sim.boards.main_brain import programs
 from ranger_sim.boards.main_brain.programs import parameter_rows
+from ranger_sim.datatable import parameters
 from ranger_sim.datatable.generated import mb as table_ids
 from ranger_sim.foundation.user_error import UserError
 
@@ -193,8 +194,8 @@ def _parameters(table: dict, place: str) -> dict:
     for name, value in table.items():
         if name not in known:
             raise UserError(f"{place}: [parameters] {name}: no such parameter (`ranger-sim table list --board PC`)")
-        row = known[name]
-        values[name] = _number(value, name, (row.minimum, row.maximum), row.unit, place)
+        parameters.checked_word(known[name], value, place)
+        values[name] = float(value)
     return values
 
 

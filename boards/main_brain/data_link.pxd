@@ -2,6 +2,7 @@ from ranger_sim.datatable.store cimport DataStore
 from ranger_sim.firmware_sim.microcontroller cimport Microcontroller
 from ranger_sim.firmware_sim.peripherals.uart_hs cimport HsUart
 from ranger_sim.firmware_sim.vic cimport InterruptSource
+from ranger_sim.foundation.numbers cimport float_of_word, wrap_i32
 
 cpdef enum:
     POINTS_PER_SEGMENT = 9
@@ -27,6 +28,10 @@ cpdef enum:
     NEW_FOR_COMPUTER = 1
     COMPUTERS_BITS = 5
     BYTE = 0xFF
+    NOT_ITS_OWN = 0
+    SINGLE = 1
+    SIGNED = 2
+    UNSIGNED = 3
 
 cdef class DataLink:
     cdef public Microcontroller chip
@@ -36,8 +41,9 @@ cdef class DataLink:
     cdef public bint checked, dma_was_off
     cdef public InterruptSource restart_source
     cdef public long long code_full, code_buffer_full, code_dma_off, code_checksum, code_no_parameter
-    cdef public long long code_id_out_of_range, last_id, first_channel
-    cdef public long long[::1] is_parameter, fast, medium, ring
+    cdef public long long code_limit, code_id_out_of_range, last_id, first_channel
+    cdef public long long[::1] kinds, fast, medium, ring
+    cdef public double[::1] least, most
     cdef public unsigned char[::1] segments
     cdef public long long filling, sending, used, in_segment, checksum
     cdef public long long fast_count, medium_count, phase, fast_place, medium_place, slow_id
@@ -55,3 +61,4 @@ cdef class DataLink:
     cpdef long long waiting(self) except? -1
     cpdef object parse(self)
     cdef void _write(self, long long number, long long word)
+    cdef double _number(self, long long number, long long word) noexcept

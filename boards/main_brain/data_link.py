@@ -22,6 +22,7 @@ from ranger_sim.datatable.generated import mb as table
 from ranger_sim.firmware_sim.peripherals.uart_hs import HsUart
 from ranger_sim.firmware_sim.vic import SOFTWARE
 from ranger_sim.foundation.events import EventQueue
+from ranger_sim.foundation.numbers import float_of_word, wrap_i32
 
 if not cython.compiled:
     POINTS_PER_SEGMENT = 9
@@ -51,15 +52,23 @@ if not cython.compiled:
     NEW_FOR_COMPUTER = 1
     COMPUTERS_BITS = 5
     BYTE = 0xFF
+    # How a word that the computer writes is to be read.
+    NOT_ITS_OWN = 0
+    SINGLE = 1
+    SIGNED = 2
+    UNSIGNED = 3
+
+KINDS = {"f32": SINGLE, "i32": SIGNED, "u32": UNSIGNED}
 
 
 class DataLink:
-    """Both directions. `report(code)` hears the errors; `checked`: only parameters can be written.
+    """Both directions. `report(code)` hears the errors; `checked`: only parameters can be written, each
+    within its limits (ROBOT PARITY: the real robot takes any value for any variable).
 
-    Its 42 fields are two rings, three lists and the counters of both directions, each a number of the firmware's.
+    Its 45 fields are two rings, three lists and the counters of both directions, each a number of the firmware's.
 
     Counters: points, segments, steps, packets (good ones), bad_packets (bytes skipped), refused (writes to what is no
-    parameter), ring_full (bytes lost because they came faster than they were parsed).
+    parameter, or beyond its limits), ring_full (bytes lost because they came faster than they were parsed).
     """
 
     def __init__(self, chip, uart, store, report, checked=True, dma_off_at_start=False) -> None:
@@ -75,12 +84,16 @@ class DataLink:
         self.code_dma_off = errors.MB_SER_DMA_OFF
         self.code_checksum = errors.MB_SER_CHKSUM
         self.code_no_parameter = errors.MB_UNKNOWN_PARAMETER
+        self.code_limit = errors.MB_PARAMETER_LIMIT
         self.code_id_out_of_range = errors.MB_IO_ID_OOR
         self.last_id = all_variables.ID_OF_LAST
-        # 1 where the computer is the publisher: what it may write
-        self.is_parameter = array.array(
-            "q", [int(all_variables.PUBLISHERS[n] == "PC") for n in range(all_variables.TABLE_SIZE)]
-        )
+        # how the word of what the computer may write is read, and between which numbers it has to be
+        self.kinds = array.array("q", [0]) * all_variables.TABLE_SIZE
+        self.least = array.array("d", [0.0]) * all_variables.TABLE_SIZE
+        self.most = array.array("d", [0.0]) * all_variables.TABLE_SIZE
+        for number, (least, most) in all_variables.WRITABLE.items():
+            self.kinds[number] = KINDS[all_variables.TYPES[number]]
+            self.least[number], self.most[number] = least, most
         self.first_channel = table.LV_CH_0
         # transmit
         self.segments = bytearray(RING_SEGMENTS * SEGMENT_BYTES)
@@ -303,8 +316,19 @@ class DataLink:
     def _write(self, number: cython.longlong, word: cython.longlong) -> cython.void:
         """A good packet: the value into the table, if the computer may set it."""
         self.packets += 1
-        if self.checked and (number > self.last_id or self.is_parameter[number] == 0):
-            self.refused += 1
-            self.report(self.code_no_parameter)
-            return
+        if self.checked:
+            if number > self.last_id or self.kinds[number] == NOT_ITS_OWN:
+                self.refused += 1
+                self.report(self.code_no_parameter)
+                return
+            if not self.least[number] <= self._number(number, word) <= self.most[number]:  # neither is what is none
+                self.refused += 1
+                self.report(self.code_limit)
+                return
         self.store.set_word(number, word, self.store.stamps[0])
+
+    def _number(self, number: cython.longlong, word: cython.longlong) -> cython.double:
+        """What a word stands for in the variable `number`."""
+        if self.kinds[number] == SINGLE:
+            return float_of_word(word)
+        return wrap_i32(word) if self.kinds[number] == SIGNED else word

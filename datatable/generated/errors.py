@@ -122,8 +122,9 @@ SCHED_TASK_LIMIT = 115
 CAN_TX_QUEUE_FULL = 116
 MC_SPEED_LIMIT = 117
 MB_UNKNOWN_PARAMETER = 118
+MB_PARAMETER_LIMIT = 119
 
-LAST = 119  # first code that is free
+LAST = 120  # first code that is free
 NAMES: dict[int, str] = {
     0: "DEFAULT",
     1: "ADCI_BAD_CHAN",
@@ -244,6 +245,7 @@ NAMES: dict[int, str] = {
     116: "CAN_TX_QUEUE_FULL",
     117: "MC_SPEED_LIMIT",
     118: "MB_UNKNOWN_PARAMETER",
+    119: "MB_PARAMETER_LIMIT",
 }
 DESCRIPTIONS: dict[int, str] = {
     0: "nothing wrong",
@@ -365,6 +367,7 @@ DESCRIPTIONS: dict[int, str] = {
     116: "CAN: send ring full, frame dropped",
     117: "motor: drive reduced to keep the speed within its limit",
     118: "main brain: a parameter was set that the controller does not have",
+    119: "main brain: a parameter was set beyond its limits, or to what is no number",
 }
 
 # what a healthy walk raises at most, by board: per second, and once after power-up

@@ -26,6 +26,7 @@ from ranger_sim.harness.conditions import Condition, ErrorNoted, condition
 from ranger_sim.harness.faults.fault import Fault
 from ranger_sim.harness.processes import board_process, kernel, places
 from ranger_sim.harness.processes.block import Block, new_stage
+from ranger_sim.harness.processes.kinds import SET_WORD
 from ranger_sim.harness.processes.remote_board import RemoteBoard
 from ranger_sim.harness.processes.settings import Settings
 from ranger_sim.harness.processes.stage import Stage
@@ -103,6 +104,13 @@ class ProcessRobot(Ranger):
         if self.processes is not None:
             raise UserError(f"replace {task} of {board}: its process runs already; replace before time passes")
         Ranger.replace(self, board, task, function, cost, limit)
+
+    def _write_word(self, number: int, word: int) -> None:
+        """Through the channel, once the main brain is in another process."""
+        if self.processes is None:
+            Ranger._write_word(self, number, word)
+        else:
+            self.loop.board("MB").send(SET_WORD, self.loop.time, number, word)
 
     def counters(self) -> dict[str, RangerCounters]:
         """What every board counted by now."""

@@ -1,13 +1,17 @@
 """The main brain's line to the computer: known segments, the cycle, the rate, packets, and what may go wrong."""
 
+import csv
+import pathlib
 import struct
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from ranger_sim import datatable
 from ranger_sim.boards.main_brain.board import MainBrainBoard
 from ranger_sim.boards.quirks import Quirks
+from ranger_sim.datatable.generated import all_variables
 from ranger_sim.datatable.generated import errors as codes
 from ranger_sim.datatable.generated import mb as table
 from ranger_sim.datatable.generated.all_variables import ID_OF_LAST
@@ -342,6 +346,36 @@ def test_a_packet_that_writes_no_parameter_is_an_error_and_changes_nothing(desk,
     assert desk.errors() == {"MB_UNKNOWN_PARAMETER": 1}
     assert desk.link.refused == 1
     assert 0x12345678 not in list(desk.board.store.words)
+
+
+@pytest.mark.parametrize("value", [5.0, 99.99, 60_000.1, -100.0, float("inf"), float("-inf"), float("nan")])
+def test_a_packet_beyond_a_parameters_limits_is_an_error_and_changes_nothing(desk, value):
+    """The display's time per page is 100 ... 60000 ms; 5 ms gave 20,000 errors in 8 s."""
+    before = desk.board.store.get_word(table.P_UI_LCD_TIME)
+    desk.send(packet(table.P_UI_LCD_TIME, word_of_float(value)))
+    desk.run_ms(44)
+    assert desk.errors() == {"MB_PARAMETER_LIMIT": 1} and desk.link.refused == 1
+    assert desk.board.store.get_word(table.P_UI_LCD_TIME) == before
+
+
+@pytest.mark.parametrize("value", [100.0, 60_000.0])
+def test_a_packet_with_a_parameters_limit_itself_sets_it(desk, value):
+    desk.send(packet(table.P_UI_LCD_TIME, word_of_float(value)))
+    desk.run_ms(44)
+    assert desk.board.store.get_float(table.P_UI_LCD_TIME) == value and desk.errors() == {}
+
+
+def test_the_link_holds_the_limits_of_the_master_file_in_single_precision():
+    """Read here with other code: the file's cells, and struct's single precision; no limit is the largest number."""
+    largest = struct.unpack("<f", b"\xff\xff\x7f\x7f")[0]
+    text = (pathlib.Path(datatable.__file__).parent / "master/variables.csv").read_text(encoding="utf-8")
+    expected = {}
+    for row in csv.DictReader(text.splitlines()):
+        if row["publisher"] == "PC":
+            assert row["type"] == "f32"
+            cells = (row["minimum"] or -largest, row["maximum"] or largest)
+            expected[int(row["id"])] = tuple(struct.unpack("<f", struct.pack("<f", float(cell)))[0] for cell in cells)
+    assert len(expected) > 150 and all_variables.WRITABLE == expected
 
 
 def test_the_firmware_of_2016_writes_whatever_it_is_told():

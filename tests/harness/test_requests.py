@@ -1,5 +1,6 @@
 """The supervisor's door: what is admitted, what is answered with its fault, and how much a client may ask."""
 
+import contextlib
 import json
 import math
 import socket
@@ -11,6 +12,9 @@ from ranger_sim.foundation.peers import LIMITS
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.processes.control import ControlServer, address
 from ranger_sim.harness.processes.requests import Request, admitted
+from ranger_sim.harness.ranger import Ranger
+from ranger_sim.harness.scenario import Scenario
+from ranger_sim.harness.testing.process_robot import ProcessRobot
 
 LIMIT = LIMITS["control"]
 
@@ -81,6 +85,24 @@ def test_every_parameters_own_limits_are_admitted_and_the_next_number_beyond_is_
                 parameters.checked_word(row, math.nextafter(bound, beyond))
             checked += 1
     assert checked > 100
+
+
+@pytest.mark.parametrize("kind", [Ranger, lambda: ProcessRobot(Scenario(), "none", None, None)])
+def test_python_writes_a_parameter_by_the_same_check(kind):
+    with contextlib.closing(kind()) as robot:
+        robot.run_for(0.01)
+        for name, value, fault in (
+            ("P_UI_LCD_TIME", 5, "P_UI_LCD_TIME = 5 is outside 100 to 60000 ms"),
+            ("P_UI_LCD_TIME", math.nan, "P_UI_LCD_TIME = nan: a number is expected"),
+            ("P_UI_LCD_TIME", None, "P_UI_LCD_TIME = None: a number is expected"),
+            ("MCH_ANGLE", 1.0, "MCH_ANGLE: not a parameter, it is published by MCH"),
+        ):
+            with pytest.raises(UserError, match=fault):
+                robot.set_parameter(name, value)
+        before = robot.variable("P_UI_LCD_TIME")
+        robot.set_parameter("P_UI_LCD_TIME", 500)
+        robot.run_for(0.01)
+        assert (before, robot.variable("P_UI_LCD_TIME")) == (4000.0, 500.0)
 
 
 class Robot:

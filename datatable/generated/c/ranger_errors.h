@@ -121,5 +121,6 @@
 #define ERR_CAN_TX_QUEUE_FULL 116 /* CAN: send ring full, frame dropped */
 #define ERR_MC_SPEED_LIMIT 117 /* motor: drive reduced to keep the speed within its limit */
 #define ERR_MB_UNKNOWN_PARAMETER 118 /* main brain: a parameter was set that the controller does not have */
+#define ERR_MB_PARAMETER_LIMIT 119 /* main brain: a parameter was set beyond its limits, or to what is no number */
 
 #endif

@@ -31,6 +31,11 @@ RETURN: int
 NEW_FOR_COMPUTER: int
 COMPUTERS_BITS: int
 BYTE: int
+NOT_ITS_OWN: int
+SINGLE: int
+SIGNED: int
+UNSIGNED: int
+KINDS: dict[str, int]
 
 class DataLink:
     chip: Microcontroller
@@ -45,13 +50,16 @@ class DataLink:
     code_dma_off: int
     code_checksum: int
     code_no_parameter: int
+    code_limit: int
     code_id_out_of_range: int
     last_id: int
     first_channel: int
-    is_parameter: MutableSequence[int]
+    kinds: MutableSequence[int]
     fast: MutableSequence[int]
     medium: MutableSequence[int]
     ring: MutableSequence[int]
+    least: MutableSequence[float]
+    most: MutableSequence[float]
     segments: MutableSequence[int]
     filling: int
     sending: int
