@@ -35,6 +35,7 @@ def parser() -> argparse.ArgumentParser:
         faults,
         info,
         slots,
+        summary_schema,
         trace,
         tune,
         up,
@@ -71,6 +72,7 @@ def parser() -> argparse.ArgumentParser:
     vm.register(commands)
     faults.register(commands)
     slots.register(commands)
+    summary_schema.register(commands)
     campaign.register(commands)
     causes.register(commands)
     diagnose.register(commands)

@@ -214,7 +214,9 @@ class RemoteBoard(Board):
         """What the board counted, as it was fetched last; only its last slot where it was gone by then."""
         if self.counted is not None:
             return self.counted
-        return replace(self.uncounted, slots=replace(self.uncounted.slots, latest_ns=self.slot_time, finished_ns=self.slot_time))
+        return replace(
+            self.uncounted, slots=replace(self.uncounted.slots, latest_ns=self.slot_time, finished_ns=self.slot_time)
+        )
 
     def dismiss(self) -> None:
         """Tell the board's process to end; nothing is answered."""

@@ -15,10 +15,12 @@ import pytest
 
 from ranger_sim.harness.ranger import Ranger
 from ranger_sim.harness.scenario import Scenario, StopRule
+from ranger_sim.harness.summary_schema import json_schema
 from ranger_sim.tools import variables_file
 from ranger_sim.tools.walk import write_frames
 from tests.oracle import figures
 from tests.oracle.run_folder import Log, Variables, frame_bits
+from tests.oracle.test_summary_schema import violations
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 MASTER = ROOT / "datatable" / "master"
@@ -170,6 +172,10 @@ def test_no_figure_is_without_an_oracle(run):
         others = [pattern for pattern in others if fnmatch.fnmatchcase(path, pattern)]
         assert of_files or others, f"{path} is neither recomputed nor in OTHER_ORACLES"
         assert not (of_files and others), f"{path} is recomputed: it need not stand in OTHER_ORACLES"
+
+
+def test_the_summary_is_as_its_schema_has_it(run):
+    assert violations({**run.summary, "interrupted": False}, json_schema()) == []
 
 
 @pytest.mark.parametrize("place", [place for _, _, place in OTHER_ORACLES])

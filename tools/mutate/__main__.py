@@ -11,6 +11,7 @@ A verdict holds for the tests of its time. `--again` tries mutants that were not
 import argparse
 import json
 import pathlib
+import shutil
 import sys
 from collections import Counter
 from typing import Any
@@ -116,7 +117,7 @@ def of_room(options: argparse.Namespace, copy: Copy, room: str, listed: list[Kno
         drawn = [mutant for mutant in every if f"{mutant.path}:{mutant.line}" in options.at]
     results = Results(options.work / f"verdicts-{room}.jsonl")
     if options.again:
-        (options.work / f"reach-{room}.json").unlink(missing_ok=True)
+        shutil.rmtree(options.work / f"reach-{room}", ignore_errors=True)
     wanted = options.tests or [f"tests/{room}"]
     tests = AllOf(wanted) if options.at else reach_of(copy, room, wanted, say)
     for mutant in drawn:

@@ -63,7 +63,7 @@ class Reach:
     def pytest_sessionfinish(self) -> None:
         """Write it down."""
         sys.setprofile(None)
-        threading.setprofile(None)  # type: ignore[arg-type]
+        threading.setprofile(None)
         found = {
             "imported": places(self.imported),
             "files": {name: places(codes) for name, codes in self.files.items()},

@@ -25,7 +25,7 @@ KILLED, SURVIVED, TIMEOUT, NOT_REACHED = "killed", "survived", "timeout", "not r
 # A mutant may make a test slow for good; chosen by us, beside a machine that has other work.
 SLOWER = 4.0
 START_S = 30.0
-NO_SUCH_TEST = 4  # pytest's exit code
+NO_SUCH_TEST, NO_TESTS = 4, 5  # pytest's exit codes
 
 
 @dataclasses.dataclass(frozen=True)
@@ -51,7 +51,7 @@ class Known:
 def known(path: pathlib.Path = EQUIVALENT) -> list[Known]:
     """What `equivalent.toml` lists. UserError for an entry without a reason, or one that stands there twice."""
     rows = tomllib.loads(path.read_text(encoding="utf-8")).get("mutant", [])
-    found = []
+    found: list[Known] = []
     for row in rows:
         if set(row) != {"key", "reason"} or not row["reason"].strip():
             raise UserError(f"{path.name}: an entry has key and reason, this one is {row}")
@@ -192,21 +192,38 @@ class AllOf:
 
 
 def reach_of(copy: Copy, room: str, tests: list[str], say: Callable[[str], None]) -> TestsOf:
-    """The map of a room's tests: of an earlier run when it is there, or made now by running all of them once."""
-    path = copy.folder.parent / f"reach-{room}.json"
-    if not path.exists():
-        say(f"{room}: running its tests once, interpreted, to see which of them reach what")
-        partial = path.with_suffix(".partial")
-        code, said = copy.pytest(
-            ["-p", "ranger_sim.tools.mutate.reach", *tests], limit_s=24 * 3600.0, RANGER_SIM_REACH=str(partial)
-        )
-        if code not in (0, 1) or not partial.exists():
-            raise UserError(f"{room}: its tests do not run: {said.strip().splitlines()[-1]}")
-        partial.replace(path)
-    found = json.loads(path.read_text(encoding="utf-8"))
-    if found["failed"]:
-        say(f"{room}: {len(found['failed'])} tests fail or skip interpreted and take no part: {found['failed'][:5]}")
-    return TestsOf(found)
+    """The map of a room's tests, file by file: kept from an earlier run, or made by running them once."""
+    folder = copy.folder.parent / f"reach-{room}"
+    folder.mkdir(exist_ok=True)
+    files = [file for path in tests for file in files_of_tests(copy.folder / path)]
+    if not files:
+        raise UserError(f"{room}: there are no tests in {', '.join(tests)}")
+    merged: dict[str, Any] = {"imported": [], "files": {}, "tests": {}, "failed": []}
+    for file in files:
+        name = file.relative_to(copy.folder).as_posix()
+        kept = folder / f"{name.replace('/', '.')}.json"
+        if not kept.exists():
+            partial = kept.with_suffix(".partial")
+            arguments = ["-p", "ranger_sim.tools.mutate.reach", name]
+            code, said = copy.pytest(arguments, limit_s=3600.0, RANGER_SIM_REACH=str(partial))
+            if code not in (0, 1, NO_TESTS) or not partial.exists():
+                raise UserError(f"{name}: does not run: {(said.strip().splitlines() or ['no end within an hour'])[-1]}")
+            partial.replace(kept)
+            say(f"{room}: {name} is mapped")
+        found = json.loads(kept.read_text(encoding="utf-8"))
+        merged["imported"] += found["imported"]
+        merged["files"] |= found["files"]
+        merged["tests"] |= found["tests"]
+        merged["failed"] += found["failed"]
+    if merged["failed"]:
+        left_out = ", ".join(merged["failed"][:3])
+        say(f"{room}: {len(merged['failed'])} tests fail or skip interpreted and take no part: {left_out} ...")
+    return TestsOf(merged)
+
+
+def files_of_tests(path: pathlib.Path) -> list[pathlib.Path]:
+    """Files of tests in a folder, or the file itself."""
+    return [path] if path.is_file() else sorted(path.rglob("test_*.py"))
 
 
 # --- verdicts ---------------------------------------------------------------------------------------------------
