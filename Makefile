@@ -1,4 +1,5 @@
 # make walk: set up everything, then let Ranger walk 100 steps.   make test: set up everything, then run all tests.
+# make docs: the documentation as a site, and every command and program of its tutorial and how-to pages run.
 # make test-vm: the tests on real SocketCAN, in a virtual machine where this kernel has none (tools/vm/README.md).
 PYTHON ?= python3
 VENV   ?= .venv
@@ -6,7 +7,7 @@ STEPS  ?= 100
 RUN    := $(VENV)/bin/python
 SOURCES := $(shell find ranger_sim foundation datatable can_bus plant firmware_sim boards harness sysid tools \( -name '*.py' -o -name '*.pxd' \) -not -name '_*' 2>/dev/null)
 
-.PHONY: walk test test-vm lint setup bench lock clean
+.PHONY: walk test test-vm docs lint setup bench lock clean
 
 walk: $(VENV)/.walk
 	$(RUN) -m ranger_sim walk --steps $(STEPS) --out runs/walk
@@ -14,10 +15,17 @@ walk: $(VENV)/.walk
 # Tests of a robot at a pace of the wall clock have both cores to themselves; the others go side by side.
 WITH_A_CLOCK = tests/system/test_attached_clients.py tests/system/test_daq.py tests/system/test_processes.py \
 	tests/tools/test_up_view.py tests/vm
+# Run by `make docs`.
+PAGES = tests/pages
 
 test: $(VENV)/.all
-	$(RUN) -m pytest -q -rs -n 2 --dist loadfile $(addprefix --ignore=,$(WITH_A_CLOCK))
+	$(RUN) -m pytest -q -rs -n 2 --dist loadfile $(addprefix --ignore=,$(WITH_A_CLOCK) $(PAGES))
 	$(RUN) -m pytest -q -rs $(WITH_A_CLOCK)
+
+docs: $(VENV)/.all
+	$(RUN) -m sphinx -W --keep-going -q -b html -c docs . build/site
+	$(RUN) -m pytest -q -n 2 $(PAGES)
+	@echo "build/site/docs/index.html"
 
 test-vm: $(VENV)/.all
 	$(RUN) -m tests.vm.run

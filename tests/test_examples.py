@@ -11,7 +11,8 @@ import pytest
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 # What each document's examples, run one after the other in one process, must print among other things.
 PRINTED = {
-    "README.md": (r"ID: +123 .*'ranger'", r"^BusState\.ERROR$", r"^[1-9]\d* -?0\.\d+ \d{4,5}$"),
+    "README.md": (r"^[1-9]\d* -?0\.\d+ \d{4,5}$",),
+    "docs/how-to/can-tools.md": (r"ID: +123 .*'ranger'", r"^BusState\.ERROR$"),
     "docs/slot-timing.md": (r"^3 7460 53% left$",),
     "docs/faults.md": (r"^True 100 counts True$",),
     # the longest wait of a frame on CAN1, µs
@@ -21,6 +22,8 @@ PRINTED = {
 }
 
 
+# Read from top to bottom, files, commands and all: tests/pages/test_pages.py.
+WALKED = "docs/tutorial.md"
 # Its examples, tests and a law beside them, are run in a project of their own: harness/testing/test_in_a_project.py.
 IN_A_PROJECT = "docs/testing.md"
 
@@ -38,7 +41,7 @@ def test_every_document_with_python_examples_is_run():
         for path in documents
         if not {".venv", "build", "tests", ".pytest_cache"} & set(path.parts) and examples(path)
     }
-    assert found == {*PRINTED, IN_A_PROJECT}
+    assert found == {*PRINTED, IN_A_PROJECT, WALKED}
 
 
 @pytest.mark.parametrize("name", PRINTED)
