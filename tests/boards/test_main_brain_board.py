@@ -377,3 +377,15 @@ def test_every_table_number_that_a_compiled_class_declares_is_filled_in(board):
         assert declared
         for variable in declared:
             assert getattr(owner, variable) == getattr(table, variable), f"{name}.pxd: {variable}"
+
+
+def test_an_error_that_waits_already_is_counted_and_keeps_its_place_with_the_newest_stamp():
+    ring = ErrorRing(2)
+    ring.add(3, 109, 5, 10)
+    ring.add(4, 105, 2, 11)
+    ring.add(3, 109, 7, 12)
+    word, stamp = ring.take()
+    assert (parts_of_error_word(word), stamp) == ((109, 3, 12), 12)
+    word, stamp = ring.take()
+    assert (parts_of_error_word(word), stamp) == ((105, 4, 2), 11)
+    assert ring.take() is None

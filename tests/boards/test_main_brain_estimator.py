@@ -4,6 +4,7 @@ import math
 
 import pytest
 
+from ranger_sim.boards.main_brain.estimator import EnergyMeter
 from ranger_sim.boards.quirks import Quirks
 from ranger_sim.datatable.generated import errors
 from tests.boards.main_brain_bench import Bench
@@ -420,3 +421,14 @@ def test_by_switch_contact_is_a_filtered_sum_above_1700_counts():
     # 1400 -> 14000 counts: 1700 is 2.4 % of the rise; the filter's step response is 0.36, 1.75, 4.3 %
     assert slots == 3
     assert bench.get("EST_CONTACT_INNER") > 1700.0
+
+
+@pytest.mark.parametrize(("gap_ms", "energy_J"), [(1, 0.003), (1000, 3.0), (1001, 0.0)])
+def test_energy_is_the_trapezoid_of_power_over_its_stamps_and_nothing_across_more_than_a_second(gap_ms, energy_J):
+    meter = EnergyMeter()
+    assert meter.update(2.0, 2**32 - 1)  # stamps wrap
+    assert meter.update(4.0, gap_ms - 1)
+    assert meter.energy_J == pytest.approx(energy_J, rel=1e-12)
+    assert not meter.update(9.0, gap_ms - 1)  # the same datum once more
+    assert meter.update(6.0, gap_ms + 99)  # and it goes on from there
+    assert meter.energy_J == pytest.approx(energy_J + 0.5, rel=1e-12)

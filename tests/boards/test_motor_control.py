@@ -567,3 +567,39 @@ def test_slots_are_never_missed_while_the_loop_runs():
     bench, _ = step_response("MCFO", 3.0)
     assert bench.board.scheduler.overruns == 0
     assert bench.board.scheduler.slot_count == (bench.now - 500_000 + SLOT_NS - 1) // SLOT_NS
+
+
+@pytest.fixture
+def loop_at_rest():
+    """The hip's current loop, fed and switched on, with how often its integral saturated since."""
+    board = Bench("MCH").run(ms=4).board
+    control = board.current_control
+    control.integral, control.block_positive, control.block_negative = 0, False, False
+    assert not board.output.off
+    before = board.errors.totals[codes.MC_INTEG_SATUR]
+    return control, lambda: board.errors.totals[codes.MC_INTEG_SATUR] - before
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_the_integral_is_clipped_beyond_its_limit_to_either_side_and_tells_of_it(loop_at_rest, sign):
+    control, saturated = loop_at_rest
+    control.integral = sign * (control.integral_limit - 1)
+    control.update(sign, 0)
+    assert control.integral == sign * control.integral_limit and saturated() == 0
+    control.update(sign, 0)
+    assert control.integral == sign * control.integral_limit and saturated() == 1
+    control.update(-sign, 0)
+    assert control.integral == sign * (control.integral_limit - 1) and saturated() == 1
+
+
+@pytest.mark.parametrize(("positive", "negative"), [(False, False), (True, False), (False, True), (True, True)])
+def test_a_closed_direction_takes_no_target_however_small_and_the_other_one_every_target(
+    loop_at_rest, positive, negative
+):
+    control, _ = loop_at_rest
+    control.block_positive, control.block_negative = positive, negative
+    control.update(1, 0)
+    assert control.integral == (0 if positive else 1)
+    control.integral = 0
+    control.update(-1, 0)
+    assert control.integral == (0 if negative else -1)

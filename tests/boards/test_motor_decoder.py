@@ -287,3 +287,15 @@ def test_an_edge_at_the_very_instant_of_a_wrap_is_timed_right():
     bench.edge(1, 0, "01", after_ns=600_000)
     bench.run(ms=1)
     assert newest(bench.board.joint, 2) == [6000, 6000]
+
+
+@pytest.mark.parametrize(
+    ("waits", "capture", "wrapped"),
+    [(1, 0, True), (1, 14_999, True), (1, 15_000, False), (1, 29_999, False), (0, 14_999, False)],
+)
+def test_a_wrap_that_is_not_counted_yet_came_before_an_early_capture_alone(waits, capture, wrapped):
+    edges = Bench("MCH").run(ms=3).board.capture01
+    edges.timer.IR = waits  # match 0: the counter began anew, and its interrupt has not run
+    edges.timer.captures = [capture] * len(edges.timer.captures)  # compiled, an element is that of a copy
+    edges.on_capture(None)
+    assert edges.last == edges.wraps.cycles + capture + (30_000 if wrapped else 0)

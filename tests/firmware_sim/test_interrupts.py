@@ -215,6 +215,10 @@ def test_a_source_can_be_attached_anew_and_taken_out():
     log.chip.request(source)
     log.chip.advance(10_000)
     assert log.names() == ["new"]
+    assert source.forgotten == 1  # the request that waited
+    attach(log, ADC_DONE, 0, FIQ, "again")
+    log.chip.vic.detach(source)
+    assert source.forgotten == 1  # none did
 
 
 # --- the story of the encoder interrupts (appendix 4.6) ----------------------------------------------------

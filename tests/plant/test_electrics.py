@@ -10,6 +10,7 @@ import pytest
 
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.plant import wiring_points as points
+from ranger_sim.plant.drive import Drive
 from ranger_sim.plant.electrics import Electrics, ElectricsParameters
 
 STEP = 125_000
@@ -251,3 +252,17 @@ def test_interpreted_and_compiled_runs_give_the_same_bits():
         shown.append(result.stdout.split())
     assert shown[1][0] == "True"
     assert shown[0][1] == shown[1][1]
+
+
+def test_a_bridge_keeps_its_power_by_an_edge_in_time_and_gets_it_back_by_a_late_one():
+    drive = Drive(watchdog_ns=10_000_000)
+    drive.watchdog_edge(0)
+    drive.apply(0)
+    drive.watchdog_edge(10_000_000)  # at the last moment
+    drive.apply(19_999_999)
+    assert drive.powered and drive.power_losses == 0
+    drive.watchdog_edge(20_000_001)  # too late: it has no power in between
+    drive.apply(20_000_000)
+    assert not drive.powered and drive.power_losses == 1
+    drive.apply(20_000_001)
+    assert drive.powered and drive.power_off_ns == 30_000_001

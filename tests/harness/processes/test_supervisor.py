@@ -1,6 +1,7 @@
 """The supervisor alone: what it does with news, without the processes of a robot."""
 
 import contextlib
+import dataclasses
 import json
 import os
 
@@ -58,3 +59,15 @@ def test_a_board_that_ended_because_it_was_told_to_is_no_news_even_when_it_is_fo
 
     with Child(alone.blocks["MCH"], find) as child:  # which has no children but its own
         assert child.ended().si_status == 0
+
+
+def test_a_board_that_ends_again_and_again_is_restarted_five_times(alone, monkeypatch):
+    alone.settings = dataclasses.replace(alone.settings, restart=supervisor.ON_FAILURE)
+    made_room = []
+    monkeypatch.setattr(alone, "make_room", made_room.append)
+    child = supervisor.Child("MCH", 0)
+    for _ in range(7):
+        child.state = supervisor.RUNNING
+        alone.ended(child, 1)
+    assert made_room == [child] * 5
+    assert [line for line in alone.view.lines if "ended 6 times: not restarted any more" in line]

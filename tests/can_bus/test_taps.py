@@ -1,0 +1,51 @@
+"""Clients that leave a bus: what they had queued is still sent, for a while, if somebody is there to hear it."""
+
+from ranger_sim.can_bus.bus import Bus
+from ranger_sim.can_bus.edge.taps import LINGER_NS, Taps
+
+EIGHT_BYTES = 8
+
+
+def clients(count):
+    taps = Taps(Bus("can1", 1_000_000, 1))
+    taps.poll(1_000)
+    return taps, [taps.add(f"client {number}") for number in range(count)]
+
+
+def test_a_client_that_has_nothing_queued_leaves_at_once():
+    taps, (leaver, other) = clients(2)
+    taps.remove(leaver)
+    assert taps.taps == [other] and taps.leaving == 0
+
+
+def test_a_client_whose_frames_do_not_go_out_leaves_when_its_time_is_over_and_not_before():
+    taps, (leaver, other) = clients(2)
+    leaver.offer(0x123, EIGHT_BYTES, 1, 2)  # and the bus stands still
+    taps.remove(leaver)
+    taps.remove(leaver)  # once more: nothing
+    assert taps.taps == [leaver, other] and taps.leaving == 1
+    taps.poll(1_000 + LINGER_NS)
+    assert taps.taps == [leaver, other]
+    taps.poll(1_000 + LINGER_NS + 1)
+    assert taps.taps == [other] and taps.leaving == 0 and taps.spare == [leaver]
+
+
+def test_a_client_that_is_alone_has_nobody_to_send_to_and_leaves_at_once():
+    taps, (leaver,) = clients(1)
+    leaver.offer(0x123, EIGHT_BYTES, 1, 2)
+    taps.remove(leaver)
+    assert taps.taps == [] and taps.leaving == 0
+
+
+def test_a_client_that_left_is_gone_when_its_frame_was_sent():
+    taps, (leaver, _) = clients(2)
+    leaver.offer(0x123, EIGHT_BYTES, 1, 2)
+    taps.remove(leaver)
+    assert taps.leaving == 1
+    now = 1_000
+    while taps.leaving and now < 1_000_000:
+        now += 20_000
+        taps.bus.advance(now)
+        taps.poll(now)
+    assert taps.leaving == 0 and leaver.sent == 1
+    assert 100_000 < now < 200_000  # a frame of 8 bytes at 1 Mbit/s takes 111 bits and stuff bits
