@@ -42,7 +42,7 @@ class TableError(UserError):
 
     def __init__(self, faults: list[Fault]) -> None:
         self.faults = tuple(faults)
-        super().__init__("\n".join(str(fault) for fault in self.faults))
+        super().__init__(*(str(fault) for fault in self.faults))
 
 
 @dataclasses.dataclass(frozen=True)

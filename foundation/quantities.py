@@ -8,6 +8,7 @@ from ranger_sim.foundation.user_error import UserError
 LENGTHS = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "km": 1e3}
 ENERGIES_WH = {"Wh": 1.0, "kWh": 1e3}
 SHARES = {"%": 1e-2}
+ANGLES = {"rad": 1.0, "mrad": 1e-3, "deg": math.pi / 180.0}
 TIMES = {"ns": 1e-9, "us": 1e-6, "ms": 1e-3, "s": 1.0, "min": 60.0, "h": 3600.0}
 
 NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
@@ -15,7 +16,7 @@ NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 
 def in_base_units(text: str, units: dict[str, float]) -> float | None:
     """A number with an optional unit of `units`, in that unit's base; None when `text` is not one."""
-    match = re.fullmatch(rf"\s*({NUMBER})\s*([a-zA-Z%]*)\s*", text)
+    match = re.fullmatch(rf"\s*({NUMBER})\s*([a-zA-Z%]*)\s*", text, re.ASCII)
     if match is None or match.group(2) not in {"", *units}:
         return None
     return float(match.group(1)) * units.get(match.group(2), 1.0)

@@ -71,7 +71,7 @@ class ProfileError(UserError):
 
     def __init__(self, faults: list[ProfileFault]) -> None:
         self.faults = tuple(faults)
-        super().__init__("\n".join(str(fault) for fault in self.faults))
+        super().__init__(*(str(fault) for fault in self.faults))
 
 
 @dataclasses.dataclass(frozen=True)

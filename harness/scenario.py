@@ -9,7 +9,14 @@ from ranger_sim.plant.battery import BatteryParameters
 from ranger_sim.plant.electrics import ElectricsParameters
 from ranger_sim.plant.electronics import SWITCHES
 
-DAY_MS = 24 * 3600 * 1000
+# {field: (lowest, highest, unit)}; beyond these the walking model itself means nothing: chosen by us
+LIMITS: dict[str, tuple[float, float, str]] = {
+    "slope_rad": (-0.5, 0.5, "rad"),
+    "floor_roughness_m": (0.0, 0.1, "m"),
+    "start_uptime_ms": (0, 2**32 - 1, "ms"),
+    "battery_charge": (1e-6, 1.0, "(full)"),
+    "battery_capacity_Wh": (1e-3, 1e6, "Wh"),
+}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -37,15 +44,7 @@ class Scenario:
     electronics_off: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        limits = {
-            # beyond these the walking model itself means nothing: chosen by us
-            "slope_rad": (-0.5, 0.5, "rad"),
-            "floor_roughness_m": (0.0, 0.1, "m"),
-            "start_uptime_ms": (0, 2**32 - 1, "ms"),
-            "battery_charge": (1e-6, 1.0, "(full)"),
-            "battery_capacity_Wh": (1e-3, 1e6, "Wh"),
-        }
-        for name, (low, high, unit) in limits.items():
+        for name, (low, high, unit) in LIMITS.items():
             value = getattr(self, name)
             if not (isinstance(value, int | float) and math.isfinite(value) and low <= value <= high):
                 raise UserError(f"scenario: {name} is {value!r}, allowed are {low} to {high} {unit}")
@@ -66,6 +65,13 @@ class Scenario:
         return dataclasses.replace(body, battery=battery, electronics_off=self.electronics_off)
 
 
+# Of a walk's end: 31 years of virtual time, and as many steps and metres. Time is a 64-bit number of nanoseconds, which
+# ends after 292 years, and network time one of 32-bit milliseconds that wraps. Chosen by us.
+MOST_TIME_S = 1e9
+MOST_STEPS = 1_000_000_000
+MOST_DISTANCE_M = 1e9
+
+
 @dataclasses.dataclass(frozen=True)
 class StopRule:
     """When a walk is done: after so many steps, so much time, or so much distance; whichever comes first."""
@@ -75,8 +81,10 @@ class StopRule:
     distance_m: float | None = None
 
     def __post_init__(self) -> None:
-        for name, value in dataclasses.asdict(self).items():
-            if value is not None and not (math.isfinite(value) and value > 0):
-                raise UserError(f"{name} is {value!r}, it must be above 0")
+        limits = {"steps": MOST_STEPS, "time_s": MOST_TIME_S, "distance_m": MOST_DISTANCE_M}
+        for name, most in limits.items():
+            value = getattr(self, name)
+            if value is not None and not 0 < value <= most:
+                raise UserError(f"{name} is {value!r}, it must be above 0 and at most {most:g}")
         if self.steps is None and self.time_s is None and self.distance_m is None:
             raise UserError("give steps, time or distance: a walk needs an end")

@@ -312,7 +312,7 @@ def _check(place: str, table: object) -> Term:
     if not isinstance(table, dict):
         raise UserError(f"{place}: a term is a table, not {table!r}")
     name = table.get("form")
-    if name not in FORMS:
+    if not isinstance(name, str) or name not in FORMS:
         raise UserError(f"{place}: form is {name!r}; there are: {', '.join(FORMS)}")
     form = FORMS[name]
     at = table.get("at")

@@ -4,7 +4,6 @@ import argparse
 import json
 from typing import Any
 
-from rich.markup import escape
 from rich.table import Table
 
 from ranger_sim.plant import body_files
@@ -63,7 +62,7 @@ def run_show(options: argparse.Namespace) -> int:
         table.add_column(title, overflow="fold", no_wrap=title == "key")
     for row in found:
         value = f"{row['value']:g}" if isinstance(row["value"], float) else str(row["value"])
-        table.add_row(*(escape(text) for text in (row["key"], value, row["unit"], row["limits"], row["source"])))
+        table.add_row(row["key"], value, row["unit"], row["limits"], row["source"])
     console = terminal.console(highlight=False)
     console.print(f"{body.title}: {body.description}")
     console.print(table)

@@ -13,8 +13,9 @@ from ranger_sim.can_bus.edge.socketcand import SocketcandServer
 from ranger_sim.foundation import wallclock
 from ranger_sim.foundation.peers import loopback
 from ranger_sim.foundation.user_error import UserError
+from ranger_sim.harness.scenario import MOST_TIME_S
 from ranger_sim.tools import server_options
-from ranger_sim.tools.units import whole_number
+from ranger_sim.tools.units import TIMES, number, quantity, whole_number
 
 
 def register(commands: Any) -> None:
@@ -33,11 +34,19 @@ def register(commands: Any) -> None:
     )
     command.add_argument("--speed", default="1", help="times real time, or max: as fast as frames are sent (default 1)")
     command.add_argument(
-        "--bit-error-rate", type=float, default=0.0, help="share of disturbed bits, 0 to 0.1 (default 0)"
+        "--bit-error-rate",
+        type=number(),
+        default=0.0,
+        help="share of disturbed bits, 0 to 0.1 (default 0)",
     )
     command.add_argument("--seed", type=whole_number(0), default=0, help="seed of the disturbances (default 0)")
     server_options.add_options(command)
-    command.add_argument("--seconds", type=float, default=math.inf, help="end after so long (default: with Ctrl-C)")
+    command.add_argument(
+        "--seconds",
+        type=quantity(TIMES, "s", above=0.0, most=MOST_TIME_S),
+        default=math.inf,
+        help="end after so long (default: with Ctrl-C)",
+    )
     command.set_defaults(run=run)
 
 
@@ -81,8 +90,6 @@ def run(options: argparse.Namespace) -> int:
     for channel in options.channel:
         if not channel or "/" in channel or any(c.isspace() for c in channel):
             raise UserError(f"bus: {channel!r} is no name for a bus: no slash and no blank, please")
-    if not options.seconds > 0.0:
-        raise UserError(f"bus: --seconds {options.seconds:g} is not above 0")
     buses = [
         PacedBus(channel, options.bitrate, speed, options.seed, options.bit_error_rate) for channel in options.channel
     ]

@@ -10,7 +10,6 @@ import argparse
 import json
 from typing import Any
 
-from rich.markup import escape
 from rich.table import Table
 
 from ranger_sim.foundation.user_error import UserError
@@ -69,7 +68,7 @@ def print_catalogue() -> None:
     for heading in ("no.", "cause", "balance", "what it is"):
         table.add_column(heading, overflow="fold", no_wrap=heading == "cause")
     for cause in causes.CAUSES.values():
-        table.add_row(str(cause.number), escape(cause.key), " ".join(cause.balances), escape(cause.meaning))
+        table.add_row(str(cause.number), cause.key, " ".join(cause.balances), cause.meaning)
     console.print(table)
     console.print()
     for letter, meaning in causes.BALANCES.items():
@@ -136,7 +135,7 @@ def analysis_json(experiment: str, given: list[str] | None) -> dict[str, Any]:
 
 def print_analysis(told: dict[str, Any]) -> None:
     """The same for a person."""
-    console = terminal.console(highlight=False, markup=False)
+    console = terminal.console(highlight=False)
 
     def tell(text: str = "") -> None:
         console.print(text, soft_wrap=True)

@@ -1,12 +1,14 @@
 """The command `ranger-sim`: every subcommand is one module of this package (or a room's own `cli`)."""
 
 import argparse
-import os
+import difflib
 import sys
 from typing import Any, NoReturn
 
 from ranger_sim import __version__
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import UserError, printable
+from ranger_sim.tools import terminal
+from ranger_sim.tools.units import NEGATIVE_VALUE
 
 EXIT_DONE = 0
 EXIT_FELL = 1  # the robot fell or a board failed
@@ -15,11 +17,26 @@ EXIT_INTERRUPTED = 130
 
 
 class OneLineParser(argparse.ArgumentParser):
-    """An argument parser that complains in one line."""
+    """An argument parser that complains in one line, and takes `-1s` for a value."""
+
+    def __init__(self, *arguments: Any, **settings: Any) -> None:
+        super().__init__(*arguments, **settings)
+        self._negative_number_matcher = NEGATIVE_VALUE  # argparse's own knows -1 and -0.5, not -1s
+
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
+        """As argparse's, but each command refuses what it does not know itself: under its own name, with a hint."""
+        options, unknown = super().parse_known_args(args, namespace)
+        if unknown:
+            named = [each.partition("=")[0] for each in unknown if each.startswith("--")]
+            known = [each for action in self._actions for each in action.option_strings]
+            near = difflib.get_close_matches(named[0], known, 2, 0.8) if named else []
+            hint = f"; meant was perhaps {' or '.join(near)}" if near else ""
+            self.error(f"unrecognized arguments: {' '.join(unknown)}{hint}")
+        return options, unknown
 
     def error(self, message: str) -> NoReturn:
         """Print what is wrong and where help is; exit code 2."""
-        self.exit(EXIT_MISUSE, f"{self.prog}: {message} (see {self.prog} --help)\n")
+        self.exit(EXIT_MISUSE, f"{self.prog}: {printable(message)} (see {self.prog} --help)\n")
 
 
 def parser() -> argparse.ArgumentParser:
@@ -84,32 +101,35 @@ def parser() -> argparse.ArgumentParser:
 
 def main(arguments: list[str] | None = None) -> int:
     """Run one command; returns the process's exit code. A user's mistake is one line and code 2."""
+    terminal.stand_in_for_closed_streams()
     try:
         options = parser().parse_args(arguments)
         code: int = options.run(options)
         sys.stdout.flush()
         return code
     except UserError as mistake:
-        print(f"ranger-sim: {mistake}", file=sys.stderr)
-        return EXIT_MISUSE
+        return misuse(str(mistake))
     except KeyboardInterrupt:
         print("ranger-sim: interrupted", file=sys.stderr)
         return EXIT_INTERRUPTED
     except BrokenPipeError:  # the reader of our output left, e.g. `| head`
         return output_closed()
-    except SystemExit as leaving:
-        if isinstance(leaving.__context__, BrokenPipeError):  # rich leaves so
-            return output_closed()
-        raise
     except OSError as error:  # a full disk, a folder that vanished: of the machine, not of the program
-        place = f"{error.filename}: " if error.filename else ""
-        print(f"ranger-sim: {place}{error.strerror or error}", file=sys.stderr)
-        return EXIT_MISUSE
+        place = error.filename or (terminal.OUTPUT if terminal.output_is_stuck() else None)
+        return misuse(printable(f"{place}: {error.strerror or error}" if place else f"{error.strerror or error}"))
+    except MemoryError:
+        return misuse(f"{options.command}: out of memory")
+
+
+def misuse(text: str) -> int:
+    """Say what is wrong, on standard error."""
+    print(f"ranger-sim: {text}", file=sys.stderr)
+    return EXIT_MISUSE
 
 
 def output_closed() -> int:
     """Nobody reads standard output any more: let the interpreter flush into nothing."""
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    terminal.lead_nowhere(sys.stdout)
     return EXIT_DONE
 
 

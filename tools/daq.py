@@ -13,7 +13,7 @@ import math
 import select
 from typing import TYPE_CHECKING, Any
 
-from rich.console import Console, Group
+from rich.console import Group
 from rich.live import Live
 from rich.table import Table
 from rich.text import Text
@@ -24,6 +24,7 @@ from ranger_sim.datatable.generated import all_variables
 from ranger_sim.foundation import wallclock
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.serial_ports import BLUETOOTH_BAUD, DAQ_BAUD, RealPort, reason_of
+from ranger_sim.tools import terminal
 from ranger_sim.tools.files import json_target, replace_file
 from ranger_sim.tools.robodaq import catalogue, logs, parameter_files
 from ranger_sim.tools.robodaq.session import Session
@@ -225,7 +226,7 @@ class View:
     def __init__(self, session: Session, asked: Asked, options: argparse.Namespace) -> None:
         self.session = session
         self.options = options
-        self.console = Console(stderr=True, quiet=options.json == "-", markup=False)
+        self.console = terminal.console(stderr=True, quiet=options.json == "-")
         self.live: Live | None = None
         self.started = self.shown_s = self.line_s = wallclock.monotonic_s()
         self.shown_counts: dict[int, int] = {}

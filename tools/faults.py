@@ -10,17 +10,34 @@ import pathlib
 from typing import Any
 
 from rich.console import Console
-from rich.markup import escape
 from rich.table import Table
 
 from ranger_sim.harness.faults import catalogue
 from ranger_sim.harness.faults.fault import Fault, Parameter, Place
 from ranger_sim.tools import terminal
+from ranger_sim.tools.options import Option
+from ranger_sim.tools.units import word
 
 DOCUMENT = pathlib.Path(__file__).resolve().parent.parent / "docs" / "faults.md"
 EXIT_INVALID = 3  # of a run in which a fault did not act: it shows nothing
 TABLES_BEGIN = "<!-- written by python -m ranger_sim.tools.faults: begin -->\n"
 TABLES_END = "<!-- end -->\n"
+
+FAULT = Option(
+    "--fault",
+    'lets something fail: "MCH.joint_encoder:stuck@step 12..step 14"; may be given several times; exit code 3 when one '
+    "did not act; ranger-sim faults lists places and modes",
+    word("PLACE:MODE"),
+    "TEXT",
+    repeated=True,
+)
+MODULE = Option(
+    "--fault-module",
+    "a .py file with fault modes or places of your own (docs/faults.md); may be given several times",
+    word("a .py file"),
+    "FILE",
+    repeated=True,
+)
 
 
 def register(commands: Any) -> None:
@@ -33,31 +50,8 @@ def register(commands: Any) -> None:
     )
     command.add_argument("place", nargs="?", metavar="PLACE", help="a place, as MCH.joint_encoder")
     command.add_argument("--json", action="store_true", help="print JSON instead of tables")
-    add_module_option(command)
+    MODULE.add(command)
     command.set_defaults(run=run)
-
-
-def add_fault_option(command: Any) -> None:
-    """The option that lets something fail."""
-    command.add_argument(
-        "--fault",
-        action="append",
-        default=[],
-        metavar="TEXT",
-        help='lets something fail: "MCH.joint_encoder:stuck@step 12..step 14"; may be given several times; exit code 3 '
-        "when one did not act; ranger-sim faults lists places and modes",
-    )
-
-
-def add_module_option(command: Any) -> None:
-    """The option that brings in a user's own modes and places."""
-    command.add_argument(
-        "--fault-module",
-        action="append",
-        default=[],
-        metavar="FILE",
-        help="a .py file with fault modes or places of your own (docs/faults.md); may be given several times",
-    )
 
 
 def load_modules(options: argparse.Namespace) -> None:
@@ -82,7 +76,7 @@ def run(options: argparse.Namespace) -> int:
         table.add_column("place", no_wrap=True)
         table.add_column("what it is, and the modes that it takes", overflow="fold")
         for place in places:
-            table.add_row(place.name, f"{escape(place.what)}\n{', '.join(catalogue.modes_of(place))}")
+            table.add_row(place.name, f"{place.what}\n{', '.join(catalogue.modes_of(place))}")
         console.print(table)
         console.print("\nranger-sim faults PLACE tells what they do, and their parameters", soft_wrap=True)
         return 0
@@ -94,7 +88,7 @@ def print_place(place: Place, console: Console) -> None:
     """Modes of one place with their parameters, where these come from, and what it refuses."""
 
     def tell(text: str) -> None:
-        console.print(escape(text), soft_wrap=True)
+        console.print(text, soft_wrap=True)
 
     tell(f"{place.name}: {place.what}")
     sources: dict[str, list[str]] = {}

@@ -19,7 +19,7 @@ from ranger_sim.harness.timing.slots import SlotView, Statistics
 from ranger_sim.harness.timing.static_check import OVERRUNS, BoardBound, FunctionBound
 from ranger_sim.tools import terminal
 from ranger_sim.tools.files import json_target, replace_file
-from ranger_sim.tools.units import TIMES, quantity, whole_number
+from ranger_sim.tools.units import TIMES, number, quantity, whole_number
 
 EXIT_DONE, EXIT_OVERRAN = 0, 1
 USUAL_TIME_S = 4.0  # the robot is let go after half of it and walks the rest (chosen by us: seconds of computing)
@@ -45,10 +45,10 @@ def register(commands: Any) -> None:
         "--time", type=quantity(TIMES, "s", 0.0), metavar="2s", help=f"virtual time of the run ({USUAL_TIME_S:g} s)"
     )
     length.add_argument("--steps", type=whole_number(1), metavar="N", help="run until so many steps")
-    command.add_argument("--seed", type=int, default=1, metavar="N", help="seed of the run (1)")
+    command.add_argument("--seed", type=whole_number(), default=1, metavar="N", help="seed of the run (1)")
     command.add_argument(
         "--edge-rate",
-        type=float,
+        type=number(least=0.0, most=1e9),
         metavar="N",
         help="edges per second of every encoder (default: its motor at 6300 rpm)",
     )
@@ -76,7 +76,7 @@ def run(options: argparse.Namespace) -> int:
     if options.json == "-":
         print(text)
     else:
-        console = terminal.console(highlight=False)
+        console = terminal.console(markup=True, highlight=False)
         for board in boards:
             show(board, ran, console, whole=options.board is not None)
     return EXIT_OVERRAN if any(board["seen"] and board["seen"]["overruns"] for board in boards) else EXIT_DONE

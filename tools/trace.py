@@ -11,8 +11,10 @@ import webbrowser
 from typing import TYPE_CHECKING, Any
 
 from ranger_sim.foundation.user_error import UserError
+from ranger_sim.harness.scenario import MOST_TIME_S
 from ranger_sim.tools.files import replace_file
-from ranger_sim.tools.units import TIMES, quantity
+from ranger_sim.tools.options import Option, add_all
+from ranger_sim.tools.units import TIMES, quantity, word
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -27,55 +29,66 @@ SHOWN_S = 0.02  # around the instant: ten slots of the main brain, chosen by us
 KEPT_S = 1.0  # what a page for offline use holds of a long trace: some 10 MB
 
 
+OPTIONS = (
+    Option(
+        "--trace",
+        "write slots, interrupts, frames, signals, states and faults into FILE; repeatable, format by suffix: "
+        ".pftrace (Perfetto), .vcd (bits), .mcap (body and signals)",
+        word("a file"),
+        "FILE",
+        repeated=True,
+        of_run=False,
+    ),
+    Option(
+        "--trace-last",
+        "keep only the last so many seconds of virtual time; without it everything, 25 MB of disk a second",
+        quantity(TIMES, "s", above=0.0, most=MOST_TIME_S),
+        "10s",
+        of_run=False,
+    ),
+)
+
+
 def add_options(command: Any) -> None:
     """The options of every command that runs a robot and can keep its timeline."""
     group = command.add_argument_group("timeline", "what happened, to be looked at with `ranger-sim trace open`")
-    group.add_argument(
-        "--trace",
-        action="append",
-        default=[],
-        type=pathlib.Path,
-        metavar="FILE",
-        help="write slots, interrupts, frames, signals, states and faults into FILE; repeatable, format by suffix: "
-        ".pftrace (Perfetto), .vcd (bits), .mcap (body and signals)",
-    )
-    group.add_argument(
-        "--trace-last",
-        type=quantity(TIMES, "s", 0.0),
-        metavar="10s",
-        help="keep only the last so many seconds of virtual time; without it everything, 25 MB of disk a second",
-    )
+    add_all(group, OPTIONS)
 
 
-def check(options: argparse.Namespace) -> None:
+def paths_of(given: argparse.Namespace) -> list[pathlib.Path]:
+    """The files that were asked for."""
+    return [pathlib.Path(name) for name in given.trace]
+
+
+def check(given: argparse.Namespace) -> None:
     """UserError, before anything runs, for a file that cannot be."""
-    if options.trace_last and not options.trace:
+    if given.trace_last and not given.trace:
         raise UserError("--trace-last needs --trace FILE")
-    for path in options.trace:
+    for path in paths_of(given):
         from ranger_sim.harness.timeline import files
 
         files.check_target(path)
 
 
-def attach(robot: Ranger, options: argparse.Namespace) -> Timeline | None:
+def attach(robot: Ranger, given: argparse.Namespace) -> Timeline | None:
     """A timeline on `robot` when one was asked for. UserError for a file that cannot be."""
-    check(options)
-    if not options.trace:
+    check(given)
+    if not given.trace:
         return None
     from ranger_sim.harness.timeline import Timeline
 
-    return Timeline(robot, options.trace_last)
+    return Timeline(robot, given.trace_last)
 
 
-def write(timeline: Timeline | None, options: argparse.Namespace, console: Console) -> None:
+def write(timeline: Timeline | None, given: argparse.Namespace, console: Console) -> None:
     """The files that were asked for."""
     if timeline is None:
         return
     with console.status("writing the timeline ..."):
-        for path in options.trace:
+        for path in paths_of(given):
             timeline.write(path)
     timeline.close()
-    for path in options.trace:
+    for path in paths_of(given):
         console.print(f"timeline: {path} (ranger-sim trace open {path})", highlight=False, soft_wrap=True)
 
 
@@ -109,34 +122,34 @@ def register(commands: Any) -> None:
     opening.set_defaults(run=run_open)
 
 
-def run_open(options: argparse.Namespace) -> int:
+def run_open(given: argparse.Namespace) -> int:
     """Show a timeline; 0 when it was read."""
     from ranger_sim.harness.timeline import moments
 
-    if options.file.suffix not in (".pftrace", ".perfetto-trace"):
-        raise UserError(f"trace {options.file}: only .pftrace files can be opened; a .vcd opens in GTKWave or Surfer")
-    asked_ns = None if options.at is None else round(options.at * 1e9)
-    moment = moments.find(options.file, asked_ns)
-    if options.offline or options.out:
-        return open_page(options, moment)
-    half_ns = round(options.shown * 0.5e9)
-    return serve(options.file, max(0, moment.time_ns - half_ns), moment.time_ns + half_ns, not options.no_browser)
+    if given.file.suffix not in (".pftrace", ".perfetto-trace"):
+        raise UserError(f"trace {given.file}: only .pftrace files can be opened; a .vcd opens in GTKWave or Surfer")
+    asked_ns = None if given.at is None else round(given.at * 1e9)
+    moment = moments.find(given.file, asked_ns)
+    if given.offline or given.out:
+        return open_page(given, moment)
+    half_ns = round(given.shown * 0.5e9)
+    return serve(given.file, max(0, moment.time_ns - half_ns), moment.time_ns + half_ns, not given.no_browser)
 
 
-def open_page(options: argparse.Namespace, moment: Any) -> int:
+def open_page(given: argparse.Namespace, moment: Any) -> int:
     """Write the page for offline use and open it."""
     from ranger_sim.harness.timeline import viewer
 
-    page = options.out or options.file.with_suffix(".html")
+    page = given.out or given.file.with_suffix(".html")
     if page.is_dir() or not page.parent.is_dir():
         raise UserError(f"page {page}: its folder is missing, or it is one")
-    content = viewer.page(options.file, moment, round(KEPT_S * 1e9), round(options.shown * 1e9))
+    content = viewer.page(given.file, moment, round(KEPT_S * 1e9), round(given.shown * 1e9))
     try:
         replace_file(page, content.encode())
     except OSError as error:
         raise UserError(f"page {page}: cannot be written: {error.strerror}") from None
     print(f"{page}: shows {moment.text}, at {moment.time_ns * 1e-9:.6f} s")
-    if not options.no_browser:
+    if not given.no_browser:
         webbrowser.open(page.absolute().as_uri())
     return 0
 

@@ -30,7 +30,7 @@ from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.scenario import Scenario, StopRule
 from ranger_sim.tools import terminal
 from ranger_sim.tools.evolution import Evolution
-from ranger_sim.tools.units import LENGTHS, quantity, whole_number
+from ranger_sim.tools.units import LENGTHS, number, quantity, whole_number
 
 # What a walk should be, and the deviation that costs 1. Values: the robot's in May 2011 (0.35 m, 0.60 s, 11.3 W,
 # 0.28, 14 ms); tolerances: a quarter of the length, 15 % of the time, and what keeps 6 ... 15 W, 0.19 ... 0.35 and
@@ -151,12 +151,19 @@ def register(commands: argparse._SubParsersAction) -> None:
     )
     command.add_argument("--rounds", type=whole_number(0), default=2, help="passes over the parameters (default 2)")
     command.add_argument(
-        "--worth", type=float, default=0.05, help="a change is kept that lowers the cost by so much (default 0.05)"
+        "--worth",
+        type=number(least=0.0),
+        default=0.05,
+        help="a change is kept that lowers the cost by so much (default 0.05)",
     )
     command.add_argument("--generations", type=whole_number(0), default=20, help="of the evolution (default 20)")
     command.add_argument("--population", type=whole_number(4), help="walkers of a generation (default by their number)")
-    command.add_argument("--spread", type=float, default=1.0, help="the evolution's first steps times this (default 1)")
-    command.add_argument("--random", type=int, default=1, metavar="SEED", help="of the evolution (default 1)")
+    command.add_argument(
+        "--spread", type=number(above=0.0), default=1.0, help="the evolution's first steps times this (default 1)"
+    )
+    command.add_argument(
+        "--random", type=whole_number(), default=1, metavar="SEED", help="of the evolution (default 1)"
+    )
     command.add_argument("--jobs", type=whole_number(1), default=1, help="walks at a time (default 1)")
     command.add_argument("--out", required=True, metavar="FILE.toml", help="file for the set that was found")
     command.set_defaults(run=run)
@@ -263,8 +270,8 @@ class Judge:
             files[key].write_text(as_toml(self.task.base, "candidate", dict(key), {}))
         summaries = list(self.each(walk, [(str(files[key]), seed, floor, self.task) for key, seed, floor in walks]))
         per_candidate = len(self.task.seeds) * len(self.task.floors)
-        for number, key in enumerate(new):
-            of_key = summaries[number * per_candidate : (number + 1) * per_candidate]
+        for place, key in enumerate(new):
+            of_key = summaries[place * per_candidate : (place + 1) * per_candidate]
             cost = sum(cost_of(summary, self.task.steps, self.task.aim) for summary in of_key) / per_candidate
             self.known[key] = cost, sum(summary["fell"] for summary in of_key)
             shown = ", ".join(f"{name} {value:g}" for name, value in key)

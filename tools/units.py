@@ -1,40 +1,154 @@
-"""Quantities as people type them on a command line: 60s, 1.5km, 1mm, 70%."""
+"""Values as people type them on a command line (60s, 1.5km, 1mm, 70 %, 1e6): the one place that reads and limits them.
+
+Each kind of value is an argparse type. What it refuses is told with the text as typed and the limit; argparse puts
+the option's name in front. `text(value)` writes a value so that it is read back as the very same number.
+"""
 
 import argparse
 import math
-from collections.abc import Callable
+import re
+from dataclasses import dataclass, field
+from typing import Any, Protocol
 
-from ranger_sim.foundation.quantities import ENERGIES_WH, LENGTHS, SHARES, TIMES, in_base_units
+from ranger_sim.foundation.quantities import (
+    ANGLES,
+    ENERGIES_WH,
+    LENGTHS,
+    NUMBER,
+    SHARES,
+    TIMES,
+    in_base_units,
+)
 
-__all__ = ["ENERGIES_WH", "LENGTHS", "SHARES", "TIMES", "quantity", "whole_number"]
+__all__ = ["ANGLES", "ENERGIES_WH", "LENGTHS", "SHARES", "TIMES", "Quantity", "Value", "WholeNumber", "Word"]
+__all__ += ["number", "quantity", "whole_number", "word"]
+
+# What starts so is a value and no option: argparse lets `--time -1s` reach its check (`-1` alone would by default).
+NEGATIVE_VALUE = re.compile(r"-(\.?\d|inf|nan)", re.IGNORECASE)
+SHOWN = 60  # letters of a typed text that a message repeats; chosen by us
 
 
-def quantity(units: dict, base: str, above: float | None = None) -> Callable[[str], float]:
-    """An argparse type: a number with an optional unit of `units`, in SI. `above`: exclusive lower limit."""
+class Value(Protocol):
+    """One kind of value of the command line."""
 
-    def parse(text: str) -> float:
-        value = in_base_units(text, units)
+    def __call__(self, text: str) -> Any:
+        """The value; argparse.ArgumentTypeError says what is wrong with the text."""
+
+    def text(self, value: Any) -> str:
+        """What to type for this value."""
+
+
+def as_typed(text: str) -> str:
+    """A typed text in a message, cut to what fits there."""
+    return repr(text if len(text) <= SHOWN else f"{text[:SHOWN]}...")
+
+
+@dataclass(frozen=True, eq=False)  # argparse asks for its hash, and a dict has none
+class Quantity:
+    """A number with an optional unit of `units`, in SI; `base` names what no unit means.
+
+    above: exclusive lower limit; least, most: inclusive ones. What is not finite is refused in any case.
+    """
+
+    units: dict[str, float] = field(default_factory=dict)
+    base: str = ""
+    above: float | None = None
+    least: float | None = None
+    most: float | None = None
+
+    def __call__(self, text: str) -> float:
+        value = in_base_units(text, self.units)
         if value is None:
-            raise argparse.ArgumentTypeError(
-                f"{text!r} is not a number with one of the units {', '.join(units)} (none means {base})"
-            )
-        if not math.isfinite(value) or (above is not None and value <= above):
-            raise argparse.ArgumentTypeError(f"{text!r} must be above {above:g} {base}")
+            kinds = f"a number with one of the units {', '.join(self.units)} (none means {self.base})"
+            raise argparse.ArgumentTypeError(f"{as_typed(text)} is not {kinds if self.units else 'a number'}")
+        if not (
+            math.isfinite(value)
+            and (self.above is None or value > self.above)
+            and (self.least is None or value >= self.least)
+            and (self.most is None or value <= self.most)
+        ):
+            raise argparse.ArgumentTypeError(f"{as_typed(text)} must be {self.limits()}")
         return value
 
-    return parse
+    def limits(self) -> str:
+        """The allowed values in words."""
+        named = (("above", self.above), ("at least", self.least), ("at most", self.most))
+        parts = [f"{name} {limit:g} {self.base}".rstrip() for name, limit in named if limit is not None]
+        return " and ".join(parts) or "finite"
+
+    def text(self, value: float) -> str:
+        """Digits that are read back as the very same number; the unit with them where 1 of it is 1 in SI."""
+        return f"{value!r}{next((unit for unit, size in self.units.items() if size == 1.0), '')}"
 
 
-def whole_number(low: int) -> Callable[[str], int]:
-    """An argparse type: a whole number of at least `low`."""
+@dataclass(frozen=True)
+class WholeNumber:
+    """A whole number from `least` to `most`; 1e6 is one."""
 
-    def parse(text: str) -> int:
-        try:
-            value = int(text)
-        except ValueError:
-            raise argparse.ArgumentTypeError(f"{text!r} is not a whole number") from None
-        if value < low:
-            raise argparse.ArgumentTypeError(f"{value} is below {low}")
+    least: int | None = None
+    most: int | None = None
+
+    def __call__(self, text: str) -> int:
+        value = self._read(text.strip())
+        if value is None:
+            raise argparse.ArgumentTypeError(f"{as_typed(text)} is not a whole number")
+        if self.least is not None and value < self.least:
+            raise argparse.ArgumentTypeError(f"{as_typed(text)} is below {self.least}")
+        if self.most is not None and value > self.most:
+            raise argparse.ArgumentTypeError(f"{as_typed(text)} is above {self.most}")
         return value
 
-    return parse
+    @staticmethod
+    def _read(text: str) -> int | None:
+        if re.fullmatch(r"[-+]?\d{1,4000}", text, re.ASCII):  # Python itself reads no more than 4300 digits
+            return int(text)
+        if re.fullmatch(NUMBER, text, re.ASCII):
+            value = float(text)
+            return int(value) if value.is_integer() and abs(value) < 2**53 else None
+        return None
+
+    def text(self, value: int) -> str:
+        """Its digits."""
+        return str(value)
+
+
+@dataclass(frozen=True)
+class Word:
+    """A name or a path: any text but the empty one. `what` is said when it is empty."""
+
+    what: str
+
+    def __call__(self, text: str) -> str:
+        if not text:
+            raise argparse.ArgumentTypeError(f"'' is empty: {self.what} is expected")
+        return text
+
+    def text(self, value: str) -> str:
+        """Itself."""
+        return value
+
+
+def quantity(
+    units: dict[str, float],
+    base: str,
+    above: float | None = None,
+    least: float | None = None,
+    most: float | None = None,
+) -> Quantity:
+    """A number with an optional unit of `units`."""
+    return Quantity(units, base, above, least, most)
+
+
+def number(above: float | None = None, least: float | None = None, most: float | None = None) -> Quantity:
+    """A number without a unit."""
+    return Quantity({}, "", above, least, most)
+
+
+def whole_number(least: int | None = None, most: int | None = None) -> WholeNumber:
+    """A whole number."""
+    return WholeNumber(least, most)
+
+
+def word(what: str) -> Word:
+    """A name or a path."""
+    return Word(what)

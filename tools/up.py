@@ -25,13 +25,15 @@ from ranger_sim.harness.processes.lateness import figures
 from ranger_sim.harness.processes.outside import move_bus
 from ranger_sim.harness.processes.plant_process import sent_away
 from ranger_sim.harness.processes.requests import admitted
-from ranger_sim.harness.processes.settings import NEVER, ON_FAILURE, Settings, one_processor
+from ranger_sim.harness.processes.settings import FASTEST, NEVER, ON_FAILURE, SLOWEST, Settings, one_processor
 from ranger_sim.harness.processes.supervisor import ELSEWHERE, RUNNING, Supervisor, View, check_platform
 from ranger_sim.harness.profile import Profile
 from ranger_sim.harness.profile import load as load_profile
-from ranger_sim.harness.scenario import StopRule
-from ranger_sim.tools import faults, serial_options, server_options, terminal, trace, walk
+from ranger_sim.harness.scenario import MOST_STEPS, StopRule
+from ranger_sim.tools import faults, serial_options, server_options, terminal, trace, walk, walk_options
 from ranger_sim.tools.files import json_target, writable_folder
+from ranger_sim.tools.options import add_all
+from ranger_sim.tools.units import number, word
 
 if TYPE_CHECKING:
     from ranger_sim.can_bus.edge.external_bus import ExternalBus
@@ -42,7 +44,8 @@ if TYPE_CHECKING:
 
 PLAIN_S = 2.0  # between two lines where there is no terminal
 FIELDS = {"restart": ("board",), "key": ("key",), "set": ("name", "value")}  # of a request, as ctl gives them
-FOREVER = StopRule(steps=1 << 40)
+PACE = number(least=SLOWEST, most=FASTEST)
+FOREVER = StopRule(steps=MOST_STEPS)
 
 
 def speed(text: str) -> float | None:
@@ -50,9 +53,9 @@ def speed(text: str) -> float | None:
     if text == "max":
         return None
     try:
-        return float(text)
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"{text!r} is neither a number nor max") from None
+        return PACE(text)
+    except argparse.ArgumentTypeError as wrong:
+        raise argparse.ArgumentTypeError(f"{wrong}, or max") from None
 
 
 def processor(text: str) -> int | None:
@@ -73,7 +76,7 @@ def register(commands: Any) -> None:
         help="let Ranger walk in real time, each board a process of its own",
         description="One process for each board and one for the body. Without an end it walks until Ctrl-C.",
     )
-    walk.add_run_options(up)
+    walk_options.add_run_options(up)
     group = up.add_argument_group("processes")
     group.add_argument(
         "--speed",
@@ -89,13 +92,17 @@ def register(commands: Any) -> None:
         help="whether a board that dies is started again (default never)",
     )
     group.add_argument(
-        "--name", default="ranger", help="name under which other programs find this robot (default ranger)"
+        "--name",
+        type=word("a name"),
+        default="ranger",
+        help="name under which other programs find this robot (default ranger)",
     )
     group.add_argument(
         "--no-real-time", action="store_true", help="do not ask for SCHED_FIFO and locked memory, even if permitted"
     )
     group.add_argument(
         "--processor",
+        type=word("one, all or a number"),
         default="one",
         metavar="one|all|N",
         help="processors for body and boards. They take turns, so one is the fastest (default; interpreted: all)",
@@ -110,8 +117,7 @@ def register(commands: Any) -> None:
         "needed ('can1=slcan:/dev/ttyACM0 --bitrate 1000000'); can1= asks python-can's configuration, section can1; "
         "MCH=... gives one board of such a bus a place of its own (repeatable). The run is then asynchronous",
     )
-    faults.add_fault_option(up)
-    faults.add_module_option(up)
+    add_all(up, (faults.FAULT, faults.MODULE))
     trace.add_options(up)
     up.set_defaults(run=run)
 
@@ -183,7 +189,7 @@ def run(options: argparse.Namespace) -> int:
     folder = writable_folder(options.out) if options.out else None
     json_file = json_target(options.json)
     console = terminal.console(stderr=True, quiet=options.json == "-")
-    scenario, stop = walk.scenario_of(options), walk.stop_of(options) or FOREVER
+    scenario, stop = walk_options.scenario_of(options), walk_options.stop_of(options) or FOREVER
     quirks = serial_options.quirks_of(options)
     profile = load_profile(options.profile) if options.profile is not None else None
     if profile is not None:
@@ -191,17 +197,15 @@ def run(options: argparse.Namespace) -> int:
         for what, boards in (("outside", profile.external()), ("absent", profile.absent())):
             if boards:
                 console.print(f"{', '.join(boards)}: {what}", highlight=False)
-    log = options.log if folder else "none"
+    log = walk_options.log_of(options)
     with contextlib.closing(Ranger(scenario, log=log, quirks=quirks, profile=profile)) as robot:
+        outside, openers = external_buses(options, robot, profile)
         ends, lines = serial_options.connect(robot, options)
         servers, more = bus.open_servers({each.name: each for each in robot.buses}, options)
         for server in servers:
             robot.attach(server)
         for line in lines + more:
             console.print(line, highlight=False, soft_wrap=True)
-        outside, openers = external_buses(options, robot, profile)
-        for each in outside:
-            console.print(f"{each.name} is outside: this run is asynchronous and cannot be repeated", highlight=False)
         if not loading.RUNS_COMPILED:
             console.print(
                 f"running interpreted, slowly: {loading.RUNS_INTERPRETED_BECAUSE}", highlight=False, soft_wrap=True
@@ -239,9 +243,13 @@ def run(options: argparse.Namespace) -> int:
                 elsewhere.append(HardwareInTheLoop(robot, profile, outside))
             arm(robot, wanted)
             timelines.append(trace.attach(robot, options))
+            for each in outside:
+                console.print(
+                    f"{each.name} is outside: this run is asynchronous and cannot be repeated", highlight=False
+                )
+            view.say(f"ranger-sim up, name {settings.name}: {supervisor.describe()}")
 
         supervisor = Supervisor(robot, settings, stop, finish, view, begin)
-        view.say(f"ranger-sim up, name {settings.name}: {supervisor.describe()}")
         return supervisor.run()
 
 

@@ -21,10 +21,9 @@ from ranger_sim.harness.profile import Profile
 from ranger_sim.harness.profile import load as load_profile
 from ranger_sim.harness.scenario import Scenario, StopRule
 from ranger_sim.plant import terms
-from ranger_sim.plant.electronics import SWITCHES
 from ranger_sim.tools import faults, serial_options, terminal, trace
 from ranger_sim.tools.files import json_target, replace_file, writable_folder
-from ranger_sim.tools.units import ENERGIES_WH, LENGTHS, SHARES, TIMES, quantity, whole_number
+from ranger_sim.tools.walk_options import add_walk_options, log_of, scenario_of, stop_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -46,94 +45,8 @@ def register(commands: Any) -> None:
         help="let Ranger walk in virtual time, as fast as it goes",
         description="All seven boards, four buses and the body in virtual time. Without an end it walks 100 steps.",
     )
-    add_run_options(command)
-    faults.add_fault_option(command)
-    command.add_argument(
-        "--proof",
-        action="store_true",
-        help="hold the walk against itself without its faults: what differs first, which error tells of it and when, "
-        "what the machines do (a second process walks that one; 2 MB a second in both)",
-    )
-    faults.add_module_option(command)
-    trace.add_options(command)
+    add_walk_options(command)
     command.set_defaults(run=run)
-
-
-def add_run_options(command: Any) -> None:
-    """The options of every command that lets the robot walk: which end, which scenario, which files."""
-    command.add_argument("--steps", type=whole_number(1), metavar="N", help="end after so many steps")
-    command.add_argument("--time", type=quantity(TIMES, "s", 0.0), metavar="60s", help="end after so much virtual time")
-    command.add_argument(
-        "--distance", type=quantity(LENGTHS, "m", 0.0), metavar="65km", help="end after so much distance"
-    )
-    command.add_argument(
-        "--controller",
-        default=None,
-        metavar="NAME",
-        help="parameter set, by name or as a .toml file (default record-2011)",
-    )
-    command.add_argument(
-        "--body",
-        default=None,
-        metavar="NAME",
-        help="body that walks, by name or as a .toml file (default ranger; `ranger-sim body list`)",
-    )
-    command.add_argument(
-        "--seed", type=int, default=1, help="chooses crystals, phases, noise and footholds (default 1)"
-    )
-    command.add_argument(
-        "--floor-roughness",
-        type=quantity(LENGTHS, "m"),
-        default=0.0,
-        metavar="1mm",
-        help="standard deviation of the footholds' heights (default 0)",
-    )
-    command.add_argument(
-        "--slope", type=float, default=0.0, metavar="RAD", help="slope of the floor, positive downhill (default 0)"
-    )
-    command.add_argument(
-        "--battery",
-        type=quantity(SHARES, "a share, 1 is full", 0.0),
-        default=Scenario.battery_charge,
-        metavar="70%",
-        help="charge of the batteries at power-up (default full)",
-    )
-    command.add_argument(
-        "--battery-capacity",
-        type=quantity(ENERGIES_WH, "Wh", 0.0),
-        default=Scenario.battery_capacity_Wh,
-        metavar="493Wh",
-        help="of all packs together (default 469 Wh, seven packs of 67 Wh)",
-    )
-    command.add_argument(
-        "--off",
-        choices=tuple(SWITCHES),
-        action="append",
-        default=[],
-        help="electronics that draw no power, as the left outer ankle's in the 65 km walk",
-    )
-    command.add_argument(
-        "--model",
-        default=None,
-        metavar="FILE",
-        help="model file (.toml) with additional terms of motors, joints, sensors",
-    )
-    command.add_argument(
-        "--log",
-        choices=("full", "window", "none"),
-        default="window",
-        help="what the files in --out keep: everything, the last 10 s (default), or no more than the summary",
-    )
-    command.add_argument(
-        "--out",
-        metavar="DIR",
-        help="folder for logs, summary and report, made if missing; without it only --json writes one",
-    )
-    command.add_argument("--json", metavar="FILE|-", help="the summary as JSON; - prints it and nothing else")
-    command.add_argument(
-        "--profile", metavar="FILE", help="boards, bit rates and bus schedules of a profile, by name or as a .toml file"
-    )
-    serial_options.add_options(command)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -144,28 +57,6 @@ def run(options: argparse.Namespace) -> int:
     stop = stop_of(options) or StopRule(steps=DEFAULT_STEPS)
     with ctrl_c_noted() as interrupted:
         return run_scenario(scenario_of(options), stop, options, interrupted)
-
-
-def stop_of(options: argparse.Namespace) -> StopRule | None:
-    """The end that was asked for, if one was."""
-    if options.steps or options.time or options.distance:
-        return StopRule(options.steps, options.time, options.distance)
-    return None
-
-
-def scenario_of(options: argparse.Namespace) -> Scenario:
-    """The scenario that was asked for."""
-    return Scenario(
-        **({"controller": options.controller} if options.controller else {}),
-        **({"body": options.body} if options.body else {}),
-        seed=options.seed,
-        slope_rad=options.slope,
-        floor_roughness_m=options.floor_roughness,
-        model_file=options.model,
-        battery_charge=options.battery,
-        battery_capacity_Wh=options.battery_capacity,
-        electronics_off=tuple(options.off),
-    )
 
 
 def profile_of(options: argparse.Namespace, console: Console) -> Profile | None:
@@ -201,7 +92,7 @@ def run_scenario(scenario: Scenario, stop: StopRule, options: argparse.Namespace
         for name in terms.load(scenario.model_file).left_out:
             console.print(f"{scenario.model_file}: {name} is left out", highlight=False, soft_wrap=True)
     wanted = [catalogue.typed(text) for text in options.fault]
-    log = options.log if folder else "none"
+    log = log_of(options)
     with contextlib.closing(Ranger(scenario, log=log, quirks=quirks, profile=profile)) as robot:
         arm(robot, wanted, options.proof)
         timeline = trace.attach(robot, options)
@@ -257,7 +148,7 @@ def finish(
         print(text)
         return
     print_summary(summary, console)
-    if folder is not None and options.log != "none":
+    if robot.logbook.mode != "none":
         console.print(f"report: {folder / 'report.html'}", soft_wrap=True)
 
 

@@ -98,10 +98,14 @@ def load(name: str | pathlib.Path) -> Controller:
     return _load(str(name), ())
 
 
-def _load(name: str, users: tuple) -> Controller:
+def _load(name: str, users: tuple[pathlib.Path, ...]) -> Controller:
+    """The set `name`; `users`: the files whose base it is, the nearest one last."""
     path = pathlib.Path(name) if name.endswith(".toml") else FOLDER / f"{name}.toml"
+    asked = f"{users[-1]}: base {name!r}" if users else f"controller {name!r}"
     if not name.endswith(".toml") and name not in available():
-        raise UserError(f"controller {name!r}: unknown; there are {', '.join(available())}, or give a .toml file")
+        raise UserError(f"{asked}: unknown; there are {', '.join(available())}, or give a .toml file")
+    if path.resolve() in [each.resolve() for each in users]:
+        raise UserError(f"{asked} leads back to this set")
     data = _read(path)
     place = str(path)
     _only(data, ("title", "description", "program", "base", "parameters", "reasons", "operator"), place)
@@ -110,9 +114,7 @@ def _load(name: str, users: tuple) -> Controller:
     base_name = _text(data, "base", place, None)
     base = None
     if base_name is not None:
-        if base_name in users or base_name == path.stem:
-            raise UserError(f"{place}: base {base_name!r} leads back to this set")
-        base = _load(base_name, (*users, path.stem))
+        base = _load(base_name, (*users, path))
     program = _text(data, "program", place, base.program if base is not None else DEFAULT_PROGRAM)
     if program not in programs.PROGRAMS:
         raise UserError(f"{place}: program = {program!r}: unknown; there are {', '.join(programs.PROGRAMS)}")

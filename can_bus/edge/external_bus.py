@@ -93,7 +93,17 @@ def place_of(text: str) -> tuple[str, dict[str, Any]]:
 
 
 def opener(name: str, keywords: dict[str, Any]) -> Callable[[], Any]:
-    """A function that opens one python-can bus with these keywords; python-can's configuration fills in the rest."""
+    """A function that opens one python-can bus with these keywords; python-can's configuration fills in the rest.
+
+    UserError where neither names an interface.
+    """
+    try:
+        can.util.load_config(config=dict(keywords), context=name)
+    except can.CanInterfaceNotImplementedError as error:
+        raise UserError(
+            f"bus {name}: python-can finds no interface for it ({error}): name one, as in {name}=socketcan:vcan0, or "
+            f"set `interface` in section [{name}] of python-can's configuration (~/.canrc, ./can.ini, CAN_INTERFACE)"
+        ) from None
 
     def open_peer() -> Any:
         try:

@@ -1,13 +1,13 @@
 """How a robot of processes is to be run."""
 
 import dataclasses
-import math
 import os
 
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness import wiring
 
 NEVER, ON_FAILURE = "never", "on-failure"
+SLOWEST, FASTEST = 1e-4, 1000.0  # times real time; chosen by us
 
 
 @dataclasses.dataclass(frozen=True)
@@ -29,8 +29,8 @@ class Settings:
     boards: tuple[str, ...] = wiring.BOARDS
 
     def __post_init__(self) -> None:
-        if self.speed is not None and not (math.isfinite(self.speed) and 1e-4 <= self.speed <= 1000.0):
-            raise UserError(f"speed is {self.speed!r}, allowed are 0.0001 to 1000, or max")
+        if self.speed is not None and not SLOWEST <= self.speed <= FASTEST:
+            raise UserError(f"speed is {self.speed!r}, allowed are {SLOWEST:g} to {FASTEST:g}, or max")
         allowed = os.sched_getaffinity(0)
         if self.processor is not None and self.processor not in allowed:
             raise UserError(

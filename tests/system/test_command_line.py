@@ -39,9 +39,18 @@ def one_clear_line(done, *words):
         (["walk", "--steps", "many"], ["--steps", "many", "whole number"]),
         (["walk", "--time", "0s"], ["--time", "above 0"]),
         (["walk", "--distance", "3 parsec"], ["--distance", "parsec", "km"]),
-        (["walk", "--floor-roughness=-1mm"], ["floor_roughness_m", "-0.001"]),
-        (["walk", "--slope", "nan"], ["slope_rad", "nan"]),
+        (["walk", "--floor-roughness", "-1mm"], ["--floor-roughness", "-1mm", "at least 0 m", "0.1 m"]),
+        (["walk", "--slope", "nan"], ["--slope", "nan", "rad"]),
         (["walk", "--seed", "x"], ["--seed", "x"]),
+        (["walk", "--time", "-1s"], ["--time", "'-1s'", "above 0 s"]),
+        (["walk", "--slope", "-inf"], ["--slope", "'-inf'"]),
+        (["walk", "--steps", "9" * 23], ["--steps", "above 1000000000"]),
+        (["walk", "--time", "1e300s"], ["--time", "1e300s", "at most"]),
+        (["walk", "--floor-roughness", "1e999mm"], ["--floor-roughness", "1e999mm", "at most 0.1 m"]),
+        (["walk", "--controller", ""], ["--controller", "empty"]),
+        (["walk", "--bode", "ranger"], ["walk: unrecognized", "--bode", "perhaps --body"]),
+        (["walk", "--fault", "a\033[31m\nb"], [r"a\x1b[31m\nb"]),
+        (["up", "--bus", "can1="], ["can1", "no interface", "socketcan:vcan0"]),
         (["walk", "--model", "no-such-model.toml"], ["no-such-model.toml", "No such file"]),
         (["walk", "--out", "/proc/no-such-folder/here"], ["/proc/no-such-folder/here"]),
         (["walk", "--json", "/proc/no-such-folder/here.json"], ["/proc/no-such-folder"]),
@@ -82,7 +91,7 @@ def test_a_folder_without_permission_gets_one_line(command, tmp_path):
         ("this is not toml", ["not valid TOML"]),
         (BROKEN_PARAMETERS, ["CTRL_NO_SUCH_PARAMETER"]),
         ('base = "robust"\n[operator]\nstance = "head"\n', ["[operator]"]),
-        ('base = "nobody"\n', ["nobody"]),
+        ('base = "nobody"\n', ["mine.toml", "base 'nobody'", "robust"]),
     ],
 )
 def test_a_broken_parameter_file_gets_one_line(command, tmp_path, content, words):
@@ -98,12 +107,47 @@ def test_a_broken_parameter_file_gets_one_line(command, tmp_path, content, words
         ('[[term]]\nform = "magic"\nat = "hip"\n', ["term 1", "magic"]),
         ('[[term]]\nform = "edge_jitter"\nat = "moon"\n', ["term 1", "moon"]),
         ("[extra]\n", ["extra"]),
+        ('[[term]]\nform = {}\nat = "hip"\n', ["term 1", "form is {}"]),
     ],
 )
 def test_a_broken_model_file_gets_one_line(command, tmp_path, content, words):
     file = tmp_path / "model.toml"
     file.write_text(content, encoding="utf-8")
     one_clear_line(command("walk", "--model", file), "model.toml", *words)
+
+
+def test_a_parameter_file_whose_base_is_itself_gets_one_line(command, tmp_path):
+    file = tmp_path / "mine.toml"
+    file.write_text(f'base = "{file}"\n', encoding="utf-8")
+    one_clear_line(command("walk", "--controller", file), "mine.toml", "leads back to this set")
+
+
+@pytest.mark.parametrize("closed", [1, 2])
+def test_a_command_whose_output_is_closed_does_its_work(closed, tmp_path):
+    words = [sys.executable, "-m", "ranger_sim", "info", "--json", "-"]
+    kept = tmp_path / "other"
+    with kept.open("w") as file:
+        streams = {"stdout": file, "stderr": file}
+        done = subprocess.run(words[:4], cwd=ROOT, check=False, preexec_fn=lambda: os.close(closed), **streams)
+    assert done.returncode == 0 and "Traceback" not in kept.read_text()
+
+
+def test_a_letter_that_the_output_has_not_is_written_as_its_escape(command):
+    done = command("body", "show", "ranger", PYTHONIOENCODING="ascii")
+    assert done.returncode == 0 and done.stdout.isascii()
+    assert command("walk", "--controller", "Größe", PYTHONIOENCODING="ascii").stderr.count(r"Gr\xf6\xdfe") == 1
+
+
+def test_a_full_disk_behind_the_output_is_named(command):
+    done = subprocess.run(
+        [sys.executable, "-m", "ranger_sim", "info"],
+        cwd=ROOT,
+        stdout=pathlib.Path("/dev/full").open("w"),
+        stderr=subprocess.PIPE,
+        text=True,
+        check=False,
+    )
+    assert (done.returncode, done.stderr) == (2, "ranger-sim: standard output: No space left on device\n")
 
 
 def test_a_bad_master_table_tells_every_fault_and_leaves_with_2(command, tmp_path):

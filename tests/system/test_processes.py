@@ -416,8 +416,8 @@ def test_ctrl_c_finishes_the_files_as_walk_does(up, tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "complaint"),
     [
-        (["--speed", "0"], "speed is 0.0, allowed are 0.0001 to 1000, or max"),
-        (["--speed", "fast"], "'fast' is neither a number nor max"),
+        (["--speed", "0"], "'0' must be at least 0.0001 and at most 1000, or max"),
+        (["--speed", "fast"], "'fast' is not a number, or max"),
         (["--processor", "99"], "processor is 99, allowed are"),
         (["--name", "a b"], "name is 'a b', allowed are"),
     ],

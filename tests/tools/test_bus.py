@@ -55,13 +55,17 @@ def test_it_ends_by_itself_when_asked_to(capsys):
         (["--name", "a b"], "name 'a b' is not"),
         (["can1", "can1"], "a name is given twice in can1 can1"),
         (["a/b"], "'a/b' is no name for a bus"),
-        (["--seconds", "-1"], "--seconds -1 is not above 0"),
+        (["--seconds", "-1"], "--seconds: '-1' must be above 0 s"),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, list) else None,
 )
 def test_a_mistake_is_one_line(arguments, words, capsys):
     given = [] if "--name" in arguments else ["--name", fresh_name()]
-    assert cli.main(["bus", *arguments, *given]) == 2
+    try:
+        code = cli.main(["bus", *arguments, *given])
+    except SystemExit as left:
+        code = left.code
+    assert code == 2
     told = capsys.readouterr().err.strip().splitlines()
     assert len(told) == 1 and words in told[0]
 

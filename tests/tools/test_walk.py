@@ -89,8 +89,8 @@ def test_an_impossible_scenario_is_refused_with_its_limit(field, value, limit):
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["--battery", "120%"], ["battery_charge", "1.2"]),
-        (["--battery", "0%"], ["--battery", "above 0"]),
+        (["--battery", "120%"], ["--battery", "120%", "at most 1"]),
+        (["--battery", "0%"], ["--battery", "at least 1e-06"]),
         (["--battery", "full"], ["--battery", "full", "%"]),
         (["--battery-capacity", "493 W"], ["--battery-capacity", "Wh"]),
         (["--off", "hip"], ["--off", "left-outer-ankle"]),

@@ -6,7 +6,8 @@ import argparse
 from typing import Any
 
 from ranger_sim.tools import recordings
-from ranger_sim.tools.units import whole_number
+from ranger_sim.tools.units import ANGLES, whole_number
+from ranger_sim.tools.walk_options import of_scenario
 
 
 def register(commands: Any) -> None:
@@ -25,8 +26,14 @@ def register(commands: Any) -> None:
     )
     command.add_argument("--body", default="ranger", metavar="NAME", help="what walks, by name or .toml file (ranger)")
     command.add_argument("--model", metavar="FILE", help="model file (.toml) with additional terms")
-    command.add_argument("--slope", type=float, default=0.0, metavar="RAD", help="of the floor, positive downhill (0)")
-    command.add_argument("--seed", type=int, default=1, help="of the emulated walks (1)")
+    command.add_argument(
+        "--slope",
+        type=of_scenario("slope_rad", ANGLES, "rad"),
+        default=0.0,
+        metavar="RAD",
+        help="of the floor, positive downhill (0)",
+    )
+    command.add_argument("--seed", type=whole_number(), default=1, help="of the emulated walks (1)")
     command.add_argument(
         "--steps",
         type=whole_number(12),

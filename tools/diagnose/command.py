@@ -7,6 +7,7 @@ from typing import Any
 
 from ranger_sim.sysid.machines import MACHINES
 from ranger_sim.tools import recordings
+from ranger_sim.tools.units import number, whole_number
 
 
 def register(commands: Any) -> None:
@@ -25,7 +26,7 @@ def register(commands: Any) -> None:
     )
     command.add_argument(
         "--holdout-part",
-        type=float,
+        type=number(),
         metavar="P",
         help="instead of --holdout: the last part of each DATA by time, above 0 and below 1",
     )
@@ -41,8 +42,8 @@ def register(commands: Any) -> None:
         help="model to start from: the extended.toml of an earlier diagnosis, or [[term]] tables; what it has already "
         "is no finding",
     )
-    command.add_argument("--gear", type=float, metavar="N", help="of the motor bench's gearbox (14)")
-    command.add_argument("--seed", type=int, default=0, metavar="N", help="of the bootstrap (0)")
+    command.add_argument("--gear", type=number(above=0.0), metavar="N", help="of the motor bench's gearbox (14)")
+    command.add_argument("--seed", type=whole_number(), default=0, metavar="N", help="of the bootstrap (0)")
     command.add_argument(
         "--out", metavar="DIR", help="folder for report.html, diagnosis.json and extended.toml, made if missing"
     )

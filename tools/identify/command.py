@@ -6,6 +6,8 @@ What does it is imported when it is asked for: a first walk needs no scipy.
 import argparse
 from typing import Any
 
+from ranger_sim.tools.units import number, whole_number
+
 # as sysid/identify/registry.py has them; a test holds both together
 BENCHES = {
     "stall": "Motor held: resistance and contact drop",
@@ -38,15 +40,18 @@ def register(commands: Any) -> None:
         metavar="NAME=VALUE+-SD",
         help="what is known already, as outer_cm=0.72+-0.004",
     )
-    command.add_argument("--gear", type=float, default=GEAR, help="of the bench's gearbox (default 14)")
-    command.add_argument("--seed", type=int, default=1, help="of the virtual instruments (default 1)")
+    command.add_argument("--gear", type=number(above=0.0), default=GEAR, help="of the bench's gearbox (default 14)")
+    command.add_argument("--seed", type=whole_number(), default=1, help="of the virtual instruments (default 1)")
     command.add_argument(
         "--model", metavar="FILE", help="model file whose terms and motor the virtual bench has (of `diagnose --out`)"
     )
     command.add_argument("--json", metavar="FILE|-", help="everything as JSON; - prints it and nothing else")
     command.add_argument("--out", metavar="DIR", help="page with figures 28, 29, 31, the recordings, and the JSON")
     command.add_argument(
-        "--coverage", type=int, metavar="N", help="N virtual machines instead: how often intervals hold the truth"
+        "--coverage",
+        type=whole_number(1),
+        metavar="N",
+        help="N virtual machines instead: how often intervals hold the truth",
     )
     command.set_defaults(run=run)
 

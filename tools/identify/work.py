@@ -46,7 +46,7 @@ def run(options: argparse.Namespace) -> int:
     target = files.json_target(options.json)
     folder = files.writable_folder(options.out) if options.out else None
     # with --json - the JSON is all that standard output gets
-    console = terminal.console(highlight=False, stderr=options.json == "-")
+    console = terminal.console(markup=True, highlight=False, stderr=options.json == "-")
     if options.gear <= 0.0 or not math.isfinite(options.gear):
         raise UserError(f"--gear {options.gear!r}: it must be above 0")
     if options.coverage is not None:

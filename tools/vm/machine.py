@@ -191,7 +191,9 @@ class Attendant:
                     else:
                         self.selector.unregister(key.fileobj)
                 if not self.selector.get_map():
-                    raise UserError(f"vm: the machine stopped by itself; its last words:\n{self.last_words()}")
+                    raise UserError(
+                        "vm: the machine stopped by itself; its last words:", *self.last_words().splitlines()
+                    )
         return Ended(self.code, self.boot_s, self.seconds())
 
     def take(self, name: str, data: bytes) -> None:
