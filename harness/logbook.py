@@ -2,7 +2,7 @@
 
 import collections
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
@@ -11,6 +11,20 @@ from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.recorder import Recorder
 
 WINDOW_S = 10.0  # default window of the logs: some 16 steps
+READ_ROWS = 4096  # of a spooled stream at a time
+
+
+def decoded(rows: Any) -> dict:
+    """Frames of rows of a frame stream (foundation/row_stream.py): dict of arrays, as `Logbook.frames` has them."""
+    first, second, third = rows[:, 0], rows[:, 1], rows[:, 2]
+    return {
+        "time_ns": first,
+        "bus": second & 15,
+        "flags": (second >> 4) & 255,
+        "word0": second >> 12,
+        "identifier": third & 0x1FFFFFFF,
+        "word1": third >> 29,
+    }
 
 
 class Logbook:
@@ -58,6 +72,43 @@ class Logbook:
 
         return write
 
+    def listen(self, name: str, taker: Callable[[Any], None]) -> None:
+        """From now on `taker` gets the rows of a stream as well, block by block, as they are recorded."""
+        stream, kept = self.streams[name], self.streams[name].sink
+
+        def both(last_time_ns: int, block: bytes) -> None:
+            if kept is not None:
+                kept(last_time_ns, block)
+            taker(self._as_rows(name, block))
+
+        stream.sink = both
+
+    def flush(self) -> None:
+        """Hand over what waits in the streams' blocks."""
+        for stream in self.streams.values():
+            stream.flush()
+
+    def kept(self, name: str) -> Iterator[Any]:
+        """The rows of a stream that are kept, some thousand at a time."""
+        stream = self.streams[name]
+        self.flush()
+        if self.mode == "full":
+            spool = self.spools[name]
+            spool.seek(0)
+            while block := spool.read(8 * stream.columns * READ_ROWS):
+                yield self._as_rows(name, block)
+            spool.seek(0, 2)
+        else:
+            begin_ns = max((each.last_time_ns for each in self.streams.values()), default=0) - self.window_ns
+            for _, block in self.blocks[name]:
+                rows = self._as_rows(name, block)
+                times_ns = rows[:, 0] * 1e9 if stream.is_real else rows[:, 0]
+                yield rows[times_ns >= begin_ns]
+
+    def _as_rows(self, name: str, block: bytes) -> Any:
+        stream = self.streams[name]
+        return np.frombuffer(block, dtype=np.float64 if stream.is_real else np.int64).reshape(-1, stream.columns)
+
     @property
     def records_words(self) -> bool:
         """True when the variables are kept (the recorder then samples the data table)."""
@@ -66,16 +117,14 @@ class Logbook:
     def _rows(self, name: str) -> Any:
         stream = self.streams[name]
         stream.flush()
-        kind = np.float64 if stream.is_real else np.int64
         if self.mode == "full":
             spool = self.spools[name]
             spool.flush()
             spool.seek(0)
-            data = np.frombuffer(spool.read(), dtype=kind)
+            rows = self._as_rows(name, spool.read())
             spool.seek(0, 2)
         else:
-            data = np.frombuffer(b"".join(block for _, block in self.blocks[name]), dtype=kind)
-        rows = data.reshape(-1, stream.columns)
+            rows = self._as_rows(name, b"".join(block for _, block in self.blocks[name]))
         if self.mode == "window" and len(rows):
             times_ns = rows[:, 0] * 1e9 if stream.is_real else rows[:, 0]
             rows = rows[times_ns >= times_ns[-1] - self.window_ns]
@@ -90,15 +139,7 @@ class Logbook:
         rows = rows[np.argsort(rows[:, 0], kind="stable")]
         if self.mode == "window" and len(rows):
             rows = rows[rows[:, 0] >= rows[-1, 0] - self.window_ns]
-        first, second, third = rows[:, 0], rows[:, 1], rows[:, 2]
-        return {
-            "time_ns": first,
-            "bus": second & 15,
-            "flags": (second >> 4) & 255,
-            "word0": second >> 12,
-            "identifier": third & 0x1FFFFFFF,
-            "word1": third >> 29,
-        }
+        return decoded(rows)
 
     def samples(self) -> Any:
         """Samples of the plant: array (rows, columns), time in s in column 0."""

@@ -14,14 +14,17 @@ SKIPPED_STEPS = 5  # the start is left out of means
 
 
 def of(robot: Any) -> dict:
-    """Everything `--json` prints; units are in the names. Means leave out the first 5 steps."""
+    """Everything `--json` prints; units are in the names. Means leave out the first 5 steps.
+
+    None where there is no such number: a mean of no step, a deviation of fewer than two, a power of no time.
+    """
     plant = robot.plant
     record = plant.record
-    speed = record.length_sum / record.time_sum_s if record.time_sum_s > 0.0 else 0.0
+    speed = record.length_sum / record.time_sum_s if record.time_sum_s > 0.0 else None
     powers = motor_powers(robot)
-    motor_power = sum(powers.values())
     electronics_power = plant.electronics_power_W
-    total = motor_power + electronics_power
+    motor_power = None if None in powers.values() else sum(powers.values())
+    total = None if motor_power is None else motor_power + electronics_power
     weight_N = plant.parameters.total_mass_kg * plant.parameters.gravity_m_per_s2
     counters: dict[str, RangerCounters] = robot.counters()
     failed = [name for name, board in counters.items() if not alive(robot, board)]
@@ -43,7 +46,7 @@ def of(robot: Any) -> dict:
         "motor_powers_W": powers,
         "electronics_power_W": electronics_power,
         "total_power_W": total,
-        "tcot": total / (weight_N * speed) if speed > 0.0 else None,
+        "tcot": total / (weight_N * speed) if total is not None and speed else None,
         "energy_Wh": energy(robot),
         "battery": battery(robot),
         "battery_V": plant.battery_V,
@@ -69,11 +72,14 @@ def of(robot: Any) -> dict:
 
 
 def motor_powers(robot: Any) -> dict:
-    """Mean power each motor drew at the battery since the robot was let go, W; what it gave back is not credited."""
+    """Mean power each motor drew at the battery since the robot was let go, W; what it gave back is not credited.
+
+    None for every motor as long as no time has passed.
+    """
     plant = robot.plant
     walked_s = (plant.time_ns - plant.record.begin_ns) * 1e-9
     if walked_s <= 0.0:
-        return dict.fromkeys((motor.name for motor in plant.motors), 0.0)
+        return dict.fromkeys((motor.name for motor in plant.motors), None)
     return {motor.name: (motor.drawn_J - motor.drawn_before_J) / walked_s for motor in plant.motors}
 
 

@@ -156,25 +156,25 @@ class WalkRecord:
         self.fall_cause = cause
         self.fall_time_ns = time_ns
 
-    def mean_step_length_m(self) -> float:
-        """Mean without the first five steps; 0 when there are no others."""
-        return self.length_sum / self.counted if self.counted else 0.0
+    def mean_step_length_m(self) -> float | None:
+        """Mean without the first five steps; None when there are no others, as of all these figures."""
+        return self.length_sum / self.counted if self.counted else None
 
-    def mean_step_time_s(self) -> float:
-        return self.time_sum_s / self.counted if self.counted else 0.0
+    def mean_step_time_s(self) -> float | None:
+        return self.time_sum_s / self.counted if self.counted else None
 
-    def mean_double_stance_s(self) -> float:
-        return self.double_stance_sum_s / self.counted if self.counted else 0.0
+    def mean_double_stance_s(self) -> float | None:
+        return self.double_stance_sum_s / self.counted if self.counted else None
 
-    def step_length_deviation_m(self) -> float:
-        """Standard deviation of the step length without the first five steps."""
+    def step_length_deviation_m(self) -> float | None:
+        """Standard deviation of the step length without the first five steps; None of fewer than two others."""
         return self._deviation(self.length_sum, self.length_squares)
 
-    def step_time_deviation_s(self) -> float:
+    def step_time_deviation_s(self) -> float | None:
         return self._deviation(self.time_sum_s, self.time_squares)
 
-    def _deviation(self, total: float, squares: float) -> float:
+    def _deviation(self, total: float, squares: float) -> float | None:
         if self.counted < 2:
-            return 0.0
+            return None
         mean = total / self.counted
         return max(0.0, squares / self.counted - mean * mean) ** 0.5

@@ -51,6 +51,14 @@ def stand_in_for_closed_streams() -> None:
             stream.reconfigure(errors="backslashreplace")
 
 
+def print_now(text: str) -> None:
+    """Print on standard output, at once; a reader that has left misses it."""
+    try:
+        print(text, flush=True)
+    except BrokenPipeError:
+        lead_nowhere(sys.stdout)
+
+
 def output_is_stuck() -> bool:
     """True when standard output does not take what waits in it, as on a full disk; what waits is given up."""
     try:

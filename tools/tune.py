@@ -301,7 +301,10 @@ def cost_of(summary: dict, steps: int, aim: str = "robot") -> float:
     if aim == "energy":
         cost = min(TCOT_COST * summary["tcot"], WORST_WALK_COST)
     else:
-        cost = sum(((summary[name] - wanted) / tolerance) ** 2 for name, (wanted, tolerance) in AIMS.items())
+        figures = (
+            (summary[name], aim) for name, aim in AIMS.items() if summary[name] is not None
+        )  # 6 steps: no spread
+        cost = sum(((figure - wanted) / tolerance) ** 2 for figure, (wanted, tolerance) in figures)
         cost += ((summary["heel_strike_delay_ms"]["mean"] - DELAY_AIM_MS) / DELAY_TOLERANCE_MS) ** 2
     lost = sum(bus["lost"] for bus in summary["can"].values())
     overruns = sum(board["overruns"] for board in summary["slots"].values())

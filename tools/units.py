@@ -21,7 +21,7 @@ from ranger_sim.foundation.quantities import (
 )
 
 __all__ = ["ANGLES", "ENERGIES_WH", "LENGTHS", "SHARES", "TIMES", "Quantity", "Value", "WholeNumber", "Word"]
-__all__ += ["number", "quantity", "whole_number", "word"]
+__all__ += ["figure", "number", "quantity", "whole_number", "word"]
 
 # What starts so is a value and no option: argparse lets `--time -1s` reach its check (`-1` alone would by default).
 NEGATIVE_VALUE = re.compile(r"-(\.?\d|inf|nan)", re.IGNORECASE)
@@ -152,3 +152,8 @@ def whole_number(least: int | None = None, most: int | None = None) -> WholeNumb
 def word(what: str) -> Word:
     """A name or a path."""
     return Word(what)
+
+
+def figure(value: float | None, form: str) -> str:
+    """A figure as `form` says ("{:.3f} m"); "none" for one that there is not."""
+    return "none" if value is None else form.format(value)

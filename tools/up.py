@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     from ranger_sim.harness.processes.plant_process import PlantRun
     from ranger_sim.harness.ranger import Ranger
     from ranger_sim.harness.timeline import Timeline
+    from ranger_sim.tools.run_logs import RunLogs
 
 PLAIN_S = 2.0  # between two lines where there is no terminal
 FIELDS = {"restart": ("board",), "key": ("key",), "set": ("name", "value")}  # of a request, as ctl gives them
@@ -186,7 +187,8 @@ def run(options: argparse.Namespace) -> int:
         name=options.name,
         processor=processor(options.processor),
     )
-    folder = writable_folder(options.out) if options.out else None
+    if options.out:
+        writable_folder(options.out)
     json_file = json_target(options.json)
     console = terminal.console(stderr=True, quiet=options.json == "-")
     scenario, stop = walk_options.scenario_of(options), walk_options.stop_of(options) or FOREVER
@@ -213,6 +215,7 @@ def run(options: argparse.Namespace) -> int:
 
         elsewhere: list[HardwareInTheLoop] = []
         timelines: list[Timeline | None] = []
+        logs: list[RunLogs | None] = []
 
         def finish(robot: Ranger, run: PlantRun, interrupted: bool) -> int:
             summary = {**robot.summary(), "interrupted": interrupted}
@@ -224,10 +227,14 @@ def run(options: argparse.Namespace) -> int:
                     console.print(line, highlight=False, soft_wrap=True)
             for line in serial_options.report(ends):
                 console.print(line, highlight=False, soft_wrap=True)
-            walk.finish(robot, summary, options, folder, json_file, console)
+            end = StopRule(time_s=robot.time_s) if interrupted else stop
+            summary["command"] = walk_options.command_again(options, end)
+            is_complete = walk.finish(robot, summary, options, folder, logs[0], json_file, console)
             print_processes(summary["processes"], console)
             for timeline in timelines:
                 trace.write(timeline, options, console)
+            if not is_complete:
+                return walk.EXIT_INCOMPLETE
             if interrupted:
                 return 130
             if not all(fault["acted"] for fault in summary["faults"]):
@@ -242,6 +249,7 @@ def run(options: argparse.Namespace) -> int:
             if profile is not None and (profile.external() or profile.absent()):
                 elsewhere.append(HardwareInTheLoop(robot, profile, outside))
             arm(robot, wanted)
+            logs.append(walk.logs_of(robot, options, folder))
             timelines.append(trace.attach(robot, options))
             for each in outside:
                 console.print(
@@ -249,6 +257,8 @@ def run(options: argparse.Namespace) -> int:
                 )
             view.say(f"ranger-sim up, name {settings.name}: {supervisor.describe()}")
 
+        # written and finished in the plant's process; if that is lost, the folder says that the run broke off
+        folder = walk.claimed(options, stop, console) if options.out else None
         supervisor = Supervisor(robot, settings, stop, finish, view, begin)
         return supervisor.run()
 

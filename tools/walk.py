@@ -7,7 +7,6 @@ import contextlib
 import json
 import pathlib
 import signal
-import tempfile
 from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
@@ -16,6 +15,7 @@ from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn
 from ranger_sim import loading
 from ranger_sim.foundation import wallclock
 from ranger_sim.foundation.user_error import UserError
+from ranger_sim.harness import normal_errors
 from ranger_sim.harness.faults import catalogue
 from ranger_sim.harness.profile import Profile
 from ranger_sim.harness.profile import load as load_profile
@@ -23,7 +23,10 @@ from ranger_sim.harness.scenario import Scenario, StopRule
 from ranger_sim.plant import terms
 from ranger_sim.tools import faults, serial_options, terminal, trace
 from ranger_sim.tools.files import json_target, replace_file, writable_folder
-from ranger_sim.tools.walk_options import add_walk_options, log_of, scenario_of, stop_of
+from ranger_sim.tools.run_folder import REPORT, SUMMARY, RunFolder
+from ranger_sim.tools.run_logs import RunLogs, write_frames
+from ranger_sim.tools.units import figure
+from ranger_sim.tools.walk_options import add_walk_options, command_again, log_of, scenario_of, stop_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -32,7 +35,10 @@ if TYPE_CHECKING:
     from ranger_sim.harness.faults.fault import Fault
     from ranger_sim.harness.ranger import Ranger
 
+__all__ = ["walk", "write_frames"]
+
 DEFAULT_STEPS = 100
+EXIT_INCOMPLETE = 2  # a file that was asked for is not whole: the disk is full
 SLICE_S = 0.05  # virtual seconds between two looks at the screen and at Ctrl-C
 TELL_EVERY_S = 60.0  # of the wall clock: a line of progress where there is no screen to draw it on (chosen by us)
 PACED_SLICE_S = 0.005  # the same when a serial port is connected: so long at most a byte waits
@@ -81,10 +87,13 @@ def run_scenario(scenario: Scenario, stop: StopRule, options: argparse.Namespace
     """`run` with everything checked; `interrupted` is filled by Ctrl-C."""
     from ranger_sim.harness.ranger import Ranger  # the whole robot: only when it is to walk
 
-    folder = writable_folder(options.out) if options.out else None
+    if options.out:
+        writable_folder(options.out)
     json_file = json_target(options.json)
     quiet = options.json == "-"
     console = terminal.console(stderr=True, quiet=quiet)
+    if options.log and not options.out:
+        console.print(f"--log {options.log} is ignored: there is no folder for logs (--out DIR)", soft_wrap=True)
     quirks = serial_options.quirks_of(options)
     profile = profile_of(options, console)
     faults.load_modules(options)
@@ -103,12 +112,17 @@ def run_scenario(scenario: Scenario, stop: StopRule, options: argparse.Namespace
             console.print(
                 f"running interpreted, slowly: {loading.RUNS_INTERPRETED_BECAUSE}", highlight=False, soft_wrap=True
             )
-        walk(robot, stop, console, interrupted, paced=bool(ends))
-        for line in serial_options.report(ends):
-            console.print(line, highlight=False, soft_wrap=True)
-        summary = {**robot.summary(), "interrupted": bool(interrupted)}
-        finish(robot, summary, options, folder, json_file, console)
+        with claimed(options, stop, console) if options.out else contextlib.nullcontext() as folder:
+            logs = logs_of(robot, options, folder)
+            walk(robot, stop, console, interrupted, paced=bool(ends))
+            for line in serial_options.report(ends):
+                console.print(line, highlight=False, soft_wrap=True)
+            summary = {**robot.summary(), "interrupted": bool(interrupted)}
+            summary["command"] = command_again(options, StopRule(time_s=robot.time_s) if interrupted else stop)
+            is_complete = finish(robot, summary, options, folder, logs, json_file, console)
         trace.write(timeline, options, console)
+    if not is_complete:
+        return EXIT_INCOMPLETE
     if interrupted:
         return 130
     if not all(fault["acted"] for fault in summary["faults"]):
@@ -130,26 +144,51 @@ def arm(robot: Ranger, wanted: list[Fault], proof: bool) -> None:
         robot.arm(fault)
 
 
+def claimed(options: argparse.Namespace, stop: StopRule, console: Console) -> RunFolder:
+    """The folder that was asked for, for this run alone. What is wrong with a run must have been told before."""
+
+    def tell(line: str) -> None:
+        console.print(line, highlight=False, soft_wrap=True)
+
+    return RunFolder(options.out, command_again(options, stop), tell)
+
+
+def logs_of(robot: Ranger, options: argparse.Namespace, folder: RunFolder | None) -> RunLogs | None:
+    """The logs of a folder; with --log full they are written from now on."""
+    if folder is None or robot.logbook.mode == "none":
+        return None
+    return RunLogs(robot, folder, follow=options.log == "full")
+
+
 def finish(
     robot: Ranger,
     summary: dict,
     options: argparse.Namespace,
-    folder: pathlib.Path | None,
+    folder: RunFolder | None,
+    logs: RunLogs | None,
     json_file: pathlib.Path | None,
     console: Console,
-) -> None:
-    """Write the files that were asked for and print the summary."""
-    if folder is not None:
-        write_files(robot, summary, folder, console)
+) -> bool:
+    """Print the summary and write the files that were asked for; False when one of them is not complete."""
     text = json.dumps(summary, indent=2)
-    if json_file is not None:
-        replace_file(json_file, (text + "\n").encode())
-    if options.json == "-":
-        print(text)
-        return
-    print_summary(summary, console)
-    if robot.logbook.mode != "none":
-        console.print(f"report: {folder / 'report.html'}", soft_wrap=True)
+    try:
+        if options.json == "-":
+            terminal.print_now(text)
+        else:
+            print_summary(summary, console)
+    finally:
+        if json_file is not None:
+            replace_file(json_file, (text + "\n").encode())
+        if folder is not None:
+            write_files(robot, summary, folder, logs, console)
+    if folder is None:
+        kept = "only the summary was kept" if json_file is not None or options.json else "nothing was kept"
+        console.print(f"{kept}: --out runs/NAME keeps summary, logs and report there", highlight=False, soft_wrap=True)
+        return True
+    name = SUMMARY if logs is None else REPORT
+    if folder.files.get(name, "complete") == "complete":
+        console.print(f"{pathlib.Path(name).stem}: {folder.path / name}", highlight=False, soft_wrap=True)
+    return folder.is_complete
 
 
 @contextlib.contextmanager
@@ -222,56 +261,49 @@ def clock_text(seconds: float) -> str:
     return f"{whole // 3600}:{whole // 60 % 60:02d}:{whole % 60:02d}"
 
 
-def write_files(robot: Ranger, summary: dict, folder: pathlib.Path, console: Console) -> None:
-    """Summary first, then candump logs, variables and report, as far as the log kept something to show."""
-    from ranger_sim.tools import variables_file
-    from ranger_sim.tools.report import page
+def write_files(robot: Ranger, summary: dict, folder: RunFolder, logs: RunLogs | None, console: Console) -> None:
+    """Logs and report, as far as there is something to show, then the summary."""
+    if logs is not None:
+        with console.status("writing logs and report ..."):
+            logs.finish()
+            with folder.file(REPORT) as path:
+                from ranger_sim.tools.report import page  # half a second of imports
 
-    replace_file(folder / "summary.json", (json.dumps(summary, indent=2) + "\n").encode())
-    if robot.logbook.mode == "none":
-        return
-    with console.status("writing logs and report ..."):
-        write_frames(robot, folder)
-        variables_file.write(robot, folder / "variables.mf4")
-        replace_file(folder / "report.html", page.render(robot, summary).encode())
-
-
-def write_frames(robot: Ranger, folder: pathlib.Path) -> None:
-    """One log per bus in candump's format."""
-    from ranger_sim.can_bus.edge.candump import CandumpWriter
-
-    frames = robot.logbook.frames()
-    columns = [frames[name] for name in ("time_ns", "identifier", "flags", "word0", "word1")]
-    for number, bus in enumerate(robot.buses):
-        of_bus = (frames["bus"] == number).nonzero()[0]
-        with tempfile.TemporaryDirectory(dir=folder, prefix=f".{bus.name}") as partial:
-            path = pathlib.Path(partial) / f"{bus.name}.log"
-            with CandumpWriter(path) as log:
-                for start in range(0, len(of_bus), 100_000):
-                    rows = of_bus[start : start + 100_000]
-                    log.write(bus.name, zip(*(column[rows].tolist() for column in columns), strict=True))
-            path.replace(folder / f"{bus.name}.log")
+                path.write_text(page.render(robot, summary), encoding="utf-8")
+    folder.finish(summary)
 
 
 def print_summary(summary: dict, console: Console) -> None:
     """The walk in a few lines."""
-    tcot = "none" if summary["tcot"] is None else f"{summary['tcot']:.3f}"
     console.print(
         f"{summary['steps']} steps, {length_text(summary['distance_m'])} in {duration_text(summary['time_s'])}, "
         f"{end_text(summary)}; "
         f"controller {summary['controller']}, body {summary['body']}; "
-        f"step {summary['mean_step_length_m']:.3f} m, {summary['mean_step_time_s']:.3f} s; "
-        f"{summary['total_power_W']:.1f} W, TCOT {tcot}; "
+        f"step {figure(summary['mean_step_length_m'], '{:.3f} m')}, {figure(summary['mean_step_time_s'], '{:.3f} s')}; "
+        f"{figure(summary['total_power_W'], '{:.1f} W')}, TCOT {figure(summary['tcot'], '{:.3f}')}; "
         f"{summary['realtime_factor']:.1f} x real time {'compiled' if summary['compiled'] else 'interpreted'}; "
         f"trace {summary['trace_digest'][:16]}",
         highlight=False,
+        soft_wrap=True,
     )
-    console.print(energy_text(summary), highlight=False)
+    console.print(energy_text(summary), highlight=False, soft_wrap=True)
     for fault in summary["faults"]:
         console.print(faults.fault_text(fault), highlight=False, soft_wrap=True)
-    for board, names in summary["errors"].items():
-        if names:
-            console.print(f"errors of {board}: " + ", ".join(f"{n} x {c}" for n, c in names.items()), highlight=False)
+    for line in error_lines(summary["errors"], summary["time_s"]):
+        console.print(line, highlight=False, soft_wrap=True)
+
+
+def error_lines(errors: dict, time_s: float) -> list[str]:
+    """What boards noted beyond what a healthy walk does, and how much was like in every walk."""
+    unusual = normal_errors.beyond(errors, time_s)
+    lines = [
+        f"errors of {board}: " + ", ".join(f"{name} x {count}" for name, count in names.items())
+        for board, names in unusual.items()
+    ]
+    usual = sum(map(len, errors.values())) - sum(map(len, unusual.values()))
+    if usual:
+        lines.append(f"errors as in every healthy walk: {usual} kinds (report and summary have them)")
+    return lines
 
 
 def end_text(summary: dict) -> str:

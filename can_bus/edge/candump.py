@@ -9,7 +9,7 @@ Nanoseconds are cut to microseconds, the resolution of the format; the time is t
 
 import pathlib
 from collections.abc import Iterable, Iterator
-from typing import Any, TextIO
+from typing import Any
 
 from ranger_sim.can_bus.edge.messages import data_of_words, words_of_data
 from ranger_sim.can_bus.frame import HIGHEST_EXTENDED, HIGHEST_STANDARD, LENGTH_CODE
@@ -39,14 +39,16 @@ def line_of_frame(interface: str, time_ns: int, identifier: int, flags: int, lo:
 class CandumpWriter:
     """Writes frames of one or more buses to a file. A context manager.
 
-    UserError when the file cannot be written. `frames` counts the lines.
+    UserError when the file cannot be opened, OSError when it takes no more; it ends with a whole line in any case.
+    `frames` counts the lines.
     """
 
     def __init__(self, path: str | pathlib.Path) -> None:
         self.path = pathlib.Path(path)
         self.frames = 0
         try:
-            self.file: TextIO = self.path.open("w", encoding="ascii", newline="\n")
+            # no buffer: a program that is killed leaves what it wrote, and a full disk is noticed at once
+            self.file = self.path.open("wb", buffering=0)
         except OSError as error:
             raise UserError(f"{self.path}: the frame log cannot be written ({error.strerror})") from None
 
@@ -63,7 +65,14 @@ class CandumpWriter:
     def write(self, interface: str, frames: Iterable[Frame]) -> None:
         """Append frames (time_ns, identifier, flags, lo, hi), in the order of their times."""
         lines = [line_of_frame(interface, *frame) for frame in frames]
-        self.file.writelines(lines)
+        rest = memoryview("".join(lines).encode("ascii"))
+        end = self.file.tell()
+        try:
+            while rest:
+                rest = rest[self.file.write(rest) :]
+        except OSError:
+            self.file.truncate(end)
+            raise
         self.frames += len(lines)
 
 

@@ -17,10 +17,8 @@ from ranger_sim.can_bus.node import BUS_OFF
 from ranger_sim.datatable.generated import errors as error_table
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness import summary, wiring
+from ranger_sim.harness.normal_errors import most_normal
 
-# Errors come in bursts: a hip that is held back tells of its clipped current in every slot. So a second more of them is
-# allowed than has passed, and a test of 10 ms may see such a burst as well.
-BURST_S = 1.0
 # What else a board notes when something that the test expects happens.
 OF_OVERRUNS = ("ASCHED_DNF", "SCHED_SLOT_NEAR_LIMIT", "SCHED_TASK_LIMIT")
 OF_BUS_ERRORS = re.compile(r"CAN\d_(BUS_RX|BUS_TX|ERR_WARN|ERR_PASS|TX_BUSOFF)")
@@ -146,8 +144,7 @@ class Health:
                 if of_test or excused(wanted, board, name):
                     continue
                 rate = error_table.NORMAL_PER_S.get(code, {}).get(board, 0.0)
-                once = error_table.NORMAL_AT_START.get(code, {}).get(board, 0.0) if before is None else 0.0
-                if events > rate * (passed_s + BURST_S) + once:
+                if events > most_normal(board, code, passed_s, before is None):
                     normal = f"normal is up to {rate:g} a second" if rate else "normal is none"
                     meaning = error_table.DESCRIPTIONS.get(code, "")
                     found.append(f"{board}: {events} x {name} ({meaning}) in {passed_s:.3f} s, {normal}")

@@ -12,7 +12,6 @@ from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.ranger import Ranger
 from ranger_sim.harness.scenario import Scenario, StopRule
 from ranger_sim.tools import cli, walk
-from ranger_sim.tools.report import page
 
 # 40 mWh: held for 1.5 s and some steps; at the 17 W of a walk 8 s
 NEARLY_EMPTY_WH = 0.04
@@ -115,8 +114,8 @@ def test_distance_in_kilometres_and_charge_in_per_cent_reach_the_robot(capsys):
     assert summary["battery"]["capacity_Wh"] == pytest.approx(493.0)
     assert summary["electronics_power_W"] == pytest.approx(4.7)
     assert summary["interrupted"] is False
-    command = page.command(summary)
-    assert "--battery 65% --battery-capacity 493Wh --off left-outer-ankle" in command
+    assert "--distance 2.0m" in summary["command"]
+    assert "--battery 0.65 --battery-capacity 493.0Wh --off left-outer-ankle" in summary["command"]
 
 
 def test_what_was_walked_before_ctrl_c_is_told(capsys, monkeypatch):

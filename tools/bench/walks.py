@@ -7,6 +7,7 @@ from collections.abc import Callable
 
 from ranger_sim.harness.ranger import Ranger
 from ranger_sim.harness.scenario import Scenario, StopRule
+from ranger_sim.tools.units import figure
 
 # parameter set, seeds, steps, roughness in m
 WALKS = (
@@ -55,8 +56,8 @@ def run(say: Callable[[str], None]) -> list[dict]:
             rows.append(row)
             say(
                 f"{controller}, seed {seed}, {1000 * roughness:g} mm: {row['steps']} of {steps} steps"
-                f"{', ' + row['fall_cause'] if row['fell'] else ''}; {row['mean_step_length_m']:.3f} m, "
-                f"{row['mean_step_time_s']:.3f} s, {row['motor_power_W']:.1f} W, "
+                f"{', ' + row['fall_cause'] if row['fell'] else ''}; {figure(row['mean_step_length_m'], '{:.3f} m')}, "
+                f"{figure(row['mean_step_time_s'], '{:.3f} s')}, {figure(row['motor_power_W'], '{:.1f} W')}, "
                 f"lost {row['lost']}, overruns {row['overruns']}"
             )
     return rows

@@ -2,7 +2,6 @@
 
 import json
 import pathlib
-import shlex
 from typing import Any
 
 import jinja2
@@ -13,6 +12,7 @@ from plotly.offline import get_plotlyjs
 from ranger_sim import datatable
 from ranger_sim.tools.faults import fault_text
 from ranger_sim.tools.report import figures
+from ranger_sim.tools.units import figure
 
 HERE = pathlib.Path(__file__).parent
 ANIMATION_HZ = 125  # frames kept per second: smooth at one eighth of real time on a 60 Hz screen
@@ -68,7 +68,7 @@ def render(robot: Any, summary: dict) -> str:
         animation=Markup(json.dumps(animation(robot, walk), allow_nan=False).replace("</", "<\\/")),
         walker_js=Markup((HERE / "walker.js").read_text(encoding="utf-8")),
         plotly_js=Markup(get_plotlyjs()),
-        command=command(summary),
+        command=summary["command"],
         table_hash=datatable.table_hash(),
     )
 
@@ -83,14 +83,14 @@ def tiles(summary: dict) -> list[dict]:
     delay = summary["heel_strike_delay_ms"]
     rows = (
         ("steps", f"{summary['steps']}", None),
-        ("mean step length", f"{summary['mean_step_length_m']:.3f} m", of_the_robot("step")),
-        ("mean step time", f"{summary['mean_step_time_s']:.3f} s", of_the_robot("time")),
-        ("speed", f"{summary['speed_m_per_s']:.2f} m/s", of_the_robot("speed")),
-        ("motors", f"{summary['motor_power_W']:.1f} W", of_the_robot("motors")),
-        ("in all", f"{summary['total_power_W']:.1f} W", of_the_robot("total")),
+        ("mean step length", figure(summary["mean_step_length_m"], "{:.3f} m"), of_the_robot("step")),
+        ("mean step time", figure(summary["mean_step_time_s"], "{:.3f} s"), of_the_robot("time")),
+        ("speed", figure(summary["speed_m_per_s"], "{:.2f} m/s"), of_the_robot("speed")),
+        ("motors", figure(summary["motor_power_W"], "{:.1f} W"), of_the_robot("motors")),
+        ("in all", figure(summary["total_power_W"], "{:.1f} W"), of_the_robot("total")),
         (
             "cost of transport",
-            "none" if summary["tcot"] is None else f"{summary['tcot']:.3f}",
+            figure(summary["tcot"], "{:.3f}"),
             of_the_robot("tcot"),
         ),
         (
@@ -117,19 +117,16 @@ def tiles(summary: dict) -> list[dict]:
 def odd(oddities: dict) -> tuple:
     """Tiles of what the contact of feet and floor did that a real floor could not, or that a walk should not need."""
 
-    def told(value: Any, text: str) -> str:
-        return "none" if value is None else text.format(value)
-
     strikes = oddities["tensile_strikes"]
     return (
         ("contact", oddities["contact"], None),
         (
             "strikes that pull",
-            told(strikes, "{}") + (f" (to {oddities['tensile_impulse_min_Ns']:.2f} N s)" if strikes else ""),
+            figure(strikes, "{}") + (f" (to {oddities['tensile_impulse_min_Ns']:.2f} N s)" if strikes else ""),
             "a floor: none",
         ),
-        ("lowest push of the floor", told(oddities["normal_force_min_N"], "{:.1f} N"), "a floor: 0 N or more"),
-        ("worst friction ratio", told(oddities["friction_ratio_max"], "{:.2f}"), None),
+        ("lowest push of the floor", figure(oddities["normal_force_min_N"], "{:.1f} N"), "a floor: 0 N or more"),
+        ("worst friction ratio", figure(oddities["friction_ratio_max"], "{:.2f}"), None),
         ("slides", f"{oddities['slides']} in {oddities['slip_s'] * 1e3:.1f} ms", None),
         ("touches, lift-offs", f"{oddities['touches']}, {oddities['lift_offs']}", None),
     )
@@ -159,32 +156,3 @@ def animation(robot: Any, walk: Any) -> dict:
     data["geometry"] = robot.plant.geometry()
     data["footholds"] = walk.footholds
     return data
-
-
-def command(summary: dict) -> str:
-    """The command line that repeats the run."""
-    parts = [
-        "ranger-sim",
-        "walk",
-        "--steps",
-        str(max(1, summary["steps"])),
-        "--controller",
-        summary["controller"],
-        "--body",
-        summary["body"],
-        "--seed",
-        str(summary["seed"]),
-    ]
-    if summary["floor_roughness_m"]:
-        parts += ["--floor-roughness", f"{summary['floor_roughness_m']:g}m"]
-    parts += ["--battery", f"{100.0 * summary['battery']['charge_at_start']:.12g}%"]
-    parts += ["--battery-capacity", f"{summary['battery']['capacity_Wh']:.12g}Wh"]
-    for name in summary["electronics_off"]:
-        parts += ["--off", name]
-    if summary["model_file"]:
-        parts += ["--model", summary["model_file"]]
-    if summary["slope_rad"]:
-        parts += ["--slope", f"{summary['slope_rad']:g}"]
-    for fault in summary["faults"]:
-        parts += ["--fault", fault["fault"]]
-    return shlex.join(parts)
