@@ -149,7 +149,7 @@ class MdfWriter:
         dtype = group.dtype
         next_channel = 0
         for number, channel in reversed(list(enumerate(group.channels))):
-            offset = dtype.fields[f"value_{number}"][1]
+            offset = sum(dtype[place].itemsize for place in range(1 + number))  # rows are packed
             next_channel = self._channel(channel, CHANNEL_FIXED, offset, next_channel)
         time = Channel("time", "s", "", np.dtype("<f8"))
         first = self._channel(time, CHANNEL_MASTER, 0, next_channel)

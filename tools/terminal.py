@@ -4,7 +4,7 @@ import contextlib
 import io
 import os
 import sys
-from typing import Any, TextIO
+from typing import IO, Any
 
 from rich.console import Console
 
@@ -69,7 +69,7 @@ def output_is_stuck() -> bool:
     return False
 
 
-def lead_nowhere(stream: TextIO) -> None:
+def lead_nowhere(stream: IO[str]) -> None:
     """Let what is still written to the stream vanish."""
     with contextlib.suppress(OSError, ValueError):
         nowhere = os.open(os.devnull, os.O_WRONLY)
