@@ -26,6 +26,8 @@ class Figure:
 
 
 NO_STEP = "no step after the fifth"
+TOO_FEW_STEPS = "fewer than two steps after the fifth"
+NO_TIME = "no time has passed"
 NOT_YET = "not yet"
 NO_STRIKE = "no step yet, or a contact whose strikes last"
 
@@ -39,18 +41,22 @@ FIGURES = (
     Figure("time_s", REAL, "s", "virtual time since power-up"),
     Figure("walked_h", REAL, "h", "virtual time since the robot was let go"),
     Figure("mean_step_length_m", REAL, "m", "mean without the first five steps", NO_STEP),
-    Figure("std_step_length_m", REAL, "m", "standard deviation of these steps, divided by their number", NO_STEP),
+    Figure("std_step_length_m", REAL, "m", "standard deviation of these steps, divided by their number", TOO_FEW_STEPS),
     Figure("mean_step_time_s", REAL, "s", "mean without the first five steps", NO_STEP),
-    Figure("std_step_time_s", REAL, "s", "standard deviation of these steps, divided by their number", NO_STEP),
+    Figure("std_step_time_s", REAL, "s", "standard deviation of these steps, divided by their number", TOO_FEW_STEPS),
     Figure("double_stance_s", REAL, "s", "mean time from a strike until the trailing foot leaves, same steps", NO_STEP),
     Figure("speed_m_per_s", REAL, "m/s", "length of these steps over their time", NO_STEP),
     # power
     Figure(
-        "motor_power_W", REAL, "W", "mean of all motors since the robot was let go; what they give back is not credited"
+        "motor_power_W",
+        REAL,
+        "W",
+        "mean of all motors since the robot was let go; what they give back is not credited",
+        NO_TIME,
     ),
-    Figure("motor_powers_W.{motor}", REAL, "W", "the same of each motor, at the battery"),
+    Figure("motor_powers_W.{motor}", REAL, "W", "the same of each motor, at the battery", NO_TIME),
     Figure("electronics_power_W", REAL, "W", "computers and sensors, at the battery"),
-    Figure("total_power_W", REAL, "W", "motors and electronics"),
+    Figure("total_power_W", REAL, "W", "motors and electronics", NO_TIME),
     Figure("tcot", REAL, "1", "total cost of transport: total power over weight times speed", NO_STEP),
     Figure("energy_Wh.{consumer}", REAL, "Wh", "taken from the battery since the robot was let go, and `total`"),
     Figure("battery.capacity_Wh", REAL, "Wh", "of all packs together, as asked for"),
@@ -161,7 +167,10 @@ FIGURES = (
     Figure("floor_roughness_m", REAL, "m", "standard deviation of the footholds' heights"),
     Figure("electronics_off", TEXTS, "", "electronics that drew no power"),
     Figure("trace_digest", TEXT, "", "BLAKE2b-256 of every frame and of the body's samples: equal for equal runs"),
-    Figure("interrupted", FLAG, "", "Ctrl-C ended the walk"),
+    Figure("interrupted", FLAG, "", "Ctrl-C or another signal ended the walk"),
+    Figure("command", TEXT, "", "walks the same again: equal digest, as long as nothing came in from outside"),
+    Figure("complete", FLAG, "", "every file of the run's folder is whole"),
+    Figure("files.{file}", TEXT, "", "`complete`, or `incomplete` and why: then it has `.partial` in its name"),
     # faults that were injected
     Figure("faults[].fault", TEXT, "", "as it is typed: place, mode, parameters, begin, end"),
     Figure("faults[].armed_s", REAL, "s", "when it was armed, since power-up", NOT_YET),

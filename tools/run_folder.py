@@ -104,8 +104,9 @@ class RunFolder:
         return all(state == "complete" for state in self.files.values())
 
     def finish(self, summary: dict) -> None:
-        """Write the summary, with what is complete, in its reserved place, and give the folder its final state."""
-        self._write_record({**summary, "complete": self.is_complete, "files": self.files})
+        """Write the summary, told what is complete, in its reserved place, and give the folder its final state."""
+        summary.update(complete=self.is_complete, files=self.files)
+        self._write_record(summary)
         try:
             (self.path / OPEN).replace(self.path / SUMMARY)
         except OSError as error:

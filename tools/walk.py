@@ -38,6 +38,7 @@ if TYPE_CHECKING:
 __all__ = ["walk", "write_frames"]
 
 DEFAULT_STEPS = 100
+ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 EXIT_INCOMPLETE = 2  # a file that was asked for is not whole: the disk is full
 SLICE_S = 0.05  # virtual seconds between two looks at the screen and at Ctrl-C
 TELL_EVERY_S = 60.0  # of the wall clock: a line of progress where there is no screen to draw it on (chosen by us)
@@ -170,17 +171,18 @@ def finish(
     console: Console,
 ) -> bool:
     """Print the summary and write the files that were asked for; False when one of them is not complete."""
-    text = json.dumps(summary, indent=2)
+    if options.json != "-":
+        print_summary(summary, console)
+    summary.update(complete=folder is None, files={})
     try:
-        if options.json == "-":
-            terminal.print_now(text)
-        else:
-            print_summary(summary, console)
-    finally:
-        if json_file is not None:
-            replace_file(json_file, (text + "\n").encode())
         if folder is not None:
             write_files(robot, summary, folder, logs, console)
+    finally:  # whatever becomes of the folder
+        text = json.dumps(summary, indent=2)
+        if options.json == "-":
+            terminal.print_now(text)
+        elif json_file is not None:
+            replace_file(json_file, (text + "\n").encode())
     if folder is None:
         kept = "only the summary was kept" if json_file is not None or options.json else "nothing was kept"
         console.print(f"{kept}: --out runs/NAME keeps summary, logs and report there", highlight=False, soft_wrap=True)
@@ -193,7 +195,10 @@ def finish(
 
 @contextlib.contextmanager
 def ctrl_c_noted() -> Iterator[list[bool]]:
-    """Inside, the first Ctrl-C only fills the list, so that the files are finished; the second one breaks off."""
+    """Inside, the first Ctrl-C only fills the list, so that the files are finished; the second one breaks off.
+
+    The signals by which a system ends programs, or a terminal takes its own along, count as Ctrl-C.
+    """
     interrupted: list[bool] = []
 
     def note(_number: int, _frame: FrameType | None) -> None:
@@ -201,11 +206,13 @@ def ctrl_c_noted() -> Iterator[list[bool]]:
             raise KeyboardInterrupt
         interrupted.append(True)
 
-    previous = signal.signal(signal.SIGINT, note)
+    signals = [each for each in ENDING if signal.getsignal(each) is not signal.SIG_IGN]  # nohup ignores one
+    previous = {each: signal.signal(each, note) for each in signals}
     try:
         yield interrupted
     finally:
-        signal.signal(signal.SIGINT, previous)
+        for each, handler in previous.items():
+            signal.signal(each, handler)
 
 
 def walk(robot: Ranger, stop: StopRule, console: Console, interrupted: list[bool], paced: bool = False) -> None:

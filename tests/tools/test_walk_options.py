@@ -3,7 +3,7 @@
 import argparse
 import shlex
 
-from hypothesis import given
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from ranger_sim.harness.scenario import LIMITS, StopRule
@@ -50,6 +50,7 @@ def test_every_option_of_walk_stands_in_the_table():
     assert set(VALUES) == {option.key for option in WALK if option.of_run}
 
 
+@settings(suppress_health_check=[HealthCheck.too_slow])  # on a busy machine
 @given(st.fixed_dictionaries({}, optional=VALUES))
 def test_the_command_asks_for_the_same_walk(chosen):
     given_options = PARSER.parse_args([])
