@@ -14,7 +14,6 @@ from ranger_sim.can_bus.edge.messages import data_of_words, words_of_data
 from ranger_sim.can_bus.edge.stream_server import Connection, StreamServer
 from ranger_sim.can_bus.edge.taps import QUEUED, RECEIVED, Event, Tap, Taps
 from ranger_sim.can_bus.frame import HIGHEST_EXTENDED, HIGHEST_STANDARD
-from ranger_sim.foundation import wallclock
 from ranger_sim.foundation.events import FLAG_ERROR, FLAG_EXTENDED, FLAG_REMOTE
 from ranger_sim.foundation.peers import FULL, LIMITS, MALFORMED, REASONS, SocketStream, listening_address
 from ranger_sim.foundation.user_error import UserError
@@ -114,7 +113,7 @@ class SocketcandServer(StreamServer[_Client]):
                 self.send_away(client, FULL)
                 return
             client.tap = client.taps.add("socketcand client")
-            client.quiet_until = wallclock.monotonic_s() + QUIET_AFTER_RAWMODE_S
+            client.quiet_until = self.clock() + QUIET_AFTER_RAWMODE_S
             self.totals["clients_seen"] += 1
             client.answer(b"< ok >")
         elif order == "echo" and len(words) == 1:
@@ -152,7 +151,7 @@ class SocketcandServer(StreamServer[_Client]):
             return
         events, client.tap.events = client.tap.events, []
         if client.quiet_until:
-            if wallclock.monotonic_s() < client.quiet_until:
+            if self.clock() < client.quiet_until:
                 room = KEPT_LIMIT - len(client.kept)
                 client.kept += events[:room]
                 self.totals["frames_dropped"] += max(0, len(events) - room)

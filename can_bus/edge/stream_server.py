@@ -15,7 +15,7 @@ from ranger_sim.foundation.peers import REASONS, Door, Peer, Stream
 
 HELD_ABOVE = 1 << 16  # bytes that wait for a client: a bus at full speed waits for it then
 NEXT_POLL_NS = 1_000_000  # while nothing waits; chosen by us: a frame from outside then waits 1 ms at most
-QUICK_POLL_NS = 31_250  # while frames of clients wait: about a window of the lockstep
+QUICK_POLL_NS = 250_000  # while frames of clients wait: three transmit buffers, so 12 full frames in a millisecond
 COUNTERS = ("clients_seen", "frames_in", "frames_out", "frames_dropped", "malformed", "refused")
 
 

@@ -42,7 +42,7 @@ FULL = 1
 NOT_ON_BUS = 2  # bus-off or listening only
 
 TRANSMIT_QUEUE = 64  # frames; chosen by us, because at 3 Mbit/s it holds 3 ms: more than a poll every 1 ms needs
-TAP_LIMIT = 64  # clients of one bus, those that left and still send included; chosen by us: each hears every frame
+TAP_LIMIT = 16  # clients of one bus, those that left and still send included; chosen by us: each hears every frame
 LINGER_NS = 1_000_000_000  # how long a client that left may still send what it had queued; chosen by us
 ORDER = STAGE_BUS * 256 + 255  # after every board's controller; a tap's inbox has no other source
 

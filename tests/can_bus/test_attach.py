@@ -297,7 +297,7 @@ def test_a_client_on_a_bus_keeps_its_place_and_one_more_is_refused(owner):
     extra = owner.connect()
     owner.run(10)
     ((kind, body),) = said(extra)
-    assert kind == wire.REFUSED and b"has 64 clients already" in body
+    assert kind == wire.REFUSED and b"has 16 clients already" in body
     assert owner.server.counters()["sent_away_full"] == 1
     clients[0].close()
     owner.run(10)

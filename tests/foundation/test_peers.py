@@ -6,7 +6,7 @@ import threading
 
 import pytest
 
-from ranger_sim.foundation import peers, wallclock
+from ranger_sim.foundation import peers
 from ranger_sim.foundation.peers import LIMITS, MS, Door, Peer, SocketStream, Terminal
 from ranger_sim.foundation.user_error import UserError
 
@@ -103,9 +103,9 @@ def test_a_peer_that_asks_without_end_does_not_keep_another_waiting(door):
     assert modest.recv(100) == TEN
 
 
-def test_who_takes_no_answers_is_not_read_and_holds_a_bounded_memory_and_is_sent_away(door, monkeypatch):
+def test_who_takes_no_answers_is_not_read_and_holds_a_bounded_memory_and_is_sent_away(door):
     clock = [0.0]
-    monkeypatch.setattr(wallclock, "monotonic_s", lambda: clock[0])
+    door.clock = lambda: clock[0]
     client = door.connect()
     door.look(0)
     (peer,) = door.peers
@@ -127,9 +127,9 @@ def test_who_takes_no_answers_is_not_read_and_holds_a_bounded_memory_and_is_sent
     assert door.sent_away == {"stalled": 1} and not door.peers
 
 
-def test_who_takes_its_answers_late_is_heard_again(door, monkeypatch):
+def test_who_takes_its_answers_late_is_heard_again(door):
     clock = [0.0]
-    monkeypatch.setattr(wallclock, "monotonic_s", lambda: clock[0])
+    door.clock = lambda: clock[0]
     client = door.connect()
     door.look(0)
     (peer,) = door.peers

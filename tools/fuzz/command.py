@@ -17,6 +17,7 @@ CASES = 10_000
 TARGETS = {
     "can": "frames of every kind, and bytes that are none, from outside onto the buses of a walking robot",
     "channel": "damaged messages in the channel between a board's process and the body's",
+    "doors": "hostile programs at every door: requests, connections, floods, answers never read; no robot behind",
     "profiles": "profiles and bus schedules with pieces cut out, doubled and replaced",
     "serial": "wrong bytes on the line between main brain and computer, both ways",
 }

@@ -1,0 +1,411 @@
+"""Hostile programs at every door: attach, slcan, socketcand and the supervisor's requests, on buses without a robot.
+
+One case is one thing that one of them does: it connects, leaves, says something of its protocol, something near it or
+noise, once or by the thousand, in one packet or cut, and reads what it is answered or never does. After every few cases
+every door is polled and looked at: no poll does more than the table of limits says, no peer holds more memory, there
+are no more peers than places, nothing is admitted that must not be, and a well-behaved program at each is answered.
+"""
+
+from __future__ import annotations
+
+import csv
+import os
+import pathlib
+import socket
+from collections.abc import Callable
+from contextlib import closing, suppress
+from typing import Any
+
+from ranger_sim import datatable
+from ranger_sim.can_bus.bus import Bus
+from ranger_sim.can_bus.edge import attach_records as wire
+from ranger_sim.can_bus.edge.attach import AttachServer
+from ranger_sim.can_bus.edge.slcan import SlcanServer
+from ranger_sim.can_bus.edge.socketcand import SocketcandServer
+from ranger_sim.can_bus.edge.taps import TAP_LIMIT, Taps
+from ranger_sim.foundation.events import STAGE_BUS, EventQueue
+from ranger_sim.foundation.peers import ARRIVAL, Door
+from ranger_sim.foundation.random_stream import RandomStream
+from ranger_sim.harness.processes.control import ControlServer, address
+from ranger_sim.harness.processes.requests import Request
+from ranger_sim.tools.fuzz import Finding
+
+RATE = 1_000_000
+POLL_NS = 500_000
+CASES_PER_POLL = 4
+HOSTILE = 6  # peers at each door, but for the one terminal
+POLLS_TO_ANSWER = 400  # of a well-behaved program, whatever others do: its turn comes in every poll
+WINDOW = 64  # frames of a client that may wait for their answers, 31 bytes each
+LONGEST_JSON = 70_000
+NUMBERS = ("0", "5", "-1", "1.5", "1e20", "100000000000000000000", "1e999", "NaN", "-Infinity", "true", "null", "500")
+TEXTS = ('""', '"abc"', "[]", "{}", '{"do": "status"}', '"\\ud800"', "[[[[[]]]]]", '"MCH"', '"P_UI_LCD_TIME"')
+VALUES = (*NUMBERS, *TEXTS)
+NAMES = ("do", "key", "name", "value", "board", "number", "", "\\u0000", "answer")
+ORDERS = ("status", "pause", "resume", "key", "set", "restart", "stop", "make_room", "revive", "finish", "")
+WORDS = (
+    "open",
+    "rawmode",
+    "echo",
+    "send",
+    "can1",
+    "can9",
+    "bcmmode",
+    "<",
+    "123",
+    "7ff",
+    "1fffffff",
+    "8",
+    "0",
+    "-1",
+    "x",
+)
+SLCAN = ("V", "v", "N", "F", "O", "L", "C", "Z0", "Z1", "S6", "t1230", "t12380011223344556677", "T1FFFFFFF0", "r7FF8")
+# How a hostile program begins, mostly: who is on a bus can do more harm.
+GREETINGS = {
+    "attach": wire.record(wire.HELLO, wire.HELLO_BODY.pack(wire.MAGIC, wire.VERSION, 0) + b"can1"),
+    "slcan": b"\rO\r",
+    "socketcand": b"< open can1 >< rawmode >",
+    "control": b"",
+}
+
+
+class Program:
+    """One end of one connection, hostile or well-behaved. Without a connection (`number` -1) it tries again."""
+
+    def __init__(self, connect: Callable[[], int], greeting: bytes = b"") -> None:
+        self.connect = connect
+        self.greeting = greeting
+        self.number = -1
+        self.reads = True
+        self.heard = bytearray()
+        self.again()
+
+    def say(self, data: bytes) -> None:
+        """As much of it as goes; where the door has closed the connection, over a new one next time."""
+        if self.number < 0:
+            self.again()
+        try:
+            if self.number >= 0:
+                os.write(self.number, data)
+        except BlockingIOError:
+            pass
+        except OSError:
+            self.again()
+
+    def hear(self) -> bytes:
+        """What has come."""
+        try:
+            while self.number >= 0:
+                data = os.read(self.number, 1 << 16)
+                self.heard += data
+                if not data:
+                    self.again()
+        except BlockingIOError:
+            pass
+        except OSError:
+            self.again()
+        return bytes(self.heard)
+
+    def again(self) -> None:
+        """A new connection, if there is room in the door's queue."""
+        self.close()
+        self.heard.clear()
+        self.reads = True
+        with suppress(OSError):
+            self.number = self.connect()
+            os.write(self.number, self.greeting)
+
+    def close(self) -> None:
+        if self.number >= 0:
+            os.close(self.number)
+        self.number = -1
+
+
+class Fuzz:
+    """`case()` is one case, `poll()` polls and checks; Finding as soon as something is not as it must be."""
+
+    def __init__(self, seed: int = 1) -> None:
+        self.stream: Any = RandomStream(seed, "doors fuzz")
+        self.now_ns = 0
+        self.cases = self.polls = self.admitted = 0
+        self.limits = parameter_limits()
+        self.bus = Bus("can1", RATE, log_capacity=0)
+        self.inbox = EventQueue(64)
+        self.bus.add_node("board", self.inbox, 1, STAGE_BUS * 256)
+        self.taps = Taps(self.bus)
+        name = f"fuzz-doors-{os.getpid()}-{id(self)}"
+        buses = {"can1": self.taps}
+        self.attach = AttachServer(name, buses)
+        self.terminal = SlcanServer("can1", self.taps)
+        self.tcp = SocketcandServer(buses, 0)
+        self.control = ControlServer(name, self.obey)
+        self.doors: tuple[Door[Any], ...] = (self.attach, self.terminal, self.tcp, self.control)
+        for door in self.doors:
+            door.clock = lambda: self.now_ns * 1e-9
+        ways = {
+            "attach": lambda: local(wire.SOCKET_PREFIX + name),
+            "slcan": lambda: os.open(self.terminal.path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK),
+            "socketcand": lambda: detached(socket.create_connection(("127.0.0.1", self.tcp.port))),
+            "control": lambda: local(address(name)),
+        }
+        self.hostile = {
+            kind: [Program(way, GREETINGS[kind]) for _ in range(1 if kind == "slcan" else HOSTILE)]
+            for kind, way in ways.items()
+        }
+        self.kinds = tuple(ways)
+        self.questions = {"attach": HELLO, "socketcand": b"< echo >", "control": b'{"do": "status"}\n'}
+        self.good = {kind: Program(ways[kind]) for kind in self.questions}
+        self.asked = dict.fromkeys(self.questions, -1)  # at which poll; -1: answered
+        self.answered = 0
+
+    # ---- what hostile programs say
+
+    def number(self, n: int) -> int:
+        """Uniform in 0 ... n-1."""
+        return int(self.stream.integer(n))
+
+    def one_of(self, choices: tuple[Any, ...]) -> Any:
+        return choices[self.number(len(choices))]
+
+    def noise(self) -> bytes:
+        return bytes(self.number(256) for _ in range(self.number(64)))
+
+    def of_attach(self) -> bytes:
+        """A record: of its kind, of any kind, or with a length that is not so."""
+        kind = self.number(24)
+        if kind == 0:
+            channel = self.one_of((b"can1", b"", b"can9", b"\xff", b"can1\ncan1", b"x" * 900))
+            body = wire.HELLO_BODY.pack(self.one_of((wire.MAGIC, b"HTTP")), self.number(3), self.number(4))
+            return wire.record(wire.HELLO, body + channel)
+        if kind == 1:
+            return wire.record(self.number(256), self.noise())
+        if kind == 2:
+            length = self.one_of((0, 1, 1024, 1025, 1 << 31, (1 << 32) - 1))
+            return wire.HEAD.pack(length, self.number(12)) + self.noise()
+        if kind == 3:
+            return wire.send_record(self.number(1 << 32), self.number(1 << 16), self.number(1 << 32), 0)
+        if kind < 10:
+            return wire.record(wire.CONTROL, bytes([1 + self.number(3)]))
+        return wire.send_record(self.number(0x800), self.number(9), self.number(1 << 32), self.number(1 << 32))
+
+    def of_slcan(self) -> bytes:
+        """A command, whole, with another end, or without one."""
+        return str(self.one_of(SLCAN)).encode() + self.one_of((b"\r", b"\r", b"\r", b"\n", b"", b"0" * 40 + b"\r"))
+
+    def of_socketcand(self) -> bytes:
+        """Words in brackets, or nearly."""
+        words = " ".join(self.one_of(WORDS) for _ in range(self.number(12)))
+        send = f"< send {self.number(0x900):x} 2 1 {self.number(257):x} >"
+        most = (send, send, send, "< echo >", f"< {words} >")
+        odd = ("< open can1 >< rawmode >", f"<{words}>", f"< {words}", " " * 300, f"{words} >")
+        return str(self.one_of(most if self.number(4) else odd)).encode()
+
+    def of_control(self) -> bytes:
+        """A request: of the model, of other words and values, nested, doubled, or long."""
+        kind = self.number(8)
+        if kind == 0:
+            return self.one_of((b"[", b'{"do":', b"[{", b"9")) * self.number(LONGEST_JSON // 6) + b"\n"
+        order = self.one_of(ORDERS)
+        if kind < 4:
+            fields = {"key": {"key"}, "set": {"name", "value"}, "restart": {"board"}}.get(order, set())
+            names = {**dict.fromkeys(fields), "do": None}
+        else:
+            names = dict.fromkeys(self.one_of(NAMES) for _ in range(self.number(5)))
+        values = {name: self.one_of(VALUES) for name in names}
+        if "do" in values and kind != 7:
+            values["do"] = f'"{order}"'
+        if "name" in values and self.number(2):
+            values["name"] = f'"{self.one_of(tuple(self.limits))}"'
+        if "value" in values and self.number(2):
+            values["value"] = repr((self.number(1 << 20) - (1 << 19)) / (1 + self.number(1 << 12)))
+        text = ", ".join(f'"{name}": {value}' for name, value in values.items())
+        return f"{{{text}}}\n".encode()
+
+    def case(self) -> None:
+        """One program does one thing."""
+        kind = self.one_of(self.kinds)
+        program = self.one_of(tuple(self.hostile[kind]))
+        self.cases += 1
+        what = self.number(40)
+        if what == 0:
+            program.again()
+        elif what == 1:
+            program.reads = not program.reads
+        elif what == 2 and kind != "slcan":
+            half_closed(program.number)
+        elif what == 3:
+            program.say(self.noise())
+        else:
+            data = getattr(self, f"of_{kind}")()
+            if what == 4:
+                data = data[: self.number(len(data) + 1)]
+            elif what == 5:
+                data *= 1 + self.number(20_000 // max(1, len(data)))
+            elif what < 12:
+                data += getattr(self, f"of_{kind}")()
+            program.say(data)
+
+    # ---- what the doors do
+
+    def obey(self, number: int, request: Request) -> None:
+        """What passes the door must be of the model, by code that the door does not share."""
+        self.admitted += 1
+        fine = {
+            "status": True,
+            "pause": True,
+            "resume": True,
+            "key": type(request.key) is int and request.key in range(6),
+            "restart": request.board in ("MCH", "MCFO", "MCFI", "MCSI", "UI", "CSR", "MB"),
+            "set": request.name in self.limits
+            and type(request.value) is float
+            and self.limits[request.name][0] <= request.value <= self.limits[request.name][1],
+        }
+        if fine.get(request.do) is not True:
+            raise Finding(f"{request} was admitted (case {self.cases})")
+        self.control.answer(number, {"did": request.do})
+
+    def poll(self) -> None:
+        """A little time, and a look at every door."""
+        self.now_ns += POLL_NS
+        self.polls += 1
+        before = [door.worked for door in self.doors]
+        for server in (self.attach, self.terminal, self.tcp):
+            server.poll(self.now_ns)
+        self.control.poll()
+        self.bus.advance(self.now_ns)
+        self.taps.poll(self.now_ns)
+        self.inbox.clear()
+        for door, worked in zip(self.doors, before, strict=True):
+            self.check(door, door.worked - worked)
+        self.talk()
+        for programs in self.hostile.values():
+            for program in programs:
+                if program.reads:
+                    program.hear()
+                    program.heard.clear()
+
+    def check(self, door: Door[Any], worked: int) -> None:
+        """Finding when a door has done or holds more than the table allows."""
+        limits = door.limits
+        answer = 4 * 1024  # the longest single answer of any door is below that
+        most_out = limits.backlog + limits.unread + limits.burst * answer
+        for what, is_so in (
+            (f"{worked} requests in a poll", worked < limits.burst + ARRIVAL),
+            (f"{len(door.peers)} peers", len(door.peers) <= limits.peers),
+            (
+                "a peer's input piles up",
+                self.most(door, "incoming") <= limits.longest + limits.read_bytes,
+            ),
+            ("a peer's answers pile up", self.most(door, "outgoing") <= most_out),
+            (f"{len(self.taps.taps)} clients on a bus", len(self.taps.taps) <= TAP_LIMIT),
+        ):
+            if not is_so:
+                raise Finding(f"{door.kind}: {what} (case {self.cases})")
+
+    @staticmethod
+    def most(door: Door[Any], buffer: str) -> int:
+        return max((len(getattr(peer, buffer)) for peer in door.peers), default=0)
+
+    def talk(self) -> None:
+        """Well-behaved programs ask, are answered in time, and ask again. Who was sent away has a reason to tell."""
+        for kind, program in self.good.items():
+            heard = program.hear()
+            if self.asked[kind] < 0:
+                program.heard.clear()
+                program.say(self.questions[kind])
+                self.asked[kind] = self.polls
+            elif answered(kind, heard):
+                self.asked[kind] = -1
+                self.answered += 1
+            elif self.polls - self.asked[kind] > POLLS_TO_ANSWER:
+                raise Finding(f"{kind}: a well-behaved program is not answered (case {self.cases}): {heard[:80]!r}")
+            elif not heard and (self.polls - self.asked[kind]) % 50 == 0:
+                program.again()  # it had to make room; it asks over a new connection
+                program.say(self.questions[kind])
+
+    def counted(self) -> dict[str, int]:
+        """Whole numbers by name."""
+        found = {
+            "cases": self.cases,
+            "polls": self.polls,
+            "answered": self.answered,
+            "admitted": self.admitted,
+            "not_admitted": self.control.not_admitted,
+            "frames": self.bus.counters.frames,
+        }
+        for door in self.doors:
+            found[f"{door.kind}_requests"] = door.worked
+            for reason, count in door.sent_away.items():
+                found[f"{door.kind}_{reason}"] = count
+        return found
+
+    def close(self) -> None:
+        """Everything."""
+        for programs in (*self.hostile.values(), list(self.good.values())):
+            for program in programs:
+                program.close()
+        for door in self.doors:
+            door.close()
+
+
+HELLO = wire.record(wire.HELLO, wire.HELLO_BODY.pack(wire.MAGIC, wire.VERSION, 0))  # for the channels alone
+
+
+def answered(kind: str, heard: bytes) -> bool:
+    """True when this is the answer to the question."""
+    if kind == "attach":
+        return heard.endswith(b"can1") and heard[4:5] == bytes([wire.WELCOME])
+    return heard.endswith(b"< echo >") if kind == "socketcand" else heard == b'{"did": "status"}\n'
+
+
+def parameter_limits() -> dict[str, tuple[float, float]]:
+    """{parameter: least, most} as the master file has it."""
+    text = (pathlib.Path(datatable.__file__).parent / "master" / "variables.csv").read_text(encoding="utf-8")
+    largest = 3.4028234663852886e38  # of single precision
+    return {
+        row["name"]: (float(row["minimum"] or -largest), float(row["maximum"] or largest))
+        for row in csv.DictReader(text.splitlines())
+        if row["publisher"] == "PC" and not row["name"].startswith("LV_")
+    }
+
+
+def local(where: str) -> int:
+    """A connection to a local server, as a descriptor."""
+    client = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+    client.setblocking(False)  # a full queue is told at once
+    try:
+        client.connect(where)
+    except OSError:
+        client.close()
+        raise
+    return client.detach()
+
+
+def detached(client: socket.socket) -> int:
+    client.setblocking(False)
+    return client.detach()
+
+
+def half_closed(number: int) -> None:
+    """Nothing more will be said; what is answered can still be heard."""
+    if number < 0:
+        return
+    client = socket.socket(fileno=os.dup(number))
+    with client, suppress(OSError):
+        client.shutdown(socket.SHUT_WR)
+
+
+def run(cases: int, seed: int = 1) -> dict[str, int]:
+    """So many cases; what the doors counted. Any other exception than Finding is one too: its traceback says where."""
+    fuzz = Fuzz(seed)
+    with closing(fuzz):
+        try:
+            while fuzz.cases < cases:
+                for _ in range(min(CASES_PER_POLL, cases - fuzz.cases)):
+                    fuzz.case()
+                fuzz.poll()
+        except Exception as error:
+            if not isinstance(error, Finding):
+                error.add_note(f"ranger-sim fuzz doors: seed {seed}, case {fuzz.cases}")
+            raise
+        return fuzz.counted()
