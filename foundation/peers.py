@@ -69,10 +69,12 @@ PATIENCE_S = 2.0  # with answers untaken for so long and more to say, a peer is 
 MS = 1_000_000
 
 # Why a peer is sent away, as it is counted.
-FULL, FOREIGN, MALFORMED, TOO_LONG, STALLED, IDLE = "full", "foreign", "malformed", "too_long", "stalled", "idle"
+FULL, FOREIGN, UNKNOWN, MALFORMED = "full", "foreign", "unknown", "malformed"
+TOO_LONG, STALLED, IDLE = "too_long", "stalled", "idle"
 REASONS = {
-    FULL: "no place was free",
+    FULL: "found no place free",
     FOREIGN: "belonged to another user",
+    UNKNOWN: "had gone before it could be told whose it was",
     MALFORMED: "did not speak the protocol",
     TOO_LONG: "sent a request above the limit",
     STALLED: "went on without taking its answers",
@@ -347,8 +349,8 @@ class Door(Generic[P]):
             if full and idle is not None:
                 self.send_away(idle, IDLE)
             self.let_in(peer)
-            if not served(connection):
-                self.send_away(peer, FOREIGN)
+            if (fault := fault_of_owner(connection)) is not None:
+                self.send_away(peer, fault)
             elif full and idle is None:
                 self.send_away(peer, FULL)
             if peer.ending:  # it does not get a place for as long as it takes to tell it
@@ -448,11 +450,14 @@ def _as_in_table(end: tuple[str, int]) -> str:
     return f"{int.from_bytes(socket.inet_aton(end[0]), sys.byteorder):08X}:{end[1]:04X}"
 
 
-def served(connection: socket.socket) -> bool:
-    """True for a connection of this user or root, and for one over the network, where nobody is known."""
+def fault_of_owner(connection: socket.socket) -> str | None:
+    """Why a connection is not served; None for this user's, root's, and one over the network, where nobody is known."""
     if connection.family != socket.AF_UNIX and not loopback(connection.getsockname()[0]):
-        return True
-    return trusted(user_behind(connection))
+        return None
+    user = user_behind(connection)
+    if user is None:
+        return UNKNOWN
+    return None if trusted(user) else FOREIGN
 
 
 def loopback(address: str) -> bool:

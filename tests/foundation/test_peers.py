@@ -210,7 +210,7 @@ def test_who_is_behind_a_loopback_connection_is_read_from_the_kernels_table():
     with socket.create_server(("127.0.0.1", 0)) as listener, socket.create_connection(listener.getsockname()):
         connection, _ = listener.accept()
         with connection:
-            assert peers.user_behind(connection) == os.getuid() and peers.served(connection)
+            assert peers.user_behind(connection) == os.getuid() and peers.fault_of_owner(connection) is None
 
 
 @pytest.mark.parametrize(("host", "address"), [("127.0.0.1", "127.0.0.1"), ("localhost", "127.0.0.1")])
