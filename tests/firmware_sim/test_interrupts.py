@@ -5,7 +5,7 @@ import pytest
 from ranger_sim.firmware_sim.peripherals.timer_capture import TimerCapture
 from ranger_sim.firmware_sim.scheduler import Task
 from ranger_sim.firmware_sim.vic import ADC_DONE, EXTERNAL_INTERRUPT, FIQ, SOFTWARE, SPI_DONE, InterruptController
-from ranger_sim.foundation.events import CAN_RX, PIN_EDGE, STAGE_BUS, STAGE_PINS, UART_BYTE
+from ranger_sim.foundation.events import CAN_RX, PIN_EDGE, STAGE_BUS, STAGE_PINS, UART_BYTE, EventQueue
 from ranger_sim.foundation.user_error import UserError
 from tests.firmware_sim.board import TICK_NS, Log, raise_at
 
@@ -219,6 +219,18 @@ def test_a_source_can_be_attached_anew_and_taken_out():
     attach(log, ADC_DONE, 0, FIQ, "again")
     log.chip.vic.detach(source)
     assert source.forgotten == 1  # none did
+
+
+def test_a_message_that_waits_for_its_service_is_given_back_whole():
+    log = Log()
+    source = attach(log, ADC_DONE, 0, 3, "handler")
+    came, seen = EventQueue(), EventQueue()
+    came.push(1_000, 2, ADC_DONE, 3, 4, 5, 6, 7, 8, log)
+    assert came.take()
+    source.keep_message(came)
+    source.give_message(seen)
+    assert (seen.time, seen.order, seen.kind) == (1_000, 2, ADC_DONE)
+    assert (seen.a, seen.b, seen.c, seen.d, seen.e, seen.f, seen.ref) == (3, 4, 5, 6, 7, 8, log)
 
 
 # --- the story of the encoder interrupts (appendix 4.6) ----------------------------------------------------

@@ -499,13 +499,17 @@ def test_master_and_slave_put_their_segments_on_the_wire():
     port.start(segment)
     port.load(segment)
     assert chip.outbox.take()
-    assert (chip.outbox.time, chip.outbox.kind, chip.outbox.ref) == (7_000, SSP_START, segment)
+    out = chip.outbox
+    assert (out.time, out.kind, out.ref) == (7_000, SSP_START, segment)
+    assert [out.order, out.a, out.b, out.c, out.d, out.e, out.f] == [0] * 7  # port 0, and nothing else is said
     assert chip.outbox.take()
-    assert (chip.outbox.kind, chip.outbox.ref) == (SSP_LOAD, segment)
+    assert (out.time, out.kind, out.ref) == (7_000, SSP_LOAD, segment)
+    assert [out.order, out.a, out.b, out.c, out.d, out.e, out.f] == [0] * 7
+    segment.words = list(range(500, 531))
     copy = SspSegment()
     copy.copy_from(segment)
     segment.clear()
-    assert (list(copy.words), copy.used) == ([0] * 30 + [1], 31)
+    assert (list(copy.words), copy.used) == (list(range(500, 531)), 31)
     assert (list(segment.words), segment.used) == ([0] * 30 + [1], 0)
 
 

@@ -95,3 +95,12 @@ def test_the_report_tells_pulls_as_the_summary_has_them():
     assert values["strikes that pull"] == "3 (to -0.46 N s)"
     assert values["lowest push of the floor"] == "-7.2 N"
     assert values["slides"] == "2 in 12.5 ms"
+
+
+def test_a_strike_that_would_pull_lets_the_trailing_foot_go_by_the_unilateral_rule(monkeypatch):
+    seen = Observer("unilateral", monkeypatch, steps=6)
+    figures = oddities(Seen(seen.body))
+    # every strike of this gait pulls by the sticking rule (the first test): here none does, and none is on both feet
+    assert seen.impulses == [0.0] * len(seen.impulses) and len(seen.impulses) >= 2
+    assert figures["tensile_strikes"] == 0 and figures["tensile_impulse_min_Ns"] == 0.0
+    assert seen.body.mode != DOUBLE and all(len(row) <= 1 for row in seen.rows)

@@ -38,6 +38,7 @@ from ranger_sim.tools.units import whole_number
 COMMAND = "python -m ranger_sim.tools.mutate"
 COUNT = 30
 LIMIT_S = 60.0
+MAP_LIMIT_S = 900
 NOTICED = (KILLED, TIMEOUT)
 
 
@@ -60,6 +61,13 @@ def parser() -> argparse.ArgumentParser:
         default=int(LIMIT_S),
         metavar="S",
         help=f"of the tests that reach a mutant, run the cheapest of so many seconds together (default {LIMIT_S:g})",
+    )
+    command.add_argument(
+        "--map-limit",
+        type=whole_number(1),
+        default=MAP_LIMIT_S,
+        metavar="S",
+        help=f"a file of tests that lasts longer while it is mapped takes no part (default {MAP_LIMIT_S})",
     )
     command.add_argument(
         "--work",
@@ -119,7 +127,7 @@ def of_room(options: argparse.Namespace, copy: Copy, room: str, listed: list[Kno
     if options.again:
         shutil.rmtree(options.work / f"reach-{room}", ignore_errors=True)
     wanted = options.tests or [f"tests/{room}"]
-    tests = AllOf(wanted) if options.at else reach_of(copy, room, wanted, say)
+    tests = AllOf(wanted) if options.at else reach_of(copy, room, wanted, options.map_limit, say)
     for mutant in drawn:
         old = results.verdicts.get(mutant.key)
         if mutant.key in equivalent or (old is not None and (old.outcome in NOTICED or not options.again)):

@@ -25,6 +25,7 @@ KILLED, SURVIVED, TIMEOUT, NOT_REACHED = "killed", "survived", "timeout", "not r
 # A mutant may make a test slow for good; chosen by us, beside a machine that has other work.
 SLOWER = 4.0
 START_S = 30.0
+NOTHING: dict[str, Any] = {"imported": [], "files": {}, "tests": {}, "failed": []}  # a map without tests
 NO_SUCH_TEST, NO_TESTS = 4, 5  # pytest's exit codes
 
 
@@ -191,8 +192,11 @@ class AllOf:
         return 900.0 / SLOWER
 
 
-def reach_of(copy: Copy, room: str, tests: list[str], say: Callable[[str], None]) -> TestsOf:
-    """The map of a room's tests, file by file: kept from an earlier run, or made by running them once."""
+def reach_of(copy: Copy, room: str, tests: list[str], map_limit_s: float, say: Callable[[str], None]) -> TestsOf:
+    """The map of a room's tests, file by file: kept from an earlier run, or made by running them once.
+
+    A file that takes longer than `map_limit_s` takes no part, and that is said.
+    """
     folder = copy.folder.parent / f"reach-{room}"
     folder.mkdir(exist_ok=True)
     files = [file for path in tests for file in files_of_tests(copy.folder / path)]
@@ -205,11 +209,13 @@ def reach_of(copy: Copy, room: str, tests: list[str], say: Callable[[str], None]
         if not kept.exists():
             partial = kept.with_suffix(".partial")
             arguments = ["-p", "ranger_sim.tools.mutate.reach", name]
-            code, said = copy.pytest(arguments, limit_s=3600.0, RANGER_SIM_REACH=str(partial))
-            if code not in (0, 1, NO_TESTS) or not partial.exists():
-                raise UserError(f"{name}: does not run: {(said.strip().splitlines() or ['no end within an hour'])[-1]}")
+            code, said = copy.pytest(arguments, limit_s=map_limit_s, RANGER_SIM_REACH=str(partial))
+            if code is None:
+                partial.write_text(json.dumps(NOTHING | {"failed": [f"{name} (over {map_limit_s:g} s)"]}), "utf-8")
+            elif code not in (0, 1, NO_TESTS) or not partial.exists():
+                raise UserError(f"{name}: does not run: {said.strip().splitlines()[-1]}")
             partial.replace(kept)
-            say(f"{room}: {name} is mapped")
+            say(f"{room}: {name} {'takes too long' if code is None else 'is mapped'}")
         found = json.loads(kept.read_text(encoding="utf-8"))
         merged["imported"] += found["imported"]
         merged["files"] |= found["files"]
@@ -217,7 +223,7 @@ def reach_of(copy: Copy, room: str, tests: list[str], say: Callable[[str], None]
         merged["failed"] += found["failed"]
     if merged["failed"]:
         left_out = ", ".join(merged["failed"][:3])
-        say(f"{room}: {len(merged['failed'])} tests fail or skip interpreted and take no part: {left_out} ...")
+        say(f"{room}: {len(merged['failed'])} tests fail, skip or last too long, and take no part: {left_out} ...")
     return TestsOf(merged)
 
 
