@@ -7,10 +7,10 @@ from ranger_sim.firmware_sim.microcontroller import Microcontroller
 from ranger_sim.firmware_sim.peripheral import Peripheral
 from ranger_sim.firmware_sim.scheduler import Schedule
 from ranger_sim.firmware_sim.vic import FIQ, SOFTWARE
-from ranger_sim.foundation.events import NEVER, PIN_OUTPUT, UART_BYTE
+from ranger_sim.foundation.events import NEVER, PIN_EDGE, PIN_OUTPUT, UART_BYTE
 from ranger_sim.foundation.random_stream import RandomStream
 from ranger_sim.foundation.user_error import UserError
-from tests.firmware_sim.board import raise_at
+from tests.firmware_sim.board import Log, raise_at
 
 
 def test_only_peripherals_can_be_reached_from_outside():
@@ -108,3 +108,12 @@ def test_interrupts_of_one_instant_are_served_after_all_that_comes_at_it():
         raise_at(chip, source, 1_000)
     chip.advance(2_000_000)
     assert served == [1, 2, 0]
+
+
+def test_an_edge_tells_the_level_of_its_partner_pin_which_may_be_pin_0():
+    log = Log()
+    for partner, level in ((0, 1), (1, 1), (-1, 1)):  # -1: it has none
+        log.chip.inbox.push(1_000, 0, PIN_EDGE, 9, 1, partner, level)
+    log.chip.advance(2_000)
+    assert [log.chip.pins[pin] for pin in (0, 1, 9)] == [1, 1, 1]
+    assert log.chip.pins[2] == 0 and log.chip.pins[len(log.chip.pins) - 1] == 0

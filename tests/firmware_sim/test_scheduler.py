@@ -2,7 +2,7 @@
 
 import pytest
 
-from ranger_sim.firmware_sim.activity import INTERRUPT_RAN, SLOT_ENDED, TASK_RAN
+from ranger_sim.firmware_sim.activity import INTERRUPT_RAN, SLOT_ENDED, TASK_RAN, ActivityLog
 from ranger_sim.firmware_sim.clock import Crystal
 from ranger_sim.firmware_sim.scheduler import Occasional, Schedule, Task, Wait
 from ranger_sim.firmware_sim.vic import EXTERNAL_INTERRUPT
@@ -192,6 +192,16 @@ def test_slots_follow_the_boards_own_crystal():
     log.start(every=(log.task("a", 60),))
     log.chip.advance(1_000_000_000)
     assert len(log.entries) == 2001  # 100 ppm fast: slot 2000 starts 100 us before the second is over
+
+
+@pytest.mark.parametrize(("limit", "hits"), [(599, 2), (600, 0), (0, 0)])
+def test_a_limit_counts_beyond_itself_and_0_is_none_also_while_every_slot_is_recorded(limit, hits):
+    log = Log()
+    task = log.task("task", 600, limit=limit)
+    log.start(every=(task,))
+    log.chip.scheduler.attach_log(ActivityLog())
+    log.chip.advance(900_000)
+    assert (task.last_cycles, task.hits) == (600, hits)
 
 
 def test_replacing_an_entry_runs_the_users_function_at_its_declared_cost():
