@@ -78,7 +78,7 @@ REASONS = {
     MALFORMED: "did not speak the protocol",
     TOO_LONG: "sent a request above the limit",
     STALLED: "went on without taking its answers",
-    IDLE: "had asked for nothing and made room",
+    IDLE: "had not begun to take part and made room",
 }
 
 
