@@ -24,7 +24,7 @@ Group = tuple[str, Any, list[tuple[str, str, str, Any]]]
 
 DTYPES = {"f32": "<f4", "i32": "<i4", "u32": "<u4"}
 WORD = np.dtype([("time_s", "<f8"), ("word", "<u4")])  # a row of a variable, before its type is looked at
-FLUSH_S = 60.0  # of virtual time: so much of a slow variable a killed run may lose; chosen by us
+FLUSH_S = 5.0  # of virtual time: so much of a slow variable a killed run may lose; chosen by us
 
 
 class VariablesFile:

@@ -21,7 +21,6 @@ from ranger_sim.tools.units import (
 )
 
 LOGS = ("full", "window", "none")
-DEFAULT_LOG = "window"
 
 
 def of_scenario(field: str, units: dict[str, float], base: str) -> Quantity:
@@ -152,8 +151,11 @@ def stop_of(given: argparse.Namespace) -> StopRule | None:
 
 
 def log_of(given: argparse.Namespace) -> str:
-    """What the log is to keep; nothing without a folder for it."""
-    return (given.log or DEFAULT_LOG) if given.out else "none"
+    """What the robot's own log keeps, for the report: the last seconds, or nothing without a folder for it.
+
+    The files of `--log full` take everything as it comes, and nothing of that is kept in memory.
+    """
+    return "none" if not given.out or given.log == "none" else "window"
 
 
 def scenario_of(given: argparse.Namespace) -> Scenario:

@@ -3,11 +3,13 @@
 import contextlib
 import io
 import json
+import shlex
 import types
 
 import pytest
 from rich.console import Console
 
+from ranger_sim.foundation import random_arrays
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.ranger import Ranger
 from ranger_sim.harness.scenario import Scenario, StopRule
@@ -178,3 +180,58 @@ def test_where_no_screen_is_progress_comes_as_lines(monkeypatch):
 )
 def test_long_times_are_told_in_hours_too(seconds, text):
     assert walk.duration_text(seconds) == text
+
+
+def digest_and_command(capsys, *words):
+    """Of a walk with these options."""
+    assert cli.main(["walk", *words, "--json", "-"]) in (0, 1, 3)
+    summary = json.loads(capsys.readouterr().out)
+    return summary["trace_digest"], summary["command"]
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_the_command_that_a_run_tells_walks_the_same_again(capsys, seed):
+    """Options at random; half of the walk the robot is held (1.5 s), then it steps on the rough floor."""
+    drawn = random_arrays.generator(seed, "options of a walk")
+    chosen = {
+        "--time": f"{drawn.uniform(1.8, 2.2)}s",
+        "--seed": str(drawn.integers(-(2**40), 2**40)),
+        "--slope": f"{drawn.uniform(-0.6, 0.6)} deg",
+        "--floor-roughness": f"{drawn.uniform(0.0, 2.0)}mm",
+        "--battery": f"{drawn.uniform(50.0, 100.0)}%",
+        "--battery-capacity": f"{drawn.uniform(0.3, 0.6)}kWh",
+        "--controller": drawn.choice(["robust", "record-2011"]),
+        "--profile": "hil-1mbit",
+        "--fault": f"MCH.joint_encoder:stuck@{drawn.uniform(0.5, 1.5)} s",
+    }
+    kept = drawn.permutation(list(chosen))[:6].tolist()
+    words = [word for name in {"--time", *kept} for word in (name, str(chosen[name]))]
+    digest, command = digest_and_command(capsys, *words, "--off", "left-outer-ankle")
+    again, same_command = digest_and_command(capsys, *shlex.split(command)[2:])
+    assert again == digest and same_command == command
+    # an option that was forgotten would give another digest, so the options have to matter
+    assert digest_and_command(capsys, "--time", chosen["--time"])[0] != digest
+
+
+def test_a_walk_that_fell_short_has_no_mean_step(capsys):
+    assert cli.main(["walk", "--time", "0.1s", "--json", "-"]) == 0
+    summary = json.loads(capsys.readouterr().out)
+    for name in ("mean_step_length_m", "std_step_length_m", "mean_step_time_s", "double_stance_s", "speed_m_per_s"):
+        assert summary[name] is None, name
+    assert summary["complete"] is True and summary["files"] == {}
+
+
+def test_a_walk_without_a_folder_says_where_results_would_go(capsys):
+    assert cli.main(["walk", "--time", "0.1s", "--log", "full"]) == 0
+    told = capsys.readouterr().err.splitlines()
+    assert told[0] == "--log full is ignored: there is no folder for logs (--out DIR)"
+    assert "step none, none" in told[1]
+    assert told[-1] == "nothing was kept: --out runs/NAME keeps summary, logs and report there"
+
+
+def test_only_errors_beyond_a_healthy_walk_are_told():
+    usual = {"MCH": {"MC_TCURR_OOB": 40}, "MB": {}}
+    assert walk.error_lines(usual, 60.0) == ["errors as in every healthy walk: 1 kinds (report and summary have them)"]
+    unusual = {"MCH": {"MC_TCURR_OOB": 40}, "MCFI": {"ADCI_DNF": 3}, "MB": {}}
+    assert walk.error_lines(unusual, 60.0)[0] == "errors of MCFI: ADCI_DNF x 3"
+    assert walk.error_lines({"MB": {}}, 60.0) == []
