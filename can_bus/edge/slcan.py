@@ -82,7 +82,8 @@ class SlcanServer(StreamServer[Connection]):
             if self.program.tap is not None or self.taps.full:
                 self._answer(BELL)
                 self.totals["refused"] += 1
-                self.sent_away[FULL] += self.taps.full
+                if self.program.tap is None:
+                    self.sent_away[FULL] += 1
                 return
             self.program.taps = self.taps
             self.program.tap = self.taps.add(f"{self.channel} slcan")

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from ranger_sim.can_bus.bus import Bus
 from ranger_sim.can_bus.edge.slcan import SlcanServer
 from ranger_sim.can_bus.edge.socketcand import SocketcandServer
+from ranger_sim.can_bus.edge.taps import TAP_LIMIT
 from ranger_sim.foundation import descriptors, wallclock
 from ranger_sim.foundation.events import FLAG_EXTENDED, FLAG_REMOTE, STAGE_BUS, EventQueue
 from ranger_sim.foundation.user_error import UserError
@@ -90,6 +91,14 @@ def test_slcan_commands_have_the_answers_of_the_protocol(line):
     assert say("T000001230\r") == "Z\r"
     assert say("F\r") == "F00\r"
     assert say("C\r") == "\r"
+
+
+def test_slcan_a_bus_without_a_place_is_refused_and_counted_and_opening_twice_is_not(line):
+    owner, say = line
+    others = [owner.server.taps.add(f"other {number}") for number in range(TAP_LIMIT)]
+    assert say("O\r") == "\a" and owner.server.sent_away == {"full": 1}
+    owner.server.taps.remove(others[0])
+    assert say("O\r") == "\r" and say("O\r") == "\a" and owner.server.sent_away == {"full": 1}
 
 
 def test_slcan_frames_are_lines(line):
