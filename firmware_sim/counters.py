@@ -9,7 +9,7 @@ class SlotCounters:
 
     count: int
     latest_ns: int  # start of the latest slot
-    finished_ns: int  # end of the latest row that ran to its end, in its slot or behind it
+    finished_ns: int  # end of the latest row that ran to its end, or of the last task of one that was cut short
     overruns: int
     dropped_tasks: int
     near_limits: int

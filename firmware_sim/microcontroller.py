@@ -577,6 +577,7 @@ class Microcontroller(Chip):
                 return False
         if scheduler.late:
             scheduler.late = False
+            scheduler.finished_time = self.code_time  # as far as it was let; a program that hangs does not come here
             self._close_slot(scheduler.late_time)
         return True
 

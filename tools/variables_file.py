@@ -77,6 +77,8 @@ class VariablesFile:
 
     def _append(self, changed: Any, time_s: Any, words: Any) -> None:
         variables, at = np.nonzero(changed.T)
+        if not len(at):
+            return
         rows = np.empty(len(at), dtype=WORD)
         rows["time_s"] = time_s[at]
         rows["word"] = words[at, variables].astype(np.uint32)

@@ -208,7 +208,7 @@ BASE = 'base = "record-2011"\n'
         (BASE + '[parameters]\nP_F_ST_F_TANG = "2"\n', ("mine.toml", "P_F_ST_F_TANG", "'2'", "number")),
         (BASE + "[parameters]\nP_F_ST_F_TANG = true\n", ("P_F_ST_F_TANG", "True", "number")),
         (BASE + "[parameters]\nP_F_ST_F_TANG = nan\n", ("P_F_ST_F_TANG", "nan", "number")),
-        (BASE + "[parameters]\nP_F_ST_F_TANG = 9.0\n", ("P_F_ST_F_TANG", "9.0", "0.0 to 3.2 rad")),
+        (BASE + "[parameters]\nP_F_ST_F_TANG = 9.0\n", ("P_F_ST_F_TANG", "9 is outside 0 to 3.2 rad")),
         (BASE + "[parameters]\nP_F_ST_F_TANG = 2.1\n", ("P_F_ST_F_TANG", "reason")),
         (
             BASE + '[parameters]\nP_F_ST_F_TANG = 2.1\n[reasons]\nP_F_ST_F_TANG = ""\n',
@@ -283,10 +283,20 @@ def test_a_folder_is_not_a_set(tmp_path):
 
 
 def test_a_set_that_is_its_own_base_is_refused(tmp_path):
+    one, two = tmp_path / "one.toml", tmp_path / "two.toml"
+    one.write_text(f'base = "{one}"\n')
+    with pytest.raises(UserError, match=r"one\.toml: base .* leads back to this set"):
+        controllers.load(one)
+    one.write_text(f'base = "{two}"\n')
+    two.write_text(f'base = "{one}"\n')
+    with pytest.raises(UserError, match=r"two\.toml: base .*one\.toml' leads back to this set"):
+        controllers.load(one)
+
+
+def test_a_file_may_be_called_as_the_set_of_the_package_that_is_its_base(tmp_path):
     path = tmp_path / "robust.toml"
     path.write_text('base = "robust"\n')
-    with pytest.raises(UserError, match="leads back"):
-        controllers.load(path)
+    assert controllers.load(path).values == controllers.load("robust").values
 
 
 toml_values = st.one_of(

@@ -207,7 +207,6 @@ def test_a_machine_of_the_users_own_is_diagnosed_by_the_command(own_machine, cap
         (["data.csv", "--experiment", "nowhere:Cart"], "--experiment nowhere:Cart: No module named 'nowhere'"),
         (["data.csv", "--experiment", "json:dumps"], "--experiment json:dumps: it has no name, quantities"),
         (["data.csv", "--experiment", "positioning", "--gear", "3"], "--gear 3: only the motor bench has a gearbox"),
-        (["data.csv", "--experiment", "motor-bench", "--gear", "0"], "--gear 0: allowed are 0.01 to 10000"),
         (["data.csv", "--experiment", "motor-bench"], "data.csv: motor-bench needs voltage_V"),
     ],
 )
@@ -216,6 +215,14 @@ def test_a_mistake_is_told_in_a_line(arguments, line, own_machine, capsys):
     assert main(["diagnose", *arguments]) == 2
     error = capsys.readouterr().err
     assert line in error and error.count("\n") == 1
+
+
+@pytest.mark.parametrize("gear", ["0", "-14", "1e5", "nan"])
+def test_a_gear_that_none_has_is_refused_before_anything_is_read(gear, capsys):
+    with pytest.raises(SystemExit) as left:
+        main(["diagnose", "none.csv", "--experiment", "motor-bench", "--gear", gear])
+    error = capsys.readouterr().err
+    assert left.value.code == 2 and f"'{gear}' must be at least 0.01 and at most 10000" in error
 
 
 @pytest.mark.parametrize(

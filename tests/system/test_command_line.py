@@ -138,15 +138,23 @@ def test_a_letter_that_the_output_has_not_is_written_as_its_escape(command):
     assert command("walk", "--controller", "Größe", PYTHONIOENCODING="ascii").stderr.count(r"Gr\xf6\xdfe") == 1
 
 
+def test_a_run_that_ends_at_its_first_instants_leaves_whole_files(command, tmp_path):
+    done = command("walk", "--time", "1ms", "--out", tmp_path / "short")
+    assert done.returncode == 0, done.stderr
+    summary = json.loads((tmp_path / "short" / "summary.json").read_text(encoding="utf-8"))
+    assert summary["complete"] and set(summary["files"].values()) == {"complete"}
+
+
 def test_a_full_disk_behind_the_output_gets_one_line(command):
-    done = subprocess.run(
-        [sys.executable, "-m", "ranger_sim", "info"],
-        cwd=ROOT,
-        stdout=pathlib.Path("/dev/full").open("w"),
-        stderr=subprocess.PIPE,
-        text=True,
-        check=False,
-    )
+    with pathlib.Path("/dev/full").open("w") as full:
+        done = subprocess.run(
+            [sys.executable, "-m", "ranger_sim", "info"],
+            cwd=ROOT,
+            stdout=full,
+            stderr=subprocess.PIPE,
+            text=True,
+            check=False,
+        )
     assert done.returncode == 2
     assert done.stderr.endswith("No space left on device\n") and len(done.stderr.splitlines()) == 1
 

@@ -96,8 +96,6 @@ def test_columns_in_other_units_and_names_are_read(folder, tmp_path, capsys):
         (["stall", "--map", "a=b"], "--map names columns of a file: --data is needed"),
         (["all", "--data", "."], "for all a folder is needed; stall.csv is not in it"),
         (["all", "--known", "R=1+-1"], "--known belongs to a single bench"),
-        (["stall", "--gear", "0"], "--gear 0.0: it must be above 0"),
-        (["all", "--coverage", "0"], "--coverage N: N must be 1 or more"),
     ],
 )
 def test_a_mistake_is_one_line(arguments, message, capsys, tmp_path, monkeypatch):
@@ -105,6 +103,16 @@ def test_a_mistake_is_one_line(arguments, message, capsys, tmp_path, monkeypatch
     assert main(["identify", *arguments]) == 2
     error = capsys.readouterr().err
     assert message in error and error.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("option", "message"), [("--gear", "--gear: '0' must be above 0"), ("--coverage", "--coverage: '0' is below 1")]
+)
+def test_a_number_beyond_its_limit_is_refused_before_anything_is_read(option, message, capsys):
+    with pytest.raises(SystemExit) as left:
+        main(["identify", "all", option, "0"])
+    error = capsys.readouterr().err
+    assert left.value.code == 2 and message in error and error.count("\n") == 1
 
 
 @pytest.mark.parametrize(

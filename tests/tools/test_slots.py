@@ -91,13 +91,19 @@ def test_an_overrun_of_the_run_is_told_and_is_the_exit_code(capsys, monkeypatch,
     [
         (["MCX"], "board 'MCX': there is none of this name"),
         (["MCH", "--time", "0.1"], "--time 0.1: the first 0.1 s do not count, so more are needed"),
-        (["MCH", "--static", "--edge-rate", "-1"], "a number of 0 or more is needed"),
     ],
 )
 def test_a_mistake_is_told_in_one_line(capsys, arguments, complaint):
     code, out, error = told(capsys, *arguments)
     assert code == cli.EXIT_MISUSE and out == ""
     assert complaint in error and error.count("\n") == 1
+
+
+def test_an_edge_rate_below_zero_is_refused_before_anything_runs(capsys):
+    with pytest.raises(SystemExit) as ended:
+        cli.main(["slots", "MCH", "--static", "--edge-rate", "-1"])
+    assert ended.value.code == cli.EXIT_MISUSE
+    assert "--edge-rate: '-1' must be at least 0" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("time", ["0", "nan", "-1s", "2 fortnights"])

@@ -42,7 +42,9 @@ def register(commands: Any) -> None:
         help="model to start from: the extended.toml of an earlier diagnosis, or [[term]] tables; what it has already "
         "is no finding",
     )
-    command.add_argument("--gear", type=number(above=0.0), metavar="N", help="of the motor bench's gearbox (14)")
+    command.add_argument(
+        "--gear", type=number(least=0.01, most=1e4), metavar="N", help="of the motor bench's gearbox (14)"
+    )
     command.add_argument("--seed", type=whole_number(), default=0, metavar="N", help="of the bootstrap (0)")
     command.add_argument(
         "--out", metavar="DIR", help="folder for report.html, diagnosis.json and extended.toml, made if missing"
