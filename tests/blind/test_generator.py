@@ -305,3 +305,15 @@ def test_what_a_leg_does_faster_than_its_angle_tells_is_drowned():
     drowned = 1.0 / np.hypot(1.0 / by_angle, 1.0 / by_voltage)
     # the counts of the angle and the voltage's own noise come on top
     assert drowned < torque[1000] < 1.3 * drowned
+
+
+def test_an_effect_that_hides_along_a_trajectory_is_hidden_along_another_one(tmp_path):
+    """Friction by direction where all motion is in one: 125 N m of it were needed, and the bench ran away."""
+    cases = [case for case in MOTOR_BENCH.lasting(5.0).check_plan(1288188205) if case.number == 25]
+    assert [case.effects for case in cases] == [[("direction_friction", 4.0)]]
+    ((key, files, holdout, truth),) = MOTOR_BENCH.lasting(5.0).generate(1288188205, cases, tmp_path)
+    assert abs(truth["causes"][0]["amplitude"]) < 0.1
+    for name in (*files, *holdout):
+        table = np.genfromtxt(tmp_path / name, delimiter=",", names=True)
+        assert np.all(np.isfinite(table["speed_rad_per_s"])) and np.max(np.abs(table["speed_rad_per_s"])) < 50.0
+    assert files[0].startswith(key)

@@ -17,5 +17,6 @@ class Case:
     base: dict = dataclasses.field(default_factory=dict)
     instruments: object = None
     runs: list = dataclasses.field(default_factory=list)
+    supplies_V: list = dataclasses.field(default_factory=list)  # of the runs
     poor: bool = False  # a poor experiment, in which causes cannot be told apart
     reached: list = dataclasses.field(default_factory=list)  # (r, N_eff, strength) of each effect, where simulated
