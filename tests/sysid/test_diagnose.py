@@ -264,6 +264,8 @@ def test_a_fault_of_the_motor_bench_is_named(tmp_path):
         "4.0",
         "--count",
         "1",
+        "--seconds",
+        "8",
     ]
     root = pathlib.Path(__file__).resolve().parents[2]
     command = [sys.executable, *program, "--seed", "11", "--out", str(folder)]
