@@ -10,7 +10,7 @@ import pytest
 OURS = ("anon_inode", "pipe", "socket")  # kinds of descriptors that a test may leave open only by mistake
 
 # Files that take longest, the longest first: side by side they begin before the many short ones, so that at the end
-# neither process waits for the other (s of processor, 23 November 2026: 270, 160, 90, 60, 60, 50, 45, 45).
+# neither process waits for the other (from some 240 s down to 40 s each, 23 November 2026, AMD EPYC).
 LONGEST = (
     "blind/test_bounds.py",
     "system/test_determinism.py",
