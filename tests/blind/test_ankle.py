@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from ranger_sim.foundation.random_arrays import generator
+from ranger_sim.plant import body_files
 from tests.blind import generate
 from tests.blind.generator.ankle import ANKLE, NUDGE, Ankle, Run
 from tests.blind.generator.case import Case
@@ -129,3 +130,20 @@ def test_logs_are_as_the_robot_s_and_carry_no_label(tmp_path, monkeypatch, capsy
                 currents = [row.split(",")[-1] for row in rows]
                 assert sum(map(bool, currents)) == 24  # every thirteenth
     assert kinds == {"sine", "foot"}
+
+
+def test_the_base_parameters_are_those_of_the_body_that_was_identified_by_the_robot_s_logs():
+    """The generator imports no plant; this test may. Its nominal ankle is that of plant/bodies/ranger.toml."""
+    body, motor = body_files.load("ranger").parameters, body_files.load("ranger").electrics.inner_ankle
+    known = {
+        "J_f": body.foot_inertia_kg_m2,
+        "k_r": body.ankle_return_Nm_per_rad,
+        "q_0": body.ankle_return_rest_rad,
+        "k_s": body.ankle_spring_Nm_per_rad,
+        "C0": motor.constant_friction_Nm,
+        "C1": motor.viscous_friction_Nms,
+        "mu": motor.load_friction,
+        "GK": motor.gear * motor.torque_constant_Nm_per_A,
+    }
+    assert {name: ANKLE.NOMINAL[name] for name in known} == pytest.approx(known)
+    assert ANKLE.FIXED["J_m"] == pytest.approx(motor.reflected_inertia_kg_m2)
