@@ -9,14 +9,16 @@ an equation is one angle, linearised about the motion that fits best:
     transmission  the same of a - p                                                    where both are measured
     joint rate    the same of a', where it is measured
 
-Free in it is what no two ankles share: foot, spring, friction with its part under load, cable, rotor, the zero of one
-angle against the other, the lag of the current. What of these the angles do not tell stays where it is known to be
-(`SPREAD`). The motor creeps inside its friction, as the simulator's does, or stands still, as a machine does: whichever
-fits.
+Free in it is what no two ankles share: foot, springs, friction with its part under load, cable, rotor, torque constant,
+the zero of one angle against the other, what the law and its target are late by. Each is known before any data, within
+what sound ankles differ in (`SPREAD`): what the angles do not tell stays there, and what they tell against it is a
+wrong value and named as one (`WRONG`). The motor creeps inside its friction, as the simulator does, or stands still, as
+a machine does; the law sees the rate through the board's filter, or as it is: whichever fits.
 
 The response is that difference plus the found values times their sensitivities, so that values come out as they are.
 """
 
+import copy
 import dataclasses
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -31,10 +33,13 @@ from ranger_sim.sysid.dataset import Array, Finding, Table
 from ranger_sim.sysid.machine import Columns, Effect, Equation, Known, Quantity, Recording, Values
 from ranger_sim.sysid.machines import ankle_motion
 from ranger_sim.sysid.machines.ankle_motion import (
+    BALANCE,
     CABLE,
+    CONSTANT,
     COULOMB,
     INERTIA,
     LAG,
+    LATE,
     LOAD,
     PARAMETERS,
     RATE_FILTER_S,
@@ -48,6 +53,7 @@ from ranger_sim.sysid.machines.ankle_motion import (
     ZERO,
     Drive,
     Motion,
+    REST_rad,
 )
 from ranger_sim.sysid.machines.forms import bristles
 from ranger_sim.sysid.regression import Regression
@@ -69,13 +75,58 @@ INERTIA_STARTS = (1.0, 2.5)  # of its value: the cable's ringing makes the sum o
 LARGEST_RIPPLE, LARGEST_COGGING_Nm, LARGEST_ECCENTRICITY_rad = 0.5, 0.1, 0.02
 SLOW = 5.0  # times what is new in it from row to row: noise of these encoders has 1.1 to 1.4, on blind recordings
 SLOWEST_NOISE = 0.9  # memory from row to row (12 ms) of what the base leaves, at most: beyond it, it is an effect's
-MEMORY = 10.0  # samples of a misfit that tell the same
+CLEARLY = 20.0  # better by so much, a law fits that the board is not known to have
+FAR = 3.0  # deviations from what is known before, from which on a value hardly pulls
+MEMORY = 4.0  # rows of noise that tell the same: with a memory of 0.6 from row to row
 JOINT, MOTOR, TRANSMISSION, RATE = "joint", "motor", "transmission", "joint rate"
-# How well a parameter is known before any data: where the angles do not tell it, the fit stays there. Chosen by us: a
-# motor's torque constant, in whose unit all torques are, is known to 20 %, its friction under load to half; a cable's
-# stiffness depends on how it lies, a foot's inertia on what is screwed to it; the robot's logs have zeros of 0.02 to
-# 0.04 rad (docs/ankle-measured.md); half a slot of the board (0.25 ms) and its current loop are 0.5 to 1 ms.
-SPREAD = {INERTIA: 0.0013, LOAD: 0.05, CABLE: 5.0, ROTOR: 0.0004, ZERO: 0.04, LAG: 0.0005}
+# How far sound ankles are from `USUAL`, as a deviation, chosen by us: 15 % of what is made of steel, cable and springs,
+# so that twice that is nothing and four times that is named. Otherwise: the spring's rest angle a quarter of a radian;
+# viscous friction from the 0.004 of the robot's logs to the appendix's 0.01 N m s/rad; a rotor and its magnets are a
+# data sheet's, 5 and 10 %; zeros are those of the
+# robot's logs, 0.02 to 0.04 rad; half a slot of the board and
+# its current loop are 0.5 to 1 ms; targets come every 2 ms, and a log's stamps are 1 ms.
+SPREAD = {
+    INERTIA: 0.15 * USUAL[INERTIA],
+    STIFFNESS: 0.15 * USUAL[STIFFNESS],
+    TORQUE: 0.25 * USUAL[STIFFNESS],
+    COULOMB: 0.15 * USUAL[COULOMB],
+    VISCOUS: 0.003,
+    LOAD: 0.15 * USUAL[LOAD],
+    CABLE: 0.15 * USUAL[CABLE],
+    ROTOR: 0.05 * USUAL[ROTOR],
+    ZERO: 0.012,
+    LAG: 0.0005,
+    LATE: 0.002,
+    BALANCE: 0.15 * USUAL[STIFFNESS],
+    CONSTANT: 0.1 * USUAL[CONSTANT],
+}
+# Where the joint alone is measured and the model's error is far above the noise, that error is in every value: then
+# springs and friction are free, the rest is known to about half of itself, and no value is called wrong.
+LOOSE = {
+    INERTIA: USUAL[INERTIA],
+    LOAD: 0.5 * USUAL[LOAD],
+    CABLE: 5.0,
+    ROTOR: 0.2 * USUAL[ROTOR],
+    ZERO: 0.04,
+    LAG: SPREAD[LAG],
+    LATE: SPREAD[LATE],
+    BALANCE: 0.01 * USUAL[STIFFNESS],
+    CONSTANT: 0.01 * USUAL[CONSTANT],
+}
+LOGGED_LATE_S = 0.0001  # where the log has the command itself
+# A wrong value, by the parameter whose sensitivity it has: cause, place, coefficient. What a coefficient says is by how
+# much the value is off what is known before.
+WRONG = (
+    (INERTIA, "inertia", "inner_foot", "inertia_kg_m2", "mechanical", "of the foot about the ankle"),
+    (STIFFNESS, "spring_value", "inner_ankle", "stiffness_Nm_per_rad", "mechanical", "of the foot's return spring"),
+    (TORQUE, "spring_value", "inner_ankle_rest", "torque_Nm", "mechanical", f"of that spring at {REST_rad:g} rad"),
+    (BALANCE, "spring_value", "inner_motor", "stiffness_Nm_per_rad", "mechanical", "of the spring at the motor"),
+    (CABLE, "spring_value", "inner_cable", "stiffness_Nm_per_rad", "transmission", "of the cable"),
+    (COULOMB, "coulomb_friction", "inner_motor", "friction_Nm", "mechanical", "of motor and gearbox"),
+    (VISCOUS, "viscous_friction", "inner_motor", "friction_Nms", "mechanical", "of motor and gearbox"),
+    (LOAD, "load_friction", "inner_motor", "share", "mechanical", "part of the motor's torque that friction takes"),
+    (ZERO, "sensor_offset", "joint_angle_rad", "offset_rad", "sensor", "what the joint's encoder shows too much"),
+)
 
 Shape = Mapping[str, float]
 
@@ -90,13 +141,29 @@ class Run:
     target_rad: Array  # (m,) at the motion's steps; of the command where no target is logged
     target_rate_rad_per_s: Array
 
+    def shown(self, rate: Array) -> Array:
+        """Rates (m,) or (m, k) as the board tells them: behind the filter that its law has."""
+        return behind(rate, self, self.drive.filter_s) if self.drive.filter_s else rate
+
+
+def behind(values: Array, run: Run, time_constant_s: float) -> Array:
+    """(m,) or (m, k) at a motion's steps behind a first-order lag, with straight lines between the steps."""
+    x = (run.motion.time_s[1] - run.motion.time_s[0]) / time_constant_s
+    keep = math.exp(-x)
+    now, was = 1.0 - (1.0 - keep) / x, (1.0 - keep) / x - keep
+    start = (1.0 - now) * values[:1]
+    return np.asarray(lfilter([now, was], [1.0, -keep], values, axis=0, zi=start)[0])
+
 
 @dataclasses.dataclass
 class AnkleRecording(Recording):
-    """A recording with its simulated runs, and the values that the simulation has."""
+    """A recording with its simulated runs, the values that the simulation has, and the effects in it."""
 
     simulated: list[Run] = dataclasses.field(default_factory=list)
     values: dict[str, float] = dataclasses.field(default_factory=dict)
+    fit: "_Fit | None" = None
+    loose: bool = False  # too much is wrong to call a value wrong
+    acting: dict[tuple, tuple[float, ...]] = dataclasses.field(default_factory=dict)  # coefficients, keys as in `made`
     made: dict[tuple, Columns] = dataclasses.field(default_factory=dict)  # columns of effects, by effect and shape
 
 
@@ -104,6 +171,52 @@ class AnkleRecording(Recording):
 Pair = tuple[Array, Array]
 Make = Callable[[Run, Table, Shape], list[Pair]]
 Torque = Callable[[Motion], Array]
+# what motor and joint show with a coefficient of this size, where that is no multiple of it
+Exact = Callable[[Run, float], Pair]
+STEP = 1e-5  # of such a coefficient, for its derivative
+
+
+@dataclasses.dataclass(frozen=True)
+class AnkleEffect(Effect):
+    """An effect that can be in the simulation. shown: it is in what is measured, and moves nothing."""
+
+    make: Make | None = None
+    shown: bool = False
+    exact: Exact | None = None
+
+    def key(self, shape: Shape) -> tuple:
+        """Of what is kept with a recording."""
+        return (self.name, *self.coefficients, *sorted(shape.items()))
+
+    def pairs(self, run: Run, table: Table, shape: Shape, at: float = 0.0) -> list[Pair]:
+        """By one of each coefficient, about a simulation that has `at` of it."""
+        if self.exact is None or at <= 0.0:
+            assert self.make is not None
+            return self.make(run, table, shape)
+        more, less = self.exact(run, at + STEP), self.exact(run, at - STEP)
+        return [((more[0] - less[0]) / (2.0 * STEP), (more[1] - less[1]) / (2.0 * STEP))]
+
+    def seen(self, run: Run, table: Table, shape: Shape, coefficients: Sequence[float]) -> Pair:
+        """All that it shows or pushes with these coefficients."""
+        if self.exact is not None and coefficients[0] > 0.0:
+            return self.exact(run, coefficients[0])
+        pairs = self.pairs(run, table, shape)
+        return (
+            np.sum([c * p for c, (p, _) in zip(coefficients, pairs, strict=True)], axis=0),
+            np.sum([c * a for c, (_, a) in zip(coefficients, pairs, strict=True)], axis=0),
+        )
+
+
+@dataclasses.dataclass(frozen=True)
+class Acting:
+    """An effect in the simulation, and the names of its coefficients among the fit's values."""
+
+    effect: AnkleEffect
+    shape: Shape
+    names: tuple[str, ...]
+
+    def of(self, values: Values) -> tuple[float, ...]:
+        return tuple(values[name] for name in self.names)
 
 
 class Ankle:
@@ -120,18 +233,21 @@ class Ankle:
         Quantity("command_stiffness_A_per_rad", "A/rad", "gain on the angle", needed=False),
         Quantity("command_dampness_A_s_per_rad", "A s/rad", "gain on the rate", needed=False),
     )
-    # Values: robot.md P3, the inner ankle. Limits chosen by us, far beyond any ankle of this size.
+    # Values: of the body `ranger` (plant/bodies/ranger.toml). Limits chosen by us, far beyond any ankle of this size.
     parameters = (
-        Known(INERTIA, "kg m^2", 0.0013, 1e-4, 0.1, "of the foot about the ankle"),
-        Known(STIFFNESS, "N m/rad", 0.33, -5.0, 5.0, "of the return spring"),
-        Known(TORQUE, "N m", 0.55, -5.0, 5.0, "of the return spring at angle 0"),
-        Known(COULOMB, "N m", 0.06, 0.0, 2.0, "of motor and gearbox"),
-        Known(VISCOUS, "N m s/rad", 0.01, -0.5, 1.0, "of motor and gearbox"),
+        Known(INERTIA, "kg m^2", USUAL[INERTIA], 1e-4, 0.1, "of the foot about the ankle"),
+        Known(STIFFNESS, "N m/rad", USUAL[STIFFNESS], -5.0, 5.0, "of the return spring, at the joint"),
+        Known(TORQUE, "N m", USUAL[TORQUE], -5.0, 5.0, f"of the return spring at {REST_rad:g} rad, where it rests"),
+        Known(COULOMB, "N m", USUAL[COULOMB], 0.0, 2.0, "of motor and gearbox"),
+        Known(VISCOUS, "N m s/rad", USUAL[VISCOUS], -0.5, 1.0, "of motor and gearbox"),
         Known(LOAD, "", USUAL[LOAD], 0.0, 0.9, "part of the motor's torque that friction takes"),
         Known(CABLE, "N m/rad", USUAL[CABLE], 1.0, 1e3, "of the cable"),
-        Known(ROTOR, "kg m^2", USUAL[ROTOR], 1e-4, 0.1, "of the rotor behind the gear; another torque constant too"),
-        Known(LAG, "s", USUAL[LAG], 0.0, 0.02, "of the current behind the law"),
+        Known(ROTOR, "kg m^2", USUAL[ROTOR], 1e-4, 0.1, "of the rotor behind the gear"),
         Known(ZERO, "rad", USUAL[ZERO], -0.5, 0.5, "what the joint's encoder shows at the motor's zero"),
+        Known(LAG, "s", USUAL[LAG], 0.0, 0.02, "of the current behind the law"),
+        Known(LATE, "s", USUAL[LATE], -0.001, 0.05, "of the target in force behind the logged one"),
+        Known(BALANCE, "N m/rad", USUAL[BALANCE], -5.0, 5.0, "of the spring at the motor"),
+        Known(CONSTANT, "N m/A", USUAL[CONSTANT], 0.05, 6.0, "of the motor behind the gear"),
     )
 
     def prepare(self, table: Table) -> AnkleRecording:
@@ -143,44 +259,21 @@ class Ankle:
         if "command_current_A" not in table and float(np.min(table["target_angle_rad"])) < FLOOR_rad:
             other = _Fit(table, self.parameters, of_program=True)
             other.improve()
-            if float(other.missed @ other.missed) < float(fit.missed @ fit.missed):
+            if other.cost() < fit.cost():
                 fit = other
-        recording = AnkleRecording(table, {}, {}, width=WIDTH, every=EVERY, left_over=True, simulated=fit.runs)
-        recording.values = dict(fit.values)
-        recording.priors = {name: (fit.usual[name], spread) for name, spread in SPREAD.items()}
-        if fit.of_program:
-            recording.findings.append(_program_found(table))
-        s = recording.signals = _signals(table, fit.runs)
-        valid = fit.valid
-        sensitivity = np.zeros((len(table), ankle_motion.STATES, len(PARAMETERS)))
-        for run in fit.runs:
-            sensitivity[run.rows] = ankle_motion.sensitivities(run.motion)[run.motion.rows]
+        return _recording(fit)
 
-        def equation(name: str, letter: str, subsystem: str, missed: Array, slopes: Array) -> None:
-            columns = {each: slopes[:, PARAMETERS.index(each)] for each in PARAMETERS}
-            response = missed + sum(fit.values[each] * column for each, column in columns.items())
-            unit = "rad/s" if name == RATE else "rad"
-            recording.equations[name] = Equation(name, letter, subsystem, unit, response, columns, valid)
+    def again(
+        self, recording: Recording, effects: Sequence[tuple[Effect, Shape, Sequence[float]]], fixed: bool = False
+    ) -> Recording:
+        """The recording fitted and linearised with these effects in the simulation; fixed: their coefficients stay.
 
-        missed = table["joint_angle_rad"] - s["a"]
-        if "motor_angle_rad" in table:
-            of_motor = table["motor_angle_rad"] - s["p"]
-            equation(MOTOR, "M", "mechanical", of_motor, sensitivity[:, 0])
-            equation(TRANSMISSION, "T", "transmission", missed - of_motor, sensitivity[:, 2] - sensitivity[:, 0])
-        else:
-            equation(JOINT, "M", "mechanical", missed, sensitivity[:, 2])
-        if "joint_rate_rad_per_s" in table:
-            equation(RATE, "S", "sensor", table["joint_rate_rad_per_s"] - s["w"], sensitivity[:, 3])
-        fast = np.abs(s["u"]) > 0.3 * np.max(np.abs(s["u"][valid]))
-        recording.regimes = {"upward": s["u"] > 0.0, "downward": s["u"] < 0.0, "near reversals": ~fast}
-        # By the joint alone an error of the model far above the noise is as slow as the foot, and whitening it would
-        # high-pass what is wrong. The joint against the motor tells of faster things.
-        left = Regression([recording])
-        recording.whitened = "motor_angle_rad" in table or all(
-            (plausibility.slowness(left, name) or 0.0) < SLOW for name in left.equations
-        )
-        recording.memory = SLOWEST_NOISE
-        return recording
+        Where the joint alone is measured and what is left is far above the noise with them too, it is as it was, with
+        `LOOSE`: the form in the simulation would be preferred to its ties for what else is wrong.
+        """
+        assert isinstance(recording, AnkleRecording) and recording.fit is not None
+        made = _recording(recording.fit.with_effects(effects, fixed))
+        return made if made.whitened else _recording(recording.fit, loose=True)
 
     def generic(self, recording: Recording) -> dict[str, dict[str, Array]]:
         """Signals over which each angle is looked at without a cause in mind."""
@@ -193,9 +286,72 @@ class Ankle:
         top = max(float(np.quantile(np.abs(r.signals["u"]), 0.98)) for r in recordings)
         both = any(MOTOR in r.equations for r in recordings)
         return [
+            *_wrong(),
             *_springs(), *_friction(top), *_periodic(), *_cable(),
             *_sensors(both, any(RATE in r.equations for r in recordings)), *_law(recordings),
         ]  # fmt: skip
+
+
+def _recording(fit: "_Fit", loose: bool = False) -> AnkleRecording:
+    """Equations about the motion that was found. loose: with what is known by `LOOSE`."""
+    table = fit.table
+    recording = AnkleRecording(
+        table, {}, {}, width=WIDTH, every=EVERY, left_over=True, simulated=fit.runs, fit=fit, loose=loose
+    )
+    recording.acting = {each.effect.key(each.shape): each.of(fit.values) for each in fit.acting}
+    recording.values = dict(fit.values)
+    recording.priors = {name: (fit.usual[name], spread) for name, spread in fit.spread.items()}
+    if fit.of_program:
+        recording.findings.append(_program_found(table))
+    if fit.filter_s:
+        recording.findings.append(_filter_found(table))
+    s = recording.signals = _signals(table, fit.runs)
+    valid = fit.valid
+    sensitivity = np.zeros((len(table), ankle_motion.STATES, len(PARAMETERS)))
+    for run in fit.runs:
+        slopes = ankle_motion.sensitivities(run.motion)
+        slopes[:, 3] = run.shown(slopes[:, 3])
+        sensitivity[run.rows] = slopes[run.motion.rows]
+
+    bare: dict[str, Array] = {}  # responses without what the effects in the simulation do
+
+    def equation(name: str, letter: str, subsystem: str, missed: Array, slopes: Array) -> None:
+        columns = {each: slopes[:, PARAMETERS.index(each)] for each in PARAMETERS}
+        response = missed + sum(fit.values[each] * column for each, column in columns.items())
+        for acting in fit.acting:  # a cause in the simulation is named again, about a motion that has it
+            made = _made(recording, acting.shape, acting.effect)
+            if name in made:
+                by_effects = made[name] @ np.array(acting.of(fit.values))
+                bare[name] = bare.get(name, response)
+                response = response + by_effects
+        unit = "rad/s" if name == RATE else "rad"
+        recording.equations[name] = Equation(name, letter, subsystem, unit, response, columns, valid)
+
+    shown_p, shown_a = fit.shown_beside()
+    missed = table["joint_angle_rad"] - s["a"] - shown_a
+    if "motor_angle_rad" in table:
+        of_motor = table["motor_angle_rad"] - s["p"] - shown_p
+        equation(MOTOR, "M", "mechanical", of_motor, sensitivity[:, 0])
+        equation(TRANSMISSION, "T", "transmission", missed - of_motor, sensitivity[:, 2] - sensitivity[:, 0])
+    else:
+        equation(JOINT, "M", "mechanical", missed, sensitivity[:, 2])
+    if "joint_rate_rad_per_s" in table:
+        equation(RATE, "S", "sensor", table["joint_rate_rad_per_s"] - s["rate"], sensitivity[:, 3])
+    fast = np.abs(s["u"]) > 0.3 * np.max(np.abs(s["u"][valid]))
+    recording.regimes = {"upward": s["u"] > 0.0, "downward": s["u"] < 0.0, "near reversals": ~fast}
+    # By the joint alone an error of the model far above the noise is as slow as the foot, and whitening it would
+    # high-pass what is wrong. The joint against the motor tells of faster things.
+    sound = {
+        name: dataclasses.replace(e, response=bare.get(name, e.response)) for name, e in recording.equations.items()
+    }
+    left = Regression([dataclasses.replace(recording, equations=sound)])
+    recording.whitened = "motor_angle_rad" in table or all(
+        (plausibility.slowness(left, name) or 0.0) < SLOW for name in left.equations
+    )
+    recording.memory = SLOWEST_NOISE
+    if loose:
+        recording.priors = {name: (fit.usual[name], spread) for name, spread in LOOSE.items()}
+    return recording
 
 
 @dataclasses.dataclass(frozen=True)
@@ -259,6 +415,14 @@ def _program_found(table: Table) -> Finding:
     )  # fmt: skip
 
 
+def _filter_found(table: Table) -> Finding:
+    return Finding(
+        "joint_angle_rad", "law", float(table.time_s[0]), float(table.time_s[-1]), RATE_FILTER_S, "s",
+        f"the law that fits sees the motor's rate behind a filter of {1e3 * RATE_FILTER_S:g} ms, as the robot's board",
+        "note",
+    )  # fmt: skip
+
+
 def _check(table: Table) -> None:
     """UserError when the channels do not tell what the ankle was to do."""
     if "joint_angle_rad" not in table:
@@ -288,6 +452,12 @@ def _gains(table: Table) -> tuple[float, float]:
     return found[0], found[1]
 
 
+def _pulls(beside: Array) -> float:
+    """Twice the negative logarithm of how probable values are that are so many deviations from what is known before:
+    heavy tails, so that one wrong value draws no other with it."""
+    return float(np.sum(FAR**2 * np.log1p((beside / FAR) ** 2)))
+
+
 class _Fit:
     """The base fitted to one recording: Gauss and Newton in free simulation, damped (Levenberg and Marquardt)."""
 
@@ -300,12 +470,14 @@ class _Fit:
     ) -> None:
         """extra: more torques on the foot, for one of their coefficients, by the coefficient's name."""
         self.extra = dict(extra or {})
+        self.acting: list[Acting] = []
         self.table, self.both, self.of_program = table, "motor_angle_rad" in table, of_program
         self.limits = {each.name: (each.low, each.high) for each in parameters}
         self.usual = {each.name: each.value for each in parameters if each.name in PARAMETERS}
         self.usual |= {name: 0.0 for name in self.extra}
         self.limits |= {name: (-math.inf, math.inf) for name in self.extra}
-        self.creep_rad_s, self.filter_s = SMOOTHED, 0.0
+        self.spread = SPREAD | ({LATE: LOGGED_LATE_S} if "command_current_A" in table else {})
+        self.creep_rad_s, self.filter_s = SMOOTHED, RATE_FILTER_S if of_program else 0.0
         self.all = [*PARAMETERS, *self.extra]
         self.values = dict(self.usual)
         K, D = _gains(table)
@@ -325,13 +497,13 @@ class _Fit:
                 command = K * target + D * table["target_rate_rad_per_s"][rows]
                 if of_program:
                     command = command + FORWARD_A_per_rad * (target - FORWARD_REST_rad)
-            drive = Drive(t, command, K, D)
+            drive = Drive(t, command, K, D, self.filter_s)
             motion = ankle_motion.simulated(drive, self.values, self._start(rows, self.values))
             target, target_rate = self._target(rows, command / K)
             self.runs.append(Run(rows, drive, motion, *(np.interp(motion.time_s, t, x) for x in (target, target_rate))))
         if not self.runs:
             raise UserError(f"{table.name}: ankle needs a stretch of {SHORTEST_S:g} s without a gap")
-        self.missed = self._missed([run.motion for run in self.runs])
+        self.missed = self._missed([run.motion for run in self.runs], self.values)
 
     def _start(self, rows: slice, values: Values) -> tuple[float, float, float, float]:
         """States at a run's start, whose cable carries what the foot needs: a foot that starts off it would ring on,
@@ -340,7 +512,7 @@ class _Fit:
         some = slice(0, FEWEST)
         along = np.polynomial.Polynomial.fit(np.arange(FEWEST) * self.table.step_s, measured[some], 3).convert()
         angle, rate, half = along.coef[:3]
-        needs = values[STIFFNESS] * angle - values[TORQUE] + values[INERTIA] * 2.0 * half
+        needs = values[STIFFNESS] * (angle - REST_rad) - values[TORQUE] + values[INERTIA] * 2.0 * half
         twist = needs / values[CABLE] - values[ZERO]
         slower = values[STIFFNESS] * rate / values[CABLE]
         if self.both:
@@ -355,6 +527,45 @@ class _Fit:
             return target, table["target_rate_rad_per_s"][rows]
         return target, np.gradient(target, table.step_s)
 
+    def with_effects(self, effects: Sequence[tuple[Effect, Shape, Sequence[float]]], fixed: bool) -> "_Fit":
+        """Fitted anew with effects in the simulation; fixed: their coefficients stay as they are."""
+        other = copy.copy(self)
+        other.runs = [dataclasses.replace(run) for run in self.runs]
+        other.acting = []
+        acting: dict[str, float] = {}
+        for effect, shape, coefficients in effects:
+            if isinstance(effect, AnkleEffect):
+                names = tuple(f"{effect.name}: {name}" for name in effect.coefficients)
+                other.acting.append(Acting(effect, shape, names))
+                acting |= dict(zip(names, coefficients, strict=True))
+        other.all = [*PARAMETERS, *self.extra, *(() if fixed else acting)]
+        other.limits = self.limits | {name: (-math.inf, math.inf) for name in acting}
+        for values in ({**self.usual, ZERO: self._zero()}, self.values):
+            moved = other._moved(values | acting)
+            if moved is not None:
+                other._take(values | acting, *moved)
+                other._settle()
+                return other
+        return self
+
+    def shown_beside(self) -> Pair:
+        """What motor's and joint's encoder show beside the motion, by the effects that act: (n,) each."""
+        found = np.zeros(len(self.table)), np.zeros(len(self.table))
+        for run in self.runs:
+            for each, part in zip(found, self._shown(run, run.motion, self.values), strict=True):
+                each[run.rows] = part
+        return found
+
+    def _shown(self, run: Run, motion: Motion, values: Values) -> Pair:
+        p, a = (np.zeros(len(motion.p[motion.rows])) for _ in range(2))
+        for each in self.acting:
+            if each.effect.shown:
+                seen = each.effect.seen(
+                    dataclasses.replace(run, motion=motion), self.table, each.shape, each.of(values)
+                )
+                p, a = p + seen[0][motion.rows], a + seen[1][motion.rows]
+        return p, a
+
     def _stacked(self, part: Callable[[int], tuple[Array, Array]]) -> Array:
         """Motor, and joint against it, of every run one below the other."""
         of_motor, of_joint = [], []
@@ -365,11 +576,12 @@ class _Fit:
             of_joint.append(a[good] - (p[good] if self.both else 0.0))
         return np.concatenate([*of_motor, *of_joint] if self.both else of_joint)
 
-    def _missed(self, motions: Sequence[Motion]) -> Array:
+    def _missed(self, motions: Sequence[Motion], values: Values) -> Array:
         def part(number: int) -> tuple[Array, Array]:
-            rows, motion = self.runs[number].rows, motions[number]
-            a = self.table["joint_angle_rad"][rows] - motion.a[motion.rows]
-            return (self.table["motor_angle_rad"][rows] - motion.p[motion.rows] if self.both else a), a
+            run, motion = self.runs[number], motions[number]
+            shown_p, shown_a = self._shown(run, motion, values)
+            a = self.table["joint_angle_rad"][run.rows] - motion.a[motion.rows] - shown_a
+            return (self.table["motor_angle_rad"][run.rows] - motion.p[motion.rows] - shown_p if self.both else a), a
 
         return self._stacked(part)
 
@@ -380,7 +592,18 @@ class _Fit:
             if self.extra:
                 pushed = np.column_stack([torque(motion) for torque in self.extra.values()])
                 slopes = np.concatenate([slopes, motion.answer(np.zeros_like(pushed), pushed)[motion.rows]], axis=2)
-            return slopes[:, 0], slopes[:, 2]
+            of_motor, of_joint = [slopes[:, 0]], [slopes[:, 2]]
+            for each in self.acting:
+                if each.names[0] not in self.all:
+                    continue
+                pairs = each.effect.pairs(self.runs[number], self.table, each.shape, self.values[each.names[0]])
+                p, a = (np.column_stack(side) for side in zip(*pairs, strict=True))
+                if not each.effect.shown:
+                    answer = motion.answer(p, a)
+                    p, a = answer[:, 0], answer[:, 2]
+                of_motor.append(p[motion.rows])
+                of_joint.append(a[motion.rows])
+            return np.column_stack(of_motor), np.column_stack(of_joint)
 
         return self._stacked(part)
 
@@ -397,19 +620,19 @@ class _Fit:
         if found:
             self._take(*min(found, key=lambda each: each[0])[1:])
         self._if_better(creep_rad_s=STANDING)
-        if self.of_program:
-            self._if_better(filter_s=RATE_FILTER_S)
+        if self.filter_s:
+            self._if_better(filter_s=0.0, by=CLEARLY)
         self._settle()
 
-    def _if_better(self, creep_rad_s: float | None = None, filter_s: float | None = None) -> None:
-        """Another friction or law where it fits better, each at its best values."""
+    def _if_better(self, creep_rad_s: float | None = None, filter_s: float | None = None, by: float = 0.0) -> None:
+        """Another friction or law where it fits better by so much, each at its best values."""
         was, old = self._state(), (self.creep_rad_s, self.filter_s)
         self._made_so(old[0] if creep_rad_s is None else creep_rad_s, old[1] if filter_s is None else filter_s)
         moved = self._moved(self.values)
         if moved is not None:
             self._take(self.values, *moved)
             self._settle(ROUGHLY)
-        if moved is None or self._state()[0] > was[0]:
+        if moved is None or self.cost() > was[0] - by:
             self._made_so(*old)
             self._take(*was[1:])
 
@@ -420,7 +643,13 @@ class _Fit:
             run.drive = dataclasses.replace(run.drive, filter_s=filter_s)
 
     def _state(self) -> tuple[float, dict[str, float], list[Motion], Array]:
-        return float(self.missed @ self.missed), self.values, [run.motion for run in self.runs], self.missed
+        return self.cost(), self.values, [run.motion for run in self.runs], self.missed
+
+    def cost(self) -> float:
+        """Twice the negative logarithm of how probable the angles and the values are, up to a constant."""
+        beside = self._beside(self.values)
+        independent = len(self.missed) / MEMORY
+        return independent * math.log(float(np.mean(self.missed**2))) + _pulls(beside)
 
     def _zero(self) -> float:
         """Joint less motor, on the mean; 0 where the motor is not measured."""
@@ -430,20 +659,21 @@ class _Fit:
 
     def _beside(self, values: Values) -> Array:
         """How far values are from what is known before, in its spreads."""
-        return np.array([(values[name] - self.usual[name]) / spread for name, spread in SPREAD.items()])
+        return np.array([(values[name] - self.usual[name]) / spread for name, spread in self.spread.items()])
 
     def _settle(self, enough: float = FULLY) -> None:
         damping = 1e-3
-        pull = np.zeros((len(SPREAD), len(self.all)))
-        for number, (name, spread) in enumerate(SPREAD.items()):
+        pull = np.zeros((len(self.spread), len(self.all)))
+        for number, (name, spread) in enumerate(self.spread.items()):
             pull[number, self.all.index(name)] = 1.0 / spread
-        # what neighbouring rows miss is the same, so that they count for less
-        level = math.sqrt(MEMORY) * float(np.std(self.missed))
         for _ in range(MOST_STEPS):
-            slopes = np.vstack([self._slopes(), level * pull])
-            missed = np.concatenate([self.missed, -level * self._beside(self.values)])
+            level = math.sqrt(MEMORY * float(np.mean(self.missed**2)))
+            beside = self._beside(self.values)
+            slack = level / np.sqrt(1.0 + (beside / FAR) ** 2)
+            slopes = np.vstack([self._slopes(), slack[:, None] * pull])
+            missed = np.concatenate([self.missed, -slack * beside])
             lengths = np.maximum(np.linalg.norm(slopes, axis=0), 1e-12)
-            least = float(missed @ missed)
+            least = float(self.missed @ self.missed) + level**2 * _pulls(beside)
             won = 0.0
             for _ in range(MOST_TRIES):
                 left = np.vstack([slopes / lengths, math.sqrt(damping) * np.eye(len(lengths))])
@@ -454,8 +684,7 @@ class _Fit:
                     tried[name] = float(np.clip(tried[name] + change, *self.limits[name]))
                 moved = self._moved(tried)
                 if moved is not None:
-                    beside = level * self._beside(tried)
-                    reached = float(moved[1] @ moved[1] + beside @ beside)
+                    reached = float(moved[1] @ moved[1]) + level**2 * _pulls(self._beside(tried))
                     if reached < least:
                         won = least - reached
                         self._take(tried, *moved)
@@ -473,19 +702,31 @@ class _Fit:
                     run.drive,
                     values,
                     self._start(run.rows, values),
-                    self._torques(values),
+                    self._torques(run, values),
                     self.creep_rad_s,
+                    run.motion.pushed,
                 )
                 for run in self.runs
             ]
         except UserError:
             return None
-        return motions, self._missed(motions)
+        return motions, self._missed(motions, values)
 
-    def _torques(self, values: Values) -> ankle_motion.Torques | None:
-        if not any(values[name] for name in self.extra):
+    def _torques(self, run: Run, values: Values) -> ankle_motion.Torques | None:
+        pushing = [each for each in self.acting if not each.effect.shown]
+        if not pushing and not any(values[name] for name in self.extra):
             return None
-        return lambda m: (_none(m), sum((values[name] * torque(m) for name, torque in self.extra.items()), _none(m)))
+
+        def torques(m: Motion) -> Pair:
+            at_motor, at_foot = _none(m), _none(m)
+            for name, torque in self.extra.items():
+                at_foot = at_foot + values[name] * torque(m)
+            for each in pushing:
+                p, a = each.effect.seen(dataclasses.replace(run, motion=m), self.table, each.shape, each.of(values))
+                at_motor, at_foot = at_motor + p, at_foot + a
+            return at_motor, at_foot
+
+        return torques
 
     def held_as(self, other: "_Fit") -> None:
         """Takes the values of another fit, with its friction and its law."""
@@ -508,6 +749,10 @@ def _signals(table: Table, runs: Sequence[Run]) -> dict[str, Array]:
         m = run.motion
         for name, values in (("p", m.p), ("u", m.u), ("a", m.a), ("w", m.w), ("I", m.I), ("acceleration", m.slopes[3])):
             s[name][run.rows] = values[m.rows]
+    s["rate"], s["slope"] = np.zeros(len(table)), np.zeros(len(table))
+    for run in runs:  # as the board tells the joint's rate
+        s["rate"][run.rows] = run.shown(run.motion.w)[run.motion.rows]
+        s["slope"][run.rows] = run.shown(run.motion.slopes[3])[run.motion.rows]
     s["t"] = table.time_s - table.time_s[0]
     return s
 
@@ -515,34 +760,25 @@ def _signals(table: Table, runs: Sequence[Run]) -> dict[str, Array]:
 # --- effects -----------------------------------------------------------------------------------------------------
 
 
-def _columns(key: str, make: Make, shown: bool) -> Callable[[Recording, Shape, Values], Columns]:
-    """Columns of an effect by what it pushes, or shows beside the motion; kept with the recording."""
-
-    def columns(recording: Recording, shape: Shape, values: Values) -> Columns:
-        assert isinstance(recording, AnkleRecording)
-        name = (key, *sorted(shape.items()))
-        if name not in recording.made:
-            recording.made[name] = _made(recording, shape, make, shown)
-        return recording.made[name]
-
-    return columns
-
-
-def _made(recording: AnkleRecording, shape: Shape, make: Make, shown: bool) -> Columns:
+def _made(recording: AnkleRecording, shape: Shape, effect: AnkleEffect) -> Columns:
+    """Columns of an effect by what it pushes, or shows beside the motion, for every equation; kept."""
+    key = effect.key(shape)
+    if key in recording.made:
+        return recording.made[key]
+    at = recording.acting.get(key, (0.0,))[0]
     out: Columns = {}
     for run in recording.simulated:
-        pairs = make(run, recording.table, shape)
+        pairs = effect.pairs(run, recording.table, shape, at)
         motion = run.motion
-        if shown:
+        if effect.shown:
             p, a = (np.column_stack(each)[motion.rows] for each in zip(*pairs, strict=True))
             w = np.zeros_like(a)
         else:
-            answer = motion.answer(*(np.column_stack(each) for each in zip(*pairs, strict=True)))[motion.rows]
-            p, a, w = answer[:, 0], answer[:, 2], answer[:, 3]
-        parts = {JOINT: a, MOTOR: p, TRANSMISSION: a - p, RATE: w}
-        for name in recording.equations:
-            if name in parts:
-                out.setdefault(name, np.zeros((len(recording.table), len(pairs))))[run.rows] = parts[name]
+            answer = motion.answer(*(np.column_stack(each) for each in zip(*pairs, strict=True)))
+            p, a, w = answer[motion.rows, 0], answer[motion.rows, 2], run.shown(answer[:, 3])[motion.rows]
+        for name, part in {JOINT: a, MOTOR: p, TRANSMISSION: a - p, RATE: w}.items():
+            out.setdefault(name, np.zeros((len(recording.table), len(pairs))))[run.rows] = part
+    recording.made[key] = out
     return out
 
 
@@ -557,9 +793,28 @@ def _effect(
     admissible: Callable[[Mapping[str, float]], bool] = lambda found: True,
     meaning: str = "",
     form: str = "",
+    exact: Exact | None = None,
 ) -> Effect:
-    key = f"{cause} at {at}: {', '.join(coefficients)}"
-    return Effect(cause, at, subsystem, coefficients, shapes, _columns(key, make, shown), admissible, meaning, form)
+    def columns(recording: Recording, shape: Shape, values: Values) -> Columns:
+        assert isinstance(recording, AnkleRecording)
+        made = _made(recording, shape, effect)
+        return {name: part for name, part in made.items() if name in recording.equations}
+
+    effect = AnkleEffect(
+        cause,
+        at,
+        subsystem,
+        coefficients,
+        shapes,
+        columns,
+        admissible,
+        meaning,
+        form,
+        make=make,
+        shown=shown,
+        exact=exact,
+    )
+    return effect
 
 
 def _below(limit: float) -> Callable[[Mapping[str, float]], bool]:
@@ -577,6 +832,24 @@ def _at_motor(torque: Callable[[Motion, Shape], Array]) -> Make:
 
 def _at_foot(*torques: Callable[[Motion, Shape], Array]) -> Make:
     return lambda run, table, shape: [(_none(run.motion), each(run.motion, shape)) for each in torques]
+
+
+def _wrong() -> list[Effect]:
+    """A value that is not what is known of sound ankles: as the parameter itself, without what holds that."""
+
+    def of(parameter: str) -> Callable[[Recording, Shape, Values], Columns]:
+        def columns(recording: Recording, _: Shape, __: Values) -> Columns:
+            assert isinstance(recording, AnkleRecording)
+            if recording.loose:
+                return {}
+            return {name: each.columns[parameter][:, None] for name, each in recording.equations.items()}
+
+        return columns
+
+    return [
+        Effect(cause, at, subsystem, (coefficient,), [{}], of(parameter), meaning=meaning)
+        for parameter, cause, at, coefficient, subsystem, meaning in WRONG
+    ]
 
 
 def _springs() -> list[Effect]:
@@ -652,7 +925,7 @@ def _periodic() -> list[Effect]:
             at,
             M,
             ("cosine", "sine"),
-            wave(lambda m: ankle_motion.GEAR_K * m.I),
+            wave(lambda m: m.values[CONSTANT] * m.I),
             turns,
             admissible=_below(LARGEST_RIPPLE),
         ),
@@ -710,7 +983,8 @@ def _sensors(both: bool, rate: bool) -> list[Effect]:
     )
     found = [
         _effect("sensor_scale", "joint_angle_rad", S, ("change",), joint(lambda m, _: m.a), shown=True),
-        _effect("sensor_lag", "joint_angle_rad", S, ("time_constant_s",), joint(lambda m, _: -m.w), shown=True),
+        _effect("sensor_lag", "joint_angle_rad", S, ("time_constant_s",), joint(lambda m, _: -m.w), shown=True,
+                exact=lambda run, size: (_none(run.motion), behind(run.motion.a, run, size) - run.motion.a)),
         _effect("eccentricity", "joint_angle_rad", S, ("cosine_rad", "sine_rad"), joint(*waves), turns, shown=True,
                 admissible=_below(LARGEST_ECCENTRICITY_rad)),
         _effect("clock_drift", "joint_angle_rad", S, ("share",),
@@ -718,12 +992,20 @@ def _sensors(both: bool, rate: bool) -> list[Effect]:
     ]  # fmt: skip
     if both:
         found.append(
-            _effect("sensor_lag", "motor_angle_rad", S, ("time_constant_s",), motor(lambda m, _: -m.u), shown=True)
+            _effect(
+                "sensor_lag",
+                "motor_angle_rad",
+                S,
+                ("time_constant_s",),
+                motor(lambda m, _: -m.u),
+                shown=True,
+                exact=lambda run, size: (behind(run.motion.p, run, size) - run.motion.p, _none(run.motion)),
+            )
         )
     if rate:
         found += [
-            _of_rate("sensor_lag", "time_constant_s", lambda s: -s["acceleration"]),
-            _of_rate("sensor_scale", "change", lambda s: s["w"]),
+            _of_rate("sensor_lag", "time_constant_s", lambda s: -s["slope"]),
+            _of_rate("sensor_scale", "change", lambda s: s["rate"]),
             _of_rate("sensor_offset", "offset_rad_s", lambda s: np.ones_like(s["w"])),
         ]
     return found
@@ -741,11 +1023,10 @@ def _of_rate(cause: str, coefficient: str, make: Callable[[Mapping[str, Array]],
 def _law(recordings: Sequence[Recording]) -> list[Effect]:
     """What the board's law can have otherwise than thought."""
     F = "firmware"
-    GK = ankle_motion.GEAR_K
     logged = any("command_current_A" in r.table for r in recordings)
 
     def driven(current: Callable[[Run, Shape], Array]) -> Make:
-        return lambda run, table, p: [(GK * current(run, p), _none(run.motion))]
+        return lambda run, table, p: [(run.motion.values[CONSTANT] * current(run, p), _none(run.motion))]
 
     def later(run: Run, _: Shape) -> Array:
         m = run.motion
@@ -759,7 +1040,8 @@ def _law(recordings: Sequence[Recording]) -> list[Effect]:
     found = [
         _effect("firmware_parameter", "stiffness", F, ("A_per_rad",),
                 driven(lambda run, _: (0.0 if logged else run.target_rad) - run.motion.p)),
-        _effect("sensor_lag", "command", F, ("time_constant_s",), driven(later)),
+        _effect("sensor_lag", "command", F, ("time_constant_s",), driven(later),
+                admissible=lambda found: found["time_constant_s"] > 0.0),  # nothing follows a command before it
     ]  # fmt: skip
     if not logged:
         found += [

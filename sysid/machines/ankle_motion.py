@@ -1,14 +1,16 @@
 """An ankle under its board's law, simulated freely: motor and foot as two inertias with the cable between them.
 
-    I = I_0 - K p - D r, late by a lag        the board's law, on the motor's angle p; I_0 is what it was told
-    r = p', or behind the board's filter      robot.md N4.2: a sixteenth every 0.5 ms
-    J_A p'' = T(I, p') - k_s x + m            T of EQUATIONS 2.1; m, f: torques of effects beside the base model
-    J_f a'' = k_s x - k_r a + b + f           EQUATIONS 2.3, 2.7 with b = k_r a_0
+    I = I_0 - K p - D r, late by a lag        the board's law, on the motor's angle p; I_0 is what it was told, late
+    r = p', or behind the board's filter      robot.md N4.1: a sixteenth every 0.5 ms
+    J_A p'' = T(I, p') - k_s x - k_m p + m    T of EQUATIONS 2.1; m, f: torques of effects beside the base model
+    J_f a'' = k_s x - k_r (a - a_0) + b + f   EQUATIONS 2.3, 2.7 with a_0 as the body has it
     x = p + z - a                             z: what the joint's encoder shows at the motor's zero
 
-The XX
-Torques are in units of the motor's torque constant: were it larger, all of them, inertias included, would be so by the
-same factor. A wrong one is therefore found as a wrong inertia of the rotor.
+k_m is of the spring at the motor, which balances that of the foot (appendix 2.2); the body has the two as one at the
+joint, and none at the motor. The constant part of its torque is not told from z and b.
+
+Were the motor's torque constant larger, all torques and inertias would come out larger by the same factor. The rotor's,
+which is known best, tells which it is.
 """
 
 import dataclasses
@@ -19,35 +21,46 @@ import numpy as np
 from scipy.linalg import lapack
 
 from ranger_sim.foundation.user_error import UserError
+from ranger_sim.plant import body_files
 from ranger_sim.plant.motor_parameters import ANKLE_MOTOR
-from ranger_sim.plant.parameters import BodyParameters
 from ranger_sim.sysid.dataset import Array
 
-GEAR_K = ANKLE_MOTOR.gear * ANKLE_MOTOR.torque_constant_Nm_per_A
 STEP_S = 0.002  # longest step: the cable's mode with the foot, 100 1/s, is within 0.4 % of its frequency
 STATES = 6  # p, u, a, w; the rate r that the law takes, the current I
 BELOW, ABOVE = 2 * STATES - 1, STATES - 1  # the matrix's bands: the states at two instants
 MOST_STEPS = 60  # of one instant's friction
 MOST_ROUNDS = 30  # with torques beside the base: each takes what they move from some per cent to so much of that
-NEAR = 1e-7  # rad, of the last round
+NEAR = 1e-6  # rad, of the last round
 CLEAR = 19.0  # speeds over which friction changes its sign: beyond it tanh is 1
 FASTEST_rad_s, FARTHEST_rad = 1e3, 1e2  # beyond it nothing moves that has gears
 
-INERTIA, STIFFNESS, TORQUE, COULOMB, VISCOUS, LOAD, CABLE, ROTOR, ZERO, LAG = (
+(
+    INERTIA, STIFFNESS, TORQUE, COULOMB, VISCOUS, LOAD, CABLE, ROTOR, ZERO, LAG, LATE, BALANCE, CONSTANT,
+) = PARAMETERS = (
     "inertia_kg_m2", "return_stiffness_Nm_per_rad", "return_torque_Nm", "coulomb_friction_Nm", "viscous_friction_Nms",
     "load_friction", "cable_stiffness_Nm_per_rad", "rotor_inertia_kg_m2", "joint_zero_rad",
-    "law_lag_s",
+    "law_lag_s", "target_late_s", "motor_spring_Nm_per_rad", "torque_constant_Nm_per_A",
 )  # fmt: skip
-PARAMETERS = (INERTIA, STIFFNESS, TORQUE, COULOMB, VISCOUS, LOAD, CABLE, ROTOR, ZERO, LAG)
-# What the simulator has, for a caller that names only some.
+BODY = body_files.load("ranger")
+REST_rad = BODY.parameters.ankle_return_rest_rad
+# What the simulator has, of the body that was identified by the robot's own logs. The lag is half of
+# the board's slot of 0.5 ms, and its current loop: robot.md N4.3.
 USUAL = {
-    LOAD: ANKLE_MOTOR.load_friction,
-    CABLE: BodyParameters().ankle_spring_Nm_per_rad,
-    ROTOR: ANKLE_MOTOR.reflected_inertia_kg_m2,
+    INERTIA: BODY.parameters.foot_inertia_kg_m2,
+    STIFFNESS: BODY.parameters.ankle_return_Nm_per_rad,
+    TORQUE: 0.0,
+    COULOMB: BODY.electrics.inner_ankle.constant_friction_Nm,
+    VISCOUS: BODY.electrics.inner_ankle.viscous_friction_Nms,
+    LOAD: BODY.electrics.inner_ankle.load_friction,
+    CABLE: BODY.parameters.ankle_spring_Nm_per_rad,
+    ROTOR: BODY.electrics.inner_ankle.reflected_inertia_kg_m2,
     ZERO: 0.0,
-    LAG: 0.00075,  # half of the board's slot of 0.5 ms, and its current loop: robot.md N4.3
+    LAG: 0.00075,
+    LATE: 0.0,
+    BALANCE: 0.0,
+    CONSTANT: BODY.electrics.inner_ankle.gear * BODY.electrics.inner_ankle.torque_constant_Nm_per_A,
 }
-RATE_FILTER_S = 0.00775  # of the board's rate: robot.md N4.2
+RATE_FILTER_S = 0.00775  # of the board's rate: robot.md N4.1
 # Speeds over which friction changes its sign: the simulator's, and next to none, of a motor that stands still inside
 # its friction (chosen by us: 2 mrad/s creep by 0.5 mrad in a quarter of a second, the noise of the robot's encoders).
 SMOOTHED, STANDING = ANKLE_MOTOR.friction_smoothing_rad_s, 0.002
@@ -70,16 +83,18 @@ class Drive:
 class Motion:
     """A simulated run. p, u, a, w: angle and rate of motor and joint; I: current; sliding: the friction's tanh,
     all of shape (m,) at every step; slopes: rates of p, u, a, w; rows: the steps that the log has; later: what the
-    current would change by for a lag longer by 1 s."""
+    current would change by for a lag longer by 1 s; behind: for a target later by 1 s."""
 
     time_s: Array
     states: Array  # (6, m)
     slopes: Array  # (4, m)
     later: Array
+    behind: Array
     sliding: Array
     rows: slice
     values: dict[str, float]
     factors: tuple
+    pushed: tuple[Array, Array] | None = None  # torques beside the base at motor and foot
 
     @property
     def p(self) -> Array:
@@ -132,31 +147,42 @@ Torques = Callable[[Motion], tuple[Array, Array]]  # (m,) at the motor and at th
 
 
 def sensitivities(motion: Motion) -> Array:
-    """Derivatives of the states by PARAMETERS: (m, 6, 10)."""
+    """Derivatives of the states by PARAMETERS: (m, 6, 13)."""
     none = np.zeros_like(motion.p)
-    load, k_s = GEAR_K * np.abs(motion.I), none + motion.values[CABLE]
+    GK, k_s = motion.values[CONSTANT], none + motion.values[CABLE]
+    load = np.abs(motion.I)
     pushes = {  # at the motor, at the foot
         INERTIA: (none, -motion.slopes[3]),
-        STIFFNESS: (none, -motion.a),
+        STIFFNESS: (none, REST_rad - motion.a),
         TORQUE: (none, none + 1.0),
         COULOMB: (-motion.sliding, none),
         VISCOUS: (-motion.u, none),
-        LOAD: (-motion.sliding * load, none),
+        LOAD: (-motion.sliding * GK * load, none),
         CABLE: (-motion.twist, motion.twist),
         ROTOR: (-motion.slopes[1], none),
         ZERO: (-k_s, k_s),
         LAG: (none, none),
+        LATE: (none, none),
+        BALANCE: (-motion.p, none),
+        CONSTANT: (motion.I - motion.values[LOAD] * motion.sliding * load, none),
     }
     at_motor, at_foot = zip(*(pushes[name] for name in PARAMETERS), strict=True)
     at_current = np.zeros((len(none), len(PARAMETERS)))
     at_current[:, PARAMETERS.index(LAG)] = motion.later
+    at_current[:, PARAMETERS.index(LATE)] = motion.behind
     return motion.answer(np.column_stack(at_motor), np.column_stack(at_foot), at_current)
 
 
 def simulated(
-    drive: Drive, values: Values, start: Sequence[float], torques: Torques | None = None, creep_rad_s: float = SMOOTHED
+    drive: Drive,
+    values: Values,
+    start: Sequence[float],
+    torques: Torques | None = None,
+    creep_rad_s: float = SMOOTHED,
+    before: tuple[Array, Array] | None = None,
 ) -> Motion:
-    """The motion under `drive` from p, u, a, w = `start`. creep_rad_s: over which friction changes its sign.
+    """The motion under `drive` from p, u, a, w = `start`. creep_rad_s: over which friction changes its sign. before:
+    what the torques were in a motion near this one.
 
     UserError when there is no motion that a machine could make with these values.
     """
@@ -165,20 +191,21 @@ def simulated(
     parts = max(1, round(step_s / STEP_S))
     time_s = drive.time_s[0] + step_s / parts * np.arange((n - 1) * parts + 1)
     none = np.zeros_like(time_s)
-    steps = _Steps(
-        drive, {**USUAL, **values}, step_s / parts, np.interp(time_s, drive.time_s, drive.command_A), creep_rad_s
-    )
+    values = {**USUAL, **values}
+    command = np.interp(time_s - values[LATE], drive.time_s, drive.command_A)
+    steps = _Steps(drive, values, step_s / parts, command, creep_rad_s)
+    pushed: tuple[Array, Array] = before if torques and before is not None else (none, none)
     motion = Motion(
-        time_s, steps.walked(none, none, start), none, none, none, slice(None, None, parts), steps.values, ()
+        time_s, steps.walked(*pushed, start), none, none, none, none, slice(None, None, parts), steps.values, ()
     )
-    pushed = (none, none)
     for _ in range(MOST_ROUNDS if torques else 0):
         assert torques is not None
         steps.complete(motion, *pushed)
-        pushed, before = torques(motion), motion.states
+        pushed, was = torques(motion), motion.states
         motion.states = steps.walked(*pushed, start)
-        if np.max(np.abs(motion.states[[0, 2]] - before[[0, 2]])) < NEAR:
+        if not np.max(np.abs(motion.states[[0, 2]] - was[[0, 2]])) > NEAR:  # or lost
             break
+    motion.pushed = pushed
     steps.complete(motion, *pushed)
     if not np.all(np.isfinite(motion.slopes)) or np.max(np.abs(motion.p)) > FARTHEST_rad:
         raise UserError(
@@ -196,7 +223,7 @@ class _Steps:
         k_s, k_r, rotor, inertia = values[CABLE], values[STIFFNESS], values[ROTOR], values[INERTIA]
         rates = np.zeros((4, STATES))  # of p, u, a, w by the states, without friction
         rates[0, 1] = rates[2, 3] = 1.0
-        rates[1] = np.array([-k_s, -values[VISCOUS], k_s, 0.0, 0.0, GEAR_K]) / rotor
+        rates[1] = np.array([-k_s - values[BALANCE], -values[VISCOUS], k_s, 0.0, 0.0, values[CONSTANT]]) / rotor
         rates[3] = np.array([k_s, 0.0, -k_s - k_r, 0.0, 0.0, 0.0]) / inertia
         self.rates = rates
         self.ends, self.starts = np.eye(STATES), np.zeros((STATES, STATES))
@@ -218,9 +245,8 @@ class _Steps:
         """Rates of p, u, a, w (4, m) by what does not depend on the states."""
         values, none = self.values, np.zeros_like(self.command)
         zero = values[CABLE] * values[ZERO]
-        return np.array(
-            [none, (at_motor - zero) / values[ROTOR], none, (zero + values[TORQUE] + at_foot) / values[INERTIA]]
-        )
+        bias = values[TORQUE] + values[STIFFNESS] * REST_rad
+        return np.array([none, (at_motor - zero) / values[ROTOR], none, (zero + bias + at_foot) / values[INERTIA]])
 
     def walked(self, at_motor: Array, at_foot: Array, start: Sequence[float]) -> Array:
         """States (6, m), step by step: what they were without friction at a step's end, and then that friction."""
@@ -237,7 +263,7 @@ class _Steps:
         (p0, p1, p2, p3, p4, p5), (u0, u1, u2, u3, u4, u5), (a0, a1, a2, a3, a4, a5), (w0, w1, w2, w3, w4, w5), (
             r0, r1, r2, r3, r4, r5), (I0, I1, I2, I3, I4, I5) = (inverse @ self.starts).tolist()  # fmt: skip
         by_p, by_u, by_a, by_w, by_r, by_I = (self.h / values[ROTOR] * inverse[:, 1]).tolist()  # of a torque there
-        C_0, m, creep_rad_s = values[COULOMB], values[LOAD] * GEAR_K, self.creep_rad_s
+        C_0, m, creep_rad_s = values[COULOMB], values[LOAD] * values[CONSTANT], self.creep_rad_s
         clear = CLEAR * creep_rad_s
         out = [(p, u, a, w, r, I)]
         for f0, f1, f2, f3, f4, f5 in forced:
@@ -268,20 +294,21 @@ class _Steps:
         """The motion's friction and rates from its states."""
         values, drive = self.values, self.drive
         motion.sliding = np.tanh(motion.u / self.creep_rad_s)
-        bound = values[COULOMB] + values[LOAD] * GEAR_K * np.abs(motion.I)
+        bound = values[COULOMB] + values[LOAD] * values[CONSTANT] * np.abs(motion.I)
         motion.slopes = self.rates @ motion.states + self.pushed(at_motor, at_foot)
         motion.slopes[1] -= bound * motion.sliding / values[ROTOR]
         asked = self.command - drive.stiffness_A_per_rad * motion.p - drive.dampness_As_per_rad * motion.states[4]
         before = np.concatenate([motion.I[:1], motion.I[:-1]])
         motion.later = self.takes**2 / self.h * (before - asked)
+        motion.behind = -self.takes * np.gradient(self.command, self.h)
 
     def factors(self, motion: Motion) -> tuple:
         """LU factors of all steps' equations: instants one below the other, the first one fixed."""
         values, steps = self.values, len(motion.p)
-        bound = values[COULOMB] + values[LOAD] * GEAR_K * np.abs(motion.I)
+        bound = values[COULOMB] + values[LOAD] * values[CONSTANT] * np.abs(motion.I)
         ends = np.repeat(self.ends[:, :, None], steps, axis=2)
         ends[1, 1] += self.h / values[ROTOR] * bound * (1.0 - motion.sliding**2) / self.creep_rad_s
-        ends[1, 5] += self.h / values[ROTOR] * values[LOAD] * GEAR_K * np.sign(motion.I) * motion.sliding
+        ends[1, 5] += self.h / values[ROTOR] * values[LOAD] * values[CONSTANT] * np.sign(motion.I) * motion.sliding
         bands = np.zeros((2 * BELOW + ABOVE + 1, STATES * steps))
         diagonal = BELOW + ABOVE
         for row in range(STATES):
