@@ -73,11 +73,14 @@ INERTIA_STARTS = (1.0, 2.5)  # of its value: the cable's ringing makes the sum o
 # Chosen by us: a motor's ripple is a part of its torque, cogging is of the size of its friction, and an encoder whose
 # disc is out of centre by more than 2 % of its radius does not read.
 LARGEST_RIPPLE, LARGEST_COGGING_Nm, LARGEST_ECCENTRICITY_rad = 0.5, 0.1, 0.02
+LATEST_s = 0.05  # of a command in force, as of the target's `LATE`: 25 of the robot's frames. Later, it is another fault
 SLOW = 5.0  # times what is new in it from row to row: noise of these encoders has 1.1 to 1.4, on blind recordings
 SLOWEST_NOISE = 0.9  # memory from row to row (12 ms) of what the base leaves, at most: beyond it, it is an effect's
 CLEARLY = 20.0  # better by so much, a law fits that the board is not known to have
-FAR = 3.0  # deviations from what is known before, from which on a value hardly pulls
-MEMORY = 4.0  # rows of noise that tell the same: with a memory of 0.6 from row to row
+# Deviations from what is known before, from which on a value hardly pulls; with `LOOSE` it always does: an error of the
+# model would be taken up by the value that knows it best.
+FAR, FAR_LOOSE = 3.0, 1e3
+MEMORY, MEMORY_LOOSE = 4.0, 10.0  # rows that tell the same: of noise with a memory of 0.6, and of a model's error
 JOINT, MOTOR, TRANSMISSION, RATE = "joint", "motor", "transmission", "joint rate"
 # How far sound ankles are from `USUAL`, as a deviation, chosen by us: 15 % of what is made of steel, cable and springs,
 # so that twice that is nothing and four times that is named. Otherwise: the spring's rest angle a quarter of a radian;
@@ -261,19 +264,20 @@ class Ankle:
             other.improve()
             if other.cost() < fit.cost():
                 fit = other
-        return _recording(fit)
+        made = _recording(fit)
+        return made if made.whitened else _recording(fit.loosened())
 
     def again(
         self, recording: Recording, effects: Sequence[tuple[Effect, Shape, Sequence[float]]], fixed: bool = False
     ) -> Recording:
         """The recording fitted and linearised with these effects in the simulation; fixed: their coefficients stay.
 
-        Where the joint alone is measured and what is left is far above the noise with them too, it is as it was, with
-        `LOOSE`: the form in the simulation would be preferred to its ties for what else is wrong.
+        Where the joint alone is measured and what is left is far above the noise with them too, it is as it was: the
+        form in the simulation would be preferred to its ties for what else is wrong.
         """
         assert isinstance(recording, AnkleRecording) and recording.fit is not None
         made = _recording(recording.fit.with_effects(effects, fixed))
-        return made if made.whitened else _recording(recording.fit, loose=True)
+        return made if made.whitened else recording
 
     def generic(self, recording: Recording) -> dict[str, dict[str, Array]]:
         """Signals over which each angle is looked at without a cause in mind."""
@@ -292,11 +296,11 @@ class Ankle:
         ]  # fmt: skip
 
 
-def _recording(fit: "_Fit", loose: bool = False) -> AnkleRecording:
-    """Equations about the motion that was found. loose: with what is known by `LOOSE`."""
+def _recording(fit: "_Fit") -> AnkleRecording:
+    """Equations about the motion that was found."""
     table = fit.table
     recording = AnkleRecording(
-        table, {}, {}, width=WIDTH, every=EVERY, left_over=True, simulated=fit.runs, fit=fit, loose=loose
+        table, {}, {}, width=WIDTH, every=EVERY, left_over=True, simulated=fit.runs, fit=fit, loose=fit.loose
     )
     recording.acting = {each.effect.key(each.shape): each.of(fit.values) for each in fit.acting}
     recording.values = dict(fit.values)
@@ -349,8 +353,6 @@ def _recording(fit: "_Fit", loose: bool = False) -> AnkleRecording:
         (plausibility.slowness(left, name) or 0.0) < SLOW for name in left.equations
     )
     recording.memory = SLOWEST_NOISE
-    if loose:
-        recording.priors = {name: (fit.usual[name], spread) for name, spread in LOOSE.items()}
     return recording
 
 
@@ -382,6 +384,8 @@ def predicted(
     """Values of the base and of `extra` by least squares of free simulation of `training`, and `held` with them."""
     fit = _Fit(signals.uniform(training), Ankle.parameters, of_program, extra)
     fit.improve()
+    if not _recording(fit).whitened:
+        fit = fit.loosened()
     other = _Fit(signals.uniform(held), Ankle.parameters, of_program, extra)
     other.held_as(fit)
     table, found = other.table, []
@@ -452,10 +456,10 @@ def _gains(table: Table) -> tuple[float, float]:
     return found[0], found[1]
 
 
-def _pulls(beside: Array) -> float:
+def _pulls(beside: Array, far: float) -> float:
     """Twice the negative logarithm of how probable values are that are so many deviations from what is known before:
-    heavy tails, so that one wrong value draws no other with it."""
-    return float(np.sum(FAR**2 * np.log1p((beside / FAR) ** 2)))
+    heavy tails beyond `far`, so that one wrong value draws no other with it."""
+    return float(np.sum(far**2 * np.log1p((beside / far) ** 2)))
 
 
 class _Fit:
@@ -476,7 +480,9 @@ class _Fit:
         self.usual = {each.name: each.value for each in parameters if each.name in PARAMETERS}
         self.usual |= {name: 0.0 for name in self.extra}
         self.limits |= {name: (-math.inf, math.inf) for name in self.extra}
-        self.spread = SPREAD | ({LATE: LOGGED_LATE_S} if "command_current_A" in table else {})
+        self.loose, self.far, self.memory = False, FAR, MEMORY
+        self.known_late = {LATE: LOGGED_LATE_S} if "command_current_A" in table else {}
+        self.spread = SPREAD | self.known_late
         self.creep_rad_s, self.filter_s = SMOOTHED, RATE_FILTER_S if of_program else 0.0
         self.all = [*PARAMETERS, *self.extra]
         self.values = dict(self.usual)
@@ -526,6 +532,16 @@ class _Fit:
         if "target_rate_rad_per_s" in table:
             return target, table["target_rate_rad_per_s"][rows]
         return target, np.gradient(target, table.step_s)
+
+    def loosened(self) -> "_Fit":
+        """Fitted anew with `LOOSE`, from what is usual."""
+        other = copy.copy(self)
+        other.runs = [dataclasses.replace(run) for run in self.runs]
+        other.loose, other.far, other.memory = True, FAR_LOOSE, MEMORY_LOOSE
+        other.spread = LOOSE | other.known_late
+        other._made_so(SMOOTHED, self.filter_s)
+        other.improve()
+        return other
 
     def with_effects(self, effects: Sequence[tuple[Effect, Shape, Sequence[float]]], fixed: bool) -> "_Fit":
         """Fitted anew with effects in the simulation; fixed: their coefficients stay as they are."""
@@ -648,8 +664,8 @@ class _Fit:
     def cost(self) -> float:
         """Twice the negative logarithm of how probable the angles and the values are, up to a constant."""
         beside = self._beside(self.values)
-        independent = len(self.missed) / MEMORY
-        return independent * math.log(float(np.mean(self.missed**2))) + _pulls(beside)
+        independent = len(self.missed) / self.memory
+        return independent * math.log(float(np.mean(self.missed**2))) + _pulls(beside, self.far)
 
     def _zero(self) -> float:
         """Joint less motor, on the mean; 0 where the motor is not measured."""
@@ -667,13 +683,13 @@ class _Fit:
         for number, (name, spread) in enumerate(self.spread.items()):
             pull[number, self.all.index(name)] = 1.0 / spread
         for _ in range(MOST_STEPS):
-            level = math.sqrt(MEMORY * float(np.mean(self.missed**2)))
+            level = math.sqrt(self.memory * float(np.mean(self.missed**2)))
             beside = self._beside(self.values)
-            slack = level / np.sqrt(1.0 + (beside / FAR) ** 2)
+            slack = level / np.sqrt(1.0 + (beside / self.far) ** 2)
             slopes = np.vstack([self._slopes(), slack[:, None] * pull])
             missed = np.concatenate([self.missed, -slack * beside])
             lengths = np.maximum(np.linalg.norm(slopes, axis=0), 1e-12)
-            least = float(self.missed @ self.missed) + level**2 * _pulls(beside)
+            least = float(self.missed @ self.missed) + level**2 * _pulls(beside, self.far)
             won = 0.0
             for _ in range(MOST_TRIES):
                 left = np.vstack([slopes / lengths, math.sqrt(damping) * np.eye(len(lengths))])
@@ -684,7 +700,7 @@ class _Fit:
                     tried[name] = float(np.clip(tried[name] + change, *self.limits[name]))
                 moved = self._moved(tried)
                 if moved is not None:
-                    reached = float(moved[1] @ moved[1]) + level**2 * _pulls(self._beside(tried))
+                    reached = float(moved[1] @ moved[1]) + level**2 * _pulls(self._beside(tried), self.far)
                     if reached < least:
                         won = least - reached
                         self._take(tried, *moved)
@@ -1041,7 +1057,8 @@ def _law(recordings: Sequence[Recording]) -> list[Effect]:
         _effect("firmware_parameter", "stiffness", F, ("A_per_rad",),
                 driven(lambda run, _: (0.0 if logged else run.target_rad) - run.motion.p)),
         _effect("sensor_lag", "command", F, ("time_constant_s",), driven(later),
-                admissible=lambda found: found["time_constant_s"] > 0.0),  # nothing follows a command before it
+                # nothing follows a command before it
+                admissible=lambda found: 0.0 < found["time_constant_s"] < LATEST_s),
     ]  # fmt: skip
     if not logged:
         found += [
