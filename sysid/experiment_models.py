@@ -404,7 +404,7 @@ def positioning() -> Model:
     b.equation(
         "motion",
         "M",
-        [("v", -mass, 1), ("u", gain), ("v", -viscous), ("pulse", 1.0)],
+        [("v", -mass, 1), ("u", gain), ("v", -viscous)],  # force pulses come through the drive too (data's README)
         {"M": b.rate(v), "F_v": v, "F_c": sign, "offset": 1.0},
         {
             **_friction(b, v, force, 5e-4, 0.02),
@@ -429,7 +429,6 @@ def positioning() -> Model:
     clip = np.where(np.abs(force) > 0.85 * np.abs(force).max(), force, 0.0) / gain
     b.sensor("voltage_V", "u", 0.005, "E", {"voltage_clip": clip, "clock_drift": b.rate(force) / gain * b.t})
     b.sensor("reference_m", "goal", 1e-6, "C")
-    b.sensor("pulse_N", "pulse", 0.05, "M")
     b.places = {"sensor_lag": "the controller's loop", "sensor_offset@angle": "position_m", "clock_drift": "voltage_V"}
     return b.model("positioning", "four periods of 6.24 s to and fro at 0.12 m/s")
 

@@ -14,7 +14,8 @@ from ranger_sim.sysid.naming import coefficients as coefficients_of
 from ranger_sim.sysid.regression import Regression, orthonormal
 
 BLOCK = 50  # rows of one block of the bootstrap: longer than any memory of the residual
-LONG_BLOCK = 500  # where the residual is not whitened: chosen by us, a second at 500 Hz, in which a leg forgets
+LONG_BLOCK_S = 1.0  # where the residual is not whitened: chosen by us, in which a leg forgets
+FEWEST_BLOCKS = 8  # of any held-out data: of one block every draw is the same
 DRAWS = 400
 MORE = 0.01  # chance at which general features count as seeing more than the effects
 
@@ -71,7 +72,7 @@ def measure(
         after = after - beside @ coefficients
         expected = float(np.sum((beside @ coefficients) ** 2))
     possible = _possible(plain, columns, general)
-    rows_in = BLOCK if _white(plain) else LONG_BLOCK
+    rows_in = _rows_of_a_block(plain)
     blocks = max(1, len(before) // rows_in)
     edges = np.arange(0, blocks * rows_in, rows_in)
     won, most = (np.add.reduceat(each[: blocks * rows_in], edges) for each in (before**2 - after**2, possible))
@@ -121,6 +122,12 @@ def _possible(plain: Regression, columns: Sequence[Array], general: General) -> 
         count = min(basis.shape[1] * _memory(plain, rest), 0.5 * len(residual))
         out[rows] = residual**2 - rest**2 * (1.0 + count / max(1, len(residual) - count))
     return out
+
+
+def _rows_of_a_block(plain: Regression) -> int:
+    long = max(round(LONG_BLOCK_S / (each.table.step_s * each.every)) for each in plain.recordings)
+    wanted = BLOCK if _white(plain) else max(BLOCK, long)
+    return max(1, min(wanted, len(plain.residual) // FEWEST_BLOCKS))
 
 
 def _white(plain: Regression) -> bool:

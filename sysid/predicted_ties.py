@@ -22,17 +22,19 @@ NOT_PREDICTED = "not predicted"  # and the data cannot tell
 
 
 def of(machine: Machine, recordings: Sequence[Recording], named: Named) -> dict[str, Any] | None:
-    """What was predicted of a named cause, and what the data say of it; None for a machine that has no prediction.
+    """What was predicted of a named cause, and what the data say of it; None where nothing was predicted: of another
+    machine, or for another place than that of the prediction.
 
     status: of the cause with these channels; ties: of each its other cause, reason and cosine of the prediction (None
     where there was none), what the data made of it, and by how much of the information criterion they are behind.
     """
     if machine.name not in MODELS or not recordings:
         return None
-    channels = [name for name in recordings[0].table.columns if name in isolability.model_of(machine.name).channels]
+    model = isolability.model_of(machine.name)
+    channels = [name for name in recordings[0].table.columns if name in model.channels]
     analysis = isolability.analyse(machine.name, channels)
     key = key_of(named.effect.cause, named.effect.at)
-    if key not in analysis.status:
+    if key not in analysis.status or model.places.get(key, named.effect.at) != named.effect.at:
         return None
     behind: dict[str, float] = {}
     for effect, bic in named.rivals:

@@ -73,7 +73,9 @@ INERTIA_STARTS = (1.0, 2.5)  # of its value: the cable's ringing makes the sum o
 # Chosen by us: a motor's ripple is a part of its torque, cogging is of the size of its friction, and an encoder whose
 # disc is out of centre by more than 2 % of its radius does not read.
 LARGEST_RIPPLE, LARGEST_COGGING_Nm, LARGEST_ECCENTRICITY_rad = 0.5, 0.1, 0.02
-LATEST_s = 0.05  # of a command in force, as of the target's `LATE`: 25 of the robot's frames. Later, it is another fault
+LATEST_s = (
+    0.05  # of a command in force, as of the target's `LATE`: 25 of the robot's frames. Later, it is another fault
+)
 SLOW = 5.0  # times what is new in it from row to row: noise of these encoders has 1.1 to 1.4, on blind recordings
 SLOWEST_NOISE = 0.9  # memory from row to row (12 ms) of what the base leaves, at most: beyond it, it is an effect's
 CLEARLY = 20.0  # better by so much, a law fits that the board is not known to have
