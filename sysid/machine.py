@@ -90,6 +90,9 @@ class Recording:
     # False where what the equations miss is far above the noise: whitening it would weigh frequencies by what is
     # wrong. Then fits are plain least squares, and only the count of samples is that of independent ones.
     whitened: bool = True
+    noise_above: float = (
+        0.0  # part of the kept rows' frequency above which the machine moves no more: noise is found there
+    )
     memory: float = 0.99  # largest autocorrelation from row to row that is taken for noise's, and not for an effect's
     # by equation, (n,) whole numbers: rows of one number are repeats of each other, as the strides of a walk are; -1: a
     # row without repeats. Noise is then what differs between repeats (pure error), however much the model misses.

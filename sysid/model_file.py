@@ -16,7 +16,7 @@ from typing import Any
 
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.plant import terms
-from ranger_sim.sysid.diagnose import Diagnosis, KnownEffect
+from ranger_sim.sysid.diagnosis import Diagnosis, KnownEffect
 from ranger_sim.sysid.machine import Machine
 from ranger_sim.sysid.model_terms import NoFormError, effects_of, parameter_terms, term_of
 

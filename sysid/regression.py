@@ -19,6 +19,7 @@ LEAST = 1e-9  # of the largest response: noise below it is rounding
 RANK = 1e-8  # a parameter whose column the others have to this part is not separable from them
 NOTHING = 1e-9  # of a column's square beside the base: rounding, with columns of up to 1e7 deviations
 ORDER = 8  # of the autoregression at most
+NEAR = 2.5  # times the frequency from which on there is noise alone: what is up to there tells how loud it is below
 FEWEST_SHARED = 40  # rows of two equations for what they share: its correlation is then known to 0.16
 UPPER = 0.95  # noise found from repeats is taken at the upper limit of this one-sided interval: few repeats, less trust
 FEWEST_REPEATS = 20  # degrees of freedom of pure error; below it the whole residual tells the noise
@@ -85,6 +86,52 @@ def autoregression(residual: Array, valid: np.ndarray) -> Array:
         if criterion < best and np.all(np.abs(np.roots(np.concatenate(([1.0], -tried)))) < 0.999):
             best, found = criterion, np.asarray(tried, dtype=float)
     return found
+
+
+def autoregression_above(residual: Array, good: np.ndarray, share: float) -> tuple[Array, float]:
+    """(coefficients, deviation of what they leave) of noise that alone is there above `share` of the rows' frequency.
+
+    What is slower may be an effect's. There the noise's spectrum is a Gaussian about 0 through what is just above,
+    as that of noise with a short memory and of what a Gaussian smoothed both are. From the spectrum follow the
+    autocorrelations, from these the coefficients (Yule and Walker), as many as the Bayesian information criterion asks
+    for. good: rows that count; each unbroken stretch of them has a periodogram of its own.
+    """
+    stretches = [_periodogram(residual[rows]) for rows in _stretches(good)]
+    frequencies, powers = (np.concatenate([each[part] for each in stretches] or [[]]) for part in (0, 1))
+    near = (frequencies >= share) & (frequencies < NEAR * share)
+    if np.count_nonzero(near) < 2 * ORDER:
+        return np.zeros(0), float(np.std(residual[good])) if np.any(good) else 1.0
+    slope, level = np.polyfit(
+        frequencies[near] ** 2, np.log(powers[near]) + np.euler_gamma, 1
+    )  # a periodogram's logarithm is low by that
+    rows = sum(2 * len(f) for f, _ in stretches)
+    correlations = np.zeros(ORDER + 1)
+    for f, p in stretches:
+        power = np.where(f < share, np.exp(level + min(slope, 0.0) * f**2), p)
+        turns = np.cos(2.0 * np.pi * np.outer(np.arange(ORDER + 1), f))
+        correlations += turns @ power * (2.0 / rows)
+    best, found, deviation = rows * float(np.log(correlations[0])), np.zeros(0), float(np.sqrt(correlations[0]))
+    for order in range(1, ORDER + 1):
+        tried = linalg.solve_toeplitz(correlations[:order], correlations[1 : order + 1])
+        left = float(correlations[0] - tried @ correlations[1 : order + 1])
+        criterion = rows * float(np.log(max(left, 1e-300))) + order * float(np.log(rows))
+        if criterion < best:
+            best, found, deviation = criterion, np.asarray(tried), float(np.sqrt(max(left, 0.0)))
+    return found, deviation
+
+
+def _stretches(good: np.ndarray) -> list[slice]:
+    """Unbroken stretches of rows, but for short ones."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], good.astype(int), [0]])))
+    return [slice(a, b) for a, b in edges.reshape(-1, 2).tolist() if b - a > 8 * ORDER]
+
+
+def _periodogram(residual: Array) -> tuple[Array, Array]:
+    """Frequencies in parts of the rows' one, and power at each; a Hann window, lest the slow part leaks."""
+    window = np.hanning(len(residual))
+    power = np.abs(np.fft.rfft((residual - residual.mean()) * window)) ** 2 / float(window @ window)
+    frequency = np.fft.rfftfreq(len(residual))
+    return frequency[1:], np.maximum(power[1:], 1e-300)
 
 
 @dataclasses.dataclass
@@ -185,7 +232,10 @@ class Regression:
                 residual = part.response - part.measured @ found
                 residuals[name], freedom = part.pure_error(residual)
                 least = LEAST * float(np.max(np.abs(part.response), initial=0.0)) or 1.0
-                if all(recording.whitened for recording in self.recordings):
+                above = max(recording.noise_above for recording in self.recordings)
+                if above and all(recording.whitened for recording in self.recordings):
+                    coefficients, deviation = autoregression_above(residual, part.valid & ~part.starts, above)
+                elif all(recording.whitened for recording in self.recordings):
                     coefficients = autoregression(np.where(part.valid, residual, 0.0), part.valid)
                     white = innovations(coefficients, residual)
                     good = self._good(name, coefficients)

@@ -76,6 +76,7 @@ LARGEST_RIPPLE, LARGEST_COGGING_Nm, LARGEST_ECCENTRICITY_rad = 0.5, 0.1, 0.02
 LATEST_s = (
     0.05  # of a command in force, as of the target's `LATE`: 25 of the robot's frames. Later, it is another fault
 )
+MOVES_TO_Hz = 10.0  # five times the fastest sine: faster, the angles' residual is noise
 SLOW = 5.0  # times what is new in it from row to row: noise of these encoders has 1.1 to 1.4, on blind recordings
 SLOWEST_NOISE = 0.9  # memory from row to row (12 ms) of what the base leaves, at most: beyond it, it is an effect's
 CLEARLY = 20.0  # better by so much, a law fits that the board is not known to have
@@ -355,6 +356,7 @@ def _recording(fit: "_Fit") -> AnkleRecording:
         (plausibility.slowness(left, name) or 0.0) < SLOW for name in left.equations
     )
     recording.memory = SLOWEST_NOISE
+    recording.noise_above = MOVES_TO_Hz * EVERY * table.step_s
     return recording
 
 

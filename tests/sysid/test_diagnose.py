@@ -12,7 +12,8 @@ import pytest
 from ranger_sim.foundation.random_arrays import generator
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.sysid.dataset import Table
-from ranger_sim.sysid.diagnose import KnownEffect, diagnose
+from ranger_sim.sysid.diagnose import diagnose
+from ranger_sim.sysid.diagnosis import KnownEffect
 from ranger_sim.sysid.machine import Effect, Equation, Known, Quantity, Recording
 from ranger_sim.sysid.machines import MACHINES
 from ranger_sim.tools.cli import main

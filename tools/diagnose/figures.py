@@ -14,7 +14,7 @@ import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
 from ranger_sim.sysid.dataset import Array
-from ranger_sim.sysid.diagnose import Diagnosis
+from ranger_sim.sysid.diagnosis import Diagnosis
 from ranger_sim.sysid.machine import Recording
 from ranger_sim.sysid.misfit import cells
 from ranger_sim.sysid.naming import Named

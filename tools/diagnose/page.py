@@ -12,7 +12,7 @@ from markupsafe import Markup, escape
 from plotly.offline import get_plotlyjs
 
 from ranger_sim.sysid import inspection, predicted_ties
-from ranger_sim.sysid.diagnose import Diagnosis
+from ranger_sim.sysid.diagnosis import Diagnosis
 from ranger_sim.sysid.naming import Named
 from ranger_sim.tools.diagnose import figures, words
 from ranger_sim.tools.report.figures import Figure

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from ranger_sim.sysid import inspection, plausibility
-from ranger_sim.sysid.diagnose import Diagnosis
+from ranger_sim.sysid.diagnosis import Diagnosis
 from ranger_sim.sysid.naming import PAYS, TIE
 
 
@@ -46,7 +46,7 @@ def doubts(answer: dict[str, Any]) -> list[dict[str, Any]]:
 
 def doubted(answer: dict[str, Any]) -> str:
     """These in a sentence."""
-    told = "; ".join(f"{each['channel']}: {each['text']}" for each in doubts(answer))
+    told = "; ".join(": ".join(filter(None, (each["channel"], each["text"]))) for each in doubts(answer))
     return f"no cause is named: {told}"
 
 

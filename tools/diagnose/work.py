@@ -21,8 +21,9 @@ from ranger_sim.foundation.user_error import UserError
 from ranger_sim.sysid import model_file, predicted_ties, repairs, sanity
 from ranger_sim.sysid.channels import named_for
 from ranger_sim.sysid.dataset import Dataset, Finding, Table
-from ranger_sim.sysid.diagnose import Diagnosis, KnownEffect, diagnose
 from ranger_sim.sysid.diagnose import Progress as Progressed
+from ranger_sim.sysid.diagnose import diagnose
+from ranger_sim.sysid.diagnosis import Diagnosis, KnownEffect
 from ranger_sim.sysid.machine import Machine
 from ranger_sim.sysid.machines import MACHINES, made
 from ranger_sim.tools import recordings, terminal

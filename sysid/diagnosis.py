@@ -1,0 +1,62 @@
+"""What a diagnosis found, before it is told (`answer.py`) or drawn."""
+
+import dataclasses
+from collections.abc import Mapping
+from typing import Any
+
+from ranger_sim.sysid import intervals, misfit, plausibility
+from ranger_sim.sysid.machine import Machine, Recording
+from ranger_sim.sysid.naming import Named
+from ranger_sim.sysid.regression import Regression
+
+# Of all general tests together. Chosen by us: their chi-squares hold for many samples only, and 0.001 gave 1 alarm in
+# 30 sound recordings of the motor bench; effects worth a name are far below it.
+GENERAL_LEVEL = 0.0001
+EXPLAINED = 0.7  # of what repeats: a name that explains less is none
+
+
+@dataclasses.dataclass(frozen=True)
+class KnownEffect:
+    """An effect that the model has already: its shape, and the coefficients that it was found with."""
+
+    cause: str
+    at: str
+    coefficients: Mapping[str, float]
+    shape: Mapping[str, float]
+
+
+@dataclasses.dataclass
+class Diagnosis:
+    """Everything that was found, for the report; `answer` is what is printed."""
+
+    machine: Machine
+    recordings: list[Recording]
+    plain: Regression
+    extended: Regression
+    skews: list[Named]  # stamps that are off, and what the model has already: in the base of both regressions
+    had: list[Named]  # the latter alone, in the order of `known`
+    known: list[KnownEffect]
+    named: list[Named]
+    intervals: dict[str, intervals.Intervals]  # of what is named, by its name, over every shape that explains the data
+    before: misfit.Misfit
+    after: misfit.Misfit
+    doubts: plausibility.Doubts
+    answer: dict[str, Any] = dataclasses.field(default_factory=dict)
+
+    @property
+    def detected(self) -> bool:
+        """Something is wrong."""
+        return self.before.p < GENERAL_LEVEL or bool(self.named) or self.doubts.forbid
+
+    @property
+    def explained(self) -> float:
+        """Share of the repeatable excess that the named effects explain."""
+        gained = sum(each.chi2 - each.freedom for each in self.named)
+        total = gained + self.after.excess
+        return float(gained / total) if total > 0.0 else 0.0
+
+    @property
+    def doubtful(self) -> bool:
+        """Something is wrong, and what it is cannot be said."""
+        left = self.explained < EXPLAINED and self.after.p < GENERAL_LEVEL
+        return self.detected and (not self.named or self.doubts.forbid or left)

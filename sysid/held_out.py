@@ -1,0 +1,84 @@
+"""Held-out data: which of the named effects they refuse, and what the rest gains there."""
+
+import dataclasses
+import math
+from collections.abc import Sequence
+from typing import Any
+
+from ranger_sim.sysid import gain, misfit, naming
+from ranger_sim.sysid.dataset import Table
+from ranger_sim.sysid.machine import Machine, Recording
+from ranger_sim.sysid.naming import Named
+from ranger_sim.sysid.regression import Regression
+
+HOLDS_OUT = 0.0  # chi-square that a further effect must win on held-out data
+REFUSES = 2.33  # deviations, 1 % on one side, below what is expected: held-out data that refuse an effect
+TELLS = 9.0  # chi-square of an effect on held-out data, three deviations: below it these say nothing of it
+
+
+@dataclasses.dataclass(frozen=True)
+class Held:
+    """gain: of what they do not refuse; tells: False where they do not excite any of it, so that they say nothing."""
+
+    gain: gain.Gain | None
+    holdout: str
+    refused: list[Named]
+    tells: bool
+
+    def told(self) -> dict[str, Any]:
+        """For the JSON."""
+        return {
+            "fraction_of_achievable": self.gain.fraction if self.gain is not None else 0.0,
+            "ci95": list(self.gain.ci95) if self.gain is not None else [0.0, 0.0],
+            "holdout": self.holdout,
+            "worse": self.gain is not None and self.gain.worse,
+        }
+
+
+def judged(
+    machine: Machine,
+    plain: Regression,
+    extended: Regression,
+    holdout: Sequence[Table],
+    skews: Sequence[Named],
+    named: Sequence[Named],
+    seed: int,
+) -> Held:
+    """What held-out recordings say of effects that were found without them."""
+    recordings = [machine.prepare(table) for table in holdout]
+    if named and hasattr(machine, "again"):
+        recordings = simulated_again(machine, recordings, named, extended, fixed=True)
+    general = misfit.general_features(machine, recordings)
+    base = naming.refit(Regression(recordings, noise=plain), skews, values=plain.values)
+    kept: list[Named] = []
+    refused: list[Named] = []
+    found, tells = None, False
+    for each in named:
+        tried = gain.measure(base, [*kept, each], extended.values, general, seed)
+        won = tried.chi2_won - (found.chi2_won if found is not None else 0.0)
+        # were the effect there as in training, it would win about what is expected, by twice its root either way
+        expected = tried.chi2_expected
+        if won > HOLDS_OUT or won > expected - REFUSES * 2.0 * math.sqrt(expected):
+            kept, found = [*kept, each], tried
+            tells = tells or expected >= TELLS
+        else:
+            refused.append(each)
+    if found is not None and hasattr(machine, "free"):
+        # refused or not is asked of the sharpest equations; how much nearer the simulation comes, of the simulation
+        recordings = [machine.free(recording) for recording in recordings]
+        general = misfit.general_features(machine, recordings)
+        base = naming.refit(Regression(recordings), skews, values=plain.values)
+        found = gain.measure(base, kept, extended.values, general, seed)
+    return Held(found, ", ".join(table.name for table in holdout), refused, found is None or tells)
+
+
+def simulated_again(
+    machine: Machine,
+    recordings: Sequence[Recording],
+    named: Sequence[Named],
+    extended: Regression,
+    fixed: bool = False,
+) -> list[Recording]:
+    """The recordings of a machine that is told by its simulator, with what was named in the simulation."""
+    acting = [(each.effect, each.shape, [extended.values[name] for name in each.coefficients]) for each in named]
+    return [machine.again(recording, acting, fixed) for recording in recordings]  # type: ignore[attr-defined]
