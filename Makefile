@@ -1,4 +1,5 @@
 # make walk: set up everything, then let Ranger walk 100 steps.   make test: set up everything, then run all tests.
+# make test-interpreted: the rooms' own tests on the plain sources, where compiled modules ran in `make test`.
 # make docs: the documentation as a site, and every command and program of its tutorial and how-to pages run.
 # make test-vm: the tests on real SocketCAN, in a virtual machine where this kernel has none (tools/vm/README.md).
 PYTHON ?= python3
@@ -7,7 +8,7 @@ STEPS  ?= 100
 RUN    := $(VENV)/bin/python
 SOURCES := $(shell find ranger_sim foundation datatable can_bus plant firmware_sim boards harness sysid tools \( -name '*.py' -o -name '*.pxd' \) -not -name '_*' 2>/dev/null)
 
-.PHONY: walk test test-vm docs lint setup bench lock clean
+.PHONY: walk test test-interpreted test-vm docs lint setup bench lock clean
 
 walk: $(VENV)/.walk
 	$(RUN) -m ranger_sim walk --steps $(STEPS) --out runs/walk
@@ -22,6 +23,14 @@ test: $(VENV)/.all
 	$(RUN) -m pytest -q -rs -n 2 --dist loadfile $(addprefix --ignore=,$(WITH_A_CLOCK) $(PAGES))
 	$(RUN) -m pytest -q -rs $(WITH_A_CLOCK)
 
+# Rooms whose modules are compiled. Left out is what takes minutes interpreted or runs programs of its own.
+ROOMS_COMPILED = can_bus firmware_sim boards datatable plant harness foundation
+SLOW_INTERPRETED =
+
+test-interpreted: $(VENV)/.all
+	RANGER_SIM_INTERPRETED=1 $(RUN) -m pytest -q -rs -n 2 --dist loadfile $(addprefix --ignore=,$(SLOW_INTERPRETED)) \
+		$(addprefix tests/,$(ROOMS_COMPILED))
+
 docs: $(VENV)/.all
 	$(RUN) -m sphinx -W --keep-going -q -b html -c docs . build/site
 	$(RUN) -m pytest -q -n 2 $(PAGES)
@@ -30,7 +39,7 @@ docs: $(VENV)/.all
 test-vm: $(VENV)/.all
 	$(RUN) -m tests.vm.run
 
-lint: $(VENV)/.all
+lint: $(VENV)/.tools
 	$(RUN) -m ruff check .
 	$(RUN) -m ruff format --check --quiet .
 	$(RUN) -m ranger_sim.tools.stubs --check
@@ -47,6 +56,10 @@ setup: $(VENV)/.all
 $(VENV)/.walk: set_up.py requirements.lock pyproject.toml setup.py $(SOURCES)
 	@$(PYTHON) -c 'import sys; sys.exit(0 if sys.version_info >= (3, 11) else "ranger-sim needs Python 3.11 or newer, this is " + sys.version.split()[0] + "; try make PYTHON=python3.12")'
 	@$(PYTHON) set_up.py walk --venv $(VENV)
+	@touch $@
+
+$(VENV)/.tools: set_up.py requirements.lock pyproject.toml
+	@$(PYTHON) set_up.py lint --venv $(VENV)
 	@touch $@
 
 $(VENV)/.all: $(VENV)/.walk

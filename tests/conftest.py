@@ -7,6 +7,10 @@ import signal
 
 import pytest
 
+from tests.examples import register_profiles
+
+register_profiles()
+
 OURS = ("anon_inode", "pipe", "socket")  # kinds of descriptors that a test may leave open only by mistake
 
 

@@ -5,7 +5,7 @@ import socket
 
 import can
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from ranger_sim.can_bus.bus import Bus
@@ -145,7 +145,6 @@ def test_slcan_a_program_that_does_not_read_loses_frames_and_is_told(line):
     assert say("F\r") == "F01\r" and say("F\r") == "F00\r"
 
 
-@settings(deadline=None)
 @given(st.lists(st.one_of(st.binary(max_size=40), st.sampled_from([b"O\r", b"C\r", b"t12380011223344556677\r"]))))
 def test_slcan_whatever_comes_over_the_line_the_server_lives_on(pieces):
     owner = Owner(lambda bus: SlcanServer("can1", bus))
@@ -274,7 +273,6 @@ def test_socketcand_what_is_not_understood_is_told(daemon, text, words):
     assert "< error " in said and words in said
 
 
-@settings(deadline=None)
 @given(
     st.lists(
         st.one_of(
