@@ -27,7 +27,8 @@ LATER = {
     "scipy",
     "perfetto",
     "pyvcd",
-}  # reads users' DBC files, fits, writes timelines: a first walk need not wait
+    "shtab",
+}  # reads users' DBC files, fits, writes timelines, completes commands: a first walk need not wait
 
 
 class SetUpError(Exception):
