@@ -1,5 +1,5 @@
 # make walk: set up everything, then let Ranger walk 100 steps.   make test: set up everything, then run all tests.
-# make test-interpreted: the rooms' own tests on the plain sources, where compiled modules ran in `make test`.
+# make test-interpreted: the rooms' own tests on the plain sources, where compiled modules run in `make test`.
 # make docs: the documentation as a site, and every command and program of its tutorial and how-to pages run.
 # make test-vm: the tests on real SocketCAN, in a virtual machine where this kernel has none (tools/vm/README.md).
 PYTHON ?= python3
@@ -23,13 +23,15 @@ test: $(VENV)/.all
 	$(RUN) -m pytest -q -rs -n 2 --dist loadfile $(addprefix --ignore=,$(WITH_A_CLOCK) $(PAGES))
 	$(RUN) -m pytest -q -rs $(WITH_A_CLOCK)
 
-# Rooms whose modules are compiled. Left out is what takes minutes interpreted or runs programs of its own.
-ROOMS_COMPILED = can_bus firmware_sim boards datatable plant harness foundation
-SLOW_INTERPRETED =
+# The rooms' own tests interpreted: what is compiled must be right as plain Python, too. Left out are walks, which take
+# minutes so, programs that keep a pace, and what compares both modes already.
+PLAIN = $(addprefix tests/,foundation datatable can_bus firmware_sim boards plant harness/test_counters.py \
+	harness/test_imu_wire.py harness/test_profile.py harness/test_requests.py harness/test_supervision.py)
+NOT_PLAIN = $(addprefix tests/,can_bus/test_can_programs.py boards/test_head_2015.py boards/test_original_images.py \
+	boards/test_main_brain_runs_alike_compiled_and_interpreted.py plant/test_walking.py)
 
 test-interpreted: $(VENV)/.all
-	RANGER_SIM_INTERPRETED=1 $(RUN) -m pytest -q -rs -n 2 --dist loadfile $(addprefix --ignore=,$(SLOW_INTERPRETED)) \
-		$(addprefix tests/,$(ROOMS_COMPILED))
+	RANGER_SIM_INTERPRETED=1 $(RUN) -m pytest -q -rs -n 2 --dist loadfile $(addprefix --ignore=,$(NOT_PLAIN)) $(PLAIN)
 
 docs: $(VENV)/.all
 	$(RUN) -m sphinx -W --keep-going -q -b html -c docs . build/site

@@ -11,7 +11,6 @@ A verdict holds for the tests of its time. `--again` tries mutants that were not
 import argparse
 import json
 import pathlib
-import shutil
 import sys
 from collections import Counter
 from typing import Any
@@ -92,7 +91,7 @@ def parser() -> argparse.ArgumentParser:
         metavar="FILE:LINE",
         help="instead of drawing: every mutant of this line",
     )
-    command.add_argument("--again", action="store_true", help="try what was not killed once more; map the tests anew")
+    command.add_argument("--again", action="store_true", help="try what was not noticed once more")
     command.add_argument("--json", metavar="FILE|-", help="the figures as JSON; - prints them and nothing else")
     return command
 
@@ -133,8 +132,6 @@ def of_room(options: argparse.Namespace, copy: Copy, room: str, listed: list[Kno
     if options.at:
         drawn = [mutant for mutant in every if f"{mutant.path}:{mutant.line}" in options.at]
     results = Results(options.work / f"verdicts-{room}.jsonl")
-    if options.again:
-        shutil.rmtree(options.work / f"reach-{room}", ignore_errors=True)
     wanted = options.tests or [f"tests/{room}", *ALSO.get(room, ())]
     with copy.server(wanted) as ask:
         tests = reach_of(copy, ask, room, wanted, options.map_limit, say)

@@ -2,6 +2,7 @@
 
 import contextlib
 import dataclasses
+import hashlib
 import json
 import os
 import pathlib
@@ -242,7 +243,7 @@ class TestsOf:
 def reach_of(
     copy: Copy, ask: Asked, room: str, tests: list[str], limit_s: float, say: Callable[[str], None]
 ) -> TestsOf:
-    """The map of a room's tests, file by file: kept from an earlier run, or made by running them once.
+    """The map of a room's tests, file by file: made by running them once, kept until the room or the file changes.
 
     A test that takes longer than LIMIT_TEST_S, or a file longer than `limit_s`, takes no part, and that is said.
     """
@@ -255,7 +256,8 @@ def reach_of(
     for file in files:
         name = file.relative_to(copy.folder).as_posix()
         kept = folder / f"{name.replace('/', '.')}.json"
-        if not kept.exists():
+        state = state_of(copy.folder, room, file)
+        if not kept.exists() or json.loads(kept.read_text(encoding="utf-8")).get("state") != state:
             partial = kept.with_suffix(".partial")
             answer = ask(map=name, to=str(partial), limit_s=limit_s, limit_test_s=LIMIT_TEST_S)
             if answer["code"] == 0:
@@ -264,12 +266,22 @@ def reach_of(
                 why = "takes too long" if answer["code"] is None else answer["by"]
                 say(f"{room}: {name} takes no part: {why}")
                 partial.write_text(json.dumps(NOTHING | {"failed": [name]}), "utf-8")
+            seen = json.loads(partial.read_text(encoding="utf-8"))
+            partial.write_text(json.dumps(seen | {"state": state}), encoding="utf-8")
             partial.replace(kept)
         found[name] = json.loads(kept.read_text(encoding="utf-8"))
     failed = [name for each in found.values() for name in each["failed"]]
     if failed:
         say(f"{room}: {len(failed)} tests fail, skip or last too long, and take no part: {', '.join(failed[:3])} ...")
     return TestsOf(found)
+
+
+def state_of(folder: pathlib.Path, room: str, tests: pathlib.Path) -> str:
+    """A digest of the room's sources and of a file of tests: what its map is made of."""
+    digest = hashlib.sha256()
+    for path in (*sorted((folder / room).rglob("*.py")), tests):
+        digest.update(path.read_bytes())
+    return digest.hexdigest()
 
 
 def files_of_tests(path: pathlib.Path) -> list[pathlib.Path]:
