@@ -1,4 +1,5 @@
 # make walk: set up everything, then let Ranger walk 100 steps.   make test: set up everything, then run all tests.
+# make test-interpreted: the rooms' own tests on the plain sources, where compiled modules run in `make test`.
 # make docs: the documentation as a site, and every command and program of its tutorial and how-to pages run.
 # make test-vm: the tests on real SocketCAN, in a virtual machine where this kernel has none (tools/vm/README.md).
 PYTHON ?= python3
@@ -7,7 +8,7 @@ STEPS  ?= 100
 RUN    := $(VENV)/bin/python
 SOURCES := $(shell find ranger_sim foundation datatable can_bus plant firmware_sim boards harness sysid tools \( -name '*.py' -o -name '*.pxd' \) -not -name '_*' 2>/dev/null)
 
-.PHONY: walk test test-vm docs lint setup bench lock clean
+.PHONY: walk test test-interpreted test-vm docs lint setup bench lock clean
 
 walk: $(VENV)/.walk
 	$(RUN) -m ranger_sim walk --steps $(STEPS) --out runs/walk
@@ -22,6 +23,16 @@ test: $(VENV)/.all
 	$(RUN) -m pytest -q -rs -n 2 --dist loadfile $(addprefix --ignore=,$(WITH_A_CLOCK) $(PAGES))
 	$(RUN) -m pytest -q -rs $(WITH_A_CLOCK)
 
+# The rooms' own tests interpreted: what is compiled must be right as plain Python, too. Left out are walks, which take
+# minutes so, programs that keep a pace, and what compares both modes already.
+PLAIN = $(addprefix tests/,foundation datatable can_bus firmware_sim boards plant harness/test_counters.py \
+	harness/test_imu_wire.py harness/test_profile.py harness/test_requests.py harness/test_supervision.py)
+NOT_PLAIN = $(addprefix tests/,can_bus/test_can_programs.py boards/test_head_2015.py boards/test_original_images.py \
+	boards/test_main_brain_runs_alike_compiled_and_interpreted.py plant/test_walking.py)
+
+test-interpreted: $(VENV)/.all
+	RANGER_SIM_INTERPRETED=1 $(RUN) -m pytest -q -rs -n 2 --dist loadfile $(addprefix --ignore=,$(NOT_PLAIN)) $(PLAIN)
+
 docs: $(VENV)/.all
 	$(RUN) -m sphinx -W --keep-going -q -b html -c docs . build/site
 	$(RUN) -m pytest -q -n 2 $(PAGES)
@@ -30,7 +41,7 @@ docs: $(VENV)/.all
 test-vm: $(VENV)/.all
 	$(RUN) -m tests.vm.run
 
-lint: $(VENV)/.all
+lint: $(VENV)/.tools
 	$(RUN) -m ruff check .
 	$(RUN) -m ruff format --check --quiet .
 	$(RUN) -m ranger_sim.tools.stubs --check
@@ -47,6 +58,10 @@ setup: $(VENV)/.all
 $(VENV)/.walk: set_up.py requirements.lock pyproject.toml setup.py $(SOURCES)
 	@$(PYTHON) -c 'import sys; sys.exit(0 if sys.version_info >= (3, 11) else "ranger-sim needs Python 3.11 or newer, this is " + sys.version.split()[0] + "; try make PYTHON=python3.12")'
 	@$(PYTHON) set_up.py walk --venv $(VENV)
+	@touch $@
+
+$(VENV)/.tools: set_up.py requirements.lock pyproject.toml
+	@$(PYTHON) set_up.py lint --venv $(VENV)
 	@touch $@
 
 $(VENV)/.all: $(VENV)/.walk

@@ -2,6 +2,7 @@
 
     python3 set_up.py walk      # what a walk needs
     python3 set_up.py all       # all of pyproject.toml: what reads DBC files, fits and tests besides
+    python3 set_up.py lint      # all packages, and nothing compiled: enough for `make lint`
 
 Packages come from requirements.lock, by hash; for a walk without those in LATER. The sources are compiled (setup.py)
 while packages are still being installed: Cython and setuptools come first. What was done before is not done again. One
@@ -26,7 +27,8 @@ LATER = {
     "scipy",
     "perfetto",
     "pyvcd",
-}  # reads users' DBC files, fits, writes timelines: a first walk need not wait
+    "shtab",
+}  # reads users' DBC files, fits, writes timelines, completes commands: a first walk need not wait
 
 
 class SetUpError(Exception):
@@ -126,9 +128,12 @@ class Steps:
             self.run([sys.executable, "-m", "venv", self.venv])
 
     def packages(self, what, entries):
-        """Install the entries of the lock; nothing when these very ones were installed before."""
+        """Install the entries of the lock; nothing when these very ones, or all of this lock, were installed before."""
         kept = self.venv / f"installed-{what}.txt"
+        whole = self.venv / "installed-all.txt"
         if kept.exists() and kept.read_text(encoding="utf-8") == entries:
+            return
+        if whole.exists() and set(entries.splitlines()) <= set(whole.read_text(encoding="utf-8").splitlines()):
             return
         wanted = self.venv / f"wanted-{what}.txt"
         wanted.write_text(entries, encoding="utf-8")
@@ -181,7 +186,7 @@ class Steps:
 
 
 def set_up(what, venv):
-    """Everything, in order; packages and library at the same time."""
+    """Everything, in order; packages and library at the same time. For `lint` packages alone."""
     project = tomllib.loads((HERE / "pyproject.toml").read_text(encoding="utf-8"))
     lock = (HERE / "requirements.lock").read_text(encoding="utf-8")
     builders = {name_of(each) for each in project["build-system"]["requires"]}
@@ -200,6 +205,9 @@ def set_up(what, venv):
 
     try:
         steps.environment()
+        if what == "lint":
+            steps.packages("all", part_of_lock(lock, None))
+            return
         steps.packages("builders", part_of_lock(lock, builders))
         beside = threading.Thread(target=library)
         beside.start()
@@ -220,7 +228,7 @@ def set_up(what, venv):
 def main():
     """The command."""
     parser = argparse.ArgumentParser(description="Sets up what `make walk` or `make test` needs.")
-    parser.add_argument("what", choices=("walk", "all"))
+    parser.add_argument("what", choices=("walk", "all", "lint"))
     parser.add_argument("--venv", type=pathlib.Path, default=HERE / ".venv")
     chosen = parser.parse_args()
     try:

@@ -10,6 +10,8 @@ import sys
 from ranger_sim.datatable.model import Table, Variable
 
 EXIT_DONE, EXIT_STALE = 0, 1
+FILE_COLUMNS = 160  # of lines in a file or a pipe
+WIDE = 120  # columns of a window with room for descriptions
 
 
 def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -112,9 +114,12 @@ def run_list(arguments: argparse.Namespace) -> int:
     from rich.console import Console
     from rich.table import Table as Grid
 
-    grid = Grid(box=SIMPLE_HEAD)
-    for heading in ("id", "name", "type", "unit", "from", "to", "ms", "description"):
-        grid.add_column(heading, justify="right" if heading in ("id", "ms") else "left", no_wrap=heading == "name")
+    console = Console(width=None if sys.stdout.isatty() else FILE_COLUMNS, markup=False, highlight=False)
+    described = console.width >= WIDE
+    grid = Grid(box=SIMPLE_HEAD, pad_edge=False)
+    for heading in ("id", "name", "type", "unit", "from", "to", "period (ms)", *["description"] * described):
+        number = heading in ("id", "period (ms)")
+        grid.add_column(heading, justify="right" if number else "left", no_wrap=heading == "name")
     for variable in variables:
         period = "-" if variable.period_ms is None else f"{float(variable.period_ms):g}"
         grid.add_row(
@@ -125,7 +130,9 @@ def run_list(arguments: argparse.Namespace) -> int:
             variable.publisher,
             " ".join(variable.subscribers),
             period,
-            variable.description,
+            *[variable.description] * described,
         )
-    Console(width=None if sys.stdout.isatty() else 160, markup=False, highlight=False).print(grid)
+    console.print(grid)
+    if not described:
+        print("no room for descriptions: a wider window, --json or `table show NAME` has them")
     return EXIT_DONE

@@ -3,10 +3,18 @@
 import collections
 import gc
 import os
+import shutil
 import signal
 
 import pytest
 
+from ranger_sim import loading
+from tests.examples import register_profiles
+
+register_profiles()
+
+BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
+COMPILERS = ("cc", "gcc", "clang")
 OURS = ("anon_inode", "pipe", "socket")  # kinds of descriptors that a test may leave open only by mistake
 
 
@@ -40,3 +48,17 @@ def pytest_configure(config):
     """Programs that a test interrupts inherit how this process takes SIGINT; a background job of a shell ignores it."""
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def missing_for_ci():
+    """What tests would skip for in silence: a browser, a C compiler, the compiled library where it was asked for."""
+    missing = [names[0] for names in (BROWSERS, COMPILERS) if not any(map(shutil.which, names))]
+    if not (loading.RUNS_COMPILED or loading.interpreted_is_forced()):
+        missing.append(f"the compiled library ({loading.RUNS_INTERPRETED_BECAUSE})")
+    return missing
+
+
+def pytest_sessionstart(session):
+    """Where CI=true says that all must be tested, nothing is left out for want of a program."""
+    if os.environ.get("CI") == "true" and (missing := missing_for_ci()):
+        raise pytest.UsageError(f"CI=true, and there is no {', no '.join(missing)}: tests would be skipped")

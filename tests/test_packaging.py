@@ -14,7 +14,7 @@ import venv
 
 import pytest
 
-from ranger_sim import loading
+from ranger_sim import __version__, loading
 from set_up import SetUpError, for_a_walk, name_of, part_of_lock
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
@@ -363,6 +363,12 @@ def test_every_dependency_has_its_reason_beside_it():
     ]  # not in the lock, reasoned too
     assert len(listed) == len(dependencies + more + grouped) + len(PROJECT["build-system"]["requires"])
     assert all(re.fullmatch(r"\s+# \w.{10,}", rest) for rest in listed)
+
+
+def test_what_is_cited_is_this_version():
+    citation = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    assert re.findall(r"^version: (.+)$", citation, re.MULTILINE) == [__version__]
+    assert re.findall(r"^license: (.+)$", citation, re.MULTILINE) == [PROJECT["project"]["license"]]
 
 
 def test_rooms_are_listed_alike_everywhere():

@@ -4,10 +4,10 @@ import argparse
 import json
 from typing import Any
 
-from rich.table import Table
-
 from ranger_sim.plant import body_files
 from ranger_sim.tools import terminal
+
+WIDE = 120  # columns of a window with room for sources beside their numbers
 
 
 def register(commands: Any) -> None:
@@ -57,13 +57,22 @@ def run_show(options: argparse.Namespace) -> int:
     if options.json:
         print(json.dumps({"name": body.name, "title": body.title, "base": body.base, "parameters": found}, indent=2))
         return 0
-    table = Table(box=None, pad_edge=False)
-    for title in ("key", "value", "unit", "limits", "source"):
-        table.add_column(title, overflow="fold", no_wrap=title == "key")
-    for row in found:
-        value = f"{row['value']:g}" if isinstance(row["value"], float) else str(row["value"])
-        table.add_row(row["key"], value, row["unit"], row["limits"], row["source"])
     console = terminal.console(highlight=False)
     console.print(f"{body.title}: {body.description}")
-    console.print(table)
+    for line in listed(found, console.width):
+        console.print(line, soft_wrap=True)
     return 0
+
+
+def listed(found: list[dict], width: int) -> list[str]:
+    """Lines of a table; in a window of less than WIDE columns each source has a line of its own below its number."""
+    cells = [("key", "value", "unit", "limits", "source")]
+    for row in found:
+        value = f"{row['value']:g}" if isinstance(row["value"], float) else str(row["value"])
+        cells.append((row["key"], value, row["unit"], row["limits"], row["source"]))
+    widths = [max(len(row[column]) for row in cells) for column in range(4)]
+    lines = []
+    for *facts, source in cells:
+        line = "  ".join(f"{text:<{size}}" for text, size in zip(facts, widths, strict=True))
+        lines += [f"{line}  {source}"] if width >= WIDE else [line.rstrip(), f"    {source}"]
+    return lines

@@ -19,6 +19,7 @@ from ranger_sim.tools.files import json_target, replace_file
 from ranger_sim.tools.units import whole_number
 
 EXIT_DONE, EXIT_MISSED = 0, 1
+TIMES_MS = ("period\n(ms)", "jitter\n(ms)", "response\n(ms)", "deadline\n(ms)")
 
 
 def register(commands: Any) -> None:
@@ -141,10 +142,11 @@ def show(bus: dict, console: Console) -> None:
     schedule = f", schedule {bus['schedule']}" if bus["schedule"] else ""
     used = f"at most {100 * bus['utilisation']:.1f} % used"
     verdict = f"{missed} can miss their deadlines" if missed else "every deadline met"
-    title = f"{bus['bus']}: {bus['bit_rate'] / 1e6:g} Mbit/s{schedule}, {used}, {verdict}"
-    table = Table(title=title, title_justify="left")
-    for column in ("id", "frame", "from", "period", "jitter", "response", "deadline", ""):
-        table.add_column(column, justify="left" if column in ("frame", "from", "") else "right")
+    heading = f"{bus['bus']}: {bus['bit_rate'] / 1e6:g} Mbit/s{schedule}, {used}, {verdict}"
+    table = Table(box=None, pad_edge=False)
+    for column in ("id", "frame", "from", *TIMES_MS, ""):
+        left = column in ("frame", "from", "")
+        table.add_column(column, justify="left" if left else "right", no_wrap=True)
     for frame in bus["frames"]:
         response = "none" if frame["response_ms"] is None else f"{frame['response_ms']:.3f}"
         times = [f"{frame[key]:.3f}" for key in ("period_ms", "jitter_ms")]
@@ -158,6 +160,7 @@ def show(bus: dict, console: Console) -> None:
             "" if frame["met"] else "late",
             style=None if frame["met"] else "red",
         )
-    console.print(table)
+    console.print(heading, style="bold", soft_wrap=True)
+    terminal.print_table(console, table, spare=TIMES_MS[1:2])
     for note in bus["notes"]:
         console.print(f"  {note}", highlight=False, soft_wrap=True)

@@ -48,6 +48,7 @@ def parser() -> argparse.ArgumentParser:
         can_bounds,
         causes,
         check_bus,
+        completion,
         daq,
         faults,
         info,
@@ -96,6 +97,7 @@ def parser() -> argparse.ArgumentParser:
     figures.register(commands)
     identify.register(commands)
     compare_walk.register(commands)
+    completion.register(commands)
     return top
 
 

@@ -163,10 +163,10 @@ def show(board: dict, ran: dict | None, console: Console, whole: bool) -> None:
     slot = f"{board['slot_us']:g} us slots of {board['slot_cycles']:,} cycles"
     console.print(f"[bold]{board['board']}[/bold], {slot}, {len(board['rows'])} rows; all in cycles")
     if whole:
-        console.print(function_table(board))
-    console.print(row_table(board))
+        terminal.print_table(console, function_table(board), spare=("robot's image", "per item", "where"))
+    terminal.print_table(console, row_table(board), spare=("all limits", "seen margin"))
     if whole:
-        console.print(interrupt_table(board))
+        terminal.print_table(console, interrupt_table(board), spare=("why so often",))
     for line in notes(board, ran):
         console.print(line, soft_wrap=True)
     console.print()
@@ -175,8 +175,8 @@ def show(board: dict, ran: dict | None, console: Console, whole: bool) -> None:
 def function_table(board: dict) -> Table:
     """The schedule, line by line."""
     table = Table(box=None, pad_edge=False)
-    table.add_column("function")
-    table.add_column("where")
+    table.add_column("function", no_wrap=True)
+    table.add_column("where", no_wrap=True)
     for title in ("cost", "per item", "limit", "worst seen", "possible", "robot's image"):
         table.add_column(title, justify="right")
     for each in board["functions"]:

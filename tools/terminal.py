@@ -4,10 +4,14 @@ import contextlib
 import io
 import os
 import sys
+from collections.abc import Sequence
 from typing import IO, Any
 
 from rich.console import Console
+from rich.measure import Measurement
+from rich.table import Table
 
+UNLIMITED = 10_000  # columns: more than any table of ours
 FILE_COLUMNS = 160  # of lines in a file or a pipe, where nothing is as wide as a window: tables stay whole
 OUTPUT = "standard output"
 
@@ -30,6 +34,28 @@ def console(**settings: Any) -> Console:
     if not made.is_terminal and "COLUMNS" not in os.environ:
         made.width = FILE_COLUMNS
     return made
+
+
+def print_table(console: Console, table: Table, spare: Sequence[str]) -> None:
+    """Print a table with every line whole: in a narrow window columns of `spare` are left out, and that is told.
+
+    spare: headings, the first to go first. Where that is not enough, what may wrap is wrapped.
+    """
+    gone = []
+    for heading in spare:
+        if Measurement.get(console, console.options.update(width=UNLIMITED), table).maximum <= console.width:
+            break
+        kept = [column for column in table.columns if column.header != heading]
+        gone += [heading] * (len(kept) < len(table.columns))
+        table.columns = kept
+    console.print(table)
+    if gone:
+        console.print(f"no room for {', '.join(map(one_line, gone))}: a wider window or --json has it", soft_wrap=True)
+
+
+def one_line(heading: str) -> str:
+    """A heading without its break and its unit's brackets."""
+    return heading.partition("\n")[0]
 
 
 def stand_in_for_closed_streams() -> None:

@@ -21,7 +21,7 @@ from ranger_sim.foundation.quantities import (
 )
 
 __all__ = ["ANGLES", "ENERGIES_WH", "LENGTHS", "SHARES", "TIMES", "Quantity", "Value", "WholeNumber", "Word"]
-__all__ += ["figure", "number", "quantity", "whole_number", "word"]
+__all__ += ["duration_text", "figure", "length_text", "number", "quantity", "whole_number", "word"]
 
 # What starts so is a value and no option: argparse lets `--time -1s` reach its check (`-1` alone would by default).
 NEGATIVE_VALUE = re.compile(r"-(\.?\d|inf|nan)", re.IGNORECASE)
@@ -157,3 +157,14 @@ def word(what: str) -> Word:
 def figure(value: float | None, form: str) -> str:
     """A figure as `form` says ("{:.3f} m"); "none" for one that there is not."""
     return "none" if value is None else form.format(value)
+
+
+def length_text(length_m: float) -> str:
+    """Metres, from 1 km up kilometres."""
+    return f"{length_m:.2f} m" if length_m < 1000.0 else f"{length_m / 1000.0:.3f} km"
+
+
+def duration_text(seconds: float) -> str:
+    """Seconds, from an hour up also hours and minutes."""
+    whole = round(seconds / 60.0)
+    return f"{seconds:.1f} s" + (f" ({whole // 60} h {whole % 60:02d} min)" if seconds >= 3600.0 else "")

@@ -21,11 +21,11 @@ from ranger_sim.harness.profile import Profile
 from ranger_sim.harness.profile import load as load_profile
 from ranger_sim.harness.scenario import Scenario, StopRule
 from ranger_sim.plant import terms
-from ranger_sim.tools import faults, serial_options, terminal, trace
+from ranger_sim.tools import faults, serial_options, terminal, trace, unexpected
 from ranger_sim.tools.files import json_target, replace_file, writable_folder
 from ranger_sim.tools.run_folder import REPORT, SUMMARY, RunFolder
 from ranger_sim.tools.run_logs import RunLogs, write_frames
-from ranger_sim.tools.units import figure
+from ranger_sim.tools.units import duration_text, figure, length_text
 from ranger_sim.tools.walk_options import add_walk_options, command_again, log_of, scenario_of, stop_of
 
 if TYPE_CHECKING:
@@ -172,7 +172,7 @@ def finish(
 ) -> bool:
     """Print the summary and write the files that were asked for; False when one of them is not complete."""
     if options.json != "-":
-        print_summary(summary, console)
+        print_summary(summary, robot.plant.parameters.floor_friction, console)
     summary.update(complete=folder is None, files={})
     try:
         if folder is not None:
@@ -257,11 +257,6 @@ def progress_text(robot: Ranger, stop: StopRule, wall_s: float) -> str:
     )
 
 
-def length_text(length_m: float) -> str:
-    """Metres, from 1 km up kilometres."""
-    return f"{length_m:.2f} m" if length_m < 1000.0 else f"{length_m / 1000.0:.3f} km"
-
-
 def clock_text(seconds: float) -> str:
     """Hours, minutes and seconds."""
     whole = round(seconds)
@@ -280,8 +275,8 @@ def write_files(robot: Ranger, summary: dict, folder: RunFolder, logs: RunLogs |
     folder.finish(summary)
 
 
-def print_summary(summary: dict, console: Console) -> None:
-    """The walk in a few lines."""
+def print_summary(summary: dict, floor_friction: float, console: Console) -> None:
+    """The walk in a few lines: what it did, then what a healthy one has not."""
     console.print(
         f"{summary['steps']} steps, {length_text(summary['distance_m'])} in {duration_text(summary['time_s'])}, "
         f"{end_text(summary)}; "
@@ -296,21 +291,15 @@ def print_summary(summary: dict, console: Console) -> None:
     console.print(energy_text(summary), highlight=False, soft_wrap=True)
     for fault in summary["faults"]:
         console.print(faults.fault_text(fault), highlight=False, soft_wrap=True)
-    for line in error_lines(summary["errors"], summary["time_s"]):
+    for line in [*unexpected.lines(summary, floor_friction), *usual_lines(summary["errors"], summary["time_s"])]:
         console.print(line, highlight=False, soft_wrap=True)
 
 
-def error_lines(errors: dict, time_s: float) -> list[str]:
-    """What boards noted beyond what a healthy walk does, and how much was like in every walk."""
+def usual_lines(errors: dict, time_s: float) -> list[str]:
+    """How much of what boards noted was as in every healthy walk, in a line if there was any."""
     unusual = normal_errors.beyond(errors, time_s)
-    lines = [
-        f"errors of {board}: " + ", ".join(f"{name} x {count}" for name, count in names.items())
-        for board, names in unusual.items()
-    ]
     usual = sum(map(len, errors.values())) - sum(map(len, unusual.values()))
-    if usual:
-        lines.append(f"errors as in every healthy walk: {usual} kinds (report and summary have them)")
-    return lines
+    return [f"errors as in every healthy walk: {usual} kinds (report and summary have them)"] if usual else []
 
 
 def end_text(summary: dict) -> str:
@@ -320,12 +309,6 @@ def end_text(summary: dict) -> str:
     if summary["fell"]:
         return f"fell: {summary['fall_cause']}"
     return "interrupted, on its feet" if summary["interrupted"] else "on its feet"
-
-
-def duration_text(seconds: float) -> str:
-    """Seconds, from an hour up also hours and minutes."""
-    whole = round(seconds / 60.0)
-    return f"{seconds:.1f} s" + (f" ({whole // 60} h {whole % 60:02d} min)" if seconds >= 3600.0 else "")
 
 
 def energy_text(summary: dict) -> str:

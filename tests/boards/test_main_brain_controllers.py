@@ -14,6 +14,7 @@ from ranger_sim.datatable.generated.all_variables import TABLE_SIZE
 from ranger_sim.datatable.store import DataStore
 from ranger_sim.firmware_sim.clock import Crystal
 from ranger_sim.foundation.user_error import UserError
+from tests.examples import examples
 
 
 def test_every_set_loads_and_gives_the_parameters_of_its_program_and_no_others():
@@ -306,7 +307,7 @@ toml_values = st.one_of(
 )
 
 
-@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=examples(150), suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     key=st.sampled_from(["title", "base", "parameters", "reasons", "operator", "P_F_ST_F_TANG", "stance", "keys"]),
     value=toml_values,
@@ -321,7 +322,7 @@ def test_no_value_anywhere_makes_a_traceback(tmp_path, key, value, where):
         assert "\n" not in str(error)
 
 
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=examples(60), suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(content=st.binary(max_size=200))
 def test_no_bytes_make_a_traceback(tmp_path, content):
     path = tmp_path / "fuzz.toml"

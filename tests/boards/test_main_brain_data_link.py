@@ -18,6 +18,7 @@ from ranger_sim.datatable.generated.all_variables import ID_OF_LAST
 from ranger_sim.firmware_sim.clock import Crystal
 from ranger_sim.foundation.events import PIN_EDGE, UART_BYTE, UART_OUTPUT
 from ranger_sim.foundation.numbers import word_of_float
+from tests.examples import examples
 
 MEDIUM, FAST = 65536, 131072
 SLOT_NS = 2_000_000
@@ -434,7 +435,7 @@ PIECES = st.one_of(
 )  # fmt: skip
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=examples(150))
 @given(st.lists(PIECES, max_size=12))
 def test_no_bytes_stop_the_board(pieces):
     desk = Desk()

@@ -407,6 +407,24 @@ def test_by_switch_the_leg_angle_is_the_imus_roll():
     assert bench.get("E_LO_ANGLE") == pytest.approx(-0.2, abs=1e-6)
 
 
+@pytest.mark.parametrize(
+    ("sensor", "leg"),
+    [
+        ("MCFO_LEFT_HEEL_SENSE", "OUTER"),
+        ("MCFO_RIGHT_HEEL_SENSE", "OUTER"),
+        ("MCFI_LEFT_HEEL_SENSE", "INNER"),
+        ("MCFI_RIGHT_HEEL_SENSE", "INNER"),
+    ],
+)
+def test_each_heel_sensor_counts_for_its_own_leg_alone(sensor, leg):
+    bench = walking(Quirks(heel_strike="filtered_sum"))
+    for _ in range(200):  # a second: 10 Hz filters have settled
+        bench.tick(**{sensor: 500.0})
+    other = {"OUTER": "INNER", "INNER": "OUTER"}[leg]
+    assert bench.get(f"EST_CONTACT_{leg}") == pytest.approx(500.0, rel=1e-3)
+    assert bench.get(f"EST_CONTACT_{other}") == 0.0
+
+
 def test_by_switch_contact_is_a_filtered_sum_above_1700_counts():
     """The robot's 850 counts are for a sum of 700 in swing; the emulated sensors have 700 each."""
     bench = walking(Quirks(heel_strike="filtered_sum"))

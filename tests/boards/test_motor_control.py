@@ -340,6 +340,7 @@ def test_bits_15_and_above_of_shutdown_are_ignored(value, stopped):
     bench.command("SHUTDOWN", value)
     bench.run(ms=1)
     assert bench.board.output.off == (SHUTDOWN if stopped else 0)
+    assert bench.board.output.shutdown.frames == 1
 
 
 def test_a_motor_keeps_its_last_command_when_the_network_falls_silent():

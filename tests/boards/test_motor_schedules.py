@@ -593,7 +593,7 @@ def test_controller_errors_get_the_codes_of_their_controller(bits, code):
 
     link = Link(number=2)
     link.push(CAN_STATUS, 2, bits, 100, 0, 0)
-    assert link.errors.totals[code] == 1
+    assert {number: count for number, count in enumerate(link.errors.totals) if count} == {code: 1}
 
 
 def test_the_hip_listens_only_to_warnings_and_bus_errors():

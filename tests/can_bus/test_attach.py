@@ -6,7 +6,7 @@ import struct
 import threading
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from ranger_sim.can_bus.bus import Bus
@@ -387,7 +387,6 @@ RECORDS = st.one_of(
 )
 
 
-@settings(deadline=None)
 @given(st.lists(st.tuples(RECORDS, st.booleans(), st.booleans()), max_size=30), st.booleans())
 def test_whatever_clients_send_the_server_and_the_other_nodes_live_on(pieces, greeted):
     owner = Owner()

@@ -12,6 +12,7 @@ from ranger_sim.can_bus.bounds import Message, level_of, message, most_waiting, 
 from ranger_sim.can_bus.frame import frame_bits, worst_case_bits
 from ranger_sim.foundation.events import FLAG_EXTENDED
 from ranger_sim.foundation.random_stream import RandomStream
+from tests.examples import examples
 
 MS = 1_000_000
 
@@ -236,7 +237,7 @@ def test_no_answer_exceeds_its_bound_over_random_sets():
     assert figures["reached_90_percent"] > 0.8  # short frames cannot have all the stuff bits that they are allowed
 
 
-@settings(deadline=None, max_examples=25)
+@settings(max_examples=examples(25))
 @given(st.integers(0, 2**32))
 def test_no_answer_exceeds_its_bound_whatever_is_drawn(seed):
     stream = RandomStream(seed, "bounds")

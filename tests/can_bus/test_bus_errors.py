@@ -27,6 +27,19 @@ def test_a_corrupted_frame_is_repeated_and_received_once():
     assert [status for *_, status in wired.of(0, "done")] == [TX_SENT]
 
 
+def test_the_repetition_is_logged_at_its_last_bit_and_lost_once_where_nobody_listens():
+    wired = Wired(2)
+    wired.bus.nodes[1].listening = False
+    wired.bus.inject_errors(1)
+    wired.send(0, 0x10, lo=7)
+    wired.bus.advance(SECOND)
+    [(ended, _, status)] = wired.of(0, "done")
+    _error, frame = wired.log()
+    bit = next(number for number in range(1000) if edge(number) == ended)  # the bit behind the frame
+    assert status == TX_SENT and frame[:2] == (edge(bit - 1), 0x10)
+    assert wired.bus.counters.lost == 1
+
+
 def test_an_error_costs_the_sender_eight_and_a_receiver_one_and_success_pays_one_back():
     wired = Wired(2)
     wired.bus.inject_errors(1)

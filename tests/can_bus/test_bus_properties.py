@@ -14,6 +14,7 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, pr
 from ranger_sim.can_bus.frame import FIELD_END, arbitration_key, frame_bits
 from ranger_sim.can_bus.node import BUS_OFF
 from ranger_sim.foundation.events import FLAG_ERROR, FLAG_EXTENDED, FLAG_SINGLE_SHOT, TX_ABORTED, TX_LOST, TX_SENT
+from tests.examples import examples
 
 from .wiring import RATE, Wired
 
@@ -185,7 +186,7 @@ class BusMachine(RuleBasedStateMachine):
         assert self.wired.bus.counters.lost == 0
 
 
-BusMachine.TestCase.settings = settings(max_examples=60, stateful_step_count=40, deadline=None)
+BusMachine.TestCase.settings = settings(max_examples=examples(60), stateful_step_count=40)
 TestWhateverIsSent = BusMachine.TestCase
 
 
@@ -202,7 +203,7 @@ REQUESTS = st.lists(
 )
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=examples(60))
 @given(REQUESTS, st.lists(st.integers(2_000, 300_000), min_size=1, max_size=20), st.booleans(), st.integers(0, 2))
 def test_results_do_not_depend_on_how_time_is_cut(requests, cuts, noise, errors):
     requests = sorted(requests, key=lambda request: request[2])

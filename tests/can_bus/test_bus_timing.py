@@ -184,6 +184,18 @@ def test_an_abort_takes_back_what_waits_but_not_what_is_under_way():
     assert wired.bus.counters.aborted == 1 and wired.bus.counters.lost == 0
 
 
+@pytest.mark.parametrize("buffer", [1, 2, 3])
+def test_each_of_the_three_buffers_can_be_taken_back_and_no_other_number_is_one(buffer):
+    wired = Wired(2)
+    wired.send(0, 0x10)
+    wired.send(1, 0x20, buffer=buffer)
+    wired.bus.advance(1000)
+    for taken_back in (0, 4, buffer):
+        wired.bus.abort(1, taken_back, 2000)
+    wired.bus.advance(SECOND)
+    assert wired.of(1, "done") == [(2000, buffer, TX_ABORTED)] and wired.bus.counters.aborted == 1
+
+
 def test_an_abort_in_the_future_lets_a_frame_go_that_starts_before_it():
     wired = Wired(3)
     wired.send(0, 0x10)

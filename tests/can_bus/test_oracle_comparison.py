@@ -4,6 +4,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tests.examples import examples
+
 from . import oracle_comparison as comparison
 from .bit_oracle import Frame
 
@@ -84,13 +86,13 @@ def scenarios(draw):
     )  # fmt: skip
 
 
-@settings(deadline=None, max_examples=150)
+@settings(max_examples=examples(150))
 @given(scenarios())
 def test_no_scenario_differs(scenario):
     assert comparison.differences(scenario) == []
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=examples(60))
 @given(
     st.sampled_from(comparison.KINDS),
     st.integers(0, 10_000),

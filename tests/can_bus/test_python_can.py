@@ -6,7 +6,7 @@ import threading
 
 import can
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from ranger_sim.can_bus.edge import attached_link, python_can
@@ -513,7 +513,6 @@ def any_message(draw):
     )
 
 
-@settings(deadline=None)
 @given(st.lists(any_message(), max_size=20))
 def test_any_message_passes_a_private_bus_unchanged(messages):
     channel = fresh_name()

@@ -5,13 +5,14 @@ import socket
 
 import can
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from ranger_sim.can_bus.bus import Bus
 from ranger_sim.can_bus.edge.slcan import SlcanServer
 from ranger_sim.can_bus.edge.socketcand import SocketcandServer
-from ranger_sim.can_bus.edge.taps import TAP_LIMIT
+from ranger_sim.can_bus.edge.taps import ERROR_PASSIVE, TAP_LIMIT, TRANSMIT_QUEUE
+from ranger_sim.can_bus.node import RESET
 from ranger_sim.foundation import descriptors, wallclock
 from ranger_sim.foundation.events import FLAG_EXTENDED, FLAG_REMOTE, STAGE_BUS, EventQueue
 from ranger_sim.foundation.user_error import UserError
@@ -93,6 +94,15 @@ def test_slcan_commands_have_the_answers_of_the_protocol(line):
     assert say("C\r") == "\r"
 
 
+def test_slcan_flags_are_bit_5_for_a_passive_controller_and_bit_7_for_one_off_the_bus(line):
+    owner, say = line
+    say("O\r")
+    owner.server.program.tap.counters = (0, 128)
+    assert owner.server.program.tap.state == ERROR_PASSIVE and owner.server._status() == 0x20
+    owner.server.program.tap.off = True
+    assert owner.server._status() == 0x80
+
+
 def test_slcan_a_bus_without_a_place_is_refused_and_counted_and_opening_twice_is_not(line):
     owner, say = line
     others = [owner.server.taps.add(f"other {number}") for number in range(TAP_LIMIT)]
@@ -145,7 +155,6 @@ def test_slcan_a_program_that_does_not_read_loses_frames_and_is_told(line):
     assert say("F\r") == "F01\r" and say("F\r") == "F00\r"
 
 
-@settings(deadline=None)
 @given(st.lists(st.one_of(st.binary(max_size=40), st.sampled_from([b"O\r", b"C\r", b"t12380011223344556677\r"]))))
 def test_slcan_whatever_comes_over_the_line_the_server_lives_on(pieces):
     owner = Owner(lambda bus: SlcanServer("can1", bus))
@@ -240,6 +249,18 @@ def test_socketcand_messages_have_the_answers_of_the_protocol(daemon):
     assert owner.server.counters()["not_carried"] == 1
 
 
+def test_socketcand_frames_beyond_a_full_queue_are_counted(daemon):
+    owner, connect = daemon
+    say = connect()
+    say("< open can1 >< rawmode >")
+    owner.bus.set_mode(0, RESET, owner.time)  # nobody acknowledges
+    [tap] = owner.server.channels["can1"].taps
+    while tap.queued < TRANSMIT_QUEUE:
+        tap.offer(0x7, 0, 0, 0)
+    say("< send 123 0 >" * 3)
+    assert (owner.server.counters()["frames_in"], owner.server.counters()["refused"]) == (0, 3)
+
+
 def test_socketcand_nothing_follows_the_answer_to_rawmode_at_once(daemon):
     owner, connect = daemon
     say = connect()
@@ -274,7 +295,6 @@ def test_socketcand_what_is_not_understood_is_told(daemon, text, words):
     assert "< error " in said and words in said
 
 
-@settings(deadline=None)
 @given(
     st.lists(
         st.one_of(

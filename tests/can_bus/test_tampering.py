@@ -164,6 +164,13 @@ def test_32_bit_errors_silence_a_node_which_comes_back_after_128_sequences():
     assert wired.bus.counters.frames == 1  # and it is left alone
 
 
+def test_a_node_that_is_to_be_silenced_leaves_the_frames_of_others_alone():
+    wired = tampered(tampering.Silence(0))
+    wired.send(1, 0x10)
+    wired.bus.advance(10 * MS)
+    assert (wired.bus.counters.frames, wired.bus.counters.errors) == (1, 0)
+
+
 def test_a_babbling_node_at_identifier_0_leaves_nobody_else_a_frame():
     wired = Wired(3)
     intruder = tampering.Intruder(wired.bus, "intruder")

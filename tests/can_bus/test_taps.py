@@ -1,7 +1,10 @@
 """Clients that leave a bus: what they had queued is still sent, for a while, if somebody is there to hear it."""
 
+import pytest
+
 from ranger_sim.can_bus.bus import Bus
-from ranger_sim.can_bus.edge.taps import LINGER_NS, Taps
+from ranger_sim.can_bus.edge.taps import LINGER_NS, Taps, fault_of_frame
+from ranger_sim.foundation.events import FLAG_EXTENDED
 
 EIGHT_BYTES = 8
 
@@ -10,6 +13,25 @@ def clients(count):
     taps = Taps(Bus("can1", 1_000_000, 1))
     taps.poll(1_000)
     return taps, [taps.add(f"client {number}") for number in range(count)]
+
+
+@pytest.mark.parametrize(
+    ("frame", "words"),
+    [
+        ((0x7FF, 8, 0xFFFFFFFF, 0xFFFFFFFF), ""),
+        ((0x1FFFFFFF, FLAG_EXTENDED, 0, 0), ""),
+        ((0x800, 0, 0, 0), "identifier 0x800 is above 0x7ff"),
+        ((0x20000000, FLAG_EXTENDED, 0, 0), "identifier 0x20000000 is above 0x1fffffff"),
+        ((-1, 0, 0, 0), "identifier -0x1 is above 0x7ff"),
+        ((1, 9, 0, 0), "flags 0x9 are not a classic data or remote frame of 0 ... 8 bytes"),
+        ((1, 1 << 20, 0, 0), "flags 0x100000 are not a classic data or remote frame of 0 ... 8 bytes"),
+        ((1, 8, 1 << 32, 0), "a data word has more than 32 bits"),
+        ((1, 8, 0, 1 << 32), "a data word has more than 32 bits"),
+        ((1, 8, -1, 0), "a data word has more than 32 bits"),
+    ],
+)
+def test_a_frame_that_cannot_be_sent_is_named_to_the_bit(frame, words):
+    assert fault_of_frame(*frame) == words
 
 
 def test_a_client_that_has_nothing_queued_leaves_at_once():

@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 from ranger_sim.datatable.loader import hash_of_master_files, load_table
 from ranger_sim.datatable.model import TableError
 from ranger_sim.foundation.user_error import UserError
+from tests.examples import examples
 
 from .small_table import BOARDS, ERRORS, VARIABLES, write
 
@@ -227,7 +228,7 @@ def load_or_be_told(folder):
             assert fault.line >= 1 and fault.rule and "\n" not in str(fault) and len(str(fault)) < 400, repr(fault)
 
 
-fuzzing = settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+fuzzing = settings(max_examples=examples(150), suppress_health_check=[HealthCheck.function_scoped_fixture])
 cells = st.one_of(
     st.text(max_size=12),
     st.integers(-(10**12), 10**12).map(str),

@@ -9,6 +9,7 @@ from ranger_sim.datatable.generate import GENERATED_FOLDER
 from ranger_sim.datatable.loader import load_table
 from ranger_sim.datatable.model import LIMITS
 from ranger_sim.datatable.packing import error_word, pack_frame, unpack_frame
+from tests.examples import examples
 
 TABLE = load_table()
 BUSES = [bus for bus in TABLE.channels if bus != "SSP"]
@@ -76,7 +77,7 @@ def test_a_variable_is_packed_as_its_dbc_file_says(bus, variable):
         check(bus, variable, value, time_ms)
 
 
-@settings(max_examples=400, deadline=None)
+@settings(max_examples=examples(400))
 @given(st.data())
 def test_any_value_of_any_variable_is_packed_as_its_dbc_file_says(data):
     plain = [item for item in CARRIED if not item[1].is_error_word]
@@ -84,7 +85,7 @@ def test_any_value_of_any_variable_is_packed_as_its_dbc_file_says(data):
     check(bus, variable, data.draw(numbers_of(variable)), data.draw(times))
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=examples(100))
 @given(st.integers(0, 65535), st.integers(0, 63), st.integers(0, 1023), times)
 def test_any_error_word_is_taken_apart_as_its_dbc_file_says(code, board, count, time_ms):
     message = DATABASES["CAN1"].get_message_by_name("ERROR_MCH")

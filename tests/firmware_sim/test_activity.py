@@ -20,6 +20,7 @@ from ranger_sim.firmware_sim.activity import (
 )
 from ranger_sim.firmware_sim.scheduler import Task, Wait
 from ranger_sim.firmware_sim.vic import ADC_DONE, EXTERNAL_INTERRUPT, FIQ, SPI_DONE
+from tests.examples import examples
 from tests.firmware_sim.board import TICK_CYCLES, TICK_NS, Log, kept, raise_at, rows_of
 from tests.firmware_sim.workload import run
 
@@ -275,7 +276,7 @@ def test_a_busy_board_does_the_same_with_a_log_and_without(seed):
     assert log.written > 1000
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=examples(10))
 @given(st.integers(1, 1000))
 def test_rows_nest_and_account_for_every_cycle_of_a_busy_board(seed):
     """An oracle that shares no code: sweep over the rows with a stack, and add up who had the processor."""

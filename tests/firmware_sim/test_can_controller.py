@@ -62,6 +62,7 @@ class Node:
 
 def test_the_bit_timing_register_of_the_robot_gives_3_megabit_sampled_at_70_percent():
     assert btr_value(brp=1, sjw=1, tseg1=5, tseg2=2) == 0x00254001
+    assert btr_value(brp=0, sjw=0, tseg1=0, tseg2=0, sam=1) == 0x00800000  # bit 23
     assert bit_rate_of(0x00254001, 60_000_000) == 3_000_000.0
     assert sample_point_of(0x00254001) == pytest.approx(0.70)
     assert Node().can.bit_rate() == 3_000_000.0

@@ -12,6 +12,7 @@ from ranger_sim.firmware_sim.vic import FIQ
 from ranger_sim.foundation.edge_buffer import EdgeBuffer
 from ranger_sim.foundation.events import CAN_RX, NEVER, PIN_EDGE
 from ranger_sim.foundation.user_error import UserError
+from tests.examples import examples
 from tests.firmware_sim.board import kept, rows_of
 
 PINS = ((22, 27), (16, 29))  # channels A and B of two encoders
@@ -115,13 +116,13 @@ trains = st.lists(st.tuples(instants, st.integers(0, 1), st.integers(0, 1)), min
 delays = st.sampled_from([0, 1, 4_000, 60_000])
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=examples(150))
 @given(st.sampled_from([10, 150, 500, 6_000]), trains, trains, st.lists(instants, max_size=6))
 def test_edges_from_the_sensors_buffer_do_what_the_same_edges_do_as_messages(cost, first, second, frames):
     assert run(cost, (first, second), frames, True) == run(cost, (first, second), frames, False)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=examples(60))
 @given(st.sampled_from([150, 500]), trains, trains, st.sampled_from([FIQ, 5, None]), st.booleans(), delays)
 def test_it_is_so_too_with_other_interrupts_with_records_and_with_alarms(
     cost, first, second, slot, recording, delay_ns

@@ -393,6 +393,19 @@ def test_divisor_6_and_5_fourteenths_give_460526_baud():
     assert 31 * uart.byte_ns == pytest.approx(0.67e6, rel=0.01)  # a packet of 31 bytes takes 0.67 ms
 
 
+@pytest.mark.parametrize("fields", [(1, 0, 1), (1, 14, 15)])
+def test_the_smallest_and_largest_dividers_are_possible(fields):
+    uart = Uart(chip_at(), number=1)
+    uart.set_divisor(*fields)
+    assert (uart.DL, uart.DIVADDVAL, uart.MULVAL) == fields
+
+
+@pytest.mark.parametrize("fields", [(0, 0, 1), (1, 0, 0), (1, -1, 1), (1, 15, 15), (1, 0, 16)])
+def test_dividers_beyond_their_fields_are_refused(fields):
+    with pytest.raises(UserError, match="is impossible"):
+        Uart(chip_at(), number=1).set_divisor(*fields)
+
+
 def test_the_receive_interrupt_comes_at_the_trigger_level_and_after_four_quiet_characters():
     chip = chip_at()
     uart = Uart(chip, number=1, divisor=6, divaddval=5, mulval=14, trigger=8)

@@ -7,6 +7,7 @@ from ranger_sim.firmware_sim.clock import Crystal
 from ranger_sim.firmware_sim.scheduler import Schedule, Task
 from ranger_sim.firmware_sim.vic import FIQ
 from ranger_sim.foundation.events import PIN_EDGE
+from tests.examples import examples
 from tests.firmware_sim.board import Log
 
 COSTS = st.integers(0, 40_000)
@@ -60,7 +61,7 @@ class Run:
 
 
 @given(tables())
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=examples(150))
 def test_no_task_runs_twice_in_a_slot_and_the_order_of_the_table_is_kept(table):
     run = Run(table)
     by_slot: dict = {}
@@ -72,7 +73,7 @@ def test_no_task_runs_twice_in_a_slot_and_the_order_of_the_table_is_kept(table):
 
 
 @given(tables())
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=examples(150))
 def test_tasks_run_and_dropped_and_still_to_come_are_those_listed(table):
     run = Run(table)
     scheduler = run.log.chip.scheduler
@@ -84,7 +85,7 @@ def test_tasks_run_and_dropped_and_still_to_come_are_those_listed(table):
 
 
 @given(tables())
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=examples(150))
 def test_cycles_are_conserved_between_tasks_interrupts_and_time(table):
     run = Run(table)
     chip = run.log.chip
@@ -102,7 +103,7 @@ def test_cycles_are_conserved_between_tasks_interrupts_and_time(table):
 
 
 @given(tables())
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=examples(100))
 def test_tasks_never_overlap_and_never_start_before_what_they_wait_for(table):
     run = Run(table)
     ends = 0
@@ -113,7 +114,7 @@ def test_tasks_never_overlap_and_never_start_before_what_they_wait_for(table):
 
 
 @given(tables(), st.lists(st.integers(0, 5_000_000), max_size=40))
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=examples(100))
 def test_it_does_not_matter_in_how_many_steps_time_is_advanced(table, stops):
     whole = Run(table)
     pieces = Run(table, sorted(stops))
@@ -123,7 +124,7 @@ def test_it_does_not_matter_in_how_many_steps_time_is_advanced(table, stops):
 
 
 @given(tables())
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=examples(60))
 def test_nothing_happens_before_next_time_and_something_does_at_it(table):
     run = Run(table)
     chip = run.log.chip

@@ -46,6 +46,7 @@ def test_a_transfer_leaves_at_the_end_of_its_last_stop_bit_and_raises_the_dma_in
     assert not chip.uart.transmit(b"next"), "the channel is busy"
     chip.advance(1_000_000)
     assert chip.output() == [(1000 + 3 * BYTE_NS, 1, 3, b"abc")]
+    assert chip.uart.sent == 3
     assert len(chip.done_at) == 1 and 0 <= chip.done_at[0] - (1000 + 3 * BYTE_NS) < 300
     assert not chip.uart.busy
 

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from ranger_sim import datatable
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness import profile, wiring
+from tests.examples import examples
 
 INTERFACES = ("ranger_sim", "slcan", "socketcan", "virtual")
 ON_CAN0 = '[buses.can1]\ninterface = "socketcan"\nchannel = "can0"\nbit_rate = 1000000\n'
@@ -257,7 +258,7 @@ def folder(tmp_path_factory):
     return tmp_path_factory.mktemp("profiles")
 
 
-@settings(deadline=None, max_examples=150)
+@settings(max_examples=examples(150))
 @given(
     st.dictionaries(
         KEYS, st.dictionaries(KEYS, st.dictionaries(KEYS, VALUES, max_size=4) | VALUES, max_size=4) | VALUES
@@ -268,7 +269,7 @@ def test_no_table_of_values_makes_a_traceback(folder, content):
     loads_or_complains(folder, text.encode())
 
 
-@settings(deadline=None, max_examples=150)
+@settings(max_examples=examples(150))
 @given(st.binary(max_size=60), st.integers(0, 400), st.integers(0, 30))
 @example(b"\xff", 10, 0)
 @example(b"[" * 60, 0, 0)

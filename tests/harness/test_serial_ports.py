@@ -20,6 +20,7 @@ from ranger_sim.harness.ranger import Ranger
 from ranger_sim.harness.scenario import Scenario
 from ranger_sim.harness.serial_ports import Dropouts, PtyPort, RealPort, SerialLine
 from ranger_sim.plant.imu import Imu
+from tests.examples import examples
 
 BYTE_NS = 10_000
 MS = 1_000_000
@@ -354,7 +355,7 @@ def test_closing_a_robot_closes_its_ends_once():
     assert line.poll(0) == NEVER
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=examples(60))
 @given(
     st.lists(st.one_of(st.binary(max_size=30), st.sampled_from((start_command(0xCF), start_command(0xC2)))), max_size=8)
 )
@@ -374,7 +375,7 @@ def test_no_bytes_of_a_host_stop_the_plants_inertial_unit(pieces):
     assert imu.mode == 0xC2
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=examples(25))
 @given(st.binary(max_size=600))
 def test_no_bytes_at_the_imu_port_stop_the_board(data):
     board = UserInterfaceBoard(Crystal(), Quirks())

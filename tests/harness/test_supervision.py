@@ -15,6 +15,7 @@ from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness import profile, rest_bus, supervision
 from ranger_sim.harness.ranger import Ranger
 from ranger_sim.harness.scenario import Scenario
+from tests.examples import examples
 
 TABLE = datatable.load()
 MS = 1_000_000
@@ -169,7 +170,7 @@ def test_the_report_names_board_variable_kind_and_count():
     assert "MCH_ANGLE on can1: out of range 100" in angle and "-6.5 ... 6.5 rad" in angle
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=examples(60))
 @given(
     st.lists(
         st.tuples(

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.plant.absolute_encoder import AbsoluteEncoder
 from ranger_sim.plant.incremental_encoder import IncrementalEncoder
+from tests.examples import examples
 
 STEP = 125_000
 
@@ -157,7 +158,7 @@ def test_a_resting_encoder_has_no_edges():
         assert encoder.edges.count == 0
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=examples(60))
 @given(
     st.lists(
         st.tuples(st.floats(-0.02, 0.02), st.floats(-200.0, 200.0)),

@@ -14,6 +14,7 @@ from ranger_sim.sysid import channels, repairs, units
 from ranger_sim.sysid.readers import columns, csv_file, read
 from ranger_sim.tools.recordings import open_recording
 from tests.boards.original_images import DATA
+from tests.examples import examples
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
 needs_data = pytest.mark.skipif(not (DATA / "emps_run1.csv").exists(), reason=f"no measured data in {DATA.name}/")
@@ -193,7 +194,7 @@ GOOD = "t_s,angle_deg,current_mA\n" + "".join(f"{k * 0.004:.3f},{k % 90},{-k}\n"
 
 
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")  # digits run together make numbers whose squares overflow
-@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=examples(150), suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     places=st.lists(st.tuples(st.integers(0, len(GOOD)), st.integers(0, 5), st.binary(max_size=4)), max_size=12),
 )

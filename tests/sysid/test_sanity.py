@@ -14,6 +14,7 @@ from ranger_sim.sysid import channels, repairs, sanity
 from ranger_sim.sysid.dataset import Channel, Dataset
 from ranger_sim.sysid.readers import read
 from tests.boards.original_images import DATA
+from tests.examples import examples
 
 STEP = 2.0 * math.pi / 8192.0  # of the robot's absolute encoders
 N = 4000
@@ -208,7 +209,7 @@ NUMBERS = st.one_of(
 )
 
 
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=examples(60), suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     samples=st.lists(st.tuples(NUMBERS, NUMBERS), max_size=80),
     repeats=st.integers(1, 3),

@@ -6,6 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ranger_sim.sysid.structure import isolable, overdetermined
+from tests.examples import examples
 
 
 def system(**equations):
@@ -69,7 +70,7 @@ def brute_force(equations):
     return best[2]
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=examples(200))
 @given(st.lists(st.frozensets(st.sampled_from("uvwxy"), max_size=3), max_size=8))
 def test_every_small_system_is_as_brute_force_finds_it(unknowns):
     equations = {f"e{k}": each for k, each in enumerate(unknowns)}

@@ -3,7 +3,6 @@
 import json
 import pathlib
 import re
-import shutil
 import subprocess
 import sys
 import warnings
@@ -14,9 +13,9 @@ import pytest
 
 from ranger_sim.can_bus.edge.candump import read_candump
 from ranger_sim.datatable.generated import all_variables
+from tests import browser
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome", "chrome"))), None)
 
 
 @pytest.fixture(scope="module")
@@ -110,20 +109,109 @@ def test_the_report_calls_the_robots_only_what_was_measured_on_it(folder):
     assert not [text for text in beside if re.fullmatch(r"the robot: 0( N)?", text)]
 
 
-@pytest.mark.skipif(BROWSER is None, reason="no Chromium or Chrome here to render the report in")
-def test_the_report_renders_in_a_browser_and_the_robot_moves(folder, tmp_path):
-    flags = ["--headless", "--no-sandbox", "--disable-gpu", "--disable-background-networking", "--disable-sync"]
-    flags += ["--no-first-run", "--disable-component-update", f"--user-data-dir={tmp_path / 'profile'}"]
-    flags += ["--virtual-time-budget=3000", "--dump-dom"]
-    done = subprocess.run(
-        [BROWSER, *flags, (folder / "report.html").as_uri()],
-        capture_output=True,
-        text=True,
-        timeout=180,
-        check=False,
-    )
-    dom = done.stdout
-    assert dom.count('class="main-svg"') >= 7, "every plot is drawn"
-    clock = float(re.search(r'id="clock">([\d.]+) s', dom).group(1))
-    first = float(re.search(r'"t": \[([\d.]+)', dom).group(1))
-    assert clock > first, "the animation has moved on"
+def test_the_report_is_small_enough_to_be_sent_around(folder):
+    # what a longer walk has more of is steps: a dot each, in 10 bytes
+    assert (folder / "report.html").stat().st_size < 2_500_000
+
+
+# Of every element: who reaches beyond the page to the right, or holds more than there is room for.
+TOO_WIDE = """[...document.querySelectorAll("body *")].filter((each) => !each.closest("svg")
+    && (each.getBoundingClientRect().right > document.documentElement.clientWidth + 0.5
+        || ["TABLE", "SECTION", "MAIN"].includes(each.tagName) && each.scrollWidth > each.clientWidth + 1)
+  ).map((each) => each.tagName + " " + each.className)"""
+# The instant at which each chart over time has its mark, read off its own axis.
+MARKED = """[...document.querySelectorAll("figure")].filter((each) => each.querySelector(".mark.line")
+    && each.querySelector(".plot")._fullLayout.xaxis.title.text.startsWith("time")).map((each) => {
+  const plot = each.querySelector(".plot"), axis = plot._fullLayout.xaxis;
+  const left = each.querySelector(".mark").getBoundingClientRect().left - plot.getBoundingClientRect().left;
+  return axis.p2d(left - axis._offset);
+})"""
+AXES = """[...document.querySelectorAll(".plot")].flatMap((each) => [each._fullLayout.xaxis.title.text,
+  each._fullLayout.yaxis.title.text])"""
+ROBOT = "document.getElementById('stage').toDataURL()"
+SHARP = """(() => { const stage = document.getElementById("stage");
+  return [stage.width, stage.height, Math.round(stage.clientWidth * 2), Math.round(stage.clientHeight * 2)]; })()"""
+DRAWN = "window.rangerReport && document.documentElement.dataset.drawn =="
+WIDTHS = (390, 768, 1400)  # a telephone, a tablet, a desk
+
+
+@pytest.fixture(scope="module")
+def page(folder, tmp_path_factory):
+    """The report, open in a real browser on a telephone."""
+    with browser.opened(tmp_path_factory.mktemp("profile")) as opened:
+        opened.open(folder / "report.html", WIDTHS[0])
+        opened.until(f"{DRAWN} {WIDTHS[0]}")
+        yield opened
+
+
+@pytest.mark.skipif(browser.BROWSER is None, reason="no Chromium or Chrome here to render the report in")
+class TestInABrowser:
+    def test_the_robot_moves_by_itself(self, page):
+        page.value("rangerReport.setCursor(0)")
+        begun = page.value("rangerReport.cursor()")
+        page.until(f"rangerReport.cursor() > {begun}")
+
+    def test_nothing_is_wider_than_the_page_and_the_robot_is_sharp(self, page):
+        for width in WIDTHS:
+            page.resize(width)
+            page.until(f"{DRAWN} {width}")
+            assert page.value(TOO_WIDE) == [], width
+            is_wide, is_high, wide, high = page.value(SHARP)
+            assert (is_wide, is_high) == (wide, high) and wide > 1.7 * min(width - 60, 1000)
+
+    def test_every_axis_has_a_quantity_and_a_unit(self, page):
+        axes = page.value(AXES)
+        assert len(axes) >= 2 * 13
+        assert [text for text in axes if not re.fullmatch(r"\w.* \(.+\)|board", text)] == []
+
+    def test_pointing_at_a_chart_moves_the_robot_and_every_chart_to_that_instant(self, page):
+        page.value("rangerReport.setRunning(false)")
+        chosen = []
+        for key, share in (("hip-angle", 0.3), ("voltage", 0.6)):
+            plot = f"document.querySelector('#chart-{key} .plot')"
+            page.value(f"{plot}.scrollIntoView({{block: 'center'}})")
+            robot = page.value(ROBOT)
+            box = page.value(
+                f"(() => {{ const box = {plot}.getBoundingClientRect(), axis = {plot}._fullLayout.xaxis;"
+                "return [box.left + axis._offset, axis._length, box.top + box.height / 2, ...axis.range]; })()"
+            )
+            left, length, y, begin, end = box
+            page.point(round(left + share * length), y)
+            chosen.append(begin + (round(left + share * length) - left) / length * (end - begin))
+            at = page.value("rangerReport.cursor()")
+            assert at == pytest.approx(chosen[-1], abs=1e-6)
+            pixel = (end - begin) / length
+            marked = page.value(MARKED)
+            assert len(marked) == 7 and marked == pytest.approx([at] * 7, abs=pixel)
+            assert page.value(ROBOT) != robot
+            assert page.value("document.getElementById('clock').textContent") == f"{at:.3f} s"
+        assert abs(chosen[1] - chosen[0]) > 0.2
+
+    def test_arrow_keys_move_the_cursor(self, page):
+        page.value("rangerReport.setRunning(false); rangerReport.setCursor(3.0)")
+        page.key("ArrowRight")
+        page.key("ArrowRight", modifiers=8)  # with Shift
+        page.key("ArrowLeft")
+        assert page.value("rangerReport.cursor()") == pytest.approx(3.1)
+
+    def test_the_states_are_named_where_they_are_coloured_and_the_one_now_is_marked(self, page):
+        page.value("rangerReport.setRunning(false); rangerReport.setCursor(3.0)")
+        for key, machine in (("hip-angle", "hip"), ("outer-ankle", "outer_foot"), ("inner-ankle", "inner_foot")):
+            marked = page.value(f"[...document.querySelectorAll('#chart-{key} .states .on')].map((e) => e.textContent)")
+            assert marked == [page.value(f"document.querySelector('#now-{machine} .state').textContent")]
+            inside = page.value(
+                f"document.querySelector('#chart-{key} .plot')._fullLayout.shapes.map((s) => s.label.text)"
+            )
+            assert len(set(inside) - {""}) >= 2, "wide bands have their names in them"
+
+    def test_in_the_dark_paper_is_dark_and_ink_light_in_charts_too(self, page):
+        brightness = """((text) => text.match(/\\d+/g).slice(0, 3).map(Number).reduce((a, b) => a + b) / 765)(%s)"""
+        ink = brightness % "getComputedStyle(document.querySelector('#chart-current .xtitle')).fill"
+        paper = brightness % "getComputedStyle(document.querySelector('section')).backgroundColor"
+        assert page.value(ink) < 0.3 and page.value(paper) > 0.9
+        page.colours(dark=True)
+        page.until(f"{ink} > 0.7")
+        assert page.value(paper) < 0.2
+
+    def test_the_page_has_no_error_of_its_own(self, page):
+        assert page.errors == []

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from ranger_sim.foundation.random_arrays import generator
 from ranger_sim.sysid.machines import MACHINES, made
 from ranger_sim.tools.cli import main
+from tests.examples import examples
 from tests.sysid.test_diagnose import cart_run
 
 ROWS = 400
@@ -146,7 +147,7 @@ def edited(text, edits):
     return text
 
 
-@settings(max_examples=15, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=examples(15), suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(edits=st.lists(EDITS, min_size=1, max_size=4))
 def test_no_mutilation_of_a_file_leads_to_a_traceback(edits, tmp_path, capsys):
     path = tmp_path / "a.csv"

@@ -1,6 +1,6 @@
 """The mutation tool: which faults it makes, how it draws them, and that it tells noticed ones from survivors."""
 
-import json
+import shutil
 import subprocess
 
 import pytest
@@ -95,26 +95,36 @@ def test_tests_that_reach_a_mutant_run_cheapest_first_and_within_the_limit():
     mutant = next(each for each in mutants(SOURCE, "a/valve.py") if each.operator == "sign")
     place, other = f"a/valve.py:{mutant.first_line}", "a/valve.py:99"
     found = {
-        "imported": [],
-        "files": {"t/x.py": [other]},
-        "tests": {
-            "t/x.py::slow": {"seconds": 5.0, "functions": [place]},
-            "t/x.py::quick": {"seconds": 0.5, "functions": [place, other]},
-            "t/y.py::elsewhere": {"seconds": 0.1, "functions": ["b/c.py:1"]},
+        "t/x.py": {
+            "imported": [],
+            "shared": [other],
+            "tests": {
+                "t/x.py::slow": {"seconds": 5.0, "functions": [place]},
+                "t/x.py::quick": {"seconds": 0.5, "functions": [place, other]},
+            },
+        },
+        "t/y.py": {
+            "imported": [],
+            "shared": [],
+            "tests": {"t/y.py::elsewhere": {"seconds": 0.1, "functions": ["b/c.py:1"]}},
         },
     }
     tests = work.TestsOf(found)
     assert tests.of(mutant, 60.0) == ["t/x.py::quick", "t/x.py::slow"]
     assert tests.of(mutant, 1.0) == ["t/x.py::quick"]
     # what runs while a module is imported is everybody's who uses the module; fixtures are their whole file's
-    assert work.TestsOf(found | {"imported": [place]}).of(mutant, 60.0) == ["t/x.py::quick", "t/x.py::slow"]
-    assert work.TestsOf(found | {"files": {"t/y.py": [place]}}).of(mutant, 0.2) == ["t/y.py::elsewhere"]
+    found["t/x.py"]["imported"] = [place]
+    assert work.TestsOf(found).of(mutant, 60.0) == ["t/x.py::quick", "t/x.py::slow"]
+    found["t/x.py"]["imported"] = []
+    found["t/y.py"]["shared"] = [place]
+    assert work.TestsOf(found).of(mutant, 0.2) == ["t/y.py::elsewhere"]
 
 
 def test_mutants_that_are_listed_as_equivalent_exist_and_have_reasons(tmp_path):
     for entry in work.known():
-        room = entry.key.partition("/")[0]
-        assert entry.key in {each.key for each in work.all_mutants(room)}, f"no such mutant any more: {entry.key}"
+        path = entry.key.partition("::")[0]
+        of_file = mutants((HOUSE / path).read_text(encoding="utf-8"), path)
+        assert entry.key in {each.key for each in of_file}, f"no such mutant any more: {entry.key}"
     listed = tmp_path / "equivalent.toml"
     listed.write_text('[[mutant]]\nkey = "a"\nreason = " "\n', encoding="utf-8")
     with pytest.raises(UserError, match="an entry has key and reason"):
@@ -124,38 +134,91 @@ def test_mutants_that_are_listed_as_equivalent_exist_and_have_reasons(tmp_path):
         work.known(listed)
 
 
-@pytest.fixture
-def house(tmp_path):
-    """A checkout small enough to be mutated in a test: one function, and a test of half of it."""
-    root = tmp_path / "house"
-    (root / "tests").mkdir(parents=True)
+VALVE = """\
+import functools
+
+LIMIT = 3
+
+
+@functools.cache
+def clip(x):
+    return LIMIT if x > 3 else x - 0
+
+
+def twice(x):
+    return [x * each for each in (1, 2)]
+"""
+TESTS = """\
+import os
+
+import pytest
+from ranger_sim.plant.valve import clip, twice
+
+clip(9)  # what is kept from before must not hide a mutant
+
+
+@pytest.fixture(scope="module")
+def doubled():
+    return twice(7)
+
+
+def test_it_clips():
+    assert clip(9) == 3
+
+
+def test_it_doubles(doubled):
+    assert doubled == [7, 14]
+
+
+def test_that_fails_in_a_second_process():
+    assert not os.path.exists("seen")
+    open("seen", "w").close()
+    clip(1)
+"""
+
+
+@pytest.fixture(scope="module")
+def tried(tmp_path_factory):
+    """{(function, change): verdict} of a checkout small enough to be mutated in a test."""
+    root = tmp_path_factory.mktemp("mutate") / "house"
+    needed = ("ranger_sim/__init__.py", "ranger_sim/loading.py", "ranger_sim/declared_fields.py")
+    for name in (*needed, "tools/__init__.py", "tools/mutate/__init__.py", "tools/mutate/serve.py"):
+        (root / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(HOUSE / name, root / name)
     (root / "pyproject.toml").write_text('[tool.pytest.ini_options]\naddopts = "-p no:ranger_sim"\n', encoding="utf-8")
-    (root / "valve.py").write_text("def clip(x):\n    return 3 if x > 3 else x - 0\n", encoding="utf-8")
-    (root / "tests" / "test_valve.py").write_text(
-        "from valve import clip\n\n\ndef test_it_clips():\n    assert clip(9) == 3\n", encoding="utf-8"
-    )
+    (root / "plant").mkdir()
+    (root / "plant" / "valve.py").write_text(VALVE, encoding="utf-8")
+    (root / "tests").mkdir()
+    (root / "tests" / "test_valve.py").write_text(TESTS, encoding="utf-8")
     for command in (["init", "-q"], ["add", "-A"]):
         subprocess.run(["git", *command], cwd=root, check=True, capture_output=True)
-    return root
+    copy = work.Copy(root.parent / "work" / "copy", root)
+    results = work.Results(root.parent / "work" / "verdicts.jsonl")
+    with copy.server(["tests"]) as ask:
+        tests = work.reach_of(copy, ask, "plant", ["tests"], 60.0, print)
+        (copy.folder / "seen").touch()
+        for mutant in mutants(VALVE, "plant/valve.py"):
+            results.add(work.judge(copy, ask, mutant, tests, 60.0))
+    assert (copy.folder / "plant" / "valve.py").read_text(encoding="utf-8") == VALVE
+    assert (root / "plant" / "valve.py").read_text(encoding="utf-8") == VALVE
+    assert work.Results(results.path).verdicts == results.verdicts  # as the next run finds them
+    return {(each.key.split("::")[1], each.key.split("::")[3]): each for each in results.verdicts.values()}
 
 
-def test_a_mutant_is_noticed_or_survives_in_a_copy_and_the_verdict_is_kept(house, tmp_path):
-    source = (house / "valve.py").read_text(encoding="utf-8")
-    copy = work.Copy(tmp_path / "work" / "copy", house)
-    results = work.Results(tmp_path / "work" / "verdicts.jsonl")
-    wanted = {
-        each.new: each for each in mutants(source, "valve.py") if each.new in ("(4)", "(0 - x)") and not each.occurrence
+def test_mutants_are_noticed_or_survive_in_a_copy_and_verdicts_are_kept(tried):
+    assert {change: verdict.outcome for change, verdict in tried.items()} == {
+        ("", "3 -> (4)"): work.KILLED,  # it runs at import: in a process of its own
+        ("clip", "3 -> (4)"): work.SURVIVED,  # 9 is above both; the last of TESTS fails on the original as well
+        ("clip", "x > 3 -> (x >= 3)"): work.SURVIVED,
+        ("clip", "x - 0 -> (x + 0)"): work.SURVIVED,
+        ("clip", "x - 0 -> (0 - x)"): work.SURVIVED,
+        ("clip", "0 -> (1)"): work.SURVIVED,
+        ("twice", "x * each -> (x + each)"): work.KILLED,
+        ("twice", "1 -> (2)"): work.KILLED,
+        ("twice", "2 -> (3)"): work.KILLED,
     }
-    tests = work.AllOf(["tests/test_valve.py"])
-    for mutant in wanted.values():
-        results.add(work.judge(copy, mutant, tests, 60.0))
-    outcome = {json.loads(line)["key"]: json.loads(line) for line in results.path.read_text("utf-8").splitlines()}
-    assert outcome[wanted["(4)"].key]["outcome"] == work.KILLED
-    assert outcome[wanted["(4)"].key]["by"] == "tests/test_valve.py::test_it_clips"
-    assert outcome[wanted["(0 - x)"].key]["outcome"] == work.SURVIVED
-    assert (copy.folder / "valve.py").read_text(encoding="utf-8") == source
-    assert (house / "valve.py").read_text(encoding="utf-8") == source
-    assert set(work.Results(results.path).verdicts) == set(outcome)  # as the next run finds them
+    assert tried["", "3 -> (4)"].by == "tests/test_valve.py::test_it_clips"
+    assert tried["twice", "2 -> (3)"].by == "tests/test_valve.py::test_it_doubles"
 
 
 def test_rooms_have_mutants_and_no_key_twice():

@@ -16,6 +16,7 @@ from ranger_sim.foundation.user_error import UserError
 from ranger_sim.tools.robodaq import catalogue, logs, parameter_files
 from ranger_sim.tools.robodaq.codec import Point, SegmentDecoder, segment, write_packet
 from ranger_sim.tools.robodaq.session import Session
+from tests.examples import examples
 
 LAST = all_variables.ID_OF_LAST
 ID = all_variables.ID_OF
@@ -84,7 +85,7 @@ def test_in_step_an_identifier_beyond_the_table_is_left_out_and_counted():
     assert len(got) == 9 + 8 and of.unknown_points == 1 and of.segments == 2
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=examples(200))
 @given(st.lists(st.one_of(st.binary(max_size=200), st.just(nine(Point(14, 7, 8)))), max_size=10))
 def test_no_bytes_stop_the_decoder_and_every_byte_is_accounted_for(pieces):
     of = decoder()

@@ -14,6 +14,7 @@ from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.ranger import Ranger
 from ranger_sim.harness.scenario import Scenario, StopRule
 from ranger_sim.tools import cli, walk
+from ranger_sim.tools.units import duration_text
 
 # 40 mWh: held for 1.5 s and some steps; at the 17 W of a walk 8 s
 NEARLY_EMPTY_WH = 0.04
@@ -179,7 +180,7 @@ def test_where_no_screen_is_progress_comes_as_lines(monkeypatch):
     ("seconds", "text"), [(59.94, "59.9 s"), (3600.0, "3600.0 s (1 h 00 min)"), (110_942.0, "110942.0 s (30 h 49 min)")]
 )
 def test_long_times_are_told_in_hours_too(seconds, text):
-    assert walk.duration_text(seconds) == text
+    assert duration_text(seconds) == text
 
 
 def digest_and_command(capsys, *words):
@@ -229,9 +230,9 @@ def test_a_walk_without_a_folder_says_where_results_would_go(capsys):
     assert told[-1] == "nothing was kept: --out runs/NAME keeps summary, logs and report there"
 
 
-def test_only_errors_beyond_a_healthy_walk_are_told():
+def test_errors_of_a_healthy_walk_are_counted_in_one_line():
     usual = {"MCH": {"MC_TCURR_OOB": 40}, "MB": {}}
-    assert walk.error_lines(usual, 60.0) == ["errors as in every healthy walk: 1 kinds (report and summary have them)"]
-    unusual = {"MCH": {"MC_TCURR_OOB": 40}, "MCFI": {"ADCI_DNF": 3}, "MB": {}}
-    assert walk.error_lines(unusual, 60.0)[0] == "errors of MCFI: ADCI_DNF x 3"
-    assert walk.error_lines({"MB": {}}, 60.0) == []
+    line = "errors as in every healthy walk: 1 kinds (report and summary have them)"
+    assert walk.usual_lines(usual, 60.0) == [line]
+    assert walk.usual_lines({**usual, "MCFI": {"ADCI_DNF": 3}}, 60.0) == [line]
+    assert walk.usual_lines({"MB": {}}, 60.0) == []

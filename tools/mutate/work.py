@@ -1,6 +1,8 @@
 """Puts mutants into a copy of the repository, one at a time, and runs the tests that reach them."""
 
+import contextlib
 import dataclasses
+import hashlib
 import json
 import os
 import pathlib
@@ -9,14 +11,15 @@ import signal
 import subprocess
 import sys
 import tomllib
-from collections.abc import Callable, Iterable
-from typing import Any
+from collections.abc import Callable, Iterable, Iterator
+from typing import Any, TextIO
 
 from ranger_sim.foundation import wallclock
 from ranger_sim.foundation.random_arrays import generator
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.loading import HOUSE
 from ranger_sim.tools.mutate.mutants import Mutant, mutants
+from ranger_sim.tools.mutate.serve import ASKED_BY
 
 EQUIVALENT = pathlib.Path(__file__).with_name("equivalent.toml")
 # Beside the room's own tests, and what is not a program of ours: written by other modules, or only for users' editors.
@@ -25,8 +28,9 @@ KILLED, SURVIVED, TIMEOUT, NOT_REACHED = "killed", "survived", "timeout", "not r
 # A mutant may make a test slow for good; chosen by us, beside a machine that has other work.
 SLOWER = 4.0
 START_S = 30.0
-NOTHING: dict[str, Any] = {"imported": [], "files": {}, "tests": {}, "failed": []}  # a map without tests
-NO_SUCH_TEST, NO_TESTS = 4, 5  # pytest's exit codes
+NOTHING: dict[str, Any] = {"imported": [], "shared": [], "tests": {}, "failed": []}  # a map without tests
+NO_SUCH_TEST = 4  # pytest's exit code
+LIMIT_TEST_S = 20.0  # of processor time: a test that takes longer takes no part; chosen by us
 
 
 @dataclasses.dataclass(frozen=True)
@@ -111,25 +115,67 @@ class Copy:
         (self.folder / path).write_text(text, encoding="utf-8")
         os.utime(self.folder / path, (self.stamp, self.stamp))
 
-    def pytest(self, arguments: Iterable[str], limit_s: float, **environment: str) -> tuple[int | None, str]:
+    def pytest(self, arguments: Iterable[str], limit_s: float) -> tuple[int | None, str]:
         """Run pytest there, interpreted: (exit code, what it printed); None when it took longer than the limit."""
-        command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-p", "no:xdist"]
-        with subprocess.Popen(
-            [*command, "--hypothesis-seed=1", *arguments],
-            cwd=self.folder,
-            env={**os.environ, "RANGER_SIM_INTERPRETED": "1", "OPENBLAS_NUM_THREADS": "1", **environment},
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            start_new_session=True,  # so that what the tests have started ends with them
-            text=True,
-            errors="replace",
-        ) as process:
+        with self._started(arguments, stdout=subprocess.PIPE, stderr=subprocess.STDOUT) as process:
             try:
                 said, _ = process.communicate(timeout=limit_s)
                 return process.returncode, said
             except subprocess.TimeoutExpired:
                 os.killpg(process.pid, signal.SIGKILL)
                 return None, process.communicate()[0]
+
+    def _started(self, arguments: Iterable[str], **options: Any) -> subprocess.Popen:
+        environment = {"RANGER_SIM_INTERPRETED": "1", "OPENBLAS_NUM_THREADS": "1", **options.pop("environment", {})}
+        return subprocess.Popen(
+            [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-p", "no:xdist", *arguments],
+            cwd=self.folder,
+            env={**os.environ, **environment},
+            start_new_session=True,  # so that what the tests have started ends with them
+            text=True,
+            errors="replace",
+            **options,
+        )
+
+    @contextlib.contextmanager
+    def server(self, tests: list[str]) -> Iterator["Asked"]:
+        """A process that has collected these tests and forks for each request (`serve.py`)."""
+        asking, requests = os.pipe()
+        answers, answering = os.pipe()
+        log = self.folder.parent / "server.log"
+        with log.open("w", encoding="utf-8") as said:
+            process = self._started(
+                ["-p", "ranger_sim.tools.mutate.serve", *tests],
+                pass_fds=(asking, answering),
+                stdin=subprocess.DEVNULL,
+                stdout=said,
+                stderr=subprocess.STDOUT,
+                environment={ASKED_BY: f"{asking},{answering}"},
+            )
+        os.close(asking)
+        os.close(answering)
+        with os.fdopen(requests, "w", encoding="utf-8") as out, os.fdopen(answers, encoding="utf-8") as back:
+            yield Asked(out, back, log)
+        process.wait()
+
+
+class Asked:
+    """A server from the side of those who ask."""
+
+    def __init__(self, requests: TextIO, answers: TextIO, log: pathlib.Path) -> None:
+        self.requests = requests
+        self.answers = answers
+        self.log = log
+
+    def __call__(self, **request: Any) -> dict:
+        """The answer. UserError when there is no server any more: the tests cannot be collected."""
+        with contextlib.suppress(BrokenPipeError):
+            print(json.dumps(request), file=self.requests, flush=True)
+        line = self.answers.readline()
+        if not line:
+            said = self.log.read_text(encoding="utf-8").strip().splitlines() or ["pytest says nothing"]
+            raise UserError(f"{self.log}: the tests do not run: {said[-1]}")
+        return json.loads(line)
 
 
 # --- which tests ------------------------------------------------------------------------------------------------
@@ -140,19 +186,22 @@ class TestsOf:
 
     __test__ = False  # pytest: this is none
 
-    def __init__(self, found: dict[str, Any]) -> None:
-        self.tests: dict[str, dict] = found["tests"]
-        self.imported = set(found["imported"])
+    def __init__(self, found: dict[str, dict[str, Any]]) -> None:
+        self.tests: dict[str, dict] = {name: test for each in found.values() for name, test in each["tests"].items()}
+        self.imported = {place for each in found.values() for place in each["imported"]}
+        self.witnesses: dict[str, bool] = {}
         self.by_function: dict[str, set[str]] = {}
         self.by_module: dict[str, set[str]] = {}
-        of_file: dict[str, list[str]] = {}
-        for name, test in self.tests.items():
-            of_file.setdefault(name.partition("::")[0], []).append(name)
-            for place in test["functions"]:
-                self._note(place, [name])
-        for file, functions in found["files"].items():
-            for place in functions:
-                self._note(place, of_file.get(file, []))
+        for each in found.values():
+            for name, test in each["tests"].items():
+                for place in test["functions"]:
+                    self._note(place, [name])
+            for place in each["shared"]:
+                self._note(place, list(each["tests"]))
+
+    def at_import(self, mutant: Mutant) -> bool:
+        """True for what runs while modules are imported or tests collected."""
+        return not mutant.first_line or f"{mutant.path}:{mutant.first_line}" in self.imported
 
     def _note(self, place: str, names: list[str]) -> None:
         self.by_function.setdefault(place, set()).update(names)
@@ -161,8 +210,8 @@ class TestsOf:
     def of(self, mutant: Mutant, limit_s: float) -> list[str]:
         """Tests that can notice it, cheapest first, as many as fit into `limit_s` (at least one)."""
         place = f"{mutant.path}:{mutant.first_line}"
-        at_import = not mutant.first_line or place in self.imported
-        reach = self.by_module.get(mutant.path, set()) if at_import else self.by_function.get(place, set())
+        late = not self.at_import(mutant)
+        reach = self.by_function.get(place, set()) if late else self.by_module.get(mutant.path, set())
         chosen: list[str] = []
         total = 0.0
         for name in sorted(reach, key=lambda each: (self.tests[each]["seconds"], each)):
@@ -172,59 +221,67 @@ class TestsOf:
             chosen.append(name)
         return chosen
 
+    def is_witness(self, name: str, ask: Asked, mutant: Mutant, original: str) -> bool:
+        """True for a test that passes on the original, tried once the way mutants are."""
+        if name not in self.witnesses:
+            limit = START_S + SLOWER * self.tests[name]["seconds"]
+            same = {"path": mutant.path, "before": original, "after": original, "tests": [name]}
+            answer = ask(**same, limit_s=limit, limit_test_s=SLOWER * LIMIT_TEST_S)
+            self.witnesses[name] = answer["code"] == 0
+        return self.witnesses[name]
+
+    def leave_out(self, name: str) -> None:
+        """Never choose this test again."""
+        for names in (*self.by_function.values(), *self.by_module.values()):
+            names.discard(name)
+
     def seconds(self, names: list[str]) -> float:
         """What they took together."""
         return sum(self.tests[name]["seconds"] for name in names)
 
 
-class AllOf:
-    """The same interface without a map: every mutant meets all of these tests."""
+def reach_of(
+    copy: Copy, ask: Asked, room: str, tests: list[str], limit_s: float, say: Callable[[str], None]
+) -> TestsOf:
+    """The map of a room's tests, file by file: made by running them once, kept until the room or the file changes.
 
-    def __init__(self, paths: list[str]) -> None:
-        self.paths = paths
-
-    def of(self, mutant: Mutant, limit_s: float) -> list[str]:
-        """All of them."""
-        return self.paths
-
-    def seconds(self, names: list[str]) -> float:
-        """Unknown: a quarter of an hour, as all tests of the repository take."""
-        return 900.0 / SLOWER
-
-
-def reach_of(copy: Copy, room: str, tests: list[str], map_limit_s: float, say: Callable[[str], None]) -> TestsOf:
-    """The map of a room's tests, file by file: kept from an earlier run, or made by running them once.
-
-    A file that takes longer than `map_limit_s` takes no part, and that is said.
+    A test that takes longer than LIMIT_TEST_S, or a file longer than `limit_s`, takes no part, and that is said.
     """
     folder = copy.folder.parent / f"reach-{room}"
     folder.mkdir(exist_ok=True)
     files = [file for path in tests for file in files_of_tests(copy.folder / path)]
     if not files:
         raise UserError(f"{room}: there are no tests in {', '.join(tests)}")
-    merged: dict[str, Any] = {"imported": [], "files": {}, "tests": {}, "failed": []}
+    found: dict[str, Any] = {}
     for file in files:
         name = file.relative_to(copy.folder).as_posix()
         kept = folder / f"{name.replace('/', '.')}.json"
-        if not kept.exists():
+        state = state_of(copy.folder, room, file)
+        if not kept.exists() or json.loads(kept.read_text(encoding="utf-8")).get("state") != state:
             partial = kept.with_suffix(".partial")
-            arguments = ["-p", "ranger_sim.tools.mutate.reach", name]
-            code, said = copy.pytest(arguments, limit_s=map_limit_s, RANGER_SIM_REACH=str(partial))
-            if code is None:
-                partial.write_text(json.dumps(NOTHING | {"failed": [f"{name} (over {map_limit_s:g} s)"]}), "utf-8")
-            elif code not in (0, 1, NO_TESTS) or not partial.exists():
-                raise UserError(f"{name}: does not run: {said.strip().splitlines()[-1]}")
+            answer = ask(map=name, to=str(partial), limit_s=limit_s, limit_test_s=LIMIT_TEST_S)
+            if answer["code"] == 0:
+                say(f"{room}: {name} is mapped")
+            else:
+                why = "takes too long" if answer["code"] is None else answer["by"]
+                say(f"{room}: {name} takes no part: {why}")
+                partial.write_text(json.dumps(NOTHING | {"failed": [name]}), "utf-8")
+            seen = json.loads(partial.read_text(encoding="utf-8"))
+            partial.write_text(json.dumps(seen | {"state": state}), encoding="utf-8")
             partial.replace(kept)
-            say(f"{room}: {name} {'takes too long' if code is None else 'is mapped'}")
-        found = json.loads(kept.read_text(encoding="utf-8"))
-        merged["imported"] += found["imported"]
-        merged["files"] |= found["files"]
-        merged["tests"] |= found["tests"]
-        merged["failed"] += found["failed"]
-    if merged["failed"]:
-        left_out = ", ".join(merged["failed"][:3])
-        say(f"{room}: {len(merged['failed'])} tests fail, skip or last too long, and take no part: {left_out} ...")
-    return TestsOf(merged)
+        found[name] = json.loads(kept.read_text(encoding="utf-8"))
+    failed = [name for each in found.values() for name in each["failed"]]
+    if failed:
+        say(f"{room}: {len(failed)} tests fail, skip or last too long, and take no part: {', '.join(failed[:3])} ...")
+    return TestsOf(found)
+
+
+def state_of(folder: pathlib.Path, room: str, tests: pathlib.Path) -> str:
+    """A digest of the room's sources and of a file of tests: what its map is made of."""
+    digest = hashlib.sha256()
+    for path in (*sorted((folder / room).rglob("*.py")), tests):
+        digest.update(path.read_bytes())
+    return digest.hexdigest()
 
 
 def files_of_tests(path: pathlib.Path) -> list[pathlib.Path]:
@@ -253,29 +310,64 @@ class Results:
             file.write(json.dumps(dataclasses.asdict(verdict)) + "\n")
 
 
-def judge(copy: Copy, mutant: Mutant, tests: TestsOf | AllOf, limit_s: float) -> Verdict:
-    """Put it into the copy, run the tests that reach it, and take it out again."""
-    chosen = tests.of(mutant, limit_s)
-    if not chosen:
-        return Verdict(mutant.key, mutant.line, NOT_REACHED)
-    original = (copy.house / mutant.path).read_text(encoding="utf-8")
+def judge(copy: Copy, ask: Asked, mutant: Mutant, tests: TestsOf, limit_s: float) -> Verdict:
+    """Put it into the copy, run the tests that reach it, and take it out again.
+
+    A test that blames it must pass on the original, or it is no witness and takes no part from then on.
+    """
+    original = (copy.folder / mutant.path).read_text(encoding="utf-8")
+    begun = wallclock.monotonic_s()
+    while True:
+        chosen = tests.of(mutant, limit_s)
+        if not chosen:
+            return Verdict(mutant.key, mutant.line, NOT_REACHED)
+        copy.put(mutant.path, mutant.applied(original))  # also for processes that tests start
+        try:
+            code, by = verdict_of(copy, ask, mutant, tests, chosen, original)
+        finally:
+            copy.put(mutant.path, original)
+        if code != 1 or by not in tests.tests or tests.is_witness(by, ask, mutant, original):
+            break
+        tests.leave_out(by)
+    seconds = round(wallclock.monotonic_s() - begun, 1)
+    outcome = {None: TIMEOUT, 0: SURVIVED}.get(code, KILLED)
+    return Verdict(mutant.key, mutant.line, outcome, by, len(chosen), seconds)
+
+
+def verdict_of(
+    copy: Copy, ask: Asked, mutant: Mutant, tests: TestsOf, chosen: list[str], original: str
+) -> tuple[int | None, str]:
+    """(pytest's exit code or None for too long, the test that failed), with the mutant in its file.
+
+    One of a function is tried in memory first; where that function also runs at import, in a new process after that.
+    """
+    limit = START_S + SLOWER * tests.seconds(chosen)
+    code: int | None = 0
+    by = ""
+    if mutant.first_line:
+        answer = ask(
+            path=mutant.path,
+            before=original,
+            after=mutant.applied(original),
+            tests=chosen,
+            limit_s=limit,
+            limit_test_s=SLOWER * LIMIT_TEST_S,
+        )
+        code, by = answer["code"], answer.get("by", "")
+    if code == 0 and tests.at_import(mutant):
+        return from_the_start(copy, chosen, limit)
+    return code, by
+
+
+def from_the_start(copy: Copy, chosen: list[str], limit_s: float) -> tuple[int | None, str]:
+    """Run these tests in a process of their own: (pytest's exit code or None for too long, the test that failed)."""
     listed = copy.folder.parent / "chosen-tests"
     listed.write_text("".join(f"{name}\n" for name in chosen), encoding="utf-8")
-    begun = wallclock.monotonic_s()
-    copy.put(mutant.path, mutant.applied(original))
-    try:
-        limit = START_S + SLOWER * tests.seconds(chosen)
-        code, said = copy.pytest(["-x", "--no-header", f"@{listed}"], limit)
-        if code == NO_SUCH_TEST:  # the mutant changed what tests are made of: then all of their files
-            files = dict.fromkeys(name.partition("::")[0] for name in chosen)
-            code, said = copy.pytest(["-x", "--no-header", *files], limit + 300.0)
-    finally:
-        copy.put(mutant.path, original)
-    seconds = round(wallclock.monotonic_s() - begun, 1)
-    if code is None:
-        return Verdict(mutant.key, mutant.line, TIMEOUT, "", len(chosen), seconds)
-    if code == 0:
-        return Verdict(mutant.key, mutant.line, SURVIVED, "", len(chosen), seconds)
+    code, said = copy.pytest(["-x", "--no-header", f"@{listed}"], limit_s)
+    if code == NO_SUCH_TEST:  # the mutant changed what tests are made of: then all of their files
+        files = dict.fromkeys(name.partition("::")[0] for name in chosen)
+        code, said = copy.pytest(["-x", "--no-header", *files], limit_s + 300.0)
     blamed = [line for line in said.splitlines() if line.startswith(("FAILED ", "ERROR "))]
-    by = blamed[0].split(" ", 1)[1].partition(" - ")[0] if blamed else f"pytest ends with {code}"
-    return Verdict(mutant.key, mutant.line, KILLED, by, len(chosen), seconds)
+    if not code:
+        return code, ""
+    return code, blamed[0].split(" ", 1)[1].partition(" - ")[0] if blamed else f"pytest ends with {code}"

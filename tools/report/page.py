@@ -1,22 +1,26 @@
-"""Puts a walk's numbers, plots and animation into one self-contained page."""
+"""Puts a walk's numbers, charts and animation into one self-contained page."""
 
+import base64
+import gzip
 import json
+import math
 import pathlib
 from typing import Any
 
 import jinja2
-import numpy as np
 from markupsafe import Markup
 from plotly.offline import get_plotlyjs
 
 from ranger_sim import datatable
+from ranger_sim.harness import normal_errors
+from ranger_sim.tools import unexpected
 from ranger_sim.tools.faults import fault_text
-from ranger_sim.tools.report import figures
-from ranger_sim.tools.units import figure
+from ranger_sim.tools.report import charts
+from ranger_sim.tools.units import duration_text, figure, length_text
 
 HERE = pathlib.Path(__file__).parent
-ANIMATION_HZ = 125  # frames kept per second: smooth at one eighth of real time on a 60 Hz screen
-ANIMATION_S = 8.0
+SCRIPTS = ("stage.js", "charts.js", "report.js")
+MACHINES = (("hip", "hip", "hip"), ("outer_foot", "outer ankle", "outer"), ("inner_foot", "inner ankle", "inner"))
 
 # What the robot itself did on 1-2 May 2011 (appendix 1, table of the ultra-marathon walk).
 ROBOT = {
@@ -40,37 +44,38 @@ def render(robot: Any, summary: dict) -> str:
         autoescape=jinja2.select_autoescape(["j2"]),
         undefined=jinja2.StrictUndefined,
     )
-    plots = [
-        make(walk)
-        for make in (
-            figures.phase_portraits,
-            figures.joint_angles,
-            figures.currents_and_power,
-            figures.steps,
-            figures.bus_load,
-            figures.slot_times,
-            figures.path,
-        )
-    ]
-    for plot in plots:
-        plot.html = Markup(plot.html)
+    groups = charts.groups(walk)
+    data = charts.data(robot, walk, groups)
+    time = data["series"]["time_s"]
     return environment.get_template("template.html.j2").render(
         summary=summary,
-        shown_s=float(walk.samples["time_s"][-1] - walk.samples["time_s"][0]),
-        tiles=tiles(summary),
-        figures=plots,
-        error_rows=[
-            {"board": board, "name": name, "meaning": robot.error_meaning(name), "count": count}
-            for board, names in summary["errors"].items()
-            for name, count in names.items()
+        shown_s=time[-1] - time[0],
+        unexpected=[
+            *unexpected.ending(summary),
+            *unexpected.lines(summary, robot.plant.parameters.floor_friction),
         ],
+        healthy=unexpected.HEALTHY,
+        tiles=tiles(summary),
+        contact=contact(summary["oddities"]),
+        machines=MACHINES,
+        groups=groups,
+        states=data["states"],
+        energy=energy(summary),
+        errors=errors(robot, summary),
         fault_lines=[fault_text(fault) for fault in summary["faults"]],
-        animation=Markup(json.dumps(animation(robot, walk), allow_nan=False).replace("</", "<\\/")),
-        walker_js=Markup((HERE / "walker.js").read_text(encoding="utf-8")),
-        plotly_js=Markup(get_plotlyjs()),
+        lengths=length_text,
+        durations=duration_text,
+        plotly=packed(get_plotlyjs()),
+        walk=packed(json.dumps(data, allow_nan=False, separators=(",", ":"))),
+        scripts=[Markup((HERE / name).read_text(encoding="utf-8")) for name in SCRIPTS],
         command=summary["command"],
         table_hash=datatable.table_hash(),
     )
+
+
+def packed(text: str) -> Markup:
+    """Text that a page can carry and unpack by itself, with the same bytes every time: a third of Plotly's 4.8 MB."""
+    return Markup(base64.b64encode(gzip.compress(text.encode(), 9, mtime=0)).decode())
 
 
 def of_the_robot(what: str) -> str:
@@ -79,32 +84,23 @@ def of_the_robot(what: str) -> str:
 
 
 def tiles(summary: dict) -> list[dict]:
-    """The key figures, beside the real robot's or what a real floor can do."""
+    """The key figures, beside the real robot's."""
     delay = summary["heel_strike_delay_ms"]
     rows = (
-        ("steps", f"{summary['steps']}", None),
+        ("steps", f"{summary['steps']:,}", None),
         ("mean step length", figure(summary["mean_step_length_m"], "{:.3f} m"), of_the_robot("step")),
         ("mean step time", figure(summary["mean_step_time_s"], "{:.3f} s"), of_the_robot("time")),
         ("speed", figure(summary["speed_m_per_s"], "{:.2f} m/s"), of_the_robot("speed")),
         ("motors", figure(summary["motor_power_W"], "{:.1f} W"), of_the_robot("motors")),
         ("in all", figure(summary["total_power_W"], "{:.1f} W"), of_the_robot("total")),
-        (
-            "cost of transport",
-            figure(summary["tcot"], "{:.3f}"),
-            of_the_robot("tcot"),
-        ),
+        ("cost of transport", figure(summary["tcot"], "{:.2f}"), of_the_robot("tcot")),
         (
             "heel-strike delay",
             "none" if delay["mean"] is None else f"{delay['mean']:.1f} ± {delay['std']:.1f} ms",
             of_the_robot("delay"),
         ),
-        (
-            "walked",
-            f"{summary['distance_m'] / 1000.0:.3f} km in {summary['walked_h']:.2f} h",
-            of_the_robot("walked"),
-        ),
-        ("energy used", f"{summary['energy_Wh']['total']:.3g} Wh", of_the_robot("energy")),
-        *odd(summary["oddities"]),
+        ("walked", f"{length_text(summary['distance_m'])} in {since_release(summary)}", of_the_robot("walked")),
+        ("energy used", energy_text(summary["energy_Wh"]["total"]), of_the_robot("energy")),
         (
             "batteries",
             "empty" if summary["battery"]["empty"] else f"{100.0 * summary['battery']['charge']:.0f} %",
@@ -114,11 +110,16 @@ def tiles(summary: dict) -> list[dict]:
     return [{"name": name, "value": value, "beside": beside} for name, value, beside in rows]
 
 
-def odd(oddities: dict) -> tuple:
-    """Tiles of what the contact of feet and floor did that a real floor could not, or that a walk should not need."""
+def since_release(summary: dict) -> str:
+    """How long it walked: hours, or seconds of less than one."""
+    hours: float = summary["walked_h"]
+    return f"{hours:.1f} h" if hours >= 1.0 else f"{3600.0 * hours:.1f} s"
 
+
+def contact(oddities: dict) -> list[dict]:
+    """Tiles of what feet and floor did, beside what a real floor can do."""
     strikes = oddities["tensile_strikes"]
-    return (
+    rows = (
         ("contact", oddities["contact"], None),
         (
             "strikes that pull",
@@ -127,32 +128,54 @@ def odd(oddities: dict) -> tuple:
         ),
         ("lowest push of the floor", figure(oddities["normal_force_min_N"], "{:.1f} N"), "a floor: 0 N or more"),
         ("worst friction ratio", figure(oddities["friction_ratio_max"], "{:.2f}"), None),
-        ("slides", f"{oddities['slides']} in {oddities['slip_s'] * 1e3:.1f} ms", None),
+        ("slides", f"{oddities['slides']} in {oddities['slip_s'] * 1e3:.0f} ms", None),
         ("touches, lift-offs", f"{oddities['touches']}, {oddities['lift_offs']}", None),
+        ("lowest clearance of the swing foot", figure(clearance_mm(oddities), "{:.0f} mm"), None),
     )
+    return [{"name": name, "value": value, "beside": beside} for name, value, beside in rows]
 
 
-def animation(robot: Any, walk: Any) -> dict:
-    """Arrays for walker.js, thinned to ANIMATION_HZ over the last ANIMATION_S seconds."""
-    s = walk.samples
-    time = s["time_s"]
-    first = np.searchsorted(time, time[-1] - ANIMATION_S)
-    interval = float(np.median(np.diff(time))) if len(time) > 1 else 1.0
-    pick = slice(first, None, max(1, round(1 / (ANIMATION_HZ * interval))))
-    names = {
-        "hip_x": "hip_x_m",
-        "hip_y": "hip_y_m",
-        "foot_outer": "foot_outer_rad",
-        "leg_outer": "leg_outer_rad",
-        "leg_inner": "leg_inner_rad",
-        "foot_inner": "foot_inner_rad",
-        "hip_A": "hip_A",
-        "outer_A": "outer_A",
-        "inner_A": "inner_A",
-    }
-    data = {key: np.round(s[name][pick], 5).tolist() for key, name in names.items()}
-    data["t"] = np.round(time[pick], 4).tolist()
-    data["state"] = walk.state_text(time[pick])
-    data["geometry"] = robot.plant.geometry()
-    data["footholds"] = walk.footholds
-    return data
+def clearance_mm(oddities: dict) -> float | None:
+    """The least clearance in millimetres, if there was a swing to measure it in."""
+    metres = oddities["min_clearance_m"]
+    return None if metres is None else 1e3 * metres
+
+
+def energy_scale(largest_Wh: float) -> tuple[str, float, int]:
+    """(unit, how many of it are 1 Wh, decimals) for a column: its largest energy has three digits."""
+    unit, factor = ("Wh", 1.0) if largest_Wh >= 1.0 else ("mWh", 1e3)
+    digits = math.floor(math.log10(largest_Wh * factor)) if largest_Wh > 0.0 else 0
+    return unit, factor, max(0, 2 - digits)
+
+
+def energy_text(energy_Wh: float) -> str:
+    """An energy with three digits."""
+    unit, factor, decimals = energy_scale(energy_Wh)
+    return f"{energy_Wh * factor:.{decimals}f} {unit}"
+
+
+def energy(summary: dict) -> dict:
+    """The energy by consumer, in one unit."""
+    total = summary["energy_Wh"]["total"]
+    unit, factor, decimals = energy_scale(total)
+    rows = [
+        {
+            "consumer": consumer.replace("_", " "),
+            "energy": f"{value * factor:.{decimals}f}",
+            "share": f"{100.0 * value / total if total else 0.0:.1f} %",
+        }
+        for consumer, value in summary["energy_Wh"].items()
+    ]
+    return {"unit": unit, "rows": rows, "delivered": energy_text(summary["battery"]["delivered_Wh"])}
+
+
+def errors(robot: Any, summary: dict) -> dict[str, list[dict]]:
+    """{heading: rows} of the errors that boards noted, first those that a healthy walk has not."""
+    beyond = normal_errors.beyond(summary["errors"], summary["time_s"])
+    found: dict[str, list[dict]] = {"Unexpected": [], "As in every healthy walk": []}
+    for board, names in summary["errors"].items():
+        for name, count in names.items():
+            heading = "Unexpected" if name in beyond.get(board, {}) else "As in every healthy walk"
+            row = {"board": board, "parts": name.split("_"), "meaning": robot.error_meaning(name), "count": count}
+            found[heading].append(row)
+    return {heading: rows for heading, rows in found.items() if rows}

@@ -15,6 +15,7 @@ from ranger_sim.harness.processes.channel import SLOT_WORDS, Mailbox
 from ranger_sim.harness.processes.kinds import FROM_BOARD, TO_BOARD
 from ranger_sim.harness.processes.lone_board import LoneBoard
 from ranger_sim.harness.ranger import Ranger
+from tests.examples import examples
 
 STEP_NS = 100_000
 LONG_TURN_NS = 900_000_000  # MCSI puts out six times what its mailbox holds
@@ -60,7 +61,7 @@ def lone():
     command=st.one_of(st.just(places.COMMAND_ADVANCE), st.integers(-5, 1000)),
 )
 @example(damage=[(0, 0)], used=20, until=LONG_TURN_NS, command=places.COMMAND_ADVANCE)  # and the answer does not fit
-@settings(max_examples=200, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=examples(200), suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_a_board_survives_whatever_stands_in_its_channel(served, damage, used, until, command):
     """It answers, counts what it could not read, and goes on with its slots."""
     if command in (places.COMMAND_STOP, places.COMMAND_COUNTERS):

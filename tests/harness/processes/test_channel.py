@@ -20,6 +20,7 @@ from ranger_sim.harness.processes.places import SLOTS
 from ranger_sim.harness.processes.remote_board import RemoteBoard
 from ranger_sim.harness.processes.stage import Stage
 from ranger_sim.harness.ranger import Ranger
+from tests.examples import examples
 from tests.harness.processes.child import Child
 
 NEAR = 1_000_000  # ns; stamps of the tests
@@ -203,7 +204,7 @@ def in_range(message):
     ),
     used=st.one_of(st.none(), st.integers(-(2**63), 2**63 - 1)),
 )
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=examples(300))
 def test_whatever_stands_in_a_mailbox_nothing_raises_and_only_whole_messages_arrive(damage, used):
     pair = Pair(FROM_BOARD)
     for number in range(10):
