@@ -19,7 +19,7 @@ LEAST = 1e-9  # of the largest response: noise below it is rounding
 RANK = 1e-8  # a parameter whose column the others have to this part is not separable from them
 NOTHING = 1e-9  # of a column's square beside the base: rounding, with columns of up to 1e7 deviations
 ORDER = 8  # of the autoregression at most
-NEAR = 2.5  # times the frequency from which on there is noise alone: what is up to there tells how loud it is below
+MEMORIES = tuple(0.05 * n for n in range(19))  # of noise from sample to sample, that are tried
 FEWEST_SHARED = 40  # rows of two equations for what they share: its correlation is then known to 0.16
 UPPER = 0.95  # noise found from repeats is taken at the upper limit of this one-sided interval: few repeats, less trust
 FEWEST_REPEATS = 20  # degrees of freedom of pure error; below it the whole residual tells the noise
@@ -88,36 +88,50 @@ def autoregression(residual: Array, valid: np.ndarray) -> Array:
     return found
 
 
-def autoregression_above(residual: Array, good: np.ndarray, share: float) -> tuple[Array, float]:
+def autoregression_above(
+    residual: Array, good: np.ndarray, share: float, width: float = 0.0, every: int = 1
+) -> tuple[Array, float]:
     """(coefficients, deviation of what they leave) of noise that alone is there above `share` of the rows' frequency.
 
-    What is slower may be an effect's. There the noise's spectrum is a Gaussian about 0 through what is just above,
-    as that of noise with a short memory and of what a Gaussian smoothed both are. From the spectrum follow the
-    autocorrelations, from these the coefficients (Yule and Walker), as many as the Bayesian information criterion asks
-    for. good: rows that count; each unbroken stretch of them has a periodogram of its own.
+    What is slower may be an effect's. There the noise's spectrum is that of samples which remember the one before,
+    under a Gaussian of `width` samples and one in `every` kept: its memory is Whittle's estimate above. From
+    the spectrum follow the autocorrelations, from these the coefficients (Yule and Walker), as many as the Bayesian
+    information criterion asks for. good: rows that count; each unbroken stretch of them has a periodogram of its own.
     """
     stretches = [_periodogram(residual[rows]) for rows in _stretches(good)]
     frequencies, powers = (np.concatenate([each[part] for each in stretches] or [[]]) for part in (0, 1))
-    near = (frequencies >= share) & (frequencies < NEAR * share)
-    if np.count_nonzero(near) < 2 * ORDER:
+    alone = frequencies >= share
+    if np.count_nonzero(alone) < 2 * ORDER:
         return np.zeros(0), float(np.std(residual[good])) if np.any(good) else 1.0
-    slope, level = np.polyfit(
-        frequencies[near] ** 2, np.log(powers[near]) + np.euler_gamma, 1
-    )  # a periodogram's logarithm is low by that
+    tried = []
+    for memory in MEMORIES:
+        shape = _spectrum(frequencies[alone], memory, width, every)
+        level = float(np.mean(powers[alone] / shape))
+        tried.append((float(np.mean(np.log(level * shape))), memory, level))
+    _, memory, level = min(tried)
     rows = sum(2 * len(f) for f, _ in stretches)
     correlations = np.zeros(ORDER + 1)
     for f, p in stretches:
-        power = np.where(f < share, np.exp(level + min(slope, 0.0) * f**2), p)
+        power = np.where(f < share, level * _spectrum(f, memory, width, every), p)
         turns = np.cos(2.0 * np.pi * np.outer(np.arange(ORDER + 1), f))
         correlations += turns @ power * (2.0 / rows)
     best, found, deviation = rows * float(np.log(correlations[0])), np.zeros(0), float(np.sqrt(correlations[0]))
     for order in range(1, ORDER + 1):
-        tried = linalg.solve_toeplitz(correlations[:order], correlations[1 : order + 1])
-        left = float(correlations[0] - tried @ correlations[1 : order + 1])
+        forecast = linalg.solve_toeplitz(correlations[:order], correlations[1 : order + 1])
+        left = float(correlations[0] - forecast @ correlations[1 : order + 1])
         criterion = rows * float(np.log(max(left, 1e-300))) + order * float(np.log(rows))
         if criterion < best:
-            best, found, deviation = criterion, np.asarray(tried), float(np.sqrt(max(left, 0.0)))
+            best, found, deviation = criterion, np.asarray(forecast), float(np.sqrt(max(left, 0.0)))
     return found, deviation
+
+
+def _spectrum(frequency: Array, memory: float, width: float, every: int) -> Array:
+    """Of rows, in parts of their frequency, but for a factor: of samples with this memory, smoothed and thinned out."""
+    total = np.zeros_like(frequency)
+    for fold in range(-(every // 2), every // 2 + 1):  # what thinning folds back
+        turn = 2.0 * np.pi * (frequency + fold) / every
+        total += np.exp(-((turn * width) ** 2)) / (1.0 + memory**2 - 2.0 * memory * np.cos(turn))
+    return total
 
 
 def _stretches(good: np.ndarray) -> list[slice]:
@@ -234,7 +248,9 @@ class Regression:
                 least = LEAST * float(np.max(np.abs(part.response), initial=0.0)) or 1.0
                 above = max(recording.noise_above for recording in self.recordings)
                 if above and all(recording.whitened for recording in self.recordings):
-                    coefficients, deviation = autoregression_above(residual, part.valid & ~part.starts, above)
+                    coefficients, deviation = autoregression_above(
+                        residual, part.valid & ~part.starts, above, self.recordings[0].width, self.recordings[0].every
+                    )
                 elif all(recording.whitened for recording in self.recordings):
                     coefficients = autoregression(np.where(part.valid, residual, 0.0), part.valid)
                     white = innovations(coefficients, residual)
