@@ -99,7 +99,7 @@ def autoregression_above(
     information criterion asks for. good: rows that count; each unbroken stretch of them has a periodogram of its own.
     """
     stretches = [_periodogram(residual[rows]) for rows in _stretches(good)]
-    frequencies, powers = (np.concatenate([each[part] for each in stretches] or [[]]) for part in (0, 1))
+    frequencies, powers = (np.concatenate([each[part] for each in stretches] or [np.zeros(0)]) for part in (0, 1))
     alone = frequencies >= share
     if np.count_nonzero(alone) < 2 * ORDER:
         return np.zeros(0), float(np.std(residual[good])) if np.any(good) else 1.0
@@ -144,8 +144,8 @@ def _periodogram(residual: Array) -> tuple[Array, Array]:
     """Frequencies in parts of the rows' one, and power at each; a Hann window, lest the slow part leaks."""
     window = np.hanning(len(residual))
     power = np.abs(np.fft.rfft((residual - residual.mean()) * window)) ** 2 / float(window @ window)
-    frequency = np.fft.rfftfreq(len(residual))
-    return frequency[1:], np.maximum(power[1:], 1e-300)
+    frequency = np.arange(1, len(power)) / len(residual)
+    return frequency, np.maximum(power[1:], 1e-300)
 
 
 @dataclasses.dataclass
