@@ -25,6 +25,11 @@ def test_the_small_table_is_good(tmp_path):
     assert table.variable(4).subscribers == ("MB", "LEG")
 
 
+def test_what_a_fault_quotes_is_cut_to_its_column(tmp_path):
+    [fault] = faults_of(write(tmp_path, variables=VARIABLES.replace("5,GAIN", "5," + "G" * 300)))
+    assert len(fault.row) == 40 and len(fault.rule) <= 240
+
+
 @pytest.mark.parametrize("period", ["1", "1.0001", "0.9999"])
 def test_a_period_may_differ_by_a_ten_thousandth_from_what_is_served(tmp_path, period):
     table = load_table(write(tmp_path, variables=VARIABLES.replace("SSP,1,-3,3", f"SSP,{period},-3,3")))
