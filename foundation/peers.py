@@ -1,6 +1,6 @@
 """Peers: programs that connect from outside. One rule says what they may ask of us, and LIMITS is that rule as a table.
 
-Whatever listens keeps it: attach, slcan, socketcand, the supervisor's requests, the serial lines. Nothing here blocks,
+Whatever listens keeps it: attach, slcan, socketcand, the supervisor's requests, the serial lines, `trace open`. Nothing here blocks,
 has a thread, or raises because of a peer.
 
 1. A look (`Door.look`) reads at most `read_bytes` of each peer and carries out at most `burst` requests of all, one of
@@ -57,7 +57,8 @@ class Limits:
 # robot carries 4 in a millisecond. requests: a frame that is sent costs some 50 us with all that follows on the bus
 # and in the boards (both measured on 23 November 2026, AMD EPYC); a real adapter of 1 Mbit/s sends 8 in a millisecond,
 # a serial one of 1 Mbaud, and a daemon before one, 4. burst: attach, a window of its protocol. longest: attach, a
-# reason; slcan, an extended frame has 26; socketcand, a send has 45; control, a request has below 100.
+# reason; slcan, an extended frame has 26; socketcand, a send has 45; control, a request has below 100;
+# trace, the head of a browser's request, cookies of other servers of this machine included.
 # backlog: 8,000 frames, 0.3 s of a full bus of 3 Mbit/s.
 KB = 1024
 LIMITS = {
@@ -67,6 +68,7 @@ LIMITS = {
     "socketcand": Limits(    8,        4,    32,     256,    4 * KB,     64 * KB,  64 * KB,  256 * KB),
     "control":    Limits(   32,        4,     8,    4096,    4 * KB,     64 * KB,  64 * KB,   64 * KB),
     "serial":     Limits(    1,        0,     0,       0,    2 * KB,      4 * KB,        0,         0),
+    "trace":      Limits(    8,        0,     8, 16 * KB,    4 * KB,    256 * KB,  64 * KB,         0),
 }  # fmt: skip
 
 ARRIVALS_PER_S = 250  # chosen by us: each costs some 80 us to take in, look up and refuse, 2 % of the time in all
@@ -231,6 +233,8 @@ class Door(Generic[P]):
 
     A protocol adds `_welcome`, `_take`, and if it likes `_takes_part` and `_closed`.
     """
+
+    tolerated_s = PATIENCE_S
 
     def __init__(self, kind: str, listener: socket.socket | None = None) -> None:
         self.kind = kind
@@ -437,7 +441,7 @@ class Door(Generic[P]):
         now_s = self.clock()
         if peer.wants_since_s is None:
             peer.wants_since_s = now_s
-        elif now_s - peer.wants_since_s > PATIENCE_S:
+        elif now_s - peer.wants_since_s > self.tolerated_s:
             if peer.ending:
                 self.drop(peer)
             else:

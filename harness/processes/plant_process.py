@@ -179,6 +179,7 @@ class PlantRun:
         return {
             "time_s": robot.time_s,
             "time_ns": robot.loop.time,
+            "at_s": wallclock.monotonic_s(),
             "steps": robot.steps,
             "distance_m": robot.distance_m,
             "speed_m_per_s": robot.mean_speed_m_per_s(),

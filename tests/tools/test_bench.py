@@ -161,12 +161,18 @@ def test_floods_are_compared_with_the_robot_left_in_peace_and_go_on_where_they_w
     paces = {floods.PEACE: 0.25, "control set": 0.2476, "slcan V": 0.2474}
     asked = []
 
-    def measured(name, seconds, speed):
-        asked.append((name, seconds, speed))
+    class Robot:
+        def __init__(self, speed):
+            self.speed, self.process, self.close = speed, self, lambda: None
+            self.poll = lambda: None
+
+    def measured(name, seconds, robot):
+        asked.append((name, seconds, robot.speed))
         return {"flood": name, "pace": paces[name], "cpu_per_s": 0.5, "memory_mb": 1.0, "memory_growth_mb": 0.0,
                 "ended": False}  # fmt: skip
 
     monkeypatch.setattr(floods, "measured", measured)
+    monkeypatch.setattr(floods, "Robot", Robot)
     said, kept = [], tmp_path / "rows"
     floods.run(5, said.append, (floods.PEACE, "control set"), 0.25, kept)
     rows = floods.run(5, said.append, tuple(paces), 0.25, kept)

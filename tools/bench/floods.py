@@ -37,7 +37,7 @@ FRAMES_IN_WINDOW = "attach SEND, answers read"
 HELD = 0.99  # share of the undisturbed pace that a flood leaves: issue 16
 PROGRAMS = 10  # boards, body, supervisor, and who floods; chosen by us: with a processor for each, real time is held
 CHUNK = 1 << 16  # bytes offered at once: what a socket takes
-LINE_S = 10.0  # it prints one every two
+SETTLE_S = 1.0  # from the first bytes of a flood to the first look, and from its end to the next; chosen by us
 PATIENCE_S = 60.0  # for a robot that starts, or ends, on a busy machine
 TICKS_PER_S = os.sysconf("SC_CLK_TCK")
 PAGE_KB = os.sysconf("SC_PAGE_SIZE") // 1024
@@ -254,17 +254,18 @@ class Robot:
             self._hear(0.1)
         return match.group(1)
 
-    def time_s(self) -> float:
-        """Its virtual time, from the lines it prints every two seconds (a supervisor under a flood may not answer)."""
-        times = re.findall(r"^([\d.]+) s, \d+ steps", self.said, re.MULTILINE)
-        return float(times[-1]) if times else 0.0
+    def moment(self) -> tuple[float, float]:
+        """(wall clock, virtual time) at one instant, s, as the body's process tells it.
 
-    def next_line(self) -> tuple[float, float]:
-        """(wall clock, virtual time) at the next line it prints, s; the last one again when none comes in LINE_S."""
-        before, end = self.said.count(" steps, "), wallclock.monotonic_s() + LINE_S
-        while self.said.count(" steps, ") == before and wallclock.monotonic_s() < end and self.process.poll() is None:
+        (0, 0) when the robot has ended, or does not answer for PATIENCE_S: a flood may keep the supervisor busy.
+        """
+        end = wallclock.monotonic_s() + PATIENCE_S
+        while wallclock.monotonic_s() < end and self.process.poll() is None:
+            with contextlib.suppress(UserError):
+                status = control.ask(self.name, {"do": "status"})
+                return status["at_s"], status["time_s"]
             self._hear(0.1)
-        return wallclock.monotonic_s(), self.time_s()
+        return 0.0, 0.0
 
     def memory_kb(self) -> int:
         """Resident memory of the body's process and the supervisor."""
@@ -345,28 +346,25 @@ def speed_for(processors: int) -> float:
     return 1.0 if processors >= PROGRAMS else 0.5 if processors >= PROGRAMS // 2 else 0.25
 
 
-def measured(name: str, seconds: float, speed: float) -> dict:
+def measured(name: str, seconds: float, robot: Robot) -> dict:
     """One flood of so many seconds: pace, processor time per second of the robot, memory."""
-    robot = Robot(speed)
-    try:
-        wall, virtual = robot.next_line()
-        memory, cpu = robot.memory_kb(), robot.body_cpu_s()
-        with flooded(name, robot.doors):
-            robot.wait(seconds)
-            end_wall, end_virtual = robot.next_line()
-            end_memory, end_cpu = robot.memory_kb(), robot.body_cpu_s()
-        ended = robot.process.poll() is not None
-    finally:
-        robot.close()
-    passed = end_virtual - virtual
+    memory = robot.memory_kb()
+    with flooded(name, robot.doors):
+        robot.wait(SETTLE_S)
+        (wall, virtual), cpu = robot.moment(), robot.body_cpu_s()
+        robot.wait(seconds)
+        (end_wall, end_virtual), end_cpu = robot.moment(), robot.body_cpu_s()
+        end_memory = robot.memory_kb()
+    passed, waited = end_virtual - virtual, end_wall - wall
+    robot.wait(SETTLE_S)
     return {
         "flood": name,
-        "seconds": end_wall - wall,
-        "pace": passed / (end_wall - wall),
+        "seconds": waited,
+        "pace": passed / waited if passed > 0.0 else 0.0,
         "cpu_per_s": (end_cpu - cpu) / passed if passed > 0.0 else None,
         "memory_mb": end_memory / 1024.0,
         "memory_growth_mb": (end_memory - memory) / 1024.0,
-        "ended": ended,
+        "ended": robot.process.poll() is not None,
     }
 
 
@@ -402,7 +400,7 @@ def run(
     speed: float | None = None,
     kept: Path | None = None,
 ) -> list[dict]:
-    """Nobody, a busy program, then every flood (or those named); a line each.
+    """Nobody, a busy program, then every flood (or those named), on one robot one after the other; a line each.
 
     speed: times real time; None: what `speed_for` says. kept: a file that gets each row when it is measured, and whose
     rows of an earlier, interrupted measurement are not measured again.
@@ -411,15 +409,21 @@ def run(
     before = {row["flood"]: row for row in _rows(kept) if (row["speed"], row["asked_s"]) == (speed, seconds)}
     say(f"the robot at {speed:g} of real time, {seconds:g} s each")
     rows: list[dict] = []
-    for name in names or NAMES:
-        row = before.get(name)
-        if row is None:
-            row = {**measured(name, seconds, speed), "speed": speed, "asked_s": seconds}
-            if kept is not None:
-                with kept.open("a", encoding="utf-8") as file:
-                    file.write(json.dumps(row) + "\n")
-        rows.append(row)
-        say(text_of(row, rows[0]["pace"] if rows[0]["flood"] == PEACE else 0.0))
+    robot = None
+    try:
+        for name in names or NAMES:
+            row = before.get(name)
+            if row is None:
+                robot = Robot(speed) if robot is None or robot.process.poll() is not None else robot
+                row = {**measured(name, seconds, robot), "speed": speed, "asked_s": seconds}
+                if kept is not None:
+                    with kept.open("a", encoding="utf-8") as file:
+                        file.write(json.dumps(row) + "\n")
+            rows.append(row)
+            say(text_of(row, rows[0]["pace"] if rows[0]["flood"] == PEACE else 0.0))
+    finally:
+        if robot is not None:
+            robot.close()
     if rows[0]["flood"] == PEACE:
         say(verdict(rows))
     return rows
