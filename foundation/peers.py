@@ -1,7 +1,7 @@
 """Peers: programs that connect from outside. One rule says what they may ask of us, and LIMITS is that rule as a table.
 
-Whatever listens keeps it: attach, slcan, socketcand, the supervisor's requests, the serial lines, `trace open`. Nothing here blocks,
-has a thread, or raises because of a peer.
+Whatever listens keeps it: attach, slcan, socketcand, the supervisor's requests, the serial lines, `trace open`. Nothing
+here blocks, has a thread, or raises because of a peer.
 
 1. A look (`Door.look`) reads at most `read_bytes` of each peer and carries out at most `burst` requests of all, one of
    each in turn; over time at most `requests` in a millisecond of the robot's. At most ARRIVALS_PER_S connections in a

@@ -1,4 +1,4 @@
-"""One trace, shown over HTTP to Perfetto's viewer in a browser on this machine, under the rule of `foundation/peers.py`.
+"""One trace, shown over HTTP to Perfetto's viewer in a browser of this machine; `foundation/peers.py` has the rule.
 
 One request of each connection is answered, and the connection closed. No page but the viewer's may read the trace: the
 Origin and Host that a browser sends must be the viewer and this machine, so that a page of another site, also one whose
@@ -137,7 +137,7 @@ class TraceServer(Door[Visitor]):
 
 
 def _head(status: str, fields: dict[str, str] | None = None, length: int = 0) -> bytes:
-    """The head of an answer. Every one says that only Perfetto's viewer may read it, also from a page of the internet."""
+    """The head of an answer; each says that Perfetto's viewer alone may read it, from a page of the internet too."""
     told = {
         "Access-Control-Allow-Origin": VIEWER,
         "Access-Control-Allow-Private-Network": "true",
