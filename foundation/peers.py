@@ -1,23 +1,28 @@
 """Peers: programs that connect from outside. One rule says what they may ask of us, and LIMITS is that rule as a table.
 
-Whatever listens keeps it: attach, slcan, socketcand, the supervisor's requests, the serial lines. Nothing here blocks,
-has a thread, or raises because of a peer.
+Whatever listens keeps it: attach, slcan, socketcand, the supervisor's requests, the serial lines, `trace open`. Nothing
+here blocks, has a thread, or raises because of a peer.
 
 1. A look (`Door.look`) reads at most `read_bytes` of each peer and carries out at most `burst` requests of all, one of
-   each in turn; over time at most `requests` in a millisecond of the robot's. A connection costs ARRIVAL requests.
+   each in turn; over time at most `requests` in a millisecond of the robot's. At most ARRIVALS_PER_S connections in a
+   second of the wall clock are taken in, beyond those that would take every place twice.
 2. What does not read is not read: with `unread` bytes of answers waiting for it, nothing more is taken from a peer.
    What it did not ask for (frames of a bus) is left out, and counted, from `backlog` bytes on.
 3. A look writes at most `write_bytes` to each peer.
-4. A door has room for `peers`. When all places are taken, a peer that has not begun to take part makes room.
-5. A peer that does not keep to this is sent away, and counted by its reason (REASONS), which the user is shown.
+4. A door has room for `peers`. When all places are taken, a peer that has not begun to take part makes room: the one
+   that has said nothing for longest.
+5. A peer that does not keep to this is sent away, and counted by its reason (REASONS), which the user is shown. What
+   it had begun is dropped.
 6. Only this user's programs and root's are served, and we trust no other server: SO_PEERCRED on local sockets; on
-   loopback the owner of the other end in the kernel's table of connections. Beyond this machine nobody is known, so
+   loopback the kernel says whose the other end is. Beyond this machine nobody is known, so
    listening there must be asked for.
 """
 
 from __future__ import annotations
 
+import errno
 import ipaddress
+import math
 import os
 import select
 import socket
@@ -39,8 +44,8 @@ class Limits:
     """One door's line of the table; the rule above says what each number limits."""
 
     peers: int
-    requests: int  # in a millisecond of virtual time, of all peers together
-    burst: int  # after a while without any, and per look while virtual time stands still
+    requests: int  # in a millisecond of virtual time (of the wall clock while a robot is paused), of all peers together
+    burst: int  # after a while without any, and per look where there is no robot
     longest: int  # bytes of one request
     read_bytes: int
     write_bytes: int
@@ -48,23 +53,26 @@ class Limits:
     backlog: int  # bytes
 
 
-# Chosen by us, for these reasons. peers: who is on a bus hears every frame, and each costs 13 us, where a bus of the
-# robot carries 4 in a millisecond; 64 clients took more time than there is. requests: a frame that is sent costs 46 us
-# with all that follows (both measured on 23 November 2026 on a machine that was busy with others, so that they are
-# high), and a real adapter of 1 Mbit/s sends 8 in a millisecond. burst: a window of the attach protocol. longest:
-# attach, a reason; slcan, an extended frame has 26; socketcand, a send has 45; control, a request has below 100.
+# Chosen by us, for these reasons. peers: who is on a bus hears every frame, and each costs 3 us, where a bus of the
+# robot carries 4 in a millisecond. requests: a frame that is sent costs some 50 us with all that follows on the bus
+# and in the boards (both measured on 23 November 2026, AMD EPYC); a real adapter of 1 Mbit/s sends 8 in a millisecond,
+# a serial one of 1 Mbaud, and a daemon before one, 4. burst: attach, a window of its protocol. longest: attach, a
+# reason; slcan, an extended frame has 26; socketcand, a send has 45; control, a request has below 100;
+# trace, the head of a browser's request, cookies of other servers of this machine included.
 # backlog: 8,000 frames, 0.3 s of a full bus of 3 Mbit/s.
 KB = 1024
 LIMITS = {
     #                    peers  requests  burst  longest  read_bytes  write_bytes  unread    backlog
-    "attach":     Limits(   16,       16,    72,    1028,    4 * KB,     64 * KB,  64 * KB,  256 * KB),
-    "slcan":      Limits(    1,        8,    32,      32,    4 * KB,      4 * KB,   4 * KB,   64 * KB),
-    "socketcand": Limits(    8,        8,    32,     256,    4 * KB,     64 * KB,  64 * KB,  256 * KB),
+    "attach":     Limits(   16,        8,    72,    1028,    4 * KB,     64 * KB,  64 * KB,  256 * KB),
+    "slcan":      Limits(    1,        4,    32,      32,    4 * KB,      4 * KB,   4 * KB,   64 * KB),
+    "socketcand": Limits(    8,        4,    32,     256,    4 * KB,     64 * KB,  64 * KB,  256 * KB),
     "control":    Limits(   32,        4,     8,    4096,    4 * KB,     64 * KB,  64 * KB,   64 * KB),
     "serial":     Limits(    1,        0,     0,       0,    2 * KB,      4 * KB,        0,         0),
+    "trace":      Limits(    8,        0,     8, 16 * KB,    4 * KB,    256 * KB,  64 * KB,         0),
 }  # fmt: skip
 
-ARRIVAL = 4  # requests that a connection counts for, which has to be taken in and looked up; chosen by us
+ARRIVALS_PER_S = 250  # chosen by us: each costs some 80 us to take in, look up and refuse, 2 % of the time in all
+PAUSED_S = 0.1  # virtual time has stood still for so long: the robot is paused, not waiting for its time
 PATIENCE_S = 2.0  # with answers untaken for so long and more to say, a peer is sent away; chosen by us
 MS = 1_000_000
 
@@ -189,6 +197,7 @@ class Peer:
         self.gone = False  # nothing more will come
         self.ending = False  # was told why, and is closed when that is out
         self.waits = False  # its last request is being carried out: the next one has to wait
+        self.last = 0  # the door's count of requests and arrivals at its last one
         self.wants_since_s: float | None = None  # it has had more to say, and taken nothing
 
     def answer(self, data: bytes) -> None:
@@ -214,11 +223,18 @@ class Peer:
 P = TypeVar("P", bound=Peer)
 
 
+def _last(peer: Peer) -> int:
+    """Who has said nothing for longest has the least."""
+    return peer.last
+
+
 class Door(Generic[P]):
     """Something that listens: takes peers in, reads, has their requests carried out, writes; a bounded part per look.
 
     A protocol adds `_welcome`, `_take`, and if it likes `_takes_part` and `_closed`.
     """
+
+    tolerated_s = PATIENCE_S
 
     def __init__(self, kind: str, listener: socket.socket | None = None) -> None:
         self.kind = kind
@@ -227,11 +243,15 @@ class Door(Generic[P]):
         self.peers: list[P] = []
         self.sent_away: Counter[str] = Counter()
         self.worked = 0  # requests carried out so far
+        self.arrived = 0  # connections taken in so far
         self.room = float(self.limits.burst)  # for requests, now
         self.time_ns = 0
         self.first = 0  # whose turn it is
         self.left_over = False  # whole requests wait for the next look
+        self.knocking = False  # connections do
         self.clock = wallclock.monotonic_s  # patience is measured by
+        self.looked_s = self.moved_s = -math.inf  # on `clock`: the last look, the last with virtual time ahead
+        self.arrivals = 2.0 * self.limits.peers  # room for connections, now
         self.watch = select.poll()
         if listener is not None:
             self.watch.register(listener, select.POLLIN)
@@ -261,16 +281,15 @@ class Door(Generic[P]):
 
     def look(self, now_ns: int) -> None:
         """New peers, what has come, and what is asked for, as far as there is room; `now_ns`: virtual time."""
-        passed, self.time_ns = now_ns - self.time_ns, now_ns
-        # where virtual time stands still, whoever calls waits between two looks
-        fresh = self.limits.requests * passed / MS if passed > 0 else self.limits.burst
-        self.room = min(float(self.limits.burst), self.room + fresh)
+        self._make_room(now_ns)
         ready = self._ready()
-        if self.listener is not None and self.listener.fileno() in ready:
-            ready |= self._accept()
+        knocks = self.listener is not None and self.listener.fileno() in ready
+        self.knocking = knocks and self.arrivals < 1.0
         self.left_over = False
         peers = self.peers[self.first :] + self.peers[: self.first]
         waiting = [peer for peer in peers if self._hear(peer, peer.stream.fileno() in ready)]
+        if knocks:  # who has gone has given its place back by now
+            waiting += [peer for peer in self._accept() if self._hear(peer, True)]
         while waiting and self.room >= 1.0:  # one of each in turn
             waiting = [peer for peer in waiting if self.room >= 1.0 and self._one(peer)]
         self.left_over = any(self._is_heard(peer) for peer in waiting)
@@ -283,7 +302,7 @@ class Door(Generic[P]):
 
     def filenos(self) -> list[int]:
         """Descriptors that become readable when a peer wants something that it can have."""
-        found = [] if self.listener is None else [self.listener.fileno()]
+        found = [] if self.listener is None or self.knocking else [self.listener.fileno()]
         return found + [peer.stream.fileno() for peer in self.peers if self._is_heard(peer) and not peer.gone]
 
     def filenos_to_write(self) -> list[int]:
@@ -328,23 +347,43 @@ class Door(Generic[P]):
 
     # ---- a look
 
+    def _make_room(self, now_ns: int) -> None:
+        """For as many requests and connections as the time since the last look allows. now_ns 0: there is no robot."""
+        now_s = self.clock()
+        passed_s = now_s - self.looked_s
+        passed, self.time_ns = now_ns - self.time_ns, now_ns
+        if passed > 0 or self.moved_s < 0.0:
+            self.moved_s = now_s
+        if now_ns == 0:  # whoever calls waits between two looks
+            fresh = float(self.limits.burst)
+        elif passed > 0:
+            fresh = self.limits.requests * passed / MS
+        elif now_s - self.moved_s > PAUSED_S:
+            fresh = self.limits.requests * passed_s * 1e3
+        else:
+            fresh = 0.0
+        self.room = min(float(self.limits.burst), self.room + fresh)
+        self.arrivals = min(2.0 * self.limits.peers, self.arrivals + ARRIVALS_PER_S * passed_s)
+        self.looked_s = now_s
+
     def _ready(self) -> set[int]:
         """Descriptors with something to read."""
         return {number for number, _ in self.watch.poll(0)}
 
-    def _accept(self) -> set[int]:
-        """Take in who knocks; descriptors of the new peers, which may have said something already."""
+    def _accept(self) -> list[P]:
+        """Take in who knocks; the new peers, which may have said something already."""
         assert self.listener is not None
-        new = set()
-        while self.room >= 1.0:
+        new: list[P] = []
+        while self.arrivals >= 1.0:
             try:
                 connection, _ = self.listener.accept()
             except OSError:
                 break
-            self.room -= ARRIVAL
-            self.worked += ARRIVAL
+            self.arrivals -= 1.0
             peer = self._welcome(connection)
-            idle = next((each for each in self.peers if not self._takes_part(each)), None)
+            self.arrived += 1
+            peer.last = self.worked + self.arrived
+            idle = min((each for each in self.peers if not self._takes_part(each)), key=_last, default=None)
             full = len(self.peers) >= self.limits.peers
             if full and idle is not None:
                 self.send_away(idle, IDLE)
@@ -357,8 +396,8 @@ class Door(Generic[P]):
                 self._write(peer)
                 self.drop(peer)
             else:
-                new.add(peer.stream.fileno())
-        return new
+                new.append(peer)
+        return [peer for peer in new if peer in self.peers]
 
     def _hear(self, peer: P, comes: bool) -> bool:
         """Read what is allowed of one peer; True when it may have a request."""
@@ -389,6 +428,7 @@ class Door(Generic[P]):
         if self._take(peer):
             self.room -= 1.0
             self.worked += 1
+            peer.last = self.worked + self.arrived
             return True
         if peer.gone and not peer.ending:
             self.drop(peer)
@@ -401,7 +441,7 @@ class Door(Generic[P]):
         now_s = self.clock()
         if peer.wants_since_s is None:
             peer.wants_since_s = now_s
-        elif now_s - peer.wants_since_s > PATIENCE_S:
+        elif now_s - peer.wants_since_s > self.tolerated_s:
             if peer.ending:
                 self.drop(peer)
             else:
@@ -431,8 +471,45 @@ def user_behind(connection: socket.socket) -> int | None:
         return int(struct.unpack("3i", connection.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, 12))[1])
     with suppress(OSError, ValueError):
         here, there = connection.getsockname()[:2], connection.getpeername()[:2]
-        return _owner_of(there, here, Path("/proc/net/tcp").read_text(encoding="ascii"))
+        try:
+            return _owner_told(_asked_of_kernel(there, here))
+        except (OSError, struct.error):  # a kernel that does not tell of one connection shows its table of all
+            return _owner_of(there, here, Path("/proc/net/tcp").read_text(encoding="ascii"))
     return None
+
+
+# sock_diag(7), linux/inet_diag.h. One connection is found in 25 us; the table of all, which the kernel writes out anew
+# for every reader, takes 11 to 19 ms (23 November 2026, AMD EPYC).
+NETLINK_SOCK_DIAG, SOCK_DIAG_BY_FAMILY, NLM_F_REQUEST, NLMSG_ERROR = 4, 20, 1, 2
+ESTABLISHED = 1  # TCP_ESTABLISHED; in any other state the end is closed, and its owner is told as root
+HEADER = struct.Struct("=IHHII")  # of a netlink message: length, type, flags, number, port
+QUESTION = struct.Struct("=BBBBI")  # inet_diag_req_v2: family, protocol, extensions, padding, states; then the ends
+ANSWER = struct.Struct("=BBBB48sIIIII")  # inet_diag_msg: family, state, ..., the ends, expires, queues, user, inode
+NO_COOKIE = b"\xff" * 8
+
+
+def _asked_of_kernel(end: tuple[str, int], other: tuple[str, int]) -> bytes:
+    """What the kernel answers when asked about the connection from `end` to `other`. OSError: it does not."""
+    ends = struct.pack(">HH", end[1], other[1])
+    ends += b"".join(socket.inet_aton(each[0]).ljust(16, b"\0") for each in (end, other))
+    body = QUESTION.pack(socket.AF_INET, socket.IPPROTO_TCP, 0, 0, 1 << ESTABLISHED) + ends + bytes(4) + NO_COOKIE
+    head = HEADER.pack(HEADER.size + len(body), SOCK_DIAG_BY_FAMILY, NLM_F_REQUEST, 0, 0)
+    with socket.socket(socket.AF_NETLINK, socket.SOCK_RAW, NETLINK_SOCK_DIAG) as kernel:
+        kernel.setblocking(False)  # it answers within `send`
+        kernel.send(head + body)
+        return kernel.recv(4096)
+
+
+def _owner_told(answer: bytes) -> int | None:
+    """Who owns the end that an answer of the kernel tells of; None when it is closed. OSError: it does not know."""
+    _, kind, *_ = HEADER.unpack_from(answer)
+    if kind == NLMSG_ERROR:
+        error = -struct.unpack_from("=i", answer, HEADER.size)[0]
+        if error == errno.ENOENT:
+            return None
+        raise OSError(error, os.strerror(error))
+    _, state, _, _, _, _, _, _, user, inode = ANSWER.unpack_from(answer, HEADER.size)
+    return int(user) if state == ESTABLISHED and inode else None
 
 
 def _owner_of(end: tuple[str, int], other: tuple[str, int], table: str) -> int | None:

@@ -119,6 +119,7 @@ class Ranger:
         self.slot_views: dict[str, RobotSlots] = {}  # of boards whose slots are recorded
         self.observed: Any = None  # what harness.testing keeps beside it: the last frames, what was measured
         self.polled: list[Any] = []  # ends of wires that lead out of the simulation
+        self.poll_due: list[int] = []  # when each of them asked to be looked at next, ns
         self.next_poll_ns = self.start_ns
         self.cpu_s = 0.0
         self.wall_s = 0.0
@@ -250,18 +251,23 @@ class Ranger:
     def attach(self, end: Any) -> None:
         """From now on `end.poll(now_ns)` is called as often as it asks for; it returns when it wants to be next."""
         self.polled.append(end)
+        self.poll_due.append(self.loop.time)
         self.next_poll_ns = self.loop.time
 
     def _poll(self) -> int:
         """Poll every end that leads outside, when it is time; returns until when the loop may run."""
         now: int = self.loop.time
         if now >= self.next_poll_ns:
-            self.next_poll_ns = max(now + lockstep.WINDOW_NS, min(end.poll(now) for end in self.polled))
+            for place, end in enumerate(self.polled):
+                if now >= self.poll_due[place]:
+                    self.poll_due[place] = end.poll(now)
+            self.next_poll_ns = max(now + lockstep.WINDOW_NS, min(self.poll_due))
         return self.next_poll_ns
 
     def poll_now(self) -> None:
         """Poll every end at once: something waits at one of them."""
         self.next_poll_ns = self.loop.time
+        self.poll_due = [self.loop.time] * len(self.polled)
         self._poll()
 
     def run_for(self, seconds: float) -> None:

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import argparse
-import http.server
+import contextlib
 import pathlib
-import shutil
 import urllib.parse
 import webbrowser
 from typing import TYPE_CHECKING, Any
@@ -14,6 +13,7 @@ from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.scenario import MOST_TIME_S
 from ranger_sim.tools.files import replace_file
 from ranger_sim.tools.options import Option, add_all
+from ranger_sim.tools.trace_server import PORT, VIEWER, TraceServer
 from ranger_sim.tools.units import TIMES, quantity, word
 
 if TYPE_CHECKING:
@@ -22,9 +22,7 @@ if TYPE_CHECKING:
     from ranger_sim.harness.ranger import Ranger
     from ranger_sim.harness.timeline import Timeline
 
-VIEWER = "https://ui.perfetto.dev"
-# The only port from which Perfetto's viewer may read: its Content-Security-Policy names that of trace_processor.
-PORT = 9001
+LONGEST_NAP_S = 1.0  # so that Ctrl-C is never late; chosen by us
 SHOWN_S = 0.02  # around the instant: ten slots of the main brain, chosen by us
 KEPT_S = 1.0  # what a page for offline use holds of a long trace: some 10 MB
 
@@ -160,52 +158,6 @@ def address(name: str, begin_ns: int, end_ns: int) -> str:
     return f"{VIEWER}/#!/?url={source}&visStart={begin_ns}&visEnd={end_ns}"
 
 
-class TraceServer(http.server.HTTPServer):
-    """Serves one file, to pages of Perfetto's viewer on this machine. `served`: it has been fetched."""
-
-    allow_reuse_address = True
-
-    def __init__(self, file: pathlib.Path, port: int = PORT) -> None:
-        self.file = file
-        self.served = False
-        super().__init__(("127.0.0.1", port), TraceHandler)
-
-
-class TraceHandler(http.server.BaseHTTPRequestHandler):
-    """GET of the trace; the browser's question beforehand is answered as well."""
-
-    server: TraceServer
-
-    def end_headers(self) -> None:
-        """Every answer says that only Perfetto's viewer may read it, also from a page of the internet."""
-        self.send_header("Access-Control-Allow-Origin", VIEWER)
-        self.send_header("Access-Control-Allow-Private-Network", "true")
-        self.send_header("Cache-Control", "no-cache")
-        super().end_headers()
-
-    def do_OPTIONS(self) -> None:
-        """May a page of the internet ask here? It may GET."""
-        self.send_response(204)
-        self.send_header("Access-Control-Allow-Methods", "GET")
-        self.end_headers()
-
-    def do_GET(self) -> None:
-        """The trace under its name, and nothing else."""
-        if urllib.parse.unquote(self.path) != f"/{self.server.file.name}":
-            self.send_error(404)
-            return
-        with self.server.file.open("rb") as file:
-            self.send_response(200)
-            self.send_header("Content-Type", "application/octet-stream")
-            self.send_header("Content-Length", str(self.server.file.stat().st_size))
-            self.end_headers()
-            shutil.copyfileobj(file, self.wfile)
-        self.server.served = True
-
-    def log_message(self, format: str, *arguments: Any) -> None:
-        """Nothing: the command says what is to be said."""
-
-
 def serve(file: pathlib.Path, begin_ns: int, end_ns: int, with_browser: bool) -> int:
     """Until the viewer has fetched the trace, or Ctrl-C."""
     try:
@@ -215,7 +167,7 @@ def serve(file: pathlib.Path, begin_ns: int, end_ns: int, with_browser: bool) ->
             f"port {PORT} of this machine cannot be used ({error.strerror}), and Perfetto's viewer reads from no "
             "other: end what holds it (trace_processor?), or use --offline"
         ) from None
-    with server:
+    with contextlib.closing(server):
         shown = address(file.name, begin_ns, end_ns)
         print(
             f"{shown}\nserving {file} until it has been fetched; Ctrl-C ends it; without a network: --offline",
@@ -224,5 +176,5 @@ def serve(file: pathlib.Path, begin_ns: int, end_ns: int, with_browser: bool) ->
         if with_browser:
             webbrowser.open(shown)
         while not server.served:
-            server.handle_request()
+            server.turn(LONGEST_NAP_S)
     return 0

@@ -43,6 +43,8 @@ class SlcanServer(StreamServer[Connection]):
     def send_away(self, peer: Connection, reason: str, apology: bytes = b"") -> None:
         """The terminal stays: the next program may be another one. The channel is closed, what waited is forgotten."""
         self.sent_away[reason] += 1
+        if peer.tap is not None:
+            peer.tap.flush(self.taps.time)
         self._closed(peer)
         peer.incoming.clear()
         peer.outgoing.clear()

@@ -64,7 +64,13 @@ class SocketcandServer(StreamServer[_Client]):
             raise UserError(f"socketcand on {host}:{port}: {reason}") from None
         super().__init__("socketcand", listener, buses, epoch_ns)
         self.totals["not_carried"] = 0
+        self.texts: dict[Event, bytes] = {}  # frames of this poll as all clients are told them
         self.host, self.port = listener.getsockname()
+
+    def poll(self, now_ns: int) -> int:
+        """As every server; each frame is put into words once, however many clients hear it."""
+        self.texts.clear()
+        return super().poll(now_ns)
 
     def patience_s(self) -> float:
         """Until kept frames may follow the answer to rawmode."""
@@ -159,21 +165,28 @@ class SocketcandServer(StreamServer[_Client]):
             client.quiet_until = 0.0
             events = client.kept + events
             client.kept = []
-        for kind, time, identifier, flags, lo, hi in events:
-            if kind != RECEIVED:
+        texts, out, totals = self.texts, client.outgoing, self.totals
+        for event in events:
+            if event[0] != RECEIVED:
                 continue
-            if flags & FLAG_REMOTE:
-                self.totals["not_carried"] += 1
+            if event[3] & FLAG_REMOTE:
+                totals["not_carried"] += 1
                 continue
-            if len(client.outgoing) >= self.limits.backlog:
-                self.totals["frames_dropped"] += 1
+            if len(out) >= self.limits.backlog:
+                totals["frames_dropped"] += 1
                 continue
-            seconds, rest = divmod(time + self.epoch_ns, 1_000_000_000)
-            stamp = f"{seconds}.{rest // 1000:06d}"
-            if flags & FLAG_ERROR:
-                text = f"< error {identifier & ERROR_MASK:03X} {stamp} >"
-            else:
-                name = f"{identifier:08X}" if flags & FLAG_EXTENDED else f"{identifier:03X}"
-                text = f"< frame {name} {stamp} {data_of_words(flags, lo, hi).hex().upper()} >"
-            client.outgoing += text.encode()
-            self.totals["frames_out"] += 1
+            text = texts.get(event)
+            if text is None:
+                text = texts[event] = self._text_of(event)
+            out += text
+            totals["frames_out"] += 1
+
+    def _text_of(self, event: Event) -> bytes:
+        """A frame of the bus, as the protocol has it."""
+        _, time, identifier, flags, lo, hi = event
+        seconds, rest = divmod(time + self.epoch_ns, 1_000_000_000)
+        stamp = f"{seconds}.{rest // 1000:06d}"
+        if flags & FLAG_ERROR:
+            return f"< error {identifier & ERROR_MASK:03X} {stamp} >".encode()
+        name = f"{identifier:08X}" if flags & FLAG_EXTENDED else f"{identifier:03X}"
+        return f"< frame {name} {stamp} {data_of_words(flags, lo, hi).hex().upper()} >".encode()

@@ -11,7 +11,7 @@ from typing import TypeVar
 
 from ranger_sim.can_bus.bus import Bus
 from ranger_sim.can_bus.edge.taps import Tap, Taps, taps_of
-from ranger_sim.foundation.peers import REASONS, Door, Peer, Stream
+from ranger_sim.foundation.peers import ARRIVALS_PER_S, REASONS, Door, Peer, Stream
 
 HELD_ABOVE = 1 << 16  # bytes that wait for a client: a bus at full speed waits for it then
 NEXT_POLL_NS = 1_000_000  # while nothing waits; chosen by us: a frame from outside then waits 1 ms at most
@@ -74,7 +74,9 @@ class StreamServer(Door[Client]):
 
     def patience_s(self) -> float:
         """Wall-clock seconds after which a poll has something to do even if nothing else happens."""
-        return 0.0 if self.left_over else math.inf
+        if self.left_over:
+            return 0.0
+        return 1.0 / ARRIVALS_PER_S if self.knocking else math.inf
 
     def counters(self) -> dict[str, int]:
         """Whole numbers by name: clients now, clients seen, frames in, out and dropped, malformed, refused.
@@ -90,8 +92,14 @@ class StreamServer(Door[Client]):
             self._tell(client)
         super().close()
 
+    def send_away(self, peer: Client, reason: str, apology: bytes = b"") -> None:
+        """What it had queued is dropped: who comes again and again must not fill the bus with what it left behind."""
+        if peer.tap is not None and peer.taps is not None:
+            peer.tap.flush(peer.taps.time)
+        super().send_away(peer, reason, apology)
+
     def _closed(self, peer: Client) -> None:
-        """Off the bus; what the client had queued is still sent."""
+        """Off the bus; what a client had queued that left by itself is still sent."""
         if peer.tap is not None and peer.taps is not None:
             peer.tap.held = False
             peer.taps.remove(peer.tap)

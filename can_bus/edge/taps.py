@@ -91,6 +91,7 @@ class Tap:
     def refresh(self, name: str) -> None:
         """As new: nothing queued, error counters zero."""
         self.controller.renew(name)
+        self.controller.listening = True
         self.inbox.clear()
         self.name = name
         self.waiting: deque[tuple[int, int, int, int]] = deque()
@@ -285,6 +286,7 @@ class Taps:
         if tap not in self.taps or tap.leaving:
             return
         tap.leaving = True
+        tap.controller.listening = False  # nobody reads it any more: what it hears would be work for nothing
         self.leaving += 1
         tap.leave_by = self.time + LINGER_NS
         self._see_off(tap)

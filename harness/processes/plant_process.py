@@ -20,7 +20,7 @@ from ranger_sim.harness.scenario import StopRule
 SLICE_S = 0.0005  # virtual time between two looks at the wall clock: one slot of a motor board
 FAST_SLICE_S = 0.005  # the same when there is no pace to keep
 STATUS_S = 0.1  # wall clock between two reports to the supervisor
-NAP_S = 0.0005  # after something outside was served, before it is looked at again
+NAP_S = 0.002  # after something outside was served, before it is looked at again while virtual time waits
 LONGEST_WAIT_S = 0.1  # so that the supervisor sees that the process lives
 ORDERS_LIMIT = 64  # keys and parameters at one instant of the robot's time: a paused robot keeps them; chosen by us
 KEY_HOLD_NS = 200_000_000  # a firm press
@@ -92,7 +92,7 @@ class PlantRun:
             for each in ends:
                 read += each.filenos()
                 write += each.filenos_to_write() if hasattr(each, "filenos_to_write") else []
-            left_over = any(getattr(each, "left_over", False) for each in ends)
+            left_over = any(getattr(each, "left_over", False) or getattr(each, "knocking", False) for each in ends)
             ready, writable = descriptors.wait(read, write, min(end - now, NAP_S) if left_over else end - now)
             if read[0] in ready:
                 self.hear()
@@ -179,6 +179,7 @@ class PlantRun:
         return {
             "time_s": robot.time_s,
             "time_ns": robot.loop.time,
+            "at_s": wallclock.monotonic_s(),
             "steps": robot.steps,
             "distance_m": robot.distance_m,
             "speed_m_per_s": robot.mean_speed_m_per_s(),

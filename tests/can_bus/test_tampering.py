@@ -4,7 +4,7 @@ import pytest
 
 from ranger_sim.can_bus import rewiring, tampering
 from ranger_sim.can_bus.frame import frame_bits, wire
-from ranger_sim.can_bus.node import BUS_OFF, JOINING, OPERATING, UNPLUGGED
+from ranger_sim.can_bus.node import BUS_OFF, JOINING, OPERATING, RESET, UNPLUGGED
 from ranger_sim.foundation.user_error import UserError
 
 from .wiring import RATE, Wired, edge
@@ -162,6 +162,24 @@ def test_32_bit_errors_silence_a_node_which_comes_back_after_128_sequences():
     wired.send(0, 0x10, time=SECOND)
     wired.bus.advance(2 * SECOND)
     assert wired.bus.counters.frames == 1  # and it is left alone
+
+
+def test_a_reset_amid_the_recovery_owes_all_of_it_again():
+    wired = tampered(tampering.Silence(0))
+    wired.send(0, 0x10)
+    wired.bus.advance(10 * MS)
+    node = wired.bus.nodes[0]
+    for begun_ms in (10, 20):
+        wired.bus.set_mode(0, OPERATING, begun_ms * MS)
+        wired.bus.advance(begun_ms * MS + MS // 10)
+        assert (node.mode, wired.bus.joining) == (JOINING, 1)
+        wired.bus.set_mode(0, RESET, begun_ms * MS + MS // 5)
+        wired.bus.advance(begun_ms * MS + 9 * MS)  # 128 sequences are 0.47 ms
+        assert (node.mode, wired.bus.joining) == (BUS_OFF, 0)
+    wired.bus.set_mode(0, OPERATING, 30 * MS)
+    wired.bus.advance(SECOND)
+    assert (node.mode, wired.bus.joining) == (OPERATING, 0)
+    assert wired.of(0, "status")[-1][0] == edge(90_001 + BITS_11_128)
 
 
 def test_a_node_that_is_to_be_silenced_leaves_the_frames_of_others_alone():

@@ -25,6 +25,17 @@ def test_the_small_table_is_good(tmp_path):
     assert table.variable(4).subscribers == ("MB", "LEG")
 
 
+def test_what_a_fault_quotes_is_cut_to_its_column(tmp_path):
+    [fault] = faults_of(write(tmp_path, variables=VARIABLES.replace("5,GAIN", "5," + "G" * 300)))
+    assert len(fault.row) == 40 and len(fault.rule) <= 240
+
+
+@pytest.mark.parametrize("period", ["1", "1.0001", "0.9999"])
+def test_a_period_may_differ_by_a_ten_thousandth_from_what_is_served(tmp_path, period):
+    table = load_table(write(tmp_path, variables=VARIABLES.replace("SSP,1,-3,3", f"SSP,{period},-3,3")))
+    assert table.variable("LEG_ANGLE").period_ms == pytest.approx(float(period))
+
+
 # What is replaced in variables.csv, and the fault that must be reported: line, row, field, part of the rule.
 VARIABLE_FAULTS = {
     "duplicate id": ("5,GAIN", "4,GAIN", 7, "GAIN", "id", "4 is also the id in line 6"),
@@ -52,6 +63,8 @@ VARIABLE_FAULTS = {
     "range against an unsigned type": ("SSP,1,,,", "SSP,1,-1,,", 2, "TIME", "minimum", "range of type u32"),
     "range upside down": ("-3,3", "3,-3", 3, "LEG_ANGLE", "minimum", "above the maximum"),
     "period of another rate": ("SSP,1,-3,3", "SSP,2,-3,3", 3, "LEG_ANGLE", "period_ms", "LEG's rows give 1 ms"),
+    "period too long by more": ("SSP,1,-3,3", "SSP,1.00011,-3,3", 3, "LEG_ANGLE", "period_ms", "LEG's rows give 1 ms"),
+    "period too short by more": ("SSP,1,-3,3", "SSP,0.99989,-3,3", 3, "LEG_ANGLE", "period_ms", "LEG's rows give 1 ms"),
     "period that nobody serves": ("SSP,,,,a com", "SSP,2,,,a com", 5, "LEG_COMMAND", "period_ms", "never sends it"),
     "period missing": ("SSP,1,-3,3", "SSP,,-3,3", 3, "LEG_ANGLE", "period_ms", "sends it every 1 ms"),
     "period of zero": ("SSP,1,-3,3", "SSP,0,-3,3", 3, "LEG_ANGLE", "period_ms", "between 0 and"),

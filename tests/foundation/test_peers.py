@@ -2,6 +2,7 @@
 
 import os
 import socket
+import struct
 import threading
 
 import pytest
@@ -166,6 +167,62 @@ def test_all_places_taken_by_partakers_one_more_is_told_and_closed(door):
     assert another.recv(100) == TEN and door.sent_away == {"full": 1, "idle": 1}
 
 
+def test_who_knocks_without_end_is_taken_in_at_a_rate_and_keeps_nobody_waiting(door):
+    """250 in a second of the wall clock: 1 in 4 ms. Connections once ate the room of requests."""
+    now = [0.0]
+    door.clock = lambda: now[0]
+    modest = door.connect()
+    door.look(0)
+    for _ in range(2 * LIMIT.peers - 1):  # what stood free at the beginning
+        door.connect()
+        door.look(0)
+        door.partakers.update(door.peers)
+    knocking = [door.connect() for _ in range(8)]
+    door.look(0)
+    begun = door.arrived
+    assert door.knocking and door.listener.fileno() not in door.filenos()  # nobody is woken for it
+    for step in range(1, 6):
+        now[0] = step * 0.004 + 1e-9
+        modest.send(b"\n")
+        door.look(0)
+        door.write()
+        assert modest.recv(100) == TEN
+        assert door.arrived - begun == step
+    now[0] = 1.0
+    door.look(0)
+    assert door.arrived - begun == len(knocking) and not door.knocking
+
+
+def test_who_has_said_nothing_for_longest_makes_room(door):
+    first, *others = [door.connect() for _ in range(LIMIT.peers)]
+    door.look(0)
+    first.send(b"\n")
+    door.look(0)
+    door.connect()
+    door.look(0)
+    assert others[0].recv(100) == b"idle"
+    with pytest.raises(BlockingIOError):
+        others[1].recv(100)
+    door.write()
+    assert first.recv(100) == TEN
+
+
+def test_while_a_robot_waits_for_its_time_no_requests_are_carried_out_and_while_it_is_paused_at_the_rate(door):
+    now = [0.0]
+    door.clock = lambda: now[0]
+    client = door.connect()
+    door.look(MS)
+    done = []
+    for _ in range(400):  # 0.4 s in which virtual time stands still
+        pour(client)
+        now[0] += 0.001
+        door.look(2 * MS)
+        done.append(door.worked)
+    waiting = round(1000 * peers.PAUSED_S)
+    assert done[waiting - 5] == done[3] <= 2 * LIMIT.burst
+    assert done[-1] - done[waiting + 5] == pytest.approx((395 - waiting) * LIMIT.requests, rel=0.02)
+
+
 def test_another_users_program_is_told_and_closed(door, monkeypatch):
     monkeypatch.setattr(peers, "user_behind", lambda connection: os.getuid() + 1)
     client = door.connect()
@@ -195,6 +252,40 @@ def test_a_server_of_another_user_is_not_trusted(door, monkeypatch):
             with pytest.raises(UserError, match="the robot x belongs to user 65534, not to you: it is not trusted"):
                 peers.connected(listener.getsockname(), "the robot x", 10.0)
         os.waitpid(child, 0)
+
+
+def told_of(state, user, inode):
+    """inet_diag_msg as linux/inet_diag.h has it, behind the header of a netlink message (netlink(7))."""
+    body = bytes([2, state, 0, 0]) + bytes(48) + struct.pack("=5I", 0, 0, 0, user, inode)
+    return struct.pack("=IHHII", 16 + len(body), 20, 0, 0, 1299) + body
+
+
+def test_an_end_belongs_to_who_holds_it_open():
+    assert peers._owner_told(told_of(1, 1234, 77)) == 1234
+    assert peers._owner_told(told_of(5, 0, 0)) is None  # FIN_WAIT2: closed already, and the kernel says root
+    assert peers._owner_told(told_of(1, 0, 0)) is None
+    refused = struct.pack("=IHHII", 36, 2, 0, 0, 0) + struct.pack("=i", -2) + bytes(16)  # ENOENT: no such connection
+    assert peers._owner_told(refused) is None
+    with pytest.raises(OSError, match="not supported"):
+        peers._owner_told(struct.pack("=IHHII", 36, 2, 0, 0, 0) + struct.pack("=i", -95) + bytes(16))
+
+
+def test_a_kernel_that_tells_of_no_connection_shows_its_table(monkeypatch):
+    def refused(*ends):
+        raise OSError("no netlink here")
+
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        client = socket.create_connection(listener.getsockname())
+        connection, _ = listener.accept()
+        with connection:
+            assert (
+                peers._owner_told(peers._asked_of_kernel(client.getsockname(), listener.getsockname())) == os.getuid()
+            )
+            with monkeypatch.context() as patch:
+                patch.setattr(peers, "_asked_of_kernel", refused)
+                assert peers.user_behind(connection) == os.getuid()
+            client.close()
+            assert peers.fault_of_owner(connection) == peers.UNKNOWN
 
 
 def test_who_is_behind_a_loopback_connection_is_read_from_the_kernels_table():

@@ -172,6 +172,31 @@ def test_limits_are_kept_on_both_sides(field, low, high):
             BodyParameters(**{field: value})
 
 
+@pytest.mark.parametrize(
+    ("key", "low", "high"),
+    [
+        ("hip_resistance_ohm", 0.01, 1000.0),
+        ("hip_contact_drop_V", 0.0, 10.0),
+        ("hip_torque_constant_Nm_per_A", 1e-4, 10.0),
+        ("hip_load_friction", 0.0, 0.9),
+        ("hip_constant_friction_Nm", 0.0, 10.0),
+        ("hip_viscous_friction_Nms", 0.0, 10.0),
+        ("foot_rise_time_constant_s", 1e-4, 1.0),
+        ("foot_share", 0.0, 1.0),
+        ("foot_full_load_N", 0.1, 1000.0),
+    ],
+)
+def test_limits_of_motors_and_sensors_are_kept_on_both_sides(tmp_path, key, low, high):
+    def text(value):
+        return f'title = "a body"\n[parameters]\n{key} = {value!r}\n[sources]\n{key} = "this test"\n'
+
+    for value in (low, high):
+        body_files.load(written(tmp_path, text(value)))
+    for value in (low - 1e-6, high * 1.000001):
+        with pytest.raises(UserError, match=f"{key} is .*, allowed are"):
+            body_files.load(written(tmp_path, text(value)))
+
+
 def test_the_command_shows_every_number_with_unit_limits_and_source(capsys):
     assert cli.main(["body", "show", "ranger", "--json"]) == 0
     shown = json.loads(capsys.readouterr().out)

@@ -112,7 +112,7 @@ class Up:
 
     def nothing_left(self):
         """No process (the kernel needs a moment to kill them), no socket, no shared memory with a name."""
-        end = wallclock.monotonic_s() + TWO_SECONDS
+        end = wallclock.monotonic_s() + PATIENCE_S
         while self.alive() or self.name in pathlib.Path("/proc/net/unix").read_text():
             assert wallclock.monotonic_s() < end, f"still there: {self.alive()} or a socket"
             wallclock.sleep_s(0.02)

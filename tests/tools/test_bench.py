@@ -8,7 +8,8 @@ from ranger_sim.can_bus.edge import benchmark
 from ranger_sim.foundation.events import EventQueue
 from ranger_sim.harness.scenario import Scenario
 from ranger_sim.tools import cli
-from ranger_sim.tools.bench import cases, command, interfaces, processes, traffic, walks
+from ranger_sim.tools.bench import cases, command, floods, interfaces, processes, traffic, walks
+from tests.can_bus.hosting import hosted
 
 
 def told(capsys, *arguments):
@@ -154,3 +155,56 @@ def test_a_queue_of_wrong_frames_is_counted_by_the_load():
     load.expected[5] = 1  # node 1 hears frame 0 of node 0's third identifier, which it takes for heard already
     load.run(30)
     assert load.out_of_order + load.wrong > 0
+
+
+def test_floods_are_compared_with_the_robot_left_in_peace_and_go_on_where_they_were_interrupted(tmp_path, monkeypatch):
+    paces = {floods.PEACE: 0.25, "control set": 0.2476, "slcan V": 0.2474}
+    asked = []
+
+    class Robot:
+        def __init__(self, speed):
+            self.speed, self.process, self.close = speed, self, lambda: None
+            self.poll = lambda: None
+
+    def measured(name, seconds, robot):
+        asked.append((name, seconds, robot.speed))
+        return {"flood": name, "pace": paces[name], "cpu_per_s": 0.5, "memory_mb": 1.0, "memory_growth_mb": 0.0,
+                "ended": False}  # fmt: skip
+
+    monkeypatch.setattr(floods, "measured", measured)
+    monkeypatch.setattr(floods, "Robot", Robot)
+    said, kept = [], tmp_path / "rows"
+    floods.run(5, said.append, (floods.PEACE, "control set"), 0.25, kept)
+    rows = floods.run(5, said.append, tuple(paces), 0.25, kept)
+    assert asked == [(name, 5, 0.25) for name in paces]
+    assert [row["flood"] for row in rows] == list(paces)
+    assert " 99.04 % of undisturbed, 0.500 s" in said[-3] and " 98.96 % of undisturbed" in said[-2]
+    assert said[-1].startswith("1 of 2 floods leave at least 99 %") and said[-1].endswith("98.96 % (slcan V)")
+    floods.run(6, said.append, (floods.PEACE,), 0.25, kept)  # other seconds are another measurement
+    assert asked[-1] == (floods.PEACE, 6, 0.25) and len(asked) == 4
+
+
+@pytest.mark.parametrize(("processors", "speed"), [(1, 0.25), (2, 0.25), (5, 0.5), (9, 0.5), (10, 1.0), (64, 1.0)])
+def test_a_robot_under_floods_runs_as_fast_as_the_machine_can_hold(processors, speed):
+    assert floods.speed_for(processors) == speed
+
+
+def test_every_flood_has_a_program_and_together_they_use_each_door():
+    doors = floods.Doors("x", "", 0, "")
+    assert [len(floods.programs(name, doors)) for name in floods.NAMES] == [0, 1, *[1] * (len(floods.FLOODS) + 1), 3]
+    assert {name.split()[0] for name in floods.TOGETHER} == {"attach", "slcan", "socketcand"}
+
+
+def test_a_sender_in_the_window_is_served_as_long_as_it_lasts():
+    """The dearest client that keeps to the protocol, against a bus alone: it is never sent away."""
+    with (
+        hosted("can1", speed=50.0) as (name, host),
+        floods.flooded(floods.FRAMES_IN_WINDOW, floods.Doors(name, "", 0, "")),
+    ):
+        (server,) = host.servers
+        listener = floods.attached(floods.Doors(name, "", 0, ""))
+        with listener:
+            heard = 0
+            while heard < 40_000:  # some 1,000 frames
+                heard += len(listener.recv(1 << 16))
+        assert server.totals["frames_in"] > 500 and not server.sent_away

@@ -2,13 +2,17 @@
 
 import contextlib
 import http.client
+import itertools
 import json
+import os
 import re
+import socket
 import sys
 import threading
 
 import pytest
 
+from ranger_sim.foundation.peers import LIMITS
 from ranger_sim.harness.timeline import moments, perfetto_reader, viewer
 from ranger_sim.tools import cli, trace
 
@@ -148,15 +152,21 @@ def test_the_address_tells_the_viewer_where_the_trace_is_and_what_to_show():
 @contextlib.contextmanager
 def served(file):
     """A connection to a server of this file that has not been asked yet."""
-    with trace.TraceServer(file, port=0) as server:
-        thread = threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.01})
+    with contextlib.closing(trace.TraceServer(file, port=0)) as server:
+        ending = threading.Event()
+
+        def turns():
+            while not ending.is_set():
+                server.turn(0.01)
+
+        thread = threading.Thread(target=turns)
         thread.start()
-        connection = http.client.HTTPConnection("127.0.0.1", server.server_address[1], timeout=60)
+        connection = http.client.HTTPConnection("127.0.0.1", server.port, timeout=60)
         try:
             yield connection, server
         finally:
             connection.close()
-            server.shutdown()
+            ending.set()
             thread.join()
 
 
@@ -166,7 +176,7 @@ def test_the_trace_is_served_to_perfettos_pages_and_to_no_others(file):
         answer = connection.getresponse()
         assert answer.status == 200 and answer.read() == file.read_bytes()
         assert answer.headers["Access-Control-Allow-Origin"] == "https://ui.perfetto.dev"
-        assert server.server_address[0] == "127.0.0.1"
+        assert server.listener.getsockname()[0] == "127.0.0.1"
     # the server's thread has ended: it says so after its answer is out
     assert server.served
 
@@ -184,6 +194,79 @@ def test_nothing_else_is_served(file, path):
     with served(file) as (connection, server):
         connection.request("GET", path)
         assert connection.getresponse().status == 404 and not server.served
+
+
+@pytest.mark.parametrize(
+    ("method", "headers", "status"),
+    [
+        ("GET", {"Origin": "https://example.org"}, 403),
+        ("GET", {"Host": "example.org:9001"}, 403),  # a name that was made to lead to this machine
+        ("POST", {}, 405),
+        ("GET", {"Origin": "https://ui.perfetto.dev"}, 200),
+    ],
+)
+def test_only_the_viewers_page_gets_the_trace(file, method, headers, status):
+    with served(file) as (connection, _):
+        connection.request(method, f"/{file.name}", headers=headers)
+        assert connection.getresponse().status == status
+
+
+def visit(server, said=b""):
+    """A connection that has said this, taken in."""
+    client = socket.create_connection(("127.0.0.1", server.port))
+    client.setblocking(False)
+    client.send(said)
+    server.turn(1.0)
+    return client
+
+
+def test_connections_that_say_nothing_keep_nobody_waiting_and_floods_are_bounded(tmp_path):
+    """A browser opens some in advance; one that said nothing once kept all others waiting for ever."""
+    file = tmp_path / "a.pftrace"
+    file.write_bytes(bytes(5_000_000))
+    limits = LIMITS["trace"]
+    get = b"GET /a.pftrace HTTP/1.1\r\n\r\n"
+    with contextlib.closing(trace.TraceServer(file, port=0)) as server, contextlib.ExitStack() as clients:
+        now = itertools.count()
+        server.clock = lambda: float(next(now))  # time enough for all who knock
+        for said in (b"", b"x" * 1000):
+            for _ in range(limits.peers):
+                clients.callback(visit(server, said).close)
+        assert len(server.peers) == limits.peers and server.sent_away == {"idle": limits.peers}
+        endless = visit(server, b"y" * limits.longest)
+        clients.callback(endless.close)
+        while not server.sent_away["too_long"]:
+            server.turn(1.0)
+        reader = visit(server, get)
+        clients.callback(reader.close)
+        heard = 0
+        while not server.served:
+            server.turn(1.0)
+            assert all(len(peer.outgoing) <= limits.write_bytes + 1000 for peer in server.peers)
+            with contextlib.suppress(BlockingIOError):
+                heard += len(reader.recv(1 << 20))
+        while piece := reader.recv(1 << 20):
+            heard += len(piece)
+        assert heard > 5_000_000
+
+
+def test_who_takes_nothing_of_the_trace_loses_its_place(tmp_path):
+    file = tmp_path / "a.pftrace"
+    file.touch()
+    os.truncate(file, 50_000_000)  # more than the kernel keeps for a connection; no disk
+    with contextlib.closing(trace.TraceServer(file, port=0)) as server:
+        now = [0.0]
+        server.clock = lambda: now[0]
+        with visit(server, b"GET /a.pftrace HTTP/1.1\r\n\r\n"):
+            before = -1
+            while before != (before := server.peers[0].left):
+                server.turn(0.0)
+            now[0] = 59.0
+            server.look(0)
+            assert server.peers
+            now[0] = 130.0
+            server.look(0)
+            assert not server.peers and not server.served
 
 
 # --- offline ----------------------------------------------------------------------------------------------

@@ -21,7 +21,7 @@ from ranger_sim import loading
 from ranger_sim.foundation import wallclock
 from ranger_sim.tools.bench.cases import CASES, FRAMES, SIMULATED, YARDSTICK, measured
 from ranger_sim.tools.files import json_target, replace_file
-from ranger_sim.tools.units import whole_number
+from ranger_sim.tools.units import number, whole_number
 
 SHOWN = {SIMULATED: "x real time", FRAMES: "frames"}
 EXIT_EXCEEDED = 1  # an answer came later than its bound
@@ -54,7 +54,8 @@ def floods(options: argparse.Namespace, say: Callable[[str], None]) -> list[dict
     """The robot under clients that write without end and read nothing."""
     from ranger_sim.tools.bench import floods as part
 
-    return part.run(options.seconds, say)
+    kept = None if options.keep is None else pathlib.Path(options.keep)
+    return part.run(options.seconds, say, speed=options.speed, kept=kept)
 
 
 def walks(options: argparse.Namespace, say: Callable[[str], None]) -> list[dict]:
@@ -84,9 +85,7 @@ PARTS = {
         "robot, body and buses from the plain sources", ("robot-interpreted", "plant-interpreted", "bus-interpreted")
     ),
     "processes": Part("the robot with a process for each board: pace, lateness of slots", alone=processes),
-    "floods": Part(
-        "the robot in real time under floods by clients: pace, processor time, memory (minutes)", alone=floods
-    ),
+    "floods": Part("the robot at a pace under floods by clients: pace, processor time, memory (minutes)", alone=floods),
     "interfaces": Part(
         "--frames through python-can's interfaces and ours: lost, reordered, frames/s", alone=interfaces
     ),
@@ -115,6 +114,15 @@ def register(commands: Any) -> None:
     )
     command.add_argument(
         "--frames", type=whole_number(3), default=1_000_000, metavar="N", help="of interfaces (default 1000000)"
+    )
+    command.add_argument(
+        "--speed",
+        type=number(above=0.0),
+        metavar="FACTOR",
+        help="times real time of the robot under floods (default: 0.25 to 1 by the number of processors)",
+    )
+    command.add_argument(
+        "--keep", metavar="FILE", help="of floods: rows that FILE has are not measured again, new ones are added"
     )
     command.add_argument("--sets", type=whole_number(1), default=10_000, metavar="N", help="of bounds (default 10000)")
     command.add_argument("--json", metavar="FILE|-", help="everything as JSON; - prints it and nothing else")
@@ -212,12 +220,12 @@ def lines_of(figures: dict, runs: int) -> list[str]:
     for name, figure in figures.items():
         ratio = figure["ratio_to_virtual"]
         compared = f"{ratio:.3g} times" if figure["unit"] == FRAMES else f"1 s costs {1.0 / ratio:,.0f} of its frames"
-        numbers = " ".join(f"{number(figure[key]):>9}" for key in ("median", "min", "max"))
+        numbers = " ".join(f"{three_digits(figure[key]):>9}" for key in ("median", "min", "max"))
         line = f"  {CASES[name].title:38} {numbers}  {SHOWN[figure['unit']]:11}"
         lines.append(line.rstrip() if name == YARDSTICK else f"{line}  {compared}")
     return lines
 
 
-def number(value: float) -> str:
+def three_digits(value: float) -> str:
     """Three digits that count, thousands apart."""
     return f"{value:,.0f}" if value >= 1000 else f"{value:.3g}"

@@ -42,6 +42,7 @@ NOTICED = (KILLED, TIMEOUT)
 ALSO = {
     "datatable": ("tests/harness/test_requests.py", "tests/tools/test_robodaq.py"),
     "can_bus": ("tests/tools/test_fuzz_can.py", "tests/tools/test_bus.py"),
+    "plant": ("tests/oracle/test_known_answers.py",),
     "sysid": ("tests/blind/test_generator.py", "tests/tools/test_diagnose_bad_data.py", "tests/tools/test_identify.py"),
 }
 

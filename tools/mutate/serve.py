@@ -213,13 +213,16 @@ class Server:
         exchange(HOUSE / request["path"], request["before"], request["after"])
         chosen = [self.items[name] for name in request["tests"]]
         for item, following in zip(chosen, [*chosen[1:], None], strict=True):
-            if any(report.failed for report in run(item, following, request["limit_test_s"])):
+            reports = run(item, following, request["limit_test_s"])
+            if not reports:
+                return {"code": None, "by": item.nodeid}
+            if any(report.failed for report in reports):
                 return {"code": 1, "by": item.nodeid}
         return {"code": 0}
 
 
 def run(item: pytest.Item, following: pytest.Item | None, limit_s: float) -> list[pytest.TestReport]:
-    """The reports of one test; fewer than three when it took more processor time than `limit_s` or was skipped."""
+    """The reports of one test; none when it took more processor time than `limit_s`, two when it was skipped."""
     from _pytest.runner import runtestprotocol
 
     late = False

@@ -24,10 +24,11 @@ from ranger_sim.tools.mutate.serve import ASKED_BY
 EQUIVALENT = pathlib.Path(__file__).with_name("equivalent.toml")
 # Beside the room's own tests, and what is not a program of ours: written by other modules, or only for users' editors.
 NOT_MUTATED = ("datatable/generated/",)
-KILLED, SURVIVED, TIMEOUT, NOT_REACHED = "killed", "survived", "timeout", "not reached"
+KILLED, SURVIVED, TIMEOUT, NOT_REACHED, TOO_SLOW = "killed", "survived", "timeout", "not reached", "too slow"
 # A mutant may make a test slow for good; chosen by us, beside a machine that has other work.
 SLOWER = 4.0
-START_S = 30.0
+START_S = 60.0
+LOOP_S = 5.0  # a test that takes so much more processor time than it did is in a loop
 NOTHING: dict[str, Any] = {"imported": [], "shared": [], "tests": {}, "failed": []}  # a map without tests
 NO_SUCH_TEST = 4  # pytest's exit code
 LIMIT_TEST_S = 20.0  # of processor time: a test that takes longer takes no part; chosen by us
@@ -313,7 +314,8 @@ class Results:
 def judge(copy: Copy, ask: Asked, mutant: Mutant, tests: TestsOf, limit_s: float) -> Verdict:
     """Put it into the copy, run the tests that reach it, and take it out again.
 
-    A test that blames it must pass on the original, or it is no witness and takes no part from then on.
+    A test that blames it must pass on the original, or it is no witness and takes no part from then on. Tests that do
+    not come to an end must do so with the original: else it is the machine, and the mutant has not been noticed.
     """
     original = (copy.folder / mutant.path).read_text(encoding="utf-8")
     begun = wallclock.monotonic_s()
@@ -323,35 +325,43 @@ def judge(copy: Copy, ask: Asked, mutant: Mutant, tests: TestsOf, limit_s: float
             return Verdict(mutant.key, mutant.line, NOT_REACHED)
         copy.put(mutant.path, mutant.applied(original))  # also for processes that tests start
         try:
-            code, by = verdict_of(copy, ask, mutant, tests, chosen, original)
+            code, by = verdict_of(copy, ask, mutant, tests, chosen, original, mutant.applied(original))
         finally:
             copy.put(mutant.path, original)
-        if code != 1 or by not in tests.tests or tests.is_witness(by, ask, mutant, original):
+        if code == 1 and by in tests.tests and not tests.is_witness(by, ask, mutant, original):
+            tests.leave_out(by)
+        elif code is None and not by and verdict_of(copy, ask, mutant, tests, chosen, original, original)[0] is None:
+            return Verdict(mutant.key, mutant.line, TOO_SLOW, "", len(chosen), limit_of(tests, chosen))
+        else:
             break
-        tests.leave_out(by)
     seconds = round(wallclock.monotonic_s() - begun, 1)
     outcome = {None: TIMEOUT, 0: SURVIVED}.get(code, KILLED)
     return Verdict(mutant.key, mutant.line, outcome, by, len(chosen), seconds)
 
 
+def limit_of(tests: TestsOf, chosen: list[str]) -> float:
+    """Wall time that these tests may take, on a machine that has other work."""
+    return START_S + SLOWER * tests.seconds(chosen)
+
+
 def verdict_of(
-    copy: Copy, ask: Asked, mutant: Mutant, tests: TestsOf, chosen: list[str], original: str
+    copy: Copy, ask: Asked, mutant: Mutant, tests: TestsOf, chosen: list[str], original: str, text: str
 ) -> tuple[int | None, str]:
-    """(pytest's exit code or None for too long, the test that failed), with the mutant in its file.
+    """(pytest's exit code or None for too long, the test that failed), with `text` in the mutant's file.
 
     One of a function is tried in memory first; where that function also runs at import, in a new process after that.
     """
-    limit = START_S + SLOWER * tests.seconds(chosen)
+    limit = limit_of(tests, chosen)
     code: int | None = 0
     by = ""
     if mutant.first_line:
         answer = ask(
             path=mutant.path,
             before=original,
-            after=mutant.applied(original),
+            after=text,
             tests=chosen,
             limit_s=limit,
-            limit_test_s=SLOWER * LIMIT_TEST_S,
+            limit_test_s=LOOP_S + SLOWER * max(tests.tests[name]["seconds"] for name in chosen),
         )
         code, by = answer["code"], answer.get("by", "")
     if code == 0 and tests.at_import(mutant):
