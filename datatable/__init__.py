@@ -32,6 +32,19 @@ def table_hash(folder: str | None = None) -> str:
     return hash_of_master_files(folder)
 
 
+def check_own_table() -> None:
+    """UserError when code was generated from another state of the user's own table (RANGER_SIM_TABLE) than it is in."""
+    from ranger_sim.foundation.user_error import UserError
+    from ranger_sim.loading import OWN_TABLE
+
+    if OWN_TABLE is None:
+        return
+    from ranger_sim.datatable.generated import all_variables
+
+    if all_variables.TABLE_HASH != table_hash(str(OWN_TABLE)):
+        raise UserError(f"{OWN_TABLE}: changed since its code was made: ranger-sim table generate --master {OWN_TABLE}")
+
+
 def published_schedule(board: str) -> "PublishedSchedule":
     """What the schedule of `board` sends, row by row, as boards.toml says it."""
     from ranger_sim.datatable.schedule import published_schedule as lookup

@@ -8,6 +8,7 @@ import pathlib
 import sys
 
 from ranger_sim.datatable.model import Table, Variable
+from ranger_sim.foundation.user_error import UserError
 
 EXIT_DONE, EXIT_STALE = 0, 1
 FILE_COLUMNS = 160  # of lines in a file or a pipe
@@ -21,8 +22,12 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 
     generate = actions.add_parser("generate", help="write everything that is made from the master table")
     generate.add_argument("--check", action="store_true", help="write nothing; exit code 1 when files are stale")
-    generate.add_argument("--out", metavar="DIR", help="write to this folder instead of datatable/generated")
+    generate.add_argument("--out", metavar="DIR", help="write to this folder (default: generated, in the master's)")
     generate.set_defaults(run=run_generate)
+
+    copying = actions.add_parser("copy", help="begin a table of your own: our master files in a folder of yours")
+    copying.add_argument("folder", metavar="DIR", help="a folder that does not exist yet")
+    copying.set_defaults(run=run_copy)
 
     show = actions.add_parser("show", help="one variable by name or id")
     show.add_argument("variable", metavar="NAME|ID")
@@ -48,7 +53,8 @@ def run_generate(arguments: argparse.Namespace) -> int:
     from ranger_sim.datatable.generate import GENERATED_FOLDER, stale, write
 
     table = load(arguments)
-    folder = pathlib.Path(arguments.out) if arguments.out else GENERATED_FOLDER
+    beside = pathlib.Path(arguments.master) / "generated" if arguments.master else GENERATED_FOLDER
+    folder = pathlib.Path(arguments.out) if arguments.out else beside
     changed = stale(table, folder) if arguments.check else write(table, folder)
     if arguments.json:
         print(json.dumps({"folder": str(folder), "checked": arguments.check, "changed": changed}))
@@ -62,6 +68,25 @@ def run_generate(arguments: argparse.Namespace) -> int:
     else:
         print(f"{len(changed)} files written to {folder}" if changed else "nothing to do: the files are up to date")
     return EXIT_STALE if arguments.check and changed else EXIT_DONE
+
+
+def run_copy(arguments: argparse.Namespace) -> int:
+    """The master files in a new folder."""
+    import shutil
+
+    from ranger_sim.datatable.loader import folder_of
+
+    folder = pathlib.Path(arguments.folder)
+    try:
+        folder.mkdir(parents=True)
+        for path in sorted(folder_of(None).glob("*.*")):
+            if path.suffix in (".csv", ".toml"):
+                shutil.copyfile(path, folder / path.name)
+    except OSError as error:
+        raise UserError(f"{error.filename or folder}: {error.strerror}: the copy needs a folder of its own") from error
+    print(f"{folder}: change variables.csv, then ranger-sim table generate --master {folder}")
+    print(f"then it is the table of whatever runs with RANGER_SIM_TABLE={folder}")
+    return EXIT_DONE
 
 
 def facts_of(variable: Variable) -> dict[str, object]:

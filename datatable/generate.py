@@ -13,8 +13,9 @@ from ranger_sim.datatable.generate_dbc import dbc_text
 from ranger_sim.datatable.generate_python import python_files
 from ranger_sim.datatable.model import Table
 from ranger_sim.foundation.user_error import UserError
+from ranger_sim.loading import OWN_TABLE
 
-GENERATED_FOLDER = pathlib.Path(__file__).parent / "generated"
+GENERATED_FOLDER = (OWN_TABLE or pathlib.Path(__file__).parent) / "generated"
 GENERATED_SUFFIXES = (".py", ".c", ".h", ".dbc", ".json")
 
 

@@ -31,6 +31,7 @@ from ranger_sim.datatable.model import (
     Variable,
 )
 from ranger_sim.datatable.routing import unreachable
+from ranger_sim.loading import OWN_TABLE
 
 MASTER_FOLDER = pathlib.Path(__file__).parent / "master"
 BOARDS_FILE, VARIABLES_FILE, ERRORS_FILE = "boards.toml", "variables.csv", "errors.csv"
@@ -99,7 +100,8 @@ def shown(text: object) -> str:
 
 
 def folder_of(folder: str | pathlib.Path | None) -> pathlib.Path:
-    return MASTER_FOLDER if folder is None else pathlib.Path(folder)
+    """Where the master files are: as said, or the user's own that RANGER_SIM_TABLE names, or ours."""
+    return (OWN_TABLE or MASTER_FOLDER) if folder is None else pathlib.Path(folder)
 
 
 def read_text(path: pathlib.Path, faults: Faults) -> str | None:

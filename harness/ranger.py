@@ -8,6 +8,7 @@ import difflib
 from collections.abc import Callable
 from typing import Any, Literal, overload
 
+from ranger_sim import datatable
 from ranger_sim.boards.can_router import CanRouterBoard
 from ranger_sim.boards.counters import RangerCounters
 from ranger_sim.boards.hip import HipBoard
@@ -82,6 +83,7 @@ class Ranger:
 
         # plant -> sensors
         self.body = body_files.load(self.scenario.body)
+        datatable.check_own_table()
         self.plant = RangerPlant(
             seed=seed,
             slope_rad=self.scenario.slope_rad,
@@ -399,8 +401,6 @@ class Ranger:
 
     def error_meaning(self, name: str) -> str:
         """What an error code means, in the words of the master table."""
-        from ranger_sim import datatable
-
         return next((row.description for row in datatable.load().errors if row.name == name), "")
 
     def close(self) -> None:

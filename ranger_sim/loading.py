@@ -4,7 +4,8 @@ The rooms are folders beside this package in a checkout and inside it when insta
 one shared library, `ranger_sim._compiled` (setup.py builds it, and says why one). It is not used when the environment
 variable ``RANGER_SIM_INTERPRETED`` is set to anything but an empty string or ``0``, and not when the last build failed
 (setup.py leaves a record of it). A finder then loads a module of the rooms from the library, or else from its plain
-Python source, and from nothing else that may lie beside it.
+Python source, and from nothing else that may lie beside it. ``RANGER_SIM_TABLE`` names a folder with a master table
+of the user's own: what is generated from the table is then found there.
 """
 
 import importlib
@@ -36,6 +37,9 @@ PACKAGE = Path(__file__).resolve().parent
 # in a checkout the rooms stand beside this package
 HOUSE = PACKAGE if (PACKAGE / ROOMS[0]).is_dir() else PACKAGE.parent
 BUILD_RECORD = PACKAGE / "build_record.json"
+# a folder with a master table of the user's own and, in `generated`, what was made from it (`ranger-sim table copy`)
+OWN_TABLE = Path(os.environ["RANGER_SIM_TABLE"]).resolve() if os.environ.get("RANGER_SIM_TABLE") else None
+GENERATED = "ranger_sim.datatable.generated"
 
 
 def interpreted_is_forced() -> bool:
@@ -91,10 +95,19 @@ class RoomFinder:
         if package != "ranger_sim" or room not in ROOMS:
             return None
         sources = (DeclaredFieldsLoader, importlib.machinery.SOURCE_SUFFIXES)
+        if fullname == GENERATED and OWN_TABLE is not None:
+            path = (str(OWN_TABLE),)
         for folder in (path or ()) if inside else (str(HOUSE),):
             spec = importlib.machinery.FileFinder(folder, sources).find_spec(fullname)
             if spec is not None:
                 return spec
+        if fullname == GENERATED and OWN_TABLE is not None:
+            from ranger_sim.foundation.user_error import UserError
+
+            raise UserError(
+                f"RANGER_SIM_TABLE: nothing was generated in {OWN_TABLE}: unset RANGER_SIM_TABLE, then "
+                f"ranger-sim table generate --master {OWN_TABLE}"
+            )
         return None
 
 
