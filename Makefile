@@ -20,7 +20,7 @@ WITH_A_CLOCK = tests/system/test_attached_clients.py tests/system/test_daq.py te
 PAGES = tests/pages
 
 test: $(VENV)/.all
-	$(RUN) -m pytest -q -rs -n 2 --dist loadfile $(addprefix --ignore=,$(WITH_A_CLOCK) $(PAGES))
+	$(RUN) -m pytest -q -rs -n 2 --dist loadfile --no-loadscope-reorder $(addprefix --ignore=,$(WITH_A_CLOCK) $(PAGES))
 	$(RUN) -m pytest -q -rs $(WITH_A_CLOCK)
 
 # The rooms' own tests interpreted: what is compiled must be right as plain Python, too. Left out are walks, which take
