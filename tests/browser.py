@@ -74,9 +74,10 @@ class Page:
         return result["result"].get("value")
 
     def until(self, condition):
-        """Wait until a condition of the page holds."""
-        script = f"new Promise((done) => (function look() {{ ({condition}) ? done(true) : setTimeout(look, 10) }})())"
-        assert self.value(script)
+        """Wait until a condition of the page holds; AssertionError with it after ANSWER_S."""
+        look = f"({condition}) ? done(true) : tries-- > 0 ? setTimeout(look, 10) : done(false)"
+        script = f"new Promise((done) => {{ let tries = {100 * ANSWER_S}; (function look() {{ {look} }})() }})"
+        assert self.value(script), condition
 
     def point(self, x, y):
         """Move the mouse there, in CSS pixels of the window."""
