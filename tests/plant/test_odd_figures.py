@@ -9,7 +9,7 @@ from ranger_sim.plant import walk_record
 from ranger_sim.plant.body import DOUBLE, FALLEN, SINGLE, Body
 from ranger_sim.plant.parameters import BodyParameters
 from ranger_sim.plant.ranger import RangerPlant
-from ranger_sim.tools.report.page import odd
+from ranger_sim.tools.report.page import contact
 from tests.plant.walking import STEP_S, PaperGait, Walker, mid_stance_start
 
 
@@ -84,17 +84,17 @@ def test_what_was_not_measured_is_null():
     figures = oddities(RangerPlant())
     names = ("tensile_strikes", "tensile_impulse_min_Ns", "friction_ratio_max", "normal_force_min_N", "min_clearance_m")
     assert [figures[name] for name in names] == [None] * 5
-    values = {name: value for name, value, _ in odd(figures)}
+    values = {tile["name"]: tile["value"] for tile in contact(figures)}
     assert values["strikes that pull"] == values["lowest push of the floor"] == "none"
     assert not any(isinstance(value, float) and math.isinf(value) for value in figures.values())
 
 
 def test_the_report_tells_pulls_as_the_summary_has_them():
     figures = oddities(RangerPlant()) | {"tensile_strikes": 3, "tensile_impulse_min_Ns": -0.456, "slides": 2}
-    values = {name: value for name, value, _ in odd(figures | {"slip_s": 0.0125, "normal_force_min_N": -7.25})}
+    values = {tile["name"]: tile["value"] for tile in contact(figures | {"slip_s": 0.013, "normal_force_min_N": -7.25})}
     assert values["strikes that pull"] == "3 (to -0.46 N s)"
     assert values["lowest push of the floor"] == "-7.2 N"
-    assert values["slides"] == "2 in 12.5 ms"
+    assert values["slides"] == "2 in 13 ms"
 
 
 def test_a_strike_that_would_pull_lets_the_trailing_foot_go_by_the_unilateral_rule(monkeypatch):
