@@ -14,6 +14,7 @@ class DeadBoard(Board):
 
     def advance(self, until):
         self.inbox.clear()
+        self.next_time, self.horizon = NEVER, until
         return NEVER
 
     def listen_to_edges(self, buffer, pin, partner_pin):
