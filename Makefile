@@ -1,5 +1,6 @@
 # make walk: set up everything, then let Ranger walk 100 steps.   make test: set up everything, then run all tests.
-# make test-interpreted: the rooms' own tests on the plain sources, where compiled modules run in `make test`.
+# make test-interpreted: the rooms' own tests on the plain sources, where compiled modules run in `make test`; and nine
+#   scenarios compiled and interpreted, to the byte.
 # make docs: the documentation as a site, and every command and program of its tutorial and how-to pages run.
 # make test-vm: the tests on real SocketCAN, in a virtual machine where this kernel has none (tools/vm/README.md).
 PYTHON ?= python3
@@ -20,7 +21,7 @@ WITH_A_CLOCK = tests/system/test_attached_clients.py tests/system/test_daq.py te
 PAGES = tests/pages
 
 test: $(VENV)/.all
-	$(RUN) -m pytest -q -rs -n 2 --dist loadfile --no-loadscope-reorder $(addprefix --ignore=,$(WITH_A_CLOCK) $(PAGES))
+	$(RUN) -m pytest -q -rs -n 2 --dist loadfile --no-loadscope-reorder -m "not both_ways" $(addprefix --ignore=,$(WITH_A_CLOCK) $(PAGES))
 	$(RUN) -m pytest -q -rs $(WITH_A_CLOCK)
 
 # The rooms' own tests interpreted: what is compiled must be right as plain Python, too. Left out are walks, which take
@@ -32,6 +33,7 @@ NOT_PLAIN = $(addprefix tests/,can_bus/test_can_programs.py boards/test_head_201
 
 test-interpreted: $(VENV)/.all
 	RANGER_SIM_INTERPRETED=1 $(RUN) -m pytest -q -rs -n 2 --dist loadfile $(addprefix --ignore=,$(NOT_PLAIN)) $(PLAIN)
+	$(RUN) -m pytest -q -rs -n 2 -m both_ways tests/system/test_determinism.py
 
 docs: $(VENV)/.all
 	$(RUN) -m sphinx -W --keep-going -q -b html -c docs . build/site

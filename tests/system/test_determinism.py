@@ -87,6 +87,7 @@ STEPS = {
 }
 
 
+@pytest.mark.both_ways
 @pytest.mark.parametrize("case", STEPS.values(), ids=[name.replace(" ", "_") for name in STEPS])
 def test_a_step_is_the_same_bytes_compiled_and_interpreted_in_every_scenario(case):
     (compiled,) = outcomes_elsewhere([case], interpreted=False, hash_seed=1)
