@@ -10,6 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from ranger_sim.plant.ranger import SAMPLES
+
 SHOWN_S = 8.0  # six or seven strides: what is drawn and animated of a walk; chosen by us, for a page of 3 MB at most
 STRAIGHT_M = 1e-3  # a path that stays so close to a line is one
 
@@ -27,33 +29,10 @@ TOLD = {
     "s": 3,
 }  # and that are read at the cursor
 
-# Samples of the body that charts and animation use, with their units.
-SERIES = {
-    "hip_x_m": "m",
-    "hip_y_m": "m",
-    "foot_outer_rad": "rad",
-    "leg_outer_rad": "rad",
-    "leg_inner_rad": "rad",
-    "foot_inner_rad": "rad",
-    "leg_outer_rad_s": "rad/s",
-    "leg_inner_rad_s": "rad/s",
-    "hip_rad": "rad",
-    "hip_rad_s": "rad/s",
-    "ankle_outer_rad": "rad",
-    "motor_outer_rad": "rad",
-    "ankle_inner_rad": "rad",
-    "motor_inner_rad": "rad",
-    "hip_A": "A",
-    "outer_A": "A",
-    "inner_A": "A",
-    "steering_A": "A",
-    "hip_W": "W",
-    "outer_W": "W",
-    "inner_W": "W",
-    "steering_W": "W",
-    "battery_V": "V",
-    "path_x_m": "m",
-}
+# Samples of the body that neither charts nor animation use.
+LEFT_OUT = {"motor_outer_rad_s", "motor_inner_rad_s", "outer_Fx_N", "outer_Fy_N", "inner_Fx_N", "inner_Fy_N"}
+LEFT_OUT |= {"battery_A", "twist_rad", "yaw_rad", "path_y_m", "mode", "steps"}
+SERIES = {name: unit for name, unit in SAMPLES.items() if name not in LEFT_OUT}
 MACHINES = {"hip": "hip", "outer_foot": "outer foot", "inner_foot": "inner foot"}
 
 
