@@ -195,6 +195,7 @@ class Peer:
         self.outgoing = bytearray()
         self.answers = 0  # bytes of `outgoing` that it asked for
         self.gone = False  # nothing more will come
+        self.lost = False  # it takes nothing any more; what it had said is still heard
         self.ending = False  # was told why, and is closed when that is out
         self.waits = False  # its last request is being carried out: the next one has to wait
         self.last = 0  # the door's count of requests and arrivals at its last one
@@ -451,10 +452,13 @@ class Door(Generic[P]):
 
     def _write(self, peer: P) -> None:
         try:
-            peer.write(self.limits.write_bytes)
+            if not peer.lost:
+                peer.write(self.limits.write_bytes)
         except OSError:
-            self.drop(peer)
-            return
+            peer.lost = True
+        if peer.lost:
+            peer.outgoing.clear()
+            peer.answers = 0
         if peer.ending and not peer.outgoing:
             self.drop(peer)
 

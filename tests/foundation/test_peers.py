@@ -94,6 +94,21 @@ def test_over_time_requests_are_carried_out_at_the_rate_of_the_table(door):
     assert door.worked - begun == pytest.approx(10 * LIMIT.requests, abs=1)
 
 
+def test_what_a_program_had_said_when_it_ended_is_carried_out_though_nobody_takes_the_answers(door):
+    client = door.connect()
+    wanted = 3 * LIMIT.burst
+    pour(client, b"\n" * wanted)
+    door.look(0)
+    door.write()
+    begun = door.worked
+    assert begun < wanted
+    client.close()  # with answers unread: from now on writing to it fails
+    for _ in range(4):
+        door.look(0)
+        door.write()
+    assert door.worked == wanted and not door.peers
+
+
 def test_a_peer_that_asks_without_end_does_not_keep_another_waiting(door):
     greedy, modest = door.connect(), door.connect()
     pour(greedy)
