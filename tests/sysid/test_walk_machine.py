@@ -90,6 +90,12 @@ def test_few_channels_are_told_what_they_lack():
         Walk().prepare(few)
 
 
+def test_a_short_walk_is_told_how_much_of_it_counts(table):
+    short = table.part(slice(0, int(4.0 / table.step_s)))
+    with pytest.raises(UserError, match=r"s of walking are too short: .* has most rows .*, \d+ of at least \d+"):
+        Walk().prepare(short)
+
+
 def test_what_was_lost_is_cut_out_and_what_stood_still_is_held():
     time_s = np.arange(0.0, 2.0, 0.002)
     value = np.where(time_s < 1.0, np.sin(time_s), np.sin(1.0))

@@ -173,7 +173,7 @@ class Walk:
         rows += _encoder_rows(table, single, recording)
         recording.rows = [each for each in rows if len(each.where) >= each.fewest]
         if not recording.rows:
-            raise UserError(_nothing(table))
+            raise UserError(_too_short(table, rows) if any(len(each.where) for each in rows) else _nothing(table))
         for each in recording.rows:
             recording.equations[each.name] = _equation(recording, each, self.numbers)
             if recording.places is not None and each.repeats:
@@ -533,6 +533,14 @@ def _spikes(response: Array, columns: Mapping[str, Array]) -> np.ndarray:
     left = left - np.median(left)
     far = np.flatnonzero(np.abs(left) > SPIKE * float(np.median(np.abs(left))) / 0.6745)
     return far if len(far) <= FEW * len(response) else far[:0]
+
+
+def _too_short(table: Table, rows: Sequence[Rows]) -> str:
+    most = max(rows, key=lambda each: len(each.where) / each.fewest)
+    return (
+        f"{table.name}: {table.time_s[-1] - table.time_s[0]:.3g} s of walking are too short: of its equations "
+        f"{most.name!r} has most rows that count, {len(most.where)} of at least {most.fewest}"
+    )
 
 
 def _nothing(table: Table) -> str:
