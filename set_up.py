@@ -24,11 +24,13 @@ HERE = pathlib.Path(__file__).resolve().parent
 LOG = HERE / "build" / "setup.log"
 LATER = {
     "cantools",
-    "scipy",
+    "cffi",
     "perfetto",
+    "pyelftools",
     "pyvcd",
+    "scipy",
     "shtab",
-}  # reads users' DBC files, fits, writes timelines, completes commands: a first walk need not wait
+}  # reads users' DBC files and firmware, fits, writes timelines, completes commands: a first walk need not wait
 
 
 class SetUpError(Exception):
