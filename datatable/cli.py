@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import pathlib
 import sys
 
@@ -139,7 +140,8 @@ def run_list(arguments: argparse.Namespace) -> int:
     from rich.console import Console
     from rich.table import Table as Grid
 
-    console = Console(width=None if sys.stdout.isatty() else FILE_COLUMNS, markup=False, highlight=False)
+    said = sys.stdout.isatty() or "COLUMNS" in os.environ
+    console = Console(width=None if said else FILE_COLUMNS, markup=False, highlight=False)
     described = console.width >= WIDE
     grid = Grid(box=SIMPLE_HEAD, pad_edge=False)
     for heading in ("id", "name", "type", "unit", "from", "to", "period (ms)", *["description"] * described):

@@ -616,7 +616,8 @@ def load_table(folder: str | pathlib.Path | None = None) -> Table:
     if boards:
         checker = VariableChecker(boards, channels, faults)
         variables = [variable for line, row in rows if (variable := checker.check(line, row)) is not None]
-        check_schedules(boards, lines, rows, faults)
+        if rows:  # a file that cannot be read is one fault, not one for each name that it does not have
+            check_schedules(boards, lines, rows, faults)
         errors = read_errors(master / ERRORS_FILE, boards, faults)
         if not faults.found and not variables:
             faults.at(VARIABLES_FILE, 1, "")("", "has no rows")

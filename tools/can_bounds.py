@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from rich.console import Console
+from rich.padding import Padding
 from rich.table import Table
 
 from ranger_sim.can_bus.bounds import Bound, response_times, utilisation
@@ -163,4 +164,4 @@ def show(bus: dict, console: Console) -> None:
     console.print(heading, style="bold", soft_wrap=True)
     terminal.print_table(console, table, spare=TIMES_MS[1:2])
     for note in bus["notes"]:
-        console.print(f"  {note}", highlight=False, soft_wrap=True)
+        console.print(Padding(note, (0, 0, 0, 2)), highlight=False)

@@ -80,4 +80,5 @@ def errors(counts: dict, time_s: float) -> Iterator[str]:
 def times(count: int, one: str) -> str:
     """`1 frame lost`, `2 frames lost`: `one` begins with the noun."""
     noun, _, rest = one.partition(" ")
-    return f"{count} {noun}{'' if count == 1 else 's'}{' ' + rest if rest else ''}"
+    ending = "" if count == 1 else "es" if noun.endswith("ch") else "s"
+    return f"{count} {noun}{ending}{' ' + rest if rest else ''}"

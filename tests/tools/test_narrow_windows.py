@@ -1,5 +1,6 @@
 """Tables in a window of 80 columns keep their lines whole; what has no room is left out and named."""
 
+import contextlib
 import io
 
 import pytest
@@ -24,6 +25,15 @@ def test_a_table_in_80_columns_has_one_line_for_each_row(capsys, monkeypatch, wo
     assert cli.main(words) == 0
     printed = capsys.readouterr().out
     assert whole in printed and told in printed and "…" not in printed
+
+
+@pytest.mark.parametrize("words", [["bench", "--help"], ["can-bounds"], ["table", "list"], ["fuzz", "--help"]])
+def test_in_80_columns_no_line_is_longer_in_a_pipe_either(capsys, monkeypatch, words):
+    monkeypatch.setenv("COLUMNS", "80")
+    with contextlib.suppress(SystemExit):
+        cli.main(words)
+    lines = capsys.readouterr().out.splitlines()
+    assert len(lines) > 5 and max(map(len, lines)) <= 80
 
 
 def test_columns_are_given_up_in_their_order_and_only_for_want_of_room():

@@ -52,6 +52,8 @@ def test_a_healthy_walk_has_no_line(healthy):
         ),
         (lambda s: s["oddities"].update(flights=2), "2 times with no foot on the floor"),
         (lambda s: s["oddities"].update(scuffs=1), "1 scuff of the swing foot"),
+        (lambda s: s["oddities"].update(recontacts=2), "2 touches out of turn"),
+        (lambda s: s["oddities"].update(bounces=2), "2 bounces of a leading foot"),
         (lambda s: s["can"]["can2"].update(lost=3), "can2: 3 frames lost"),
         (lambda s: s["can"]["can2"].update(queue_full=1), "can2: 1 frame refused by a full queue"),
         (lambda s: s["can"]["can4"].update(errors=2), "can4: 2 errors"),

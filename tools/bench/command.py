@@ -21,6 +21,7 @@ from ranger_sim import loading
 from ranger_sim.foundation import wallclock
 from ranger_sim.tools.bench.cases import CASES, FRAMES, SIMULATED, YARDSTICK, measured
 from ranger_sim.tools.files import json_target, replace_file
+from ranger_sim.tools.help_text import named_lines
 from ranger_sim.tools.units import number, whole_number
 
 SHOWN = {SIMULATED: "x real time", FRAMES: "frames"}
@@ -100,9 +101,9 @@ def register(commands: Any) -> None:
     command = commands.add_parser(
         "bench",
         help="how fast the whole robot and its parts are, how far it walks",
-        description=f"Measurements by name. Without a name: {', '.join(TOGETHER)}.\n"
+        description=f"Measurements by name. Without a name:\n{', '.join(TOGETHER)}.\n"
         "These are timed together; the others run alone, when they are named.",
-        epilog="parts:\n" + "\n".join(f"  {name:15} {part.line}" for name, part in PARTS.items()),
+        epilog="parts:\n" + named_lines({name: part.line for name, part in PARTS.items()}, 15),
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     command.add_argument("part", nargs="*", metavar="PART", help="what is measured; see below")

@@ -10,6 +10,7 @@ from typing import Any
 
 from ranger_sim.tools.files import json_target, replace_file
 from ranger_sim.tools.fuzz import Finding
+from ranger_sim.tools.help_text import named_lines
 from ranger_sim.tools.units import whole_number
 
 EXIT_FOUND = 1
@@ -28,9 +29,9 @@ def register(commands: Any) -> None:
     command = commands.add_parser(
         "fuzz",
         help="hostile input by the thousand: wrong frames, bytes, messages, files",
-        description="Hostile input by the thousand. After every case everything is checked. The first case that the\n"
-        "program does not stand is named with its seed; the exit code is then 1.",
-        epilog="targets:\n" + "\n".join(f"  {name:10} {text}" for name, text in TARGETS.items()),
+        description="Hostile input by the thousand. After every case everything is checked.\n"
+        "The first case that the program does not stand is named with its seed;\nthe exit code is then 1.",
+        epilog="targets:\n" + named_lines(TARGETS, 10),
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     command.add_argument(

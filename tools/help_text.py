@@ -1,0 +1,15 @@
+"""Help that fits a window of 80 columns where argparse leaves the lines as they are."""
+
+import textwrap
+from collections.abc import Mapping
+
+COLUMNS = 79
+
+
+def named_lines(meanings: Mapping[str, str], width: int) -> str:
+    """Names in a column of `width` with their meanings beside them, which go on below where they are long."""
+    margin = " " * (width + 3)
+    return "\n".join(
+        textwrap.fill(f"  {name:{width}} {meaning}", COLUMNS, subsequent_indent=margin, break_on_hyphens=False)
+        for name, meaning in meanings.items()
+    )
