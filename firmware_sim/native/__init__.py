@@ -1,0 +1,1 @@
+"""Firmware in C, compiled for this computer, in an emulated board's place."""
