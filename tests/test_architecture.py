@@ -31,6 +31,7 @@ MAY_IMPORT = {
 # Libraries that belong to one place of the house.
 ONLY_IN = {
     "can": ("can_bus/edge/",),
+    "cffi": ("firmware_sim/native/",),
     "serial": ("harness/", "tools/"),
     "asammdf": ("tools/", "harness/", "sysid/readers/"),
     "plotly": ("tools/",),

@@ -31,6 +31,7 @@ cdef class Ads7871(Peripheral):
     # the rest
     cdef public long long eint, not_finished
     cpdef bint start(self, long long register4) except? -1
+    cpdef bint write(self, long long register4, long long time) except? -1
     @cython.final
     cdef void _take(self, long long register4, long long time) noexcept
     cpdef long long read_result(self) noexcept

@@ -106,9 +106,13 @@ class Ads7871(Peripheral):
 
     def start(self, register4: cython.longlong) -> cython.bint:
         """Write register 4; False when a conversion is under way (the write is lost)."""
+        return self.write(register4, self.chip.now)
+
+    def write(self, register4: cython.longlong, time: cython.longlong) -> cython.bint:
+        """The same, the word being there at `time` (ns): behind the code before it and the transfers."""
         if self.busy:
             return False
-        self._take(register4, self.chip.now)
+        self._take(register4, time)
         return True
 
     @cython.final

@@ -1,0 +1,47 @@
+"""What hangs on the chip of a board whose firmware is C, or is in it: given by who builds the board, not by the program."""
+
+import dataclasses
+
+from ranger_sim.firmware_sim.peripherals import adc_external
+
+
+@dataclasses.dataclass(frozen=True)
+class ExternalConverter:
+    """An ADS7871 on the SSP. `inputs`: the analog place behind each multiplexer code; one not told is that number."""
+
+    eint: int = 1
+    conversion_ns: int = adc_external.CONVERSION_NS
+    reference_V: float = adc_external.REFERENCE_V
+    scale: float = 1.0
+    offset_counts: int = 0
+    inputs: dict[int, int] = dataclasses.field(default_factory=dict)
+
+
+@dataclasses.dataclass(frozen=True)
+class InternalConverter:
+    """The chip's own. `inputs`: the analog place behind each channel; one not told is that number."""
+
+    reference_V: float = 3.3
+    scale: float = 1.0
+    offset_counts: int = 0
+    inputs: dict[int, int] = dataclasses.field(default_factory=dict)
+
+
+@dataclasses.dataclass(frozen=True)
+class SpiDevice:
+    """An absolute encoder on an SPI: which of the chip's `words` it holds out, and how it sends it."""
+
+    word: int = 0
+    bits: int = 14
+    bit_rate: int = 1_000_000
+    value_bits: int = 13
+
+
+@dataclasses.dataclass(frozen=True)
+class Hardware:
+    """Core clock (Hz), converters (None: there is none), and what hangs on each SPI."""
+
+    hz: int = 60_000_000
+    external: ExternalConverter | None = dataclasses.field(default_factory=ExternalConverter)
+    internal: InternalConverter = dataclasses.field(default_factory=InternalConverter)
+    spi: dict[int, SpiDevice] = dataclasses.field(default_factory=lambda: {0: SpiDevice()})

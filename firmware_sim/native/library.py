@@ -1,0 +1,122 @@
+"""The compiled firmware as a library of its own for every board: loaded, and what it must have looked at.
+
+Every board gets a copy of the file, so that two boards from one source share no variable.
+"""
+
+import contextlib
+import os
+import pathlib
+import shutil
+import tempfile
+from typing import Any
+
+import cffi
+
+from ranger_sim.foundation.user_error import UserError
+
+VERSION = 1  # of the header: FW_VERSION
+
+# The structures of firmware.h and what runtime.c shows. A library says the sizes that its compiler gave them.
+DECLARATIONS = """
+typedef int32_t (*fw_work)(void);
+typedef void (*fw_call)(void);
+typedef struct { fw_work function; const char *name; uint32_t cost; uint32_t limit; uint32_t per_item;
+                 const char *item; int kind; int32_t speaks; } fw_task;
+typedef struct { const fw_task *tasks; uint32_t count; } fw_tasks;
+typedef struct { uint32_t after_ns; fw_call function; } fw_step;
+typedef struct { uint32_t slot_ns; uint32_t divider; uint32_t tick_cost; int32_t tick_vic_slot; uint32_t flags;
+                 uint32_t first_slot_ns; fw_tasks every; const fw_tasks *rows; uint32_t row_count; fw_tasks last;
+                 fw_tasks occasional; uint32_t occasional_row; uint32_t occasional_cost; uint32_t occasional_limit;
+                 const fw_step *steps; uint32_t step_count;
+                 fw_call on_tick; fw_call on_overrun; fw_call on_limit; fw_call on_near_limit; } fw_schedule;
+typedef struct { int kind; uint32_t index; fw_work handler; const char *name; uint32_t cost; uint32_t per_item;
+                 int32_t vic_slot; int32_t latency; } fw_interrupt;
+typedef int64_t (*host_call)(int64_t, int64_t, int64_t, int64_t, int64_t);
+
+void firmware_start(void);
+const fw_schedule *firmware_schedule(void);
+void firmware_main(void);
+uint32_t firmware_table_version(void);
+
+extern uint32_t fw_compiled_version;
+extern uint32_t fw_sizes[4];
+extern const char *fw_call_names[];
+extern host_call fw_calls[];
+extern const int64_t *fw_pin_levels;
+extern int64_t fw_mail[32];
+int64_t fw_turn(void);
+"""
+SIZED = ("fw_task", "fw_step", "fw_schedule", "fw_interrupt")  # in the order of fw_sizes
+ENTRY_POINTS = "firmware_start() and one of firmware_schedule() and firmware_main()"
+
+ffi: Any = cffi.FFI()
+ffi.cdef(DECLARATIONS)
+
+
+class Library:
+    """One loaded copy of the firmware in the file `path`.
+
+    `schedule`: whether it offers a schedule, else it has a main loop. `table_version`: of the master table that it was
+    compiled with, None where it does not say. UserError for a file that is no such library.
+    """
+
+    def __init__(self, path: pathlib.Path) -> None:
+        self.path = path
+        if not path.is_file():
+            raise UserError(f"{path}: there is no such firmware library; `ranger-sim firmware build` makes one")
+        self.code = _loaded_copy(path)
+        for name in ("fw_compiled_version", "fw_sizes", "fw_call_names", "fw_turn"):
+            if not self.has(name):
+                raise UserError(f"{path}: no {name} in it: not made by `ranger-sim firmware build`")
+        version = self.code.fw_compiled_version
+        if version != VERSION:
+            raise UserError(f"{path}: compiled with version {version} of firmware.h, this is {VERSION}: build it again")
+        sizes = [ffi.sizeof(name) for name in SIZED]
+        if list(self.code.fw_sizes) != sizes:
+            raise UserError(f"{path}: its structures have {list(self.code.fw_sizes)} bytes, expected are {sizes}")
+        missing = [] if self.has("firmware_start") else ["firmware_start()"]
+        kinds = [name for name in ("firmware_schedule", "firmware_main") if self.has(name)]
+        if not kinds:
+            missing.append("firmware_schedule() or firmware_main()")
+        if missing:
+            raise UserError(f"{path}: no {' and no '.join(missing)} in it; a program has {ENTRY_POINTS}")
+        if len(kinds) == 2:
+            raise UserError(
+                f"{path}: firmware_schedule() and firmware_main() are both there; a program has one of them"
+            )
+        self.schedule = kinds == ["firmware_schedule"]
+        self.table_version = self.code.firmware_table_version() if self.has("firmware_table_version") else None
+
+    def has(self, name: str) -> bool:
+        """True when the library defines `name`."""
+        try:
+            getattr(self.code, name)
+        except AttributeError:
+            return False
+        return True
+
+    def call_names(self) -> list[str]:
+        """The calls of the header that it was compiled with, in the order of its table."""
+        names: list[str] = []
+        while self.code.fw_call_names[len(names)] != ffi.NULL:
+            names.append(text(self.code.fw_call_names[len(names)]))
+        return names
+
+
+def _loaded_copy(path: pathlib.Path) -> Any:
+    """A copy of the file, loaded. What is loaded twice from one file would be one library."""
+    handle, copy = tempfile.mkstemp(prefix=f"{path.stem}-", suffix=".so")
+    os.close(handle)
+    try:
+        shutil.copyfile(path, copy)
+        return ffi.dlopen(copy, ffi.RTLD_NOW | ffi.RTLD_LOCAL)
+    except OSError as error:
+        raise UserError(f"{path}: cannot be loaded as a library: {str(error).replace(copy, path.name)}") from None
+    finally:
+        with contextlib.suppress(FileNotFoundError):
+            os.unlink(copy)
+
+
+def text(characters: Any) -> str:
+    """A C string."""
+    return ffi.string(characters).decode(errors="replace") if characters != ffi.NULL else ""

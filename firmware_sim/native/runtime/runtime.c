@@ -1,0 +1,246 @@
+/* The header for a simulated chip: every call leads to the board's models of the devices (native_board.py).
+ *
+ * Compiled together with a program into one library. The harness finds out by name which calls there are, and puts
+ * its functions in. A main loop of its own runs on a stack of its own; what it calls is done on the harness's stack,
+ * between two turns of it, so that the harness's language never runs on the program's stack.
+ */
+#define _GNU_SOURCE
+#include <ranger_sim/firmware.h>
+
+#include <stdlib.h>
+#include <sys/mman.h>
+#include <ucontext.h>
+
+#define EXPORTED __attribute__((visibility("default")))
+
+#define CALLS(CALL) \
+    CALL(attach) CALL(detach) CALL(request) \
+    CALL(spend) CALL(idle) CALL(slot_cycles) CALL(cycles) \
+    CALL(pin_write) CALL(pin_toggle) CALL(IOPIN) CALL(IOSET) CALL(IOCLR) \
+    CALL(timer_start) CALL(capture_connect) CALL(timer_CCR) CALL(timer_write_CCR) CALL(timer_CR) CALL(timer_IR) \
+    CALL(timer_clear_IR) CALL(timer_TC) \
+    CALL(pwm_start) CALL(pwm_MR) CALL(pwm_write_MR) CALL(pwm_latch) CALL(pwm_write) \
+    CALL(adc_start_clock) CALL(adc_start) CALL(adc_result) CALL(adc_burst) CALL(adc_DR) \
+    CALL(adcx_start_ssp) CALL(adcx_write) CALL(adcx_busy) CALL(adcx_result) \
+    CALL(spi_start) CALL(spi_transfer) CALL(spi_SPSR) CALL(spi_SPDR) \
+    CALL(ssp_start) CALL(ssp_exchange) CALL(ssp_load) CALL(ssp_take) \
+    CALL(uart_start) CALL(uart_RBR) CALL(uart_THR) CALL(uart_LSR) CALL(uart_IIR) \
+    CALL(can_start) CALL(can_transmit) CALL(can_buffer_free) CALL(can_abort) CALL(can_read) CALL(can_release) \
+    CALL(can_clear_overrun) CALL(can_GSR) CALL(can_SR) CALL(can_ICR) CALL(can_MOD) CALL(can_write_MOD) \
+    CALL(can_write_IER)
+
+/* One of the two a program leaves out. */
+void firmware_main(void) __attribute__((weak));
+
+#define NUMBER(name) CALL_##name,
+#define NAME(name) #name,
+enum call { CALLS(NUMBER) CALL_COUNT };
+
+/* What a call does in the harness: up to five numbers in, one out. */
+typedef int64_t (*host_call)(int64_t, int64_t, int64_t, int64_t, int64_t);
+
+EXPORTED const uint32_t fw_compiled_version = FW_VERSION;
+EXPORTED const uint32_t fw_sizes[4] = {sizeof(fw_task), sizeof(fw_step), sizeof(fw_schedule), sizeof(fw_interrupt)};
+EXPORTED const char *const fw_call_names[CALL_COUNT + 1] = {CALLS(NAME) NULL};
+EXPORTED host_call fw_calls[CALL_COUNT];
+EXPORTED const int64_t *fw_pin_levels; /* of the chip's 64 pins */
+EXPORTED int64_t fw_mail[32];          /* what does not fit into five numbers, both ways */
+
+/* --- the main loop's own stack --- */
+
+#define STACK_BYTES (256u * 1024u) /* sixteen times the RAM of the chip: its own would have overflowed before */
+#define TURN_ENDED_MAIN (-1)       /* what a turn returns beside cycles: the main loop has returned, */
+#define TURN_FAILED (-2)           /* or there is no memory for its stack */
+
+static struct {
+    int exists;
+    int running; /* the code that runs now is the main loop's */
+    int ended;
+    ucontext_t harness;
+    ucontext_t program;
+    enum call asked;
+    int64_t arguments[5];
+    int64_t answer;
+} loop;
+
+static void loop_body(void)
+{
+    firmware_main();
+    loop.ended = 1;
+}
+
+static int loop_begin(void)
+{
+    const size_t guard = 4096;
+    char *stack = mmap(NULL, STACK_BYTES + guard, PROT_NONE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+    if (stack == MAP_FAILED || mprotect(stack + guard, STACK_BYTES, PROT_READ | PROT_WRITE) != 0
+        || getcontext(&loop.program) != 0)
+        return 0;
+    loop.program.uc_stack.ss_sp = stack + guard;
+    loop.program.uc_stack.ss_size = STACK_BYTES;
+    loop.program.uc_link = &loop.harness;
+    makecontext(&loop.program, loop_body, 0);
+    loop.exists = 1;
+    return 1;
+}
+
+/* A turn of the main loop: until it lets time pass. Returns the cycles that pass, 0 when it sleeps. */
+EXPORTED int64_t fw_turn(void)
+{
+    if (loop.ended)
+        return TURN_ENDED_MAIN;
+    if (!loop.exists && !loop_begin())
+        return TURN_FAILED;
+    for (;;) {
+        loop.running = 1;
+        swapcontext(&loop.harness, &loop.program);
+        loop.running = 0;
+        if (loop.ended)
+            return TURN_ENDED_MAIN;
+        if (loop.asked == CALL_spend)
+            return loop.arguments[0];
+        if (loop.asked == CALL_idle)
+            return 0;
+        const int64_t *with = loop.arguments;
+        loop.answer = fw_calls[loop.asked](with[0], with[1], with[2], with[3], with[4]);
+    }
+}
+
+static int64_t host(enum call asked, int64_t a, int64_t b, int64_t c, int64_t d, int64_t e)
+{
+    if (!loop.running)
+        return fw_calls[asked](a, b, c, d, e);
+    loop.asked = asked;
+    loop.arguments[0] = a;
+    loop.arguments[1] = b;
+    loop.arguments[2] = c;
+    loop.arguments[3] = d;
+    loop.arguments[4] = e;
+    swapcontext(&loop.program, &loop.harness);
+    return loop.answer;
+}
+
+#define HOST0(name) host(CALL_##name, 0, 0, 0, 0, 0)
+#define HOST1(name, a) host(CALL_##name, a, 0, 0, 0, 0)
+#define HOST2(name, a, b) host(CALL_##name, a, b, 0, 0, 0)
+#define HOST3(name, a, b, c) host(CALL_##name, a, b, c, 0, 0)
+#define HOST5(name, a, b, c, d, e) host(CALL_##name, a, b, c, d, e)
+
+/* --- the calls of the header --- */
+
+void fw_attach(const fw_interrupt *interrupt) { HOST1(attach, (int64_t)(intptr_t)interrupt); }
+void fw_detach(enum fw_interrupt_kind kind, uint32_t index) { HOST2(detach, kind, index); }
+void fw_request(enum fw_interrupt_kind kind, uint32_t index) { HOST2(request, kind, index); }
+
+void fw_spend(uint32_t cycles)
+{
+    if (cycles > 0)
+        HOST1(spend, cycles);
+}
+void fw_idle(void) { HOST0(idle); }
+uint32_t fw_slot_cycles(void) { return (uint32_t)HOST0(slot_cycles); }
+uint32_t fw_cycles(void) { return (uint32_t)HOST0(cycles); }
+
+uint32_t fw_pin(uint32_t pin) { return (uint32_t)fw_pin_levels[pin & 63]; }
+void fw_pin_write(uint32_t pin, uint32_t level) { HOST2(pin_write, pin, level); }
+void fw_pin_toggle(uint32_t pin) { HOST1(pin_toggle, pin); }
+uint32_t fw_IOPIN(uint32_t port) { return (uint32_t)HOST1(IOPIN, port); }
+void fw_IOSET(uint32_t port, uint32_t mask) { HOST2(IOSET, port, mask); }
+void fw_IOCLR(uint32_t port, uint32_t mask) { HOST2(IOCLR, port, mask); }
+
+void fw_timer_start(uint32_t timer, uint32_t period, uint32_t match_interrupt)
+{
+    HOST3(timer_start, timer, period, match_interrupt);
+}
+void fw_capture_connect(uint32_t timer, uint32_t channel, uint32_t pin) { HOST3(capture_connect, timer, channel, pin); }
+uint32_t fw_timer_CCR(uint32_t timer) { return (uint32_t)HOST1(timer_CCR, timer); }
+void fw_timer_write_CCR(uint32_t timer, uint32_t value) { HOST2(timer_write_CCR, timer, value); }
+uint32_t fw_timer_CR(uint32_t timer, uint32_t channel) { return (uint32_t)HOST2(timer_CR, timer, channel); }
+uint32_t fw_timer_IR(uint32_t timer) { return (uint32_t)HOST1(timer_IR, timer); }
+void fw_timer_clear_IR(uint32_t timer, uint32_t mask) { HOST2(timer_clear_IR, timer, mask); }
+uint32_t fw_timer_TC(uint32_t timer) { return (uint32_t)HOST1(timer_TC, timer); }
+
+void fw_pwm_start(uint32_t period) { HOST1(pwm_start, period); }
+uint32_t fw_pwm_MR(uint32_t match) { return (uint32_t)HOST1(pwm_MR, match); }
+void fw_pwm_write_MR(uint32_t match, uint32_t counts) { HOST2(pwm_write_MR, match, counts); }
+void fw_pwm_latch(uint32_t mask) { HOST1(pwm_latch, mask); }
+void fw_pwm_write(uint32_t MR2, uint32_t MR6) { HOST2(pwm_write, MR2, MR6); }
+
+void fw_adc_start_clock(uint32_t clkdiv) { HOST1(adc_start_clock, clkdiv); }
+uint32_t fw_adc_start(uint32_t channel) { return (uint32_t)HOST1(adc_start, channel); }
+uint32_t fw_adc_result(void) { return (uint32_t)HOST0(adc_result); }
+void fw_adc_burst(uint32_t mask) { HOST1(adc_burst, mask); }
+uint32_t fw_adc_DR(uint32_t channel) { return (uint32_t)HOST1(adc_DR, channel); }
+
+void fw_adcx_start_ssp(void) { HOST0(adcx_start_ssp); }
+uint32_t fw_adcx_write(uint32_t register4, uint32_t later_ns) { return (uint32_t)HOST2(adcx_write, register4, later_ns); }
+uint32_t fw_adcx_busy(void) { return (uint32_t)HOST0(adcx_busy); }
+int32_t fw_adcx_result(void) { return (int32_t)HOST0(adcx_result); }
+
+void fw_spi_start(uint32_t number) { HOST1(spi_start, number); }
+uint32_t fw_spi_transfer(uint32_t number) { return (uint32_t)HOST1(spi_transfer, number); }
+uint32_t fw_spi_SPSR(uint32_t number) { return (uint32_t)HOST1(spi_SPSR, number); }
+uint32_t fw_spi_SPDR(uint32_t number) { return (uint32_t)HOST1(spi_SPDR, number); }
+
+static void post_words(const uint16_t *words)
+{
+    for (int i = 0; i < FW_SEGMENT_WORDS; i++)
+        fw_mail[i] = words[i];
+}
+
+void fw_ssp_start(uint32_t number) { HOST1(ssp_start, number); }
+void fw_ssp_exchange(uint32_t number, const uint16_t words[FW_SEGMENT_WORDS])
+{
+    post_words(words);
+    HOST1(ssp_exchange, number);
+}
+void fw_ssp_load(uint32_t number, const uint16_t words[FW_SEGMENT_WORDS])
+{
+    post_words(words);
+    HOST1(ssp_load, number);
+}
+uint32_t fw_ssp_take(uint32_t number, uint16_t words[FW_SEGMENT_WORDS])
+{
+    uint32_t came = (uint32_t)HOST1(ssp_take, number);
+    if (came)
+        for (int i = 0; i < FW_SEGMENT_WORDS; i++)
+            words[i] = (uint16_t)fw_mail[i];
+    return came;
+}
+
+void fw_uart_start(uint32_t number, uint32_t divisor, uint32_t divaddval, uint32_t mulval, uint32_t trigger)
+{
+    HOST5(uart_start, number, divisor, divaddval, mulval, trigger);
+}
+uint32_t fw_uart_RBR(uint32_t number) { return (uint32_t)HOST1(uart_RBR, number); }
+uint32_t fw_uart_THR(uint32_t number, uint32_t byte) { return (uint32_t)HOST2(uart_THR, number, byte); }
+uint32_t fw_uart_LSR(uint32_t number) { return (uint32_t)HOST1(uart_LSR, number); }
+uint32_t fw_uart_IIR(uint32_t number) { return (uint32_t)HOST1(uart_IIR, number); }
+
+void fw_can_start(uint32_t controller, uint32_t BTR, uint32_t IER) { HOST3(can_start, controller, BTR, IER); }
+uint32_t fw_can_transmit(uint32_t controller, uint32_t buffer, const fw_can_frame *frame)
+{
+    int64_t place = (int64_t)controller << 32 | buffer;
+    return (uint32_t)HOST5(can_transmit, place, frame->FS, frame->ID, frame->DA, frame->DB);
+}
+uint32_t fw_can_buffer_free(uint32_t controller, uint32_t buffer)
+{
+    return (uint32_t)HOST2(can_buffer_free, controller, buffer);
+}
+void fw_can_abort(uint32_t controller, uint32_t buffer) { HOST2(can_abort, controller, buffer); }
+void fw_can_read(uint32_t controller, fw_can_frame *frame)
+{
+    HOST1(can_read, controller);
+    frame->FS = (uint32_t)fw_mail[0];
+    frame->ID = (uint32_t)fw_mail[1];
+    frame->DA = (uint32_t)fw_mail[2];
+    frame->DB = (uint32_t)fw_mail[3];
+}
+void fw_can_release(uint32_t controller) { HOST1(can_release, controller); }
+void fw_can_clear_overrun(uint32_t controller) { HOST1(can_clear_overrun, controller); }
+uint32_t fw_can_GSR(uint32_t controller) { return (uint32_t)HOST1(can_GSR, controller); }
+uint32_t fw_can_SR(uint32_t controller) { return (uint32_t)HOST1(can_SR, controller); }
+uint32_t fw_can_ICR(uint32_t controller) { return (uint32_t)HOST1(can_ICR, controller); }
+uint32_t fw_can_MOD(uint32_t controller) { return (uint32_t)HOST1(can_MOD, controller); }
+void fw_can_write_MOD(uint32_t controller, uint32_t value) { HOST2(can_write_MOD, controller, value); }
+void fw_can_write_IER(uint32_t controller, uint32_t value) { HOST2(can_write_IER, controller, value); }
