@@ -8,6 +8,7 @@ import pytest
 from ranger_sim.sysid.dataset import Table
 from ranger_sim.sysid.diagnose import diagnose
 from ranger_sim.tools.diagnose import figures, page, words
+from ranger_sim.tools.report.figures import library
 from tests.sysid.test_diagnose import Cart, cart_run
 
 
@@ -44,7 +45,7 @@ def test_the_page_says_what_is_wrong_how_large_how_sure_and_where_to_look(found,
 
 
 def test_the_page_is_one_file_and_the_same_each_time(found, drawn):
-    without_library = drawn.replace(str(page.get_plotlyjs()), "")
+    without_library = drawn.replace(str(library()), "")
     assert not re.search(r"""(src|href)=["'](https?:)?//""", without_library)
     again = page.render(found, "ranger-sim diagnose a.csv", {"diagnosis.json": "the answer"})
     assert again == drawn

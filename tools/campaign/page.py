@@ -5,11 +5,10 @@ from typing import Any
 
 import jinja2
 import plotly.graph_objects as go
-from markupsafe import Markup
-from plotly.offline import get_plotlyjs
 
 from ranger_sim.harness.campaigns.outcomes import CRITERIA
 from ranger_sim.harness.campaigns.summary import worst_of
+from ranger_sim.tools.report.figures import library, placed
 
 HERE = pathlib.Path(__file__).parent
 # From harmless to harmful; grey proves nothing.
@@ -55,12 +54,12 @@ def render(told: dict[str, Any]) -> str:
         told=told,
         colours=COLOURS,
         criteria=CRITERIA,
-        heat_html=Markup(heat_map(heat)) if heat["places"] else "",
+        heat_html=heat_map(heat) if heat["places"] else "",
         extremes=[extremes_text(each) for each in told["extremes"]],
         setting_columns=SETTING_COLUMNS,
         settings=[(list(each["axes"].values()), setting_cells(each)) for each in told["settings"]],
-        times_html=Markup(times(told["rows"])) if any(row["detection_ms"] is not None for row in told["rows"]) else "",
-        plotly_js=Markup(get_plotlyjs()),
+        times_html=times(told["rows"]) if any(row["detection_ms"] is not None for row in told["rows"]) else "",
+        library=library(),
     )
 
 
@@ -110,7 +109,7 @@ def heat_map(heat: dict[str, Any]) -> str:
         yaxis={"autorange": "reversed"},
         font={"size": 11},
     )
-    return html_of(figure)
+    return placed(figure)
 
 
 def counts_text(outcomes: list[str] | None) -> str:
@@ -138,14 +137,7 @@ def times(rows: list[dict[str, Any]]) -> str:
         yaxis={"title": "share of all runs, %", "rangemode": "tozero"},
         legend={"orientation": "h", "y": 1.15, "x": 0},
     )
-    return html_of(figure)
-
-
-def html_of(figure: Any) -> str:
-    """A figure without a copy of the library."""
-    config = {"displaylogo": False, "displayModeBar": False}
-    html: str = figure.to_html(full_html=False, include_plotlyjs=False, config=config)
-    return html
+    return placed(figure)
 
 
 def markdown(told: dict[str, Any]) -> str:

@@ -19,7 +19,7 @@ from ranger_sim.sysid.machine import Recording
 from ranger_sim.sysid.misfit import cells
 from ranger_sim.sysid.naming import Named
 from ranger_sim.sysid.regression import Regression, kept_rows, reduced
-from ranger_sim.tools.report.figures import Figure
+from ranger_sim.tools.report.figures import Figure, placed
 
 BEFORE, AFTER, MEASURED, FAINT = "#d9731a", "#1f6fb2", "#7a8794", "#9aa5b1"  # legible on white and on black
 MOST_POINTS = 3000  # per line: a window of so many rows is shown
@@ -359,7 +359,4 @@ def finished(figure: Any, title: str, note: str, height: int) -> Figure:
         font={"size": 12},
     )
     figure.update_xaxes(automargin=True, zeroline=False)
-    config = {"displaylogo": False, "displayModeBar": False, "responsive": True}
-    name = "figure-" + "-".join("".join(each if each.isalnum() else " " for each in title.lower()).split())
-    html = figure.to_html(full_html=False, include_plotlyjs=False, config=config, div_id=name)
-    return Figure(title, html, note)
+    return Figure(title, placed(figure), note)

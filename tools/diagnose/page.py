@@ -9,13 +9,12 @@ from typing import Any
 import jinja2
 import numpy as np
 from markupsafe import Markup, escape
-from plotly.offline import get_plotlyjs
 
 from ranger_sim.sysid import inspection, predicted_ties
 from ranger_sim.sysid.diagnosis import Diagnosis
 from ranger_sim.sysid.naming import Named
 from ranger_sim.tools.diagnose import figures, words
-from ranger_sim.tools.report.figures import Figure
+from ranger_sim.tools.report.figures import library
 
 HERE = pathlib.Path(__file__).parent
 MOST_RIVALS = 6
@@ -50,28 +49,21 @@ def render(found: Diagnosis, command: str = "", files: dict[str, str] | None = N
         headline=headline,
         told=words.told(found),
         causes=[cause_of(found, each, cause, sides) for each, cause in named(found)],
-        telling=marked(telling),
-        over_time=[marked(each) for each in over_time],
+        telling=telling,
+        over_time=over_time,
         parameters=parameters(found),
         notable=[each for each in answer["misfit"] if each["regime"] == "all" or each["repeatable_fraction"] > NOTABLE],
         gain=gain_of(answer),
         steps=words.next_steps(found),
         command=command,
         files=files or {},
-        plotly_js=Markup(get_plotlyjs()),
+        library=library(),
     )
 
 
 def breakable(identifier: str) -> Markup:
     """An identifier that may go on in the next line after each of its underscores."""
     return Markup(str(escape(identifier)).replace("_", "_<wbr>"))
-
-
-def marked(figure: Figure | None) -> Figure | None:
-    """A figure whose HTML is taken as it is."""
-    if figure is not None:
-        figure.html = Markup(figure.html)
-    return figure
 
 
 def named(found: Diagnosis) -> list[tuple[Named, dict[str, Any]]]:
@@ -101,7 +93,7 @@ def cause_of(found: Diagnosis, each: Named, cause: dict[str, Any], sides: dict[s
             {"name": name, "behind": behind, "standing": "a tie" if name in tied else words.standing(behind)}
             for name, behind in rivals
         ],
-        "figure": marked(figures.of_cause(found, each, sides)),
+        "figure": figures.of_cause(found, each, sides),
         "looks": once(looks),
     }
 

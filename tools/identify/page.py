@@ -6,13 +6,11 @@ from typing import Any
 import jinja2
 import numpy as np
 import plotly.graph_objects as go
-from markupsafe import Markup
-from plotly.offline import get_plotlyjs
 
 from ranger_sim.sysid.dataset import Dataset
 from ranger_sim.sysid.fit import Fit
 from ranger_sim.sysid.identify import legs, motor
-from ranger_sim.tools.report.figures import HIP, INK, INNER, OUTER, Figure, finished
+from ranger_sim.tools.report.figures import HIP, INK, INNER, OUTER, Figure, finished, library
 
 HERE = pathlib.Path(__file__).parent
 COLOURS = (OUTER, "#5aa1d8", "#8a6fb5", "#5b6875", "#2c7a4b", "#d9731a", "#b3261e")
@@ -27,10 +25,8 @@ def render(told: dict[str, Any], recordings: dict[str, Dataset], fits: dict[str,
         undefined=jinja2.StrictUndefined,
     )
     figures = drawn(recordings, found_values(fits), gear)
-    for figure in figures:
-        figure.html = Markup(figure.html)
     return environment.get_template("template.html.j2").render(
-        told=told, figures=figures, plotly_js=Markup(get_plotlyjs()), recordings=list(recordings)
+        told=told, figures=figures, library=library(), recordings=list(recordings)
     )
 
 

@@ -1,7 +1,5 @@
 """Puts a walk's numbers, charts and animation into one self-contained page."""
 
-import base64
-import gzip
 import json
 import math
 import pathlib
@@ -16,6 +14,7 @@ from ranger_sim.harness import normal_errors
 from ranger_sim.tools import unexpected
 from ranger_sim.tools.faults import fault_text
 from ranger_sim.tools.report import charts
+from ranger_sim.tools.report.figures import packed
 from ranger_sim.tools.units import duration_text, figure, length_text
 
 HERE = pathlib.Path(__file__).parent
@@ -71,11 +70,6 @@ def render(robot: Any, summary: dict) -> str:
         command=summary["command"],
         table_hash=datatable.table_hash(),
     )
-
-
-def packed(text: str) -> Markup:
-    """Text that a page can carry and unpack by itself, with the same bytes every time: a third of Plotly's 4.8 MB."""
-    return Markup(base64.b64encode(gzip.compress(text.encode(), 9, mtime=0)).decode())
 
 
 def of_the_robot(what: str) -> str:
