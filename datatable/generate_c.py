@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import zlib
+
 from ranger_sim.datatable.generate_python import heard_by, known_to, sent_by
 from ranger_sim.datatable.model import Board, Table, Variable
 from ranger_sim.datatable.routing import destination_masks
@@ -16,6 +18,9 @@ COMMON = f"""{HEADER}
 
 #include <stddef.h>
 #include <stdint.h>
+
+/* Of this state of the table: another one has another number (CRC-32 of the other generated C files). */
+#define RANGER_TABLE_VERSION VERSION_OF_TABLEu
 
 /* Type of the value word, bytes 0-3 of a frame; bytes 4-7 are a uint32_t of milliseconds. */
 enum ranger_type {{ RANGER_F32 = 0, RANGER_I32 = 1, RANGER_U32 = 2 }};
@@ -126,9 +131,10 @@ def errors_header(table: Table) -> str:
 
 def c_files(table: Table) -> dict[str, str]:
     """File name and text of every generated C file."""
-    files = {"ranger_table.h": COMMON, "ranger_errors.h": errors_header(table)}
+    files = {"ranger_errors.h": errors_header(table)}
     for board in table.boards:
         if board.firmware:
             files[f"{board.name.lower()}_table.h"] = board_header(table, board)
             files[f"{board.name.lower()}_table.c"] = board_source(table, board)
-    return files
+    version = zlib.crc32("".join(files[name] for name in sorted(files)).encode())
+    return {"ranger_table.h": COMMON.replace("VERSION_OF_TABLE", f"0x{version:08X}"), **files}

@@ -5,7 +5,8 @@ tables of harness/wiring.py; `harness/lockstep.py` then passes time and carries 
 """
 
 import difflib
-from collections.abc import Callable
+import os
+from collections.abc import Callable, Mapping
 from typing import Any, Literal, overload
 
 from ranger_sim import datatable
@@ -30,11 +31,13 @@ from ranger_sim.foundation.events import NEVER, STAGE_BUS
 from ranger_sim.foundation.quantities import duration_text, nanoseconds
 from ranger_sim.foundation.random_stream import RandomStream
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness import bus_schedule, lockstep, wiring
+from ranger_sim.harness import bus_schedule, lockstep, native_boards, wiring
 from ranger_sim.harness.conditions import Condition, ConditionNotMetError, Waiting, condition
 from ranger_sim.harness.faults import catalogue
 from ranger_sim.harness.faults.fault import Fault
+from ranger_sim.harness.fresh_board import first_outputs, pass_on
 from ranger_sim.harness.logbook import Logbook
+from ranger_sim.harness.native_boards import Firmware, RobotNativeBoard
 from ranger_sim.harness.operator import Operator
 from ranger_sim.harness.profile import Profile
 from ranger_sim.harness.recorder import Recorder
@@ -73,6 +76,7 @@ class Ranger:
         log: str = "none",
         quirks: Quirks | None = None,
         profile: Profile | None = None,  # its bit rates and schedules; boards that it has outside are emulated here
+        firmware: Mapping[str, Firmware | str | os.PathLike] | None = None,  # boards that run C, by folder
     ) -> None:
         self.scenario = scenario if scenario is not None else Scenario()
         self.controller = controllers.load(self.scenario.controller)
@@ -93,11 +97,13 @@ class Ranger:
             parameters=self.body.parameters,
             electrics=self.scenario.electrics(self.body.electrics),
         )
+        self.firmware: dict[str, Firmware] = native_boards.built(firmware if firmware is not None else {})
         # interrupts and slots: each board on its own crystal, powered up in its own moment
         self.boards: dict[str, Any] = {
             name: self.new_board(name, self.start_ns + self._stream(name)[1]) for name in BOARD_CLASSES
         }
         self.boards["CSR"].time.ms = self.scenario.start_uptime_ms
+        said = {name: first_outputs(self.boards[name]) for name in self.firmware}  # while their programs started
         # CAN
         self.profile = profile
         rates = {name: bus.bit_rate for name, bus in profile.buses.items()} if profile is not None else {}
@@ -113,6 +119,8 @@ class Ranger:
         boards = [self.boards[name] for name in wiring.BOARDS]
         self.loop: Any = lockstep.Lockstep(self.plant, boards, self.buses, sampler, self.start_ns)
         self._connect()
+        for name, messages in said.items():
+            pass_on(messages, self.boards[name].outbox, self.start_ns)
         if profile is not None:
             for board in self.boards.values():
                 bus_schedule.apply(board, profile.schedules())
@@ -135,6 +143,8 @@ class Ranger:
     def new_board(self, name: str, power_up_ns: int) -> Any:
         """A board fresh from the shelf, with its own crystal, powered up at `power_up_ns`; not wired."""
         crystal = self._stream(name)[0]
+        if name in self.firmware:
+            return RobotNativeBoard(name, self.firmware[name], crystal, power_up_ns)
         if name == "MB":
             return MainBrainBoard(crystal, self.quirks, power_up_ns, controller=self.controller)
         return BOARD_CLASSES[name](crystal, self.quirks, power_up_ns)
@@ -144,7 +154,8 @@ class Ranger:
         loop, boards = self.loop, self.boards
         place = {name: number for number, name in enumerate(wiring.BOARDS)}
         for name in wiring.HEAR_IN_SLOTS:
-            loop.hears_in_its_slots(boards[name])
+            if name not in self.firmware or boards[name].scheduler.announces:  # else its handlers may send
+                loop.hears_in_its_slots(boards[name])
         for wire in wiring.ENCODERS:
             pins = wiring.PINS[wire.board]
             encoder = self.plant.encoders[wire.encoder]

@@ -51,6 +51,7 @@ def parser() -> argparse.ArgumentParser:
         completion,
         daq,
         faults,
+        firmware,
         info,
         slots,
         summary_schema,
@@ -89,6 +90,7 @@ def parser() -> argparse.ArgumentParser:
     daq.register(commands)
     vm.register(commands)
     faults.register(commands)
+    firmware.register(commands)
     slots.register(commands)
     summary_schema.register(commands)
     campaign.register(commands)

@@ -15,7 +15,7 @@ from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn
 from ranger_sim import loading
 from ranger_sim.foundation import wallclock
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness import normal_errors
+from ranger_sim.harness import native_boards, normal_errors
 from ranger_sim.harness.faults import catalogue
 from ranger_sim.harness.profile import Profile
 from ranger_sim.harness.profile import load as load_profile
@@ -103,7 +103,8 @@ def run_scenario(scenario: Scenario, stop: StopRule, options: argparse.Namespace
             console.print(f"{scenario.model_file}: {name} is left out", highlight=False, soft_wrap=True)
     wanted = [catalogue.typed(text) for text in options.fault]
     log = log_of(options)
-    with contextlib.closing(Ranger(scenario, log=log, quirks=quirks, profile=profile)) as robot:
+    firmware = firmware_of(options, console)
+    with contextlib.closing(Ranger(scenario, log, quirks, profile, firmware)) as robot:
         arm(robot, wanted, options.proof)
         timeline = trace.attach(robot, options)
         ends, places = serial_options.connect(robot, options)
@@ -129,6 +130,21 @@ def run_scenario(scenario: Scenario, stop: StopRule, options: argparse.Namespace
     if not all(fault["acted"] for fault in summary["faults"]):
         return faults.EXIT_INVALID
     return 1 if summary["fell"] or summary["failed_boards"] else 0
+
+
+def firmware_of(options: argparse.Namespace, console: Console) -> dict[str, native_boards.Firmware]:
+    """The firmware in C that was asked for, by board, compiled."""
+    wanted: dict[str, str] = {}
+    for text in options.firmware:
+        board, folder = native_boards.placed(text)
+        if board in wanted:
+            raise UserError(f"--firmware {text}: {board} has {wanted[board]} already")
+        wanted[board] = folder
+    firmware = native_boards.built(wanted)
+    for each in firmware.values():
+        for line in each.warnings:
+            console.print(line, highlight=False, markup=False, soft_wrap=True)
+    return firmware
 
 
 def arm(robot: Ranger, wanted: list[Fault], proof: bool) -> None:

@@ -7,6 +7,7 @@ from typing import Any
 from ranger_sim.harness.scenario import LIMITS, MOST_DISTANCE_M, MOST_STEPS, MOST_TIME_S, Scenario, StopRule
 from ranger_sim.plant.electronics import SWITCHES
 from ranger_sim.tools import faults, serial_options, trace
+from ranger_sim.tools.firmware import FIRMWARE
 from ranger_sim.tools.options import Option, add_all
 from ranger_sim.tools.units import (
     ANGLES,
@@ -127,7 +128,7 @@ PROOF = Option(
 )
 
 RUN = (*END, *SCENARIO, *FILES)  # of every command that lets the robot walk
-WALK = (*RUN, *serial_options.OPTIONS, faults.FAULT, PROOF, faults.MODULE, *trace.OPTIONS)
+WALK = (*RUN, *serial_options.OPTIONS, faults.FAULT, PROOF, faults.MODULE, FIRMWARE, *trace.OPTIONS)
 
 
 def add_run_options(command: Any) -> None:
@@ -139,7 +140,7 @@ def add_run_options(command: Any) -> None:
 def add_walk_options(command: Any) -> None:
     """All options of `walk`."""
     add_run_options(command)
-    add_all(command, (faults.FAULT, PROOF, faults.MODULE))
+    add_all(command, (faults.FAULT, PROOF, faults.MODULE, FIRMWARE))
     trace.add_options(command)
 
 

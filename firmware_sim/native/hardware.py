@@ -1,4 +1,4 @@
-"""What hangs on the chip of a board whose firmware is C, or is in it: given by who builds the board, not by the program."""
+"""What is in the chip of a board and hangs on it: given by who builds the board, not by its program."""
 
 import dataclasses
 

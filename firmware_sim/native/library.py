@@ -37,6 +37,9 @@ void firmware_start(void);
 const fw_schedule *firmware_schedule(void);
 void firmware_main(void);
 uint32_t firmware_table_version(void);
+typedef struct { const uint32_t *counts; uint32_t count; } fw_error_counts;
+const fw_error_counts *firmware_errors(void);
+uint32_t firmware_time_ms(void);
 
 extern uint32_t fw_compiled_version;
 extern uint32_t fw_sizes[4];
@@ -54,17 +57,18 @@ ffi.cdef(DECLARATIONS)
 
 
 class Library:
-    """One loaded copy of the firmware in the file `path`.
+    """One loaded copy of the firmware in the file `path`, which messages call `shown`.
 
     `schedule`: whether it offers a schedule, else it has a main loop. `table_version`: of the master table that it was
     compiled with, None where it does not say. UserError for a file that is no such library.
     """
 
-    def __init__(self, path: pathlib.Path) -> None:
+    def __init__(self, path: pathlib.Path, shown: pathlib.Path | None = None) -> None:
         self.path = path
         if not path.is_file():
             raise UserError(f"{path}: there is no such firmware library; `ranger-sim firmware build` makes one")
         self.code = _loaded_copy(path)
+        path = shown if shown is not None else path
         for name in ("fw_compiled_version", "fw_sizes", "fw_call_names", "fw_turn"):
             if not self.has(name):
                 raise UserError(f"{path}: no {name} in it: not made by `ranger-sim firmware build`")
@@ -81,9 +85,7 @@ class Library:
         if missing:
             raise UserError(f"{path}: no {' and no '.join(missing)} in it; a program has {ENTRY_POINTS}")
         if len(kinds) == 2:
-            raise UserError(
-                f"{path}: firmware_schedule() and firmware_main() are both there; a program has one of them"
-            )
+            raise UserError(f"{path}: firmware_schedule() and firmware_main() are both there: one of them is too many")
         self.schedule = kinds == ["firmware_schedule"]
         self.table_version = self.code.firmware_table_version() if self.has("firmware_table_version") else None
 

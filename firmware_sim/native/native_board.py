@@ -62,6 +62,13 @@ class StartUp(Peripheral):
         self.functions[alarm]()
 
 
+class PlainPin(Peripheral):
+    """A pin with an encoder that the program captures nowhere: its level can be read, that is all."""
+
+    def on_pin(self, channel: int, level: int, time: int) -> int:
+        return 0
+
+
 class Calls:
     """What the calls of firmware.h do: a method for each, with whole numbers in and out."""
 
@@ -395,6 +402,7 @@ class NativeBoard(Microcontroller):
         self.callbacks = [self._callback(call, name) for call, name in enumerate(self.library.call_names())]
         self.library.code.firmware_start()
         self._raise_failure()
+        self.error_counts = self.library.code.firmware_errors() if self.library.has("firmware_errors") else None
         if self.library.schedule:
             self._take_schedule()
         else:
@@ -436,6 +444,12 @@ class NativeBoard(Microcontroller):
         if self.failure is not None:
             raise self.failure
         return next_time
+
+    def listen_to_edges(self, buffer: Any, pin: int, partner_pin: int) -> None:
+        """As the chip's; the program need not capture the pin."""
+        if self.pin_owners[pin] is None:
+            self.claim_pin(pin, 0, PlainPin(self))
+        Microcontroller.listen_to_edges(self, buffer, pin, partner_pin)
 
     # --- the schedule -------------------------------------------------------------------------------------
 
@@ -514,6 +528,18 @@ class NativeBoard(Microcontroller):
         return BoardCounters(
             hz=self.hz, unclaimed=self.unclaimed, slots=self.scheduler.counters(), can=self.can_counters()
         )
+
+    def network_time_ms(self) -> int:
+        """The robot's time as the program has it (ms); 0 where it does not say."""
+        return self.library.code.firmware_time_ms() if self.library.has("firmware_time_ms") else 0
+
+    def error_totals(self, count: int) -> Any:
+        """How often the program noted the errors 0 ... count - 1; zeros where it does not say."""
+        totals = array.array("q", bytes(8 * count))
+        if self.error_counts is not None:
+            for code, times in enumerate(ffi.unpack(self.error_counts.counts, min(count, self.error_counts.count))):
+                totals[code] = times
+        return totals
 
     def can_counters(self) -> list[CanCounters]:
         """Of each controller that the program has started."""

@@ -131,6 +131,15 @@ void firmware_main(void);
  * The loader refuses another one than its own. */
 uint32_t firmware_table_version(void);
 
+/* Optional, for reports and tests, as a debugger would read it; no part of the program calls them. */
+typedef struct fw_error_counts {
+    const uint32_t *counts; /* how often each error was noted since power-up, by its number in the master table */
+    uint32_t count;         /* numbers 0 ... count - 1 */
+} fw_error_counts;
+const fw_error_counts *firmware_errors(void);
+/* The robot's time as the program has it, ms. */
+uint32_t firmware_time_ms(void);
+
 /* --- interrupts ------------------------------------------------------------------------------------------------------
  * A source is one line into the vectored interrupt controller, named by kind and index. */
 enum fw_interrupt_kind {

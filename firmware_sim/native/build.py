@@ -1,0 +1,180 @@
+"""Compiles a folder of firmware for this computer: one library, kept in its folder `build`."""
+
+import dataclasses
+import hashlib
+import os
+import pathlib
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Sequence
+
+from ranger_sim.firmware_sim.native.library import Library
+from ranger_sim.firmware_sim.native.manifest import Manifest
+from ranger_sim.foundation.user_error import UserError
+
+HERE = pathlib.Path(__file__).resolve().parent
+INCLUDE = HERE / "include"
+RUNTIME = HERE / "runtime" / "runtime.c"
+COMPILERS = ("cc", "gcc", "clang")
+LONGEST_S = 600.0  # a compiler that takes longer than this stands still
+WORD_BITS = sys.maxsize.bit_length() + 1  # of pointers, and of long in the data models of Unix
+
+# -std=c99: what the chip's compiler is asked for as well. No fused multiply-add and no fast mathematics, so that floats
+# come out as on the chip and in the emulated boards. Fields left out of a structure are 0, as firmware.h says.
+OPTIONS = (
+    "-std=c99", "-O2", "-g", "-fPIC", "-fno-omit-frame-pointer", "-ffp-contract=off", "-fno-fast-math",
+    "-Wall", "-Wextra", "-Wno-missing-field-initializers",
+    "-Werror=implicit-function-declaration", "-Werror=incompatible-pointer-types", "-Werror=int-conversion",
+    f"-DFW_LONG_BITS={WORD_BITS}", f"-DFW_POINTER_BITS={WORD_BITS}",
+)  # fmt: skip
+# Its own functions come first, whatever else is loaded; what is missing is told now and not at loading.
+LINKING = ("-shared", "-Wl,-Bsymbolic", "-Wl,--no-undefined")
+# -O1 keeps lines and variables true; findings are told, and the program goes on.
+SANITIZING = ("-O1", "-fsanitize=address,undefined", "-fsanitize-recover=address,undefined", "-fno-sanitize=vptr")
+COVERING = ("-O0", "--coverage")
+
+MESSAGE = re.compile(
+    r"^(?P<file>[^:\s][^:]*):(?P<line>\d+)(?::\d+)?: (?P<kind>fatal error|error|warning): (?P<text>.*)$"
+)
+UNDEFINED = re.compile(r"(?P<place>[^\s:]+\.c:\d+): undefined reference to `(?P<name>[^']+)'")
+
+
+@dataclasses.dataclass(frozen=True)
+class Built:
+    """A library that is up to date. `warnings` of the compiler, a line each; none when nothing had to be done."""
+
+    path: pathlib.Path
+    warnings: tuple[str, ...] = ()
+    was_made: bool = True
+
+
+@dataclasses.dataclass(frozen=True)
+class Addition:
+    """What the caller compiles along: folders of headers, sources."""
+
+    include: tuple[pathlib.Path, ...] = ()
+    sources: tuple[pathlib.Path, ...] = ()
+
+
+def compiler() -> str:
+    """The C compiler: $CC, or the first of those usual; UserError when there is none."""
+    asked = os.environ.get("CC")
+    for name in (asked.split()[-1],) if asked and asked.split() else COMPILERS:
+        found = shutil.which(name)
+        if found:
+            return found
+    looked = f"CC={asked}" if asked else ", ".join(COMPILERS)
+    raise UserError(f"no C compiler is installed here (looked for {looked}); firmware in C needs one")
+
+
+def build(
+    manifest: Manifest, sanitize: bool = False, coverage: bool = False, addition: Addition | None = None
+) -> Built:
+    """Compile unless it is up to date; UserError with a line for each error of the compiler.
+
+    sanitize: told at run time what is out of bounds or undefined. coverage: lines that ran are counted.
+    """
+    addition = addition if addition is not None else Addition()
+    program = compiler()
+    sources = [*manifest.sources, *addition.sources]
+    watching = [*(SANITIZING if sanitize else ()), *(COVERING if coverage else ())]
+    options = [
+        *OPTIONS,
+        *watching,
+        *manifest.options,
+        *(f"-D{name}={value}" for name, value in manifest.defines),
+        *(f"-I{folder}" for folder in (*manifest.include, *addition.include, INCLUDE)),
+    ]
+    kind = f"{'-sanitize' if sanitize else ''}{'-coverage' if coverage else ''}"
+    folder = manifest.folder / "build"
+    path = folder / f"{manifest.name}{kind}.so"
+    stamp = path.with_suffix(".stamp")
+    state = _state([program, *options], [*sources, RUNTIME, *_headers((*manifest.include, *addition.include, INCLUDE))])
+    if path.is_file() and stamp.is_file() and stamp.read_text(encoding="utf-8") == state:
+        return Built(path, was_made=False)
+    try:
+        folder.mkdir(exist_ok=True)
+        with tempfile.TemporaryDirectory(prefix=".making-", dir=folder) as making:
+            warnings = _compile(program, options, watching, sources, pathlib.Path(making), manifest)
+            made = pathlib.Path(making) / "library.so"
+            Library(made, shown=path)
+            stamp.unlink(missing_ok=True)
+            made.replace(path)
+            stamp.write_text(state, encoding="utf-8")
+    except OSError as error:
+        raise UserError(f"{error.filename or folder}: {error.strerror}: nothing can be built there") from None
+    return Built(path, warnings)
+
+
+def _compile(
+    program: str,
+    options: Sequence[str],
+    watching: Sequence[str],
+    sources: Sequence[pathlib.Path],
+    making: pathlib.Path,
+    manifest: Manifest,
+) -> tuple[str, ...]:
+    """Compile and link in the folder `making`; returns the warnings. The runtime is not watched itself."""
+    said: list[str] = []
+    objects = [str(making / "runtime.o")]
+    code, text = _run([program, *OPTIONS, f"-I{INCLUDE}", "-c", str(RUNTIME), "-o", objects[0]])
+    if code:
+        raise UserError(f"{RUNTIME} does not compile with {program}:", *text[:20])
+    failed = False
+    for number, source in enumerate(sources):
+        place = making / f"{number}-{source.stem}.o"
+        code, text = _run([program, *options, "-c", str(source), "-o", str(place)])
+        objects.append(str(place))
+        failed |= code != 0
+        said += text
+    if not failed:
+        code, text = _run([program, *watching, *objects, *LINKING, "-lm", "-o", str(making / "library.so")])
+        failed = code != 0
+        said += text
+    if failed:
+        raise UserError(*_errors(manifest, said))
+    return tuple(line for line in map(_message, said) if line and " warning: " in line)
+
+
+def _run(command: list[str]) -> tuple[int, list[str]]:
+    """Exit code and lines of a compiler, told in English."""
+    setting = {**os.environ, "LC_ALL": "C"}
+    try:
+        done = subprocess.run(command, capture_output=True, check=False, timeout=LONGEST_S, env=setting)
+    except subprocess.TimeoutExpired:
+        raise UserError(f"{command[0]}: has not finished after {LONGEST_S:g} s") from None
+    return done.returncode, (done.stderr + done.stdout).decode(errors="replace").splitlines()
+
+
+def _message(line: str) -> str | None:
+    """A compiler's line as we tell it; None for those that only explain."""
+    found = MESSAGE.match(line)
+    return f"{found['file']}:{found['line']}: {found['kind']}: {found['text']}" if found else None
+
+
+def _errors(manifest: Manifest, said: list[str]) -> list[str]:
+    """What went wrong: compiler's errors, or what the linker misses, or, where neither reads so, all it said."""
+    errors = [line for line in map(_message, said) if line and "error: " in line]
+    for line in said:
+        found = UNDEFINED.search(line)
+        if found:
+            errors.append(f"{found['place']}: error: {found['name']} is used, but no source defines it")
+    errors = list(dict.fromkeys(errors)) or said[:20] or ["the compiler failed and said nothing"]
+    return [f"{manifest.folder}: {manifest.name} does not compile:", *errors]
+
+
+def _headers(folders: Sequence[pathlib.Path]) -> list[pathlib.Path]:
+    return sorted({path for folder in folders for path in folder.rglob("*.h")})
+
+
+def _state(words: Sequence[str], files: Sequence[pathlib.Path]) -> str:
+    """A digest of everything that the library depends on."""
+    digest = hashlib.blake2b(digest_size=16)
+    for word in words:
+        digest.update(word.encode() + b"\0")
+    for path in files:
+        digest.update(str(path).encode() + b"\0" + hashlib.blake2b(path.read_bytes()).digest())
+    return digest.hexdigest() + "\n"

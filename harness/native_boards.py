@@ -1,0 +1,161 @@
+"""Boards of the robot whose firmware is C: what hangs on their chips, their table, and their counters."""
+
+import dataclasses
+import functools
+import os
+import pathlib
+import re
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+from ranger_sim.boards import ankle_board, hip, inner_feet, motor_board, outer_feet, steering
+from ranger_sim.boards.counters import RangerCounters
+from ranger_sim.boards.modules.error_module import ErrorModule
+from ranger_sim.boards.modules.network_time import NetworkTime
+from ranger_sim.datatable import generated
+from ranger_sim.firmware_sim.native import build as compiling
+from ranger_sim.firmware_sim.native import manifest as manifests
+from ranger_sim.firmware_sim.native.hardware import ExternalConverter, Hardware, InternalConverter
+from ranger_sim.firmware_sim.native.native_board import NativeBoard
+from ranger_sim.foundation.user_error import UserError
+
+BATTERY_VOLTAGE_CHANNEL = 1  # AIN1, P0.28
+
+
+class Place(NamedTuple):
+    """A board that firmware in C can take, one with a motor: its generated table, and its external converter."""
+
+    table: Any
+    sequence: tuple[tuple[str, int, int], ...]  # (analog input, multiplexer code, gain code)
+    conversion_ns: int
+
+
+PLACES = {
+    "MCH": Place(hip.table, hip.SEQUENCE, motor_board.FASTEST_CONVERSION_NS),
+    "MCFO": Place(outer_feet.table, ankle_board.SEQUENCE, motor_board.CONVERSION_NS),
+    "MCFI": Place(inner_feet.table, ankle_board.SEQUENCE, motor_board.CONVERSION_NS),
+    "MCSI": Place(steering.table, steering.SEQUENCE, motor_board.CONVERSION_NS),
+}
+
+
+def hardware_of(board: str) -> Hardware:
+    """What hangs on the chip of a board of the robot, as on the emulated one."""
+    place = PLACES[board]
+    return Hardware(
+        hz=place.table.CLOCK_HZ,
+        external=ExternalConverter(
+            eint=1,
+            conversion_ns=place.conversion_ns,
+            inputs={code: motor_board.ANALOG[name] for name, code, _ in place.sequence},
+        ),
+        internal=InternalConverter(inputs={BATTERY_VOLTAGE_CHANNEL: motor_board.ANALOG["battery_voltage"]}),
+    )
+
+
+@dataclasses.dataclass(frozen=True)
+class Firmware:
+    """A folder of firmware, built. `warnings` of the compiler; `sanitize`, `coverage`: how it was built."""
+
+    folder: pathlib.Path
+    library: pathlib.Path
+    manifest: manifests.Manifest
+    warnings: tuple[str, ...] = ()
+    was_made: bool = True
+    sanitize: bool = False
+    coverage: bool = False
+
+
+def build(folder: str | pathlib.Path, sanitize: bool = False, coverage: bool = False) -> Firmware:
+    """Compile a folder of firmware, with the generated C of the tables that it names, unless it is up to date."""
+    manifest = manifests.load(folder)
+    place = generated_c()
+    sources = []
+    for table in manifest.tables:
+        source = place / f"{table.lower()}_table.c"
+        if not source.is_file():
+            there = ", ".join(sorted(each.name.removesuffix("_table.c") for each in place.glob("*_table.c")))
+            raise UserError(f"{manifest.folder}: firmware.tables: no board {table!r}; there are {there}")
+        sources.append(source)
+    built = compiling.build(manifest, sanitize, coverage, compiling.Addition((place,), tuple(sources)))
+    return Firmware(manifest.folder, built.path, manifest, built.warnings, built.was_made, sanitize, coverage)
+
+
+def built(wanted: Mapping[str, Firmware | str | os.PathLike]) -> dict[str, Firmware]:
+    """The firmware of each board, folders compiled unless up to date. UserError for a board that takes none."""
+    return {
+        known(board): each if isinstance(each, Firmware) else build(pathlib.Path(each))
+        for board, each in wanted.items()
+    }
+
+
+def include_folders() -> tuple[pathlib.Path, ...]:
+    """Where firmware.h and the table's headers are."""
+    return compiling.INCLUDE, generated_c()
+
+
+def generated_c() -> pathlib.Path:
+    """The folder of the table's generated C."""
+    return pathlib.Path(next(iter(generated.__path__))) / "c"
+
+
+@functools.cache
+def table_version() -> int:
+    """RANGER_TABLE_VERSION of the table that this robot has."""
+    text = (generated_c() / "ranger_table.h").read_text(encoding="utf-8")
+    found = re.search(r"#define RANGER_TABLE_VERSION 0x([0-9A-F]{8})u", text)
+    if found is None:
+        raise UserError(f"{generated_c() / 'ranger_table.h'}: no version; `ranger-sim table generate` writes it")
+    return int(found[1], 16)
+
+
+def placed(text: str) -> tuple[str, str]:
+    """Board and folder of `MCH=DIR`; UserError for what does not read so."""
+    board, equals, folder = text.partition("=")
+    if not equals or not folder:
+        raise UserError(f"firmware {text!r}: BOARD=DIR is expected, as in MCH=examples/hip_in_c")
+    return known(board), folder
+
+
+def known(board: str) -> str:
+    """A board that firmware in C can take."""
+    if board not in PLACES:
+        raise UserError(f"firmware for board {board!r}: boards that can run firmware in C are {', '.join(PLACES)}")
+    return board
+
+
+class RobotNativeBoard(NativeBoard):
+    """Board `name` of the robot with a firmware in C, in the place of the emulated one."""
+
+    def __init__(self, name: str, firmware: Firmware, crystal: Any, power_up_ns: int) -> None:
+        hardware = firmware.manifest.hardware if firmware.manifest.hardware is not None else hardware_of(name)
+        NativeBoard.__init__(self, name, firmware.library, crystal, power_up_ns, hardware)
+        version = self.library.table_version
+        if version is not None and version != table_version():
+            raise UserError(
+                f"{firmware.library}: compiled with version 0x{version:08X} of the master table, "
+                f"this robot has 0x{table_version():08X}: build it again"
+            )
+        controller = PLACES[name].table.CONTROLLER
+        if controller not in self.devices.cans:
+            raise UserError(
+                f"{firmware.library}: firmware_start() does not start CAN controller {controller}, "
+                f"on which {name}'s bus hangs (fw_can_start)"
+            )
+        self.module = ErrorModule(PLACES[name].table.BOARD_NUMBER, NetworkTime())
+
+    @property
+    def errors(self) -> ErrorModule:
+        """How often its program noted each error, where it says so (`firmware_error_totals`); else never."""
+        self.module.totals = self.error_totals(len(self.module.totals))
+        return self.module
+
+    def counters(self) -> object:
+        """What the board counted; its program's own queues are not known."""
+        return RangerCounters(
+            hz=self.hz,
+            unclaimed=self.unclaimed,
+            slots=self.scheduler.counters(),
+            can=self.can_counters(),
+            time_ms=self.network_time_ms(),
+            errors=list(self.errors.totals),
+        )
