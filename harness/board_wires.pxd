@@ -18,7 +18,7 @@ from ranger_sim.foundation.events cimport (
     Outbox,
 )
 from ranger_sim.foundation.row_stream cimport RowStream
-from ranger_sim.plant.drive cimport Drive
+from ranger_sim.plant.bridge cimport Bridge
 
 @cython.final
 cdef class WordWire:
@@ -38,7 +38,7 @@ cdef class SspWire:
 @cython.final
 cdef class BoardWires(Outbox):
     cdef public Board board
-    cdef public Drive drive
+    cdef public Bridge drive
     cdef public long long window_ns, silent_until, watchdog_pin, low_side_2_pin, low_side_6_pin
     cdef public bint low_side_2, low_side_6
     cdef public list buses

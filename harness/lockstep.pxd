@@ -8,7 +8,7 @@ from ranger_sim.harness.imu_wire cimport ImuWire
 from ranger_sim.harness.sampler cimport Sampler
 from ranger_sim.harness.step_watch cimport StepWatch
 from ranger_sim.harness.strike_watch cimport StrikeWatch
-from ranger_sim.plant.ranger cimport RangerPlant
+from ranger_sim.plant.plant cimport Plant
 
 cpdef enum:
     REACHED_TIME = 0
@@ -19,7 +19,7 @@ cpdef enum:
 
 @cython.final
 cdef class Lockstep:
-    cdef public RangerPlant plant
+    cdef public Plant plant
     cdef public list boards, buses, wires, word_wires, encoder_wires
     cdef public long long time, window_ns, stop_steps
     cdef public double stop_distance_m

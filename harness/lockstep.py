@@ -44,7 +44,7 @@ from ranger_sim.harness.imu_wire import ImuWire
 from ranger_sim.harness.sampler import Sampler
 from ranger_sim.harness.step_watch import StepWatch
 from ranger_sim.harness.strike_watch import StrikeWatch
-from ranger_sim.plant.ranger import RangerPlant
+from ranger_sim.plant.plant import Plant
 
 if not cython.compiled:
     from ranger_sim.foundation.events import NEVER
@@ -65,7 +65,7 @@ class Lockstep:
 
     def __init__(self, plant, boards, buses, sampler, start_ns) -> None:
         # the compiled loop takes these for what they should be without asking again
-        for thing, kind in (*((b, Board) for b in boards), *((b, Bus) for b in buses)):
+        for thing, kind in ((plant, Plant), *((b, Board) for b in boards), *((b, Bus) for b in buses)):
             if not isinstance(thing, kind):
                 raise UserError(f"lockstep: {thing!r} is no {kind.__name__}")
         self.plant = plant
@@ -188,7 +188,7 @@ class Lockstep:
 
     def run(self, until: cython.longlong) -> cython.longlong:
         """Advance to `until` (ns) or until the walk is over; returns one of the reasons above."""
-        plant: RangerPlant = self.plant
+        plant: Plant = self.plant
         sampler: Sampler = self.sampler
         board: Board
         wires: BoardWires
@@ -358,7 +358,7 @@ class Lockstep:
 
     def _sense(self) -> None:
         """What the plant's sensors showed during the step that was just integrated."""
-        plant: RangerPlant = self.plant
+        plant: Plant = self.plant
         i: cython.longlong
         end: cython.longlong = plant.time_ns
         start: cython.longlong = end - plant.step_ns
@@ -398,7 +398,7 @@ class Lockstep:
 
     def _show_words(self) -> cython.void:
         """What the absolute encoders hold at the start of the step: their words stand until the next one."""
-        plant: RangerPlant = self.plant
+        plant: Plant = self.plant
         wire: WordWire
         for wire in self.word_wires:
             wire.board.words[wire.word] = plant.words[wire.source]

@@ -8,15 +8,17 @@ import re
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-from ranger_sim.boards import ankle_board, hip, inner_feet, motor_board, outer_feet, steering
+from ranger_sim.boards import ankle_board, hip, motor_board, steering
 from ranger_sim.boards.counters import RangerCounters
 from ranger_sim.boards.modules.error_module import ErrorModule
 from ranger_sim.boards.modules.network_time import NetworkTime
 from ranger_sim.datatable import generated
+from ranger_sim.datatable.generated import mcfi, mcfo, mch, mcsi
 from ranger_sim.firmware_sim.native import build as compiling
 from ranger_sim.firmware_sim.native import manifest as manifests
 from ranger_sim.firmware_sim.native.hardware import ExternalConverter, Hardware, InternalConverter
 from ranger_sim.firmware_sim.native.native_board import NativeBoard
+from ranger_sim.firmware_sim.peripherals.adc_external import CONVERSION_NS as FASTEST_CONVERSION_NS
 from ranger_sim.foundation.user_error import UserError
 
 BATTERY_VOLTAGE_CHANNEL = 1  # AIN1, P0.28
@@ -31,10 +33,10 @@ class Place(NamedTuple):
 
 
 PLACES = {
-    "MCH": Place(hip.table, hip.SEQUENCE, motor_board.FASTEST_CONVERSION_NS),
-    "MCFO": Place(outer_feet.table, ankle_board.SEQUENCE, motor_board.CONVERSION_NS),
-    "MCFI": Place(inner_feet.table, ankle_board.SEQUENCE, motor_board.CONVERSION_NS),
-    "MCSI": Place(steering.table, steering.SEQUENCE, motor_board.CONVERSION_NS),
+    "MCH": Place(mch, hip.SEQUENCE, FASTEST_CONVERSION_NS),
+    "MCFO": Place(mcfo, ankle_board.SEQUENCE, motor_board.CONVERSION_NS),
+    "MCFI": Place(mcfi, ankle_board.SEQUENCE, motor_board.CONVERSION_NS),
+    "MCSI": Place(mcsi, steering.SEQUENCE, motor_board.CONVERSION_NS),
 }
 
 

@@ -2,11 +2,11 @@ cimport cython
 
 from ranger_sim.firmware_sim.board cimport Board
 from ranger_sim.foundation.row_stream cimport RowStream
-from ranger_sim.plant.ranger cimport RangerPlant
+from ranger_sim.plant.plant cimport Plant
 
 @cython.final
 cdef class Sampler:
-    cdef public RangerPlant plant
+    cdef public Plant plant
     cdef public Board board
     cdef public RowStream samples, words
     cdef public long long next_ns, columns

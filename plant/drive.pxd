@@ -1,6 +1,7 @@
 cimport cython
 
 from ranger_sim.foundation.events cimport NEVER
+from ranger_sim.plant.bridge cimport Bridge
 
 cpdef enum:
     PWM_WRITE = 0
@@ -13,7 +14,7 @@ cpdef enum:
     HELD_HIGH = 3
 
 @cython.final
-cdef class Drive:
+cdef class Drive(Bridge):
     # what a motor looks at in every step stands first, beside each other
     cdef public long long next_change_ns
     cdef public double duty, ripple
@@ -26,9 +27,6 @@ cdef class Drive:
     cdef public long long held2, held6
     cdef public double healthy_duty
     cdef public bint healthy_open
-    cpdef void write_pwm(self, long long time, long long mr2, long long mr6, long long mr0) noexcept
-    cpdef void watchdog_edge(self, long long time) noexcept
-    cpdef void low_side(self, long long time, bint enable2, bint enable6) noexcept
     cpdef void hold_leg(self, long long leg, long long state) noexcept
     cpdef void _queue(self, long long time, long long kind, long long a, long long b, long long c) noexcept
     cpdef void apply(self, long long time) noexcept

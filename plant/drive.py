@@ -11,6 +11,7 @@ bridge has power until `watchdog_ns` after the last edge on the watchdog line, a
 import cython
 
 from ranger_sim.foundation.numbers import integers
+from ranger_sim.plant.bridge import Bridge
 
 # C constants when compiled: the same numbers stand in the .pxd, and a test holds them together.
 if not cython.compiled:
@@ -30,7 +31,7 @@ if not cython.compiled:
     HELD_HIGH = 3
 
 
-class Drive:
+class Drive(Bridge):
     """One bridge. `duty`: net drive (MR2 - MR6) / MR0 of the battery voltage across the motor, -1 ... 1.
 
     `is_open`: no transistor conducts (no power, or a low side off), so the winding can only freewheel through the

@@ -8,14 +8,15 @@ from ranger_sim.plant.incremental_encoder cimport IncrementalEncoder
 from ranger_sim.plant.leg cimport INNER, OUTER, Leg
 from ranger_sim.plant.motion cimport advance
 from ranger_sim.plant.motor_unit cimport MotorUnit
+from ranger_sim.plant.plant cimport Plant
 from ranger_sim.plant.steering cimport Steering
 from ranger_sim.plant.watch cimport fall
 from ranger_sim.plant.wiring_points cimport HIP_WORD, INNER_ANKLE_WORD, OUTER_ANKLE_WORD
 
 @cython.final
-cdef class RangerPlant:
+cdef class RangerPlant(Plant):
     # what every step looks at stands first, beside each other
-    cdef public long long time_ns, step_ns, changes
+    cdef public long long changes
     cdef public double step_s, zero
     cdef public Body body
     cdef public Electrics electrics
@@ -23,15 +24,12 @@ cdef class RangerPlant:
     cdef public MotorUnit hip, outer_ankle, inner_ankle, steering_motor
     cdef public IncrementalEncoder hip_joint, hip_motor, outer_motor, outer_joint, inner_motor, inner_joint
     cdef public AbsoluteEncoder hip_word, outer_word, inner_word
-    cdef public long long[3] words
     cdef public Imu imu
-    cdef public bint jumped, fell
-    cdef public long long steps, strike_time_ns, lift_off_time_ns
-    cdef public double step_length_m, distance_m
-    cdef public str fall_cause
-    cdef public list motors, encoders
-    cdef public object parameters, floor, record, sample_names, model_file
-    cdef public double[::1] analog_start, analog_end
+    cdef public bint jumped
+    cdef public long long strike_time_ns, lift_off_time_ns
+    cdef public double step_length_m
+    cdef public list motors
+    cdef public object parameters, floor, record, model_file
     cpdef void hold(
         self, object stance=*, double lean_rad=*, double hip_angle_rad=*, double outer_ankle_rad=*,
         double inner_ankle_rad=*, bint lifted=*,
@@ -39,6 +37,4 @@ cdef class RangerPlant:
     cpdef void release(self, double rate_rad_s, double hip_rate_rad_s=*)
     cpdef void begin(self)
     cpdef void _settle(self)
-    cpdef int step(self) except -1
     cpdef int _note(self) except -1
-    cpdef void fill_sample(self, double[::1] row)

@@ -21,6 +21,7 @@ from ranger_sim.plant.incremental_encoder import IncrementalEncoder
 from ranger_sim.plant.leg import Leg
 from ranger_sim.plant.motor_unit import MotorUnit
 from ranger_sim.plant.parameters import BodyParameters
+from ranger_sim.plant.plant import Plant
 from ranger_sim.plant.steering import Steering
 from ranger_sim.plant.walk_record import RING
 
@@ -80,7 +81,7 @@ SAMPLES = {
 HIP_BOUNCE = 0.01
 
 
-class RangerPlant:
+class RangerPlant(Plant):
     """The robot's physics. `seed`: of every noise and foothold; `model_file`: additional named terms (plant/terms.py).
 
     `parameters`: BodyParameters, `electrics`: ElectricsParameters, `floor`: Floor (built from slope and roughness
@@ -98,6 +99,7 @@ class RangerPlant:
         electrics=None,
         floor=None,
     ) -> None:
+        Plant.__init__(self, STEP_NS, start_ns, words=3, samples=SAMPLES)
         self.parameters = parameters if parameters is not None else BodyParameters()
         self.floor = floor if floor is not None else Floor(slope_rad, floor_roughness_m, seed)
         self.body = Body(self.parameters, self.floor)
@@ -107,10 +109,9 @@ class RangerPlant:
         self.inner_ankle = self.electrics.inner_ankle
         self.steering_motor = self.electrics.steering
         self.motors = [self.hip, self.outer_ankle, self.inner_ankle, self.steering_motor]
+        self.bridges = [motor.drive for motor in self.motors]
         self.steering = Steering(self.steering_motor.parameters.reflected_inertia_kg_m2)
         self.record = self.body.record
-        self.time_ns = start_ns
-        self.step_ns = STEP_NS
         self.step_s = STEP_NS * 1e-9
         self.zero = self.parameters.ankle_zero_rad
 
@@ -133,22 +134,16 @@ class RangerPlant:
         self.hip_word = AbsoluteEncoder("hip", 4590, 1, seed=seed)
         self.outer_word = AbsoluteEncoder("outer_ankle", 6562, -1, seed=seed)
         self.inner_word = AbsoluteEncoder("inner_ankle", 1572, 1, seed=seed)
-        self.words = [0] * 3  # of the absolute encoders
         self.imu = Imu(seed, phase_ns=start_ns)
         self.analog_start = self.electrics.analog_start
         self.analog_end = self.electrics.analog_end
 
         # the walk, as a harness asks for it every step
-        self.steps = 0
         self.strike_time_ns = start_ns
         self.lift_off_time_ns = -1
         self.step_length_m = 0.0
-        self.distance_m = 0.0
-        self.fell = False
-        self.fall_cause = ""
         self.changes = 0
         self.jumped = True  # rates at the start of the next step do not continue those of the last one
-        self.sample_names = SAMPLES
         self.model_file = model_file
         if model_file is not None:
             from ranger_sim.plant import terms
@@ -334,7 +329,7 @@ class RangerPlant:
 
     # ---- looking from outside ---------------------------------------------------------------------------------
 
-    def fill_sample(self, row: cython.double[::1]) -> cython.void:
+    def fill_sample(self, row: cython.double[::1]) -> object:
         """Write the values named in SAMPLES."""
         b: Body = self.body
         o: Leg = b.outer
@@ -382,6 +377,7 @@ class RangerPlant:
         )
         for place in range(len(values)):
             row[place] = values[place]
+        return None
 
     @property
     def electronics_power_W(self):

@@ -81,9 +81,7 @@ class WordFault(Fault):
 
     def _put(self, word: int) -> None:
         """This word is held out."""
-        words = self.robot.plant.words  # compiled, a copy of the array
-        words[self.word] = word
-        self.robot.plant.words = words
+        self.robot.plant.words[self.word] = word
 
     def instead(self, now_ns: int) -> int:
         """The word that is held out in place of `true`."""

@@ -5,7 +5,7 @@ from ranger_sim.firmware_sim.board import Board
 from ranger_sim.foundation.events import EventQueue
 from ranger_sim.foundation.events import Outbox
 from ranger_sim.foundation.row_stream import RowStream
-from ranger_sim.plant.drive import Drive
+from ranger_sim.plant.bridge import Bridge
 from typing import Any
 from typing import final
 
@@ -34,7 +34,7 @@ class SspWire:
 @final
 class BoardWires(Outbox):
     board: Board
-    drive: Drive | None
+    drive: Bridge | None
     window_ns: int
     silent_until: int
     watchdog_pin: int

@@ -5,7 +5,7 @@ from ranger_sim.firmware_sim.board import Board
 from ranger_sim.harness.imu_wire import ImuWire
 from ranger_sim.harness.sampler import Sampler
 from ranger_sim.harness.strike_watch import StrikeWatch
-from ranger_sim.plant.ranger import RangerPlant
+from ranger_sim.plant.plant import Plant
 from typing import Any
 from typing import final
 
@@ -19,7 +19,7 @@ ANY_DISTANCE_M: float
 
 @final
 class Lockstep:
-    plant: RangerPlant
+    plant: Plant
     boards: list[Any]
     buses: list[Any]
     wires: list[Any]
@@ -40,7 +40,7 @@ class Lockstep:
     step_times: MutableSequence[int]
     side_by_side: bool
     stop_wanted: bool
-    def __init__(self, plant: RangerPlant, boards: Any, buses: list[Any], sampler: Sampler, start_ns: int) -> None: ...
+    def __init__(self, plant: Plant, boards: Any, buses: list[Any], sampler: Sampler, start_ns: int) -> None: ...
     def _put(self, place: Any, board: Any) -> None: ...
     def place(self, name: Any) -> int: ...
     def board(self, name: Any) -> Board: ...

@@ -1,6 +1,7 @@
 # Generated from plant/drive.py and plant/drive.pxd (python -m ranger_sim.tools.stubs); do not edit.
 
 from collections.abc import MutableSequence
+from ranger_sim.plant.bridge import Bridge
 from typing import final
 
 PWM_WRITE: int
@@ -13,7 +14,7 @@ HELD_LOW: int
 HELD_HIGH: int
 
 @final
-class Drive:
+class Drive(Bridge):
     next_change_ns: int
     duty: float
     ripple: float

@@ -7,6 +7,7 @@ from ranger_sim.plant.electrics import Electrics
 from ranger_sim.plant.imu import Imu
 from ranger_sim.plant.incremental_encoder import IncrementalEncoder
 from ranger_sim.plant.motor_unit import MotorUnit
+from ranger_sim.plant.plant import Plant
 from ranger_sim.plant.steering import Steering
 from typing import Any
 from typing import final
@@ -16,9 +17,7 @@ SAMPLES: dict[str, str]
 HIP_BOUNCE: float
 
 @final
-class RangerPlant:
-    time_ns: int
-    step_ns: int
+class RangerPlant(Plant):
     changes: int
     step_s: float
     zero: float
@@ -38,25 +37,16 @@ class RangerPlant:
     hip_word: AbsoluteEncoder
     outer_word: AbsoluteEncoder
     inner_word: AbsoluteEncoder
-    words: MutableSequence[int]
     imu: Imu
     jumped: bool
-    fell: bool
-    steps: int
     strike_time_ns: int
     lift_off_time_ns: int
     step_length_m: float
-    distance_m: float
-    fall_cause: str
     motors: list[Any]
-    encoders: list[Any]
     parameters: Any
     floor: Any
     record: Any
-    sample_names: Any
     model_file: Any
-    analog_start: MutableSequence[float]
-    analog_end: MutableSequence[float]
     def __init__(self, seed: Any = 0, slope_rad: Any = 0.0, floor_roughness_m: Any = 0.0, model_file: Any = None, start_ns: int = 0, parameters: Any = None, electrics: Any = None, floor: Any = None) -> None: ...
     def hold(self, stance: Any = 'outer', lean_rad: float = 0.0, hip_angle_rad: float = 0.3, outer_ankle_rad: float = 1.68, inner_ankle_rad: float = 1.68, lifted: bool = False) -> None: ...
     def release(self, rate_rad_s: float, hip_rate_rad_s: float = 0.0) -> None: ...
@@ -64,7 +54,7 @@ class RangerPlant:
     def _settle(self) -> None: ...
     def step(self) -> None: ...
     def _note(self) -> None: ...
-    def fill_sample(self, row: MutableSequence[float] | memoryview[float]) -> None: ...
+    def fill_sample(self, row: MutableSequence[float] | memoryview[float]) -> Any: ...
     @property
     def electronics_power_W(self) -> Any: ...
     @property

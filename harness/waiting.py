@@ -1,0 +1,176 @@
+"""Waiting for something in a machine: a condition is looked at between two steps of its plant.
+
+What any machine can be asked for stands here: an instant ("12.3 s"), a quantity of its body ("angle_rad > 0.5"), its
+end, a function. Ranger's own are in harness/conditions.py.
+"""
+
+import array
+import difflib
+import operator
+import re
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from ranger_sim.foundation.quantities import NUMBER, TIMES, duration_text, in_base_units
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.harness.step_watch import StepWatch
+
+COMPARISONS: dict[str, Callable[[Any, Any], bool]] = {
+    "<=": operator.le,
+    ">=": operator.ge,
+    "==": operator.eq,
+    "!=": operator.ne,
+    "<": operator.lt,
+    ">": operator.gt,
+}
+COMPARED = rf"(\w+) ?(<=|>=|==|!=|<|>) ?({NUMBER})"
+
+
+class ConditionNotMetError(AssertionError):
+    """A condition was not met in its time; the text says what was nearest."""
+
+
+class Condition:
+    """`text`: as it was written. `begin(robot)` once, then `met()` as often as it is asked."""
+
+    def __init__(self, text: str) -> None:
+        self.text = text
+        self.robot: Any = None
+
+    def begin(self, robot: Any) -> None:
+        """From now on the condition is about `robot`."""
+        self.robot = robot
+
+    def met(self) -> bool:
+        """Whether it holds now."""
+        raise NotImplementedError
+
+    def nearest(self) -> str:
+        """How near it came since `begin`, for the message of a test that waited in vain."""
+        raise NotImplementedError
+
+
+class At(Condition):
+    """An instant, `time_ns` since power-up."""
+
+    def __init__(self, text: str, time_ns: int) -> None:
+        Condition.__init__(self, text)
+        self.time_ns = time_ns
+
+    def met(self) -> bool:
+        return bool(self.robot.loop.time - self.robot.start_ns >= self.time_ns)
+
+    def nearest(self) -> str:
+        return f"it is {duration_text(self.robot.loop.time - self.robot.start_ns)} since power-up"
+
+
+class Ended(Condition):
+    """The machine can go no further: its plant says so."""
+
+    def met(self) -> bool:
+        return bool(self.robot.plant.fell)
+
+    def nearest(self) -> str:
+        return "it goes on"
+
+
+class Comparison(Condition):
+    """A quantity of the body against a number. `quantities`: {name: unit}, as the plant samples them."""
+
+    def __init__(self, text: str, name: str, sign: str, value: float, quantities: Mapping[str, str]) -> None:
+        Condition.__init__(self, text)
+        self.name = name
+        self.compare = COMPARISONS[sign]
+        self.value = value
+        self.closest: float | None = None
+        self.quantities = quantities
+        self.column = list(quantities).index(name) if name in quantities else -1
+        self.row = array.array("d", [0.0]) * len(quantities)
+
+    def begin(self, robot: Any) -> None:
+        Condition.begin(self, robot)
+        self.closest = None
+
+    def now(self) -> float:
+        """Its value."""
+        self.robot.plant.fill_sample(self.row)
+        return self.row[self.column]
+
+    def met(self) -> bool:
+        now = self.now()
+        if self.closest is None or abs(now - self.value) < abs(self.closest - self.value):
+            self.closest = now
+        return self.compare(now, self.value)
+
+    def unit(self) -> str:
+        """Of the quantity."""
+        return self.quantities[self.name]
+
+    def nearest(self) -> str:
+        return f"the nearest value of {self.name} was {self.closest:.6g} {self.unit()}".rstrip()
+
+
+class Function(Condition):
+    """A function of the robot."""
+
+    def __init__(self, function: Callable[[Any], Any]) -> None:
+        Condition.__init__(self, getattr(function, "__name__", repr(function)))
+        self.function = function
+
+    def met(self) -> bool:
+        return bool(self.function(self.robot))
+
+    def nearest(self) -> str:
+        return "it never returned a true value"
+
+
+def instant(text: str) -> At | None:
+    """The condition of a text like "12.3 s"; None for another one."""
+    seconds = in_base_units(text, TIMES) if re.search(r"[a-z]$", text) else None
+    return At(text, round(seconds * 1e9)) if seconds is not None and seconds >= 0.0 else None
+
+
+def meant(name: str, known: Any) -> str:
+    """What a wrong name may have been, as the end of a message."""
+    near = difflib.get_close_matches(name, known, 3)
+    return f"; meant was perhaps {' or '.join(near)}" if near else ""
+
+
+def condition(wanted: str | Condition | Callable[[Any], Any], quantities: Mapping[str, str]) -> Condition:
+    """The condition that is written in `wanted`, or is it already, for a machine whose plant samples `quantities`."""
+    if isinstance(wanted, Condition):
+        return wanted
+    if callable(wanted):
+        return Function(wanted)
+    text = " ".join(wanted.split())
+    if text == "ended":
+        return Ended(text)
+    if match := re.fullmatch(COMPARED, text):
+        name, sign, value = match.groups()
+        if name not in quantities:
+            told = ", ".join(quantities) or "none"
+            raise UserError(
+                f"condition {text!r}: {name!r} is no quantity of the body, but {told}{meant(name, quantities)}"
+            )
+        return Comparison(text, name, sign, float(value), quantities)
+    at = instant(text)
+    if at is None:
+        example = next(iter(quantities), "angle_rad")
+        raise UserError(f"condition {wanted!r}: it reads like 12.3 s, {example} > 0.3, or ended")
+    return at
+
+
+class Waiting(StepWatch):
+    """Stops the loop as soon as a condition holds."""
+
+    def __init__(self, robot: Any, wanted: Condition) -> None:
+        StepWatch.__init__(self)
+        self.wanted = wanted
+        self.loop = robot.loop
+        self.met = False
+        wanted.begin(robot)
+
+    def before_step(self, now_ns: int) -> None:
+        if self.wanted.met():
+            self.met = True
+            self.loop.stop_wanted = True

@@ -1,0 +1,54 @@
+"""What the harness needs of any machine's body: steps of equal length, and sensors that show each of them.
+
+Ranger's is plant/ranger.py. A machine of your own is a subclass; plain Python does, a step takes as long as it takes:
+
+    class Arm(Plant):
+        def __init__(self):
+            Plant.__init__(self, step_ns=250_000, voltages=1, samples={"angle_rad": "rad"})
+            self.bridges = [Drive()]
+            self.encoders = [IncrementalEncoder("arm", 1024)]
+
+        def step(self):
+            ...  # integrate over [time_ns, time_ns + step_ns]
+            self.time_ns += self.step_ns
+"""
+
+import array
+
+import cython
+
+from ranger_sim.foundation.numbers import integers
+
+
+class Plant:
+    """A body that moves in steps of `step_ns`. Subclasses fill in `step` and `fill_sample`.
+
+    Towards the boards: `bridges` (Bridge) that their PWM and pins drive; `encoders`, each with its `edges`
+    (IncrementalEncoder); `analog_start` and `analog_end`, each voltage at the ends of the step, V, a straight line
+    between; `words` of digital sensors, which stand for a step.
+
+    Towards the harness: `sample_names`, {name: unit} of what `fill_sample` writes; `fell`: it can go no further, with
+    the reason in `fall_cause`; `steps` and `distance_m`, for machines that walk.
+    """
+
+    def __init__(self, step_ns, start_ns=0, voltages=0, words=0, samples=None) -> None:
+        self.step_ns = step_ns
+        self.time_ns = start_ns
+        self.bridges = []
+        self.encoders = []
+        self.analog_start = array.array("d", [0.0]) * max(1, voltages)
+        self.analog_end = array.array("d", [0.0]) * max(1, voltages)
+        self.words = integers(max(1, words))
+        self.sample_names = samples if samples is not None else {}
+        self.steps = 0
+        self.distance_m = 0.0
+        self.fell = False
+        self.fall_cause = ""
+
+    def step(self) -> None:
+        """Integrate over [time_ns, time_ns + step_ns], then show it: time_ns, edges, voltages, words."""
+        raise NotImplementedError
+
+    def fill_sample(self, row: cython.double[::1]) -> object:
+        """Write the values named in `sample_names` into `row`, in their order."""
+        return None
