@@ -1,4 +1,4 @@
-"""Boards of the robot whose firmware is C: what hangs on their chips, their table, and their counters."""
+"""Boards of the robot that can have firmware in C: what hangs on their chips, and compiling it with the table."""
 
 import dataclasses
 import functools
@@ -9,15 +9,11 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from ranger_sim.boards import ankle_board, hip, motor_board, steering
-from ranger_sim.boards.counters import RangerCounters
-from ranger_sim.boards.modules.error_module import ErrorModule
-from ranger_sim.boards.modules.network_time import NetworkTime
 from ranger_sim.datatable import generated
 from ranger_sim.datatable.generated import mcfi, mcfo, mch, mcsi
 from ranger_sim.firmware_sim.native import build as compiling
 from ranger_sim.firmware_sim.native import manifest as manifests
 from ranger_sim.firmware_sim.native.hardware import ExternalConverter, Hardware, InternalConverter
-from ranger_sim.firmware_sim.native.native_board import NativeBoard
 from ranger_sim.firmware_sim.peripherals.adc_external import CONVERSION_NS as FASTEST_CONVERSION_NS
 from ranger_sim.foundation.user_error import UserError
 
@@ -123,41 +119,3 @@ def known(board: str) -> str:
     if board not in PLACES:
         raise UserError(f"firmware for board {board!r}: boards that can run firmware in C are {', '.join(PLACES)}")
     return board
-
-
-class RobotNativeBoard(NativeBoard):
-    """Board `name` of the robot with a firmware in C, in the place of the emulated one."""
-
-    def __init__(self, name: str, firmware: Firmware, crystal: Any, power_up_ns: int) -> None:
-        hardware = firmware.manifest.hardware if firmware.manifest.hardware is not None else hardware_of(name)
-        NativeBoard.__init__(self, name, firmware.library, crystal, power_up_ns, hardware)
-        version = self.library.table_version
-        if version is not None and version != table_version():
-            raise UserError(
-                f"{firmware.library}: compiled with version 0x{version:08X} of the master table, "
-                f"this robot has 0x{table_version():08X}: build it again"
-            )
-        controller = PLACES[name].table.CONTROLLER
-        if controller not in self.devices.cans:
-            raise UserError(
-                f"{firmware.library}: firmware_start() does not start CAN controller {controller}, "
-                f"on which {name}'s bus hangs (fw_can_start)"
-            )
-        self.module = ErrorModule(PLACES[name].table.BOARD_NUMBER, NetworkTime())
-
-    @property
-    def errors(self) -> ErrorModule:
-        """How often its program noted each error, where it says so (`firmware_error_totals`); else never."""
-        self.module.totals = self.error_totals(len(self.module.totals))
-        return self.module
-
-    def counters(self) -> object:
-        """What the board counted; its program's own queues are not known."""
-        return RangerCounters(
-            hz=self.hz,
-            unclaimed=self.unclaimed,
-            slots=self.scheduler.counters(),
-            can=self.can_counters(),
-            time_ms=self.network_time_ms(),
-            errors=list(self.errors.totals),
-        )

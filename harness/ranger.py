@@ -37,7 +37,7 @@ from ranger_sim.harness.faults import catalogue
 from ranger_sim.harness.faults.fault import Fault
 from ranger_sim.harness.fresh_board import first_outputs, pass_on
 from ranger_sim.harness.logbook import Logbook
-from ranger_sim.harness.native_boards import Firmware, RobotNativeBoard
+from ranger_sim.harness.native_boards import Firmware
 from ranger_sim.harness.operator import Operator
 from ranger_sim.harness.profile import Profile
 from ranger_sim.harness.recorder import Recorder
@@ -144,6 +144,8 @@ class Ranger:
         """A board fresh from the shelf, with its own crystal, powered up at `power_up_ns`; not wired."""
         crystal = self._stream(name)[0]
         if name in self.firmware:
+            from ranger_sim.harness.robot_native_board import RobotNativeBoard  # only here: it loads cffi
+
             return RobotNativeBoard(name, self.firmware[name], crystal, power_up_ns)
         if name == "MB":
             return MainBrainBoard(crystal, self.quirks, power_up_ns, controller=self.controller)

@@ -11,7 +11,6 @@ import sys
 import tempfile
 from collections.abc import Sequence
 
-from ranger_sim.firmware_sim.native.library import Library
 from ranger_sim.firmware_sim.native.manifest import Manifest
 from ranger_sim.foundation.user_error import UserError
 
@@ -100,13 +99,20 @@ def build(
         with tempfile.TemporaryDirectory(prefix=".making-", dir=folder) as making:
             warnings = _compile(program, options, watching, sources, pathlib.Path(making), manifest)
             made = pathlib.Path(making) / "library.so"
-            Library(made, shown=path)
+            _looked_at(made, path)
             stamp.unlink(missing_ok=True)
             made.replace(path)
             stamp.write_text(state, encoding="utf-8")
     except OSError as error:
         raise UserError(f"{error.filename or folder}: {error.strerror}: nothing can be built there") from None
     return Built(path, warnings)
+
+
+def _looked_at(made: pathlib.Path, shown: pathlib.Path) -> None:
+    """UserError for a library without the entry points."""
+    from ranger_sim.firmware_sim.native.library import Library  # only here: it loads cffi
+
+    Library(made, shown)
 
 
 def _compile(

@@ -32,6 +32,7 @@ VALUES = {
     "daq_link": st.sampled_from(["wired", "bluetooth"]),
     "daq_dropouts": st.just(True),
     "imu_port": NAMES,
+    "firmware": st.lists(NAMES, min_size=1, max_size=2),
 }
 
 
