@@ -10,6 +10,8 @@ from ranger_sim.boards.modules.ssp_link import MainBrainSspLink, RouterSspLink
 from ranger_sim.datatable.generated import errors, routes
 from ranger_sim.foundation.events import FLAG_REMOTE
 
+EIGHT_BYTES = 8  # flags of a data frame of eight bytes, identifier of 11 bits
+
 
 def build(lag=False, table=None):
     said = []
@@ -247,3 +249,11 @@ def drain(router):
     while router.ssp.half_words_waiting():
         router.ssp.next_segment(10**9)
     return out
+
+
+def test_a_frame_of_the_routers_own_is_a_data_frame_of_eight_bytes():
+    router, _ = build(table=RoutingTable([(900, 1 << 1)]))
+    router.send(900, 5, 6)
+    assert router.route_step(0) == 1
+    row = 4 * 8  # of CAN1
+    assert list(router.tx_rows[row : row + 4]) == [900, EIGHT_BYTES, 5, 6]

@@ -453,3 +453,10 @@ def test_no_bytes_stop_the_board(pieces):
     assert desk.board.store.get_float(table.C_F_ST_F_ANG) == 4.5
     assert desk.board.scheduler.slot_count == slots + 35
     assert desk.link.points > before
+
+
+def test_the_two_ports_are_the_wire_without_flow_control_and_bluetooth_at_half_its_rate():
+    # robot.md N4.15: HS-UART1 at 13 MHz / 14, no flow control; HS-UART2 at half of that, CTS on pin 0
+    from ranger_sim.boards.main_brain.board import COMPUTER_PORTS
+
+    assert COMPUTER_PORTS == {"wired": (1, 0, -1), "bluetooth": (2, 1, 0)}

@@ -64,6 +64,17 @@ def test_motors_are_off_outside_walking(keys):
     assert bench.store.is_unread(18, 1)
 
 
+def test_standby_stops_the_steering_of_the_walk_that_it_ends():
+    bench = Bench()
+    bench.tick()
+    bench.press(1)
+    bench.modes.steering.twist = 55.0
+    bench.set(MCSI_COMMAND_CURRENT=55.0)
+    bench.press(2)
+    assert (bench.states()[0], bench.modes.steering.twist) == ("standby", 0.0)
+    assert bench.command("MCSI") == OFF
+
+
 def put_machines(bench, leg, hip, inner, outer, steering):
     modes = bench.modes
     modes.leg.machine.put(leg)

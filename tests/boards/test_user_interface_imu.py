@@ -8,6 +8,9 @@ from hypothesis import strategies as st
 
 from ranger_sim.boards.modules.imu_parser import ImuParser, start_command
 from ranger_sim.datatable.generated import errors
+from ranger_sim.firmware_sim.microcontroller import Microcontroller
+from ranger_sim.firmware_sim.peripherals.uart import Uart
+from ranger_sim.foundation.events import UART_BYTE
 from ranger_sim.foundation.numbers import float32
 
 
@@ -99,6 +102,20 @@ def test_a_full_ring_reports_and_loses_the_byte(said):
     feed(parser, bytes(129))
     assert said == [errors.MSIMU_RX_OF] * 2
     assert (parser.waiting(), parser.bytes_lost) == (127, 2)
+
+
+@pytest.mark.parametrize(("stored", "kept"), [(118, 127), (119, 127), (120, 127)])
+def test_what_the_fifo_brings_fills_the_ring_to_its_last_place_and_the_rest_is_reported(said, stored, kept):
+    chip = Microcontroller("UI", 60_000_000)
+    uart = Uart(chip, number=1, trigger=14)
+    for byte in range(9):
+        chip.inbox.push(1000 * (1 + byte), 0, UART_BYTE, 1, byte)
+    chip.advance(20_000)
+    parser = ImuParser(said.append)
+    feed(parser, bytes(stored))
+    assert parser.receive(uart) == 9
+    lost = max(0, stored + 9 - kept)
+    assert (parser.waiting(), parser.bytes_lost, len(said)) == (min(stored + 9, kept), lost, lost)
 
 
 @given(st.lists(st.one_of(st.binary(max_size=40), st.just(packet(0xCF, (1.0, 2.0, 3.0, 4.0, 5.0, 6.0))))))

@@ -225,6 +225,11 @@ def test_the_buttons_word_has_a_bit_per_key(chip, gpio, said):
     assert said == [errors.BUTTON_OOB]
 
 
+def test_the_keys_hang_on_the_pins_of_the_board():
+    # robot.md N4.11: P1.18, P0.12, P0.13, P0.28, P1.16, P0.30
+    assert KEY_PINS == (32 + 18, 12, 13, 28, 32 + 16, 30)
+
+
 # --- radio control ------------------------------------------------------------------------------------
 
 

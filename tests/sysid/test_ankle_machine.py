@@ -6,6 +6,7 @@ import pathlib
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 from ranger_sim.foundation.random_arrays import generator
 from ranger_sim.foundation.user_error import UserError
@@ -245,3 +246,18 @@ def test_the_second_half_of_the_slow_sine_is_predicted_by_the_first():
     values, (square,) = predicted(first, second, {"square": lambda m: -(m.a**2)})
     assert plain.nrmse > 0.2 and square.nrmse < 0.135
     assert values["square"] == pytest.approx(0.13, abs=0.02)
+
+
+def test_the_friction_of_a_step_solves_its_equation():
+    """Against bisection by scipy, which shares nothing with Newton's method."""
+    rng = generator(11, "friction")
+    for _ in range(300):
+        free, current = rng.normal() * 0.05, rng.normal() * 2.0
+        v, by_r = 10.0 ** rng.uniform(-4.0, -1.0), rng.uniform(-2.0, 2.0)
+        C_0, m, creep = rng.uniform(0.0, 0.3), rng.uniform(0.0, 0.3), 0.01
+
+        def missed(r, free=free, v=v, current=current, by_r=by_r, C_0=C_0, m=m, creep=creep):
+            return r - (C_0 + m * abs(current + by_r * r)) * math.tanh((free - v * r) / creep)
+
+        r = ankle_motion._friction(free, v, current, by_r, C_0, m, creep)
+        assert r == pytest.approx(brentq(missed, -20.0, 20.0, xtol=1e-13), abs=1e-9)

@@ -32,6 +32,8 @@ def test_a_gap_of_any_channel_cuts_the_table():
     assert table.time_s.tolist() == [*range(10), *range(30, 40)]
     assert table.runs == (slice(0, 10), slice(10, 20))
     assert table.part(slice(5, 15)).runs == (slice(0, 5), slice(5, 10))
+    assert table.part(slice(0, 10)).runs == (slice(0, 10),)  # none that is empty
+    assert table.part(slice(10, 12)).runs == (slice(0, 2),)
 
 
 def test_only_the_time_that_all_channels_have_counts():

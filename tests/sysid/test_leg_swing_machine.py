@@ -1,6 +1,7 @@
 """The swinging leg is diagnosed: by data of an integrator of the tests' own, with standstill, noise and counts."""
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from ranger_sim.foundation.random_arrays import generator
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.sysid.dataset import Table
 from ranger_sim.sysid.diagnose import diagnose
+from ranger_sim.sysid.machines import leg_swing
 from ranger_sim.sysid.machines.leg_swing import LegSwing
 
 STEP_S, FINE, SIZE = 0.002, 4, 6000
@@ -110,3 +112,37 @@ def test_recordings_that_say_nothing_are_told_in_a_sentence():
         LegSwing().prepare(one)
     with pytest.raises(UserError, match="swing 6: no voltage_V, which the other recordings have"):
         diagnose(LegSwing(), [run, swing(6, with_voltage=False)])
+
+
+def test_the_balance_of_torques_is_the_legs_equation():
+    """Term by term, at states drawn at random; the oracle has the balance written out for one row."""
+    machine = LegSwing().by_voltage
+    rng = generator(5, "balance")
+    for _ in range(50):
+        q, w = rng.normal(size=2)
+        p = {known.name: known.value * rng.uniform(0.5, 2.0) for known in machine.parameters}
+        u = {"V": rng.normal() * 10.0, "slope": rng.normal(), "drop_V": rng.normal(), "torque_Nm": rng.normal(),
+             "constant_share": 0.1 * rng.normal()}  # fmt: skip
+        K = p["torque_constant_Nm_per_A"] * (1.0 + u["constant_share"])
+        driving = u["V"] - u["drop_V"] - K * w
+        current = 0.0
+        if abs(driving) > p["contact_drop_V"]:
+            beyond = driving - math.copysign(p["contact_drop_V"], driving)
+            current = (beyond - p["inductance_H"] * u["slope"] / p["resistance_ohm"]) / p["resistance_ohm"]
+        torque, friction = machine._torques(np.array([q]), np.array([w]), {k: np.array([v]) for k, v in u.items()}, p)
+        expected = K * current + u["torque_Nm"] - p["hip_spring_Nm_per_rad"] * q - machine.weight_Nm * math.sin(q)
+        expected += 9.81 * p["ahead_kg_m"] * math.cos(q) - p["viscous_friction_Nms"] * w
+        assert torque[0] == pytest.approx(expected, rel=1e-9, abs=1e-9)
+        assert friction[0] == pytest.approx(
+            p["constant_friction_Nm"] + p["load_friction_Nm_per_A"] * abs(current), rel=1e-9
+        )
+
+
+def test_a_clipped_voltage_is_what_lies_beyond_the_limit_with_its_sign():
+    voltage = np.array([-20.0, -12.0, -5.0, 0.0, 5.0, 12.0, 20.0])
+    terms = {term.cause: term for term in leg_swing._electric(1.0, 20.0)}
+    recording = SimpleNamespace(signals={"V": voltage})
+    shapes = [shape["limit_V"] for shape in terms["voltage_clip"].shapes]
+    assert shapes == pytest.approx([10.0, 12.0, 14.0, 16.0, 18.0, 19.0])
+    made = terms["voltage_clip"].make(recording, {"limit_V": 12.0}, {})
+    assert made["drop_V"].tolist() == [-8.0, 0.0, 0.0, 0.0, 0.0, 0.0, 8.0]

@@ -53,6 +53,9 @@ def table(tmp_path):
         ("duty_percent", "duty", 1e-2),
         ("load_kg_cm2", "load_kg_m2", 1e-4),
         ("gain_V_s_per_mm", "gain_V_s_per_m", 1e3),
+        ("speed_mm_s", "speed_m_per_s", 1e-3),
+        ("accel_mm_s2", "accel_m_per_s2", 1e-3),
+        ("rate_per_ms", "rate_per_s", 1e3),
     ],
 )
 def test_a_unit_in_a_name_becomes_si(column, name, factor):
@@ -61,7 +64,9 @@ def test_a_unit_in_a_name_becomes_si(column, name, factor):
     assert unit.factor == pytest.approx(factor, rel=1e-12)
 
 
-@pytest.mark.parametrize("column", ["current_min", "current_1", "position", "A", "state_x", "speed_furlongs"])
+@pytest.mark.parametrize(
+    "column", ["current_min", "current_1", "position", "A", "state_x", "speed_furlongs", "gain_V_per"]
+)
 def test_what_is_no_unit_is_not_taken_for_one(column):
     assert units.split(column) == (column, None)
 
@@ -114,6 +119,12 @@ def test_one_table_in_many_dresses(table, text):
     assert data[name].unit == "V"
     assert data[name].value.tolist() == pytest.approx([1.5, 2.5])
     assert data[name].time_s.tolist() == pytest.approx([0.0, 1.0])
+
+
+def test_the_separator_is_that_of_the_first_fifty_lines(table):
+    rows = "".join(f"{k}\t{k}\n" for k in range(49))
+    data = table(f"t_s\ta_V\n{rows}a torn line\n")  # the 51st
+    assert data["a_V"].value.tolist() == [float(k) for k in range(49)]
 
 
 def test_an_empty_cell_is_an_instant_without_a_sample(table):
@@ -266,6 +277,20 @@ def test_a_measurement_file_keeps_units_and_leaves_out_what_no_instrument_sees(t
     assert [each.kind for each in read(tmp_path).findings] == ["fell"]
     named = channels.named_for(read(tmp_path), "walk")
     assert named["hip_angle_rad"].value.tolist() == [0.0, 1.0, 2.0, 3.0, 4.0]
+
+
+def test_a_measurement_begins_at_zero_and_its_groups_keep_their_distance(tmp_path):
+    from ranger_sim.tools import variables_file
+
+    start_s = 1.75e9  # of a calendar
+    early, late = start_s + np.arange(5) * 0.5, start_s + 0.25 + np.arange(5) * 0.5
+    variables_file.write_groups(
+        [("a", early, [("a", "A", "", np.arange(5.0))]), ("b", late, [("b", "V", "", np.arange(5.0))])],
+        tmp_path / "late.mf4",
+    )
+    data = read(tmp_path / "late.mf4")
+    assert data["a_A" if "a_A" in data else "a"].time_s.tolist() == pytest.approx((early - start_s).tolist())
+    assert data["b_V" if "b_V" in data else "b"].time_s.tolist() == pytest.approx((late - start_s).tolist())
 
 
 def test_a_broken_measurement_file_is_told_in_a_line(tmp_path):

@@ -1,0 +1,61 @@
+"""Writes docs/reference/causes.md: the catalogue of causes, and what each machine takes for known.
+
+python docs/causes_table.py
+"""
+
+import importlib
+import pathlib
+
+from ranger_sim.sysid import causes, machines
+from ranger_sim.sysid.fit import Parameter
+from ranger_sim.tools.files import replace_file
+
+PAGE = pathlib.Path(__file__).parent / "reference/causes.md"
+HEAD = """# Causes and unknowns
+
+What `ranger-sim diagnose` can name, what its machines know beforehand, and what `ranger-sim identify` finds.
+`ranger-sim causes CAUSE` tells more of one; [diagnose](../diagnose.md) says how a cause is found, and
+[identify](../identify.md) how a number is.
+
+`python docs/causes_table.py` writes this page, and a test holds it: no number of these tables changes unseen.
+"""
+
+
+def page() -> str:
+    """The whole page."""
+    lines = [HEAD, "## Causes", ""]
+    lines += [f"- **{letter}**: {meaning}" for letter, meaning in causes.BALANCES.items()]
+    lines += [
+        "",
+        "| | cause | what | balances | what it leaves behind | may be taken for |",
+        "|---|---|---|---|---|---|",
+    ]
+    for key, cause in causes.CAUSES.items():
+        more = "; a wrong value of a number that the model has" if cause.shift else ""
+        rivals = ", ".join(str(number) for number in cause.confusable)
+        lines.append(
+            f"| {cause.number} | {key} | {cause.meaning}{more} | {', '.join(cause.balances)} | {cause.signature} | {rivals} |"
+        )
+    for name in machines.MACHINES:
+        machine = machines.made(name)()
+        lines += ["", f"## What {name} knows", "", "| | unit | value | limits | what |", "|---|---|---|---|---|"]
+        for known in machine.parameters:
+            limits = f"{known.low:g} to {known.high:g}"
+            lines.append(f"| {known.name} | {known.unit} | {known.value:.6g} | {limits} | {known.meaning} |")
+    for name in ("motor", "springs", "ankle"):
+        module = importlib.import_module(f"ranger_sim.sysid.identify.{name}")
+        lines += ["", f"## Unknowns of identify/{name}.py", "", "| | unit | start | limits | known to | source |"]
+        lines.append("|---|---|---|---|---|---|")
+        for unknown in (each for each in vars(module).values() if isinstance(each, Parameter)):
+            known = f"{unknown.uncertainty:g}" if unknown.uncertainty else ""
+            limits = f"{unknown.low:g} to {unknown.high:g}"
+                f"{unknown.low:g} to {unknown.high:g}",
+                f"{unknown.uncertainty:g}" if unknown.uncertainty else "",
+            )
+            value = f"{unknown.value:.6g}"
+            lines.append(f"| {unknown.name} | {unknown.unit} | {value} | {limits} | {known} | {unknown.source} |")
+    return "\n".join(lines) + "\n"
+
+
+if __name__ == "__main__":
+    replace_file(PAGE, page().encode())
