@@ -33,9 +33,9 @@ def page() -> str:
     for key, cause in causes.CAUSES.items():
         more = "; a wrong value of a number that the model has" if cause.shift else ""
         rivals = ", ".join(str(number) for number in cause.confusable)
-        lines.append(
-            f"| {cause.number} | {key} | {cause.meaning}{more} | {', '.join(cause.balances)} | {cause.signature} | {rivals} |"
-        )
+        meaning = cause.meaning + more
+        cells = (str(cause.number), key, meaning, ", ".join(cause.balances), cause.signature, rivals)
+        lines.append(f"| {' | '.join(cells)} |")
     for name in machines.MACHINES:
         machine = machines.made(name)()
         lines += ["", f"## What {name} knows", "", "| | unit | value | limits | what |", "|---|---|---|---|---|"]
@@ -47,13 +47,10 @@ def page() -> str:
         lines += ["", f"## Unknowns of identify/{name}.py", "", "| | unit | start | limits | known to | source |"]
         lines.append("|---|---|---|---|---|---|")
         for unknown in (each for each in vars(module).values() if isinstance(each, Parameter)):
-            known = f"{unknown.uncertainty:g}" if unknown.uncertainty else ""
             limits = f"{unknown.low:g} to {unknown.high:g}"
-                f"{unknown.low:g} to {unknown.high:g}",
-                f"{unknown.uncertainty:g}" if unknown.uncertainty else "",
-            )
-            value = f"{unknown.value:.6g}"
-            lines.append(f"| {unknown.name} | {unknown.unit} | {value} | {limits} | {known} | {unknown.source} |")
+            known_to = f"{unknown.uncertainty:g}" if unknown.uncertainty else ""
+            cells = (unknown.name, unknown.unit, f"{unknown.value:.6g}", limits, known_to, unknown.source)
+            lines.append(f"| {' | '.join(cells)} |")
     return "\n".join(lines) + "\n"
 
 
