@@ -2,6 +2,7 @@ cimport cython
 
 from ranger_sim.foundation.edge_buffer cimport ByteBuffer
 from ranger_sim.foundation.events cimport ORDER_PINS, UART_BYTE, EventQueue
+from ranger_sim.harness.step_watch cimport SerialDevice
 from ranger_sim.plant.imu cimport Imu
 
 cpdef enum:
@@ -10,11 +11,10 @@ cpdef enum:
     PAUSE_NS = 25000
 
 @cython.final
-cdef class ImuWire:
+cdef class ImuWire(SerialDevice):
     cdef public Imu imu
     cdef public EventQueue inbox
     cdef public long long uart
     cdef public object tap
     cdef public bint plugged
-    cpdef int deliver(self) except -1
     cdef void _put_bytes(self) noexcept

@@ -6,6 +6,7 @@ import cython
 
 from ranger_sim.foundation.edge_buffer import ByteBuffer
 from ranger_sim.foundation.events import EventQueue
+from ranger_sim.harness.step_watch import SerialDevice
 
 if not cython.compiled:
     from ranger_sim.foundation.events import ORDER_PINS, UART_BYTE
@@ -15,7 +16,7 @@ if not cython.compiled:
     PAUSE_NS = 25_000  # from byte to byte; after more a new message begins (at 460,800 baud a byte takes 21.7 us)
 
 
-class ImuWire:
+class ImuWire(SerialDevice):
     """`imu` on UART `uart` of `board`. `tap.bytes_sent(times, values, count)` hears what the unit sends, beside it."""
 
     def __init__(self, imu, board, uart) -> None:
@@ -33,12 +34,13 @@ class ImuWire:
         """A byte of the board arrives at the unit."""
         self.imu.receive_byte(time, byte)
 
-    def deliver(self) -> None:
+    def deliver(self) -> object:
         """Carry on what the unit sent during the step that was just integrated."""
         if self.plugged and self.imu.bytes.count:
             if self.tap is not None:
                 self.tap.bytes_sent(self.imu.bytes.times, self.imu.bytes.values, self.imu.bytes.count)
             self._put_bytes()
+        return None
 
     def _put_bytes(self) -> cython.void:
         """Up to eight bytes that follow each other closely travel as one message."""

@@ -4,10 +4,8 @@ from ranger_sim.can_bus.bus cimport Bus
 from ranger_sim.firmware_sim.board cimport Board
 from ranger_sim.foundation.events cimport NEVER
 from ranger_sim.harness.board_wires cimport BoardWires, WordWire
-from ranger_sim.harness.imu_wire cimport ImuWire
 from ranger_sim.harness.sampler cimport Sampler
-from ranger_sim.harness.step_watch cimport StepWatch
-from ranger_sim.harness.strike_watch cimport StrikeWatch
+from ranger_sim.harness.step_watch cimport SerialDevice, StepEnd, StepWatch
 from ranger_sim.plant.plant cimport Plant
 
 cpdef enum:
@@ -24,9 +22,9 @@ cdef class Lockstep:
     cdef public long long time, window_ns, stop_steps
     cdef public double stop_distance_m
     cdef public Sampler sampler
-    cdef public StrikeWatch strikes
+    cdef public StepEnd strikes
     cdef public list watchers
-    cdef public ImuWire imu_wire
+    cdef public SerialDevice serial_device
     cdef public long long[::1] encoder_boards, due, came, prompt, step_times
     cdef public bint side_by_side, stop_wanted
     cpdef long long run(self, long long until) except? <long long>-1

@@ -40,10 +40,8 @@ from ranger_sim.firmware_sim.board import Board
 from ranger_sim.foundation.numbers import integers
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.board_wires import BoardWires, SspWire, WordWire
-from ranger_sim.harness.imu_wire import ImuWire
 from ranger_sim.harness.sampler import Sampler
-from ranger_sim.harness.step_watch import StepWatch
-from ranger_sim.harness.strike_watch import StrikeWatch
+from ranger_sim.harness.step_watch import SerialDevice, StepEnd, StepWatch
 from ranger_sim.plant.plant import Plant
 
 if not cython.compiled:
@@ -61,7 +59,7 @@ ANY_DISTANCE_M = 1e300
 
 
 class Lockstep:
-    """Boards, buses and plant on one clock. Built by `harness.ranger.Ranger`, which wires it."""
+    """Boards, buses and plant on one clock. Built by `harness.machine.Machine`, which wires it."""
 
     def __init__(self, plant, boards, buses, sampler, start_ns) -> None:
         # the compiled loop takes these for what they should be without asking again
@@ -72,7 +70,7 @@ class Lockstep:
         self.boards = list(boards)
         self.buses = buses
         self.sampler = sampler
-        self.strikes = None
+        self.strikes = None  # a StepEnd
         self.watchers = []  # StepWatch: what looks at every step of the plant, or reaches into it
         self.stop_wanted = False  # a watcher sets it: `run` returns before the step
         self.time = start_ns
@@ -96,7 +94,7 @@ class Lockstep:
         self.word_wires = []
         self.encoder_wires = []  # (place of the board, edges, two pins)
         self.encoder_boards = array.array("q")  # places of the boards with encoders on their pins
-        self.imu_wire = None
+        self.serial_device = None
 
     def _put(self, place, board) -> None:
         """`board` stands at `place`, on the wires there."""
@@ -166,18 +164,14 @@ class Lockstep:
         for board in (master, slave):
             self.wires[self.place(board.name)].link = link
 
-    def connect_imu(self, imu, board, uart) -> None:
-        """The inertial unit `imu` of the plant hangs on UART `uart` of `board`."""
-        self.imu_wire = ImuWire(imu, board, uart)
-        self.connect_serial_line(board, uart, self.imu_wire)
+    def connect_serial_device(self, device, board, uart) -> None:
+        """`device` of the plant (a SerialDevice that hears `from_board`) hangs on UART `uart` of `board`."""
+        self.serial_device = device
+        self.connect_serial_line(board, uart, device)
 
     def connect_serial_line(self, board, uart, line) -> None:
         """What `board` sends by UART `uart` goes to `line.from_board(time, byte, count, data)`, and nowhere else."""
         self.wires[self.place(board.name)].serial_lines[uart] = line
-
-    def watch_strikes(self, main_brain) -> None:
-        """Time from the body's heel strikes to the main-brain slots that notice them."""
-        self.strikes = StrikeWatch(self.plant, main_brain)
 
     # --- passing time -------------------------------------------------------------------------------------
 
@@ -230,7 +224,7 @@ class Lockstep:
                 self._run_in_turn(end, end == until)
             self.time = end
             if self.strikes is not None:
-                self.strikes.look()
+                cython.cast(StepEnd, self.strikes).look()
         due[board_count] = self._decide(self.time - 1)
         return reason
 
@@ -375,8 +369,8 @@ class Lockstep:
                 self.came[place] = first
                 if self.prompt[place] and first < self.due[place]:
                     self.due[place] = first
-        if self.imu_wire is not None:
-            self.imu_wire.deliver()
+        if self.serial_device is not None:
+            cython.cast(SerialDevice, self.serial_device).deliver()
 
     def _watch_before(self, now: cython.longlong) -> cython.bint:
         """Every watcher once per step, before it; True when one of them wants to stop here."""

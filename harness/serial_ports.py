@@ -362,14 +362,14 @@ def connect_imu(robot: Ranger, port: Port) -> SerialLine:
     """A real inertial unit at the port, instead of the plant's, on the user interface board's UART."""
     board = robot.boards[wiring.IMU_BOARD]
     line = SerialLine(board.inbox.push, wiring.IMU_UART, port, board.uart1.byte_ns)
-    robot.loop.imu_wire.unplug()
+    robot.loop.serial_device.unplug()
     return _connect(robot, wiring.IMU_BOARD, line)
 
 
 def offer_imu(robot: Ranger, port: Port) -> ImuOffer:
     """The plant's inertial unit for a real host at the port."""
     offer = ImuOffer(robot.plant.imu, port)
-    robot.loop.imu_wire.tap = offer
+    robot.loop.serial_device.tap = offer
     robot.attach(offer)
     return offer
 

@@ -22,3 +22,19 @@ class StepWatch:
         Absolute encoders: their words in `plant.words` stand from `end_ns` to the end of the next step.
         """
         return None
+
+
+class StepEnd:
+    """What looks at the robot at the end of every step, when the boards have run through it (`Lockstep.strikes`)."""
+
+    def look(self) -> object:
+        """Once per step of the plant."""
+        return None
+
+
+class SerialDevice:
+    """What of the plant hangs on a board's UART and speaks by itself (`Lockstep.connect_serial_device`)."""
+
+    def deliver(self) -> object:
+        """Carry on what it sent during the step that was just integrated."""
+        return None

@@ -5,10 +5,11 @@ import math
 import cython
 
 from ranger_sim.firmware_sim.board import Board
+from ranger_sim.harness.step_watch import StepEnd
 from ranger_sim.plant.ranger import RangerPlant
 
 
-class StrikeWatch:
+class StrikeWatch(StepEnd):
     """`board`: the main brain, of which the swing leg can be watched (`Board.watched`).
 
     `count` strikes were noticed; `missed`: steps of which no flip of the swing leg told; `unmatched`: flips without a
@@ -27,13 +28,14 @@ class StrikeWatch:
         self.sum_ms = 0.0
         self.squares_ms2 = 0.0
 
-    def look(self) -> None:
+    def look(self) -> object:
         """Once per step of the plant: has the main brain flipped the swing leg?"""
         board: Board = self.board
         leg: cython.longlong = board.watched()
         if leg != self.swing_leg:
             self.swing_leg = leg
             self._notice()
+        return None
 
     def _notice(self) -> cython.void:
         """It has: how long after the body's strike did that slot begin?"""

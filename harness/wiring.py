@@ -4,9 +4,8 @@ Source: robot.md N1.1 (buses), N4.1 (encoders), N4.5-N4.9 (converters, switches)
 Read a line from left to right in the direction in which the signal goes.
 """
 
-from typing import NamedTuple
-
 from ranger_sim.boards import can_router, motor_board, user_interface
+from ranger_sim.harness.wires import AnalogInput, BridgeWire, CanWire, EncoderWire, EncoderWord, Wiring
 from ranger_sim.plant import wiring_points as point
 
 # The order in which boards are advanced and their messages sorted within an instant.
@@ -15,14 +14,6 @@ BOARDS = ("MCH", "MCFO", "MCFI", "MCSI", "UI", "CSR", "MB")
 # Boards on which frames, edges and bytes wait for a task: no handler and no main loop answers them at once, or looks at
 # a sensor because of them.
 HEAR_IN_SLOTS = ("MCH", "MCFO", "MCFI", "MCSI", "UI")
-
-
-class CanWire(NamedTuple):
-    """Controller `controller` of `board` hangs on bus `bus` (1 ... 4)."""
-
-    board: str
-    controller: int
-    bus: int
 
 
 CAN = (
@@ -38,15 +29,6 @@ CAN = (
 )
 
 
-class EncoderWire(NamedTuple):
-    """Channels A and B of an incremental encoder (place in the plant's list) on two pins of a board."""
-
-    encoder: int
-    board: str
-    pin_a: str
-    pin_b: str
-
-
 ENCODERS = (
     EncoderWire(point.HIP_JOINT_EDGES, "MCH", "encoder_01_a", "encoder_01_b"),
     EncoderWire(point.HIP_MOTOR_EDGES, "MCH", "encoder_23_a", "encoder_23_b"),
@@ -55,14 +37,6 @@ ENCODERS = (
     EncoderWire(point.INNER_MOTOR_EDGES, "MCFI", "encoder_01_a", "encoder_01_b"),
     EncoderWire(point.INNER_ANKLE_EDGES, "MCFI", "encoder_23_a", "encoder_23_b"),
 )
-
-
-class AnalogInput(NamedTuple):
-    """A voltage of the plant on an analog input of a board."""
-
-    voltage: int
-    board: str
-    input: str
 
 
 ANALOG = (
@@ -92,14 +66,6 @@ ANALOG_INPUTS = {
 }
 
 
-class EncoderWord(NamedTuple):
-    """The serial word of an absolute encoder, read by a board's SPI."""
-
-    word: int
-    board: str
-    register: str
-
-
 WORDS = (
     EncoderWord(point.HIP_WORD, "MCH", "absolute_encoder"),
     EncoderWord(point.OUTER_ANKLE_WORD, "MCFO", "absolute_encoder"),
@@ -119,3 +85,17 @@ PINS = {**dict.fromkeys(("MCH", "MCFO", "MCFI", "MCSI"), motor_board.PINS), "UI"
 
 # The inertial unit talks to UART 1 of the user interface board.
 IMU_BOARD, IMU_UART = "UI", user_interface.IMU_UART
+
+MOTOR_BOARDS = ("MCH", "MCFO", "MCFI", "MCSI")
+RANGER = Wiring(
+    can=CAN,
+    encoders=ENCODERS,
+    analog=ANALOG,
+    words=WORDS,
+    bridges=[BridgeWire(board, motor, "motor_watchdog", "low_side_2", "low_side_6") for board, motor in MOTORS.items()],
+    names={
+        **dict.fromkeys(MOTOR_BOARDS, {**MOTOR_PINS, **motor_board.ANALOG, **WORD_REGISTERS}),
+        "UI": PINS["UI"],
+        "CSR": ANALOG_INPUTS["CSR"],
+    },
+)

@@ -13,7 +13,7 @@ from ranger_sim.can_bus.edge.socketcand import SocketcandServer
 from ranger_sim.foundation import wallclock
 from ranger_sim.foundation.peers import loopback
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.scenario import MOST_TIME_S
+from ranger_sim.harness.stop_rule import MOST_TIME_S
 from ranger_sim.tools import server_options
 from ranger_sim.tools.units import TIMES, number, quantity, whole_number
 

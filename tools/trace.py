@@ -10,7 +10,7 @@ import webbrowser
 from typing import TYPE_CHECKING, Any
 
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.scenario import MOST_TIME_S
+from ranger_sim.harness.stop_rule import MOST_TIME_S
 from ranger_sim.tools.files import replace_file
 from ranger_sim.tools.options import Option, add_all
 from ranger_sim.tools.trace_server import PORT, VIEWER, TraceServer

@@ -29,7 +29,7 @@ from ranger_sim.harness.processes.settings import FASTEST, NEVER, ON_FAILURE, SL
 from ranger_sim.harness.processes.supervisor import ELSEWHERE, RUNNING, Supervisor, View, check_platform
 from ranger_sim.harness.profile import Profile
 from ranger_sim.harness.profile import load as load_profile
-from ranger_sim.harness.scenario import MOST_STEPS, StopRule
+from ranger_sim.harness.stop_rule import MOST_STEPS, StopRule
 from ranger_sim.tools import faults, serial_options, server_options, terminal, trace, walk, walk_options
 from ranger_sim.tools.files import json_target, writable_folder
 from ranger_sim.tools.options import add_all

@@ -4,7 +4,8 @@ import argparse
 import shlex
 from typing import Any
 
-from ranger_sim.harness.scenario import LIMITS, MOST_DISTANCE_M, MOST_STEPS, MOST_TIME_S, Scenario, StopRule
+from ranger_sim.harness.scenario import LIMITS, Scenario
+from ranger_sim.harness.stop_rule import MOST_DISTANCE_M, MOST_STEPS, MOST_TIME_S, StopRule
 from ranger_sim.plant.electronics import SWITCHES
 from ranger_sim.tools import faults, serial_options, trace
 from ranger_sim.tools.firmware import FIRMWARE

@@ -177,7 +177,7 @@ class Fault(StepWatch):
     def arm(self, robot: Any) -> None:
         """It waits on `robot` for its start; without a start condition it begins with the next step."""
         self.robot = robot
-        self.random = RandomStream(robot.scenario.seed, f"fault {len(robot.faults)} {self.place.name} {self.mode}")
+        self.random = RandomStream(robot.seed, f"fault {len(robot.faults)} {self.place.name} {self.mode}")
         self.connect()
         for each in (self.start, self.end):
             if each is not None:

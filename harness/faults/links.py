@@ -139,7 +139,7 @@ class DropOut(Fault):
         loop = self.robot.loop
         board = self.place.details["board"]
         self.lines: dict[int, Any] = loop.wires[loop.place(board)].serial_lines
-        self.imu_wire: Any = loop.imu_wire if board == "UI" else None
+        self.imu_wire: Any = loop.serial_device if board == "UI" else None
         if not self.lines:
             raise UserError(f"fault {self.text()}: nothing is connected to this line, so nobody could miss its bytes")
         if self.imu_wire is not None and not self.imu_wire.plugged:

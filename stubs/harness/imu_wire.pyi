@@ -1,6 +1,7 @@
 # Generated from harness/imu_wire.py and harness/imu_wire.pxd (python -m ranger_sim.tools.stubs); do not edit.
 
 from ranger_sim.foundation.events import EventQueue
+from ranger_sim.harness.step_watch import SerialDevice
 from ranger_sim.plant.imu import Imu
 from typing import Any
 from typing import final
@@ -10,7 +11,7 @@ WORD_BYTES: int
 PAUSE_NS: int
 
 @final
-class ImuWire:
+class ImuWire(SerialDevice):
     imu: Imu
     inbox: EventQueue
     uart: int
@@ -19,4 +20,4 @@ class ImuWire:
     def __init__(self, imu: Imu, board: Any, uart: int) -> None: ...
     def unplug(self) -> None: ...
     def from_board(self, time: Any, byte: Any, count: Any, data: Any) -> None: ...
-    def deliver(self) -> None: ...
+    def deliver(self) -> Any: ...

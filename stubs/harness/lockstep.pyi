@@ -2,9 +2,9 @@
 
 from collections.abc import MutableSequence
 from ranger_sim.firmware_sim.board import Board
-from ranger_sim.harness.imu_wire import ImuWire
 from ranger_sim.harness.sampler import Sampler
-from ranger_sim.harness.strike_watch import StrikeWatch
+from ranger_sim.harness.step_watch import SerialDevice
+from ranger_sim.harness.step_watch import StepEnd
 from ranger_sim.plant.plant import Plant
 from typing import Any
 from typing import final
@@ -30,9 +30,9 @@ class Lockstep:
     stop_steps: int
     stop_distance_m: float
     sampler: Sampler
-    strikes: StrikeWatch | None
+    strikes: StepEnd | None
     watchers: list[Any]
-    imu_wire: ImuWire | None
+    serial_device: SerialDevice | None
     encoder_boards: MutableSequence[int]
     due: MutableSequence[int]
     came: MutableSequence[int]
@@ -50,8 +50,7 @@ class Lockstep:
     def connect_voltage(self, source: Any, board: Any, channel: Any) -> None: ...
     def connect_word(self, source: Any, board: Any, word: Any) -> None: ...
     def connect_link(self, master: Any, slave: Any, exchange_ns: Any, idle_segment: Any) -> None: ...
-    def connect_imu(self, imu: Any, board: Any, uart: Any) -> None: ...
+    def connect_serial_device(self, device: Any, board: Any, uart: Any) -> None: ...
     def connect_serial_line(self, board: Any, uart: Any, line: Any) -> None: ...
-    def watch_strikes(self, main_brain: Any) -> None: ...
     def stop_at(self, steps: Any, distance_m: Any) -> None: ...
     def run(self, until: int) -> int: ...

@@ -1,12 +1,13 @@
 # Generated from harness/strike_watch.py and harness/strike_watch.pxd (python -m ranger_sim.tools.stubs); do not edit.
 
 from ranger_sim.firmware_sim.board import Board
+from ranger_sim.harness.step_watch import StepEnd
 from ranger_sim.plant.ranger import RangerPlant
 from typing import Any
 from typing import final
 
 @final
-class StrikeWatch:
+class StrikeWatch(StepEnd):
     plant: RangerPlant
     board: Board
     swing_leg: int
@@ -18,5 +19,5 @@ class StrikeWatch:
     sum_ms: float
     squares_ms2: float
     def __init__(self, plant: RangerPlant, board: Board) -> None: ...
-    def look(self) -> None: ...
+    def look(self) -> Any: ...
     def statistics(self) -> dict[Any, Any]: ...

@@ -28,7 +28,7 @@ class Bench:
 
     def __init__(self, plant, seed=1):
         self.plant = plant
-        self.scenario = types.SimpleNamespace(seed=seed)
+        self.seed = seed
         self.loop = Loop()
         self.start_ns = 0
         self.faults = []

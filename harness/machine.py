@@ -1,0 +1,253 @@
+"""Any machine: boards, buses and a plant, wired by tables, on one clock. Ranger is one (harness/ranger.py).
+
+    machine = Machine(
+        plant=Servo(),
+        boards={"DRIVE": NativeBoard("DRIVE", library), "CONTROL": ...},
+        buses={"can1": 500_000},
+        wiring=Wiring(can=[CanWire("DRIVE", 1, 1), CanWire("CONTROL", 1, 1)], ...),
+    )
+    machine.until("angle_rad > 0.5", within="2 s")
+
+examples/servo is a whole one.
+"""
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from ranger_sim.can_bus.bus import Bus
+from ranger_sim.foundation import wallclock
+from ranger_sim.foundation.events import NEVER, STAGE_BUS
+from ranger_sim.foundation.quantities import duration_text, nanoseconds
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.harness import lockstep, waiting
+from ranger_sim.harness.logbook import Logbook
+from ranger_sim.harness.recorder import Recorder
+from ranger_sim.harness.sampler import Sampler
+from ranger_sim.harness.stop_rule import StopRule
+from ranger_sim.harness.waiting import Condition, ConditionNotMetError, Waiting
+from ranger_sim.harness.wires import Wiring
+
+GRID_NS = 20_000_000  # whoever acts from outside does so on this grid: a run does not depend on how it is sliced
+
+Wanted = str | Condition | Callable[[Any], Any]
+
+
+class Machine:
+    """One machine. Same parts and seed, same bytes. Close it when done (or use contextlib.closing).
+
+    boards: {name: Board}, in the order in which they run and are sorted within an instant. buses: {name: bit/s}, with
+    names can1, can2, ...; seed: of crystals, noise and faults, as far as the parts take it from here; log: "none",
+    "window" (the last seconds in memory) or "full" (on disk), what `logbook` has of frames and samples.
+    words: (how many, board): the memory of a board that the log keeps as well.
+    """
+
+    backend = "sim"  # what it runs on; harness/testing/backends.py has the others
+    lost = False  # a part of it that runs elsewhere is gone: it can pass no more time
+
+    def __init__(
+        self,
+        plant: Any,
+        boards: Mapping[str, Any],
+        buses: Mapping[str, int],
+        wiring: Wiring,
+        seed: int = 0,
+        log: str = "none",
+        words: tuple[int, Any] = (0, None),
+    ) -> None:
+        self.plant = plant
+        self.boards: dict[str, Any] = dict(boards)
+        self.seed = seed
+        self.start_ns: int = plant.time_ns
+        for number, name in enumerate(buses, start=1):
+            if name != f"can{number}":
+                raise UserError(f"machine: bus {number} is called {name!r}, expected is can{number}")
+        for name, board in self.boards.items():
+            if board.name != name:
+                raise UserError(f"machine: board {name!r} calls itself {board.name!r}")
+        self.recorder = Recorder(len(buses), len(plant.sample_names), words[0])
+        self.buses: list[Any] = [Bus(name, rate, seed, log_capacity=0) for name, rate in buses.items()]
+        for bus, stream in zip(self.buses, self.recorder.frames, strict=True):
+            bus.log.stream = stream
+            bus.reset_statistics(self.start_ns)  # loads count from the start of the run
+        self.logbook = Logbook(self.recorder, log)
+        kept = self.recorder.words if self.logbook.records_words and words[1] is not None else None
+        sampler = Sampler(plant, words[1], self.recorder.samples, kept, self.start_ns)
+        self.loop: Any = lockstep.Lockstep(plant, list(self.boards.values()), self.buses, sampler, self.start_ns)
+        self.wiring = wiring
+        self._connect()
+        self.faults: list[Any] = []  # armed so far
+        self.polled: list[Any] = []  # ends of wires that lead out of the simulation
+        self.poll_due: list[int] = []  # when each of them asked to be looked at next, ns
+        self.next_poll_ns = self.start_ns
+        self.cpu_s = 0.0
+        self.wall_s = 0.0
+        self.ended = ""
+
+    def _connect(self) -> None:
+        """Solder every wire of the tables."""
+        loop, wiring = self.loop, self.wiring
+        place = {name: number for number, name in enumerate(self.boards)}
+        for name in wiring.hear_in_slots:
+            loop.hears_in_its_slots(self.board(name))
+        for wire in wiring.encoders:
+            pins = (wiring.number(wire.board, wire.pin_a), wiring.number(wire.board, wire.pin_b))
+            loop.connect_encoder(self._part("encoders", wire.encoder), self.board(wire.board), *pins)
+        for analog in wiring.analog:
+            board = self.board(analog.board)
+            loop.connect_voltage(analog.voltage, board, wiring.number(analog.board, analog.input))
+        for word in wiring.words:
+            loop.connect_word(word.word, self.board(word.board), wiring.number(word.board, word.register))
+        for can_wire in wiring.can:
+            board = self.board(can_wire.board)
+            if not 1 <= can_wire.bus <= len(self.buses):
+                raise UserError(f"wiring: {can_wire}: there are buses 1 to {len(self.buses)}")
+            bus = self.buses[can_wire.bus - 1]
+            order = STAGE_BUS * 256 + 16 * place[can_wire.board] + can_wire.controller
+            node = bus.add_node(can_wire.board, board.inbox, can_wire.controller, order)
+            loop.wires[place[can_wire.board]].connect_bus(can_wire.controller, bus, node)
+        for bridge in wiring.bridges:
+            self.board(bridge.board)
+            pins3 = [wiring.number(bridge.board, pin) for pin in bridge[2:]]
+            loop.wires[place[bridge.board]].connect_drive(self._part("bridges", bridge.bridge), *pins3)
+
+    def _part(self, kind: str, number: int) -> Any:
+        """Part `number` of a list of the plant."""
+        parts = getattr(self.plant, kind)
+        if not 0 <= number < len(parts):
+            raise UserError(f"wiring: {kind} {number}: the plant has {len(parts)} of them")
+        return parts[number]
+
+    # --- passing time -------------------------------------------------------------------------------------
+
+    def act(self, end_ns: int) -> None:
+        """Who works with the machine from outside acts here, once before each 20 ms of virtual time."""
+
+    def run(self, stop: StopRule, slice_s: float = 1.0) -> bool:
+        """Pass up to `slice_s` of virtual time; True when the stop rule is met or the machine can go no further."""
+        if self.ended:
+            return True
+        loop = self.loop
+        loop.stop_at(stop.steps, stop.distance_m)
+        limit = NEVER if stop.time_s is None else self.start_ns + round(stop.time_s * 1e9)
+        until = min(loop.time + round(slice_s * 1e9), limit)
+        cpu, wall = wallclock.process_cpu_s(), wallclock.monotonic_s()
+        reason = lockstep.REACHED_TIME
+        while loop.time < until and reason == lockstep.REACHED_TIME:
+            end = self.start_ns + ((loop.time - self.start_ns) // GRID_NS + 1) * GRID_NS
+            self.act(end)
+            if self.polled:
+                end = min(end, self._poll())
+            reason = loop.run(min(end, until))
+        self.cpu_s += wallclock.process_cpu_s() - cpu
+        self.wall_s += wallclock.monotonic_s() - wall
+        if reason == lockstep.FELL:
+            self.ended = self.plant.fall_cause or "fell"
+        elif reason != lockstep.REACHED_TIME or loop.time >= limit:
+            return True
+        return bool(self.ended)
+
+    def run_for(self, seconds: float) -> None:
+        """Pass `seconds` of virtual time, or less when the machine can go no further."""
+        self.run(StopRule(time_s=self.time_s + seconds), seconds)
+
+    def condition(self, wanted: Wanted) -> Condition:
+        """The condition that is written in `wanted` (harness/waiting.py)."""
+        return waiting.condition(wanted, self.plant.sample_names)
+
+    def until(self, wanted: Wanted, within: str = "60 s") -> float:
+        """Pass time until a condition holds; returns the virtual time since power-up, s.
+
+        ConditionNotMetError, an AssertionError, when it does not hold `within` this time from now, or the machine can
+        go no further before. It is looked at between two steps of the plant.
+        """
+        __tracebackhide__ = True
+        waited = Waiting(self, self.condition(wanted))
+        begun_ns, patience_ns = self.loop.time, nanoseconds(within, "until: within")
+        stop = StopRule(time_s=(begun_ns + patience_ns - self.start_ns) * 1e-9) if patience_ns else None
+        self.loop.watchers.append(waited)
+        try:
+            if stop is not None:
+                self.run(stop, patience_ns * 1e-9)
+        finally:
+            self.loop.watchers.remove(waited)
+        if not waited.met and not waited.wanted.met():
+            passed = duration_text(self.loop.time - begun_ns)
+            why = f"{self.end_word} ({self.ended}) after" if self.ended else "not within"
+            raise ConditionNotMetError(f"{waited.wanted.text}: {why} {passed}; {waited.wanted.nearest()}")
+        return self.time_s
+
+    end_word = "the machine stopped"
+
+    @property
+    def time_s(self) -> float:
+        """Virtual time since power-up, s."""
+        return (self.loop.time - self.start_ns) * 1e-9
+
+    def realtime_factor(self) -> float:
+        """Virtual seconds per wall-clock second of the stepping loop."""
+        return self.time_s / self.wall_s if self.wall_s > 0.0 else 0.0
+
+    # --- what leads outside -------------------------------------------------------------------------------
+
+    def attach(self, end: Any) -> None:
+        """From now on `end.poll(now_ns)` is called as often as it asks for; it returns when it wants to be next."""
+        self.polled.append(end)
+        self.poll_due.append(self.loop.time)
+        self.next_poll_ns = self.loop.time
+
+    def _poll(self) -> int:
+        """Poll every end that leads outside, when it is time; returns until when the loop may run."""
+        now: int = self.loop.time
+        if now >= self.next_poll_ns:
+            for place, end in enumerate(self.polled):
+                if now >= self.poll_due[place]:
+                    self.poll_due[place] = end.poll(now)
+            self.next_poll_ns = max(now + lockstep.WINDOW_NS, min(self.poll_due))
+        return self.next_poll_ns
+
+    def poll_now(self) -> None:
+        """Poll every end at once: something waits at one of them."""
+        self.next_poll_ns = self.loop.time
+        self.poll_due = [self.loop.time] * len(self.polled)
+        self._poll()
+
+    # --- looking in, reaching in --------------------------------------------------------------------------
+
+    def board(self, name: str) -> Any:
+        """The board of this name. UserError for any other."""
+        if name not in self.boards:
+            raise UserError(f"board {name!r}: there is none of this name, but {', '.join(self.boards)}")
+        return self.boards[name]
+
+    def quantities(self) -> dict[str, float]:
+        """What the body shows now, by name (`Plant.sample_names` has the units)."""
+        row = self.loop.sampler.row
+        self.plant.fill_sample(row)
+        return dict(zip(self.plant.sample_names, row, strict=False))
+
+    def replace(
+        self, board: Any, task: str, function: Callable[[], int | None], cost: int, limit: int | None = None
+    ) -> None:
+        """Put your own function in a schedule entry of a board; it declares its cost in cycles."""
+        self.board(board).scheduler.replace(task, function, cost=cost, limit=limit)
+
+    def counters(self) -> dict[str, Any]:
+        """What every board counted, by its name; also of a board that runs in another process."""
+        return {name: self.loop.board(name).counters() for name in self.boards}
+
+    def arm(self, fault: Any) -> Any:
+        """Arm a fault (harness/faults/fault.py)."""
+        fault.arm(self)
+        self.faults.append(fault)
+        return fault
+
+    def trace_digest(self) -> str:
+        """BLAKE2b-256 of the canonical trace so far."""
+        digest: str = self.recorder.trace_digest()
+        return digest
+
+    def close(self) -> None:
+        """Give back the log's files and the ends that lead outside."""
+        self.logbook.close()
+        for end in self.polled:
+            end.close()
