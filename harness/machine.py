@@ -74,7 +74,11 @@ class Machine:
         sampler = Sampler(plant, words[1], self.recorder.samples, kept, self.start_ns)
         self.loop: Any = lockstep.Lockstep(plant, list(self.boards.values()), self.buses, sampler, self.start_ns)
         self.wiring = wiring
-        self._connect()
+        try:
+            self._connect()
+        except BaseException:
+            self.logbook.close()
+            raise
         self.faults: list[Any] = []  # armed so far
         self.polled: list[Any] = []  # ends of wires that lead out of the simulation
         self.poll_due: list[int] = []  # when each of them asked to be looked at next, ns
@@ -88,17 +92,17 @@ class Machine:
         loop, wiring = self.loop, self.wiring
         place = {name: number for number, name in enumerate(self.boards)}
         for name in wiring.hear_in_slots:
-            loop.hears_in_its_slots(self.board(name))
+            loop.hears_in_its_slots(self._wired(name))
         for wire in wiring.encoders:
             pins = (wiring.number(wire.board, wire.pin_a), wiring.number(wire.board, wire.pin_b))
-            loop.connect_encoder(self._part("encoders", wire.encoder), self.board(wire.board), *pins)
+            loop.connect_encoder(self._part("encoders", wire.encoder), self._wired(wire.board), *pins)
         for analog in wiring.analog:
-            board = self.board(analog.board)
+            board = self._wired(analog.board)
             loop.connect_voltage(analog.voltage, board, wiring.number(analog.board, analog.input))
         for word in wiring.words:
-            loop.connect_word(word.word, self.board(word.board), wiring.number(word.board, word.register))
+            loop.connect_word(word.word, self._wired(word.board), wiring.number(word.board, word.register))
         for can_wire in wiring.can:
-            board = self.board(can_wire.board)
+            board = self._wired(can_wire.board)
             if not 1 <= can_wire.bus <= len(self.buses):
                 raise UserError(f"wiring: {can_wire}: there are buses 1 to {len(self.buses)}")
             bus = self.buses[can_wire.bus - 1]
@@ -106,9 +110,15 @@ class Machine:
             node = bus.add_node(can_wire.board, board.inbox, can_wire.controller, order)
             loop.wires[place[can_wire.board]].connect_bus(can_wire.controller, bus, node)
         for bridge in wiring.bridges:
-            self.board(bridge.board)
+            self._wired(bridge.board)
             pins3 = [wiring.number(bridge.board, pin) for pin in bridge[2:]]
             loop.wires[place[bridge.board]].connect_drive(self._part("bridges", bridge.bridge), *pins3)
+
+    def _wired(self, name: str) -> Any:
+        """A board that the wiring names."""
+        if name not in self.boards:
+            raise UserError(f"wiring: there is no board {name!r}, but {', '.join(self.boards)}")
+        return self.boards[name]
 
     def _part(self, kind: str, number: int) -> Any:
         """Part `number` of a list of the plant."""

@@ -1,4 +1,4 @@
 cdef class Bridge:
-    cpdef void write_pwm(self, long long time, long long mr2, long long mr6, long long mr0) noexcept
-    cpdef void watchdog_edge(self, long long time) noexcept
-    cpdef void low_side(self, long long time, bint enable2, bint enable6) noexcept
+    cpdef object write_pwm(self, long long time, long long mr2, long long mr6, long long mr0)
+    cpdef object watchdog_edge(self, long long time)
+    cpdef object low_side(self, long long time, bint enable2, bint enable6)

@@ -72,11 +72,11 @@ class Drive(Bridge):
         mr2: cython.longlong,
         mr6: cython.longlong,
         mr0: cython.longlong,
-    ) -> cython.void:
+    ) -> None:
         """Match values of the two leads and of the period, in counts, from `time` on."""
         self._queue(time, PWM_WRITE, mr2, mr6, mr0)
 
-    def watchdog_edge(self, time: cython.longlong) -> cython.void:
+    def watchdog_edge(self, time: cython.longlong) -> None:
         """The watchdog line changed its level at `time`."""
         if not self.powered or time > self.power_off_ns:
             self._queue(time, WATCHDOG_EDGE, 0, 0, 0)  # the bridge gets its power back at this edge
@@ -87,7 +87,7 @@ class Drive(Bridge):
         if self.count > 0 and self.changes[0] < self.next_change_ns:
             self.next_change_ns = self.changes[0]
 
-    def low_side(self, time: cython.longlong, enable2: cython.bint, enable6: cython.bint) -> cython.void:
+    def low_side(self, time: cython.longlong, enable2: cython.bint, enable6: cython.bint) -> None:
         """The two low-side enables from `time` on."""
         self._queue(time, LOW_SIDE_WRITE, enable2, enable6, 0)
 

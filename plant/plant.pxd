@@ -8,5 +8,5 @@ cdef class Plant:
     cdef public str fall_cause
     cdef public list bridges, encoders
     cdef public object sample_names
-    cpdef int step(self) except -1
+    cpdef object step(self)
     cpdef object fill_sample(self, double[::1] row)

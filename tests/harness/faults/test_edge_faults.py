@@ -384,7 +384,7 @@ def test_a_second_fault_at_a_place_may_begin_when_the_first_one_is_clear():
 def test_the_same_seed_gives_the_same_edges_and_another_one_others():
     def edges(seed):
         bench = EdgeBench(to_and_fro)
-        bench.scenario.seed = seed
+        bench.seed = seed
         fault = injected(bench, "lost_edges", share=0.3)
         run(bench, 60)
         return bench.board.edges, fault.acted_count
