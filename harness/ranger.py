@@ -257,6 +257,12 @@ class Ranger(Machine):
             )
         return value_of_word(all_variables.TYPES[number], self.loop.board("MB").memory[number])
 
+    def replace(
+        self, board: BoardName, task: str, function: Callable[[], int | None], cost: int, limit: int | None = None
+    ) -> None:
+        """Put your own function in a schedule entry; it declares its cost in cycles."""
+        Machine.replace(self, board, task, function, cost, limit)
+
     def slots(self, board: BoardName) -> RobotSlots:
         """The slots of a board from now on, or from the first time on that they were asked for (harness/timing)."""
         if board not in self.slot_views:
