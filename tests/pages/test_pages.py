@@ -1,9 +1,9 @@
 """The tutorial and the how-to pages, walked as a reader walks them: `make docs` runs this, not `make test`.
 
 A page is read from top to bottom in a folder of its own. A block whose first line is a comment with a file's name
-(`# mine.toml`) is that file; a block `sh` is run line by line, and each line of the block `text` below it must be in
-what it printed; a block `python` without a file's name is a program. A block `console` shows what needs an adapter,
-a right or a second terminal, and is not run.
+(`# mine.toml`, `/* mine.c */`) is that file; a block `sh` is run line by line, and each line of the block `text` below
+it must be in what it printed; a block `python` without a file's name is a program. A block `console` shows what needs
+an adapter, a right or a second terminal, and is not run.
 """
 
 import dataclasses
@@ -18,9 +18,9 @@ import pytest
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 PAGES = [ROOT / "docs" / "tutorial.md", *sorted((ROOT / "docs" / "how-to").glob("*.md"))]
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
-FILE_NAME = re.compile(r"# ([\w-]+\.(?:py|toml))\n")
+FILE_NAME = re.compile(r"(?:# ([\w-]+\.(?:py|toml))|/\* ([\w-]+\.c) \*/)\n")
 EXIT_CODE = re.compile(r"#.*\bexit code (\d+)")
-KINDS = {"sh", "text", "python", "toml", "console"}
+KINDS = {"sh", "text", "python", "toml", "c", "console"}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -32,7 +32,7 @@ class Block:
     def file(self):
         """Name of the file that the block is, or None."""
         named = FILE_NAME.match(self.text)
-        return named.group(1) if named and self.kind in ("python", "toml") else None
+        return named.group(1) or named.group(2) if named and self.kind in ("python", "toml", "c") else None
 
 
 def blocks(text):
