@@ -6,6 +6,7 @@ python docs/causes_table.py
 import importlib
 import pathlib
 
+from ranger_sim.plant import terms
 from ranger_sim.sysid import causes, machines
 from ranger_sim.sysid.fit import Parameter
 from ranger_sim.tools.files import replace_file
@@ -13,9 +14,9 @@ from ranger_sim.tools.files import replace_file
 PAGE = pathlib.Path(__file__).parent / "reference/causes.md"
 HEAD = """# Causes and unknowns
 
-What `ranger-sim diagnose` can name, what its machines know beforehand, and what `ranger-sim identify` finds.
-`ranger-sim causes CAUSE` tells more of one; [diagnose](../diagnose.md) says how a cause is found, and
-[identify](../identify.md) how a number is.
+What `ranger-sim diagnose` can name, what its machines know beforehand, what `ranger-sim identify` finds, and what a
+model file can add. `ranger-sim causes CAUSE` tells more of one; [diagnose](../diagnose.md) says how a cause is found,
+[identify](../identify.md) how a number is, and [model terms](../how-to/model-term.md) how a form is put into a walk.
 
 `python docs/causes_table.py` writes this page, and a test holds it: no number of these tables changes unseen.
 """
@@ -51,7 +52,23 @@ def page() -> str:
             known_to = f"{unknown.uncertainty:g}" if unknown.uncertainty else ""
             cells = (unknown.name, unknown.unit, f"{unknown.value:.6g}", limits, known_to, unknown.source)
             lines.append(f"| {' | '.join(cells)} |")
+    lines += [
+        "",
+        "## Forms of a model file",
+        "",
+        "| form | where | parameters: limits, default | what |",
+        "|---|---|---|---|",
+    ]
+    for form in terms.FORMS.values():
+        parameters = "; ".join(parameter_text(parameter) for parameter in form.parameters)
+        lines.append(f"| {form.name} | {', '.join(form.places)} | {parameters} | {form.meaning} |")
     return "\n".join(lines) + "\n"
+
+
+def parameter_text(parameter: terms.Parameter) -> str:
+    """Name, unit, limits and default of a form's parameter."""
+    default = "" if parameter.default is None else f", left out {parameter.default:g}"
+    return f"{parameter.name} ({parameter.unit}) {parameter.low:g} to {parameter.high:g}{default}"
 
 
 if __name__ == "__main__":
