@@ -245,6 +245,15 @@ class Machine:
         """What every board counted, by its name; also of a board that runs in another process."""
         return {name: self.loop.board(name).counters() for name in self.boards}
 
+    def inject(
+        self, place: Any, mode: Any, at: Wanted | None = None, until: Wanted | None = None, **parameters: Any
+    ) -> Any:
+        """Arm a fault: `mode`, a class of faults, at a `Place` (harness/faults/fault.py), from the condition `at` on
+        (None: at once) `until` another one or for a length, as "+50 ms" (None: it stays). UserError for a parameter or
+        a value that the mode does not take. The Fault that is returned tells what became of it.
+        """
+        return self.arm(mode.asked(place, at, until, parameters, self.condition))
+
     def arm(self, fault: Any) -> Any:
         """Arm a fault (harness/faults/fault.py)."""
         fault.arm(self)

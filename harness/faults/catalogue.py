@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.conditions import Condition, condition
 from ranger_sim.harness.faults import text as typed_text
-from ranger_sim.harness.faults.fault import Fault, Place, end_condition
+from ranger_sim.harness.faults.fault import Fault, Place
 
 # Modules of this package that put places and modes here when they are imported, in the order in which they are listed.
 MODULES = (
@@ -122,12 +122,10 @@ def fault(
     if reason := refusal(where, mode):
         raise UserError(f"fault {where.name}:{mode}: it cannot act there; {reason}, this is {where.what}")
     kind = modes_of(where)[named(mode, modes_of(where), f"fault mode at {where.name},")]
-    known = {parameter.name: parameter for parameter in kind.parameters}
-    values = {name: parameter.default for name, parameter in known.items()}
-    for name, value in parameters.items():
+    known = [parameter.name for parameter in kind.parameters]
+    for name in parameters:
         named(name, known, f"fault {where.name}:{mode}, parameter")
-        values[name] = known[name].checked(value, f"fault {where.name}:{mode}")
-    return kind(where, None if start is None else condition(start), end_condition(end), values)
+    return kind.asked(where, start, end, parameters, condition)
 
 
 def typed(text: str) -> Fault:

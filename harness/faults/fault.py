@@ -15,13 +15,13 @@ A fault that never acted proves nothing, whatever the robot did.
 import dataclasses
 import math
 from collections.abc import Callable, Mapping
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 from ranger_sim.foundation.quantities import nanoseconds
 from ranger_sim.foundation.random_stream import RandomStream
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.conditions import Condition, condition
 from ranger_sim.harness.step_watch import StepWatch
+from ranger_sim.harness.waiting import Condition
 
 
 @dataclasses.dataclass(frozen=True)
@@ -93,8 +93,11 @@ class Lasting(Condition):
         return "it has not begun" if self.since_ns < 0 else "it has not lasted so long"
 
 
-def end_condition(wanted: str | Condition | Callable[[Any], Any] | None) -> Condition | None:
-    """The condition that ends a fault: any, or a length as "+50 ms"; None: none."""
+Wanted = str | Condition | Callable[[Any], Any]
+
+
+def end_condition(wanted: Wanted | None, condition: Callable[[Wanted], Condition]) -> Condition | None:
+    """The condition that ends a fault: any that `condition` can make, or a length as "+50 ms"; None: none."""
     if isinstance(wanted, str) and wanted.strip().startswith("+"):
         return Lasting(" ".join(wanted.split()))
     return None if wanted is None else condition(wanted)
@@ -131,6 +134,27 @@ class Fault(StepWatch):
         self.largest_difference = 0.0
         self.stop_wanted = False
         self.twin: Any = None  # harness.faults.twin.Twin: of a fault that is to be proven
+
+    @classmethod
+    def asked(
+        cls,
+        place: Place,
+        start: Wanted | None,
+        end: Wanted | None,
+        parameters: Mapping[str, Any],
+        condition: Callable[[Wanted], Condition],
+    ) -> Self:
+        """One that is not armed yet; `condition` makes the machine's conditions. UserError for a parameter or a value
+        that the mode does not have.
+        """
+        known = {parameter.name: parameter for parameter in cls.parameters}
+        values = {name: parameter.default for name, parameter in known.items()}
+        where = f"fault {place.name}:{cls.mode}"
+        for name, value in parameters.items():
+            if name not in known:
+                raise UserError(f"{where}: there is no parameter {name!r}, but {', '.join(known) or 'none at all'}")
+            values[name] = known[name].checked(value, where)
+        return cls(place, None if start is None else condition(start), end_condition(end, condition), values)
 
     # --- what a mode says -----------------------------------------------------------------------------------
 

@@ -10,6 +10,7 @@ from ranger_sim.firmware_sim.native.build import build
 from ranger_sim.firmware_sim.native.manifest import load
 from ranger_sim.firmware_sim.native.native_board import NativeBoard
 from ranger_sim.foundation.user_error import UserError
+from ranger_sim.harness.faults.fault import Fault, Parameter, Place
 from ranger_sim.harness.machine import Machine
 from ranger_sim.harness.waiting import ConditionNotMetError
 from ranger_sim.harness.wires import AnalogInput, BridgeWire, CanWire, EncoderWire, Wiring
@@ -143,9 +144,54 @@ def test_a_wire_that_leads_nowhere_is_told_in_a_line(firmware, wiring, line):
         pass
 
 
+class NoEdges(Fault):
+    """The encoder's disc does not turn."""
+
+    mode, kinds, unit = "no_edges", ("encoder",), "edges"
+    meaning = "shows no edge any more"
+    parameters = (Parameter("least", "edges", 1.0, 1.0, 100.0, "steps with fewer are let through", "chosen by us"),)
+
+    def after(self, start_ns, end_ns):
+        edges = self.robot.plant.encoders[self.place.details["encoder"]].edges
+        if edges.count >= self.values["least"]:
+            self.note(end_ns, edges.count)
+            edges.clear()
+
+
+WHEEL = Place("LEFT.encoder", "encoder", "the wheel's incremental encoder", {"encoder": 0})
+
+
+@needs_a_compiler
+def test_a_fault_of_the_machines_own_acts_from_its_condition_on_for_its_length(firmware):
+    with machine(firmware) as robot:
+        fault = robot.inject(WHEEL, NoEdges, at="angle_rad > 0.5", until="+50 ms")
+        robot.until("angle_rad > 3", within="1 s")
+        robot.run_for(0.002)
+        assert fault.acted and fault.cleared_ns > 0
+        assert fault.ended_ns - fault.activated_ns == 50_000_000
+        frames = robot.logbook.frames()
+        missed = EDGES_PER_RAD * robot.quantities()["angle_rad"] - max(frames["word0"][frames["identifier"] == 0x14])
+        # 50 ms at 20 rad/s, but for the edges of a step at either end and of the 2 ms since the newest frame
+        assert missed == pytest.approx(EDGES_PER_RAD * 0.05 * FULL_RATE, abs=3)
+
+
+@needs_a_compiler
+@pytest.mark.parametrize(
+    ("asked", "line"),
+    [
+        ({"most": 3}, "fault LEFT.encoder:no_edges: there is no parameter 'most', but least"),
+        ({"least": 0}, "fault LEFT.encoder:no_edges: least is 0, allowed are 1 to 100 edges"),
+        ({"at": "hip in HI_premid"}, "it reads like 12.3 s, angle_rad > 0.3, or ended"),
+    ],
+)
+def test_what_a_fault_does_not_take_is_told_in_a_line(firmware, asked, line):
+    with machine(firmware) as robot, pytest.raises(UserError, match=line):
+        robot.inject(WHEEL, NoEdges, **asked)
+
+
 def test_nothing_of_ranger_is_needed():
     program = (
-        "import sys, ranger_sim.harness.machine\n"
+        "import sys, ranger_sim.harness.machine, ranger_sim.harness.faults.fault\n"
         "rooms = ('ranger_sim.boards', 'ranger_sim.datatable', 'ranger_sim.sysid', 'ranger_sim.tools')\n"
         "plant = {'ranger_sim.plant', 'ranger_sim.plant.plant', 'ranger_sim.plant.bridge'}\n"
         "print([m for m in sys.modules if m.startswith(rooms)"
