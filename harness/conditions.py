@@ -25,6 +25,7 @@ from ranger_sim.harness.waiting import (
     Comparison,
     Condition,
     ConditionNotMetError,
+    Ended,
     Function,
     Waiting,
     instant,
@@ -58,11 +59,8 @@ class Step(Condition):
         return f"step {self.robot.plant.steps} was reached"
 
 
-class Fell(Condition):
+class Fell(Ended):
     """The robot lies on the floor."""
-
-    def met(self) -> bool:
-        return bool(self.robot.plant.fell)
 
     def nearest(self) -> str:
         return f"it walks, step {self.robot.plant.steps}"

@@ -24,12 +24,10 @@ from ranger_sim.harness.logbook import Logbook
 from ranger_sim.harness.recorder import Recorder
 from ranger_sim.harness.sampler import Sampler
 from ranger_sim.harness.stop_rule import StopRule
-from ranger_sim.harness.waiting import Condition, ConditionNotMetError, Waiting
+from ranger_sim.harness.waiting import Condition, ConditionNotMetError, Waiting, Wanted
 from ranger_sim.harness.wires import Wiring
 
 GRID_NS = 20_000_000  # whoever acts from outside does so on this grid: a run does not depend on how it is sliced
-
-Wanted = str | Condition | Callable[[Any], Any]
 
 
 class Machine:

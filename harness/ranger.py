@@ -32,13 +32,14 @@ from ranger_sim.harness.faults import catalogue
 from ranger_sim.harness.faults.fault import Fault
 from ranger_sim.harness.fresh_board import first_outputs, pass_on
 from ranger_sim.harness.imu_wire import ImuWire
-from ranger_sim.harness.machine import Machine, Wanted
+from ranger_sim.harness.machine import Machine
 from ranger_sim.harness.native_boards import Firmware
 from ranger_sim.harness.operator import Operator
 from ranger_sim.harness.profile import Profile
 from ranger_sim.harness.scenario import Scenario, StopRule
 from ranger_sim.harness.strike_watch import StrikeWatch
 from ranger_sim.harness.timing.robot_slots import RobotSlots, slot_view
+from ranger_sim.harness.waiting import Wanted
 from ranger_sim.plant import body_files
 from ranger_sim.plant.ranger import RangerPlant
 

@@ -50,6 +50,9 @@ class Condition:
         raise NotImplementedError
 
 
+Wanted = str | Condition | Callable[[Any], Any]  # as it is written
+
+
 class At(Condition):
     """An instant, `time_ns` since power-up."""
 
@@ -136,7 +139,7 @@ def meant(name: str, known: Any) -> str:
     return f"; meant was perhaps {' or '.join(near)}" if near else ""
 
 
-def condition(wanted: str | Condition | Callable[[Any], Any], quantities: Mapping[str, str]) -> Condition:
+def condition(wanted: Wanted, quantities: Mapping[str, str]) -> Condition:
     """The condition that is written in `wanted`, or is it already, for a machine whose plant samples `quantities`."""
     if isinstance(wanted, Condition):
         return wanted

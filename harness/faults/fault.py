@@ -21,7 +21,7 @@ from ranger_sim.foundation.quantities import nanoseconds
 from ranger_sim.foundation.random_stream import RandomStream
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.step_watch import StepWatch
-from ranger_sim.harness.waiting import Condition
+from ranger_sim.harness.waiting import Condition, Wanted
 
 
 @dataclasses.dataclass(frozen=True)
@@ -91,9 +91,6 @@ class Lasting(Condition):
 
     def nearest(self) -> str:
         return "it has not begun" if self.since_ns < 0 else "it has not lasted so long"
-
-
-Wanted = str | Condition | Callable[[Any], Any]
 
 
 def end_condition(wanted: Wanted | None, condition: Callable[[Wanted], Condition]) -> Condition | None:
