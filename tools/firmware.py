@@ -22,7 +22,7 @@ def register(commands: Any) -> None:
     command = commands.add_parser(
         "firmware",
         help="compile a board's firmware from C for this computer",
-        description="Firmware in C against the header ranger_sim/firmware.h; walk --firmware BOARD=DIR runs it.",
+        description="Firmware in C against the header ranger_sim/firmware.h; walk or up --firmware BOARD=DIR runs it.",
     )
     parts = command.add_subparsers(dest="part", required=True, metavar="build|include")
     build = parts.add_parser("build", help="compile the folder of a firmware.toml into a library")

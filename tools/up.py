@@ -32,6 +32,7 @@ from ranger_sim.harness.profile import load as load_profile
 from ranger_sim.harness.stop_rule import MOST_STEPS, StopRule
 from ranger_sim.tools import faults, serial_options, server_options, terminal, trace, walk, walk_options
 from ranger_sim.tools.files import json_target, writable_folder
+from ranger_sim.tools.firmware import FIRMWARE
 from ranger_sim.tools.options import add_all
 from ranger_sim.tools.units import number, word
 
@@ -118,7 +119,7 @@ def register(commands: Any) -> None:
         "needed ('can1=slcan:/dev/ttyACM0 --bitrate 1000000'); can1= asks python-can's configuration, section can1; "
         "MCH=... gives one board of such a bus a place of its own (repeatable). The run is then asynchronous",
     )
-    add_all(up, (faults.FAULT, faults.MODULE))
+    add_all(up, (faults.FAULT, faults.MODULE, FIRMWARE))
     trace.add_options(up)
     up.set_defaults(run=run)
 
@@ -200,7 +201,11 @@ def run(options: argparse.Namespace) -> int:
             if boards:
                 console.print(f"{', '.join(boards)}: {what}", highlight=False)
     log = walk_options.log_of(options)
-    with contextlib.closing(Ranger(scenario, log=log, quirks=quirks, profile=profile)) as robot:
+    firmware = walk.firmware_of(options, console)
+    for name in firmware:
+        if name not in settings.boards:
+            raise UserError(f"--firmware {name}={firmware[name].folder}: {name} is not emulated in this profile")
+    with contextlib.closing(Ranger(scenario, log, quirks, profile, firmware)) as robot:
         outside, openers = external_buses(options, robot, profile)
         ends, lines = serial_options.connect(robot, options)
         servers, more = bus.open_servers({each.name: each for each in robot.buses}, options)
@@ -318,7 +323,8 @@ def print_processes(found: dict, console: Console) -> None:
     for door, counts in found["sent_away"].items():
         console.print(f"{door}: sent away {told(counts)}", highlight=False, soft_wrap=True)
     for death in found["deaths"]:
-        console.print(f"{death['board']} was lost at {death['time_s']:.3f} s", highlight=False)
+        why = f": {death['why']}" if death["why"] else ""
+        console.print(f"{death['board']} was lost at {death['time_s']:.3f} s{why}", highlight=False, soft_wrap=True)
 
 
 def micro(value: float | None) -> str:

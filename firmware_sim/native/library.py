@@ -48,6 +48,7 @@ extern host_call fw_calls[];
 extern const int64_t *fw_pin_levels;
 extern int64_t fw_mail[32];
 int64_t fw_turn(void);
+int32_t fw_watch(int64_t *record);
 """
 SIZED = ("fw_task", "fw_step", "fw_schedule", "fw_interrupt")  # in the order of fw_sizes
 ENTRY_POINTS = "firmware_start() and one of firmware_schedule() and firmware_main()"
@@ -69,7 +70,7 @@ class Library:
             raise UserError(f"{path}: there is no such firmware library; `ranger-sim firmware build` makes one")
         self.code = _loaded_copy(path)
         path = shown if shown is not None else path
-        for name in ("fw_compiled_version", "fw_sizes", "fw_call_names", "fw_turn"):
+        for name in ("fw_compiled_version", "fw_sizes", "fw_call_names", "fw_turn", "fw_watch"):
             if not self.has(name):
                 raise UserError(f"{path}: no {name} in it: not made by `ranger-sim firmware build`")
         version = self.code.fw_compiled_version

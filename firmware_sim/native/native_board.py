@@ -9,6 +9,7 @@ from typing import Any
 
 from ranger_sim.firmware_sim.counters import BoardCounters, CanCounters
 from ranger_sim.firmware_sim.microcontroller import Microcontroller
+from ranger_sim.firmware_sim.native import crash
 from ranger_sim.firmware_sim.native.hardware import Hardware
 from ranger_sim.firmware_sim.native.library import Library, ffi, text
 from ranger_sim.firmware_sim.peripheral import Peripheral
@@ -444,6 +445,13 @@ class NativeBoard(Microcontroller):
         if self.failure is not None:
             raise self.failure
         return next_time
+
+    def leave_record_in(self, words: memoryview) -> None:
+        """From now on a signal that ends this process leaves in `words` where the program was (crash.py)."""
+        self.record = ffi.from_buffer("int64_t[]", words, require_writable=True)
+        if len(self.record) < crash.RECORD:
+            raise ValueError(f"a record has {crash.RECORD} numbers, not {len(self.record)}")
+        self.library.code.fw_watch(self.record)
 
     def listen_to_edges(self, buffer: Any, pin: int, partner_pin: int) -> None:
         """As the chip's; the program need not capture the pin."""

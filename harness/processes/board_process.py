@@ -25,6 +25,7 @@ def serve(robot: Any, name: str, block: Block, stage: tuple, settings: Settings,
     place = wiring.BOARDS.index(name)
     board = robot.boards[name]
     said = []
+    crash_record = block.words[places.CRASH : places.CRASH + places.CRASH_WORDS]
     if fresh:
         bell = Bell(block.words, places.ASKED, places.BOARD_SLEEPS, block.ask_descriptor)
         turns = block.words[places.ASKED]
@@ -34,6 +35,8 @@ def serve(robot: Any, name: str, block: Block, stage: tuple, settings: Settings,
             pass
         board = fresh_board(robot, name, block.words[places.POWER_UP])
         said = first_outputs(board)
+    if name in robot.firmware:
+        board.leave_record_in(crash_record)
     if block.table_words:
         board.move_memory(block.table())
     wires = [

@@ -96,8 +96,7 @@ class Endpoint:
             shared.words, f"from {board.name}", shared.from_board_first, SLOTS, ANSWER_USED, FROM_BOARD
         )
         self.audience = audience
-        errors = getattr(board, "errors", None)
-        self.totals: object = None if errors is None else errors.totals
+        self.counts_errors = hasattr(board, "errors")
         self.activity: object = ActivityStore(board, shared.words)
         self.can_wait = SLOT_KINDS if board.name in HEAR_IN_SLOTS else 0
         self.promised = 0
@@ -217,8 +216,8 @@ class Endpoint:
         self.block[DAMAGED] = self.to_board.damaged
         self.block[REACHED] = self.reached
         self.block[TURNS] += 1
-        if (self.block[TURNS] & ERRORS_EVERY) == 1 and self.totals is not None:
-            self.block[ERRORS] = sum(self.totals)
+        if (self.block[TURNS] & ERRORS_EVERY) == 1 and self.counts_errors:
+            self.block[ERRORS] = sum(self.board.errors.totals)
 
     def broke_its_promise(self) -> None:
         """An output before the instant that the last answer named: the plant has gone on without it."""

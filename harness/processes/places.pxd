@@ -34,6 +34,8 @@ cpdef enum:
     FATE = 56
     ALIVE = 0
     GONE = 1
+    CRASH = 57
+    CRASH_WORDS = 7
     FAULT_TEXT = 64
     FAULT_WORDS = 64
     LATENESS = 128

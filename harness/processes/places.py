@@ -47,6 +47,9 @@ if not cython.compiled:
     FATE = 56  # ALIVE or GONE: nobody will answer
     ALIVE = 0
     GONE = 1
+    # where a program in C was when a signal ended its process: firmware_sim/native/crash.py
+    CRASH = 57
+    CRASH_WORDS = 7
     # text of what ended the process, UTF-8, its length in bytes in the first word
     FAULT_TEXT = 64
     FAULT_WORDS = 64

@@ -216,7 +216,7 @@ class PlantRun:
         for name, remote in self.remotes.items():
             if remote.gone and name not in self.mourned:
                 self.mourned.add(name)
-                self.deaths.append({"board": name, "time_s": self.robot.time_s})
+                self.deaths.append({"board": name, "time_s": self.robot.time_s, "why": self.blocks[name].fault()})
                 self.unplug(name)
                 self.tell(gone=name, time_s=self.robot.time_s)
 

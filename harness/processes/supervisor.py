@@ -17,6 +17,7 @@ import warnings
 from collections.abc import Callable, Iterator
 from typing import Any
 
+from ranger_sim.firmware_sim.native import crash
 from ranger_sim.foundation import descriptors, wallclock
 from ranger_sim.foundation.peers import REASONS
 from ranger_sim.foundation.user_error import UserError
@@ -61,6 +62,7 @@ class Child:
     turn: int = -1
     turn_since_s: float = 0.0
     turn_cpu_s: float = 0.0
+    was_asked: bool = False  # where it is while it keeps its turn: a program in C says so with its end
 
 
 class Supervisor:
@@ -151,6 +153,7 @@ class Supervisor:
 
         block.words[places.FATE] = 0
         block.words[places.FAULT_TEXT] = 0
+        block.words[places.CRASH] = 0
         self.fork(name, body)
 
     def start_plant(self) -> None:
@@ -364,7 +367,7 @@ class Supervisor:
             return
         words = self.blocks[child.name].words
         how = f"was killed by signal {-code}" if code < 0 else f"ended with code {code}"
-        why = self.blocks[child.name].fault()
+        why = self.why_ended(child.name)
         if before != RESTARTING:
             self.view.say(f"{child.name} (process {child.process}) {how}{': ' + why if why else ''}")
         words[places.FATE] = 1
@@ -379,6 +382,15 @@ class Supervisor:
                 self.view.say(f"{child.name} ended {RESTART_LIMIT + 1} times: not restarted any more")
             else:
                 self.make_room(child)
+
+    def why_ended(self, name: str) -> str:
+        """What its board process left to be said, or where its program in C was; kept for the summary."""
+        block = self.blocks[name]
+        if name in self.robot.firmware and block.words[places.CRASH]:
+            record = block.words[places.CRASH : places.CRASH + places.CRASH_WORDS].tolist()
+            firmware = self.robot.firmware[name]
+            block.leave_fault(crash.told(firmware.library, firmware.folder, record))
+        return block.fault()
 
     def make_room(self, child: Child) -> None:
         """Have the plant's process set the channel back; `answered` starts the new process."""
@@ -417,7 +429,9 @@ class Supervisor:
                 f"{name} (process {child.process}) hangs: no answer for {held_s:.1f} s, "
                 f"{used_s:.1f} s of them computing; it is killed"
             )
-            os.kill(child.process, signal.SIGKILL)
+            tells_where = name in self.robot.firmware and not child.was_asked
+            os.kill(child.process, crash.ASKED if tells_where else signal.SIGKILL)
+            child.was_asked = True
             child.turn_since_s = now
         plant = self.children.get(PLANT)
         if not self.ending and plant is not None and plant.state == RUNNING:

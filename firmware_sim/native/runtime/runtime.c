@@ -10,6 +10,12 @@
 #include <stdlib.h>
 #include <sys/mman.h>
 #include <ucontext.h>
+#ifdef __linux__
+#include <link.h>
+#include <signal.h>
+#include <sys/uio.h>
+#include <unistd.h>
+#endif
 
 #define EXPORTED __attribute__((visibility("default")))
 
@@ -244,3 +250,115 @@ uint32_t fw_can_ICR(uint32_t controller) { return (uint32_t)HOST1(can_ICR, contr
 uint32_t fw_can_MOD(uint32_t controller) { return (uint32_t)HOST1(can_MOD, controller); }
 void fw_can_write_MOD(uint32_t controller, uint32_t value) { HOST2(can_write_MOD, controller, value); }
 void fw_can_write_IER(uint32_t controller, uint32_t value) { HOST2(can_write_IER, controller, value); }
+
+/* --- where the program was when a signal ended its process --- */
+
+#define PLACES 6u           /* of the program's functions, innermost first */
+#define MOST_FRAMES 64u     /* looked at for them: between them are frames of the harness */
+#define OVERFLOW_FLAG 256   /* in the record's first number, beside the signal */
+#define NEAR_WORDS 1024u    /* of the stack, looked at where there are no frames */
+#define NEAR_STACK 65536u   /* bytes: an access so near to the stack pointer that fails has left the stack */
+
+#ifdef __linux__
+
+static struct {
+    int64_t *record;
+    uintptr_t base; /* of this library; its code is within first ... end */
+    uintptr_t first;
+    uintptr_t end;
+    char stack[65536]; /* the handler's own: the program's may be what is used up */
+} watch;
+
+/* The two words of a frame: the frame before, and where it goes on. By the kernel, as nothing need be there. */
+static int frame_at(uintptr_t address, uintptr_t words[2])
+{
+    const size_t size = 2 * sizeof *words;
+    struct iovec here = {words, size}, there = {(void *)address, size};
+    return process_vm_readv(getpid(), &here, 1, &there, 1, 0) == (ssize_t)size;
+}
+
+static uint32_t noted(uint32_t count, uintptr_t address)
+{
+    if (address < watch.first || address >= watch.end)
+        return count;
+    watch.record[1 + count] = (int64_t)(address - watch.base);
+    return count + 1;
+}
+
+static void note_signal(int number, siginfo_t *what, void *context)
+{
+    const ucontext_t *at = context;
+    uintptr_t pc = 0, frame = 0, stack = 0, words[2];
+#if defined __x86_64__
+    pc = (uintptr_t)at->uc_mcontext.gregs[REG_RIP];
+    frame = (uintptr_t)at->uc_mcontext.gregs[REG_RBP];
+    stack = (uintptr_t)at->uc_mcontext.gregs[REG_RSP];
+#elif defined __aarch64__
+    pc = (uintptr_t)at->uc_mcontext.pc;
+    frame = (uintptr_t)at->uc_mcontext.regs[29];
+    stack = (uintptr_t)at->uc_mcontext.sp;
+#else
+    (void)at;
+#endif
+    const uintptr_t top = stack;
+    uint32_t count = noted(0, pc);
+    /* A function without a frame of its own is not in the chain of frames. Of the program: its caller's address is on
+       top of the stack. Of another library: the program's address nearest to the top is where it was called. */
+    const uint32_t looked_at = count > 0 ? 1 : NEAR_WORDS, before = count;
+    for (uint32_t i = 0; i < looked_at && count == before && stack != frame && frame_at(stack, words); i++) {
+        count = noted(count, words[0] - 1);
+        stack += sizeof *words;
+    }
+    for (uint32_t i = 0; i < MOST_FRAMES && count < PLACES && frame_at(frame, words); i++) {
+        count = noted(count, words[1] - 1); /* the call, not what comes behind it */
+        if (words[0] <= frame)
+            break;
+        frame = words[0];
+    }
+    const int overflow = (number == SIGSEGV || number == SIGBUS)
+        && (uintptr_t)what->si_addr + NEAR_STACK - top < 2 * (uintptr_t)NEAR_STACK;
+    watch.record[0] = number + (overflow ? OVERFLOW_FLAG : 0);
+    signal(number, SIG_DFL);
+    raise(number); /* ends the process when this function returns */
+}
+
+static int own_code(struct dl_phdr_info *library, size_t size, void *unused)
+{
+    (void)size;
+    (void)unused;
+    for (int i = 0; i < library->dlpi_phnum; i++) {
+        const ElfW(Phdr) *part = &library->dlpi_phdr[i];
+        const uintptr_t first = library->dlpi_addr + part->p_vaddr;
+        if (part->p_type == PT_LOAD && (part->p_flags & PF_X) && (uintptr_t)own_code - first < part->p_memsz) {
+            watch.base = library->dlpi_addr;
+            watch.first = first;
+            watch.end = first + part->p_memsz;
+            return 1;
+        }
+    }
+    return 0;
+}
+
+/* From now on a signal that ends this process leaves the signal and up to six places in `record` (seven numbers). */
+EXPORTED int32_t fw_watch(int64_t *record)
+{
+    static const int signals[] = {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT, SIGTRAP, SIGXCPU};
+    stack_t own = {.ss_sp = watch.stack, .ss_size = sizeof watch.stack};
+    struct sigaction action = {.sa_sigaction = note_signal, .sa_flags = SA_SIGINFO | SA_ONSTACK};
+    watch.record = record;
+    if (!dl_iterate_phdr(own_code, NULL) || sigaltstack(&own, NULL) != 0)
+        return 0;
+    for (uint32_t i = 0; i < sizeof signals / sizeof *signals; i++)
+        sigaction(signals[i], &action, NULL);
+    return 1;
+}
+
+#else
+
+EXPORTED int32_t fw_watch(int64_t *record)
+{
+    (void)record;
+    return 0;
+}
+
+#endif

@@ -15,7 +15,7 @@ NOTE_BYTES: Any
 
 class Endpoint:
     board: Microcontroller
-    totals: Any
+    counts_errors: bool
     clock: Any
     shared: Any
     activity: Any

@@ -35,6 +35,8 @@ URGENT: int
 FATE: int
 ALIVE: int
 GONE: int
+CRASH: int
+CRASH_WORDS: int
 FAULT_TEXT: int
 FAULT_WORDS: int
 LATENESS: int

@@ -1,0 +1,67 @@
+"""Where a program in C was when a signal ended its process: the runtime leaves a record, this tells it in words.
+
+The record is `RECORD` numbers: the signal, plus `OVERFLOW` when the stack was left; then places in the library's code
+from its beginning, the innermost function first, 0 for none.
+"""
+
+import pathlib
+import shutil
+import signal
+import subprocess
+from collections.abc import Sequence
+
+RECORD = 7
+OVERFLOW = 256  # OVERFLOW_FLAG of runtime.c
+ASKED = signal.SIGXCPU  # sent to a program that lets no time pass, to be told where it is
+LONGEST_S = 20.0  # binutils read some megabytes of debug information at most
+UNKNOWN = "??"  # what addr2line says for what it does not know
+
+
+def told(library: pathlib.Path, sources: pathlib.Path, record: Sequence[int]) -> str:
+    """`SIGSEGV (Segmentation fault) in control() at hip.c:42, called from slot() at hip.c:17`; "" for no record.
+
+    library: the file with its debug information; sources: folder that files are told relative to.
+    """
+    number = record[0] % OVERFLOW
+    if number == 0:
+        return ""
+    places = [place for place in record[1:RECORD] if place]
+    if number == ASKED:
+        what = "its program let no time pass"
+    else:
+        what = f"{signal.Signals(number).name} ({signal.strsignal(number)})"
+        if record[0] & OVERFLOW:
+            what = f"stack overflow, {what}"
+    if not places:
+        return f"{what}, outside of the program's code"
+    lines = _lines(library, sources, places)
+    once = [line for i, line in enumerate(lines) if line not in lines[:i]]  # a recursion is told once
+    return f"{what} in {', called from '.join(once)}"
+
+
+def _lines(library: pathlib.Path, sources: pathlib.Path, places: Sequence[int]) -> list[str]:
+    """Function, file and line of each place; offsets where no addr2line is installed or it does not know."""
+    offsets = [f"{library.name}+0x{place:x}" for place in places]
+    program = shutil.which("addr2line")
+    if program is None:
+        return offsets
+    command = [program, "-f", "-e", str(library), *(f"0x{place:x}" for place in places)]
+    try:
+        done = subprocess.run(command, capture_output=True, check=False, timeout=LONGEST_S, text=True)
+    except (subprocess.TimeoutExpired, OSError):
+        return offsets
+    said = done.stdout.splitlines()
+    if len(said) != 2 * len(places):
+        return offsets
+    return [
+        offset if function == UNKNOWN else f"{function}() at {_shown(place, sources)}"
+        for offset, function, place in zip(offsets, said[::2], said[1::2], strict=True)
+    ]
+
+
+def _shown(place: str, sources: pathlib.Path) -> str:
+    """File and line, the file relative to the folder when it is within."""
+    file, _, line = place.partition(" ")[0].rpartition(":")
+    path = pathlib.Path(file)
+    shown = path.relative_to(sources) if path.is_relative_to(sources) else path.name
+    return f"{shown}:{line}"
