@@ -108,6 +108,7 @@ def main(arguments: list[str] | None = None) -> int:
     terminal.stand_in_for_closed_streams()
     try:
         options = parser().parse_args(arguments)
+        options.arguments = list(sys.argv[1:] if arguments is None else arguments)
         code: int = options.run(options)
         sys.stdout.flush()
         return code

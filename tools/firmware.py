@@ -1,9 +1,18 @@
 """`ranger-sim firmware`: firmware in C, compiled for this computer."""
 
 import argparse
+import os
+import pathlib
+import signal
+import subprocess
+import sys
+import tempfile
 from typing import Any
 
+from ranger_sim.firmware_sim.native import sanitizers
+from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness import native_boards
+from ranger_sim.harness.processes import kernel
 from ranger_sim.tools import terminal
 from ranger_sim.tools.options import Option
 from ranger_sim.tools.units import word
@@ -15,6 +24,14 @@ FIRMWARE = Option(
     "BOARD=DIR",
     repeated=True,
 )
+SANITIZE = Option(
+    "--sanitize",
+    "compile the firmware with the address and undefined-behaviour sanitizers; what they find is told at the end, with "
+    "file and line, and makes exit code 1",
+    of_run=False,
+)
+OPTIONS = (FIRMWARE, SANITIZE)
+EXIT_FOUND = 1
 
 
 def register(commands: Any) -> None:
@@ -36,6 +53,8 @@ def register(commands: Any) -> None:
 
 def run_build(options: argparse.Namespace) -> int:
     """Build, and print warnings and the library's place."""
+    if options.sanitize and not sanitizers.is_ready():  # a library is looked at when it is built: loaded
+        return run_sanitized(options, [options.folder])
     firmware = native_boards.build(options.folder, options.sanitize, options.coverage)
     console = terminal.console(stderr=True)
     for line in firmware.warnings:
@@ -48,3 +67,47 @@ def run_include(options: argparse.Namespace) -> int:
     """For editors, and for compilers of the chip."""
     print(" ".join(f"-I{folder}" for folder in native_boards.include_folders()))
     return 0
+
+
+def wants_another_process(options: argparse.Namespace) -> bool:
+    """True when --sanitize is asked for in a process that cannot hold sanitizers: `run_sanitized` makes one."""
+    if not options.sanitize:
+        return False
+    if not options.firmware:
+        raise UserError("--sanitize: there is no firmware in C in this run; --firmware BOARD=DIR gives a board one")
+    return not sanitizers.is_ready()
+
+
+def folders_of(options: argparse.Namespace) -> list[str]:
+    """The folders of --firmware."""
+    return [native_boards.placed(text)[1] for text in options.firmware]
+
+
+def run_sanitized(options: argparse.Namespace, folders: list[str]) -> int:
+    """The same command in a process that can hold sanitizers; tells what they found, also when it ended by a signal."""
+    with tempfile.TemporaryDirectory(prefix="ranger-sim-findings-") as logs:
+        place = pathlib.Path(logs)
+        command = [sys.executable, "-m", "ranger_sim", *options.arguments]
+        parent = os.getpid()
+        interrupt = signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C comes to the run as well, which ends itself
+        run = subprocess.Popen(command, env=sanitizers.environment(place), preexec_fn=lambda: _begin(parent, interrupt))
+        end = signal.signal(signal.SIGTERM, lambda number, _frame: run.send_signal(number))
+        try:
+            code = run.wait()
+        finally:
+            signal.signal(signal.SIGINT, interrupt)
+            signal.signal(signal.SIGTERM, end)
+        found = sanitizers.findings(place, [pathlib.Path(folder) for folder in folders])
+    for line in found:
+        print(f"ranger-sim: firmware: {line}", file=sys.stderr)
+    if code < 0:
+        print(f"ranger-sim: the run was ended by {signal.Signals(-code).name}", file=sys.stderr)
+        return EXIT_FOUND
+    return code or (EXIT_FOUND if found else 0)
+
+
+def _begin(parent: int, interrupt: Any) -> None:
+    """In the new process: it hears Ctrl-C, and does not outlive who waits for it."""
+    signal.signal(signal.SIGINT, interrupt)
+    kernel.die_with_parent(parent)
+    kernel.fix_addresses()

@@ -32,7 +32,8 @@ from ranger_sim.harness.profile import load as load_profile
 from ranger_sim.harness.stop_rule import MOST_STEPS, StopRule
 from ranger_sim.tools import faults, serial_options, server_options, terminal, trace, walk, walk_options
 from ranger_sim.tools.files import json_target, writable_folder
-from ranger_sim.tools.firmware import FIRMWARE
+from ranger_sim.tools.firmware import OPTIONS as FIRMWARE
+from ranger_sim.tools.firmware import folders_of, run_sanitized, wants_another_process
 from ranger_sim.tools.options import add_all
 from ranger_sim.tools.units import number, word
 
@@ -119,7 +120,7 @@ def register(commands: Any) -> None:
         "needed ('can1=slcan:/dev/ttyACM0 --bitrate 1000000'); can1= asks python-can's configuration, section can1; "
         "MCH=... gives one board of such a bus a place of its own (repeatable). The run is then asynchronous",
     )
-    add_all(up, (faults.FAULT, faults.MODULE, FIRMWARE))
+    add_all(up, (faults.FAULT, faults.MODULE, *FIRMWARE))
     trace.add_options(up)
     up.set_defaults(run=run)
 
@@ -178,6 +179,8 @@ def run(options: argparse.Namespace) -> int:
     from ranger_sim.tools import bus
 
     check_platform()
+    if wants_another_process(options):
+        return run_sanitized(options, folders_of(options))
     trace.check(options)
     faults.load_modules(options)
     wanted = [catalogue.typed(text) for text in options.fault]

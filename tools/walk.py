@@ -23,6 +23,7 @@ from ranger_sim.harness.scenario import Scenario, StopRule
 from ranger_sim.plant import terms
 from ranger_sim.tools import faults, serial_options, terminal, trace, unexpected
 from ranger_sim.tools.files import json_target, replace_file, writable_folder
+from ranger_sim.tools.firmware import folders_of, run_sanitized, wants_another_process
 from ranger_sim.tools.run_folder import REPORT, SUMMARY, RunFolder
 from ranger_sim.tools.run_logs import RunLogs, write_frames
 from ranger_sim.tools.units import duration_text, figure, length_text
@@ -61,6 +62,8 @@ def run(options: argparse.Namespace) -> int:
 
     0 done, 1 fell or a board failed, 3 a fault did not act, 130 interrupted.
     """
+    if wants_another_process(options):
+        return run_sanitized(options, folders_of(options))
     stop = stop_of(options) or StopRule(steps=DEFAULT_STEPS)
     with ctrl_c_noted() as interrupted:
         return run_scenario(scenario_of(options), stop, options, interrupted)
@@ -140,7 +143,7 @@ def firmware_of(options: argparse.Namespace, console: Console) -> dict[str, nati
         if board in wanted:
             raise UserError(f"--firmware {text}: {board} has {wanted[board]} already")
         wanted[board] = folder
-    firmware = native_boards.built(wanted)
+    firmware = {board: native_boards.build(folder, options.sanitize) for board, folder in wanted.items()}
     for each in firmware.values():
         for line in each.warnings:
             console.print(line, highlight=False, markup=False, soft_wrap=True)

@@ -34,13 +34,16 @@ def told(library: pathlib.Path, sources: pathlib.Path, record: Sequence[int]) ->
             what = f"stack overflow, {what}"
     if not places:
         return f"{what}, outside of the program's code"
-    lines = _lines(library, sources, places)
+    lines = lines_of(library, sources, places)
     once = [line for i, line in enumerate(lines) if line not in lines[:i]]  # a recursion is told once
     return f"{what} in {', called from '.join(once)}"
 
 
-def _lines(library: pathlib.Path, sources: pathlib.Path, places: Sequence[int]) -> list[str]:
-    """Function, file and line of each place; offsets where no addr2line is installed or it does not know."""
+def lines_of(library: pathlib.Path, sources: pathlib.Path, places: Sequence[int]) -> list[str]:
+    """`function() at file:line` of each place, the file relative to the folder `sources`.
+
+    Offsets in the library where no addr2line is installed, or it does not know.
+    """
     offsets = [f"{library.name}+0x{place:x}" for place in places]
     program = shutil.which("addr2line")
     if program is None:

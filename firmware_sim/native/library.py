@@ -12,6 +12,7 @@ from typing import Any
 
 import cffi
 
+from ranger_sim.firmware_sim.native import sanitizers
 from ranger_sim.foundation.user_error import UserError
 
 VERSION = 1  # of the header: FW_VERSION
@@ -69,6 +70,7 @@ class Library:
         if not path.is_file():
             raise UserError(f"{path}: there is no such firmware library; `ranger-sim firmware build` makes one")
         self.code = _loaded_copy(path)
+        sanitizers.lead_findings()
         path = shown if shown is not None else path
         for name in ("fw_compiled_version", "fw_sizes", "fw_call_names", "fw_turn", "fw_watch"):
             if not self.has(name):
