@@ -7,6 +7,7 @@ import signal
 from ranger_sim.harness.processes.settings import Settings
 
 PR_SET_PDEATHSIG, PR_SET_NAME, PR_SET_TIMERSLACK = 1, 15, 29  # linux/prctl.h
+ADDR_NO_RANDOMIZE = 0x0040000  # sys/personality.h
 MCL_CURRENT, MCL_FUTURE = 1, 2  # sys/mman.h
 FIFO_PRIORITY = 20  # of 99: above everything ordinary, below what keeps the machine alive; chosen by us
 PARENT_GONE = 3  # exit code of a child whose parent was dead before it could ask for the signal
