@@ -13,7 +13,8 @@ def fault(kind=actuators.WeakMotor, number=point.HIP, duty=0.5, is_open=False, o
     made.number = number
     made.motor = Made(
         mounting=-1.0, gear=10.0, K=0.02, angle_factor=1.1, contact_drop_V=0.7, diode_drop_V=0.8,
-        dead_time_fraction=0.05, winding_ohm=1.2, series_ohm=0.3, inductance_H=0.001, ripple_per_ohm2=2.0, parameters=None, known_s=1.0, current_A=4.0,
+        dead_time_fraction=0.05, winding_ohm=1.2, series_ohm=0.3, inductance_H=0.001, ripple_per_ohm2=2.0,
+        parameters=None, known_s=1.0, current_A=4.0,
         drive=Made(is_open=is_open, duty=duty),
     )  # fmt: skip
     body = Made(outer=Made(rate=outer_rate, motor_rate=5.0), inner=Made(rate=1.0, motor_rate=7.0))
