@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import pathlib
 
+from ranger_sim.datatable.generate_a2l import a2l_text
 from ranger_sim.datatable.generate_c import c_files
 from ranger_sim.datatable.generate_catalogue import catalogue_text
 from ranger_sim.datatable.generate_dbc import dbc_text
@@ -16,7 +17,7 @@ from ranger_sim.foundation.user_error import UserError
 from ranger_sim.loading import OWN_TABLE
 
 GENERATED_FOLDER = (OWN_TABLE or pathlib.Path(__file__).parent) / "generated"
-GENERATED_SUFFIXES = (".py", ".c", ".h", ".dbc", ".json")
+GENERATED_SUFFIXES = (".py", ".c", ".h", ".dbc", ".json", ".a2l")
 
 
 def generated_files(table: Table) -> dict[str, str]:
@@ -26,6 +27,7 @@ def generated_files(table: Table) -> dict[str, str]:
     for bus in table.channels:
         if bus != "SSP":
             files[f"{bus.lower()}.dbc"] = dbc_text(table, bus)
+    files["ranger.a2l"] = a2l_text(table)
     files["catalogue.json"] = catalogue_text(table)
     return dict(sorted(files.items()))
 

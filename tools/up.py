@@ -35,7 +35,7 @@ from ranger_sim.tools.files import json_target, writable_folder
 from ranger_sim.tools.firmware import OPTIONS as FIRMWARE
 from ranger_sim.tools.firmware import folders_of, run_sanitized, wants_another_process
 from ranger_sim.tools.options import add_all
-from ranger_sim.tools.units import number, word
+from ranger_sim.tools.units import number, whole_number, word
 
 if TYPE_CHECKING:
     from ranger_sim.can_bus.edge.external_bus import ExternalBus
@@ -111,6 +111,12 @@ def register(commands: Any) -> None:
         help="processors for body and boards. They take turns, so one is the fastest (default; interpreted: all)",
     )
     server_options.add_options(group)
+    group.add_argument(
+        "--xcp-udp",
+        type=whole_number(0, 65535),
+        metavar="PORT",
+        help="let a calibration program measure and set parameters by XCP on UDP, on this machine (0: a free port)",
+    )
     group.add_argument(
         "--bus",
         action="append",
@@ -212,6 +218,12 @@ def run(options: argparse.Namespace) -> int:
         outside, openers = external_buses(options, robot, profile)
         ends, lines = serial_options.connect(robot, options)
         servers, more = bus.open_servers({each.name: each for each in robot.buses}, options)
+        if options.xcp_udp is not None:
+            from ranger_sim.harness.xcp.udp import XcpUdpServer
+
+            xcp = XcpUdpServer(robot, options.xcp_udp)
+            robot.attach(xcp)
+            more.append(f"XCP on UDP: {xcp.host}:{xcp.port}, described by ranger.a2l of the generated files")
         for server in servers:
             robot.attach(server)
         for line in lines + more:

@@ -31,6 +31,7 @@ def test_the_files_checked_in_are_what_the_table_gives(table):
         ".h",
         ".dbc",
         ".json",
+        ".a2l",
     }
 
 
@@ -66,8 +67,9 @@ def test_a_folder_that_cannot_be_written_is_one_clear_line(table, tmp_path):
 def test_a_changed_master_table_makes_the_generated_files_stale(tmp_path):
     write(load_table(small_table.write(tmp_path)), tmp_path / "out")
     small_table.write(tmp_path, variables=small_table.VARIABLES.replace("-12.5,12.5", "-12.5,13"))
-    # the range of one variable on CAN1: its DBC and the catalogue; and wherever the table's hash stands
-    assert stale(load_table(tmp_path), tmp_path / "out") == ["all_variables.py", "can1.dbc", "catalogue.json"]
+    # the range of one variable on CAN1: its DBC, the catalogue, the A2L file; and wherever the table's hash stands
+    changed = ["all_variables.py", "can1.dbc", "catalogue.json", "ranger.a2l"]
+    assert stale(load_table(tmp_path), tmp_path / "out") == changed
 
 
 def test_a_spare_that_is_renamed_reaches_the_code_of_its_board_only(tmp_path):

@@ -1,0 +1,169 @@
+"""XCP on UDP: one master over datagrams (ASAM MCD-1 XCP, part 3: length and counter before each packet).
+
+It keeps the rule of `foundation/peers.py` as far as datagrams have it: a look takes a bounded number, one master
+has the place, who else speaks is not answered and counted by reason, and beyond this machine nobody is served unless
+that is asked for. A datagram that finds no room is dropped, and counted.
+"""
+
+from __future__ import annotations
+
+import socket
+import struct
+import sys
+from collections import Counter, deque
+from pathlib import Path
+from typing import Any
+
+from ranger_sim.foundation.peers import FOREIGN, FULL, MALFORMED, UNKNOWN, listening_address, loopback, trusted
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.harness.step_watch import StepWatch
+from ranger_sim.harness.xcp.slave import FINE, Slave
+from ranger_sim.harness.xcp.table_memory import TableMemory
+
+MAX_CTO, MAX_DTO = 248, 1400  # bytes: a datagram fits into one frame of Ethernet
+DATAGRAMS_A_LOOK = 16  # chosen by us, as burst and read_bytes of the other doors: below 4 KB of commands
+WAITING = 4096  # packets of measurements kept for the next look; chosen by us: 2 s of one list at 0.5 ms
+LOOK_NS = 500_000  # virtual time between two looks: the fastest event
+HEADER = struct.Struct("<HH")
+
+
+class _Sampling(StepWatch):
+    """Asks the slave at every step of the plant; measures, and changes nothing."""
+
+    def __init__(self, server: XcpUdpServer) -> None:
+        super().__init__()
+        self.server = server
+
+    def before_step(self, now_ns: int) -> object:
+        self.server.sample(now_ns)
+        return None
+
+
+class XcpUdpServer:
+    """A slave over `robot`'s data table on a UDP port (0: a free one; see `port`). Give it to `robot.attach`.
+
+    UserError when the port cannot be had, or would be open to the network without `allow_network`.
+    """
+
+    kind = "xcp-udp"
+
+    def __init__(self, robot: Any, port: int, host: str = "127.0.0.1", allow_network: bool = False) -> None:
+        address = listening_address(host, f"XCP on {host}:{port}", allow_network)
+        self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        try:
+            self.socket.bind((address, port))
+        except (OSError, OverflowError) as error:
+            self.socket.close()
+            reason = error.strerror if isinstance(error, OSError) else "a port is 0 ... 65535"
+            raise UserError(f"XCP on {host}:{port}: {reason}") from None
+        self.socket.setblocking(False)
+        self.host, self.port = self.socket.getsockname()
+        self.robot = robot
+        self.memory = TableMemory(robot)
+        self.slave = Slave(self.memory, MAX_CTO, MAX_DTO, FINE)
+        self.master: tuple[str, int] | None = None
+        self.counter = 0
+        self.waiting: deque[bytes] = deque()
+        self.sent_away: Counter[str] = Counter()
+        self.totals = {"commands": 0, "packets_out": 0, "packets_dropped": 0}
+        self.left_over = False  # datagrams may wait for the next look
+        self.sampling = _Sampling(self)
+        robot.loop.watchers.append(self.sampling)
+
+    def sample(self, now_ns: int) -> None:
+        """What is measured at this instant waits for the next look."""
+        if not self.slave.running:
+            return
+        for packet in self.slave.sample(now_ns, now_ns - self.robot.start_ns):
+            if len(self.waiting) >= WAITING:
+                self.totals["packets_dropped"] += 1
+            else:
+                self.waiting.append(packet)
+
+    def poll(self, now_ns: int) -> int:
+        """Commands that have come, measurements that wait; returns when it wants to be looked at next, ns."""
+        while self.waiting:
+            self._send(self.waiting.popleft())
+        for _ in range(DATAGRAMS_A_LOOK):
+            try:
+                data, sender = self.socket.recvfrom(2048)
+            except (BlockingIOError, InterruptedError):
+                self.left_over = False
+                break
+            except OSError:  # an earlier datagram found nobody there
+                continue
+            self._take(data, sender, now_ns)
+        else:
+            self.left_over = True
+        return now_ns + LOOK_NS
+
+    def _take(self, data: bytes, sender: tuple[str, int], now_ns: int) -> None:
+        """The packets of a datagram, in their order."""
+        if sender != self.master and (fault := self._fault_of(sender)) is not None:
+            self.sent_away[fault] += 1
+            return
+        at = 0
+        while at < len(data):
+            length = HEADER.unpack_from(data, at)[0] if len(data) - at >= HEADER.size else 0
+            packet = data[at + HEADER.size : at + HEADER.size + length]
+            at += HEADER.size + length
+            if not 0 < length == len(packet):
+                self.sent_away[MALFORMED] += 1
+                return
+            self.totals["commands"] += 1
+            answer = self.slave.command(packet, now_ns)
+            if not answer:
+                continue
+            self.master = sender
+            self._send(answer)
+            if not self.slave.connected:
+                self.master = None
+                self.waiting.clear()
+
+    def _fault_of(self, sender: tuple[str, int]) -> str | None:
+        """Why this sender is not served; None when it may be."""
+        if self.slave.connected:
+            return FULL
+        if not loopback(self.host):
+            return None
+        user = owner_of(sender)
+        if user is None:
+            return UNKNOWN
+        return None if trusted(user) else FOREIGN
+
+    def _send(self, packet: bytes) -> None:
+        if self.master is None:
+            return
+        try:
+            self.socket.sendto(HEADER.pack(len(packet), self.counter) + packet, self.master)
+        except OSError:
+            self.totals["packets_dropped"] += 1
+        else:
+            self.totals["packets_out"] += 1
+        self.counter = (self.counter + 1) & 0xFFFF  # also of what is lost, so that the master sees it
+
+    def filenos(self) -> list[int]:
+        """What becomes readable when the master speaks."""
+        return [self.socket.fileno()]
+
+    def counters(self) -> dict[str, int]:
+        """Whole numbers by name."""
+        away = {f"sent_away_{reason}": count for reason, count in self.sent_away.items()}
+        return {**self.totals, "writes_refused": self.memory.refused, **away}
+
+    def close(self) -> None:
+        """Serve nobody any more."""
+        if self.sampling in self.robot.loop.watchers:
+            self.robot.loop.watchers.remove(self.sampling)
+        self.socket.close()
+
+
+def owner_of(sender: tuple[str, int]) -> int | None:
+    """The user id behind a UDP port of this machine, by the kernel's table; None when it is not there."""
+    number = int.from_bytes(socket.inet_aton(sender[0]), sys.byteorder)
+    wanted = {f"{number:08X}:{sender[1]:04X}", f"00000000:{sender[1]:04X}"}
+    for line in Path("/proc/net/udp").read_text(encoding="ascii").splitlines()[1:]:
+        cells = line.split()
+        if cells[1] in wanted:
+            return int(cells[7])
+    return None

@@ -1,0 +1,145 @@
+"""The XCP slave by packets whose bytes follow from the standard's tables (ASAM MCD-1 XCP part 2)."""
+
+import pytest
+
+from ranger_sim.harness.xcp.slave import FINE, Slave, XcpError
+
+MS = 1_000_000
+
+
+class Bytes:
+    """16 bytes of memory at 0x100, of which the last four may be written."""
+
+    def __init__(self):
+        self.data = bytearray(range(16))
+
+    def read(self, address, count):
+        if not 0x100 <= address <= 0x110 - count:
+            raise XcpError(0x22)
+        return bytes(self.data[address - 0x100 : address - 0x100 + count])
+
+    def write(self, address, data):
+        if address != 0x10C or len(data) != 4:
+            raise XcpError(0x24)
+        self.data[12:16] = data
+
+
+@pytest.fixture
+def slave():
+    made = Slave(Bytes())
+    assert made.command(bytes.fromhex("FF00"), 0) == bytes.fromhex("FF 05 80 08 0800 01 01")
+    return made
+
+
+def say(slave, text, time_ns=0):
+    return slave.command(bytes.fromhex(text), time_ns).hex(" ").upper()
+
+
+def test_nothing_but_connect_is_answered_before_connect():
+    slave = Slave(Bytes())
+    assert say(slave, "FD") == ""
+    assert say(slave, "FF01") == "FE 22" and not slave.connected
+
+
+@pytest.mark.parametrize(
+    ("command", "answer"),
+    [
+        ("FD", "FF 00 00 00 00 00"),
+        ("FC", "FE 00"),
+        ("FB", "FF 00 00 00 00 00 00 10"),
+        ("FA00", "FF 00 00 00 0A 00 00 00"),
+        ("FA04", "FF 00 00 00 00 00 00 00"),
+        ("F4 02 00 00 04010000", "FF 04 05"),
+        ("F4 08 00 00 00010000", "FE 22"),
+        ("F4 02 00 01 04010000", "FE 22"),
+        ("F4 02 00 00 0F010000", "FE 22"),
+        ("DA", "FF 13 20 00 03 00 00 00"),
+        ("D9", "FF 01 04 01 00 42 01 00"),
+        ("D7 00 0000", "FF 04 20 0A 05 05 00"),
+        ("D7 00 0300", "FE 22"),
+        ("F6 00", "FE 21"),
+        ("C0", "FE 20"),
+        ("EB 83 00 00", "FE 20"),
+    ],
+)
+def test_a_command_has_the_answer_of_the_standard(slave, command, answer):
+    assert say(slave, command) == answer
+
+
+def test_upload_moves_the_pointer_and_a_checksum_adds_bytes(slave):
+    assert say(slave, "F6 0000 00 00010000") == "FF"
+    assert say(slave, "F503") == "FF 00 01 02"
+    assert say(slave, "F502") == "FF 03 04"
+    assert say(slave, "F6 0000 00 00010000") == "FF"
+    assert say(slave, "F3 000000 10000000") == "FF 03 00 00 78 00 00 00"  # 0 + 1 ... + 15 = 120
+
+
+def test_the_name_is_uploaded_in_parts(slave):
+    say(slave, "FA01")
+    assert slave.command(b"\xf5\x07", 0)[1:] + slave.command(b"\xf5\x03", 0)[1:] == b"ranger_sim"
+    assert say(slave, "F501") == "FE 22"
+
+
+def test_what_is_refused_changes_nothing(slave):
+    say(slave, "F6 0000 00 00010000")
+    assert say(slave, "F0 04 01020304") == "FE 24"
+    assert slave.memory.data == bytearray(range(16))
+    say(slave, "F6 0000 00 0C010000")
+    assert say(slave, "F0 05 01020304") == "FE 21"
+    assert say(slave, "F0 04 01020304") == "FF"
+    assert slave.memory.data[12:] == b"\1\2\3\4"
+
+
+def arranged(slave, event="0000", prescaler="01"):
+    for command in (
+        "D6", "D5 00 0100", "D4 00 0000 02", "D3 00 0000 00 01", "D3 00 0000 01 01", "E2 00 0000 00 00",
+        "E1 FF 04 00 00010000", "E2 00 0000 01 00", "E1 FF 02 00 08010000", f"E0 10 0000 {event} {prescaler} 00",
+        "DE 02 0000", "DD 01",
+    ):  # fmt: skip
+        assert say(slave, command)[:2] == "FF", command
+
+
+def test_a_list_is_sampled_at_its_event_with_stamps_of_virtual_time(slave):
+    arranged(slave, "0100")
+    assert say(slave, "FD")[:5] == "FF 40"
+    assert slave.sample(7 * MS, 500_000) == []
+    assert slave.sample(7 * MS, 3 * MS) == [bytes.fromhex("00 BC02 00010203"), bytes.fromhex("01 0809")]
+    assert say(slave, "DD00") == "FF"
+    assert slave.sample(8 * MS, 4 * MS) == []
+
+
+def test_a_prescaler_leaves_events_out(slave):
+    arranged(slave, "0000", "03")
+    found = [bool(slave.sample(at, at)) for at in range(0, 7 * MS // 2, MS // 2)]
+    assert found == [True, False, False, True, False, False, True]
+
+
+def test_lists_are_allocated_in_the_order_of_the_standard(slave):
+    assert say(slave, "D5 00 0100") == "FE 29"
+    assert say(slave, "E1 FF 04 00 00010000") == "FE 29"
+    say(slave, "D6")
+    assert say(slave, "D5 00 2100") == "FE 30"
+    assert say(slave, "D5 00 0100") == "FF"
+    assert say(slave, "D3 00 0000 00 01") == "FE 29"
+    assert say(slave, "D4 00 0000 FD") == "FE 30"
+
+
+def test_lists_are_not_changed_while_one_runs(slave):
+    arranged(slave)
+    assert say(slave, "E2 00 0000 00 00") == "FE 11"
+    assert say(slave, "E0 10 0000 0000 01 00") == "FE 11"
+
+
+def test_a_list_whose_packet_is_too_long_does_not_start(slave):
+    for command in ("D6", "D5 00 0100", "D4 00 0000 01", "D3 00 0000 00 02", "E2 00 0000 00 00"):
+        say(slave, command)
+    for _ in range(2):
+        assert say(slave, "E1 FF 04 00 00010000") == "FF"
+    assert say(slave, "DE 01 0000") == "FE 2A"
+
+
+def test_fine_stamps_count_microseconds_in_four_bytes():
+    slave = Slave(Bytes(), 248, 1400, FINE)
+    assert say(slave, "FF00") == "FF 05 80 F8 78 05 01 01"
+    assert say(slave, "D9") == "FF 01 04 01 00 34 01 00"
+    assert say(slave, "DC", 5_000_001_000) == "FF 00 00 00 41 4B 4C 00"

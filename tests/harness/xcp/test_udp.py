@@ -1,0 +1,140 @@
+"""XCP on UDP with a whole robot behind it: by datagrams, and with pyxcp as the master."""
+
+import contextlib
+import importlib.util
+import json
+import pathlib
+import socket
+import struct
+import subprocess
+import sys
+
+import pytest
+
+from ranger_sim.datatable import parameters
+from ranger_sim.datatable.addresses import address_of
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.harness.ranger import Ranger
+from ranger_sim.harness.scenario import Scenario
+from ranger_sim.harness.xcp.udp import XcpUdpServer
+
+MASTER = pathlib.Path(__file__).with_name("pyxcp_master.py")
+
+
+class Client:
+    """A master of a few lines; the robot runs while it waits."""
+
+    def __init__(self, robot, server):
+        self.robot = robot
+        self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self.socket.bind(("127.0.0.1", 0))
+        self.socket.connect((server.host, server.port))
+        self.socket.setblocking(False)
+
+    def close(self):
+        self.socket.close()
+
+    def say(self, *commands):
+        for command in commands:
+            packet = bytes.fromhex(command)
+            self.socket.send(struct.pack("<HH", len(packet), 0) + packet)
+        self.robot.run_for(0.002)
+        return self.heard()
+
+    def heard(self):
+        packets = []
+        with contextlib.suppress(BlockingIOError):
+            while True:
+                packets.append(self.socket.recv(2048)[4:])
+        return packets
+
+
+@pytest.fixture
+def robot():
+    with contextlib.closing(Ranger(Scenario(seed=3))) as made:
+        yield made
+
+
+def number_of(name):
+    return parameters.find(name).id
+
+
+def test_a_master_that_measures_leaves_the_run_as_it_is():
+    with contextlib.closing(Ranger(Scenario(seed=3), log="full")) as alone:
+        alone.run_for(0.2)
+        expected = alone.trace_digest()
+    with contextlib.closing(Ranger(Scenario(seed=3), log="full")) as measured, contextlib.ExitStack() as opened:
+        server = XcpUdpServer(measured, 0)
+        measured.attach(server)
+        client = opened.enter_context(contextlib.closing(Client(measured, server)))
+        address = struct.pack("<I", address_of(number_of("TIMESTAMP"))).hex()
+        answers = client.say(
+            "FF00", "D6", "D500 0100", "D400 0000 01", "D300 0000 00 01", "E200 0000 00 00", f"E1FF0400{address}",
+            "E0100000 0000 0100", "DE01 0000",
+        )  # fmt: skip
+        assert len(answers) >= 9 and all(each[0] == 0xFF for each in answers[:9])
+        packets = []
+        while measured.time_s < 0.2:  # a socket keeps 0.1 s of these packets
+            measured.run_for(min(0.05, 0.2 - measured.time_s))
+            packets += [each for each in client.heard() if each[0] == 0]
+        stamps = [struct.unpack_from("<I", each, 1)[0] for each in packets]
+        assert len(stamps) > 300 and {b - a for a, b in zip(stamps, stamps[1:], strict=False)} == {500}
+        assert measured.trace_digest() == expected
+
+
+def test_a_second_master_is_not_answered_and_counted(robot):
+    server = XcpUdpServer(robot, 0)
+    robot.attach(server)
+    first, second = clients = Client(robot, server), Client(robot, server)
+    assert first.say("FF00")
+    assert second.say("FF00") == []
+    assert server.counters()["sent_away_full"] == 1
+    first.say("FE")
+    assert second.say("FF00")
+    second.socket.send(b"\x09\x00\x00\x00\xff")
+    robot.run_for(0.002)
+    assert server.counters()["sent_away_malformed"] == 1
+    for client in clients:
+        client.close()
+
+
+def test_beyond_this_machine_it_listens_only_when_that_is_asked_for(robot):
+    with pytest.raises(UserError, match="allow-network"):
+        XcpUdpServer(robot, 0, "0.0.0.0")
+
+
+@pytest.mark.skipif(importlib.util.find_spec("pyxcp") is None, reason="pyxcp is not installed")
+def test_pyxcp_measures_at_half_a_millisecond_and_writes_only_what_the_one_check_takes(robot):
+    server = XcpUdpServer(robot, 0)
+    robot.attach(server)
+    row = next(
+        each
+        for each in parameters.parameters()
+        if each.type == "f32" and each.minimum is not None and each.minimum <= 0.5 <= (each.maximum or 0.0) < 1e9
+    )
+    names = ("TIMESTAMP", "MCH_BATT_POWER")
+    seen = {}
+    numbers = [number_of(name) for name in names]
+    addresses = [str(address_of(number)) for number in (*numbers, row.id)]
+    master = subprocess.Popen(
+        [sys.executable, MASTER, str(server.port), *addresses], stdout=subprocess.PIPE, stderr=subprocess.STDOUT
+    )
+    try:
+        while master.poll() is None and robot.time_s < 300.0:
+            robot.run_for(0.0005)
+            seen[robot.loop.time // 1000] = [robot.variable(name) for name in names]
+    finally:
+        master.kill()
+        output = master.communicate()[0].decode()
+    assert "FOUND " in output, output
+    found = json.loads(output.partition("FOUND ")[2])
+    assert found["name"] == "ranger_sim"
+    assert "OUT_OF_RANGE" in found["refused"] and "ACCESS_DENIED" in found["measured_refused"]
+    assert found["accepted"] is None and found["now"] == 0.5 == robot.variable(row.name)
+    rows = found["rows"]
+    assert len(rows) >= 200
+    stamps = [stamp for stamp, *_ in rows]
+    assert {b - a for a, b in zip(stamps, stamps[1:], strict=False)} == {500_000}  # pyxcp counts in ns
+    # it counts from the first packet on; the network time in each row says when that was, to its resolution of 1 ms
+    starts = [at for at in seen if all(seen.get(at + stamp // 1000) == values for stamp, *values in rows)]
+    assert len(starts) == 1
