@@ -69,6 +69,7 @@ OFTEN_RUN = (
     "ranger_sim.datatable.store",
     "ranger_sim.firmware_sim.alarm",
     "ranger_sim.firmware_sim.analog",
+    "ranger_sim.firmware_sim.arm7.core",
     "ranger_sim.firmware_sim.chip",
     "ranger_sim.firmware_sim.edge_line",
     "ranger_sim.firmware_sim.microcontroller",

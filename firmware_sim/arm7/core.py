@@ -1,0 +1,987 @@
+# cython: boundscheck=False, wraparound=False
+# (every index below is a field of 4 bits, or a place held against its memory's size)
+"""The ARM7TDMI core (ARMv4T): ARM and Thumb state, seven modes with banked registers, exceptions, cycles.
+
+Sources: ARM Architecture Reference Manual (DDI 0100, ARMv4T) for results, ARM7TDMI data sheet (DDI 0029) for cycles
+and for what the architecture leaves open: loads from unaligned addresses rotate, an aborted load leaves its base
+updated, STR and STM of the program counter store its address + 12, an empty register list moves the program counter
+and steps by 64 bytes.
+
+Cycles are the data sheet's S, N, I and C cycles of each class of instruction; each is one clock, and memory adds
+waits. RAM adds none. A device adds `device_waits` (chosen by us). Flash adds what its accelerator (MAM, LPC2194 user
+manual) cannot hide; the model, chosen by us, holds lines of 16 bytes: the line that runs, the line after it
+(prefetched while this one runs), the line of the last branch that missed (branch trail) and the line of the last
+datum. `mam_mode` 2 has all of it, 1 has no branch trail and no line of data, 0 has nothing: each access then takes
+`mam_timing` clocks.
+
+An access to what is not there raises `BusFault` with address and program counter. With `takes_aborts` the program
+gets its data or prefetch abort instead, as on the chip, and `fault_address` keeps the address.
+"""
+
+import array
+
+import cython
+
+from ranger_sim.foundation.user_error import UserError
+
+if not cython.compiled:
+    # modes: low five bits of the CPSR
+    USER = 0x10
+    FAST = 0x11
+    INTERRUPT = 0x12
+    SUPERVISOR = 0x13
+    ABORT = 0x17
+    UNDEFINED = 0x1B
+    SYSTEM = 0x1F
+    # bits of Core.lines
+    IRQ_LINE = 1
+    FIQ_LINE = 2
+
+# C variables when compiled (.pxd): Cython makes a Python object of every literal above 31 bits.
+_MASK = 0xFFFFFFFF
+_SIGN = 0x80000000
+_STATUS = 0xF00000FF  # the bits a status register has
+
+MODES = (USER, FAST, INTERRUPT, SUPERVISOR, ABORT, UNDEFINED, SYSTEM)
+# Chosen by us: the bridge to the peripheral bus at the processor's own clock takes two clocks more than memory.
+DEVICE_WAITS = 2
+MAM_TIMING = 4  # clocks of a flash access at 60 MHz: what all of the robot's boards write to MAMTIM
+
+
+class ProcessorError(UserError):
+    """The program did what the processor does not define."""
+
+
+class BusFault(ProcessorError):  # noqa: N818  (what processors call it)
+    """The program reached for an address where nothing is; `address` and `pc` say where, both as numbers."""
+
+    def __init__(self, text, address, pc) -> None:
+        UserError.__init__(self, text)
+        self.address = address
+        self.pc = pc
+
+
+def memory(what, size):
+    """`size` bytes of zeros as an array of words; UserError when that is no whole number of words, 4 or more."""
+    if not isinstance(size, int) or size < 4 or size % 4:
+        raise UserError(f"{what} of {size!r} bytes: must be a whole number of words of 4 bytes, at least one")
+    return array.array("q", [0]) * (size // 4)
+
+
+def put(words, place, content):
+    """Bytes into an array of words, from byte `place` on."""
+    for i, byte in enumerate(content, place):
+        turn = 8 * (i & 3)
+        words[i >> 2] = words[i >> 2] & ~(0xFF << turn) | byte << turn
+
+
+class Core:
+    """One processor with flash, RAM and a hook for everything else.
+
+    `device`: an object with read(address, size) -> value and write(address, size, value), size in bytes 1, 2 or 4;
+    both raise LookupError where nothing is. `lines` holds the two interrupt inputs (IRQ_LINE, FIQ_LINE), levels set by
+    devices. `r` holds the registers of the present mode, `pc` the address of the next instruction (`r[15]` is only
+    valid inside an instruction). `cycles` and `instructions` count from the start.
+    """
+
+    def __init__(
+        self, flash_size=0x40000, ram_size=0x4000, flash_base=0, ram_base=0x40000000, device=None, name="ARM7TDMI"
+    ) -> None:
+        self.name = name
+        self.flash = memory(f"{name}: flash", flash_size)
+        self.ram = memory(f"{name}: RAM", ram_size)
+        self.flash_base = flash_base
+        self.flash_size = flash_size
+        self.ram_base = ram_base
+        self.ram_size = ram_size
+        self.device = device
+        self.device_waits = DEVICE_WAITS
+        self.mam_mode = 2
+        self.mam_timing = MAM_TIMING
+        self.takes_aborts = False
+        self.fault_address = -1
+        self.r = array.array("q", [0]) * 16
+        self.high = array.array("q", [0]) * 10  # r8 ... r12 of the other modes, then of FIQ
+        self.banked = array.array("q", [0]) * 12  # r13, r14 of: user, FIQ, IRQ, supervisor, abort, undefined
+        self.saved = array.array("q", [0]) * 6  # SPSR of the same; the first is never used
+        self.cycles = 0
+        self.instructions = 0
+        self.lines = 0
+        self.carry = 0
+        self.reset()
+
+    def reset(self) -> None:
+        """As the reset input: supervisor mode, both interrupts off, ARM state, address 0. Memory and counts stay."""
+        self.n = self.z = self.c = self.v = 0
+        self.control = SUPERVISOR | 0xC0
+        self.pc = self.following = 0
+        self.faulted = 0
+        self.flowed = 0
+        self.stopped = 0
+        self.line = self.trail = self.data_line = -2
+
+    def stop(self) -> None:
+        """`run` ends after the present instruction; a device calls this."""
+        self.stopped = 1
+
+    def set_mam(self, mode, timing) -> None:
+        """Mode 0 ... 2 and clocks per access 1 ... 7 of the flash accelerator; what it held is forgotten."""
+        if mode not in (0, 1, 2) or not 1 <= timing <= 7:
+            raise UserError(f"{self.name}: MAM mode {mode} of {timing} clocks: modes are 0 ... 2, clocks 1 ... 7")
+        self.mam_mode = mode
+        self.mam_timing = timing
+        self.line = self.trail = self.data_line = -2
+
+    # ---- memory from outside: no cycles, no devices
+
+    def place(self, address, content) -> None:
+        """Write bytes into flash or RAM, as a programmer does; UserError when they do not fit in one of them."""
+        end = address + len(content)
+        if self.flash_base <= address and end <= self.flash_base + self.flash_size:
+            put(self.flash, address - self.flash_base, content)
+            return
+        if self.ram_base <= address and end <= self.ram_base + self.ram_size:
+            put(self.ram, address - self.ram_base, content)
+            return
+        raise UserError(
+            f"{self.name}: {len(content)} bytes at {address:#010x} fit neither flash ({self.flash_base:#010x}, "
+            f"{self.flash_size} bytes) nor RAM ({self.ram_base:#010x}, {self.ram_size} bytes)"
+        )
+
+    def peek(self, address) -> int:
+        """The word of flash or RAM that holds this address; UserError elsewhere."""
+        if 0 <= address - self.flash_base < self.flash_size:
+            return self.flash[(address - self.flash_base) >> 2]
+        if 0 <= address - self.ram_base < self.ram_size:
+            return self.ram[(address - self.ram_base) >> 2]
+        raise UserError(f"{self.name}: {address:#010x} is neither in flash nor in RAM")
+
+    # ---- status registers and modes
+
+    def cpsr(self) -> cython.longlong:
+        """The current program status register."""
+        return self.n << 31 | self.z << 30 | self.c << 29 | self.v << 28 | self.control
+
+    def spsr(self) -> int:
+        """The saved status register of the present mode; of user and system mode, which have none, the CPSR."""
+        bank = self.bank(self.control & 0x1F)
+        return self.saved[bank] if bank else self.cpsr()
+
+    def set_spsr(self, value) -> None:
+        """Write it; nothing happens in a mode that has none."""
+        if self.bank(self.control & 0x1F):
+            self.saved[self.bank(self.control & 0x1F)] = value & _STATUS
+
+    def set_cpsr(self, value: cython.longlong) -> cython.int:
+        """Write all of it; registers change with the mode. ProcessorError for a mode that is none."""
+        self.switch_mode(value & 0x1F)
+        self.n = value >> 31 & 1
+        self.z = value >> 30 & 1
+        self.c = value >> 29 & 1
+        self.v = value >> 28 & 1
+        self.control = value & 0xFF
+        return 0
+
+    def bank(self, mode: cython.longlong) -> cython.longlong:
+        if mode == FAST:
+            return 1
+        if mode == INTERRUPT:
+            return 2
+        if mode == SUPERVISOR:
+            return 3
+        if mode == ABORT:
+            return 4
+        if mode == UNDEFINED:
+            return 5
+        return 0
+
+    def switch_mode(self, mode: cython.longlong) -> cython.int:
+        old = self.bank(self.control & 0x1F)
+        new = self.bank(mode)
+        if new == 0 and mode != USER and mode != SYSTEM:
+            raise ProcessorError(f"{self.name}: mode {mode:#04x} set at pc {self.pc:#010x}: there is no such mode")
+        if old != new:
+            self.banked[2 * old] = self.r[13]
+            self.banked[2 * old + 1] = self.r[14]
+            self.r[13] = self.banked[2 * new]
+            self.r[14] = self.banked[2 * new + 1]
+            if old == 1 or new == 1:
+                for i in range(5):
+                    self.high[(5 if old == 1 else 0) + i] = self.r[8 + i]
+                    self.r[8 + i] = self.high[(5 if new == 1 else 0) + i]
+        self.control = self.control & 0xE0 | mode
+        return 0
+
+    def enter(self, mode: cython.longlong, vector: cython.longlong, back: cython.longlong) -> cython.int:
+        """Take an exception: status and return address saved, ARM state, IRQ off (for FIQ also FIQ)."""
+        before = self.cpsr()
+        self.switch_mode(mode)
+        self.saved[self.bank(mode)] = before
+        self.r[14] = back & _MASK
+        self.control = (self.control | (0xC0 if mode == FAST else 0x80)) & 0xDF
+        self.following = vector
+        self.cycles += 2
+        return 0
+
+    def undefined(self) -> cython.int:
+        self.cycles += 1
+        return self.enter(UNDEFINED, 4, self.following)
+
+    # ---- memory
+
+    def fetch_line(self, line: cython.longlong) -> cython.int:
+        """Waits of a fetch from another line of flash than the last fetch."""
+        waits = self.mam_timing - 1
+        if self.mam_mode == 0:
+            self.line = -2
+        else:
+            if line == self.line + 1 or (line == self.trail and self.mam_mode == 2):
+                waits = 0
+            else:
+                self.trail = line
+            # a line lasts four clocks at least; of a slower flash the rest is not hidden
+            if line == self.line + 1 and self.mam_timing > 4:
+                waits = self.mam_timing - 4
+            self.line = line
+        self.cycles += waits
+        return 0
+
+    def read_flash(self, line: cython.longlong) -> cython.int:
+        """Waits of a datum in flash."""
+        if line != self.data_line:
+            self.cycles += self.mam_timing - 1
+            if self.mam_mode == 2:
+                self.data_line = line
+        return 0
+
+    def nothing(self, address: cython.longlong, size: cython.longlong, writing: cython.bint) -> cython.int:
+        self.fault_address = address
+        if not self.takes_aborts:
+            what = "write to" if writing else "read from"
+            why = "flash" if 0 <= address - self.flash_base < self.flash_size else "an address where nothing is"
+            raise BusFault(
+                f"{self.name}: {what} {why}: {address:#010x}, {size} bytes, at pc {self.pc:#010x}", address, self.pc
+            )
+        self.faulted = 1
+        return 0
+
+    def load(self, address: cython.longlong, size: cython.longlong) -> cython.longlong:
+        """A datum at an address that is a multiple of its size."""
+        self.cycles += 1
+        place = address - self.ram_base
+        if 0 <= place < self.ram_size:
+            value = self.ram[place >> 2]
+        else:
+            place = address - self.flash_base
+            if 0 <= place < self.flash_size:
+                self.read_flash(place >> 4)
+                value = self.flash[place >> 2]
+            else:
+                if self.device is not None:
+                    self.cycles += self.device_waits
+                    try:
+                        return self.device.read(address, size)
+                    except LookupError:
+                        pass
+                self.nothing(address, size, False)
+                return 0
+        if size == 4:
+            return value
+        value >>= 8 * (address & 3)
+        return value & 0xFF if size == 1 else value & 0xFFFF
+
+    def store(self, address: cython.longlong, size: cython.longlong, value: cython.longlong) -> cython.int:
+        self.cycles += 1
+        place = address - self.ram_base
+        if 0 <= place < self.ram_size:
+            if size == 4:
+                self.ram[place >> 2] = value
+            else:
+                moved = 8 * (address & 3)
+                mask = (0xFF if size == 1 else 0xFFFF) << moved
+                self.ram[place >> 2] = self.ram[place >> 2] & (_MASK ^ mask) | value << moved & mask
+            return 0
+        if self.device is not None and not 0 <= address - self.flash_base < self.flash_size:
+            self.cycles += self.device_waits
+            try:
+                self.device.write(address, size, value if size == 4 else value & (0xFF if size == 1 else 0xFFFF))
+                return 0
+            except LookupError:
+                pass
+        return self.nothing(address, size, True)
+
+    def load_word(self, address: cython.longlong) -> cython.longlong:
+        value = self.load(address & -4, 4)
+        turn = 8 * (address & 3)
+        return (value >> turn | value << (32 - turn)) & _MASK if turn else value
+
+    def load_half(self, address: cython.longlong, signed: cython.bint) -> cython.longlong:
+        if address & 1 and signed:
+            return self.load_byte(address, True)
+        value = self.load(address & -2, 2)
+        if address & 1:
+            return (value >> 8 | value << 24) & _MASK
+        return value | (_MASK ^ 0xFFFF) if signed and value & 0x8000 else value
+
+    def load_byte(self, address: cython.longlong, signed: cython.bint) -> cython.longlong:
+        value = self.load(address, 1)
+        return value | (_MASK ^ 0xFF) if signed and value & 0x80 else value
+
+    # ---- arithmetic
+
+    def jump(self, address: cython.longlong) -> cython.int:
+        """Go on there, in the present state: the pipeline fills anew."""
+        self.following = address & (_MASK - 1 if self.control & 0x20 else _MASK - 3)
+        self.cycles += 2
+        return 0
+
+    def passes(self, condition: cython.longlong) -> cython.bint:
+        if condition == 0:
+            return self.z == 1
+        elif condition == 1:
+            return self.z == 0
+        elif condition == 2:
+            return self.c == 1
+        elif condition == 3:
+            return self.c == 0
+        elif condition == 4:
+            return self.n == 1
+        elif condition == 5:
+            return self.n == 0
+        elif condition == 6:
+            return self.v == 1
+        elif condition == 7:
+            return self.v == 0
+        elif condition == 8:
+            return self.c == 1 and self.z == 0
+        elif condition == 9:
+            return self.c == 0 or self.z == 1
+        elif condition == 10:
+            return self.n == self.v
+        elif condition == 11:
+            return self.n != self.v
+        elif condition == 12:
+            return self.z == 0 and self.n == self.v
+        elif condition == 13:
+            return self.z == 1 or self.n != self.v
+        return condition == 14  # 15 is "never" before ARMv5
+
+    def add(self, a: cython.longlong, b: cython.longlong, carry: cython.longlong) -> cython.longlong:
+        """a + b + carry with all four flags; a - b is a + not b + 1."""
+        total = a + b + carry
+        result = total & _MASK
+        self.n = result >> 31
+        self.z = 1 if result == 0 else 0
+        self.c = total >> 32
+        self.v = ((a ^ result) & (b ^ result)) >> 31
+        return result
+
+    def mark(self, result: cython.longlong) -> cython.int:
+        self.n = result >> 31
+        self.z = 1 if result == 0 else 0
+        return 0
+
+    def shift(self, kind: cython.longlong, value: cython.longlong, amount: cython.longlong) -> cython.longlong:
+        """By the low byte of a register; the bit shifted out last goes to `carry`."""
+        self.carry = self.c
+        if amount == 0:
+            return value
+        if kind == 0:
+            if amount > 32:
+                self.carry = 0
+                return 0
+            self.carry = value >> (32 - amount) & 1
+            return value << amount & _MASK if amount < 32 else 0
+        elif kind == 1:
+            if amount > 32:
+                self.carry = 0
+                return 0
+            self.carry = value >> (amount - 1) & 1
+            return value >> amount
+        elif kind == 2:
+            if amount > 31:
+                self.carry = value >> 31
+                return _MASK if self.carry else 0
+            self.carry = value >> (amount - 1) & 1
+            return (value >> amount | (_MASK << (32 - amount) & _MASK if value >> 31 else 0)) & _MASK
+        amount &= 31
+        if amount:
+            value = (value >> amount | value << (32 - amount)) & _MASK
+        self.carry = value >> 31
+        return value
+
+    def shift_fixed(self, kind: cython.longlong, value: cython.longlong, amount: cython.longlong) -> cython.longlong:
+        """By an amount in the instruction, where 0 means 32, or for ROR one place through the carry."""
+        if amount == 0 and kind:
+            if kind == 3:
+                self.carry = value & 1
+                return value >> 1 | self.c << 31
+            amount = 32
+        return self.shift(kind, value, amount)
+
+    def multiplier_cycles(self, value: cython.longlong, signed: cython.bint) -> cython.int:
+        """The multiplier takes 8 bits at a time and ends when the rest is all zeros, or (signed) all ones."""
+        if signed and value & _SIGN:
+            value ^= _MASK
+        self.cycles += 1 if value < 0x100 else 2 if value < 0x10000 else 3 if value < 0x1000000 else 4
+        return 0
+
+    # ---- running
+
+    def run(self, until: cython.longlong) -> cython.int:
+        """Execute until `cycles` has reached `until` (the last instruction is completed) or `stop` was called."""
+        self.stopped = 0
+        while self.cycles < until and not self.stopped:
+            if self.lines:
+                self.interrupt()
+            self.one()
+        return 0
+
+    def step(self) -> cython.int:
+        """One instruction; an interrupt that waits is taken first."""
+        if self.lines:
+            self.interrupt()
+        return self.one()
+
+    def interrupt(self) -> cython.int:
+        if self.lines & FIQ_LINE and not self.control & 0x40:
+            self.enter(FAST, 0x1C, self.pc + 4)
+        elif self.lines & IRQ_LINE and not self.control & 0x80:
+            self.enter(INTERRUPT, 0x18, self.pc + 4)
+        else:
+            return 0
+        self.cycles += 1
+        self.pc = self.following
+        return 0
+
+    def one(self) -> cython.int:
+        pc = self.pc
+        self.instructions += 1
+        self.cycles += 1
+        place = pc - self.flash_base
+        if 0 <= place < self.flash_size:
+            if place >> 4 != self.line:
+                self.fetch_line(place >> 4)
+            op = self.flash[place >> 2]
+        else:
+            place = pc - self.ram_base
+            self.line = -2
+            if 0 <= place < self.ram_size:
+                op = self.ram[place >> 2]
+            else:
+                self.nothing(pc, 2 if self.control & 0x20 else 4, False)
+                self.faulted = 0
+                self.enter(ABORT, 0x0C, pc + 4)
+                self.pc = self.following
+                return 0
+        if self.control & 0x20:
+            self.following = pc + 2 & _MASK
+            self.r[15] = pc + 4 & _MASK
+            self.thumb(op >> 16 if pc & 2 else op & 0xFFFF)
+        else:
+            self.following = pc + 4 & _MASK
+            self.r[15] = pc + 8 & _MASK
+            if op >> 28 == 14 or self.passes(op >> 28):
+                self.arm(op)
+        if self.faulted:
+            self.faulted = 0
+            self.enter(ABORT, 0x10, pc + 8)
+        self.pc = self.following
+        return 0
+
+    # ---- ARM state
+
+    def arm(self, op: cython.longlong) -> cython.int:
+        group = op >> 25 & 7
+        if group == 0:
+            if op & 0x90 == 0x90:
+                if op & 0x60:
+                    return self.transfer(op)
+                if op & 0x01000000:
+                    return self.swap(op)
+                return self.multiply(op)
+            if op & 0x01900000 == 0x01000000:
+                return self.status(op)
+            return self.data(op)
+        elif group == 1:
+            return self.status(op) if op & 0x01900000 == 0x01000000 else self.data(op)
+        elif group == 2:
+            return self.transfer(op)
+        elif group == 3:
+            return self.undefined() if op & 0x10 else self.transfer(op)
+        elif group == 4:
+            return self.block(op)
+        elif group == 5:
+            offset = (op & 0xFFFFFF) << 2
+            if op & 0x800000:
+                offset -= 0x4000000
+            if op & 0x01000000:
+                self.r[14] = self.following
+            return self.jump(self.r[15] + offset)
+        elif group == 7:
+            if op & 0x01000000:
+                return self.enter(SUPERVISOR, 8, self.following)
+        return self.undefined()  # no coprocessor answers
+
+    def data(self, op: cython.longlong) -> cython.int:
+        if op & 0x02000000:
+            b = op & 0xFF
+            turn = op >> 7 & 30
+            self.carry = self.c
+            if turn:
+                b = (b >> turn | b << (32 - turn)) & _MASK
+                self.carry = b >> 31
+        elif op & 0x10:
+            self.cycles += 1
+            self.r[15] = self.r[15] + 4 & _MASK
+            b = self.shift(op >> 5 & 3, self.r[op & 15], self.r[op >> 8 & 15] & 0xFF)
+        else:
+            b = self.shift_fixed(op >> 5 & 3, self.r[op & 15], op >> 7 & 31)
+        a = self.r[op >> 16 & 15]
+        rd = op >> 12 & 15
+        code = op >> 21 & 15
+        writes = code < 8 or code > 11
+        if not op & 0x00100000:
+            # no flags: what they would be is not computed
+            if code == 0:
+                result = a & b
+            elif code == 1:
+                result = a ^ b
+            elif code == 2:
+                result = a - b
+            elif code == 3:
+                result = b - a
+            elif code == 4:
+                result = a + b
+            elif code == 5:
+                result = a + b + self.c
+            elif code == 6:
+                result = a - b - 1 + self.c
+            elif code == 7:
+                result = b - a - 1 + self.c
+            elif code == 12:
+                result = a | b
+            elif code == 13:
+                result = b
+            elif code == 14:
+                result = a & (_MASK ^ b)
+            else:
+                result = _MASK ^ b
+            result &= _MASK
+            if rd == 15:
+                return self.jump(result)
+            self.r[rd] = result
+            return 0
+        if rd == 15 and writes:
+            # the form that returns from an exception: flags come from the saved status
+            self.carry = self.c
+        if code == 2 or code == 10:
+            result = self.add(a, _MASK ^ b, 1)
+        elif code == 3:
+            result = self.add(b, _MASK ^ a, 1)
+        elif code == 4 or code == 11:
+            result = self.add(a, b, 0)
+        elif code == 5:
+            result = self.add(a, b, self.c)
+        elif code == 6:
+            result = self.add(a, _MASK ^ b, self.c)
+        elif code == 7:
+            result = self.add(b, _MASK ^ a, self.c)
+        else:
+            if code == 0 or code == 8:
+                result = a & b
+            elif code == 1 or code == 9:
+                result = a ^ b
+            elif code == 12:
+                result = a | b
+            elif code == 13:
+                result = b
+            elif code == 14:
+                result = a & (_MASK ^ b)
+            else:
+                result = _MASK ^ b
+            self.mark(result)
+            self.c = self.carry
+        if writes:
+            if rd == 15:
+                if self.bank(self.control & 0x1F):
+                    self.set_cpsr(self.saved[self.bank(self.control & 0x1F)])
+                return self.jump(result)
+            self.r[rd] = result
+        return 0
+
+    def status(self, op: cython.longlong) -> cython.int:
+        """MRS, MSR and BX; what else has this form belongs to later architectures."""
+        if op & 0x0FBF0FFF == 0x010F0000:
+            self.r[op >> 12 & 15] = self.spsr() if op & 0x400000 else self.cpsr()
+            return 0
+        if op & 0x0FFFFFF0 == 0x012FFF10:
+            value = self.r[op & 15]
+            if value & 1:
+                self.control |= 0x20
+            return self.jump(value)
+        if op & 0x0FB0F000 == 0x0320F000:
+            turn = op >> 7 & 30
+            value = op & 0xFF
+            value = (value >> turn | value << (32 - turn)) & _MASK
+        elif op & 0x0FB0FFF0 == 0x0120F000:
+            value = self.r[op & 15]
+        else:
+            return self.undefined()
+        mask = 0xFF if op & 0x10000 else 0
+        if op & 0x80000:
+            mask |= _MASK ^ 0xFFFFFF
+        if op & 0x400000:
+            if self.bank(self.control & 0x1F):
+                self.set_spsr(self.spsr() & (_MASK ^ mask) | value & mask)
+            return 0
+        if self.control & 0x1F == USER:
+            mask &= _MASK ^ 0xFF
+        mask &= _MASK ^ 0x20  # the state changes by BX only
+        return self.set_cpsr(self.cpsr() & (_MASK ^ mask) | value & mask)
+
+    def multiply(self, op: cython.longlong) -> cython.int:
+        kind = op >> 21 & 7
+        rd = op >> 16 & 15
+        rn = op >> 12 & 15
+        a = self.r[op & 15]
+        b = self.r[op >> 8 & 15]
+        if kind < 2:
+            self.multiplier_cycles(b, True)
+            low = (a & 0xFFFF) * b + (((a >> 16) * (b & 0xFFFF)) << 16)
+            if kind == 1:
+                self.cycles += 1
+                low += self.r[rn]
+            low &= _MASK
+            self.r[rd] = low
+            if op & 0x100000:
+                self.mark(low)
+            return 0
+        if kind < 4:
+            return self.undefined()
+        # the signed product; the unsigned one has more in its upper word for each factor with bit 31
+        self.cycles += 1
+        product = (a - (a >> 31 << 32)) * (b - (b >> 31 << 32))
+        low = product & _MASK
+        top = product >> 32 & _MASK
+        if kind < 6:
+            self.multiplier_cycles(b, False)
+            top += (b if a >> 31 else 0) + (a if b >> 31 else 0)
+        else:
+            self.multiplier_cycles(b, True)
+        if kind & 1:
+            self.cycles += 1
+            low += self.r[rn]
+            top += self.r[rd] + (low >> 32)
+            low &= _MASK
+        top &= _MASK
+        self.r[rn] = low
+        self.r[rd] = top
+        if op & 0x100000:
+            self.n = top >> 31
+            self.z = 1 if top == 0 and low == 0 else 0
+        return 0
+
+    def swap(self, op: cython.longlong) -> cython.int:
+        if op & 0x0FB00FF0 != 0x01000090:
+            return self.undefined()
+        address = self.r[op >> 16 & 15]
+        self.cycles += 1
+        if op & 0x400000:
+            value = self.load(address, 1)
+            if not self.faulted:
+                self.store(address, 1, self.r[op & 15])
+        else:
+            value = self.load_word(address)
+            if not self.faulted:
+                self.store(address & -4, 4, self.r[op & 15])
+        if not self.faulted:
+            self.r[op >> 12 & 15] = value
+        return 0
+
+    def transfer(self, op: cython.longlong) -> cython.int:
+        """Load or store of one register: words and bytes, and in group 0 half-words and signed ones."""
+        kind = 0  # 1 ... 3: half-word, signed byte, signed half-word
+        rn = op >> 16 & 15
+        rd = op >> 12 & 15
+        if op >> 25 & 7 == 0:
+            kind = op >> 5 & 3
+            if kind > 1 and not op & 0x100000:
+                return self.undefined()
+            offset = op >> 4 & 0xF0 | op & 15 if op & 0x400000 else self.r[op & 15]
+        elif op & 0x02000000:
+            offset = self.shift_fixed(op >> 5 & 3, self.r[op & 15], op >> 7 & 31)
+        else:
+            offset = op & 0xFFF
+        base = self.r[rn]
+        moved = (base + offset if op & 0x800000 else base - offset) & _MASK
+        address = moved if op & 0x01000000 else base
+        if not op & 0x100000:
+            value = self.r[rd] if rd != 15 else self.r[15] + 4 & _MASK
+            if kind == 1:
+                self.store(address & -2, 2, value)
+            elif op & 0x400000 and kind == 0:
+                self.store(address, 1, value)
+            else:
+                self.store(address & -4, 4, value)
+            if op & 0x200000 or not op & 0x01000000:
+                self.r[rn] = moved
+            return 0
+        if kind:
+            value = self.load_byte(address, True) if kind == 2 else self.load_half(address, kind == 3)
+        elif op & 0x400000:
+            value = self.load(address, 1)
+        else:
+            value = self.load_word(address)
+        if op & 0x200000 or not op & 0x01000000:
+            self.r[rn] = moved
+        return self.finish_load(rd, value)
+
+    def finish_load(self, rd: cython.longlong, value: cython.longlong) -> cython.int:
+        self.cycles += 1
+        if not self.faulted:
+            if rd == 15:
+                return self.jump(value)
+            self.r[rd] = value
+        return 0
+
+    def get_user(self, i: cython.longlong) -> cython.longlong:
+        """A register of user mode, seen from any mode."""
+        if self.bank(self.control & 0x1F) and i < 15:
+            if i > 12:
+                return self.banked[i - 13]
+            if i > 7 and self.control & 0x1F == FAST:
+                return self.high[i - 8]
+        return self.r[i]
+
+    def set_user(self, i: cython.longlong, value: cython.longlong) -> cython.int:
+        if self.bank(self.control & 0x1F) and i > 12:
+            self.banked[i - 13] = value
+        elif i > 7 and self.control & 0x1F == FAST:
+            self.high[i - 8] = value
+        else:
+            self.r[i] = value
+        return 0
+
+    def block(self, op: cython.longlong) -> cython.int:
+        """LDM and STM, with the forms that reach user registers or return from an exception."""
+        rn = op >> 16 & 15
+        chosen = op & 0xFFFF
+        count = 0
+        for i in range(16):
+            count += chosen >> i & 1
+        if chosen == 0:
+            chosen = 0x8000
+            count = 16
+        base = self.r[rn]
+        if op & 0x800000:
+            last = base + 4 * count & _MASK
+            address = base + 4 if op & 0x01000000 else base
+        else:
+            last = base - 4 * count & _MASK
+            address = last if op & 0x01000000 else last + 4
+        user = op & 0x400000 != 0 and not (op & 0x100000 and chosen & 0x8000)
+        if not op & 0x100000:
+            first = True
+            for i in range(16):
+                if chosen >> i & 1:
+                    value = self.get_user(i) if user else self.r[i]
+                    self.store(address & _MASK & -4, 4, value if i != 15 else value + 4 & _MASK)
+                    address += 4
+                    # the base changes after the first transfer: lowest in the list it is stored as it was
+                    if first and op & 0x200000:
+                        self.r[rn] = last
+                    first = False
+            return 0
+        self.cycles += 1
+        if op & 0x200000:
+            self.r[rn] = last
+        else:
+            last = base
+        for i in range(16):
+            if chosen >> i & 1:
+                value = self.load(address & _MASK & -4, 4)
+                address += 4
+                if self.faulted:
+                    self.r[rn] = last
+                    return 0
+                if user:
+                    self.set_user(i, value)
+                elif i == 15:
+                    if op & 0x400000 and self.bank(self.control & 0x1F):
+                        self.set_cpsr(self.saved[self.bank(self.control & 0x1F)])
+                    self.jump(value)
+                else:
+                    self.r[i] = value
+        return 0
+
+    # ---- Thumb state
+
+    def thumb(self, op: cython.longlong) -> cython.int:
+        kind = op >> 11
+        rd = op & 7
+        rs = op >> 3 & 7
+        if kind < 3:
+            result = self.shift_fixed(kind, self.r[rs], op >> 6 & 31)
+            self.r[rd] = result
+            self.mark(result)
+            self.c = self.carry
+            return 0
+        elif kind == 3:
+            b = op >> 6 & 7
+            if not op & 0x400:
+                b = self.r[b]
+            self.r[rd] = self.add(self.r[rs], _MASK ^ b, 1) if op & 0x200 else self.add(self.r[rs], b, 0)
+            return 0
+        elif kind < 8:
+            rd = op >> 8 & 7
+            b = op & 0xFF
+            if kind == 4:
+                self.r[rd] = b
+                return self.mark(b)
+            result = self.add(self.r[rd], b, 0) if kind == 6 else self.add(self.r[rd], _MASK ^ b, 1)
+            if kind != 5:
+                self.r[rd] = result
+            return 0
+        elif kind == 8:
+            return self.thumb_register(op)
+        elif kind == 9:
+            return self.finish_load(op >> 8 & 7, self.load_word((self.r[15] & -4) + ((op & 0xFF) << 2)))
+        elif kind < 20:
+            return self.thumb_transfer(op)
+        elif kind < 22:
+            self.r[op >> 8 & 7] = ((self.r[13] if op & 0x800 else self.r[15] & -4) + ((op & 0xFF) << 2)) & _MASK
+            return 0
+        elif kind < 24:
+            if op & 0xFF00 == 0xB000:
+                a = (op & 0x7F) << 2
+                self.r[13] = self.r[13] + (-a if op & 0x80 else a) & _MASK
+                return 0
+            if op & 0x0600 == 0x0400:
+                # PUSH is STMDB r13!, POP is LDMIA r13!; the ninth bit is r14 or the program counter
+                if op & 0x800:
+                    return self.block(0x08BD0000 | op & 0xFF | (op & 0x100) << 7)
+                return self.block(0x092D0000 | op & 0xFF | (op & 0x100) << 6)
+            return self.undefined()
+        elif kind < 26:
+            return self.block((0x08B00000 if op & 0x800 else 0x08A00000) | (op >> 8 & 7) << 16 | op & 0xFF)
+        elif kind < 28:
+            a = op >> 8 & 15
+            if a == 15:
+                return self.enter(SUPERVISOR, 8, self.following)
+            if a == 14:
+                return self.undefined()
+            if self.passes(a):
+                b = (op & 0xFF) << 1
+                return self.jump(self.r[15] + (b - 0x200 if b & 0x100 else b))
+            return 0
+        elif kind == 28:
+            b = (op & 0x7FF) << 1
+            return self.jump(self.r[15] + (b - 0x1000 if b & 0x800 else b))
+        elif kind == 30:
+            b = (op & 0x7FF) << 12
+            self.r[14] = self.r[15] + (b - 0x800000 if b & 0x400000 else b) & _MASK
+            return 0
+        elif kind == 31:
+            address = self.r[14] + ((op & 0x7FF) << 1)
+            self.r[14] = self.following | 1
+            return self.jump(address)
+        return self.undefined()
+
+    def thumb_register(self, op: cython.longlong) -> cython.int:
+        """Operations on two registers, and those on high registers with BX."""
+        rd = op & 7
+        if op & 0x400:
+            rd |= op >> 4 & 8
+            a = self.r[rd]
+            b = self.r[op >> 3 & 15]
+            code = op >> 8 & 3
+            if code == 1:
+                self.add(a, _MASK ^ b, 1)
+                return 0
+            if code == 3:
+                if not b & 1:
+                    self.control &= 0xDF
+                return self.jump(b)
+            result = a + b & _MASK if code == 0 else b
+            if rd == 15:
+                return self.jump(result)
+            self.r[rd] = result
+            return 0
+        a = self.r[rd]
+        b = self.r[op >> 3 & 7]
+        code = op >> 6 & 15
+        if code == 2 or code == 3 or code == 4 or code == 7:
+            self.cycles += 1
+            result = self.shift(3 if code == 7 else code - 2, a, b & 0xFF)
+            self.c = self.carry
+        elif code == 5:
+            self.r[rd] = self.add(a, b, self.c)
+            return 0
+        elif code == 6:
+            self.r[rd] = self.add(a, _MASK ^ b, self.c)
+            return 0
+        elif code == 9:
+            self.r[rd] = self.add(0, _MASK ^ b, 1)
+            return 0
+        elif code == 10:
+            self.add(a, _MASK ^ b, 1)
+            return 0
+        elif code == 11:
+            self.add(a, b, 0)
+            return 0
+        elif code == 0 or code == 8:
+            result = a & b
+        elif code == 1:
+            result = a ^ b
+        elif code == 12:
+            result = a | b
+        elif code == 13:
+            self.multiplier_cycles(a, True)
+            result = (a & 0xFFFF) * b + (((a >> 16) * (b & 0xFFFF)) << 16) & _MASK
+        elif code == 14:
+            result = a & (_MASK ^ b)
+        else:
+            result = _MASK ^ b
+        if code != 8:
+            self.r[rd] = result
+        return self.mark(result)
+
+    def thumb_transfer(self, op: cython.longlong) -> cython.int:
+        """Load or store of one register, by a register's offset, by one in the instruction, or on the stack."""
+        rd = op & 7
+        kind = op >> 12
+        if kind == 5:
+            address = self.r[op >> 3 & 7] + self.r[op >> 6 & 7] & _MASK
+            kind = op >> 9 & 7
+            if kind == 0:
+                return self.store(address & -4, 4, self.r[rd])
+            elif kind == 1:
+                return self.store(address & -2, 2, self.r[rd])
+            elif kind == 2:
+                return self.store(address, 1, self.r[rd])
+            elif kind == 3:
+                return self.finish_load(rd, self.load_byte(address, True))
+            elif kind == 4:
+                return self.finish_load(rd, self.load_word(address))
+            elif kind == 5:
+                return self.finish_load(rd, self.load_half(address, False))
+            elif kind == 6:
+                return self.finish_load(rd, self.load(address, 1))
+            return self.finish_load(rd, self.load_half(address, True))
+        if kind == 9:
+            rd = op >> 8 & 7
+            address = self.r[13] + ((op & 0xFF) << 2) & _MASK
+        else:
+            address = self.r[op >> 3 & 7] + ((op >> 6 & 31) << (2 if kind == 6 else 0 if kind == 7 else 1)) & _MASK
+        if kind == 7:
+            if op & 0x800:
+                return self.finish_load(rd, self.load(address, 1))
+            return self.store(address, 1, self.r[rd])
+        if kind == 8:
+            if op & 0x800:
+                return self.finish_load(rd, self.load_half(address, False))
+            return self.store(address & -2, 2, self.r[rd])
+        if op & 0x800:
+            return self.finish_load(rd, self.load_word(address))
+        return self.store(address & -4, 4, self.r[rd])

@@ -1,0 +1,79 @@
+# Generated from firmware_sim/arm7/core.py and firmware_sim/arm7/core.pxd (python -m ranger_sim.tools.stubs); do not edit.
+
+from collections.abc import MutableSequence
+from ranger_sim.foundation.user_error import UserError
+from typing import Any
+from typing import final
+
+USER: int
+FAST: int
+INTERRUPT: int
+SUPERVISOR: int
+ABORT: int
+UNDEFINED: int
+SYSTEM: int
+IRQ_LINE: int
+FIQ_LINE: int
+MODES: tuple[int, ...]
+DEVICE_WAITS: int
+MAM_TIMING: int
+
+class ProcessorError(UserError):
+    pass
+
+class BusFault(ProcessorError):
+    address: Any
+    pc: Any
+    def __init__(self, text: Any, address: Any, pc: Any) -> None: ...
+
+def memory(what: Any, size: Any) -> Any: ...
+def put(words: Any, place: Any, content: Any) -> None: ...
+
+@final
+class Core:
+    pc: int
+    following: int
+    cycles: int
+    instructions: int
+    n: int
+    z: int
+    c: int
+    v: int
+    carry: int
+    control: int
+    lines: int
+    faulted: int
+    stopped: int
+    flowed: int
+    flash_base: int
+    flash_size: int
+    ram_base: int
+    ram_size: int
+    line: int
+    trail: int
+    data_line: int
+    mam_mode: int
+    mam_timing: int
+    device_waits: int
+    takes_aborts: bool
+    fault_address: int
+    r: MutableSequence[int]
+    high: MutableSequence[int]
+    banked: MutableSequence[int]
+    saved: MutableSequence[int]
+    flash: MutableSequence[int]
+    ram: MutableSequence[int]
+    device: Any
+    name: str
+    def __init__(self, flash_size: int = 262144, ram_size: int = 16384, flash_base: int = 0, ram_base: int = 1073741824, device: Any = None, name: str = 'ARM7TDMI') -> None: ...
+    def reset(self) -> None: ...
+    def stop(self) -> None: ...
+    def set_mam(self, mode: Any, timing: Any) -> None: ...
+    def place(self, address: Any, content: Any) -> None: ...
+    def peek(self, address: Any) -> int: ...
+    def cpsr(self) -> int: ...
+    def spsr(self) -> int: ...
+    def set_spsr(self, value: Any) -> None: ...
+    def set_cpsr(self, value: int) -> int: ...
+    def run(self, until: int) -> int: ...
+    def step(self) -> int: ...
