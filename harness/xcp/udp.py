@@ -24,6 +24,7 @@ MAX_CTO, MAX_DTO = 248, 1400  # bytes: a datagram fits into one frame of Etherne
 DATAGRAMS_A_LOOK = 16  # chosen by us, as burst and read_bytes of the other doors: below 4 KB of commands
 WAITING = 4096  # packets of measurements kept for the next look; chosen by us: 2 s of one list at 0.5 ms
 LOOK_NS = 500_000  # virtual time between two looks: the fastest event
+DISCONNECT = b"\xfe"  # the command's code
 HEADER = struct.Struct("<HH")
 
 
@@ -99,6 +100,10 @@ class XcpUdpServer:
 
     def _take(self, data: bytes, sender: tuple[str, int], now_ns: int) -> None:
         """The packets of a datagram, in their order."""
+        if sender != self.master and self._master_is_gone():
+            self.slave.command(DISCONNECT, now_ns)
+            self.master = None
+            self.waiting.clear()
         if sender != self.master and (fault := self._fault_of(sender)) is not None:
             self.sent_away[fault] += 1
             return
@@ -119,6 +124,10 @@ class XcpUdpServer:
             if not self.slave.connected:
                 self.master = None
                 self.waiting.clear()
+
+    def _master_is_gone(self) -> bool:
+        """True when the one that has the place was a program of this machine that has ended without a word."""
+        return self.master is not None and loopback(self.master[0]) and owner_of(self.master) is None
 
     def _fault_of(self, sender: tuple[str, int]) -> str | None:
         """Why this sender is not served; None when it may be."""

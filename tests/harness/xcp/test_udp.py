@@ -98,6 +98,22 @@ def test_a_second_master_is_not_answered_and_counted(robot):
         client.close()
 
 
+def test_a_master_that_ended_without_a_word_makes_room_and_its_lists_stop(robot):
+    server = XcpUdpServer(robot, 0)
+    robot.attach(server)
+    first, second = Client(robot, server), Client(robot, server)
+    address = struct.pack("<I", address_of(number_of("TIMESTAMP"))).hex()
+    first.say("FF00", "D6", "D500 0100", "D400 0000 01", "D300 0000 00 01", "E200 0000 00 00", f"E1FF0400{address}",
+              "E0100000 0000 0100", "DE01 0000")  # fmt: skip
+    assert server.slave.running
+    first.close()
+    answers = second.say("FF00")
+    assert len(answers) == 1 and answers[0][0] == 0xFF  # its own answer, and no packet of the other's list
+    assert not server.slave.running
+    assert server.counters().get("sent_away_full", 0) == 0
+    second.close()
+
+
 def test_beyond_this_machine_it_listens_only_when_that_is_asked_for(robot):
     with pytest.raises(UserError, match="allow-network"):
         XcpUdpServer(robot, 0, "0.0.0.0")
