@@ -17,7 +17,7 @@ cdef long long _STATUS
 
 @cython.final
 cdef class Core:
-    cdef public long long pc, following, cycles, instructions
+    cdef public long long pc, following, cycles, began, instructions
     cdef public long long n, z, c, v, carry, control, lines, faulted, stopped, flowed
     cdef public long long flash_base, flash_size, ram_base, ram_size
     cdef public long long line, trail, data_line, mam_mode, mam_timing, device_waits

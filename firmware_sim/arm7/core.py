@@ -81,7 +81,8 @@ class Core:
     `device`: an object with read(address, size) -> value and write(address, size, value), size in bytes 1, 2 or 4;
     both raise LookupError where nothing is. `lines` holds the two interrupt inputs (IRQ_LINE, FIQ_LINE), levels set by
     devices. `r` holds the registers of the present mode, `pc` the address of the next instruction (`r[15]` is only
-    valid inside an instruction). `cycles` and `instructions` count from the start.
+    valid inside an instruction). `cycles` and `instructions` count from the start; `began` is what `cycles` was when the
+    present instruction began: devices take that as the instant of its accesses.
     """
 
     def __init__(
@@ -105,6 +106,7 @@ class Core:
         self.banked = array.array("q", [0]) * 12  # r13, r14 of: user, FIQ, IRQ, supervisor, abort, undefined
         self.saved = array.array("q", [0]) * 6  # SPSR of the same; the first is never used
         self.cycles = 0
+        self.began = 0
         self.instructions = 0
         self.lines = 0
         self.carry = 0
@@ -432,8 +434,9 @@ class Core:
         """Execute until `cycles` has reached `until` (the last instruction is completed) or `stop` was called."""
         self.stopped = 0
         while self.cycles < until and not self.stopped:
-            if self.lines:
-                self.interrupt()
+            if self.lines and self.interrupt():
+                continue  # the entry's cycles may have reached `until`
+            self.began = self.cycles
             self.one()
         return 0
 
@@ -441,9 +444,11 @@ class Core:
         """One instruction; an interrupt that waits is taken first."""
         if self.lines:
             self.interrupt()
+        self.began = self.cycles
         return self.one()
 
     def interrupt(self) -> cython.int:
+        """Enter the exception that a line asks for and the status allows; 1 when it did."""
         if self.lines & FIQ_LINE and not self.control & 0x40:
             self.enter(FAST, 0x1C, self.pc + 4)
         elif self.lines & IRQ_LINE and not self.control & 0x80:
@@ -452,7 +457,7 @@ class Core:
             return 0
         self.cycles += 1
         self.pc = self.following
-        return 0
+        return 1
 
     def one(self) -> cython.int:
         pc = self.pc

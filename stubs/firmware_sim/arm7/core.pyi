@@ -34,6 +34,7 @@ class Core:
     pc: int
     following: int
     cycles: int
+    began: int
     instructions: int
     n: int
     z: int
