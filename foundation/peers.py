@@ -9,7 +9,8 @@ here blocks, has a thread, or raises because of a peer.
 2. What does not read is not read: with `unread` bytes of answers waiting for it, nothing more is taken from a peer.
    What it did not ask for (frames of a bus) is left out, and counted, from `backlog` bytes on.
 3. A look writes at most `write_bytes` to each peer.
-4. A door has room for `peers`. When all places are taken, a peer that has not begun to take part makes room: the one
+4. A door has room for `peers`. When all places are taken, one makes room: a peer that takes nothing any more, though
+   something that it had said is still to be carried out; else one that has not begun to take part. Of several the one
    that has said nothing for longest.
 5. A peer that does not keep to this is sent away, and counted by its reason (REASONS), which the user is shown. What
    it had begun is dropped.
@@ -86,7 +87,7 @@ REASONS = {
     MALFORMED: "did not speak the protocol",
     TOO_LONG: "sent a request above the limit",
     STALLED: "went on without taking its answers",
-    IDLE: "had not begun to take part and made room",
+    IDLE: "had left or not begun to take part, and made room",
 }
 
 
@@ -226,9 +227,9 @@ class Peer:
 P = TypeVar("P", bound=Peer)
 
 
-def _last(peer: Peer) -> int:
-    """Who has said nothing for longest has the least."""
-    return peer.last
+def _use_of_place(peer: Peer) -> tuple[bool, int]:
+    """The least is of who makes room first: it takes nothing any more, or has said nothing for longest."""
+    return not peer.lost, peer.last
 
 
 class Door(Generic[P]):
@@ -386,7 +387,8 @@ class Door(Generic[P]):
             peer = self._welcome(connection)
             self.arrived += 1
             peer.last = self.worked + self.arrived
-            idle = min((each for each in self.peers if not self._takes_part(each)), key=_last, default=None)
+            places = (each for each in self.peers if each.lost or not self._takes_part(each))
+            idle = min(places, key=_use_of_place, default=None)
             full = len(self.peers) >= self.limits.peers
             if full and idle is not None:
                 self.send_away(idle, IDLE)

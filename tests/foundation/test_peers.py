@@ -222,6 +222,32 @@ def test_who_has_said_nothing_for_longest_makes_room(door):
     assert first.recv(100) == TEN
 
 
+def test_who_has_left_makes_room_before_others_though_its_requests_are_not_all_carried_out(door):
+    """Programs that fill the places, pour requests and leave once kept a new one out for 0.2 s of the robot."""
+    leavers = [door.connect() for _ in range(LIMIT.peers - 1)]
+    for client in leavers:
+        pour(client, b"\n" * 1000)
+    door.look(0)
+    quiet = door.connect()
+    door.look(0)
+    door.write()
+    door.partakers.update(door.peers[:-1])
+    for client in leavers:
+        client.close()  # with answers unread: from now on writing to it fails
+    for _ in range(4):
+        door.look(0)
+        door.write()
+    assert len(door.peers) == LIMIT.peers and sum(peer.lost for peer in door.peers) == LIMIT.peers - 1
+    new = door.connect()
+    pour(new, b"\n")
+    door.look(0)
+    door.write()
+    assert new.recv(100) == TEN
+    with pytest.raises(BlockingIOError):
+        quiet.recv(1)  # it has kept its place
+    assert door.sent_away == {"idle": 1}
+
+
 def test_while_a_robot_waits_for_its_time_no_requests_are_carried_out_and_while_it_is_paused_at_the_rate(door):
     now = [0.0]
     door.clock = lambda: now[0]
