@@ -1,5 +1,7 @@
 """The mutation tool: which faults it makes, how it draws them, and that it tells noticed ones from survivors."""
 
+import dataclasses
+import pathlib
 import shutil
 import subprocess
 
@@ -98,26 +100,52 @@ def test_tests_that_reach_a_mutant_run_cheapest_first_and_within_the_limit():
         "t/x.py": {
             "imported": [],
             "shared": [other],
+            "late": {},
             "tests": {
-                "t/x.py::slow": {"seconds": 5.0, "functions": [place]},
-                "t/x.py::quick": {"seconds": 0.5, "functions": [place, other]},
+                "t/x.py::slow": {"seconds": 5.0, "functions": [place], "starts": False},
+                "t/x.py::quick": {"seconds": 0.5, "functions": [place, other], "starts": False},
             },
         },
         "t/y.py": {
             "imported": [],
             "shared": [],
-            "tests": {"t/y.py::elsewhere": {"seconds": 0.1, "functions": ["b/c.py:1"]}},
+            "late": {},
+            "tests": {"t/y.py::elsewhere": {"seconds": 0.1, "functions": ["b/c.py:1"], "starts": False}},
         },
     }
     tests = work.TestsOf(found)
-    assert tests.of(mutant, 60.0) == ["t/x.py::quick", "t/x.py::slow"]
-    assert tests.of(mutant, 1.0) == ["t/x.py::quick"]
+    assert tests.of(mutant, 60.0) == (["t/x.py::quick", "t/x.py::slow"], 0)
+    assert tests.of(mutant, 1.0) == (["t/x.py::quick"], 1)
     # what runs while a module is imported is everybody's who uses the module; fixtures are their whole file's
     found["t/x.py"]["imported"] = [place]
-    assert work.TestsOf(found).of(mutant, 60.0) == ["t/x.py::quick", "t/x.py::slow"]
+    assert work.TestsOf(found).of(mutant, 60.0) == (["t/x.py::quick", "t/x.py::slow"], 0)
     found["t/x.py"]["imported"] = []
     found["t/y.py"]["shared"] = [place]
-    assert work.TestsOf(found).of(mutant, 0.2) == ["t/y.py::elsewhere"]
+    assert work.TestsOf(found).of(mutant, 0.2) == (["t/y.py::elsewhere"], 2)
+
+
+def test_tests_that_last_too_long_or_start_processes_count_for_what_they_may_notice():
+    mutant = next(each for each in mutants(SOURCE, "a/valve.py") if each.operator == "sign")
+    place = f"a/valve.py:{mutant.first_line}"
+    of_file = {
+        "imported": [],
+        "shared": [],
+        "late": {"t::walk": [place]},
+        "tests": {
+            "t::near": {"seconds": 0.5, "functions": [place], "starts": False},
+            "t::programs": {"seconds": 2.0, "functions": ["a/other.py:3"], "starts": True},
+            "t::more": {"seconds": 9.0, "functions": [], "starts": True},
+            "t::apart": {"seconds": 0.1, "functions": ["a/other.py:3"], "starts": False},
+        },
+    }
+    tests = work.TestsOf({"t": of_file})
+    assert tests.of(mutant, 5.0) == (["t::near", "t::programs"], 2)  # left out: 9 s, and the walk that does not end
+    # built, the walk ends; what the interpreted map knows to pass it by takes no part, what it does not know may
+    seconds = {"t::near": 0.1, "t::walk": 1.0, "t::apart": 0.1, "t::only compiled": 0.3}
+    every = {name: {"seconds": took, "functions": [], "starts": False} for name, took in seconds.items()}
+    built = work.TestsOf({"t": {"imported": [], "shared": [], "late": {}, "tests": every}})
+    assert built.built_of(mutant, tests, 1.0) == (["t::near", "t::only compiled"], 1)
+    assert built.built_of(mutant, tests, 2.0) == (["t::near", "t::only compiled", "t::walk"], 0)
 
 
 def test_mutants_that_are_listed_as_equivalent_exist_and_have_reasons(tmp_path):
@@ -178,8 +206,8 @@ def test_that_fails_in_a_second_process():
 
 
 @pytest.fixture(scope="module")
-def tried(tmp_path_factory):
-    """{(function, change): verdict} of a checkout small enough to be mutated in a test."""
+def house(tmp_path_factory):
+    """A checkout small enough to be mutated in a test."""
     root = tmp_path_factory.mktemp("mutate") / "house"
     needed = ("ranger_sim/__init__.py", "ranger_sim/loading.py", "ranger_sim/declared_fields.py")
     for name in (*needed, "tools/__init__.py", "tools/mutate/__init__.py", "tools/mutate/serve.py"):
@@ -192,6 +220,13 @@ def tried(tmp_path_factory):
     (root / "tests" / "test_valve.py").write_text(TESTS, encoding="utf-8")
     for command in (["init", "-q"], ["add", "-A"]):
         subprocess.run(["git", *command], cwd=root, check=True, capture_output=True)
+    return root
+
+
+@pytest.fixture(scope="module")
+def tried(house):
+    """{(function, change): verdict} of all its mutants."""
+    root = house
     copy = work.Copy(root.parent / "work" / "copy", root)
     results = work.Results(root.parent / "work" / "verdicts.jsonl")
     with copy.server(["tests"]) as ask:
@@ -219,6 +254,48 @@ def test_mutants_are_noticed_or_survive_in_a_copy_and_verdicts_are_kept(tried):
     }
     assert tried["", "3 -> (4)"].by == "tests/test_valve.py::test_it_clips"
     assert tried["twice", "2 -> (3)"].by == "tests/test_valve.py::test_it_doubles"
+
+
+def test_a_mutant_is_noticed_as_well_by_a_second_server_that_has_a_map_already(house, tried, monkeypatch):
+    """It must have imported everything when the first mutant is put into a file; folders may be told from here."""
+    monkeypatch.chdir(house.parent)
+    copy = work.Copy(pathlib.Path("work/copy"), house)
+    (copy.folder / "seen").unlink()
+    said = []
+    with copy.server(["tests"]) as ask:
+        tests = work.reach_of(copy, ask, "plant", ["tests"], 60.0, said.append)
+        for mutant in mutants(VALVE, "plant/valve.py"):
+            if mutant.old == "x * each":
+                verdict = work.judge(copy, ask, mutant, tests, 60.0)
+    assert not said, "it was mapped once more"
+    assert verdict.outcome == work.KILLED
+    assert verdict.by == "tests/test_valve.py::test_it_doubles"
+
+
+class Rebuilt(work.Copy):
+    """A copy in which nothing has to be compiled, except for what cannot be."""
+
+    def build(self):
+        return "not a" not in (self.folder / "plant" / "valve.py").read_text(encoding="utf-8")
+
+
+def test_what_is_built_anew_is_noticed_by_tests_that_pass_with_the_original(house):
+    copy = Rebuilt(house.parent / "built" / "copy", house)
+    (copy.folder / "seen").touch()  # so that the last of TESTS always fails
+    names = ["it_clips", "it_doubles", "that_fails_in_a_second_process"]
+    every = {f"tests/test_valve.py::test_{name}": {"seconds": 0.1, "functions": [], "starts": False} for name in names}
+    compiled = work.TestsOf({"t": work.NOTHING | {"tests": every}})
+    plain = work.TestsOf({"t": work.NOTHING})
+    of_file = {each.old: each for each in mutants(VALVE, "plant/valve.py")}
+    noticed = work.judge_built(copy, of_file["x * each"], plain, compiled, 60.0)
+    assert (noticed.outcome, noticed.by, noticed.tests) == (work.KILLED, "tests/test_valve.py::test_it_doubles", 3)
+    # the last test is blamed, fails with the original as well, and takes no part from then on
+    passed = work.judge_built(copy, of_file["x > 3"], plain, compiled, 60.0)
+    assert (passed.outcome, passed.tests, passed.left) == (work.SURVIVED, 2, 0)
+    assert work.judge_built(copy, of_file["x > 3"], plain, compiled, 0.15).outcome == work.NOT_WITHIN
+    broken = dataclasses.replace(of_file["x > 3"], new="(not a > 3)")
+    assert work.judge_built(copy, broken, plain, compiled, 60.0).by == "the build"
+    assert (copy.folder / "plant" / "valve.py").read_text(encoding="utf-8") == VALVE
 
 
 def test_rooms_have_mutants_and_no_key_twice():

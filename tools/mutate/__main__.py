@@ -2,8 +2,10 @@
 
 Of all faults that `mutants.py` knows to put into the room's files, so many are drawn with a seed, put one at a time
 into a copy of the repository, and the tests of the room that reach the place are run there, interpreted and cheapest
-first. Verdicts are kept in the work folder: a run that was broken off goes on where it was, and a larger count goes on
-from a smaller one. Survivors are printed with their place and difference.
+first. Where the robot is built, a mutant in a plain Python module is tried with all else compiled; with --build, one
+in a compiled module that the interpreted tests let pass is built and given to the compiled ones. Verdicts are kept in
+the work folder: a run that was broken off goes on where it was, and a larger count goes on from a smaller one.
+Survivors are printed with their place and difference; "not within the limit": tests that reach it were left out.
 
 A verdict holds for the tests of its time. `--again` tries mutants that were not killed once more.
 """
@@ -22,11 +24,15 @@ from ranger_sim.tools.mutate.mutants import Mutant
 from ranger_sim.tools.mutate.work import (
     KILLED,
     TIMEOUT,
+    Built,
     Copy,
     Known,
     Results,
+    TestsOf,
+    Verdict,
     all_mutants,
     judge,
+    judge_built,
     known,
     reach_of,
     sample,
@@ -44,6 +50,12 @@ ALSO = {
     "can_bus": ("tests/tools/test_fuzz_can.py", "tests/tools/test_bus.py"),
     "plant": ("tests/oracle/test_known_answers.py",),
     "sysid": ("tests/blind/test_generator.py", "tests/tools/test_diagnose_bad_data.py", "tests/tools/test_identify.py"),
+}
+# Walks, which end in time compiled alone; there they take part in what is tried.
+WALKS = {
+    "can_bus": ("tests/oracle", "tests/system/test_walking.py"),
+    "plant": ("tests/oracle", "tests/system/test_walking.py"),
+    "harness": ("tests/oracle", "tests/system"),
 }
 
 
@@ -70,6 +82,12 @@ def parser() -> argparse.ArgumentParser:
         default=int(LIMIT_S),
         metavar="S",
         help=f"of the tests that reach a mutant, run the cheapest of so many seconds together (default {LIMIT_S:g})",
+    )
+    command.add_argument(
+        "--build",
+        type=whole_number(1),
+        metavar="S",
+        help="what is not noticed in a compiled module: build it, and run so many seconds of compiled tests",
     )
     command.add_argument(
         "--map-limit",
@@ -134,15 +152,33 @@ def of_room(options: argparse.Namespace, copy: Copy, room: str, listed: list[Kno
         drawn = [mutant for mutant in every if f"{mutant.path}:{mutant.line}" in options.at]
     results = Results(options.work / f"verdicts-{room}.jsonl")
     wanted = options.tests or [f"tests/{room}", *ALSO.get(room, ())]
-    with copy.server(wanted) as ask:
-        tests = reach_of(copy, ask, room, wanted, options.map_limit, say)
-        for mutant in drawn:
-            old = results.verdicts.get(mutant.key)
-            if mutant.key in equivalent or (old is not None and (old.outcome in NOTICED or not options.again)):
-                continue
-            verdict = judge(copy, ask, mutant, tests, options.limit)
-            results.add(verdict)
-            say(f"{verdict.outcome:11} {verdict.seconds:6.1f} s  {mutant.path}:{mutant.line} {mutant.operator}")
+
+    def keep(mutant: Mutant, verdict: Verdict) -> None:
+        results.add(verdict)
+        by = f"  by {verdict.by}" if verdict.by else ""
+        say(f"{verdict.outcome:11} {verdict.seconds:6.1f} s  {mutant.path}:{mutant.line} {mutant.operator}{by}")
+
+    def is_open(mutant: Mutant) -> bool:
+        old = results.verdicts.get(mutant.key)
+        return mutant.key not in equivalent and (old is None or (options.again and old.outcome not in NOTICED))
+
+    drawn_open = [mutant for mutant in drawn if is_open(mutant)]
+    maps: dict[bool, TestsOf] = {}
+    for compiled in (False, True):
+        of_mode = [mutant for mutant in drawn_open if copy.runs_compiled(mutant) == compiled]
+        build_later = compiled and options.build and len(of_mode) < len(drawn_open)
+        if not of_mode and not build_later:
+            continue
+        paths = [*wanted, *WALKS.get(room, ())] if compiled and not options.tests else wanted
+        with copy.server(paths, compiled) as ask:
+            maps[compiled] = reach_of(copy, ask, room, paths, options.map_limit, say)
+            for mutant in of_mode:
+                keep(mutant, judge(copy, ask, mutant, maps[compiled], options.limit))
+    if options.build and False in maps:
+        built = Built(options.work / "built")
+        for mutant in drawn_open:
+            if not copy.runs_compiled(mutant) and results.verdicts[mutant.key].outcome not in NOTICED:
+                keep(mutant, judge_built(built, mutant, maps[False], maps[True], options.build))
     return told(room, every, drawn, results, equivalent, say)
 
 

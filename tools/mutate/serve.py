@@ -8,7 +8,10 @@ RANGER_SIM_MUTANTS names two descriptors: requests come from the first as lines 
     {"map": FILE, "to": PATH, ...}                                which test of a file runs which function
     {"path": PATH, "before": TEXT, "after": TEXT, "tests": [...]}   whether these tests notice the changed text
 with `limit_s`, wall time of it all, and `limit_test_s`, processor time of one test. The answer is an object with `code`
-(0: all passed, 1: one failed, null: over the limit) and `by`. Interpreted runs only.
+(0: all passed, 1: one failed, null: over the limit) and `by`. The first answer comes unasked, when all is collected:
+what is put into a file before that would be imported as if it were the original.
+
+Compiled functions cannot be exchanged nor watched: a server that runs compiled serves for plain Python modules alone.
 """
 
 import contextlib
@@ -26,10 +29,11 @@ from typing import Any
 
 import pytest
 
-from ranger_sim.loading import HOUSE, ROOMS, RUNS_COMPILED
+from ranger_sim.loading import HOUSE, ROOMS
 
 ROOTS = tuple(str(HOUSE / room) + os.sep for room in ROOMS)
 ASKED_BY = "RANGER_SIM_MUTANTS"
+STARTING = ("subprocess.Popen", "os.fork", "os.posix_spawn")  # the interpreter's audit events
 
 
 class TooLong(BaseException):
@@ -154,6 +158,7 @@ class Server:
         self.items: dict[str, pytest.Item] = {}
         self.watch: Watch | None = None
         self.in_test: set[CodeType] = set()
+        self.started = False
 
     def note(self, frame: FrameType, event: str, _argument: object) -> None:
         """Called by the interpreter at every call, until the tests are collected."""
@@ -164,6 +169,7 @@ class Server:
         """Instead of running tests: serve until nobody asks any more."""
         sys.setprofile(None)
         self.items = {item.nodeid: item for item in session.items}
+        print(json.dumps({"code": 0}), file=self.answers, flush=True)
         for line in self.requests:
             request = json.loads(line)
             work = self.map if "map" in request else self.judge
@@ -174,20 +180,31 @@ class Server:
     def map(self, request: dict) -> dict:
         """Run the tests of one file, each with its own list of functions, and write what was seen to `to`.
 
-        What runs while fixtures are made or taken down may serve every test of the file: `shared`.
+        What runs while fixtures are made or taken down may serve every test of the file: `shared`. A test that was
+        ended at its limit is `late`: what it ran until then is known, not whether it passes. Those that start
+        processes run more than is seen here: `starts`.
         """
+
+        def audit(event: str, _arguments: tuple) -> None:
+            self.started = self.started or event in STARTING
+
+        sys.addaudithook(audit)
         self.watch = Watch()
-        found: dict[str, Any] = {"imported": places(self.imported), "tests": {}, "failed": []}
+        found: dict[str, Any] = {"imported": places(self.imported), "tests": {}, "late": {}, "failed": []}
         shared: set[CodeType] = set()
         chosen = [item for name, item in self.items.items() if name.partition("::")[0] == request["map"]]
         for item, following in zip(chosen, [*chosen[1:], None], strict=True):
             self.in_test = set()
+            self.started = False
             self.watch.begin()
             reports = run(item, following, request["limit_test_s"])
             shared |= self.watch.end()
             if len(reports) == 3 and all(report.outcome == "passed" for report in reports):
-                seconds = sum(report.duration for report in reports)
-                found["tests"][item.nodeid] = {"seconds": round(seconds, 4), "functions": places(self.in_test)}
+                seconds = round(sum(report.duration for report in reports), 4)
+                functions = places(self.in_test)
+                found["tests"][item.nodeid] = {"seconds": seconds, "functions": functions, "starts": self.started}
+            elif not reports:
+                found["late"][item.nodeid] = places(self.in_test)
             else:
                 found["failed"].append(item.nodeid)
         found["shared"] = places(shared)
@@ -274,7 +291,7 @@ def forked(work: Callable[[], dict], limit_s: float) -> dict:
 def pytest_configure(config: pytest.Config) -> None:
     """Serve, if somebody asks."""
     asked = os.environ.pop(ASKED_BY, "")
-    if asked and not RUNS_COMPILED:
+    if asked:
         requests, answers = (int(each) for each in asked.split(","))
         server = Server(requests, answers)
         config.pluginmanager.register(server, "ranger-sim-mutants")

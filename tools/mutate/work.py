@@ -17,7 +17,7 @@ from typing import Any, TextIO
 from ranger_sim.foundation import wallclock
 from ranger_sim.foundation.random_arrays import generator
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.loading import HOUSE
+from ranger_sim.loading import BUILD_RECORD, HOUSE, LIBRARY, RUNS_INTERPRETED_BECAUSE
 from ranger_sim.tools.mutate.mutants import Mutant, mutants
 from ranger_sim.tools.mutate.serve import ASKED_BY
 
@@ -25,18 +25,22 @@ EQUIVALENT = pathlib.Path(__file__).with_name("equivalent.toml")
 # Beside the room's own tests, and what is not a program of ours: written by other modules, or only for users' editors.
 NOT_MUTATED = ("datatable/generated/",)
 KILLED, SURVIVED, TIMEOUT, NOT_REACHED, TOO_SLOW = "killed", "survived", "timeout", "not reached", "too slow"
+NOT_WITHIN = "not within the limit"  # more tests reach it than there was time for
 # A mutant may make a test slow for good; chosen by us, beside a machine that has other work.
 SLOWER = 4.0
 START_S = 60.0
 LOOP_S = 5.0  # a test that takes so much more processor time than it did is in a loop
-NOTHING: dict[str, Any] = {"imported": [], "shared": [], "tests": {}, "failed": []}  # a map without tests
+BUILD_S = 600.0  # nor one module to be built, on a machine that has other work
+NOTHING: dict[str, Any] = {"imported": [], "shared": [], "tests": {}, "late": {}, "failed": []}  # a map without tests
 NO_SUCH_TEST = 4  # pytest's exit code
 LIMIT_TEST_S = 20.0  # of processor time: a test that takes longer takes no part; chosen by us
 
 
 @dataclasses.dataclass(frozen=True)
 class Verdict:
-    """What became of a mutant; `by`: the test that noticed it, `tests`: how many were run at most."""
+    """What became of a mutant; `by`: the test that noticed it, `tests`: how many were run at most, `left`: how many
+    reach it and were not run, for want of time.
+    """
 
     key: str
     line: int
@@ -44,6 +48,7 @@ class Verdict:
     by: str = ""
     tests: int = 0
     seconds: float = 0.0
+    left: int = 0
 
 
 @dataclasses.dataclass(frozen=True)
@@ -90,7 +95,7 @@ class Copy:
     """The repository's files in another folder, where mutants live; the folder may be one that an earlier run left."""
 
     def __init__(self, folder: pathlib.Path, house: pathlib.Path = HOUSE) -> None:
-        self.folder = folder
+        self.folder = folder = folder.resolve()  # what runs there has another working folder than we
         self.house = house
         listed = subprocess.run(
             ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"],
@@ -108,7 +113,17 @@ class Copy:
         for path in [path for path in folder.rglob("*") if path.is_file() and "__pycache__" not in path.parts]:
             if path.relative_to(folder).as_posix() not in set(names) and path.suffix in (".py", ".pxd", ".toml"):
                 path.unlink()  # gone since an earlier run
+        for cache in [path for path in folder.rglob("__pycache__") if path.is_dir()]:
+            shutil.rmtree(cache)  # an earlier run gave its files the same time stamps
         self.stamp = int((folder / "pyproject.toml").stat().st_mtime)
+        self.compiled = LIBRARY is not None and house == HOUSE
+        if self.compiled:
+            for built in (pathlib.Path(LIBRARY.__file__), BUILD_RECORD):
+                shutil.copy2(built, folder / built.relative_to(house))
+
+    def runs_compiled(self, mutant: Mutant) -> bool:
+        """True when the rest of the robot may run compiled: the mutant's own file never is."""
+        return self.compiled and not (self.folder / mutant.path).with_suffix(".pxd").exists()
 
     def put(self, path: str, text: str) -> None:
         """The file's text from now on. A time stamp that it never had, so that no byte code of before is believed."""
@@ -116,9 +131,9 @@ class Copy:
         (self.folder / path).write_text(text, encoding="utf-8")
         os.utime(self.folder / path, (self.stamp, self.stamp))
 
-    def pytest(self, arguments: Iterable[str], limit_s: float) -> tuple[int | None, str]:
-        """Run pytest there, interpreted: (exit code, what it printed); None when it took longer than the limit."""
-        with self._started(arguments, stdout=subprocess.PIPE, stderr=subprocess.STDOUT) as process:
+    def pytest(self, arguments: Iterable[str], limit_s: float, compiled: bool = False) -> tuple[int | None, str]:
+        """Run pytest there: (exit code, what it printed); None when it took longer than the limit."""
+        with self._started(arguments, compiled, stdout=subprocess.PIPE, stderr=subprocess.STDOUT) as process:
             try:
                 said, _ = process.communicate(timeout=limit_s)
                 return process.returncode, said
@@ -126,8 +141,12 @@ class Copy:
                 os.killpg(process.pid, signal.SIGKILL)
                 return None, process.communicate()[0]
 
-    def _started(self, arguments: Iterable[str], **options: Any) -> subprocess.Popen:
-        environment = {"RANGER_SIM_INTERPRETED": "1", "OPENBLAS_NUM_THREADS": "1", **options.pop("environment", {})}
+    def _started(self, arguments: Iterable[str], compiled: bool, **options: Any) -> subprocess.Popen:
+        environment = {
+            "RANGER_SIM_INTERPRETED": "0" if compiled else "1",
+            "OPENBLAS_NUM_THREADS": "1",
+            **options.pop("environment", {}),
+        }
         return subprocess.Popen(
             [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-p", "no:xdist", *arguments],
             cwd=self.folder,
@@ -139,7 +158,7 @@ class Copy:
         )
 
     @contextlib.contextmanager
-    def server(self, tests: list[str]) -> Iterator["Asked"]:
+    def server(self, tests: list[str], compiled: bool = False) -> Iterator["Asked"]:
         """A process that has collected these tests and forks for each request (`serve.py`)."""
         asking, requests = os.pipe()
         answers, answering = os.pipe()
@@ -147,6 +166,7 @@ class Copy:
         with log.open("w", encoding="utf-8") as said:
             process = self._started(
                 ["-p", "ranger_sim.tools.mutate.serve", *tests],
+                compiled,
                 pass_fds=(asking, answering),
                 stdin=subprocess.DEVNULL,
                 stdout=said,
@@ -156,22 +176,59 @@ class Copy:
         os.close(asking)
         os.close(answering)
         with os.fdopen(requests, "w", encoding="utf-8") as out, os.fdopen(answers, encoding="utf-8") as back:
-            yield Asked(out, back, log)
+            asked = Asked(out, back, log, compiled)
+            asked.answer()  # all is collected: from now on files may be changed
+            yield asked
         process.wait()
 
 
-class Asked:
-    """A server from the side of those who ask."""
+class Built(Copy):
+    """A copy whose compiled modules are built again with each mutant: what `make test` would run."""
 
-    def __init__(self, requests: TextIO, answers: TextIO, log: pathlib.Path) -> None:
+    def __init__(self, folder: pathlib.Path, house: pathlib.Path = HOUSE) -> None:
+        super().__init__(folder, house)
+        if not self.compiled:
+            raise UserError(f"{house}: nothing is compiled there, so that no mutant can be: {RUNS_INTERPRETED_BECAUSE}")
+        shutil.rmtree(self.folder / "build", ignore_errors=True)  # an earlier run may have left a mutant in it
+        for made in (house / "build" / "cython", *(house / "build").glob("temp.*")):
+            shutil.copytree(made, self.folder / "build" / made.name)
+
+    def put(self, path: str, text: str) -> None:
+        """The file's text from now on, newer than all that was built."""
+        (self.folder / path).write_text(text, encoding="utf-8")
+
+    def build(self) -> bool:
+        """Build what is newer than its object file; False when it cannot be compiled."""
+        subprocess.run(
+            [sys.executable, "setup.py", "-q", "build_ext", "--inplace"],
+            cwd=self.folder,
+            env={**os.environ, "RANGER_SIM_INTERPRETED": "0"},
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            check=False,
+            timeout=BUILD_S,
+        )
+        record = self.folder / BUILD_RECORD.relative_to(HOUSE)
+        return json.loads(record.read_text(encoding="utf-8"))["compiled"]
+
+
+class Asked:
+    """A server from the side of those who ask; `compiled`: what it runs is."""
+
+    def __init__(self, requests: TextIO, answers: TextIO, log: pathlib.Path, compiled: bool) -> None:
         self.requests = requests
         self.answers = answers
         self.log = log
+        self.compiled = compiled
 
     def __call__(self, **request: Any) -> dict:
-        """The answer. UserError when there is no server any more: the tests cannot be collected."""
+        """The answer to a request."""
         with contextlib.suppress(BrokenPipeError):
             print(json.dumps(request), file=self.requests, flush=True)
+        return self.answer()
+
+    def answer(self) -> dict:
+        """The next answer. UserError when there is no server any more: the tests cannot be collected."""
         line = self.answers.readline()
         if not line:
             said = self.log.read_text(encoding="utf-8").strip().splitlines() or ["pytest says nothing"]
@@ -189,6 +246,13 @@ class TestsOf:
 
     def __init__(self, found: dict[str, dict[str, Any]]) -> None:
         self.tests: dict[str, dict] = {name: test for each in found.values() for name, test in each["tests"].items()}
+        self.known = set(self.tests) | {name for each in found.values() for name in each["late"]}
+        self.starting = {name for name, test in self.tests.items() if test["starts"]}
+        self.late: dict[str, set[str]] = {}
+        for each in found.values():
+            for name, functions in each["late"].items():
+                for place in functions:
+                    self.late.setdefault(place, set()).add(name)
         self.imported = {place for each in found.values() for place in each["imported"]}
         self.witnesses: dict[str, bool] = {}
         self.by_function: dict[str, set[str]] = {}
@@ -208,19 +272,43 @@ class TestsOf:
         self.by_function.setdefault(place, set()).update(names)
         self.by_module.setdefault(place.partition(":")[0], set()).update(names)
 
-    def of(self, mutant: Mutant, limit_s: float) -> list[str]:
-        """Tests that can notice it, cheapest first, as many as fit into `limit_s` (at least one)."""
+    def of(self, mutant: Mutant, limit_s: float) -> tuple[list[str], int]:
+        """Tests that can notice it, cheapest first, and how many more there are.
+
+        Those that reach it in their own process come first, as many as fit into `limit_s` (at least one); after them
+        those that start processes, for which the map does not see what runs there, as many as fit into it again.
+        """
         place = f"{mutant.path}:{mutant.first_line}"
         late = not self.at_import(mutant)
         reach = self.by_function.get(place, set()) if late else self.by_module.get(mutant.path, set())
         chosen: list[str] = []
+        left = len(self.late.get(place, ()))
+        for names in (reach, self.starting - reach):
+            total = 0.0
+            for name in sorted(names, key=lambda each: (self.tests[each]["seconds"], each)):
+                total += self.tests[name]["seconds"]
+                if total <= limit_s or not chosen:
+                    chosen.append(name)
+                else:
+                    left += 1
+        return chosen, left
+
+    def built_of(self, mutant: Mutant, plain: "TestsOf", limit_s: float) -> tuple[list[str], int]:
+        """Tests that can notice it in a compiled module, cheapest first as they run compiled, and how many more.
+
+        `plain` knows what runs the mutant's function, for the tests that end in time interpreted; all others may.
+        """
+        place = f"{mutant.path}:{mutant.first_line}"
+        reach = plain.by_module if plain.at_import(mutant) else plain.by_function
+        seen = reach.get(mutant.path if plain.at_import(mutant) else place, set()) | plain.late.get(place, set())
+        names = [name for name in self.tests if name in seen | self.starting or name not in plain.known]
+        chosen: list[str] = []
         total = 0.0
-        for name in sorted(reach, key=lambda each: (self.tests[each]["seconds"], each)):
+        for name in sorted(names, key=lambda each: (self.tests[each]["seconds"], each)):
             total += self.tests[name]["seconds"]
-            if chosen and total > limit_s:
-                break
-            chosen.append(name)
-        return chosen
+            if total <= limit_s:
+                chosen.append(name)
+        return chosen, len(names) - len(chosen)
 
     def is_witness(self, name: str, ask: Asked, mutant: Mutant, original: str) -> bool:
         """True for a test that passes on the original, tried once the way mutants are."""
@@ -233,7 +321,8 @@ class TestsOf:
 
     def leave_out(self, name: str) -> None:
         """Never choose this test again."""
-        for names in (*self.by_function.values(), *self.by_module.values()):
+        del self.tests[name]
+        for names in (*self.by_function.values(), *self.by_module.values(), self.starting):
             names.discard(name)
 
     def seconds(self, names: list[str]) -> float:
@@ -246,11 +335,12 @@ def reach_of(
 ) -> TestsOf:
     """The map of a room's tests, file by file: made by running them once, kept until the room or the file changes.
 
-    A test that takes longer than LIMIT_TEST_S, or a file longer than `limit_s`, takes no part, and that is said.
+    A test that takes longer than LIMIT_TEST_S is not run again, one that fails or a file that takes longer than
+    `limit_s` takes no part, and that is said. UserError when a map cannot be made at all.
     """
-    folder = copy.folder.parent / f"reach-{room}"
+    folder = copy.folder.parent / f"reach-{room}{'-compiled' if ask.compiled else ''}"
     folder.mkdir(exist_ok=True)
-    files = [file for path in tests for file in files_of_tests(copy.folder / path)]
+    files = list(dict.fromkeys(file for path in tests for file in files_of_tests(copy.folder / path)))
     if not files:
         raise UserError(f"{room}: there are no tests in {', '.join(tests)}")
     found: dict[str, Any] = {}
@@ -263,24 +353,29 @@ def reach_of(
             answer = ask(map=name, to=str(partial), limit_s=limit_s, limit_test_s=LIMIT_TEST_S)
             if answer["code"] == 0:
                 say(f"{room}: {name} is mapped")
-            else:
-                why = "takes too long" if answer["code"] is None else answer["by"]
-                say(f"{room}: {name} takes no part: {why}")
+            elif answer["code"] is None:
+                say(f"{room}: {name} takes no part: it takes too long")
                 partial.write_text(json.dumps(NOTHING | {"failed": [name]}), "utf-8")
+            else:
+                raise UserError(f"{name}: its map cannot be made: {answer['by']}")
             seen = json.loads(partial.read_text(encoding="utf-8"))
             partial.write_text(json.dumps(seen | {"state": state}), encoding="utf-8")
             partial.replace(kept)
         found[name] = json.loads(kept.read_text(encoding="utf-8"))
     failed = [name for each in found.values() for name in each["failed"]]
     if failed:
-        say(f"{room}: {len(failed)} tests fail, skip or last too long, and take no part: {', '.join(failed[:3])} ...")
+        say(f"{room}: {len(failed)} tests fail or skip and take no part: {', '.join(failed[:3])} ...")
+    late = [name for each in found.values() for name in each["late"]]
+    if late:
+        say(f"{room}: {len(late)} tests last longer than {LIMIT_TEST_S:g} s and are not run: {', '.join(late[:3])} ...")
     return TestsOf(found)
 
 
 def state_of(folder: pathlib.Path, room: str, tests: pathlib.Path) -> str:
-    """A digest of the room's sources and of a file of tests: what its map is made of."""
+    """A digest of the room's sources, a file of tests and its helpers: what its map is made of."""
     digest = hashlib.sha256()
-    for path in (*sorted((folder / room).rglob("*.py")), tests):
+    helpers = [path for path in tests.parent.glob("*.py") if not path.name.startswith("test_")]
+    for path in (*sorted((folder / room).rglob("*.py")), *sorted(helpers), tests):
         digest.update(path.read_bytes())
     return digest.hexdigest()
 
@@ -320,9 +415,9 @@ def judge(copy: Copy, ask: Asked, mutant: Mutant, tests: TestsOf, limit_s: float
     original = (copy.folder / mutant.path).read_text(encoding="utf-8")
     begun = wallclock.monotonic_s()
     while True:
-        chosen = tests.of(mutant, limit_s)
+        chosen, left = tests.of(mutant, limit_s)
         if not chosen:
-            return Verdict(mutant.key, mutant.line, NOT_REACHED)
+            return Verdict(mutant.key, mutant.line, NOT_WITHIN if left else NOT_REACHED, left=left)
         copy.put(mutant.path, mutant.applied(original))  # also for processes that tests start
         try:
             code, by = verdict_of(copy, ask, mutant, tests, chosen, original, mutant.applied(original))
@@ -331,12 +426,12 @@ def judge(copy: Copy, ask: Asked, mutant: Mutant, tests: TestsOf, limit_s: float
         if code == 1 and by in tests.tests and not tests.is_witness(by, ask, mutant, original):
             tests.leave_out(by)
         elif code is None and not by and verdict_of(copy, ask, mutant, tests, chosen, original, original)[0] is None:
-            return Verdict(mutant.key, mutant.line, TOO_SLOW, "", len(chosen), limit_of(tests, chosen))
+            return Verdict(mutant.key, mutant.line, TOO_SLOW, "", len(chosen), limit_of(tests, chosen), left)
         else:
             break
     seconds = round(wallclock.monotonic_s() - begun, 1)
-    outcome = {None: TIMEOUT, 0: SURVIVED}.get(code, KILLED)
-    return Verdict(mutant.key, mutant.line, outcome, by, len(chosen), seconds)
+    outcome = {None: TIMEOUT, 0: NOT_WITHIN if left else SURVIVED}.get(code, KILLED)
+    return Verdict(mutant.key, mutant.line, outcome, by, len(chosen), seconds, left)
 
 
 def limit_of(tests: TestsOf, chosen: list[str]) -> float:
@@ -365,19 +460,53 @@ def verdict_of(
         )
         code, by = answer["code"], answer.get("by", "")
     if code == 0 and tests.at_import(mutant):
-        return from_the_start(copy, chosen, limit)
+        return from_the_start(copy, chosen, limit, ask.compiled)
     return code, by
 
 
-def from_the_start(copy: Copy, chosen: list[str], limit_s: float) -> tuple[int | None, str]:
+def from_the_start(copy: Copy, chosen: list[str], limit_s: float, compiled: bool) -> tuple[int | None, str]:
     """Run these tests in a process of their own: (pytest's exit code or None for too long, the test that failed)."""
     listed = copy.folder.parent / "chosen-tests"
     listed.write_text("".join(f"{name}\n" for name in chosen), encoding="utf-8")
-    code, said = copy.pytest(["-x", "--no-header", f"@{listed}"], limit_s)
+    code, said = copy.pytest(["-x", "--no-header", f"@{listed}"], limit_s, compiled)
     if code == NO_SUCH_TEST:  # the mutant changed what tests are made of: then all of their files
         files = dict.fromkeys(name.partition("::")[0] for name in chosen)
-        code, said = copy.pytest(["-x", "--no-header", *files], limit_s + 300.0)
+        code, said = copy.pytest(["-x", "--no-header", *files], limit_s + 300.0, compiled)
     blamed = [line for line in said.splitlines() if line.startswith(("FAILED ", "ERROR "))]
     if not code:
         return code, ""
     return code, blamed[0].split(" ", 1)[1].partition(" - ")[0] if blamed else f"pytest ends with {code}"
+
+
+def judge_built(built: Built, mutant: Mutant, plain: TestsOf, compiled: TestsOf, limit_s: float) -> Verdict:
+    """Build it into the library and run tests that passed with the original; then take it out again.
+
+    As with `judge`, what is noticed must not be so with the original, built the same way.
+    """
+    original = (built.folder / mutant.path).read_text(encoding="utf-8")
+    begun = wallclock.monotonic_s()
+    while True:
+        chosen, left = compiled.built_of(mutant, plain, limit_s)
+        limit = limit_of(compiled, chosen)
+        built.put(mutant.path, mutant.applied(original))
+        try:
+            code, by = built_verdict(built, chosen, limit)
+        finally:
+            built.put(mutant.path, original)
+        same: int | None = 0
+        if code is None or by in compiled.tests:
+            same = built_verdict(built, [by] if by else chosen, limit)[0]
+        if code is None and same is None:
+            return Verdict(mutant.key, mutant.line, TOO_SLOW, "", len(chosen), limit, left)
+        if not same or not by:
+            break
+        compiled.leave_out(by)
+    outcome = {None: TIMEOUT, 0: NOT_WITHIN if left else SURVIVED}.get(code, KILLED)
+    return Verdict(mutant.key, mutant.line, outcome, by, len(chosen), round(wallclock.monotonic_s() - begun, 1), left)
+
+
+def built_verdict(built: Built, chosen: list[str], limit_s: float) -> tuple[int | None, str]:
+    """What these tests say of the files as they are now: (pytest's exit code or None for too long, who failed)."""
+    if not built.build():
+        return 1, "the build"
+    return from_the_start(built, chosen, limit_s, True) if chosen else (0, "")
