@@ -76,5 +76,5 @@ lock:
 clean:
 	rm -rf $(VENV) build *.egg-info
 	find . -name '*.so' -not -path './$(VENV)/*' -delete
-	find . -name '*.c' -not -path './$(VENV)/*' -not -path './datatable/generated/*' -delete
+	find . -name '*.c' -not -path './$(VENV)/*' -not -path './datatable/generated/*' -not -path './firmware_sim/native/*' -not -path './examples/*' -not -path './tests/*' -delete
 	rm -f ranger_sim/build_record.json

@@ -5,7 +5,7 @@ from typing import Any
 from ranger_sim.boards.counters import RangerCounters
 from ranger_sim.boards.modules.error_module import ErrorModule
 from ranger_sim.boards.modules.network_time import NetworkTime
-from ranger_sim.firmware_sim.native.native_board import NativeBoard
+from ranger_sim.firmware_sim.native.native_board import NativeBoard, Started
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.native_boards import PLACES, Firmware, hardware_of, table_version
 
@@ -35,6 +35,22 @@ class RobotNativeBoard(NativeBoard):
         """How often its program noted each error, where it says so (`firmware_error_totals`); else never."""
         self.module.totals = self.error_totals(len(self.module.totals))
         return self.module
+
+    @property
+    def adc_external(self) -> Any:
+        """Its external converter, where faults of it act."""
+        return self._started(self.devices.adcxs)
+
+    @property
+    def adc_internal(self) -> Any:
+        """Its chip's own converter."""
+        return self._started(self.devices.adcs)
+
+    def _started(self, devices: Started) -> Any:
+        """The one device of a kind."""
+        if 0 not in devices:
+            raise UserError(f"{self.name}: its program has not started the {devices.what}")
+        return devices[0]
 
     def counters(self) -> object:
         """What the board counted; its program's own queues are not known."""

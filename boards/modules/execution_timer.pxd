@@ -12,7 +12,6 @@ cdef class ExecutionTimer:
     cdef public Microcontroller chip
     cdef public NetworkTime time
     cdef public double seconds_per_cycle
-    cdef public long long longest_ns, longest_ever_ns
-    cpdef long long cycles(self, long long time_ns) noexcept
+    cdef public long long longest, longest_ever
     cpdef double seconds(self) noexcept
     cpdef double longest_seconds(self) noexcept

@@ -80,7 +80,8 @@ class TransferFault(ConverterFault):
         """What the converter makes of the present voltages at its inputs that are used."""
         converter, volts = self.converter, self.board.analog.volts
         if self.external:
-            for code in converter.sequence[: converter.length]:
+            # a program in C keeps its sequence to itself: known is what it has started last
+            for code in converter.sequence[: converter.length] or [converter.register4]:
                 gain = code >> GAIN_SHIFT & GAIN_MASK
                 yield converter.convert(volts(converter.inputs[code & 15], now_ns), gain)
         else:

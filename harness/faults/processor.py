@@ -171,8 +171,8 @@ class FullRing(Hold):
         ProcessorFault.connect(self)
         if not isinstance(self.board, SatelliteBoard):
             raise UserError(
-                f"fault {self.text()}: {self.name} has no ring of a satellite; the router's rings only lose frames, and"
-                " the main brain has no CAN"
+                f"fault {self.text()}: {self.name} has no ring of a satellite; the router's rings only lose frames, the"
+                " main brain has no CAN, and a program in C keeps its ring to itself"
             )
         self.task = self.found(RECEIVE_TASK)
         if self.robot.quirks.full_receive_ring_kills:

@@ -137,6 +137,8 @@ static int64_t host(enum call asked, int64_t a, int64_t b, int64_t c, int64_t d,
 void fw_attach(const fw_interrupt *interrupt) { HOST1(attach, (int64_t)(intptr_t)interrupt); }
 void fw_detach(enum fw_interrupt_kind kind, uint32_t index) { HOST2(detach, kind, index); }
 void fw_request(enum fw_interrupt_kind kind, uint32_t index) { HOST2(request, kind, index); }
+uint32_t fw_lock(void) { return 0; }
+void fw_unlock(uint32_t state) { (void)state; }
 
 void fw_spend(uint32_t cycles)
 {

@@ -177,6 +177,10 @@ void fw_attach(const fw_interrupt *interrupt);
 void fw_detach(enum fw_interrupt_kind kind, uint32_t index);
 /* Raise it by software. */
 void fw_request(enum fw_interrupt_kind kind, uint32_t index);
+/* From fw_lock to fw_unlock no handler runs, the fast interrupt neither: for a few lines on what both sides change.
+ * They nest; fw_unlock gets what fw_lock returned. Here a task or handler takes effect at one instant anyhow. */
+uint32_t fw_lock(void);
+void fw_unlock(uint32_t state);
 
 /* --- time ------------------------------------------------------------------------------------------------------------
  */
