@@ -18,9 +18,11 @@ cdef long long _STATUS
 @cython.final
 cdef class Core:
     cdef public long long pc, following, cycles, began, instructions
-    cdef public long long n, z, c, v, carry, control, lines, faulted, stopped, flowed
+    cdef public long long n, z, c, v, carry, control, lines, faulted, stopped
     cdef public long long flash_base, flash_size, ram_base, ram_size
-    cdef public long long line, trail, data_line, mam_mode, mam_timing, device_waits
+    cdef public long long line, data_line, mam_mode, mam_timing, device_waits, bridge_base
+    cdef public long long cycles_per_instruction
+    cdef public long long[::1] trail, ahead, ready
     cdef public bint takes_aborts
     cdef public long long fault_address
     cdef public long long[::1] r, high, banked, saved
@@ -36,7 +38,7 @@ cdef class Core:
     @cython.locals(before=cython.longlong)
     cdef int enter(self, long long mode, long long vector, long long back) except -1
     cdef int undefined(self) except -1
-    @cython.locals(waits=cython.longlong)
+    @cython.locals(begun=cython.longlong, bank=cython.longlong)
     cdef int fetch_line(self, long long line) noexcept
     cdef int read_flash(self, long long line) noexcept
     @cython.locals(place=cython.longlong, value=cython.longlong)

@@ -2,17 +2,26 @@
 # (every index below is a field of 4 bits, or a place held against its memory's size)
 """The ARM7TDMI core (ARMv4T): ARM and Thumb state, seven modes with banked registers, exceptions, cycles.
 
-Sources: ARM Architecture Reference Manual (DDI 0100, ARMv4T) for results, ARM7TDMI data sheet (DDI 0029) for cycles
+Sources: ARM Architecture Reference Manual (DDI 0100, ARMv4T) for results, ARM7TDMI data sheet (DDI 0029E) for cycles
 and for what the architecture leaves open: loads from unaligned addresses rotate, an aborted load leaves its base
 updated, STR and STM of the program counter store its address + 12, an empty register list moves the program counter
-and steps by 64 bytes.
+and steps by 64 bytes. A status register has twelve bits (DDI 0029E, section 3.8): 8 to 27 are not stored, read as zero.
 
-Cycles are the data sheet's S, N, I and C cycles of each class of instruction; each is one clock, and memory adds
-waits. RAM adds none. A device adds `device_waits` (chosen by us). Flash adds what its accelerator (MAM, LPC2194 user
-manual) cannot hide; the model, chosen by us, holds lines of 16 bytes: the line that runs, the line after it
-(prefetched while this one runs), the line of the last branch that missed (branch trail) and the line of the last
-datum. `mam_mode` 2 has all of it, 1 has no branch trail and no line of data, 0 has nothing: each access then takes
-`mam_timing` clocks.
+Cycles are the S, N, I and C cycles that chapter 10 of the data sheet sums up by class of instruction; each is one
+clock, and memory adds waits. RAM adds none. A device from `bridge_base` up, behind the bridge to the peripheral bus,
+adds `device_waits`; below it (fast GPIO) none. Flash adds what its accelerator cannot hide.
+
+The accelerator (MAM) is modelled after chapter 5 of the user manual of the LPC2119/2129/2194/2292/2294: two banks of
+lines of 16 bytes, in turn; for each bank a branch trail buffer, which holds the last line that had to be waited for,
+and a prefetch buffer, which begins to fetch the next line as a line is entered; one line of data for both. An access
+takes `mam_timing` clocks; a datum in a bank that is prefetching makes this begin anew. `mam_mode` 2 has all of it;
+in 1 only fetches that follow one another use what was prefetched, branches, fetches after a store and data wait; in 0
+everything waits. Chosen by us, because the manual does not say: a prefetch begins in the clock after its line was
+entered, and the two fetches by which the pipeline runs ahead of a branch do not count.
+
+Straight code does not wait, a branch to a new place waits `mam_timing - 1` clocks, as does a constant out of another
+line. What compiled code comes to is told in docs/explanation/arm7.md. `cycles_per_instruction`, when not 0, takes the
+place of all of this: every instruction then takes so many cycles, the entry of an interrupt or abort 3 as ever.
 
 An access to what is not there raises `BusFault` with address and program counter. With `takes_aborts` the program
 gets its data or prefetch abort instead, as on the chip, and `fault_address` keeps the address.
@@ -43,8 +52,10 @@ _SIGN = 0x80000000
 _STATUS = 0xF00000FF  # the bits a status register has
 
 MODES = (USER, FAST, INTERRUPT, SUPERVISOR, ABORT, UNDEFINED, SYSTEM)
-# Chosen by us: the bridge to the peripheral bus at the processor's own clock takes two clocks more than memory.
-DEVICE_WAITS = 2
+# A store to a port behind the bridge, at the processor's own clock, takes 7 clocks instead of 2: the data sheet of the
+# LPC2194/01 has its fast ports, which stand beside memory, toggle pins up to 3.5 times as fast as the old ones.
+DEVICE_WAITS = 5
+BRIDGE_BASE = 0xE0000000  # where the peripheral bus begins (user manual, chapter 2)
 MAM_TIMING = 4  # clocks of a flash access at 60 MHz: what all of the robot's boards write to MAMTIM
 
 
@@ -81,8 +92,8 @@ class Core:
     `device`: an object with read(address, size) -> value and write(address, size, value), size in bytes 1, 2 or 4;
     both raise LookupError where nothing is. `lines` holds the two interrupt inputs (IRQ_LINE, FIQ_LINE), levels set by
     devices. `r` holds the registers of the present mode, `pc` the address of the next instruction (`r[15]` is only
-    valid inside an instruction). `cycles` and `instructions` count from the start; `began` is what `cycles` was when the
-    present instruction began: devices take that as the instant of its accesses.
+    valid inside an instruction). `cycles` and `instructions` count from the start; `began` is what `cycles` was when
+    the present instruction began: devices take that as the instant of its accesses.
     """
 
     def __init__(
@@ -97,8 +108,13 @@ class Core:
         self.ram_size = ram_size
         self.device = device
         self.device_waits = DEVICE_WAITS
+        self.bridge_base = BRIDGE_BASE
         self.mam_mode = 2
         self.mam_timing = MAM_TIMING
+        self.trail = array.array("q", [-2, -2])  # of the even and of the odd bank: line in the branch trail buffer,
+        self.ahead = array.array("q", [-2, -2])  # line in the prefetch buffer,
+        self.ready = array.array("q", [0, 0])  # and the cycle at which that one is there
+        self.cycles_per_instruction = 0
         self.takes_aborts = False
         self.fault_address = -1
         self.r = array.array("q", [0]) * 16
@@ -118,9 +134,8 @@ class Core:
         self.control = SUPERVISOR | 0xC0
         self.pc = self.following = 0
         self.faulted = 0
-        self.flowed = 0
         self.stopped = 0
-        self.line = self.trail = self.data_line = -2
+        self.forget_flash()
 
     def stop(self) -> None:
         """`run` ends after the present instruction; a device calls this."""
@@ -132,7 +147,12 @@ class Core:
             raise UserError(f"{self.name}: MAM mode {mode} of {timing} clocks: modes are 0 ... 2, clocks 1 ... 7")
         self.mam_mode = mode
         self.mam_timing = timing
-        self.line = self.trail = self.data_line = -2
+        self.forget_flash()
+
+    def forget_flash(self) -> None:
+        self.line = self.data_line = -2
+        for bank in range(2):
+            self.trail[bank] = self.ahead[bank] = -2
 
     # ---- memory from outside: no cycles, no devices
 
@@ -233,24 +253,30 @@ class Core:
 
     def fetch_line(self, line: cython.longlong) -> cython.int:
         """Waits of a fetch from another line of flash than the last fetch."""
-        waits = self.mam_timing - 1
+        begun = self.cycles
         if self.mam_mode == 0:
-            self.line = -2
-        else:
-            if line == self.line + 1 or (line == self.trail and self.mam_mode == 2):
-                waits = 0
-            else:
-                self.trail = line
-            # a line lasts four clocks at least; of a slower flash the rest is not hidden
-            if line == self.line + 1 and self.mam_timing > 4:
-                waits = self.mam_timing - 4
-            self.line = line
-        self.cycles += waits
+            self.cycles += self.mam_timing - 1
+            return 0
+        bank = line & 1
+        if line == self.ahead[bank] and (self.mam_mode == 2 or line == self.line + 1):
+            if self.ready[bank] > begun:
+                self.cycles = self.ready[bank]
+        elif self.mam_mode == 1 or line != self.trail[bank]:
+            self.cycles += self.mam_timing - 1
+            self.trail[bank] = line
+        self.line = line
+        line += 1
+        bank ^= 1
+        if line != self.ahead[bank] and line != self.trail[bank]:
+            self.ahead[bank] = line
+            self.ready[bank] = begun + self.mam_timing
         return 0
 
     def read_flash(self, line: cython.longlong) -> cython.int:
         """Waits of a datum in flash."""
         if line != self.data_line:
+            if self.ready[line & 1] > self.cycles:
+                self.ready[line & 1] = self.cycles + 2 * self.mam_timing - 1
             self.cycles += self.mam_timing - 1
             if self.mam_mode == 2:
                 self.data_line = line
@@ -280,7 +306,8 @@ class Core:
                 value = self.flash[place >> 2]
             else:
                 if self.device is not None:
-                    self.cycles += self.device_waits
+                    if address >= self.bridge_base:
+                        self.cycles += self.device_waits
                     try:
                         return self.device.read(address, size)
                     except LookupError:
@@ -294,6 +321,8 @@ class Core:
 
     def store(self, address: cython.longlong, size: cython.longlong, value: cython.longlong) -> cython.int:
         self.cycles += 1
+        if self.mam_mode == 1:
+            self.line = -2  # the fetch after a store is an N cycle
         place = address - self.ram_base
         if 0 <= place < self.ram_size:
             if size == 4:
@@ -304,7 +333,8 @@ class Core:
                 self.ram[place >> 2] = self.ram[place >> 2] & (_MASK ^ mask) | value << moved & mask
             return 0
         if self.device is not None and not 0 <= address - self.flash_base < self.flash_size:
-            self.cycles += self.device_waits
+            if address >= self.bridge_base:
+                self.cycles += self.device_waits
             try:
                 self.device.write(address, size, value if size == 4 else value & (0xFF if size == 1 else 0xFFFF))
                 return 0
@@ -335,6 +365,8 @@ class Core:
         """Go on there, in the present state: the pipeline fills anew."""
         self.following = address & (_MASK - 1 if self.control & 0x20 else _MASK - 3)
         self.cycles += 2
+        if self.mam_mode == 1:
+            self.line = -2
         return 0
 
     def passes(self, condition: cython.longlong) -> cython.bint:
@@ -436,7 +468,6 @@ class Core:
         while self.cycles < until and not self.stopped:
             if self.lines and self.interrupt():
                 continue  # the entry's cycles may have reached `until`
-            self.began = self.cycles
             self.one()
         return 0
 
@@ -444,7 +475,6 @@ class Core:
         """One instruction; an interrupt that waits is taken first."""
         if self.lines:
             self.interrupt()
-        self.began = self.cycles
         return self.one()
 
     def interrupt(self) -> cython.int:
@@ -461,6 +491,7 @@ class Core:
 
     def one(self) -> cython.int:
         pc = self.pc
+        self.began = self.cycles
         self.instructions += 1
         self.cycles += 1
         place = pc - self.flash_base
@@ -488,8 +519,11 @@ class Core:
             self.r[15] = pc + 8 & _MASK
             if op >> 28 == 14 or self.passes(op >> 28):
                 self.arm(op)
+        if self.cycles_per_instruction:
+            self.cycles = self.began + self.cycles_per_instruction
         if self.faulted:
             self.faulted = 0
+            self.cycles += 1
             self.enter(ABORT, 0x10, pc + 8)
         self.pc = self.following
         return 0
@@ -791,7 +825,9 @@ class Core:
             for i in range(16):
                 if chosen >> i & 1:
                     value = self.get_user(i) if user else self.r[i]
-                    self.store(address & _MASK & -4, 4, value if i != 15 else value + 4 & _MASK)
+                    if i == 15:  # one fetch further on
+                        value = value + (2 if self.control & 0x20 else 4) & _MASK
+                    self.store(address & _MASK & -4, 4, value)
                     address += 4
                     # the base changes after the first transfer: lowest in the list it is stored as it was
                     if first and op & 0x200000:

@@ -16,6 +16,7 @@ IRQ_LINE: int
 FIQ_LINE: int
 MODES: tuple[int, ...]
 DEVICE_WAITS: int
+BRIDGE_BASE: int
 MAM_TIMING: int
 
 class ProcessorError(UserError):
@@ -45,17 +46,20 @@ class Core:
     lines: int
     faulted: int
     stopped: int
-    flowed: int
     flash_base: int
     flash_size: int
     ram_base: int
     ram_size: int
     line: int
-    trail: int
     data_line: int
     mam_mode: int
     mam_timing: int
     device_waits: int
+    bridge_base: int
+    cycles_per_instruction: int
+    trail: MutableSequence[int]
+    ahead: MutableSequence[int]
+    ready: MutableSequence[int]
     takes_aborts: bool
     fault_address: int
     r: MutableSequence[int]
@@ -70,6 +74,7 @@ class Core:
     def reset(self) -> None: ...
     def stop(self) -> None: ...
     def set_mam(self, mode: Any, timing: Any) -> None: ...
+    def forget_flash(self) -> None: ...
     def place(self, address: Any, content: Any) -> None: ...
     def peek(self, address: Any) -> int: ...
     def cpsr(self) -> int: ...
