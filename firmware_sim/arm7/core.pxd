@@ -10,6 +10,8 @@ cpdef enum:
     SYSTEM = 0x1F
     IRQ_LINE = 1
     FIQ_LINE = 2
+    STATE = 53
+    LOOK_CYCLES = 60_000
 
 cdef long long _MASK
 cdef long long _SIGN
@@ -23,7 +25,12 @@ cdef class Core:
     cdef public long long line, data_line, mam_mode, mam_timing, device_waits, bridge_base
     cdef public long long cycles_per_instruction
     cdef public long long[::1] trail, ahead, ready
-    cdef public bint takes_aborts
+    cdef public long long ram_open, flash_open
+    cdef public bint takes_aborts, armed
+    cdef public object debugger, hit
+    cdef public set points
+    cdef public tuple watches
+    cdef public long long stepping, passing, return_pc, return_mode, next_look
     cdef public long long fault_address
     cdef public long long[::1] r, high, banked, saved
     cdef public long long[::1] flash, ram
@@ -43,6 +50,9 @@ cdef class Core:
     cdef int read_flash(self, long long line) noexcept
     @cython.locals(place=cython.longlong, value=cython.longlong)
     cdef long long load(self, long long address, long long size) except? <long long>-1
+    @cython.locals(value=cython.longlong)
+    cdef long long load_elsewhere(self, long long address, long long size) except? <long long>-1
+    cdef int store_elsewhere(self, long long address, long long size, long long value) except -1
     @cython.locals(place=cython.longlong, moved=cython.longlong, mask=cython.longlong)
     cdef int store(self, long long address, long long size, long long value) except -1
     cdef int nothing(self, long long address, long long size, bint writing) except -1
@@ -61,7 +71,16 @@ cdef class Core:
     cdef long long shift_fixed(self, long long kind, long long value, long long amount) noexcept
     cdef int multiplier_cycles(self, long long value, bint signed) noexcept
     cpdef int run(self, long long until) except -1
+    @cython.locals(count=cython.longlong)
     cpdef int step(self) except -1
+    cdef int run_debugged(self, long long until) except -1
+    @cython.locals(pc=cython.longlong, mode=cython.longlong)
+    cdef int debugged(self) except -1
+    cdef bint is_memory(self, long long address) noexcept
+    cdef int open_memory(self) noexcept
+    cdef int close_memory(self) noexcept
+    cdef int look_for_watch(self, long long address, long long size, long long kind) except -1
+    cpdef int state_into(self, long long[::1] into) except -1
     @cython.locals(pc=cython.longlong, place=cython.longlong, op=cython.longlong)
     cdef int one(self) except -1
     cdef int interrupt(self) except -1

@@ -23,6 +23,10 @@ Straight code does not wait, a branch to a new place waits `mam_timing - 1` cloc
 line. What compiled code comes to is told in docs/explanation/arm7.md. `cycles_per_instruction`, when not 0, takes the
 place of all of this: every instruction then takes so many cycles, the entry of an interrupt or abort 3 as ever.
 
+A debugger (`firmware_sim/gdb`) takes part by `debugger`: `run` then asks it at breakpoints, watchpoints and steps, and
+looks at its door now and then. It stops between two instructions, for as long as it likes; no cycle passes meanwhile,
+and what was not changed by hand goes on as without it.
+
 An access to what is not there raises `BusFault` with address and program counter. With `takes_aborts` the program
 gets its data or prefetch abort instead, as on the chip, and `fault_address` keeps the address.
 """
@@ -45,6 +49,8 @@ if not cython.compiled:
     # bits of Core.lines
     IRQ_LINE = 1
     FIQ_LINE = 2
+    STATE = 53  # numbers of Core.state_into
+    LOOK_CYCLES = 60_000  # between two looks at a debugger's door; chosen by us: 1 ms of the robot's processors
 
 # C variables when compiled (.pxd): Cython makes a Python object of every literal above 31 bits.
 _MASK = 0xFFFFFFFF
@@ -117,6 +123,16 @@ class Core:
         self.cycles_per_instruction = 0
         self.takes_aborts = False
         self.fault_address = -1
+        self.ram_open = ram_size  # as far as loads and stores need no second look: none of it while data are watched
+        self.flash_open = flash_size
+        self.debugger = None
+        self.armed = False
+        self.points = set()
+        self.watches = ()
+        self.hit = None
+        self.stepping = 0
+        self.passing = self.return_pc = self.return_mode = -1
+        self.next_look = 0
         self.r = array.array("q", [0]) * 16
         self.high = array.array("q", [0]) * 10  # r8 ... r12 of the other modes, then of FIQ
         self.banked = array.array("q", [0]) * 12  # r13, r14 of: user, FIQ, IRQ, supervisor, abort, undefined
@@ -297,34 +313,45 @@ class Core:
         """A datum at an address that is a multiple of its size."""
         self.cycles += 1
         place = address - self.ram_base
-        if 0 <= place < self.ram_size:
+        if 0 <= place < self.ram_open:
             value = self.ram[place >> 2]
         else:
             place = address - self.flash_base
-            if 0 <= place < self.flash_size:
-                self.read_flash(place >> 4)
-                value = self.flash[place >> 2]
-            else:
-                if self.device is not None:
-                    if address >= self.bridge_base:
-                        self.cycles += self.device_waits
-                    try:
-                        return self.device.read(address, size)
-                    except LookupError:
-                        pass
-                self.nothing(address, size, False)
-                return 0
+            if not 0 <= place < self.flash_open:
+                return self.load_elsewhere(address, size)
+            self.read_flash(place >> 4)
+            value = self.flash[place >> 2]
         if size == 4:
             return value
         value >>= 8 * (address & 3)
         return value & 0xFF if size == 1 else value & 0xFFFF
+
+    def load_elsewhere(self, address: cython.longlong, size: cython.longlong) -> cython.longlong:
+        """A datum of a device, or of memory that is watched."""
+        if self.watches:
+            self.look_for_watch(address, size, 1)
+            if self.is_memory(address):
+                self.open_memory()
+                self.cycles -= 1
+                value = self.load(address, size)
+                self.close_memory()
+                return value
+        if self.device is not None:
+            if address >= self.bridge_base:
+                self.cycles += self.device_waits
+            try:
+                return self.device.read(address, size)
+            except LookupError:
+                pass
+        self.nothing(address, size, False)
+        return 0
 
     def store(self, address: cython.longlong, size: cython.longlong, value: cython.longlong) -> cython.int:
         self.cycles += 1
         if self.mam_mode == 1:
             self.line = -2  # the fetch after a store is an N cycle
         place = address - self.ram_base
-        if 0 <= place < self.ram_size:
+        if 0 <= place < self.ram_open:
             if size == 4:
                 self.ram[place >> 2] = value
             else:
@@ -332,6 +359,17 @@ class Core:
                 mask = (0xFF if size == 1 else 0xFFFF) << moved
                 self.ram[place >> 2] = self.ram[place >> 2] & (_MASK ^ mask) | value << moved & mask
             return 0
+        return self.store_elsewhere(address, size, value)
+
+    def store_elsewhere(self, address: cython.longlong, size: cython.longlong, value: cython.longlong) -> cython.int:
+        if self.watches:
+            self.look_for_watch(address, size, 2)
+            if 0 <= address - self.ram_base < self.ram_size:
+                self.open_memory()
+                self.cycles -= 1
+                self.store(address, size, value)
+                self.close_memory()
+                return 0
         if self.device is not None and not 0 <= address - self.flash_base < self.flash_size:
             if address >= self.bridge_base:
                 self.cycles += self.device_waits
@@ -465,6 +503,8 @@ class Core:
     def run(self, until: cython.longlong) -> cython.int:
         """Execute until `cycles` has reached `until` (the last instruction is completed) or `stop` was called."""
         self.stopped = 0
+        if self.debugger is not None:
+            return self.run_debugged(until)
         while self.cycles < until and not self.stopped:
             if self.lines and self.interrupt():
                 continue  # the entry's cycles may have reached `until`
@@ -473,9 +513,136 @@ class Core:
 
     def step(self) -> cython.int:
         """One instruction; an interrupt that waits is taken first."""
+        if self.armed:
+            count = self.instructions
+            while self.instructions == count:
+                self.debugged()
+            return 0
         if self.lines:
             self.interrupt()
         return self.one()
+
+    # ---- with a debugger
+
+    def run_debugged(self, until: cython.longlong) -> cython.int:
+        """As `run`."""
+        while self.cycles < until and not self.stopped:
+            if self.cycles >= self.next_look:
+                self.next_look = self.cycles + LOOK_CYCLES
+                self.debugger.look()
+            if self.armed:
+                self.debugged()
+                continue
+            if self.lines and self.interrupt():
+                continue
+            self.one()
+        return 0
+
+    def debugged(self) -> cython.int:
+        """An instruction, an interrupt's entry, or a halt.
+
+        A step goes over what an interrupt does meanwhile: it has ended when an instruction of its own is done.
+        """
+        if self.return_pc == self.pc and self.return_mode == self.control & 0x1F:
+            self.return_pc = -1
+        if self.return_pc < 0 and self.stepping == 2 or self.pc != self.passing and self.pc in self.points:
+            self.halt(None)
+            return 0
+        pc = self.pc
+        mode = self.control & 0x1F
+        if self.lines and self.interrupt():
+            if self.stepping and self.return_pc < 0:
+                self.return_pc = pc
+                self.return_mode = mode
+            return 0
+        if pc == self.passing:
+            self.passing = -1
+        if self.stepping and self.return_pc < 0:
+            self.stepping = 2
+        try:
+            self.one()
+        except UserError as error:
+            self.halt(error)
+            raise
+        if self.hit is not None:
+            self.halt(None)
+        return 0
+
+    def halt(self, error) -> None:
+        """The debugger has it for as long as it likes. `error`: what the program did; it ends the run after that."""
+        self.stepping = 0
+        self.return_pc = -1
+        self.debugger.halted(error)
+        self.passing = self.pc
+        self.hit = None
+        self.rearm()
+
+    def is_memory(self, address: cython.longlong) -> cython.bint:
+        return 0 <= address - self.ram_base < self.ram_size or 0 <= address - self.flash_base < self.flash_size
+
+    def open_memory(self) -> cython.int:
+        self.ram_open = self.ram_size
+        self.flash_open = self.flash_size
+        return 0
+
+    def close_memory(self) -> cython.int:
+        self.ram_open = self.flash_open = 0
+        return 0
+
+    def look_for_watch(self, address: cython.longlong, size: cython.longlong, kind: cython.longlong) -> cython.int:
+        """`hit` is the first watchpoint that this access meets: (address, its kinds)."""
+        if self.hit is None:
+            for start, end, kinds in self.watches:
+                if address < end and start < address + size and kinds & kind:
+                    self.hit = (max(start, address), kinds)
+                    break
+        return 0
+
+    def set_points(self, points, watches) -> None:
+        """Halt before instructions at these addresses, and after accesses to what is watched.
+
+        watches: (first address, the one after the last, kinds), kinds 1 for loads, 2 for stores, 3 for both.
+        """
+        self.points = set(points)
+        self.watches = tuple(watches)
+        if self.watches:
+            self.close_memory()
+        else:
+            self.open_memory()
+        self.rearm()
+
+    def set_step(self) -> None:
+        """Halt again after one instruction."""
+        self.stepping = 1
+        self.rearm()
+
+    def rearm(self) -> None:
+        self.armed = bool(self.points or self.watches or self.stepping)
+
+    def state_into(self, into: cython.longlong[::1]) -> cython.int:
+        """All that the next instruction can depend on beside memory, inputs and time, as STATE numbers; returns STATE.
+
+        What flash has under way counts from now: the same numbers at another cycle are the same state.
+        """
+        i: cython.longlong
+        place: cython.longlong
+        for i in range(15):
+            into[i] = self.r[i]
+        for i in range(10):
+            into[15 + i] = self.high[i]
+        for i in range(12):
+            into[25 + i] = self.banked[i]
+        for i in range(6):
+            into[37 + i] = self.saved[i]
+        into[43] = self.pc
+        into[44] = self.cpsr()
+        into[45] = self.line
+        into[46] = self.data_line
+        for place in range(2):
+            into[47 + place] = self.trail[place]
+            into[49 + place] = self.ahead[place]
+            into[51 + place] = self.ready[place] - self.cycles if self.ready[place] > self.cycles else 0
+        return STATE
 
     def interrupt(self) -> cython.int:
         """Enter the exception that a line asks for and the status allows; 1 when it did."""

@@ -14,6 +14,8 @@ UNDEFINED: int
 SYSTEM: int
 IRQ_LINE: int
 FIQ_LINE: int
+STATE: int
+LOOK_CYCLES: int
 MODES: tuple[int, ...]
 DEVICE_WAITS: int
 BRIDGE_BASE: int
@@ -60,7 +62,19 @@ class Core:
     trail: MutableSequence[int]
     ahead: MutableSequence[int]
     ready: MutableSequence[int]
+    ram_open: int
+    flash_open: int
     takes_aborts: bool
+    armed: bool
+    debugger: Any
+    hit: Any
+    points: set[Any]
+    watches: tuple[Any, ...]
+    stepping: int
+    passing: int
+    return_pc: int
+    return_mode: int
+    next_look: int
     fault_address: int
     r: MutableSequence[int]
     high: MutableSequence[int]
@@ -83,3 +97,8 @@ class Core:
     def set_cpsr(self, value: int) -> int: ...
     def run(self, until: int) -> int: ...
     def step(self) -> int: ...
+    def halt(self, error: Any) -> None: ...
+    def set_points(self, points: Any, watches: Any) -> None: ...
+    def set_step(self) -> None: ...
+    def rearm(self) -> None: ...
+    def state_into(self, into: MutableSequence[int] | memoryview[int]) -> int: ...

@@ -5,6 +5,8 @@ the "instruction cycle times" of its chapter 5; sections 4.7 and 4.8 say how far
 writes the class down as the sheet does, in S, N and I cycles; out of RAM each is one clock.
 """
 
+import array
+
 import pytest
 
 from ranger_sim.firmware_sim.arm7.core import FIQ_LINE, IRQ_LINE, Core
@@ -307,3 +309,18 @@ def test_with_a_fixed_number_every_instruction_takes_it_and_interrupts_their_thr
 def test_a_mode_that_the_accelerator_has_not_is_one_line():
     with pytest.raises(UserError, match="MAM mode 3 of 4 clocks"):
         Core().set_mam(3, 4)
+
+
+def test_the_state_of_a_loop_in_flash_is_the_same_after_every_pass():
+    made = core(*[NOP] * 11, branch(0x3C, 0x1C), at=0x10)  # three lines, entered at the end of one: prefetches matter
+    states = []
+    for _ in range(4):
+        trace(made, 12 if not states else 9)
+        state = array.array("q", [0]) * 53
+        made.state_into(state)
+        states.append(list(state))
+    assert made.pc == 0x1C
+    assert states[1] == states[2] == states[3]
+    made.step()
+    made.state_into(state)
+    assert list(state) != states[3]
