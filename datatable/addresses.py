@@ -1,12 +1,20 @@
-"""Where a calibration program finds the variables: the address of each, fixed by its id.
+"""Where a calibration program finds the variables, and on which identifiers of CAN it speaks.
 
-One 32-bit word a variable, little-endian, in the order of the table. What is beyond the last word is no memory.
+One 32-bit word a variable, little-endian, in the order of the table: an address is fixed by the id. What is beyond the
+last word is no memory.
 """
 
 from __future__ import annotations
 
 BASE = 0x10000  # chosen by us: 0, which programs take for "no address", belongs to nothing
 WORD_BYTES = 4
+
+# XCP on CAN. Chosen by us: free in the robot's table (robot.md N1.9), and above all of it, so that calibration loses
+# every arbitration against the robot. A variable that takes one of them is refused.
+XCP_MASTER_ID = 2000  # commands
+XCP_SLAVE_ID = 2001  # answers and measurements
+XCP_IDS = (XCP_MASTER_ID, XCP_SLAVE_ID)
+XCP_BUS = "CAN2"  # chosen by us: the robot's quietest bus, and no motor hangs on it
 
 
 def address_of(number: int) -> int:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from ranger_sim.datatable.addresses import BASE, WORD_BYTES, address_of
+import dataclasses
+
+from ranger_sim.datatable.a2ml import A2ML, COMMANDS
+from ranger_sim.datatable.addresses import BASE, WORD_BYTES, XCP_MASTER_ID, XCP_SLAVE_ID, address_of
 from ranger_sim.datatable.generate_dbc import bound
 from ranger_sim.datatable.model import COMPUTER, LIMITS, Table, Variable
 
@@ -62,35 +65,81 @@ def object_lines(table: Table, variable: Variable) -> list[str]:
     ]
 
 
-def transport_lines() -> list[str]:
-    """IF_DATA XCP: the protocol layer, measurement lists, and XCP on UDP."""
-    commands = (
-        "GET_COMM_MODE_INFO GET_ID SET_MTA UPLOAD SHORT_UPLOAD BUILD_CHECKSUM DOWNLOAD SHORT_DOWNLOAD SET_DAQ_PTR "
-        "WRITE_DAQ SET_DAQ_LIST_MODE GET_DAQ_LIST_MODE START_STOP_DAQ_LIST START_STOP_SYNCH GET_DAQ_CLOCK "
-        "GET_DAQ_PROCESSOR_INFO GET_DAQ_RESOLUTION_INFO GET_DAQ_EVENT_INFO FREE_DAQ ALLOC_DAQ ALLOC_ODT ALLOC_ODT_ENTRY"
-    )
+@dataclasses.dataclass(frozen=True)
+class Transport:
+    """What differs between the two: its tag, bytes of packets, packets of a block, the clock, its own lines."""
+
+    tag: str
+    max_cto: int
+    max_dto: int
+    most_packets: int
+    stamp: str
+    without: tuple[str, ...]
+    lines: tuple[str, ...]
+
+
+# harness/xcp/udp.py and can.py serve them; tests hold both together
+UDP = Transport(
+    "XCP_ON_UDP_IP",
+    248,
+    1400,
+    2,
+    "SIZE_DWORD UNIT_1US",
+    ("TRANSPORT_LAYER_CMD",),
+    (f'0x0100 {UDP_PORT} ADDRESS "127.0.0.1"',),
+)
+# Bit timing as on the robot: 3 Mbit/s, ten quanta, sample point 70 %, SJW two of them (robot.md N1.2).
+CAN = Transport(
+    "XCP_ON_CAN",
+    8,
+    8,
+    43,
+    "SIZE_WORD UNIT_10US",
+    ("SHORT_DOWNLOAD", "WRITE_DAQ_MULTIPLE"),
+    (
+        "0x0100",
+        f"CAN_ID_BROADCAST 0x{XCP_MASTER_ID:X}",
+        f"CAN_ID_MASTER 0x{XCP_MASTER_ID:X}",
+        f"CAN_ID_SLAVE 0x{XCP_SLAVE_ID:X}",
+        "BAUDRATE 3000000",
+        "SAMPLE_POINT 70",
+        "SAMPLE_RATE SINGLE",
+        "BTL_CYCLES 10",
+        "SJW 2",
+    ),
+)
+
+
+def common_lines(transport: Transport) -> list[str]:
+    """The protocol layer and measurement lists over one transport."""
+    commands = [each for each in COMMANDS if each not in transport.without]
     lines = [
-        "    /begin IF_DATA XCP",
-        "      /begin PROTOCOL_LAYER",
-        "        0x0101 2000 2000 0 0 0 0 0 248 1400 BYTE_ORDER_MSB_LAST ADDRESS_GRANULARITY_BYTE",
-        *(f"        OPTIONAL_CMD {each}" for each in commands.split()),
-        "      /end PROTOCOL_LAYER",
-        "      /begin DAQ",
-        f"        DYNAMIC 0x20 0x{len(EVENTS):X} 0x0 OPTIMISATION_TYPE_DEFAULT ADDRESS_EXTENSION_FREE",
-        "        IDENTIFICATION_FIELD_TYPE_ABSOLUTE GRANULARITY_ODT_ENTRY_SIZE_DAQ_BYTE 0x4 NO_OVERLOAD_INDICATION",
-        "        PRESCALER_SUPPORTED",
-        "        /begin TIMESTAMP_SUPPORTED 0x1 SIZE_DWORD UNIT_1US /end TIMESTAMP_SUPPORTED",
+        "/begin PROTOCOL_LAYER",
+        f"  0x0101 2000 2000 0 0 0 0 0 {transport.max_cto} {transport.max_dto} BYTE_ORDER_MSB_LAST "
+        "ADDRESS_GRANULARITY_BYTE",
+        *(f"  OPTIONAL_CMD {each}" for each in commands),
+        f"  COMMUNICATION_MODE_SUPPORTED BLOCK MASTER {transport.most_packets} 0",
+        "/end PROTOCOL_LAYER",
+        "/begin DAQ",
+        f"  DYNAMIC 0x20 0x{len(EVENTS):X} 0x0 OPTIMISATION_TYPE_DEFAULT ADDRESS_EXTENSION_FREE",
+        "  IDENTIFICATION_FIELD_TYPE_ABSOLUTE GRANULARITY_ODT_ENTRY_SIZE_DAQ_BYTE 0x4 NO_OVERLOAD_INDICATION",
+        "  PRESCALER_SUPPORTED",
+        f"  /begin TIMESTAMP_SUPPORTED 0x1 {transport.stamp} /end TIMESTAMP_SUPPORTED",
     ]
     for number, (name, cycle) in enumerate(EVENTS):
         lines += [
-            f'        /begin EVENT "{name}" "{name[:8]}" 0x{number:X} DAQ 0x20 {cycle} 5 0 CONSISTENCY DAQ /end EVENT'
+            f'  /begin EVENT "{name}" "{name[:8]}" 0x{number:X} DAQ 0x20 {cycle} 5 0 CONSISTENCY EVENT /end EVENT'
         ]
-    return [
-        *lines,
-        "      /end DAQ",
-        f'      /begin XCP_ON_UDP_IP 0x0101 {UDP_PORT} ADDRESS "127.0.0.1" /end XCP_ON_UDP_IP',
-        "    /end IF_DATA",
-    ]
+    return [*lines, "/end DAQ"]
+
+
+def transport_lines() -> list[str]:
+    """IF_DATA XCP: the protocol as it is on CAN, the ways to the slave, and what UDP has other than CAN."""
+    lines = ["/begin IF_DATA XCP", *(f"  {each}" for each in common_lines(CAN))]
+    for transport, more in ((CAN, []), (UDP, common_lines(UDP))):
+        inner = [*transport.lines, *more]
+        lines += [f"  /begin {transport.tag}", *(f"    {each}" for each in inner), f"  /end {transport.tag}"]
+    return [f"    {each}" for each in [*lines, "/end IF_DATA"]]
 
 
 def a2l_text(table: Table) -> str:
@@ -103,6 +152,7 @@ def a2l_text(table: Table) -> str:
         '/begin PROJECT ranger_sim "Cornell Ranger, emulated"',
         f'  /begin HEADER "made from the master table {table.hash[:16]}" /end HEADER',
         '  /begin MODULE main_brain "data table of the main brain"',
+        *(f"    {each}" for each in A2ML.splitlines()),
         '    /begin MOD_COMMON ""',
         "      BYTE_ORDER MSB_LAST",
         "      ALIGNMENT_LONG 4",

@@ -16,6 +16,7 @@ from collections.abc import Callable, Iterable
 from fractions import Fraction
 from typing import Any
 
+from ranger_sim.datatable.addresses import XCP_IDS
 from ranger_sim.datatable.model import (
     LARGEST_CAN_ID,
     LARGEST_ID,
@@ -498,6 +499,10 @@ class VariableChecker:
                 report("bus", f"unknown bus {shown(name)}")
         for name in repeated(names):
             report("bus", f"{shown(name)} is named twice")
+        if number in XCP_IDS and names:
+            report(
+                "id", f"{number} is an identifier of XCP on CAN ({' and '.join(map(str, XCP_IDS))}); take another one"
+            )
         if number is not None and number > LARGEST_CAN_ID and names:
             report(
                 "id",

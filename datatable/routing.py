@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from ranger_sim.datatable.addresses import XCP_IDS
 from ranger_sim.datatable.model import LARGEST_CAN_ID, Board, Table
 
 ENTRIES = LARGEST_CAN_ID + 1
@@ -32,10 +33,12 @@ def destination_masks(table: Table) -> bytes:
 
     Every identifier goes to the main brain unless the table says otherwise. What the main brain or the computer
     publishes for a satellite goes to the buses named, and not back. What the router sends by itself
-    (`sends_itself`) is on the buses already, so only the SSP copy is routed.
+    (`sends_itself`) is on the buses already, so only the SSP copy is routed. Frames of XCP end where they are sent.
     """
     ssp = 1 << table.channels["SSP"]
     masks = bytearray([ssp]) * ENTRIES
+    for identifier in XCP_IDS:  # ROBOT PARITY: its table knows no XCP and would send these to the main brain
+        masks[identifier] = 0
     for variable in table.variables:
         if variable.id >= ENTRIES:
             continue

@@ -79,18 +79,12 @@ class Lockstep:
         self.stop_steps = NEVER
         self.stop_distance_m = ANY_DISTANCE_M
         self.step_times = array.array("q", [start_ns, start_ns])  # ns, of the step that the sensors show
-        # per board the instant (ns) at which it must run, and that at which something comes in that may wait;
-        # behind the boards' the instant at which a bus must decide
-        self.due = integers(len(boards) + 1, start_ns)
-        self.came = integers(len(boards), start_ns)
-        self.prompt = integers(len(boards), 1)
+        self.prompt = integers(0)
         self.wires = []
         for place, board in enumerate(boards):
             self.wires.append(BoardWires(board, WINDOW_NS))
             self._put(place, board)
-            board.inbox.wake(self.due, self.due, place)
-        for bus in buses:
-            bus.wake(self.due, len(boards))
+        self._seat()
         self.word_wires = []
         self.encoder_wires = []  # (place of the board, edges, two pins)
         self.encoder_boards = array.array("q")  # places of the boards with encoders on their pins
@@ -101,6 +95,25 @@ class Lockstep:
         self.boards[place] = board
         self.wires[place].lead_from(board)
         self.side_by_side = any(each.apart for each in self.boards)
+
+    def _seat(self) -> None:
+        """Places for all boards: where those who send to one tell when it must run."""
+        count = len(self.boards)
+        # per board the instant (ns) at which it must run, and that at which something comes in that may wait;
+        # behind the boards' the instant at which a bus must decide
+        self.due = integers(count + 1, self.time)
+        self.came = integers(count, self.time)
+        before, self.prompt = list(self.prompt), integers(count, 1)
+        for place in range(count):
+            if place < len(before):
+                self.prompt[place] = before[place]
+            self._hear(place)
+        for bus in self.buses:
+            bus.wake(self.due, count)
+
+    def _hear(self, place) -> None:
+        """The inbox of the board there tells when it must run: at once, or by `prompt` when it likes."""
+        self.boards[place].inbox.wake(self.due if self.prompt[place] else self.came, self.due, place)
 
     # --- wiring -------------------------------------------------------------------------------------------
 
@@ -114,6 +127,17 @@ class Lockstep:
     def board(self, name) -> Board:
         """The board of this name."""
         return self.boards[self.place(name)]
+
+    def add(self, board) -> BoardWires:
+        """One more board, behind those that are there; between two runs. Returns its wires, which lead nowhere yet."""
+        if not isinstance(board, Board) or board.name in [each.name for each in self.boards]:
+            raise UserError(f"lockstep: {board!r} is no Board, or there is one of its name")
+        wires = BoardWires(board, WINDOW_NS)
+        self.boards.append(board)
+        self.wires.append(wires)
+        self._put(len(self.boards) - 1, board)
+        self._seat()
+        return wires
 
     def replace(self, board) -> None:
         """`board` stands from now on where the board of its name stood: on the same wires, at the same sensors.
@@ -141,7 +165,7 @@ class Lockstep:
         """Not urgent messages (`EventQueue.put`) wait for tasks of `board`: no handler sends or looks at a sensor."""
         place = self.place(board.name)
         self.prompt[place] = 0
-        board.inbox.wake(self.came, self.due, place)
+        self._hear(place)
 
     def connect_encoder(self, encoder, board, pin_a, pin_b) -> None:
         """Channels A and B of `encoder` on two pins of `board`."""

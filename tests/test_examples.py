@@ -12,7 +12,11 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent
 # What each document's examples, run one after the other in one process, must print among other things.
 PRINTED = {
     "README.md": (r"^[1-9]\d* -?0\.\d+ \d{4,5}$",),
-    "docs/how-to/calibration.md": (r"^a master finds it on port \d+$", r"'commands': 0"),
+    "docs/how-to/calibration.md": (
+        r"^a master finds it on port \d+$",
+        r"^ff 05 80 08 08 00 01 01$",
+        r"^ff 72 61 6e 67 65 72$",
+    ),
     "docs/how-to/can-tools.md": (r"ID: +123 .*'ranger'", r"^BusState\.ERROR$"),
     "docs/slot-timing.md": (r"^3 7460 53% left$",),
     "docs/faults.md": (r"^True 100 counts True$",),

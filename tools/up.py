@@ -13,6 +13,7 @@ from rich.live import Live
 from rich.table import Table
 
 from ranger_sim import loading
+from ranger_sim.datatable.addresses import XCP_BUS, XCP_MASTER_ID, XCP_SLAVE_ID
 from ranger_sim.foundation import wallclock
 from ranger_sim.foundation.peers import told
 from ranger_sim.foundation.user_error import UserError
@@ -116,6 +117,15 @@ def register(commands: Any) -> None:
         type=whole_number(0, 65535),
         metavar="PORT",
         help="let a calibration program measure and set parameters by XCP on UDP, on this machine (0: a free port)",
+    )
+    group.add_argument(
+        "--xcp-can",
+        nargs="?",
+        const=XCP_BUS.lower(),
+        choices=[f"can{number}" for number in range(1, 5)],
+        metavar="BUS",
+        help=f"the same by XCP on CAN, on one of the robot's buses (default {XCP_BUS.lower()}), identifiers "
+        f"{XCP_MASTER_ID} and {XCP_SLAVE_ID}",
     )
     group.add_argument(
         "--bus",
@@ -266,6 +276,18 @@ def run(options: argparse.Namespace) -> int:
         def begin(robot: Ranger) -> None:
             for each in outside:
                 move_bus(robot, each, openers, settings.boards)
+            if options.xcp_can is not None:
+                from ranger_sim.harness.xcp.can import MOST_LOAD, XcpCanProbe
+
+                there = next((each for each in outside if each.name == options.xcp_can), None)
+                probe = XcpCanProbe(robot, options.xcp_can, there)
+                robot.attach(probe)
+                console.print(
+                    f"XCP on CAN: {probe.bus}, commands {XCP_MASTER_ID}, answers {XCP_SLAVE_ID}; the robot needs at "
+                    f"most {float(probe.robots_share):.1%} of it, measurements may fill it to {float(MOST_LOAD):.0%}",
+                    highlight=False,
+                    soft_wrap=True,
+                )
             if profile is not None and (profile.external() or profile.absent()):
                 elsewhere.append(HardwareInTheLoop(robot, profile, outside))
             arm(robot, wanted)

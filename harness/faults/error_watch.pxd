@@ -7,6 +7,6 @@ from ranger_sim.harness.step_watch cimport StepWatch
 @cython.final
 cdef class ErrorWatch(StepWatch):
     cdef public list boards
-    cdef public long long codes
+    cdef public long long codes, count
     cdef public long long[::1] before
     cdef public RowStream rows

@@ -13,7 +13,8 @@ from ranger_sim.harness.step_watch import StepWatch
 class ErrorWatch(StepWatch):
     """Fills `rows`: time (ns), place of the board in `boards`, code, how often since it was last looked.
 
-    boards: the list that the loop runs, so that a board that takes another one's place is seen. codes: 0 ... codes - 1
+    boards: the list that the loop runs, so that a board that takes another one's place is seen; what stands behind the
+    boards with errors, as a calibration probe, is not looked at. codes: 0 ... codes - 1
     are looked at. Times are those of the 250 us step before which the error was noted.
     """
 
@@ -21,9 +22,10 @@ class ErrorWatch(StepWatch):
         StepWatch.__init__(self)
         self.boards = boards
         self.codes = codes
-        self.before = integers(len(boards) * codes)
+        self.count = sum(hasattr(board, "errors") for board in boards)
+        self.before = integers(self.count * codes)
         self.rows = RowStream("q", 4, False)
-        for place, board in enumerate(boards):
+        for place, board in enumerate(boards[: self.count]):
             for code in range(codes):
                 self.before[place * codes + code] = board.errors.totals[code]
 
@@ -36,7 +38,7 @@ class ErrorWatch(StepWatch):
         errors: ErrorModule
         boards: list = self.boards
         stream: RowStream = self.rows
-        for place in range(len(boards)):
+        for place in range(self.count):
             errors = boards[place].errors
             for code in range(self.codes):
                 at = place * self.codes + code

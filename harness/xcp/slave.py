@@ -1,14 +1,15 @@
 """The XCP slave without a transport: a command packet in, an answer packet out; measurement lists when time passes.
 
 Packets are those of ASAM MCD-1 XCP, part 2 (protocol layer 1.1), in Intel byte order. No clock, no socket, no robot:
-the same commands at the same instants give the same packets. What is not served is answered ERR_CMD_UNKNOWN.
+the same commands at the same instants give the same packets. What is not served is answered ERR_CMD_UNKNOWN. A master
+may write more than one packet holds: DOWNLOAD and the DOWNLOAD_NEXT behind it are one write, answered once.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import struct
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Protocol
 
 # First byte of what the slave sends.
@@ -34,17 +35,21 @@ TIMESTAMP_WANTED = 0x10  # of a list's mode
 UNSERVED_MODES = 0x02 | 0x01 | 0x20 | 0x40  # stimulation, alternating display, no identifiers: refused
 ADD_14 = 0x03  # checksum: bytes added up in 32 bits
 ID_TEXT, ID_A2L_NAME = 0, 1
+A2L_NAME = "ranger"  # of the file, without its ending
+MASTER_BLOCKS = 0x01  # of the optional communication modes
+MOST_BLOCK_BYTES = 255  # what the count of DOWNLOAD can say
+A_DAQ_LIST, CONSISTENT = 0x04, 0x80  # an event's: for lists that measure, which are of one instant all together
 MOST_LISTS = 32  # chosen by us: bounds what one master can make us keep and sample
 MOST_ENTRY_BYTES = 4
 MOST_CHECKSUM_BYTES = 65536  # chosen by us, above the whole table
 
 
 class XcpError(Exception):
-    """A command that is refused: `code` goes to the master."""
+    """A command that is refused: `code` goes to the master, and `more` behind it."""
 
-    def __init__(self, code: int) -> None:
+    def __init__(self, code: int, more: bytes = b"") -> None:
         super().__init__(f"XCP error {code:#04x}")
-        self.code = code
+        self.code, self.more = code, more
 
 
 class Memory(Protocol):
@@ -109,13 +114,21 @@ class _List:
 class Slave:
     """One slave for one master. `name`: what GET_ID says; `max_cto`, `max_dto`: bytes of a packet, 8 ... 255 and more.
 
-    `command` answers; `sample` gives the packets of the lists that are due.
+    `command` answers; `sample` gives the packets of the lists that are due. `bears`: whether the transport has room for
+    packets (bytes, shortest time between two in ns), all that would be measured at once; None: always.
     """
 
     def __init__(
-        self, memory: Memory, max_cto: int = 8, max_dto: int = 8, clock: Clock = SHORT, name: str = "ranger_sim"
+        self,
+        memory: Memory,
+        max_cto: int = 8,
+        max_dto: int = 8,
+        clock: Clock = SHORT,
+        name: str = "ranger_sim",
+        bears: Callable[[Sequence[tuple[int, int]]], bool] | None = None,
     ) -> None:
         self.memory, self.max_cto, self.max_dto, self.clock, self.name = memory, max_cto, max_dto, clock, name
+        self.bears = bears
         self.connected = False
         self.time_ns = 0
         self._forget()
@@ -127,6 +140,8 @@ class Slave:
         self.pointer: tuple[int, int, int] | None = None
         self.address = 0
         self.text: bytes | None = None  # what UPLOAD reads instead of memory: a name that was asked for
+        self.block: bytes | None = None  # what of a write in several packets has come
+        self.block_bytes = 0  # and how long it will be
 
     @property
     def running(self) -> bool:
@@ -136,20 +151,26 @@ class Slave:
     # ---- commands
 
     def command(self, packet: bytes, time_ns: int) -> bytes:
-        """The answer to a command at this instant of virtual time, ns; no bytes while nobody is connected."""
+        """The answer to a command at this instant of virtual time, ns.
+
+        No bytes while nobody is connected, and for all but the last packet of a block.
+        """
         self.time_ns = time_ns
         if not packet or (not self.connected and packet[0] != 0xFF):
             return b""
+        if packet[0] != DOWNLOAD_NEXT:
+            self.block = None
         entry = COMMANDS.get(packet[0])
-        if entry is None:
+        if entry is None or self.max_cto < SHORTEST_CTO.get(packet[0], 0):
             return bytes((ERROR, ERR_CMD_UNKNOWN))
         obey, length = entry
         if len(packet) < length or len(packet) > self.max_cto:
             return bytes((ERROR, ERR_CMD_SYNTAX))
         try:
-            return bytes((ANSWER,)) + obey(self, packet)
+            answer = bytes((ANSWER,)) + obey(self, packet)
         except XcpError as refused:
-            return bytes((ERROR, refused.code))
+            return bytes((ERROR, refused.code)) + refused.more
+        return b"" if self.block is not None else answer
 
     def _connect(self, packet: bytes) -> bytes:
         if packet[1] != 0:  # user-defined modes: none here
@@ -170,10 +191,11 @@ class Slave:
         raise XcpError(ERR_CMD_SYNCH)
 
     def _comm_mode(self, packet: bytes) -> bytes:
-        return bytes((0, 0, 0, 0, 0, 0, 0x10))  # no blocks, no interleaving; driver 1.0
+        # blocks from the master, without a pause between their packets; no interleaving; driver 1.0
+        return bytes((0, MASTER_BLOCKS, 0, most_packets(self.max_cto), 0, 0, 0x10))
 
     def _identify(self, packet: bytes) -> bytes:
-        self.text = self.name.encode() if packet[1] in (ID_TEXT, ID_A2L_NAME) else b""
+        self.text = {ID_TEXT: self.name, ID_A2L_NAME: A2L_NAME}.get(packet[1], "").encode()
         return struct.pack("<BHI", 0, 0, len(self.text))
 
     def _set_address(self, packet: bytes) -> bytes:
@@ -213,7 +235,22 @@ class Slave:
     def _download(self, packet: bytes) -> bytes:
         if self.text is not None:
             raise XcpError(ERR_ACCESS_DENIED)
+        if packet[1] > self.max_cto - 2 == len(packet) - 2:
+            self.block, self.block_bytes = packet[2:], packet[1]
+            return b""
         return self._write(packet[2:], packet[1])
+
+    def _download_next(self, packet: bytes) -> bytes:
+        block, self.block = self.block, None
+        missing = self.block_bytes - len(block) if block is not None else 0
+        if block is None or packet[1] != missing:
+            raise XcpError(ERR_SEQUENCE, bytes((missing,)))
+        if missing > self.max_cto - 2 == len(packet) - 2:
+            self.block = block + packet[2:]
+            return b""
+        if missing > len(packet) - 2:
+            raise XcpError(ERR_CMD_SYNTAX)
+        return self._write(block + packet[2 : 2 + missing], self.block_bytes)
 
     def _short_download(self, packet: bytes) -> bytes:
         self.address, self.text = _address(packet[3], packet, 4), None
@@ -292,6 +329,14 @@ class Slave:
     def _enter(self, packet: bytes) -> bytes:
         return self._put(packet[1], packet[2], packet[3], packet, 4)
 
+    def _enter_several(self, packet: bytes) -> bytes:
+        """Entries of eight bytes: bit, size, address, extension, one that only fills up."""
+        if len(packet) < 2 + 8 * packet[1]:
+            raise XcpError(ERR_CMD_SYNTAX)
+        for at in range(2, 2 + 8 * packet[1], 8):
+            self._put(packet[at], packet[at + 1], packet[at + 6], packet, at + 2)
+        return b""
+
     def _put(self, bit: int, size: int, extension: int, packet: bytes, at: int) -> bytes:
         """One entry at the pointer, which moves."""
         self._still()
@@ -323,14 +368,24 @@ class Slave:
         return struct.pack("<BHHBB", state, 0, wanted.event, wanted.prescaler, 0)
 
     def _may_run(self, wanted: _List) -> None:
-        """Refused when a packet of it would be longer than the transport has room for, or an entry was left out."""
-        for place, entries in enumerate(wanted.tables):
-            stamp = self.clock.size if place == 0 and wanted.mode else 0
-            size = 1 + stamp + sum(size for _, size in entries)
-            if size > self.max_dto or any(size == 0 for _, size in entries):
-                raise XcpError(ERR_DAQ_CONFIG)
-        if not wanted.tables:
+        """Refused when its packets are too long or, with all others, too many for the transport, or an entry is left
+        out."""
+        left_out = any(size == 0 for entries in wanted.tables for _, size in entries)
+        if not wanted.tables or left_out or any(size > self.max_dto for size, _ in self._packets(wanted)):
             raise XcpError(ERR_DAQ_CONFIG)
+        if self.bears is not None:
+            at_once = [each for each in self.lists if each.running or each.selected or each is wanted]
+            if not self.bears([packet for each in at_once for packet in self._packets(each)]):
+                raise XcpError(ERR_DAQ_CONFIG)
+
+    def _packets(self, measured: _List) -> list[tuple[int, int]]:
+        """(bytes, shortest time between two in ns) of each packet of a list."""
+        period_ns = EVENTS[measured.event].period_ns * measured.prescaler
+        stamps = [self.clock.size if measured.mode else 0] + [0] * (len(measured.tables) - 1)
+        return [
+            (1 + stamp + sum(size for _, size in entries), period_ns)
+            for stamp, entries in zip(stamps, measured.tables, strict=True)
+        ]
 
     def _start_list(self, packet: bytes) -> bytes:
         wanted = self._list(_word(packet, 2))
@@ -372,7 +427,12 @@ class Slave:
             raise XcpError(ERR_OUT_OF_RANGE)
         event = EVENTS[number]
         self.text = event.name.encode()
-        return bytes((0x04, MOST_LISTS, len(self.text), event.cycle, event.unit_code, 0))
+        return bytes((A_DAQ_LIST | CONSISTENT, MOST_LISTS, len(self.text), event.cycle, event.unit_code, 0))
+
+    def _list_info(self, packet: bytes) -> bytes:
+        tables = self._list(_word(packet, 2)).tables
+        most = max((len(entries) for entries in tables), default=0)
+        return struct.pack("<BBBH", A_DAQ_LIST, len(tables), most, 0)
 
     # ---- time
 
@@ -405,6 +465,14 @@ def _address(extension: int, packet: bytes, at: int) -> int:
     return int.from_bytes(packet[at : at + 4], "little")
 
 
+def most_packets(max_cto: int) -> int:
+    """Of one write: as many as its longest block needs."""
+    return -(-MOST_BLOCK_BYTES // (max_cto - 2))
+
+
+DOWNLOAD_NEXT = 0xEF
+# What a packet of CAN is too short for: SHORT_DOWNLOAD and WRITE_DAQ_MULTIPLE with one byte and one entry
+SHORTEST_CTO = {0xED: 9, 0xC7: 10}
 # Code of a command: what obeys it, and how many bytes it has at least.
 COMMANDS: dict[int, tuple[Callable[[Slave, bytes], bytes], int]] = {
     0xFF: (Slave._connect, 2),
@@ -418,6 +486,7 @@ COMMANDS: dict[int, tuple[Callable[[Slave, bytes], bytes], int]] = {
     0xF4: (Slave._short_upload, 8),
     0xF3: (Slave._checksum, 8),
     0xF0: (Slave._download, 3),
+    DOWNLOAD_NEXT: (Slave._download_next, 3),
     0xED: (Slave._short_download, 9),
     0xE2: (Slave._point, 6),
     0xE1: (Slave._enter, 8),
@@ -428,9 +497,11 @@ COMMANDS: dict[int, tuple[Callable[[Slave, bytes], bytes], int]] = {
     0xDC: (Slave._clock, 1),
     0xDA: (Slave._processor, 1),
     0xD9: (Slave._resolution, 1),
+    0xD8: (Slave._list_info, 4),
     0xD7: (Slave._event, 4),
     0xD6: (Slave._free, 1),
     0xD5: (Slave._allocate_lists, 4),
     0xD4: (Slave._allocate_tables, 5),
     0xD3: (Slave._allocate_entries, 6),
+    0xC7: (Slave._enter_several, 2),
 }

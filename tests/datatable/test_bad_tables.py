@@ -48,6 +48,7 @@ VARIABLE_FAULTS = {
     "no subscriber": ("MB;PC", "", 3, "LEG_ANGLE", "subscribers", "is empty"),
     "subscriber twice": ("MB;PC", "MB;MB", 3, "LEG_ANGLE", "subscribers", "'MB' is named twice"),
     "a board hears itself": ("MB;PC", "LEG;MB", 3, "LEG_ANGLE", "subscribers", "LEG publishes it"),
+    "id of XCP on a bus": ("3,LEG_COMMAND", "2001,LEG_COMMAND", 5, "LEG_COMMAND", "id", "an identifier of XCP on CAN"),
     "id above 2031 on a bus": ("3,LEG_COMMAND", "2032,LEG_COMMAND", 5, "LEG_COMMAND", "id", "above 2031"),
     "id beyond 16 bits": ("5,GAIN", "65536,GAIN", 7, "GAIN", "id", "0 ... 65535"),
     "id not a number": ("5,GAIN", "five,GAIN", 7, "GAIN", "id", "not a whole number"),

@@ -10,6 +10,7 @@ from typing import final
 class ErrorWatch(StepWatch):
     boards: list[Any]
     codes: int
+    count: int
     before: MutableSequence[int]
     rows: RowStream
     def __init__(self, boards: list[Any], codes: int) -> None: ...

@@ -1,4 +1,8 @@
-"""pyxcp as the master, in a process of its own; prints what it found as JSON. Arguments: port, three addresses."""
+"""pyxcp as the master, in a process of its own; prints what it found as JSON.
+
+Arguments: the port of UDP, or the channel of python-can's interface ranger_sim with the two identifiers behind it, as
+"robot/can2,2000,2001"; then three addresses.
+"""
 
 import json
 import logging
@@ -35,12 +39,26 @@ def refusal(master, address, value):
     return None
 
 
-port, first, second, parameter = map(int, sys.argv[1:])
-application = create_application_from_config(
-    {"Transport": {"Eth": {"host": "127.0.0.1", "port": port, "protocol": "UDP"}}, "General": {}}, logging.ERROR
-)
+where = sys.argv[1]
+first, second, parameter = map(int, sys.argv[2:])
+if where.isdecimal():
+    layer = "eth"
+    transport = {"Eth": {"host": "127.0.0.1", "port": int(where), "protocol": "UDP"}}
+else:
+    layer = "can"
+    channel, master_id, slave_id = where.split(",")
+    transport = {
+        "CAN": {
+            "interface": "ranger_sim",
+            "channel": channel,
+            "bitrate": 3_000_000,
+            "can_id_master": int(master_id),
+            "can_id_slave": int(slave_id),
+        }
+    }
+application = create_application_from_config({"Transport": transport, "General": {}}, logging.ERROR)
 set_application(application)
-application.transport.layer = "ETH"
+application.transport.layer = layer.upper()
 kept = Kept(
     [
         DaqList(
@@ -54,7 +72,7 @@ kept = Kept(
         )  # fmt: skip
     ]
 )
-with Master("eth", config=application, policy=kept) as master:
+with Master(layer, config=application, policy=kept) as master:
     master.connect()
     found = {"name": master.identifier(1)}
     kept.setup(write_multiple=False)

@@ -46,8 +46,9 @@ def test_nothing_but_connect_is_answered_before_connect():
     [
         ("FD", "FF 00 00 00 00 00"),
         ("FC", "FE 00"),
-        ("FB", "FF 00 00 00 00 00 00 10"),
+        ("FB", "FF 00 01 00 2B 00 00 10"),  # blocks from the master, of 43 packets: 255 bytes by 6
         ("FA00", "FF 00 00 00 0A 00 00 00"),
+        ("FA01", "FF 00 00 00 06 00 00 00"),
         ("FA04", "FF 00 00 00 00 00 00 00"),
         ("F4 02 00 00 04010000", "FF 04 05"),
         ("F4 08 00 00 00010000", "FE 22"),
@@ -55,7 +56,10 @@ def test_nothing_but_connect_is_answered_before_connect():
         ("F4 02 00 00 0F010000", "FE 22"),
         ("DA", "FF 13 20 00 03 00 00 00"),
         ("D9", "FF 01 04 01 00 42 01 00"),
-        ("D7 00 0000", "FF 04 20 0A 05 05 00"),
+        ("D7 00 0000", "FF 84 20 0A 05 05 00"),  # for measuring, all lists of one instant
+        ("D8 00 0000", "FE 22"),
+        ("F8 00 00", "FE 20"),  # GET_SEED
+        ("EA 83 00", "FE 20"),  # GET_CAL_PAGE
         ("D7 00 0300", "FE 22"),
         ("F6 00", "FE 21"),
         ("C0", "FE 20"),
@@ -75,9 +79,11 @@ def test_upload_moves_the_pointer_and_a_checksum_adds_bytes(slave):
 
 
 def test_the_name_is_uploaded_in_parts(slave):
-    say(slave, "FA01")
+    say(slave, "FA00")
     assert slave.command(b"\xf5\x07", 0)[1:] + slave.command(b"\xf5\x03", 0)[1:] == b"ranger_sim"
     assert say(slave, "F501") == "FE 22"
+    say(slave, "FA01")
+    assert slave.command(b"\xf5\x06", 0)[1:] == b"ranger"  # as ranger.a2l is called
 
 
 def test_what_is_refused_changes_nothing(slave):
@@ -143,3 +149,54 @@ def test_fine_stamps_count_microseconds_in_four_bytes():
     assert say(slave, "FF00") == "FF 05 80 F8 78 05 01 01"
     assert say(slave, "D9") == "FF 01 04 01 00 34 01 00"
     assert say(slave, "DC", 5_000_001_000) == "FF 00 00 00 41 4B 4C 00"
+
+
+def test_a_block_is_one_write_answered_once():
+    slave = Slave(Bytes())
+    slave.memory.data = bytearray(40)
+    slave.memory.write = lambda address, data: written.append((address, data))
+    written = []
+    say(slave, "FF00")
+    say(slave, "F6 0000 00 00010000")
+    assert say(slave, "F0 0E 010203040506") == "" and say(slave, "EF 08 0708090A0B0C") == ""
+    assert say(slave, "EF 02 0D0E") == "FF"
+    assert written == [(0x100, bytes(range(1, 15)))] and slave.address == 0x10E
+
+
+@pytest.mark.parametrize(
+    ("packets", "answer"),
+    [
+        (("EF 02 0102",), "FE 29 00"),  # no block was begun
+        (("F0 0E 010203040506", "EF 07 0708090A0B0C"), "FE 29 08"),  # eight bytes are missing
+        (("F0 08 010203040506", "EF 02 07"), "FE 21"),
+        (("F0 08 010203040506", "FD"), "FF 00 00 00 00 00"),  # another command ends the block
+        (("F0 08 010203040506", "FD", "EF 02 0708"), "FE 29 00"),
+        (("F0 08 010203040506", "EF 02 0708"), "FE 24"),  # refused as a whole
+    ],
+)
+def test_a_block_that_is_broken_off_writes_nothing(slave, packets, answer):
+    say(slave, "F6 0000 00 00010000")
+    assert [say(slave, each) for each in packets][-1] == answer
+    assert slave.memory.data == bytearray(range(16))
+
+
+def test_several_entries_are_written_by_one_command_where_a_packet_has_room():
+    slave = Slave(Bytes(), 248, 1400, FINE)
+    say(slave, "FF00")
+    for command in ("D6", "D500 0100", "D400 0000 01", "D300 0000 00 02", "E200 0000 00 00"):
+        assert say(slave, command) == "FF"
+    assert say(slave, "C7 02 FF 04 00010000 00 00 FF 02 08010000 00 00") == "FF"
+    assert slave.lists[0].tables == [[(0x100, 4), (0x108, 2)]]
+    assert say(slave, "D8 00 0000") == "FF 04 01 02 00 00"
+    assert say(slave, "C7 01 FF 04 00010000") == "FE 21"
+    assert say(Slave(Bytes()), "C7 01") == ""
+
+
+def test_a_list_that_the_transport_does_not_bear_is_refused_beside_those_that_run():
+    asked = []
+    slave = Slave(Bytes(), bears=lambda packets: asked.append(list(packets)) or len(packets) < 3)
+    say(slave, "FF00")
+    arranged(slave, "0200", "03")
+    assert asked[-1] == [(7, 6 * MS), (3, 6 * MS)]  # identifier, stamp and four bytes; the third of each 2 ms
+    slave.bears = lambda packets: False
+    assert say(slave, "DE 02 0000") == "FE 2A"
