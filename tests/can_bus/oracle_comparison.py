@@ -91,8 +91,11 @@ def moved(counters):
     return [each for i, each in enumerate(counters) if i == 0 or each[1:] != counters[i - 1][1:]]
 
 
-def on_our_bus(scenario, steps=None):
-    """(Outcome, commands that were accepted). `steps`: lengths in ns of the pieces in which time passes, in turn."""
+def run_on_our_bus(scenario, steps=None, prepare=lambda bus: None):
+    """(bus, its nodes' inboxes, commands that were accepted) after a scenario; `prepare` gets the bus before it.
+
+    `steps`: lengths in ns of the pieces in which time passes, in turn.
+    """
     bus = Bus("can", BITRATE)
     inboxes = [EventQueue(64) for _ in range(scenario.nodes)]
     for i, inbox in enumerate(inboxes):
@@ -102,6 +105,7 @@ def on_our_bus(scenario, steps=None):
         node.passive, node.warning = max(scenario.counters[i]) >= 128, max(scenario.counters[i]) >= 96
     for bit in scenario.inverted:
         bus.inject_error_at(bit * BIT_NS)
+    prepare(bus)
     accepted = []
     time, turn = 0, 0
     for bit, node, buffer, what in commands_of(scenario):
@@ -123,6 +127,12 @@ def on_our_bus(scenario, steps=None):
         turn += 1
         bus.advance(time)
     bus.advance(end)
+    return bus, inboxes, accepted
+
+
+def on_our_bus(scenario, steps=None):
+    """(Outcome, commands that were accepted), of `run_on_our_bus`."""
+    bus, inboxes, accepted = run_on_our_bus(scenario, steps)
     outcome = Outcome([], [], [])
     for node, inbox in zip(bus.nodes, inboxes, strict=True):
         seen, counters = [], [(-1, *scenario.counters[node.index])]
@@ -146,6 +156,11 @@ def on_our_bus(scenario, steps=None):
 
 def on_the_oracle(scenario, accepted):
     """Outcome of what our bus accepted."""
+    return run_on_the_oracle(scenario, accepted)[0]
+
+
+def run_on_the_oracle(scenario, accepted):
+    """(Outcome, the oracle's nodes) of what our bus accepted."""
     nodes = [oracle.Node(f"n{i}") for i in range(scenario.nodes)]
     counters = []
     for node, (transmit_errors, receive_errors) in zip(nodes, scenario.counters, strict=True):
@@ -185,7 +200,7 @@ def on_the_oracle(scenario, accepted):
         outcome.counters.append(moved(known))
         state = {oracle.OFF: "off", oracle.BUS_OFF: "bus-off", oracle.INTEGRATING: "joining"}
         outcome.states.append(state.get(node.state, "on"))
-    return outcome
+    return outcome, nodes
 
 
 def differences(scenario):
