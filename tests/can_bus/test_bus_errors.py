@@ -5,7 +5,7 @@ import pytest
 from ranger_sim.can_bus import node as can_node
 from ranger_sim.can_bus.frame import FIELD_ACK_SLOT, FIELD_CRC_DELIMITER, FIELD_ID_28_21, frame_bits
 from ranger_sim.can_bus.node import BUS_OFF, JOINING, OPERATING, RESET
-from ranger_sim.foundation.events import FLAG_ERROR, FLAG_SINGLE_SHOT, TX_ABORTED, TX_LOST, TX_SENT
+from ranger_sim.foundation.events import FLAG_ERROR, FLAG_EXTENDED, FLAG_SINGLE_SHOT, TX_ABORTED, TX_LOST, TX_SENT
 
 from .wiring import Wired, edge
 
@@ -364,3 +364,21 @@ def test_noise_can_be_switched_off_and_its_rate_is_checked():
     assert wired.bus.counters.errors == errors
     with pytest.raises(ValueError, match="0.2 is outside"):
         wired.bus.set_bit_error_rate(0.2)
+
+
+@pytest.mark.parametrize("flags", [8, 5, 1, 0, 8 | FLAG_EXTENDED])
+def test_a_frame_that_is_hit_anywhere_is_hit_in_its_middle_or_behind_its_arbitration(flags):
+    """The bit that is told is the middle one of an odd number of bits, of an even number the one before the middle."""
+    lengths = set()
+    for lo in range(12):
+        wired = Wired(2)
+        wired.bus.inject_errors(1)
+        wired.send(0, 0x123, flags=flags | FLAG_SINGLE_SHOT, lo=lo * 0x01010101)
+        wired.bus.advance(1_000_000)
+        (error,) = wired.log()
+        bits = frame_bits(0x123, flags, lo * 0x01010101, 0)
+        lengths.add(bits % 2)
+        behind = 41 if flags & FLAG_EXTENDED else 17
+        assert error[4] == max((bits - 1) // 2, behind)
+        assert error[2] == flags | FLAG_ERROR
+    assert lengths == {0, 1} or flags == 0

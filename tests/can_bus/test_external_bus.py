@@ -1,5 +1,7 @@
 """Controllers as peers on python-can interfaces: what goes out, what comes in, what is counted when it does not fit."""
 
+import os
+
 import can
 import pytest
 
@@ -229,3 +231,60 @@ def test_at_the_end_everything_that_was_sent_is_read(bus):
     bus.wires[0].to_read = [can.Message(arbitration_id=number, is_extended_id=False) for number in range(500)]
     bus.drain(0)
     assert [frame[1] for frame in bus.heard] == list(range(500))
+
+
+def test_nothing_has_happened_on_a_bus_that_is_new():
+    external = ExternalBus("can1", 1_000_000, Wire)
+    counts = ("frames_in", "frames_out", "not_taken", "overflow", "refused", "errors", "single_shot_skipped", "busy_ns")
+    assert [getattr(external, each) for each in counts] == [0] * len(counts)
+    assert (external.window_load, external.last_error) == (0.0, "")
+    assert external.add_peer("can1, CSR", EventQueue(), 1, 600).descriptor == -1  # this interface has no file
+
+
+def test_the_load_is_that_of_the_last_window_of_10_ms_that_is_over(bus):
+    """Frames of FRAME_NS each: a window ends with the first frame 10 ms or more after it began."""
+    for number in range(3):
+        bus.peers[0].from_board(CAN_REQUEST, number * 1_000_000, 1, 0x123, 8, 1, 2)
+    assert (bus.busy_ns, bus.window_load) == (3 * FRAME_NS, 0.0)
+    last = 10_000_000 - FRAME_NS  # its end is exactly 10 ms after the window's begin
+    bus.peers[0].from_board(CAN_REQUEST, last - 1, 1, 0x123, 8, 1, 2)
+    assert bus.window_load == 0.0
+    bus.peers[0].from_board(CAN_REQUEST, last + FRAME_NS - 1, 1, 0x123, 8, 1, 2)
+    end = last + 2 * FRAME_NS - 1
+    assert bus.window_load == pytest.approx(4 * FRAME_NS / end, rel=1e-12)
+    assert (bus.window_ns, bus.window_busy_ns, bus.busy_ns) == (end, FRAME_NS, 5 * FRAME_NS)
+    bus.peers[0].from_board(CAN_REQUEST, end + 10_000_000 - FRAME_NS, 1, 0x123, 8, 1, 2)
+    assert bus.window_load == pytest.approx(FRAME_NS / 10_000_000, rel=1e-12)
+    assert (bus.window_ns, bus.window_busy_ns) == (end + 10_000_000, FRAME_NS)
+
+
+def test_only_the_first_peer_counts_for_the_load(bus):
+    bus.peers[1].from_board(CAN_REQUEST, 0, 1, 0x123, 8, 1, 2)
+    assert (bus.busy_ns, bus.heard) == (0, [])
+
+
+def test_an_interface_with_a_file_is_read_when_that_says_so(bus):
+    """A pipe stands for a socket: `recv` is asked only when something lies in it."""
+    reading, writing = os.pipe()
+    asked = []
+
+    class Filed(Wire):
+        def fileno(self):
+            return reading
+
+        def recv(self, timeout):
+            asked.append(timeout)
+            return None
+
+    peer = bus.add_peer("can1, own", EventQueue(), 1, 620, Filed)
+    assert peer.descriptor == reading
+    bus.poll(0)
+    assert asked == []
+    os.write(writing, b"x")
+    bus.poll(0)
+    assert asked == [0]
+    bus.remove_peer(peer)
+    bus.poll(0)
+    assert asked == [0] and peer not in bus.peers
+    for end in (reading, writing):
+        os.close(end)

@@ -6,6 +6,7 @@ import pytest
 
 from ranger_sim.can_bus.bounds import response_times
 from ranger_sim.can_bus.edge.dbc import read_messages
+from ranger_sim.foundation.user_error import UserError
 from ranger_sim.tools import cli
 from ranger_sim.tools.cli import main
 
@@ -42,6 +43,30 @@ def dbc(tmp_path):
 def printed(capsys, *arguments):
     code = main(list(map(str, arguments)))
     return code, capsys.readouterr().out
+
+
+@pytest.mark.parametrize(("told", "rate"), [(10, 10_000), (125, 125_000), (9_999, 9_999_000), (10_000, 10_000)])
+def test_a_bit_rate_below_any_bus_s_is_in_kbit_s(dbc, told, rate):
+    dbc.write_text(DBC.replace('BA_ "Baudrate" 125;', f'BA_ "Baudrate" {told};'), encoding="utf-8")
+    assert read_messages(dbc, None)[1] == rate
+    assert read_messages(dbc, 500_000)[1] == 500_000  # what is asked for comes first
+
+
+@pytest.mark.parametrize("told", [0, -1])
+def test_a_bit_rate_of_nothing_is_none(dbc, told):
+    dbc.write_text(DBC.replace('BA_ "Baudrate" 125;', f'BA_ "Baudrate" {told};'), encoding="utf-8")
+    with pytest.raises(UserError, match="--bit-rate"):
+        read_messages(dbc, None)
+
+
+def test_messages_without_a_cycle_time_are_told_apart(dbc):
+    messages, _, silent = read_messages(dbc, None)
+    assert [(one.name, one.period_ns, one.deadline_ns) for one in messages] == [
+        ("First", 4_000_000, 4_000_000),
+        ("Second", 6_000_000, 6_000_000),
+        ("Third", 20_000_000, 20_000_000),
+    ]
+    assert silent == ["Silent"]
 
 
 def test_the_robots_own_buses_are_met_and_told_as_tables(capsys):
