@@ -3,7 +3,7 @@
 import dataclasses
 from typing import Any
 
-from ranger_sim.firmware_sim.counters import BoardCounters, CanCounters, SlotCounters
+from ranger_sim.firmware_sim.counters import CanCounters, ProgramCounters, SlotCounters
 
 
 @dataclasses.dataclass(frozen=True)
@@ -28,11 +28,9 @@ class RouterCounters:
 
 
 @dataclasses.dataclass(frozen=True)
-class RangerCounters(BoardCounters):
-    """A board of the robot. `time_ms`: its network time; `errors`: how often it noted each error, by error number."""
+class RangerCounters(ProgramCounters):
+    """A board of the robot. `time_ms`: its network time."""
 
-    time_ms: int = 0
-    errors: list[int] = dataclasses.field(default_factory=list)
     link: LinkCounters | None = None
     router: RouterCounters | None = None
 

@@ -1,4 +1,4 @@
-"""Everything that is generated from the master table, as {path below datatable/generated: text}.
+"""Everything that is generated from a master table, as {path below its folder `generated`: text}.
 
 The files carry no date, so the same table gives the same bytes on every machine.
 """
@@ -12,7 +12,7 @@ from ranger_sim.datatable.generate_c import c_files
 from ranger_sim.datatable.generate_catalogue import catalogue_text
 from ranger_sim.datatable.generate_dbc import dbc_text
 from ranger_sim.datatable.generate_python import python_files
-from ranger_sim.datatable.model import Table
+from ranger_sim.datatable.model import MAIN_BRAIN, Table
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.loading import OWN_TABLE
 
@@ -21,14 +21,19 @@ GENERATED_SUFFIXES = (".py", ".c", ".h", ".dbc", ".json", ".a2l")
 
 
 def generated_files(table: Table) -> dict[str, str]:
-    """Path and text of every generated file."""
-    files = python_files(table)
-    files.update({f"c/{name}": text for name, text in c_files(table).items()})
+    """Path and text of every generated file.
+
+    Python modules and the A2L file describe a machine with a main brain: its boards are our Python, and the calibration
+    slave serves its store. A machine without one has its firmware in C, and its harness reads the table itself.
+    """
+    files = {f"c/{name}": text for name, text in c_files(table).items()}
     for bus in table.channels:
         if bus != "SSP":
             files[f"{bus.lower()}.dbc"] = dbc_text(table, bus)
-    files["ranger.a2l"] = a2l_text(table)
     files["catalogue.json"] = catalogue_text(table)
+    if table.with_role(MAIN_BRAIN):
+        files.update(python_files(table))
+        files["ranger.a2l"] = a2l_text(table)
     return dict(sorted(files.items()))
 
 

@@ -1,6 +1,7 @@
 """Reads the master files and holds them against the rules; all faults are reported together.
 
-A table passes whole or not at all. Nothing a file can contain raises anything but TableError.
+A main brain, a router and the serial link SSP between them belong together: a table has all three or none of them. A
+table passes whole or not at all. Nothing a file can contain raises anything but TableError.
 """
 
 from __future__ import annotations
@@ -22,7 +23,9 @@ from ranger_sim.datatable.model import (
     LARGEST_ID,
     LIMITS,
     LONGEST_NAME,
+    MAIN_BRAIN,
     ROLES,
+    ROUTER,
     TYPES,
     Board,
     ErrorCode,
@@ -214,8 +217,10 @@ class BoardReader:
             self.report(shown(key), "is not a key of a board")
 
 
-def board_of(name: str, content: object, channels: dict[str, int], report: Callable[[str, str], None]) -> Board:
-    """A board from its TOML table."""
+def board_of(
+    name: str, content: object, channels: dict[str, int], routed: bool, report: Callable[[str, str], None]
+) -> Board:
+    """A board from its TOML table. `routed`: of a machine with a router, the bus of which its ribbon tells."""
     reader = BoardReader(name, content, report)
     role = reader.take("role", str, "satellite")
     if role not in ROLES:
@@ -229,8 +234,8 @@ def board_of(name: str, content: object, channels: dict[str, int], report: Calla
     buses = tuple(bus for bus in buses if bus in channels)
     on_can = role == "satellite"
     controller = reader.take_whole("controller", 0, 4, None if on_can else 0)
-    ribbon = reader.take_whole("ribbon", 0, 1, None if on_can else 0)
-    if on_can and buses and channels[buses[0]] != controller + 2 * ribbon:
+    ribbon = reader.take_whole("ribbon", 0, 1, None if on_can else 0) if routed else 0
+    if routed and on_can and buses and channels[buses[0]] != controller + 2 * ribbon:
         report("buses", f"{buses[0]} is not controller + 2 x ribbon = CAN{controller + 2 * ribbon}")
     runs = firmware or "slot_us" in reader.content
     slot_us = reader.take_whole("slot_us", 1, 1_000_000) if runs else 0
@@ -317,11 +322,14 @@ def read_boards(
             report(f"buses {shown(name)}", "channel 0 is SSP, channels 1-4 are CAN1-CAN4")
         else:
             channels[name], rates[name] = bus["channel"], bus["bit_rate"]
-    if "SSP" not in channels:
+    routed = "SSP" in channels or any(
+        isinstance(board, dict) and board.get("role") in (MAIN_BRAIN, ROUTER) for board in sections["boards"].values()
+    )
+    if routed and "SSP" not in channels:
         report("buses", "SSP, the link between router and main brain, is missing")
     for name, table in sections["boards"].items():
         lines[name] = line_of_table(text, name)
-        boards[name] = board_of(name, table, channels, faults.at(path.name, lines[name], shown(name)[1:-1]))
+        boards[name] = board_of(name, table, channels, routed, faults.at(path.name, lines[name], shown(name)[1:-1]))
     by_number: dict[int, str] = {}
     without_number = {fault.row for fault in faults.found if fault.field == "number"}
     for name, board in boards.items():
@@ -330,7 +338,7 @@ def read_boards(
         first = by_number.setdefault(board.number, name)
         if first != name:
             faults.at(path.name, lines[name], name)("number", f"{board.number} is also the number of {first}")
-    for role in ("main brain", "router"):
+    for role in (MAIN_BRAIN, ROUTER) if routed else ():
         having = [name for name, board in boards.items() if board.role == role]
         if len(having) != 1:
             report("boards", f"exactly one board must have the role {role!r}, not {len(having)}")
@@ -395,6 +403,7 @@ class VariableChecker:
     def __init__(self, boards: dict[str, Board], channels: dict[str, int], faults: Faults) -> None:
         self.boards = boards
         self.channels = channels
+        self.routed = any(board.role == ROUTER for board in boards.values())
         self.faults = faults
         self.periods = {name: board.periods_ms() for name, board in boards.items()}
         self.ids: dict[int, int] = {}
@@ -417,7 +426,7 @@ class VariableChecker:
         buses = self.buses_of(row["bus"], number, report)
         if publisher is not None:
             for subscriber in subscribers:
-                reason = unreachable(publisher, self.boards[subscriber], buses)
+                reason = unreachable(publisher, self.boards[subscriber], buses, self.routed)
                 if reason is not None:
                     report("bus", f"{shown(row['bus'])}: {reason}")
                     if reason.startswith("leaves"):

@@ -19,7 +19,8 @@ LIMITS = {
     "u32": (0, (1 << 32) - 1),
 }
 COMPUTER = "PC"  # the board that publishes parameters
-ROLES = ("satellite", "router", "main brain", "computer")
+ROUTER, MAIN_BRAIN = "router", "main brain"
+ROLES = ("satellite", ROUTER, MAIN_BRAIN, "computer")
 
 
 @dataclasses.dataclass(frozen=True)

@@ -3,18 +3,25 @@
 from __future__ import annotations
 
 from ranger_sim.datatable.addresses import XCP_IDS
-from ranger_sim.datatable.model import LARGEST_CAN_ID, Board, Table
+from ranger_sim.datatable.model import LARGEST_CAN_ID, MAIN_BRAIN, Board, Table
 
 ENTRIES = LARGEST_CAN_ID + 1
 
 
-def unreachable(publisher: Board, subscriber: Board, buses: tuple[str, ...]) -> str | None:
+def unreachable(publisher: Board, subscriber: Board, buses: tuple[str, ...], routed: bool) -> str | None:
     """Why a variable carried on `buses` does not get from `publisher` to `subscriber`; None when it does.
 
-    The computer hangs on the main brain's serial line, so both share everything. All else goes by the
-    named buses: the router passes a frame on to every bus the variable is carried on.
+    With a router (`routed`) the computer hangs on the main brain's serial line, so both share everything. All else
+    goes by the named buses: the router passes a frame on to every bus the variable is carried on. Without one every
+    board hears what is sent on a bus that it hangs on itself.
     """
-    ends = ("main brain", "computer")
+    if not routed:
+        common = set(publisher.buses) & set(subscriber.buses)
+        if common & set(buses):
+            return None
+        shared = " and ".join(sorted(common)) or "no bus"
+        return f"does not get from {publisher.name} to {subscriber.name}: they have {shared} in common"
+    ends = (MAIN_BRAIN, "computer")
     if publisher.role in ends and subscriber.role in ends:
         return None
     if publisher.role in ends and "SSP" not in buses:

@@ -40,3 +40,13 @@ class BoardCounters:
     unclaimed: int
     slots: SlotCounters
     can: list[CanCounters] = dataclasses.field(default_factory=list)
+
+
+@dataclasses.dataclass(frozen=True)
+class ProgramCounters(BoardCounters):
+    """What its program tells besides. `time_ms`: the machine's time as it has it; `errors`: how often it noted each
+    error, by error number.
+    """
+
+    time_ms: int = 0
+    errors: list[int] = dataclasses.field(default_factory=list)

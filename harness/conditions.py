@@ -16,24 +16,26 @@ from collections.abc import Callable
 from typing import Any
 
 from ranger_sim.datatable.generated import all_variables
-from ranger_sim.datatable.generated import errors as error_table
 from ranger_sim.datatable.packing import value_of_word
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness import wiring
+from ranger_sim.harness.names import meant
+from ranger_sim.harness.ranger_names import RANGER
 from ranger_sim.harness.waiting import (
     COMPARED,
+    NOTED,
     Comparison,
     Condition,
     ConditionNotMetError,
     Ended,
+    ErrorNoted,
     Function,
     Waiting,
     instant,
-    meant,
 )
 from ranger_sim.plant.ranger import SAMPLES
 
-__all__ = ["STATE_VARIABLES", "Condition", "ConditionNotMetError", "ErrorNoted", "Waiting", "condition", "errors_of"]
+__all__ = ["STATE_VARIABLES", "Condition", "ConditionNotMetError", "ErrorNoted", "Waiting", "condition"]
 
 # machine: variable of its state in the main brain's table
 STATE_VARIABLES = {
@@ -123,45 +125,6 @@ class Quantity(Comparison):
         return all_variables.UNITS[self.variable] if self.variable is not None else Comparison.unit(self)
 
 
-class ErrorNoted(Condition):
-    """A board notes an error; `board` None: any board."""
-
-    def __init__(self, text: str, error: str, board: str | None) -> None:
-        Condition.__init__(self, text)
-        codes = {name: code for code, name in error_table.NAMES.items()}
-        if error not in codes:
-            raise UserError(f"condition {text!r}: the table has no error {error!r}{meant(error, codes)}")
-        if board is not None and board not in wiring.BOARDS:
-            raise UserError(f"condition {text!r}: board {board!r} is none of {', '.join(wiring.BOARDS)}")
-        self.code = codes[error]
-        self.error = error
-        self.boards = (board,) if board is not None else wiring.BOARDS
-        self.before: list[int] = []  # by board
-
-    def begin(self, robot: Any) -> None:
-        Condition.begin(self, robot)
-        self.before = self.counts()
-
-    def counts(self) -> list[int]:
-        """How often each of these boards noted it since its power-up."""
-        return [int(errors_of(self.robot.loop.board(name))[self.code]) for name in self.boards]
-
-    def met(self) -> bool:
-        now = self.counts()
-        noted = any(count > before for count, before in zip(now, self.before, strict=True))
-        self.before = [min(pair) for pair in zip(now, self.before, strict=True)]  # a board that begins anew counts anew
-        return noted
-
-    def nearest(self) -> str:
-        return f"{', '.join(self.boards)} noted no {self.error}"
-
-
-def errors_of(board: Any) -> Any:
-    """How often `board` noted each error, by number; also of a board in another process."""
-    module = getattr(board, "errors", None)
-    return module.totals if module is not None else board.counters().errors
-
-
 def condition(wanted: str | Condition | Callable[[Any], Any]) -> Condition:
     """The condition that is written in `wanted`, or is it already. UserError for a text that is none."""
     if isinstance(wanted, Condition):
@@ -175,8 +138,8 @@ def condition(wanted: str | Condition | Callable[[Any], Any]) -> Condition:
         return Step(text, int(match.group(1)))
     if match := re.fullmatch(r"(\w+) in (\w+)", text):
         return State(text, match.group(1), match.group(2))
-    if match := re.fullmatch(r"error (\w+)(?: from (\w+))?", text):
-        return ErrorNoted(text, match.group(1), match.group(2))
+    if match := re.fullmatch(NOTED, text):
+        return ErrorNoted(text, match.group(1), match.group(2), RANGER, wiring.BOARDS)
     if match := re.fullmatch(COMPARED, text):
         return Quantity(text, match.group(1), match.group(2), float(match.group(3)))
     if (at := instant(text)) is not None:

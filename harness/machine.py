@@ -11,7 +11,7 @@
 examples/servo is a whole one.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 from ranger_sim.can_bus.bus import Bus
@@ -20,7 +20,12 @@ from ranger_sim.foundation.events import NEVER, STAGE_BUS
 from ranger_sim.foundation.quantities import duration_text, nanoseconds
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness import lockstep, waiting
+from ranger_sim.harness.faults import network_places
+from ranger_sim.harness.faults.catalogue import Catalogue
+from ranger_sim.harness.faults.error_rows import ErrorRows, StateWord
+from ranger_sim.harness.faults.fault import Fault, Place
 from ranger_sim.harness.logbook import Logbook
+from ranger_sim.harness.names import Names
 from ranger_sim.harness.recorder import Recorder
 from ranger_sim.harness.sampler import Sampler
 from ranger_sim.harness.stop_rule import StopRule
@@ -36,7 +41,8 @@ class Machine:
     boards: {name: Board}, in the order in which they run and are sorted within an instant. buses: {name: bit/s}, with
     names can1, can2, ...; seed: of crystals, noise and faults, as far as the parts take it from here; log: "none",
     "window" (the last seconds in memory) or "full" (on disk), what `logbook` has of frames and samples.
-    words: (how many, board): the memory of a board that the log keeps as well.
+    words: (how many, board): the memory of a board that the log keeps as well. names: of frames and errors, as
+    `Names.of(load_table(folder))` has them; without, frames have numbers alone. places: where faults can sit.
     """
 
     backend = "sim"  # what it runs on; harness/testing/backends.py has the others
@@ -51,6 +57,8 @@ class Machine:
         seed: int = 0,
         log: str = "none",
         words: tuple[int, Any] = (0, None),
+        names: Names | None = None,
+        places: Iterable[Place] = (),
     ) -> None:
         self.plant = plant
         self.boards: dict[str, Any] = dict(boards)
@@ -81,6 +89,12 @@ class Machine:
         self.polled: list[Any] = []  # ends of wires that lead out of the simulation
         self.poll_due: list[int] = []  # when each of them asked to be looked at next, ns
         self.next_poll_ns = self.start_ns
+        self.names = names if names is not None else Names()
+        self.catalogue = Catalogue(
+            [*places, *network_places.controllers(wiring.can), *network_places.buses(len(buses))], self.condition
+        )
+        self.slot_views: dict[str, Any] = {}  # of boards whose slots are recorded
+        self.observed: Any = None  # what harness.testing keeps beside it: the last frames, what was measured
         self.cpu_s = 0.0
         self.wall_s = 0.0
         self.ended = ""
@@ -160,7 +174,7 @@ class Machine:
 
     def condition(self, wanted: Wanted) -> Condition:
         """The condition that is written in `wanted` (harness/waiting.py)."""
-        return waiting.condition(wanted, self.plant.sample_names)
+        return waiting.condition(wanted, self.plant.sample_names, self.names, tuple(self.boards))
 
     def until(self, wanted: Wanted, within: str = "60 s") -> float:
         """Pass time until a condition holds; returns the virtual time since power-up, s.
@@ -184,7 +198,11 @@ class Machine:
             raise ConditionNotMetError(f"{waited.wanted.text}: {why} {passed}; {waited.wanted.nearest()}")
         return self.time_s
 
-    end_word = "the machine stopped"
+    end_word, end_name = "the machine stopped", "its end"
+
+    def whereabouts(self) -> str:
+        """How far it came, beside the time, as the end of a message; empty where time says all."""
+        return ""
 
     @property
     def time_s(self) -> float:
@@ -243,14 +261,53 @@ class Machine:
         """What every board counted, by its name; also of a board that runs in another process."""
         return {name: self.loop.board(name).counters() for name in self.boards}
 
-    def inject(
-        self, place: Any, mode: Any, at: Wanted | None = None, until: Wanted | None = None, **parameters: Any
-    ) -> Any:
-        """Arm a fault: `mode`, a class of faults, at a `Place` (harness/faults/fault.py), from the condition `at` on
-        (None: at once) `until` another one or for a length, as "+50 ms" (None: it stays). UserError for a parameter or
-        a value that the mode does not take. The Fault that is returned tells what became of it.
+    def slots(self, board: Any) -> Any:
+        """The slots of a board from now on, or from the first time on that they were asked for: a
+        `harness.timing.machine_slots.MachineSlots`.
         """
-        return self.arm(mode.asked(place, at, until, parameters, self.condition))
+        if board not in self.slot_views:
+            from ranger_sim.harness.timing.machine_slots import slot_view  # numpy: only where slots are looked at
+
+            self.slot_views[board] = slot_view(self, board)
+        return self.slot_views[board]
+
+    def wire(self, bus: str = "can1", since_s: float = 0.0) -> Any:
+        """Frames on a bus, their periods and latencies, as assertions: a `harness.testing.wire.Wire`.
+
+        Frames are kept from the first call on, or from power-up in a machine that harness.testing made.
+        """
+        from ranger_sim.harness.testing.wire import wire_of
+
+        return wire_of(self, bus, since_s)
+
+    def inject(
+        self,
+        place: str | Place,
+        mode: str | type[Fault],
+        at: Wanted | None = None,
+        until: Wanted | None = None,
+        proof: bool = False,
+        **parameters: Any,
+    ) -> Fault:
+        """Arm a fault: `mode` at `place` from the condition `at` on (None: at once) `until` another one or for a
+        length, as "+50 ms" (None: it stays). UserError for a place, mode, parameter or value that there is not. The
+        Fault tells what became of it: `acted`, the stamps, the largest difference at its place.
+
+        Both are names of the machine's catalogue, or a `Place` and a class of faults (harness/faults/fault.py).
+
+        proof: it can also be asked for `detected`, `detection_ms`, `reaction` and the rest of its `proof()`: a forked
+        process is the machine without it, both are recorded from now on (2 MB a second each of Ranger), until `close`.
+        """
+        if isinstance(mode, str):
+            fault = self.catalogue.fault(place, mode, at, until, parameters)
+        else:
+            where = self.catalogue.find(place) if isinstance(place, str) else place
+            fault = mode.asked(where, at, until, parameters, self.condition)
+        if proof:
+            from ranger_sim.harness.faults.twin import Twin
+
+            fault.twin = Twin(self)
+        return self.arm(fault)
 
     def arm(self, fault: Any) -> Any:
         """Arm a fault (harness/faults/fault.py)."""
@@ -258,13 +315,28 @@ class Machine:
         self.faults.append(fault)
         return fault
 
+    def machines(self) -> dict[str, StateWord]:
+        """The state machines of the board whose memory the log keeps, by name."""
+        return {}
+
+    def fell_ns(self) -> int:
+        """When the plant could go no further, ns; -1: it can."""
+        return int(self.loop.time) if self.plant.fell else -1
+
+    def error_watch(self) -> Any:
+        """What sees which error each board notes, and when, from now on: a StepWatch with `rows`."""
+        return ErrorRows(self.loop.boards, max(self.names.errors, default=-1) + 1)
+
     def trace_digest(self) -> str:
         """BLAKE2b-256 of the canonical trace so far."""
         digest: str = self.recorder.trace_digest()
         return digest
 
     def close(self) -> None:
-        """Give back the log's files and the ends that lead outside."""
+        """Give back the log's files, the ends that lead outside, and the golden runs of faults."""
         self.logbook.close()
         for end in self.polled:
             end.close()
+        for fault in self.faults:
+            if fault.twin is not None:
+                fault.twin.close()

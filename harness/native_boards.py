@@ -1,10 +1,8 @@
 """Boards of the robot that can have firmware in C: what hangs on their chips, and compiling it with the table."""
 
-import dataclasses
 import functools
 import os
 import pathlib
-import re
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
@@ -12,10 +10,11 @@ from ranger_sim.boards import ankle_board, hip, motor_board, steering
 from ranger_sim.datatable import generated
 from ranger_sim.datatable.generated import mcfi, mcfo, mch, mcsi
 from ranger_sim.firmware_sim.native import build as compiling
-from ranger_sim.firmware_sim.native import manifest as manifests
 from ranger_sim.firmware_sim.native.hardware import ExternalConverter, Hardware, InternalConverter
 from ranger_sim.firmware_sim.peripherals.adc_external import CONVERSION_NS as FASTEST_CONVERSION_NS
 from ranger_sim.foundation.user_error import UserError
+from ranger_sim.harness import native_firmware
+from ranger_sim.harness.native_firmware import Firmware
 
 BATTERY_VOLTAGE_CHANNEL = 1  # AIN1, P0.28
 
@@ -50,32 +49,9 @@ def hardware_of(board: str) -> Hardware:
     )
 
 
-@dataclasses.dataclass(frozen=True)
-class Firmware:
-    """A folder of firmware, built. `warnings` of the compiler; `sanitize`, `coverage`: how it was built."""
-
-    folder: pathlib.Path
-    library: pathlib.Path
-    manifest: manifests.Manifest
-    warnings: tuple[str, ...] = ()
-    was_made: bool = True
-    sanitize: bool = False
-    coverage: bool = False
-
-
 def build(folder: str | pathlib.Path, sanitize: bool = False, coverage: bool = False) -> Firmware:
     """Compile a folder of firmware, with the generated C of the tables that it names, unless it is up to date."""
-    manifest = manifests.load(folder)
-    place = generated_c()
-    sources = []
-    for table in manifest.tables:
-        source = place / f"{table.lower()}_table.c"
-        if not source.is_file():
-            there = ", ".join(sorted(each.name.removesuffix("_table.c") for each in place.glob("*_table.c")))
-            raise UserError(f"{manifest.folder}: firmware.tables: no board {table!r}; there are {there}")
-        sources.append(source)
-    built = compiling.build(manifest, sanitize, coverage, compiling.Addition((place,), tuple(sources)))
-    return Firmware(manifest.folder, built.path, manifest, built.warnings, built.was_made, sanitize, coverage)
+    return native_firmware.build(folder, generated_c(), sanitize, coverage)
 
 
 def built(wanted: Mapping[str, Firmware | str | os.PathLike]) -> dict[str, Firmware]:
@@ -99,11 +75,7 @@ def generated_c() -> pathlib.Path:
 @functools.cache
 def table_version() -> int:
     """RANGER_TABLE_VERSION of the table that this robot has."""
-    text = (generated_c() / "ranger_table.h").read_text(encoding="utf-8")
-    found = re.search(r"#define RANGER_TABLE_VERSION 0x([0-9A-F]{8})u", text)
-    if found is None:
-        raise UserError(f"{generated_c() / 'ranger_table.h'}: no version; `ranger-sim table generate` writes it")
-    return int(found[1], 16)
+    return native_firmware.table_version(generated_c())
 
 
 def placed(text: str) -> tuple[str, str]:

@@ -27,18 +27,20 @@ from ranger_sim.firmware_sim.clock import seeded_crystal
 from ranger_sim.foundation.random_stream import RandomStream
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness import bus_schedule, native_boards, wiring
-from ranger_sim.harness.conditions import Condition, condition
-from ranger_sim.harness.faults import catalogue
-from ranger_sim.harness.faults.fault import Fault
+from ranger_sim.harness.conditions import STATE_VARIABLES, Condition, condition
+from ranger_sim.harness.faults.error_rows import StateWord
+from ranger_sim.harness.faults.error_watch import ErrorWatch
+from ranger_sim.harness.faults.ranger_catalogue import CATALOGUE
 from ranger_sim.harness.fresh_board import first_outputs, pass_on
 from ranger_sim.harness.imu_wire import ImuWire
 from ranger_sim.harness.machine import Machine
-from ranger_sim.harness.native_boards import Firmware
+from ranger_sim.harness.native_firmware import Firmware
 from ranger_sim.harness.operator import Operator
 from ranger_sim.harness.profile import Profile
+from ranger_sim.harness.ranger_names import RANGER
 from ranger_sim.harness.scenario import Scenario, StopRule
 from ranger_sim.harness.strike_watch import StrikeWatch
-from ranger_sim.harness.timing.robot_slots import RobotSlots, slot_view
+from ranger_sim.harness.timing.machine_slots import MachineSlots
 from ranger_sim.harness.waiting import Wanted
 from ranger_sim.plant import body_files
 from ranger_sim.plant.ranger import RangerPlant
@@ -63,7 +65,10 @@ BOARD_CLASSES: dict[str, Any] = {
 class Ranger(Machine):
     """One robot in one scenario. Same scenario, same bytes. Close it when done (or use contextlib.closing)."""
 
-    end_word = "the robot fell"
+    end_word, end_name = "the robot fell", "a fall"
+
+    def whereabouts(self) -> str:
+        return f", in step {self.steps}"
 
     def __init__(
         self,
@@ -109,6 +114,7 @@ class Ranger(Machine):
             seed,
             log,
             (all_variables.TABLE_SIZE, boards["MB"]),
+            RANGER,
         )
         for name, messages in said.items():
             pass_on(messages, self.boards[name].outbox, self.start_ns)
@@ -116,8 +122,7 @@ class Ranger(Machine):
             for board in self.boards.values():
                 bus_schedule.apply(board, profile.schedules())
         self.operator = Operator(self.controller.operator, self.plant, self.boards["UI"], self.start_ns, seed)
-        self.slot_views: dict[str, RobotSlots] = {}  # of boards whose slots are recorded
-        self.observed: Any = None  # what harness.testing keeps beside it: the last frames, what was measured
+        self.catalogue = CATALOGUE
 
     def _stream(self, board: str) -> tuple[Any, int]:
         """(crystal, power-up instant after the robot's in ns) of a board, drawn from the scenario's seed."""
@@ -156,30 +161,6 @@ class Ranger(Machine):
     def condition(self, wanted: Wanted) -> Condition:
         """The condition that is written in `wanted` (harness/conditions.py)."""
         return condition(wanted)
-
-    def inject(
-        self,
-        place: str,
-        mode: str,
-        at: str | Condition | Callable[[Any], Any] | None = None,
-        until: str | Condition | Callable[[Any], Any] | None = None,
-        proof: bool = False,
-        **parameters: float,
-    ) -> Fault:
-        """Arm a fault: `mode` at `place` from the condition `at` on (None: at once) `until` another one (None: stays).
-
-        `ranger-sim faults` lists places, modes and parameters. UserError for what is not in that list. The Fault
-        tells what became of it: `acted`, the stamps, the largest difference at its place.
-
-        proof: it can also be asked for `detected`, `detection_ms`, `reaction` and the rest of its `proof()`: a forked
-        process is the robot without it, both are recorded from now on (2 MB a second each), until `close`.
-        """
-        fault = catalogue.fault(place, mode, at, until, parameters)
-        if proof:
-            from ranger_sim.harness.faults.twin import Twin
-
-            fault.twin = Twin(self)
-        return self.arm(fault)
 
     @property
     def walked_s(self) -> float:
@@ -264,20 +245,10 @@ class Ranger(Machine):
         """Put your own function in a schedule entry; it declares its cost in cycles."""
         Machine.replace(self, board, task, function, cost, limit)
 
-    def slots(self, board: BoardName) -> RobotSlots:
+    def slots(self, board: BoardName) -> MachineSlots:
         """The slots of a board from now on, or from the first time on that they were asked for (harness/timing)."""
-        if board not in self.slot_views:
-            self.slot_views[board] = slot_view(self, board)
-        return self.slot_views[board]
-
-    def wire(self, bus: str = "can1", since_s: float = 0.0) -> Any:
-        """Frames on a bus, their periods and latencies, as assertions: a `harness.testing.wire.Wire`.
-
-        Frames are kept from the first call on, or from power-up in a robot that harness.testing made.
-        """
-        from ranger_sim.harness.testing.wire import wire_of
-
-        return wire_of(self, bus, since_s)
+        view: MachineSlots = Machine.slots(self, board)
+        return view
 
     def recorded(self) -> Any:
         """What the log kept, as arrays: a `harness.recorded.Recorded`."""
@@ -287,14 +258,24 @@ class Ranger(Machine):
 
     def error_meaning(self, name: str) -> str:
         """What an error code means, in the words of the master table."""
-        return next((row.description for row in datatable.load().errors if row.name == name), "")
+        return self.names.descriptions.get(self.names.codes.get(name, -1), "")
 
-    def close(self) -> None:
-        """Give back the log's files and the ends that lead outside."""
-        Machine.close(self)
-        for fault in self.faults:
-            if fault.twin is not None:
-                fault.twin.close()
+    def machines(self) -> dict[str, StateWord]:
+        """The main brain's machines."""
+        modes = self.boards["MB"].modes
+        return {
+            machine: StateWord(
+                all_variables.ID_OF[variable],
+                {state.number: state.name for state in getattr(modes, machine).machine.states},
+            )
+            for machine, variable in STATE_VARIABLES.items()
+        }
+
+    def fell_ns(self) -> int:
+        return int(self.plant.record.fall_time_ns) if self.plant.fell else -1
+
+    def error_watch(self) -> Any:
+        return ErrorWatch(self.loop.boards, max(self.names.errors) + 1)
 
     def summary(self) -> dict:
         """The walk in numbers: what `--json` prints."""

@@ -1,13 +1,12 @@
 """The walk in numbers."""
 
 import math
-from collections.abc import Mapping
 from typing import Any
 
 from ranger_sim import loading
 from ranger_sim.boards.counters import RangerCounters
 from ranger_sim.datatable.generated import errors as error_table
-from ranger_sim.harness import wiring
+from ranger_sim.harness.vital_signs import alive, can
 
 JOULES_PER_WH = 3600.0
 SKIPPED_STEPS = 5  # the start is left out of means
@@ -137,26 +136,6 @@ def oddities(plant: Any) -> dict:
     }
 
 
-def can(robot: Any, bus: Any, counters: Mapping[str, RangerCounters]) -> dict:
-    """Traffic of one bus; loads as fractions 0-1 with stuff bits and intermission.
-
-    lost: frames accepted for sending that a listening node did not get, on the wire or in its receive buffers.
-    queue_full: frames that a full transmit ring of a board or of the router did not accept.
-    """
-    now = robot.loop.time
-    wired = {(wire.board, wire.controller) for wire in wiring.CAN if f"can{wire.bus}" == bus.name}
-    ends = [each for name, board in counters.items() for each in board.can if (name, each.controller) in wired]
-    return {
-        "frames": bus.counters.frames,
-        "load_mean": bus.load_mean(now),
-        "load_max": bus.load.largest(),
-        "lost": bus.counters.lost + sum(end.data_overruns + end.receive_lost for end in ends),
-        "queue_full": sum(end.queue_full for end in ends),
-        "single_shot_skipped": bus.counters.single_shot_skipped + sum(end.skipped for end in ends),
-        "errors": bus.counters.errors,
-    }
-
-
 def slots(counters: RangerCounters) -> dict:
     """How one board kept its slots; interrupts included."""
     kept = counters.slots
@@ -171,9 +150,3 @@ def slots(counters: RangerCounters) -> dict:
 def errors(counters: RangerCounters) -> dict:
     """Errors the board itself noted, by name."""
     return {name: counters.errors[code] for code, name in error_table.NAMES.items() if counters.errors[code]}
-
-
-def alive(robot: Any, counters: RangerCounters) -> bool:
-    """True when the board finished a slot's work lately: a program that hangs has slots that begin, and no others."""
-    silent_ns = robot.loop.time - counters.slots.finished_ns
-    return robot.loop.time - robot.start_ns < 20_000_000 or silent_ns < 20 * counters.slots.slot_ns

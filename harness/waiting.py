@@ -1,18 +1,18 @@
 """Waiting for something in a machine: a condition is looked at between two steps of its plant.
 
-What any machine can be asked for stands here: an instant ("12.3 s"), a quantity of its body ("angle_rad > 0.5"), its
-end, a function. Ranger's own are in harness/conditions.py.
+What any machine can be asked for stands here: an instant ("12.3 s"), a quantity of its body ("angle_rad > 0.5"), an
+error that a board notes ("error FOLLOWING from CONTROL"), its end, a function. Ranger's own: harness/conditions.py.
 """
 
 import array
-import difflib
 import operator
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from ranger_sim.foundation.quantities import NUMBER, TIMES, duration_text, in_base_units
 from ranger_sim.foundation.user_error import UserError
+from ranger_sim.harness.names import Names, meant
 from ranger_sim.harness.step_watch import StepWatch
 
 COMPARISONS: dict[str, Callable[[Any, Any], bool]] = {
@@ -23,6 +23,7 @@ COMPARISONS: dict[str, Callable[[Any, Any], bool]] = {
     "<": operator.lt,
     ">": operator.gt,
 }
+NOTED = r"error (\w+)(?: from (\w+))?"
 COMPARED = rf"(\w+) ?(<=|>=|==|!=|<|>) ?({NUMBER})"
 
 
@@ -113,6 +114,44 @@ class Comparison(Condition):
         return f"the nearest value of {self.name} was {self.closest:.6g} {self.unit()}".rstrip()
 
 
+class ErrorNoted(Condition):
+    """One of `boards` notes an error of `names`; `board` None: any of them."""
+
+    def __init__(self, text: str, error: str, board: str | None, names: Names, boards: Sequence[str]) -> None:
+        Condition.__init__(self, text)
+        if error not in names.codes:
+            raise UserError(f"condition {text!r}: the table has no error {error!r}{meant(error, names.codes)}")
+        if board is not None and board not in boards:
+            raise UserError(f"condition {text!r}: board {board!r} is none of {', '.join(boards)}")
+        self.code = names.codes[error]
+        self.error = error
+        self.boards = (board,) if board is not None else tuple(boards)
+        self.before: list[int] = []  # by board
+
+    def begin(self, robot: Any) -> None:
+        Condition.begin(self, robot)
+        self.before = self.counts()
+
+    def counts(self) -> list[int]:
+        """How often each of these boards noted it since its power-up."""
+        return [self.count_of(self.robot.loop.board(name)) for name in self.boards]
+
+    def count_of(self, board: Any) -> int:
+        """The same of a board, also of one in another process."""
+        module = getattr(board, "errors", None)
+        totals = module.totals if module is not None else board.counters().errors
+        return int(totals[self.code]) if self.code < len(totals) else 0
+
+    def met(self) -> bool:
+        now = self.counts()
+        noted = any(count > before for count, before in zip(now, self.before, strict=True))
+        self.before = [min(pair) for pair in zip(now, self.before, strict=True)]  # a board that begins anew counts anew
+        return noted
+
+    def nearest(self) -> str:
+        return f"{', '.join(self.boards)} noted no {self.error}"
+
+
 class Function(Condition):
     """A function of the robot."""
 
@@ -133,14 +172,12 @@ def instant(text: str) -> At | None:
     return At(text, round(seconds * 1e9)) if seconds is not None and seconds >= 0.0 else None
 
 
-def meant(name: str, known: Any) -> str:
-    """What a wrong name may have been, as the end of a message."""
-    near = difflib.get_close_matches(name, known, 3)
-    return f"; meant was perhaps {' or '.join(near)}" if near else ""
-
-
-def condition(wanted: Wanted, quantities: Mapping[str, str]) -> Condition:
-    """The condition that is written in `wanted`, or is it already, for a machine whose plant samples `quantities`."""
+def condition(
+    wanted: Wanted, quantities: Mapping[str, str], names: Names | None = None, boards: Sequence[str] = ()
+) -> Condition:
+    """The condition that is written in `wanted`, or is it already, for a machine of these `boards` whose plant samples
+    `quantities` and whose table has `names`.
+    """
     if isinstance(wanted, Condition):
         return wanted
     if callable(wanted):
@@ -156,10 +193,13 @@ def condition(wanted: Wanted, quantities: Mapping[str, str]) -> Condition:
                 f"condition {text!r}: {name!r} is no quantity of the body, but {told}{meant(name, quantities)}"
             )
         return Comparison(text, name, sign, float(value), quantities)
+    if match := re.fullmatch(NOTED, text):
+        return ErrorNoted(text, match.group(1), match.group(2), names if names is not None else Names(), boards)
     at = instant(text)
     if at is None:
         example = next(iter(quantities), "angle_rad")
-        raise UserError(f"condition {wanted!r}: it reads like 12.3 s, {example} > 0.3, or ended")
+        error = f", error {next(iter(names.codes))}" if names is not None and names.codes else ""
+        raise UserError(f"condition {wanted!r}: it reads like 12.3 s, {example} > 0.3{error}, or ended")
     return at
 
 

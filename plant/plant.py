@@ -29,6 +29,8 @@ class Plant:
 
     Towards the harness: `sample_names`, {name: unit} of what `fill_sample` writes; `fell`: it can go no further, with
     the reason in `fall_cause`; `steps` and `distance_m`, for machines that walk.
+
+    Towards faults, for those that a machine's places take: `encoder_rad`, `analog_line`, `analog_value`.
     """
 
     def __init__(self, step_ns, start_ns=0, voltages=0, words=0, samples=None) -> None:
@@ -47,6 +49,18 @@ class Plant:
 
     def step(self) -> None:
         """Integrate over [time_ns, time_ns + step_ns], then show it: time_ns, edges, voltages, words."""
+        raise NotImplementedError
+
+    def encoder_rad(self, number) -> float:
+        """The angle (rad) that encoder `number` measures now."""
+        raise NotImplementedError
+
+    def analog_line(self, number) -> tuple[float, float, float]:
+        """(V at 0, V per unit, standard deviation of its noise in V) of the sensor behind voltage `number`."""
+        raise NotImplementedError
+
+    def analog_value(self, number) -> float:
+        """What that sensor measures now, in its unit."""
         raise NotImplementedError
 
     def fill_sample(self, row: cython.double[::1]) -> object:

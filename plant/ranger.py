@@ -329,6 +329,30 @@ class RangerPlant(Plant):
 
     # ---- looking from outside ---------------------------------------------------------------------------------
 
+    def encoder_rad(self, number) -> float:
+        """Of a joint, or of what its motor's shaft shows of it."""
+        body = self.body
+        if self.encoders[number] in (self.hip_joint, self.hip_motor):
+            return body.outer.angle - body.inner.angle
+        leg = body.outer if self.encoders[number] in (self.outer_motor, self.outer_joint) else body.inner
+        if self.encoders[number] in (self.outer_motor, self.inner_motor):
+            return leg.motor_angle + self.zero
+        return leg.foot_angle - leg.angle + self.zero
+
+    def word_rad(self, number) -> float:
+        """The angle (rad) that absolute encoder `number` measures now."""
+        if number == HIP_WORD:
+            return self.body.outer.angle - self.body.inner.angle
+        leg = self.body.outer if number == OUTER_ANKLE_WORD else self.body.inner
+        return leg.foot_angle - leg.angle + self.zero
+
+    def analog_line(self, number) -> tuple[float, float, float]:
+        electrics = self.electrics
+        return electrics.zero_V[number], electrics.slope_V[number], electrics.noise_V[number]
+
+    def analog_value(self, number) -> float:
+        return self.electrics.values[number]
+
     def fill_sample(self, row: cython.double[::1]) -> object:
         """Write the values named in SAMPLES."""
         b: Body = self.body

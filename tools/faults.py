@@ -12,8 +12,9 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from ranger_sim.harness.faults import catalogue
+from ranger_sim.harness.faults.catalogue import MODES
 from ranger_sim.harness.faults.fault import Fault, Parameter, Place
+from ranger_sim.harness.faults.ranger_catalogue import CATALOGUE
 from ranger_sim.tools import terminal
 from ranger_sim.tools.options import Option
 from ranger_sim.tools.units import word
@@ -56,17 +57,17 @@ def register(commands: Any) -> None:
 
 def load_modules(options: argparse.Namespace) -> None:
     """Fill the catalogue, with the user's modules."""
-    catalogue.load()
+    CATALOGUE.load()
     for name in options.fault_module:
-        catalogue.load_file(name)
+        CATALOGUE.load_file(name)
 
 
 def run(options: argparse.Namespace) -> int:
     """Print the catalogue, or one place of it."""
     load_modules(options)
-    places = list(catalogue.PLACES.values())
+    places = list(CATALOGUE.places.values())
     if options.place is not None:
-        places = [catalogue.find(options.place)]
+        places = [CATALOGUE.find(options.place)]
     if options.json:
         print(json.dumps([place_json(place) for place in places], indent=2))
         return 0
@@ -76,7 +77,7 @@ def run(options: argparse.Namespace) -> int:
         table.add_column("place", no_wrap=True)
         table.add_column("what it is, and the modes that it takes", overflow="fold")
         for place in places:
-            table.add_row(place.name, f"{place.what}\n{', '.join(catalogue.modes_of(place))}")
+            table.add_row(place.name, f"{place.what}\n{', '.join(CATALOGUE.modes_of(place))}")
         console.print(table)
         console.print("\nranger-sim faults PLACE tells what they do, and their parameters", soft_wrap=True)
         return 0
@@ -92,7 +93,7 @@ def print_place(place: Place, console: Console) -> None:
 
     tell(f"{place.name}: {place.what}")
     sources: dict[str, list[str]] = {}
-    for name, kind in catalogue.modes_of(place).items():
+    for name, kind in CATALOGUE.modes_of(place).items():
         tell(f"\n{name:20}{kind.meaning}")
         if kind.permanent:
             tell(f"{'':20}stays until: {kind.permanent}")
@@ -100,7 +101,7 @@ def print_place(place: Place, console: Console) -> None:
             unit = "" if p.unit in ("1", "name") else f" {p.unit}"
             tell(f"    {p.name:16}{default_text(p)}{unit} ({limits_text(p)}): {p.meaning}")
             sources.setdefault(p.source, []).append(f"{name} {p.name}")
-    units = sorted({kind.unit for kind in catalogue.modes_of(place).values() if kind.unit})
+    units = sorted({kind.unit for kind in CATALOGUE.modes_of(place).values() if kind.unit})
     tell(f"\nThe difference at the place is told in {' or '.join(units)}. Where the numbers come from:")
     for source, parameters in sources.items():
         tell(f"    {', '.join(parameters)}: {source}")
@@ -112,8 +113,8 @@ def print_place(place: Place, console: Console) -> None:
 
 def refused(place: Place) -> dict[str, str]:
     """Modes that other places take and this one does not, with the reason."""
-    names = sorted({name for _, name in catalogue.MODES})
-    return {name: reason for name in names if (reason := catalogue.refusal(place, name))}
+    names = sorted({name for _, name in MODES})
+    return {name: reason for name in names if (reason := CATALOGUE.refusal(place, name))}
 
 
 def default_text(parameter: Parameter) -> str:
@@ -134,7 +135,7 @@ def place_json(place: Place) -> dict[str, Any]:
         "place": place.name,
         "kind": place.kind,
         "what": place.what,
-        "modes": [mode_json(name, kind) for name, kind in catalogue.modes_of(place).items()],
+        "modes": [mode_json(name, kind) for name, kind in CATALOGUE.modes_of(place).items()],
         "refused": refused(place),
     }
 
@@ -212,20 +213,20 @@ def proof_text(proof: dict | None) -> str:
 
 def markdown() -> str:
     """The tables of docs/faults.md: kinds of places, their modes and parameters."""
-    catalogue.load()
+    CATALOGUE.load()
     kinds: dict[str, list[Place]] = {}
-    for place in catalogue.PLACES.values():
+    for place in CATALOGUE.places.values():
         kinds.setdefault(place.kind, []).append(place)
     return "\n".join(line for kind, places in kinds.items() for line in kind_lines(kind, places))
 
 
 def kind_lines(kind: str, places: list[Place]) -> list[str]:
     """One kind of place: where, what it takes."""
-    unit = next((mode.unit for mode in catalogue.modes_of(places[0]).values() if mode.unit), "")
+    unit = next((mode.unit for mode in CATALOGUE.modes_of(places[0]).values() if mode.unit), "")
     lines = [f"### {kind}{f', in {unit}' if unit else ''}", ""]
     lines += [f"{', '.join(f'`{place.name}`' for place in places)}", ""]
     lines += ["| mode | what it does | parameters: default (limits) |", "|---|---|---|"]
-    for name, mode in catalogue.modes_of(places[0]).items():
+    for name, mode in CATALOGUE.modes_of(places[0]).items():
         parameters = "; ".join(
             f"`{p.name}` {default_text(p)} ({limits_text(p)}{f' {p.unit}' if p.unit not in ('1', 'name') else ''})"
             for p in mode.parameters

@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 
 from ranger_sim.harness import normal_errors
+from ranger_sim.harness.ranger_names import RANGER
 
 HEALTHY = (
     "On its feet; no board dead, no frame lost or refused, no slot overrun, every strike noticed; a floor that only "
@@ -73,7 +74,7 @@ def boards(summary: dict) -> Iterator[str]:
 
 def errors(counts: dict, time_s: float) -> Iterator[str]:
     """Errors that boards noted beyond those of a healthy walk of so long a time."""
-    for board, names in normal_errors.beyond(counts, time_s).items():
+    for board, names in normal_errors.beyond(RANGER, counts, time_s).items():
         yield f"errors of {board}: " + ", ".join(f"{name} x {count}" for name, count in names.items())
 
 

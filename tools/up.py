@@ -19,7 +19,7 @@ from ranger_sim.foundation.peers import told
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness import wiring
 from ranger_sim.harness.conditions import ErrorNoted
-from ranger_sim.harness.faults import catalogue
+from ranger_sim.harness.faults.ranger_catalogue import CATALOGUE
 from ranger_sim.harness.processes import control, places
 from ranger_sim.harness.processes.hardware import HardwareInTheLoop
 from ranger_sim.harness.processes.lateness import figures
@@ -199,7 +199,7 @@ def run(options: argparse.Namespace) -> int:
         return run_sanitized(options, folders_of(options))
     trace.check(options)
     faults.load_modules(options)
-    wanted = [catalogue.typed(text) for text in options.fault]
+    wanted = [CATALOGUE.typed(text) for text in options.fault]
     settings = Settings(
         speed=options.speed,
         restart=options.restart,

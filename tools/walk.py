@@ -16,9 +16,11 @@ from ranger_sim import loading
 from ranger_sim.foundation import wallclock
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness import native_boards, normal_errors
-from ranger_sim.harness.faults import catalogue
+from ranger_sim.harness.faults.ranger_catalogue import CATALOGUE
+from ranger_sim.harness.native_firmware import Firmware
 from ranger_sim.harness.profile import Profile
 from ranger_sim.harness.profile import load as load_profile
+from ranger_sim.harness.ranger_names import RANGER
 from ranger_sim.harness.scenario import Scenario, StopRule
 from ranger_sim.plant import terms
 from ranger_sim.tools import faults, serial_options, terminal, trace, unexpected
@@ -104,7 +106,7 @@ def run_scenario(scenario: Scenario, stop: StopRule, options: argparse.Namespace
     if scenario.model_file is not None:
         for name in terms.load(scenario.model_file).left_out:
             console.print(f"{scenario.model_file}: {name} is left out", highlight=False, soft_wrap=True)
-    wanted = [catalogue.typed(text) for text in options.fault]
+    wanted = [CATALOGUE.typed(text) for text in options.fault]
     log = log_of(options)
     firmware = firmware_of(options, console)
     with contextlib.closing(Ranger(scenario, log, quirks, profile, firmware)) as robot:
@@ -135,7 +137,7 @@ def run_scenario(scenario: Scenario, stop: StopRule, options: argparse.Namespace
     return 1 if summary["fell"] or summary["failed_boards"] else 0
 
 
-def firmware_of(options: argparse.Namespace, console: Console) -> dict[str, native_boards.Firmware]:
+def firmware_of(options: argparse.Namespace, console: Console) -> dict[str, Firmware]:
     """The firmware in C that was asked for, by board, compiled."""
     wanted: dict[str, str] = {}
     for text in options.firmware:
@@ -316,7 +318,7 @@ def print_summary(summary: dict, floor_friction: float, console: Console) -> Non
 
 def usual_lines(errors: dict, time_s: float) -> list[str]:
     """How much of what boards noted was as in every healthy walk, in a line if there was any."""
-    unusual = normal_errors.beyond(errors, time_s)
+    unusual = normal_errors.beyond(RANGER, errors, time_s)
     usual = sum(map(len, errors.values())) - sum(map(len, unusual.values()))
     return [f"errors as in every healthy walk: {usual} kinds (report and summary have them)"] if usual else []
 

@@ -5,6 +5,7 @@ name = "hip"                 # of the library
 sources = ["*.c"]            # patterns, relative to this file
 include = ["."]              # folders of headers beside ours
 tables = ["mch"]             # generated C of these boards' data tables, compiled along
+master = "../table"          # folder of the master table that they are of; left out: Ranger's
 options = ["-O2"]            # more for the compiler, behind ours
 [defines]
 REZERO = 1                   # -DREZERO=1
@@ -38,6 +39,7 @@ class Manifest:
     sources: tuple[pathlib.Path, ...]
     include: tuple[pathlib.Path, ...]
     tables: tuple[str, ...]
+    master: pathlib.Path | None
     options: tuple[str, ...]
     defines: tuple[tuple[str, str], ...]
     hardware: Hardware | None
@@ -58,7 +60,7 @@ def load(folder: str | pathlib.Path) -> Manifest:
         raise UserError(f"{path}: {error.strerror}") from None
     _known(path, "", found, ("firmware", "defines", "hardware"))
     firmware = _table(path, found, "firmware")
-    _known(path, "firmware.", firmware, ("name", "sources", "include", "tables", "options"))
+    _known(path, "firmware.", firmware, ("name", "sources", "include", "tables", "master", "options"))
     name = firmware.get("name", folder.resolve().name)
     if not isinstance(name, str) or not re.fullmatch(r"[\w-]+", name):
         raise UserError(f"{path}: firmware.name {name!r}: letters, digits, _ and - are expected")
@@ -68,6 +70,7 @@ def load(folder: str | pathlib.Path) -> Manifest:
         sources=_sources(path, folder, _texts(path, firmware, "sources", ["*.c"])),
         include=tuple(_folder(path, folder, each) for each in _texts(path, firmware, "include", ["."])),
         tables=tuple(_texts(path, firmware, "tables", [])),
+        master=_master(path, folder, firmware),
         options=tuple(_texts(path, firmware, "options", [])),
         defines=_defines(path, _table(path, found, "defines")),
         hardware=_hardware(path, _table(path, found, "hardware")) if "hardware" in found else None,
@@ -110,6 +113,15 @@ def _sources(path: pathlib.Path, folder: pathlib.Path, patterns: list[str]) -> t
 def _folder(path: pathlib.Path, folder: pathlib.Path, name: str) -> pathlib.Path:
     if not (folder / name).is_dir():
         raise UserError(f"{path}: firmware.include: {name!r} is no folder in {folder}")
+    return folder / name
+
+
+def _master(path: pathlib.Path, folder: pathlib.Path, firmware: dict) -> pathlib.Path | None:
+    name = firmware.get("master")
+    if name is None:
+        return None
+    if not isinstance(name, str) or not (folder / name).is_dir():
+        raise UserError(f"{path}: firmware.master: {name!r} is no folder in {folder}")
     return folder / name
 
 

@@ -7,7 +7,7 @@ import array
 import pathlib
 from typing import Any
 
-from ranger_sim.firmware_sim.counters import BoardCounters, CanCounters
+from ranger_sim.firmware_sim.counters import CanCounters, ProgramCounters
 from ranger_sim.firmware_sim.microcontroller import Microcontroller
 from ranger_sim.firmware_sim.native import crash
 from ranger_sim.firmware_sim.native.hardware import Hardware
@@ -533,8 +533,13 @@ class NativeBoard(Microcontroller):
 
     def counters(self) -> object:
         """What the board counted, by name. Its program's own queues are not known."""
-        return BoardCounters(
-            hz=self.hz, unclaimed=self.unclaimed, slots=self.scheduler.counters(), can=self.can_counters()
+        return ProgramCounters(
+            hz=self.hz,
+            unclaimed=self.unclaimed,
+            slots=self.scheduler.counters(),
+            can=self.can_counters(),
+            time_ms=self.network_time_ms(),
+            errors=list(self.error_totals(self.error_counts.count if self.error_counts is not None else 0)),
         )
 
     def network_time_ms(self) -> int:

@@ -23,10 +23,10 @@ from ranger_sim.harness.branching import BranchError, branch, die_with
 from ranger_sim.harness.campaigns.cases import Case, Settings, version
 from ranger_sim.harness.campaigns.outcomes import Band, against_fallen, classify, deviation
 from ranger_sim.harness.conditions import condition
-from ranger_sim.harness.faults import catalogue
 from ranger_sim.harness.faults import text as typed_text
 from ranger_sim.harness.faults.evidence import Evidence, Record
 from ranger_sim.harness.faults.proof import Difference, Healthy, Proof, Reaction, damage, false_alarms, gait, prove
+from ranger_sim.harness.faults.ranger_catalogue import CATALOGUE
 from ranger_sim.harness.ranger import GRID_NS, Ranger
 from ranger_sim.harness.scenario import StopRule
 from ranger_sim.harness.step_watch import StepWatch
@@ -147,8 +147,8 @@ def run_group(request: dict[str, Any], emit: Callable[[Result], None]) -> None:
         raise UserError(f"campaign: this worker runs {version()}, asked for is {request['version']}")
     if request.get("fault_module"):
         name, digest = request["fault_module"]
-        catalogue.load()
-        catalogue.load_file(name)
+        CATALOGUE.load()
+        CATALOGUE.load_file(name)
         if digest_of(name) != digest:
             raise UserError(f"campaign: fault module {name}: it is not the file that was asked for")
     watch = Watch.from_dict(request["watch"])
@@ -195,7 +195,7 @@ def fault_run(
 ) -> Result:
     """In the branch: inject, walk on, and hold the record against the golden one."""
     try:
-        fault = robot.arm(catalogue.typed(text))
+        fault = robot.arm(CATALOGUE.typed(text))
     except UserError as refused:
         return {"outcome": "invalid", "why": f"refused: {refused}"}
     start_ns = golden.starts[start_of(text)]

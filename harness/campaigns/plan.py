@@ -21,7 +21,7 @@ from ranger_sim.harness.campaigns.group import Watch, digest_of, rounded, start_
 from ranger_sim.harness.campaigns.outcomes import OUTCOMES, Band, severity
 from ranger_sim.harness.campaigns.statistics import CONFIDENCE, INTERVALS, Stopping
 from ranger_sim.harness.conditions import condition
-from ranger_sim.harness.faults import catalogue
+from ranger_sim.harness.faults.ranger_catalogue import CATALOGUE
 from ranger_sim.harness.scenario import Scenario
 
 TEXTS = ("title", "description", "fault_module")
@@ -327,9 +327,9 @@ def module_of(data: dict[str, Any], path: str) -> str | None:
     if not isinstance(name, str) or not name:
         raise UserError(f"{path}: fault_module = {name!r}: the name of a .py file is expected, relative to the plan")
     found = (pathlib.Path(path).parent / name).resolve()
-    catalogue.load()
+    CATALOGUE.load()
     try:
-        catalogue.load_file(found)
+        CATALOGUE.load_file(found)
     except UserError as error:
         raise UserError(f"{path}: {error}") from None
     return str(found)
@@ -378,7 +378,7 @@ def check_faults(plan: Plan) -> None:
                 raise UserError(f"{plan.path}: fault {fault!r}: {error}") from None
             try:
                 condition(start_of(text))
-                catalogue.typed(text)
+                CATALOGUE.typed(text)
             except UserError as error:
                 raise UserError(f"{plan.path}: {error}") from None
 
@@ -477,12 +477,12 @@ def faults_of(group: Any, path: str) -> Iterator[str]:
     without = patterns(group, "without", where, [])
     period = group.get("period", "")
     values = "".join(f",{name}={value}" for name, value in table(group, "values", where).items())
-    catalogue.load()
+    CATALOGUE.load()
     count = 0
-    for place in catalogue.PLACES.values():
+    for place in CATALOGUE.places.values():
         if not matches(place.name, places) or not matches(place.kind, kinds):
             continue
-        for mode in sorted(catalogue.modes_of(place)):
+        for mode in sorted(CATALOGUE.modes_of(place)):
             text = f"{place.name}:{mode}"
             if matches(mode, modes) and not matches(text, without):
                 count += 1

@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.faults.catalogue import mode
 from ranger_sim.harness.faults.fault import Fault, Parameter, WholeNumber
-from ranger_sim.harness.faults.places import BRIDGE, CABLE, JOINT, MOTOR
+from ranger_sim.harness.faults.kinds import BRIDGE, CABLE, JOINT, MOTOR
 from ranger_sim.plant import wiring_points as point
 from ranger_sim.plant.drive import DRIVEN, HELD_HIGH, HELD_LOW, HELD_OPEN
 from ranger_sim.plant.leg import INNER, OUTER

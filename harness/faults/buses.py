@@ -6,20 +6,16 @@ from ranger_sim.can_bus import rewiring, tampering
 from ranger_sim.can_bus.disturbance import HIGHEST_RATE
 from ranger_sim.can_bus.node import OPERATING
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.faults.catalogue import add_places, mode
-from ranger_sim.harness.faults.fault import Fault, Parameter, Place, WholeNumber
+from ranger_sim.harness.faults.catalogue import mode
+from ranger_sim.harness.faults.fault import Fault, Parameter, WholeNumber
+from ranger_sim.harness.faults.kinds import BUS
 from ranger_sim.harness.faults.names import ANY, identifier_of, name_parameter
 from ranger_sim.harness.faults.outside import OutsideBabbling, OutsideDuplicate, OutsideIntruder, external_bus
 from ranger_sim.harness.faults.reach import bus_of, wake_buses
 
-BUS = "CAN bus"
-BUSES = 4
-
-add_places(Place(f"can{n}", BUS, f"the wire of CAN bus {n}", {"bus": n}) for n in range(1, BUSES + 1))
-
 
 class BusFault(Fault):
-    """A fault on the wire of one bus. Clear when all of the robot's controllers take part, counters as they were."""
+    """A fault on the wire of one bus. Clear when all of the machine's controllers take part, counters as they were."""
 
     kinds = (BUS,)
     needs = "a CAN bus"
@@ -106,7 +102,7 @@ class BabblingNode(IntruderFault):
 
     def connect(self) -> None:
         IntruderFault.connect(self)
-        self.identifier = identifier_of(self.values["frame"], f"fault {self.text()}")
+        self.identifier = identifier_of(self.robot, self.values["frame"], f"fault {self.text()}")
         if self.identifier < 0:
             raise UserError(f"fault {self.text()}: a babbling node needs an identifier, not {ANY!r}")
 
@@ -143,7 +139,7 @@ class DuplicateIdentifier(IntruderFault):
         IntruderFault.connect(self)
         if not self.values["frame"] or self.values["frame"] == ANY:
             raise UserError(f"fault {self.text()}: say by frame= which identifier is there twice")
-        self.identifier = identifier_of(self.values["frame"], f"fault {self.text()}")
+        self.identifier = identifier_of(self.robot, self.values["frame"], f"fault {self.text()}")
 
     def made_outside(self) -> OutsideIntruder:
         return OutsideDuplicate(self.external, self.identifier, 1 << int(self.values["bit"]), self.note)

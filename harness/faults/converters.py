@@ -13,7 +13,7 @@ from ranger_sim.foundation.events import NEVER
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.faults.catalogue import mode
 from ranger_sim.harness.faults.fault import Fault, Parameter
-from ranger_sim.harness.faults.places import BURST_CONVERTER, CONVERTER, INTERNAL_CONVERTER
+from ranger_sim.harness.faults.kinds import BURST_CONVERTER, CONVERTER, INTERNAL_CONVERTER
 from ranger_sim.harness.faults.reach import emulated
 
 CONVERTERS = (CONVERTER, INTERNAL_CONVERTER, BURST_CONVERTER)

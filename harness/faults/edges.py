@@ -22,21 +22,15 @@ from typing import Any
 from ranger_sim.harness.faults import signals
 from ranger_sim.harness.faults.catalogue import mode
 from ranger_sim.harness.faults.fault import Fault, Parameter, WholeNumber
-from ranger_sim.harness.faults.places import EDGES
+from ranger_sim.harness.faults.kinds import EDGES
 from ranger_sim.harness.faults.sensor import Quantity, SignalFault, lasting, mode_classes
-from ranger_sim.plant import wiring_points as point
 from ranger_sim.plant.incremental_encoder import BOUNCE_NS
 
 # From one extra edge to the next. Chosen by us: 50 per slot of a board, so that its ring of 63 takes them all, and as
 # fast as the ankles' motor encoders at 18 rad/s of the joint.
 SPACING_NS = 10_000
-# A board's count after lost edges: what brings it back (robot.md N4.8).
-KEPT_BY_THE_BOARD = {
-    "MCH.motor_encoder": "the board's count, until its re-zeroing has drawn it back to the joint's: 5 % at 45 Hz",
-    "MCFO.motor_encoder": "the board's count, until its re-zeroing has: 20 % at 15 Hz, ankle flipped up at rest",
-    "MCFI.motor_encoder": "the board's count, until its re-zeroing has: 5 % at 17 Hz, ankle flipped up at rest",
-}
-KEPT_BY_A_JOINTS = "the board's count, until its next power-up; it uses only the rate"
+# What keeps a board's count wrong after lost edges, where the place does not say (`kept` of its details).
+KEPT = "the board's count, until its next power-up; it uses only the rate"
 
 COUNTS = Quantity(
     unit="edges",
@@ -88,15 +82,7 @@ class EdgeFault(Fault):
 
     def joint_rad(self) -> float:
         """Angle now, which this encoder measures."""
-        plant = self.robot.plant
-        body = plant.body
-        if self.number in (point.HIP_JOINT_EDGES, point.HIP_MOTOR_EDGES):
-            return float(body.outer.angle - body.inner.angle)
-        outer = self.number in (point.OUTER_MOTOR_EDGES, point.OUTER_ANKLE_EDGES)
-        leg = body.outer if outer else body.inner
-        if self.number in (point.OUTER_MOTOR_EDGES, point.INNER_MOTOR_EDGES):
-            return float(leg.motor_angle + plant.zero)
-        return float(leg.foot_angle - leg.angle + plant.zero)
+        return float(self.robot.plant.encoder_rad(self.number))
 
     def begin(self, now_ns: int) -> None:
         super().begin(now_ns)
@@ -282,7 +268,7 @@ class OnTheLine(EdgeFault):
 
     def connect(self) -> None:
         super().connect()
-        self.permanent = KEPT_BY_THE_BOARD.get(self.place.name, KEPT_BY_A_JOINTS)
+        self.permanent = self.place.details.get("kept") or KEPT
 
     @property
     def miscount(self) -> int:

@@ -21,10 +21,9 @@ import dataclasses
 from typing import Any
 
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.conditions import Condition, condition
-from ranger_sim.harness.faults import catalogue
 from ranger_sim.harness.faults.fault import Fault
 from ranger_sim.harness.step_watch import StepWatch
+from ranger_sim.harness.waiting import Condition
 
 
 @dataclasses.dataclass(frozen=True)
@@ -67,11 +66,11 @@ class ErrorPort(StepWatch):
             for each in one.errors:
                 self._made(configuration, each)  # so that mistakes are told now
             if one.trigger is not None:
-                condition(one.trigger)
+                self.robot.condition(one.trigger)
         self.configuration = configuration
 
     def _made(self, configuration: ErrorConfiguration, text: str) -> Fault:
-        fault = catalogue.typed(text)
+        fault = self.robot.catalogue.typed(text)
         if fault.start is not None or fault.end is not None:
             raise UserError(f"error configuration {configuration.name}: {text!r}: its set says when it begins and ends")
         return fault
@@ -133,5 +132,5 @@ class ErrorPort(StepWatch):
         if self.number + 1 < len(self.configuration.sets):
             trigger = self.configuration.sets[self.number + 1].trigger
             if trigger is not None:
-                self.waits = condition(trigger)
+                self.waits = self.robot.condition(trigger)
                 self.waits.begin(self.robot)

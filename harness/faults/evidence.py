@@ -1,6 +1,6 @@
-"""What a run leaves behind for a comparison: frames, the body, the main brain's variables, the boards' errors.
+"""What a run leaves behind for a comparison: frames, the body, the variables that the log keeps, the boards' errors.
 
-An `Evidence` listens to a robot from the moment it is made; its `record()` is arrays, the same for the same run, also
+An `Evidence` listens to a machine from the moment it is made; its `record()` is arrays, the same for the same run, also
 when it was made in a forked process.
 """
 
@@ -10,15 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from ranger_sim.datatable.generated import all_variables
-from ranger_sim.datatable.generated import errors as error_table
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.conditions import STATE_VARIABLES
-from ranger_sim.harness.faults.error_watch import ErrorWatch
-from ranger_sim.plant.ranger import SAMPLES
-
-CODES = max(error_table.NAMES) + 1
-COLUMN = {name: place for place, name in enumerate(SAMPLES, start=1)}  # of `Record.samples`
+from ranger_sim.harness.faults.error_rows import StateWord
+from ranger_sim.harness.names import Names
 
 
 @dataclasses.dataclass
@@ -26,8 +20,9 @@ class Record:
     """A run between two instants (ns since the simulation's zero, as all times here).
 
     frames: {bus: rows of `foundation.row_stream.FrameStream`}. samples: rows of time (s) and the plant's quantities,
-    words: rows of time and the main brain's table, both every 2 ms. errors: rows of `ErrorWatch`, places as in
-    `boards`. states: {machine: {number: name}}. fell_ns: -1 when it stands at the end.
+    words: rows of time and the memory of the board `memory` (empty: of none), both every 2 ms. errors: rows of
+    `ErrorRows`, places as in `boards`. quantities: names of the samples' columns behind the time. machines: those whose
+    state is in the words. fell_ns: -1 when it stands at the end.
     """
 
     begin_ns: int
@@ -37,7 +32,10 @@ class Record:
     words: np.ndarray
     errors: np.ndarray
     boards: list[str]
-    states: dict[str, dict[int, str]]
+    names: Names
+    quantities: tuple[str, ...]
+    machines: dict[str, StateWord]
+    memory: str = ""
     fell_ns: int = -1
     fall_cause: str = ""
 
@@ -55,17 +53,17 @@ class Record:
 
     def sample(self, name: str) -> np.ndarray:
         """One quantity of the body over the run."""
-        return self.samples[:, COLUMN[name]]
+        return self.samples[:, 1 + self.quantities.index(name)]
 
     def machine(self, name: str) -> np.ndarray:
-        """The state numbers of one of the main brain's machines, one per row of `words`."""
-        return self.words[:, 1 + all_variables.ID_OF[STATE_VARIABLES[name]]]
+        """The state numbers of a machine, one per row of `words`."""
+        return self.words[:, 1 + self.machines[name].word]
 
 
 class Evidence:
-    """Listens to `robot` (a `harness.ranger.Ranger`) from now on, beside what the robot's log keeps.
+    """Listens to `robot` (a `harness.machine.Machine`) from now on, beside what its log keeps.
 
-    UserError for a robot with boards in other processes: their errors come too late to be timed.
+    UserError for one with boards in other processes: their errors come too late to be timed.
     """
 
     def __init__(self, robot: Any) -> None:
@@ -75,9 +73,9 @@ class Evidence:
         self.begin_ns = robot.loop.time
         self.blocks: dict[str, list[bytes]] = {}
         self.streams = robot.recorder.streams()
-        if robot.loop.sampler.words is None:
+        if robot.loop.sampler.words is None and robot.loop.sampler.board is not None:
             robot.loop.sampler.words = robot.recorder.words
-        self.watch = ErrorWatch(robot.loop.boards, CODES)
+        self.watch = robot.error_watch()
         self.streams["errors"] = self.watch.rows
         for name, stream in self.streams.items():
             stream.flush()
@@ -107,7 +105,7 @@ class Evidence:
             stream.flush()
             kind = np.float64 if stream.is_real else np.int64
             rows[name] = np.frombuffer(b"".join(self.blocks[name]), dtype=kind).reshape(-1, stream.columns)
-        fell = robot.plant.record.fall_time_ns if robot.plant.fell else -1
+        remembered = robot.loop.sampler.board
         return Record(
             begin_ns=self.begin_ns,
             end_ns=robot.loop.time,
@@ -116,16 +114,10 @@ class Evidence:
             words=rows["words"],
             errors=rows["errors"],
             boards=[board.name for board in robot.loop.boards],
-            states=states_of(robot),
-            fell_ns=int(fell),
+            names=robot.names,
+            quantities=tuple(robot.plant.sample_names),
+            machines=robot.machines(),
+            memory=remembered.name if remembered is not None else "",
+            fell_ns=robot.fell_ns(),
             fall_cause=robot.plant.fall_cause,
         )
-
-
-def states_of(robot: Any) -> dict[str, dict[int, str]]:
-    """The states of the main brain's machines by their numbers."""
-    modes = robot.boards["MB"].modes
-    return {
-        machine: {state.number: state.name for state in getattr(modes, machine).machine.states}
-        for machine in STATE_VARIABLES
-    }

@@ -10,23 +10,11 @@ from ranger_sim.can_bus import rewiring, tampering
 from ranger_sim.can_bus.frame import wire
 from ranger_sim.can_bus.node import OPERATING
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness import wiring
-from ranger_sim.harness.faults.catalogue import add_places, mode
-from ranger_sim.harness.faults.fault import Fault, Parameter, Place, WholeNumber
+from ranger_sim.harness.faults.catalogue import mode
+from ranger_sim.harness.faults.fault import Fault, Parameter, WholeNumber
+from ranger_sim.harness.faults.kinds import CONTROLLER
 from ranger_sim.harness.faults.names import ANY, identifier_of, name_parameter
 from ranger_sim.harness.faults.reach import controller_of, reaching_into, wake_buses
-
-CONTROLLER = "CAN controller"
-
-add_places(
-    Place(
-        f"{wire.board}.can{wire.bus}",
-        CONTROLLER,
-        f"the controller and transceiver of {wire.board} on can{wire.bus}",
-        {"board": wire.board, "bus": wire.bus},
-    )
-    for wire in wiring.CAN
-)
 
 FRAME = name_parameter("frame", ANY, "variable or identifier of the frames; any: all of them", "the master table")
 EVERY = WholeNumber("every", "frames", 1, 1, 1e6, "every n-th of these frames", "chosen by us: each of them")
@@ -72,8 +60,8 @@ class ControllerFault(Fault):
         return calm and all(node.mode == OPERATING or node.index >= len(self.nodes()) for node in self.bus.nodes)
 
     def nodes(self) -> list[Any]:
-        """The robot's own controllers on this bus, which are first there."""
-        return [wire for wire in wiring.CAN if wire.bus == self.place.details["bus"]]
+        """The machine's own controllers on this bus, which are first there."""
+        return [wire for wire in self.robot.wiring.can if wire.bus == self.place.details["bus"]]
 
 
 class FrameFault(ControllerFault):
@@ -83,7 +71,7 @@ class FrameFault(ControllerFault):
 
     def connect(self) -> None:
         ControllerFault.connect(self)
-        self.identifier = identifier_of(self.values["frame"], f"fault {self.text()}")
+        self.identifier = identifier_of(self.robot, self.values["frame"], f"fault {self.text()}")
         self.tamper = self.made()
         self.tamper.every = int(self.values["every"])
         self.tamper.count = int(self.values["count"])

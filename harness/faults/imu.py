@@ -10,7 +10,7 @@ from ranger_sim.foundation.numbers import float_of_word, word_of_float
 from ranger_sim.harness.faults import signals
 from ranger_sim.harness.faults.catalogue import REASONS, mode
 from ranger_sim.harness.faults.fault import Fault, Parameter
-from ranger_sim.harness.faults.places import IMU
+from ranger_sim.harness.faults.kinds import IMU
 from ranger_sim.harness.faults.sensor import Quantity, SignalFault, lasting, mode_classes
 from ranger_sim.plant.imu import PACKET_BYTES, SET_MODE
 

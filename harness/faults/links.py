@@ -4,8 +4,9 @@ from typing import Any
 
 from ranger_sim.firmware_sim.peripherals.ssp import SspSegment
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.faults.catalogue import add_places, mode
+from ranger_sim.harness.faults.catalogue import mode
 from ranger_sim.harness.faults.fault import Fault, Parameter, Place, WholeNumber
+from ranger_sim.harness.faults.ranger_catalogue import CATALOGUE
 
 LINK = "serial link"
 SERIAL = "serial line"
@@ -13,7 +14,7 @@ SEGMENT_BITS = 31 * 16  # half-words of a segment, the last one its checksum (ro
 EVERY = WholeNumber("every", "exchanges", 1, 1, 1e6, "every n-th exchange", "chosen by us: each of them")
 SHARE = Parameter("share", "1", 1.0, 0.0, 1.0, "chance of each, by the fault's own seeded stream", "chosen by us: all")
 
-add_places(
+CATALOGUE.add_places(
     (
         Place("CSR.ssp", LINK, "what the router receives from the main brain", {"slave": False}),
         Place("MB.ssp", LINK, "what the main brain receives from the router", {"slave": True}),

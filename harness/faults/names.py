@@ -4,7 +4,6 @@ import dataclasses
 import difflib
 from typing import Any
 
-from ranger_sim.datatable.generated import all_variables
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.faults.fault import Parameter
 
@@ -29,16 +28,17 @@ def name_parameter(name: str, default: Any, meaning: str, source: str) -> NamePa
     return NameParameter(name, "name", default, 0.0, 0.0, meaning, source)
 
 
-def identifier_of(text: str, where: str) -> int:
+def identifier_of(robot: Any, text: str, where: str) -> int:
     """Identifier of the frame called `text`: a variable, a number, or "any" (-1). UserError for anything else."""
     if text == ANY:
         return -1
-    if text in all_variables.ID_OF:
-        return int(all_variables.ID_OF[text])
+    known = robot.names.ids
+    if text in known:
+        return int(known[text])
     try:
         number = int(text, 0)
     except ValueError:
-        near = difflib.get_close_matches(text, all_variables.ID_OF, 3)
+        near = difflib.get_close_matches(text, known, 3)
         hint = f", meant was perhaps {' or '.join(near)}" if near else ""
         raise UserError(f"{where}: frame {text!r} is neither a variable nor an identifier{hint}") from None
     if not 0 <= number <= HIGHEST_IDENTIFIER:

@@ -4,30 +4,31 @@ A place is named by the board that hears it, or whose motor it belongs to, and b
 """
 
 from ranger_sim.harness import wiring
-from ranger_sim.harness.faults.catalogue import add_places
+from ranger_sim.harness.faults import network_places
 from ranger_sim.harness.faults.fault import Place
+from ranger_sim.harness.faults.kinds import (
+    BATTERY_CURRENT,
+    BATTERY_VOLTAGE,
+    BRIDGE,
+    BURST_CONVERTER,
+    CABLE,
+    CONVERTER,
+    EDGES,
+    FLOOR,
+    FOOT,
+    IMU,
+    INTERNAL_CONVERTER,
+    JOINT,
+    MOTOR,
+    MOTOR_CURRENT,
+    ROBOT,
+    STEERING_ANGLE,
+    SUPPLY_CURRENT,
+    SUPPLY_VOLTAGE,
+    WORD,
+)
+from ranger_sim.harness.faults.ranger_catalogue import CATALOGUE
 from ranger_sim.plant import wiring_points as point
-
-# Kinds of places
-EDGES = "incremental encoder"
-WORD = "absolute encoder"
-MOTOR_CURRENT = "motor current"
-BATTERY_CURRENT = "battery current"
-BATTERY_VOLTAGE = "battery voltage"
-FOOT = "foot sensor"
-STEERING_ANGLE = "steering sensor"
-SUPPLY_CURRENT = "supply current"
-SUPPLY_VOLTAGE = "supply voltage"
-IMU = "inertial unit"
-CONVERTER = "external converter"
-INTERNAL_CONVERTER = "internal converter"
-BURST_CONVERTER = "burst converter"  # it converts by itself, nobody waits for it
-MOTOR = "motor"
-BRIDGE = "bridge"
-CABLE = "cable"
-JOINT = "joint"
-ROBOT = "robot"
-FLOOR = "floor"
 
 # What hangs on each encoder of the plant's list: name at its board, what it is, joint, edges of channel A per turn.
 ENCODERS = {
@@ -43,6 +44,12 @@ ENCODERS = {
         "the incremental encoder of the inner ankles' motor, 1024 edges, gear 34",
     ),
     point.INNER_ANKLE_EDGES: ("joint_encoder", "the incremental encoder of the inner ankles, 4096 edges a turn"),
+}
+# A board's count after lost edges: what brings it back (robot.md N4.8).
+KEPT_BY_THE_BOARD = {
+    "MCH": {"motor_encoder": "the board's count, until its re-zeroing has drawn it back to the joint's: 5 % at 45 Hz"},
+    "MCFO": {"motor_encoder": "the board's count, until its re-zeroing has: 20 % at 15 Hz, ankle flipped up at rest"},
+    "MCFI": {"motor_encoder": "the board's count, until its re-zeroing has: 5 % at 17 Hz, ankle flipped up at rest"},
 }
 WORDS = {
     point.HIP_WORD: "the serial word of the hip's absolute encoder, 8192 counts a turn",
@@ -74,7 +81,12 @@ def sensors() -> list[Place]:
     places = []
     for wire in wiring.ENCODERS:
         name, what = ENCODERS[wire.encoder]
-        places.append(Place(f"{wire.board}.{name}", EDGES, what, {"board": wire.board, "encoder": wire.encoder}))
+        details = {
+            "board": wire.board,
+            "encoder": wire.encoder,
+            "kept": KEPT_BY_THE_BOARD.get(wire.board, {}).get(name),
+        }
+        places.append(Place(f"{wire.board}.{name}", EDGES, what, details))
     for word in wiring.WORDS:
         places.append(
             Place(f"{word.board}.{word.register}", WORD, WORDS[word.word], {"board": word.board, "word": word.word})
@@ -116,12 +128,14 @@ def actuators() -> list[Place]:
     return places
 
 
-add_places(sensors())
-add_places(converters())
-add_places(actuators())
-add_places(
+CATALOGUE.add_places(sensors())
+CATALOGUE.add_places(converters())
+CATALOGUE.add_places(actuators())
+CATALOGUE.add_places(
     (
         Place("world.robot", ROBOT, "the robot's centre of mass"),
         Place("world.floor", FLOOR, "the floor under the feet"),
     )
 )
+CATALOGUE.add_places(network_places.controllers(wiring.CAN))
+CATALOGUE.add_places(network_places.buses(4))

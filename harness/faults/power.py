@@ -8,8 +8,9 @@ from ranger_sim.firmware_sim.board import Board
 from ranger_sim.foundation.events import NEVER
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness import wiring
-from ranger_sim.harness.faults.catalogue import add_places, mode
+from ranger_sim.harness.faults.catalogue import mode
 from ranger_sim.harness.faults.fault import Fault, Parameter, Place, WholeNumber
+from ranger_sim.harness.faults.ranger_catalogue import CATALOGUE
 from ranger_sim.harness.faults.reach import emulated, reaching_into, wake_buses
 from ranger_sim.harness.fresh_board import first_outputs, fresh_board, pass_on
 
@@ -20,8 +21,10 @@ RESET, OPERATING = 1, 0  # modes of a bus node
 # comes back in a process of its own (harness/processes): supply and oscillator settle in about a millisecond.
 START_NS = 1_000_000
 
-add_places([Place("battery", BATTERY, "the packs that feed motors and electronics")])
-add_places(Place(f"{name}.supply", SUPPLY, f"the supply of {name}", {"board": name}) for name in wiring.BOARDS)
+CATALOGUE.add_places([Place("battery", BATTERY, "the packs that feed motors and electronics")])
+CATALOGUE.add_places(
+    Place(f"{name}.supply", SUPPLY, f"the supply of {name}", {"board": name}) for name in wiring.BOARDS
+)
 
 
 class BatteryFault(Fault):

@@ -10,10 +10,11 @@ from ranger_sim.firmware_sim.clock import Crystal
 from ranger_sim.firmware_sim.scheduler import NORMAL_TASK
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness import wiring
-from ranger_sim.harness.faults.catalogue import add_places, mode
+from ranger_sim.harness.faults.catalogue import mode
 from ranger_sim.harness.faults.fault import Fault, Parameter, Place, WholeNumber
 from ranger_sim.harness.faults.names import chosen, name_parameter
 from ranger_sim.harness.faults.power import Restart
+from ranger_sim.harness.faults.ranger_catalogue import CATALOGUE
 from ranger_sim.harness.faults.reach import emulated, reaching_into
 
 PROCESSOR = "processor"
@@ -21,7 +22,9 @@ RECEIVE_RING = 63  # frames that a satellite's ring holds (robot.md N4.14: 64 pl
 RECEIVE_TASK = "can_rx_dispatch_all"
 POWER_CYCLE = "a power cycle of the board: the mode brown_out at its supply, or reset at its processor"
 
-add_places(Place(f"{name}.processor", PROCESSOR, f"the processor of {name}", {"board": name}) for name in wiring.BOARDS)
+CATALOGUE.add_places(
+    Place(f"{name}.processor", PROCESSOR, f"the processor of {name}", {"board": name}) for name in wiring.BOARDS
+)
 
 
 class ProcessorFault(Fault):

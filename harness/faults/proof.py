@@ -16,12 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from ranger_sim.datatable.generated import all_variables
-from ranger_sim.datatable.generated import errors as error_table
-from ranger_sim.datatable.packing import value_of_word
-from ranger_sim.harness.conditions import STATE_VARIABLES
-from ranger_sim.harness.faults.evidence import COLUMN, Record
-from ranger_sim.plant.ranger import SAMPLES
+from ranger_sim.harness.faults.evidence import Record
+from ranger_sim.harness.names import Names
 
 NS_PER_MS = 1e6
 # A code that healthy walks have detects a fault when it comes twice as often as in the worst of them, and five times
@@ -39,7 +35,7 @@ Key = tuple[str, int]  # board, error code
 
 @dataclasses.dataclass(frozen=True)
 class Difference:
-    """The first that differs: `where` (a bus, "MB", "errors", "body"), `name` of variable or quantity, values."""
+    """What differs first: `where` (a bus, "errors", "body", the board whose memory is logged), `name`, values."""
 
     where: str
     name: str
@@ -60,7 +56,7 @@ class Detection:
 
 @dataclasses.dataclass(frozen=True)
 class Reaction:
-    """A machine of the main brain in another state than in the golden run."""
+    """A state machine in another state than in the golden run."""
 
     machine: str
     state: str
@@ -129,7 +125,7 @@ def prove(golden: Record, faulty: Record, activated_ns: int, acted: bool, health
 
     healthy: what healthy walks raise; without it the golden run and the master table say what is normal.
     """
-    normal = healthy if healthy is not None else Healthy.of([golden], normal_per_s())
+    normal = healthy if healthy is not None else Healthy.of([golden], normal_per_s(golden.names))
     firmware = [
         *frame_differences(golden, faulty),
         *word_differences(golden, faulty),
@@ -148,9 +144,9 @@ def prove(golden: Record, faulty: Record, activated_ns: int, acted: bool, health
     )
 
 
-def normal_per_s() -> dict[Key, float]:
-    """How many errors a second are normal in a walk, by board and number: the master table's column."""
-    rates = error_table.NORMAL_PER_S.items()
+def normal_per_s(names: Names) -> dict[Key, float]:
+    """How many errors a second are normal, by board and number: the master table's column."""
+    rates = names.normal_per_s.items()
     return {(board, code): rate for code, boards in rates for board, rate in boards.items()}
 
 
@@ -186,28 +182,27 @@ def frame_differences(golden: Record, faulty: Record) -> Iterable[Difference]:
         same = here is not None and there is not None and int(here[2]) & 0x1FFFFFFF == int(there[2]) & 0x1FFFFFFF
         yield Difference(
             bus,
-            all_variables.NAMES.get(number, f"frame {number:X}"),
+            faulty.names.variables.get(number, f"frame {number:X}"),
             int(first[0]),
-            frame_value(number, there) if same else None,
-            frame_value(number, here) if same else None,
+            frame_value(faulty.names, number, there) if same else None,
+            frame_value(faulty.names, number, here) if same else None,
         )
 
 
-def frame_value(number: int, row: Any) -> float | None:
+def frame_value(names: Names, number: int, row: Any) -> float | None:
     """The variable's value in a frame, None for what is no variable."""
-    kind = all_variables.TYPES.get(number)
-    return None if kind is None else float(value_of_word(kind, (int(row[1]) >> 12) & 0xFFFFFFFF))
+    return float(names.value(number, (int(row[1]) >> 12) & 0xFFFFFFFF)) if number in names.types else None
 
 
 def word_differences(golden: Record, faulty: Record) -> Iterable[Difference]:
-    """The first variable of the main brain's table that differs."""
+    """The first variable of the logged memory that differs."""
     place = first_other_row(golden.words, faulty.words)
     if place is not None:
         column = int(np.flatnonzero(golden.words[place] != faulty.words[place])[0])
         number = column - 1
-        kind = all_variables.TYPES.get(number, "u32")
-        there, here = (float(value_of_word(kind, int(run.words[place, column]))) for run in (golden, faulty))
-        yield Difference("MB", all_variables.NAMES.get(number, "?"), int(faulty.words[place, 0]), there, here)
+        names = faulty.names
+        there, here = (float(names.value(number, int(run.words[place, column]))) for run in (golden, faulty))
+        yield Difference(faulty.memory, names.variables.get(number, "?"), int(faulty.words[place, 0]), there, here)
 
 
 def error_differences(golden: Record, faulty: Record) -> Iterable[Difference]:
@@ -221,7 +216,7 @@ def error_differences(golden: Record, faulty: Record) -> Iterable[Difference]:
         place = min(len(reference), len(rows))
     # at one instant rows are in order of board and code: the lower one is missing in the other run
     row = min((run[place] for run in (reference, rows) if place < len(run)), key=lambda each: tuple(each[:3]))
-    name = f"{faulty.boards[int(row[1])]} {error_table.NAMES.get(int(row[2]), int(row[2]))}"
+    name = f"{faulty.boards[int(row[1])]} {faulty.names.errors.get(int(row[2]), int(row[2]))}"
     yield Difference("errors", name, int(row[0]), None, None)
 
 
@@ -230,7 +225,7 @@ def body_differences(golden: Record, faulty: Record) -> Iterable[Difference]:
     place = first_other_row(golden.samples, faulty.samples)
     if place is not None:
         column = int(np.flatnonzero(golden.samples[place] != faulty.samples[place])[0])
-        name = list(SAMPLES)[column - 1] if column else "time"
+        name = faulty.quantities[column - 1] if column else "time"
         time_ns = round(float(faulty.samples[place, 0]) * 1e9)
         yield Difference(
             "body", name, time_ns, float(golden.samples[place, column]), float(faulty.samples[place, column])
@@ -241,7 +236,7 @@ def reaction(golden: Record, faulty: Record) -> Reaction | None:
     """The first machine whose state is not golden's at that instant."""
     common = min(len(golden.words), len(faulty.words))
     found = None
-    for machine in STATE_VARIABLES:
+    for machine in faulty.machines:
         there, here = golden.machine(machine)[:common], faulty.machine(machine)[:common]
         differs = np.flatnonzero(there != here)
         if len(differs) and (found is None or differs[0] < found[0]):
@@ -249,7 +244,7 @@ def reaction(golden: Record, faulty: Record) -> Reaction | None:
     if found is None:
         return None
     place, machine, now, then = found
-    names = faulty.states[machine]
+    names = faulty.machines[machine].states
     return Reaction(machine, names.get(now, str(now)), names.get(then, str(then)), int(faulty.words[place, 0]))
 
 
@@ -277,7 +272,7 @@ class Healthy:
     def of(cls, records: Sequence[Record], per_s: dict[Key, float] | None = None) -> "Healthy":
         """From runs without a fault. `per_s`: errors of which so many a second are known to be normal besides."""
         spans: dict[Key, list[int]] = {}
-        changes: dict[str, set[tuple[int, int]]] = {machine: set() for machine in STATE_VARIABLES}
+        changes: dict[str, set[tuple[int, int]]] = {machine: set() for each in records for machine in each.machines}
         for record in records:
             for key, times in event_times(record).items():
                 here = shortest_spans(times)
@@ -311,7 +306,7 @@ class Healthy:
                 duration = int(times[count - 1]) - since_ns
                 most = self.most(key, duration)
                 if count > (RATE_FACTOR * most + RATE_MORE if self.knows(key) else 0):
-                    name = error_table.NAMES.get(key[1], str(key[1]))
+                    name = record.names.errors.get(key[1], str(key[1]))
                     found.append(Detection(key[0], name, int(times[count - 1]), self.knows(key)))
                     break
         return sorted(found, key=lambda each: (each.time_ns, each.board, each.code))
@@ -319,13 +314,13 @@ class Healthy:
     def unusual_change(self, record: Record, since_ns: int) -> Reaction | None:
         """The first change of state from `since_ns` on that no healthy walk has."""
         found = None
-        for machine in STATE_VARIABLES:
+        for machine in record.machines:
             states = record.machine(machine)
             places = np.flatnonzero(states[1:] != states[:-1]) + 1
             for place in places[record.words[places, 0] >= since_ns]:
                 before, now = int(states[place - 1]), int(states[place])
                 if (before, now) not in self.changes[machine]:
-                    time_ns, names = int(record.words[place, 0]), record.states[machine]
+                    time_ns, names = int(record.words[place, 0]), record.machines[machine].states
                     if found is None or time_ns < found.time_ns:
                         found = Reaction(machine, names.get(now, str(now)), names.get(before, str(before)), time_ns)
                     break
@@ -351,7 +346,10 @@ class Healthy:
             known = spans.get(key, [])
             longer, shorter = (known, here) if len(known) > len(here) else (here, known)
             spans[key] = [min(a, b) for a, b in zip(longer, shorter, strict=False)] + longer[len(shorter) :]
-        changes = {machine: seen | other.changes[machine] for machine, seen in self.changes.items()}
+        changes = {
+            machine: self.changes.get(machine, set()) | other.changes.get(machine, set())
+            for machine in (*self.changes, *other.changes)
+        }
         return Healthy(spans, changes)
 
 
@@ -448,7 +446,7 @@ def damage(record: Record, since_ns: int) -> str:
     window = record.samples[:, 0] >= since_ns * 1e-9
     time = record.samples[window, 0]
     for motor in MOTORS:
-        current = record.samples[window, COLUMN[f"{motor}_A"]]
+        current = record.sample(f"{motor}_A")[window]
         longest = longest_run(np.abs(current) > PEAK_FACTOR * PEAK_A[motor], time)
         if longest > PEAK_S:
             return f"{motor} motor beyond {PEAK_FACTOR * PEAK_A[motor]:g} A for {1e3 * longest:.0f} ms"

@@ -6,7 +6,6 @@ from typing import Any
 
 from ranger_sim.firmware_sim.microcontroller import Microcontroller
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness import wiring
 
 
 def emulated(robot: Any, name: str, where: str) -> Any:
@@ -36,9 +35,9 @@ def reaching_into(robot: Any, name: str, now_ns: int) -> Iterator[Any]:
 
 
 def controller_of(robot: Any, board: str, bus: int, where: str) -> tuple[Any, int, Any, int]:
-    """(bus, node, wires, controller) of the controller of `board` on bus 1 ... 4. UserError where that is outside."""
+    """(bus, node, wires, controller) of `board`'s controller on a bus, from 1 on. UserError where that is outside."""
     loop = robot.loop
-    wire = next(wire for wire in wiring.CAN if wire.board == board and wire.bus == bus)
+    wire = next(wire for wire in robot.wiring.can if wire.board == board and wire.bus == bus)
     wires = loop.wires[loop.place(board)]
     if wires.buses[wire.controller] is None:
         raise UserError(
@@ -49,8 +48,8 @@ def controller_of(robot: Any, board: str, bus: int, where: str) -> tuple[Any, in
 
 
 def bus_of(robot: Any, number: int, where: str) -> Any:
-    """Bus 1 ... 4. UserError where it is outside."""
-    wire = next(wire for wire in wiring.CAN if wire.bus == number)
+    """A bus, counted from 1. UserError where it is outside."""
+    wire = next(wire for wire in robot.wiring.can if wire.bus == number)
     return controller_of(robot, wire.board, number, where)[0]
 
 

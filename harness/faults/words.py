@@ -10,9 +10,8 @@ from typing import Any
 from ranger_sim.harness.faults import signals
 from ranger_sim.harness.faults.catalogue import mode
 from ranger_sim.harness.faults.fault import Fault, Parameter, WholeNumber
-from ranger_sim.harness.faults.places import WORD
+from ranger_sim.harness.faults.kinds import WORD
 from ranger_sim.harness.faults.sensor import Quantity, SignalFault, lasting, mode_classes
-from ranger_sim.plant import wiring_points as point
 from ranger_sim.plant.absolute_encoder import COUNTS_PER_TURN, WORD_BITS
 
 COUNTS = Quantity(
@@ -44,12 +43,7 @@ class WordFault(Fault):
 
     def joint_rad(self) -> float:
         """Angle now, which this encoder measures."""
-        plant = self.robot.plant
-        body = plant.body
-        if self.word == point.HIP_WORD:
-            return float(body.outer.angle - body.inner.angle)
-        leg = body.outer if self.word == point.OUTER_ANKLE_WORD else body.inner
-        return float(leg.foot_angle - leg.angle + plant.zero)
+        return float(self.robot.plant.word_rad(self.word))
 
     def counts(self, word: int) -> int:
         """A word in the joint's sense, from the joint's angle 0."""

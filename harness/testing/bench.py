@@ -50,8 +50,9 @@ from ranger_sim.harness import wiring
 from ranger_sim.harness.conditions import ConditionNotMetError
 from ranger_sim.harness.fresh_board import first_outputs, pass_on
 from ranger_sim.harness.ranger import BOARD_CLASSES, BUS_BIT_RATE
+from ranger_sim.harness.ranger_names import RANGER
 from ranger_sim.harness.testing.figures import Figure, Observed
-from ranger_sim.harness.testing.frames import Frame, FrameKeeper, identifier_of
+from ranger_sim.harness.testing.frames import Frame, FrameKeeper, frame_type
 from ranger_sim.harness.testing.links import Link, link_of
 from ranger_sim.harness.testing.wire import Wire
 
@@ -93,7 +94,7 @@ class Node:
 
         `stamp_ms`: its time word; the network time if it is not given.
         """
-        identifier = identifier_of(what)
+        identifier = RANGER.identifier(what)
         due_ns = self.bench.now + nanoseconds(at, "at")
         if isinstance(value, bytes):
             if len(value) > 8:
@@ -128,7 +129,7 @@ class Node:
             if queue.kind == CAN_TX_DONE:
                 self.free.append(queue.b)
             elif queue.kind == CAN_RX:
-                self.heard.append(Frame(queue.time, self.bus.name, queue.b, queue.c, queue.d, queue.e))
+                self.heard.append(frame_type(RANGER)(queue.time, self.bus.name, queue.b, queue.c, queue.d, queue.e))
         while self.due and self.free and self.due[0][0] <= now_ns:
             _, _, *frame = heapq.heappop(self.due)
             self.bus.request(self.number, self.free.pop(0), now_ns, *frame)
@@ -137,7 +138,7 @@ class Node:
         """What others sent: every frame, or those of one variable, since the start or the last `forget`."""
         if what is None:
             return list(self.heard)
-        wanted = identifier_of(what)
+        wanted = RANGER.identifier(what)
         return [frame for frame in self.heard if frame.identifier == wanted]
 
     def forget(self) -> None:
@@ -160,7 +161,7 @@ class Bench:
         streams = {}
         for number, (name, bus) in enumerate(self.buses.items()):
             bus.log.stream = streams[name] = FrameStream(number)
-        self.observed = Observed(FrameKeeper(streams))
+        self.observed = Observed(FrameKeeper(streams, RANGER))
         self.window_ns = AHEAD_BITS * SECOND_NS // max([BUS_BIT_RATE, *buses.values()])
         self.nodes: list[Node] = []
         self.calls: list[tuple[int, int, int, Callable[[float], Any]]] = []  # instant, count, period, function

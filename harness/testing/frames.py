@@ -1,22 +1,20 @@
 """Frames as tests read them, and what keeps the last of them while a robot or a board runs."""
 
 import collections
-import difflib
+import functools
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
-from ranger_sim.datatable.generated import all_variables
-from ranger_sim.datatable.generated import errors as error_table
-from ranger_sim.datatable.packing import parts_of_error_word, value_of_word
 from ranger_sim.foundation.events import FLAG_ERROR
 from ranger_sim.foundation.user_error import UserError
+from ranger_sim.harness.names import Names
 
 WINDOW_S = 20.0  # how much is kept: some 30 steps of a walk, 16 MB for all four buses (chosen by us)
 ROW = 3  # numbers per frame in a stream: foundation/row_stream.py says which
 
 
-class Frame(NamedTuple):
-    """A frame that was on a bus; `time_ns` is when receivers had it, counted as the robot counts."""
+class Words(NamedTuple):
+    """What a frame is made of; `time_ns` is when receivers had it, counted as the machine counts."""
 
     time_ns: int
     bus: str
@@ -25,21 +23,26 @@ class Frame(NamedTuple):
     lo: int
     hi: int
 
+
+class Frame(Words):
+    """A frame that was on a bus. `frame_type` gives the class for the names of a machine."""
+
+    names: ClassVar[Names] = Names()
+
     @property
     def name(self) -> str:
         """The variable's name, or the identifier where the table has none."""
-        return all_variables.NAMES.get(self.identifier, f"{self.identifier:03X}")
+        return self.names.name(self.identifier)
 
     @property
     def time_s(self) -> float:
-        """The same in s."""
+        """When, in s."""
         return self.time_ns * 1e-9
 
     @property
     def value(self) -> float:
         """The value word as the table's type reads it; of an identifier without one, as it is."""
-        kind = all_variables.TYPES.get(self.identifier)
-        return self.lo if kind is None else value_of_word(kind, self.lo)
+        return self.names.value(self.identifier, self.lo)
 
     @property
     def stamp_ms(self) -> int:
@@ -57,29 +60,23 @@ class Frame(NamedTuple):
             return f"{self.time_s:12.6f} s  {self.bus}  error frame"
         line = f"{self.time_s:12.6f} s  {self.bus}  {self.identifier:03X} {self.name}"
         if self.name.startswith("ERROR_"):
-            code, board, count = parts_of_error_word(self.lo)
-            of = all_variables.BOARD_NAMES.get(board, str(board))
-            return f"{line} {error_table.NAMES.get(code, code)} x {count} from {of}"
+            return f"{line} {self.names.error_text(self.lo)}"
         return f"{line} {self.value:.6g} (stamp {self.stamp_ms})"
 
 
-def identifier_of(name: str | int) -> int:
-    """The identifier of a variable; a number stands for itself. UserError for a name that the table has not."""
-    if isinstance(name, int):
-        return name
-    number = all_variables.ID_OF.get(name)
-    if number is None:
-        near = difflib.get_close_matches(name, all_variables.ID_OF, 3)
-        instead = f"; meant was perhaps {' or '.join(near)}" if near else ""
-        raise UserError(f"frame {name!r}: no variable of the table has this name{instead}")
-    return number
+@functools.cache
+def frame_type(names: Names) -> type[Frame]:
+    """Frames that are called by these names."""
+    return type("Frame", (Frame,), {"names": names, "__doc__": Frame.__doc__})
 
 
 class FrameKeeper:
     """Keeps the frames of the last `window_s` that pass through `streams`: {bus: its FrameStream}."""
 
-    def __init__(self, streams: dict[str, Any], window_s: float = WINDOW_S) -> None:
+    def __init__(self, streams: dict[str, Any], names: Names, window_s: float = WINDOW_S) -> None:
         self.streams = streams
+        self.names = names
+        self.frame = frame_type(names)
         self.window_ns = round(window_s * 1e9)
         self.blocks: dict[str, collections.deque[tuple[int, bytes]]] = {}
         for name, stream in streams.items():
@@ -107,7 +104,7 @@ class FrameKeeper:
         found: list[Frame] = []
         for last_ns, block in self.blocks[bus]:
             if last_ns >= since_ns:
-                found += frames_of(block, bus, identifiers, since_ns)
+                found += frames_of(self.frame, block, bus, identifiers, since_ns)
         return found
 
     def latest(self, most: int) -> list[Frame]:
@@ -117,14 +114,16 @@ class FrameKeeper:
             stream.flush()
             of_bus: list[Frame] = []
             for _, block in reversed(self.blocks[bus]):
-                of_bus = frames_of(block, bus) + of_bus
+                of_bus = frames_of(self.frame, block, bus) + of_bus
                 if len(of_bus) >= most:
                     break
             every += of_bus[-most:]
         return sorted(every)[-most:]
 
 
-def frames_of(block: bytes, bus: str, identifiers: set[int] | None = None, since_ns: int = 0) -> list[Frame]:
+def frames_of(
+    frame: type[Frame], block: bytes, bus: str, identifiers: set[int] | None = None, since_ns: int = 0
+) -> list[Frame]:
     """The frames of a block of a stream."""
     rows = memoryview(block).cast("q")
     found = []
@@ -134,5 +133,5 @@ def frames_of(block: bytes, bus: str, identifiers: set[int] | None = None, since
         if rows[at] < since_ns or (identifiers is not None and identifier not in identifiers):
             continue
         second = rows[at + 1]
-        found.append(Frame(rows[at], bus, identifier, second >> 4 & 0xFF, second >> 12 & 0xFFFFFFFF, third >> 29))
+        found.append(frame(rows[at], bus, identifier, second >> 4 & 0xFF, second >> 12 & 0xFFFFFFFF, third >> 29))
     return found

@@ -2,21 +2,20 @@
 
 A fault that a test has injected and that never acted is told as well: what the test saw proves nothing about it.
 
-Normal is what the columns normal_per_s and normal_at_start of datatable/master/errors.csv say. A test may expect what
+Normal is what the columns normal_per_s and normal_at_start of the master table's errors.csv say. A test may expect what
 is not normal; what it expects and does not come is a fault as well.
 """
 
 import dataclasses
-import difflib
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
-from ranger_sim.boards.counters import RangerCounters
 from ranger_sim.can_bus.node import BUS_OFF
-from ranger_sim.datatable.generated import errors as error_table
+from ranger_sim.firmware_sim.counters import ProgramCounters
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness import summary, wiring
+from ranger_sim.harness import vital_signs
+from ranger_sim.harness.names import Names, meant
 from ranger_sim.harness.normal_errors import most_normal
 
 # What else a board notes when something that the test expects happens.
@@ -45,15 +44,14 @@ class Expected:
     fall: bool = False
     idle_faults: Amount = False
 
-    def __post_init__(self) -> None:
+    def check(self, names: Names, boards: Iterable[str]) -> None:
+        """UserError for an error that the table has not, and for a board that is none of the machine's."""
         for text in self.errors:
             board, _, name = text.rpartition(":")
-            if name not in error_table.NAMES.values():
-                near = difflib.get_close_matches(name, error_table.NAMES.values(), 3)
-                instead = f"; meant was perhaps {' or '.join(near)}" if near else ""
-                raise UserError(f"expected error {text!r}: the table has none of this name{instead}")
-            if board and board not in wiring.BOARDS:
-                raise UserError(f"expected error {text!r}: board {board!r} is none of {', '.join(wiring.BOARDS)}")
+            if name not in names.codes:
+                raise UserError(f"expected error {text!r}: the table has none of this name{meant(name, names.codes)}")
+            if board and board not in boards:
+                raise UserError(f"expected error {text!r}: board {board!r} is none of {', '.join(boards)}")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -61,7 +59,7 @@ class Seen:
     """Everything that is counted, at one instant."""
 
     time_ns: int
-    boards: Mapping[str, RangerCounters]
+    boards: Mapping[str, ProgramCounters]
     lost: Mapping[str, int]  # by bus: frames that a listening node did not get
     bus_errors: Mapping[str, int]  # by bus
     flushed: Mapping[str, int]  # by board: frames that waited when it went bus-off
@@ -75,7 +73,7 @@ def look(robot: Any) -> Seen:
     flushed: dict[str, int] = {}
     off = set()
     for bus in robot.buses:
-        figures = summary.can(robot, bus, boards)
+        figures = vital_signs.can(robot, bus, boards)
         lost[bus.name], errors[bus.name] = figures["lost"] + figures["queue_full"], figures["errors"]
         for node in bus.nodes:
             flushed[node.name] = flushed.get(node.name, 0) + node.flushed
@@ -104,6 +102,7 @@ class Health:
     def faults(self, expected: Expected | None = None) -> list[str]:
         """What was not to be expected and happened, or was expected and did not; a line for each."""
         wanted = expected if expected is not None else Expected()
+        wanted.check(self.robot.names, self.robot.boards)
         now, before = look(self.robot), self.before
         off = wanted.bus_off is not False
         lost = since(now.lost, before.lost if before is not None else {})
@@ -131,6 +130,7 @@ class Health:
     def _errors(self, wanted: Expected, now: Seen, before: Seen | None) -> list[str]:
         start_ns = self.robot.start_ns if before is None else before.time_ns
         passed_s = (now.time_ns - start_ns) * 1e-9
+        names = self.robot.names
         missing = set(wanted.errors)
         found = []
         for board, counters in now.boards.items():
@@ -138,15 +138,15 @@ class Health:
                 events = total - (before.boards[board].errors[code] if before is not None else 0)
                 if not events:
                     continue
-                name = error_table.NAMES.get(code, str(code))
+                name = names.errors.get(code, str(code))
                 of_test = {name, f"{board}:{name}"} & set(wanted.errors)
                 missing -= of_test
                 if of_test or excused(wanted, board, name):
                     continue
-                rate = error_table.NORMAL_PER_S.get(code, {}).get(board, 0.0)
-                if events > most_normal(board, code, passed_s, before is None):
+                rate = names.normal_per_s.get(code, {}).get(board, 0.0)
+                if events > most_normal(names, board, code, passed_s, before is None):
                     normal = f"normal is up to {rate:g} a second" if rate else "normal is none"
-                    meaning = error_table.DESCRIPTIONS.get(code, "")
+                    meaning = names.descriptions.get(code, "")
                     found.append(f"{board}: {events} x {name} ({meaning}) in {passed_s:.3f} s, {normal}")
         found += [f"expected and not seen: error {text}" for text in sorted(missing)]
         return found
@@ -158,20 +158,20 @@ class Health:
             {name: board.slots.overruns for name, board in before.boards.items()} if before is not None else {},
         )
 
-    @staticmethod
-    def _bus_off(now: Seen, before: Seen | None) -> dict[str, int]:
+    def _bus_off(self, now: Seen, before: Seen | None) -> dict[str, int]:
         """Boards that are bus-off, or were: their error module tells it, or frames were thrown away."""
         found = since(now.flushed, before.flushed if before is not None else {})
         for name, board in now.boards.items():
-            for code in (code for code, text in error_table.NAMES.items() if text.endswith("_TX_BUSOFF")):
-                found[name] = found.get(name, 0) + board.errors[code]
-                found[name] -= before.boards[name].errors[code] if before is not None else 0
+            for code, total in enumerate(board.errors):
+                if self.robot.names.errors.get(code, "").endswith("_TX_BUSOFF"):
+                    found[name] = found.get(name, 0) + total
+                    found[name] -= before.boards[name].errors[code] if before is not None else 0
         for name in now.off:
             found[name] = max(1, found.get(name, 0))
         return found
 
     def _dead(self, now: Seen) -> dict[str, int]:
-        return {name: 0 if summary.alive(self.robot, board) else 1 for name, board in now.boards.items()}
+        return {name: 0 if vital_signs.alive(self.robot, board) else 1 for name, board in now.boards.items()}
 
     def _idle(self) -> dict[str, int]:
         """How many of the faults that were injected since then have not acted, by place; but for those called off."""
@@ -187,9 +187,9 @@ class Health:
         robot = self.robot
         fell = bool(robot.ended) and not self.had_fallen
         if fell and not wanted.fall:
-            return [f"the robot fell ({robot.ended}) at {robot.time_s:.3f} s, in step {robot.steps}"]
+            return [f"{robot.end_word} ({robot.ended}) at {robot.time_s:.3f} s{robot.whereabouts()}"]
         if wanted.fall and not fell:
-            return ["expected and not seen: a fall"]
+            return [f"expected and not seen: {robot.end_name}"]
         return []
 
 

@@ -8,7 +8,8 @@ from ranger_sim.boards.modules.ssp_link import EXCHANGE_NS, MainBrainSspLink, Ro
 from ranger_sim.datatable.generated import all_variables
 from ranger_sim.datatable.packing import word_of_value
 from ranger_sim.foundation.events import ORDER_INTERRUPTS, SSP_SEGMENT, SSP_START
-from ranger_sim.harness.testing.frames import Frame, identifier_of
+from ranger_sim.harness.ranger_names import RANGER
+from ranger_sim.harness.testing.frames import Frame, frame_type
 
 if TYPE_CHECKING:
     from ranger_sim.harness.testing.bench import BoardAlone
@@ -28,18 +29,18 @@ class Link:
 
     def send(self, what: str | int, value: float, stamp_ms: int | None = None) -> None:
         """Send a variable with the next exchange that has room."""
-        identifier = identifier_of(what)
+        identifier = RANGER.identifier(what)
         stamp = self.bench.now // 1_000_000 if stamp_ms is None else stamp_ms
         self.send_words(identifier, word_of_value(all_variables.TYPES[identifier], value), stamp & 0xFFFFFFFF)
 
     def received(self, what: str | int | None = None) -> list[Frame]:
         """What the board sent: every frame, or those of one variable."""
-        wanted = None if what is None else identifier_of(what)
+        wanted = None if what is None else RANGER.identifier(what)
         return [frame for frame in self.heard if wanted is None or frame.identifier == wanted]
 
     def note(self, time_ns: int, identifier: int, lo: int, hi: int) -> None:
         """A frame of the board has come."""
-        self.heard.append(Frame(time_ns, "link", identifier, DATA_8, lo, hi))
+        self.heard.append(frame_type(RANGER)(time_ns, "link", identifier, DATA_8, lo, hi))
 
     def send_words(self, identifier: int, lo: int, hi: int) -> None:
         """Send a frame as it is."""

@@ -1,4 +1,4 @@
-"""The pytest plugin: fixtures `ranger`, `board` and `can_bus`, markers, options, reports; docs/testing.md tells of it.
+"""The pytest plugin: fixtures `ranger`, `machine`, `board`, `can_bus`, markers, options, reports; see docs/testing.md.
 
 Everybody's pytest imports this module, so it imports nothing of the robot before a fixture needs it.
 """
@@ -15,11 +15,13 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 if TYPE_CHECKING:
+    from ranger_sim.harness.machine import Machine
     from ranger_sim.harness.ranger import Ranger
     from ranger_sim.harness.testing.bench import BoardAlone, BusAlone
     from ranger_sim.harness.testing.health import Expected, Health
-    from ranger_sim.harness.testing.robots import Order
+    from ranger_sim.harness.testing.making import Order
 
+FIXTURES = ("ranger", "machine")  # that give a whole machine, watched
 SCOPES = ("function", "class", "module", "package", "session")
 MOST_KEPT = 8  # warmed-up robots that wait to be branched, some 30 MB each; chosen by us
 LAST_FRAMES = 12  # in the report of a failure
@@ -39,6 +41,8 @@ OPTIONS = {
 MARKERS = (
     "ranger(seed=1, controller=..., body=..., warmed_up='step 3', backend=..., quirks=..., profile=...): "
     "the robot of the fixture `ranger`; also any other field of Scenario",
+    "machine(seed=1, warmed_up='angle_rad > 1', ...): the machine of the fixture `machine`, which the project's "
+    "conftest.py makes in pytest_machine(wanted)",
     "board(name, quirks=..., network_time=True): the board of the fixture `board`",
     "can_bus(bit_rate=...): the bus of the fixture `can_bus`",
     "requires(thing, ...): the test is skipped where the backend has not that thing",
@@ -49,9 +53,9 @@ MARKERS = (
 
 
 class Watched:
-    """A robot that a fixture has made, with what the report of a test about it needs."""
+    """A machine that a fixture has made, with what the report of a test about it needs."""
 
-    def __init__(self, robot: Ranger, order: Order, health: Health) -> None:
+    def __init__(self, robot: Machine, order: Order, health: Health) -> None:
         self.robot = robot
         self.order = order
         self.health = health
@@ -61,16 +65,16 @@ class WarmedUp:
     """Robots of this process that have been warmed up once, to be branched by forking. None of them ever runs on."""
 
     def __init__(self) -> None:
-        self.kept: dict[Order, Ranger] = {}
+        self.kept: dict[Order, Machine] = {}
 
     def prepare(self, order: Order) -> bool:
         """Have the robot of `order`; False when it cannot be had: the test will say why when it makes its own."""
         from ranger_sim.foundation.user_error import UserError
-        from ranger_sim.harness.testing.robots import robot_of
+        from ranger_sim.harness.testing.making import made
 
         if order not in self.kept:
             try:
-                robot = robot_of(order)
+                robot = made(order)
             except (UserError, AssertionError):
                 return False
             while len(self.kept) >= MOST_KEPT:
@@ -106,6 +110,13 @@ def option(config: pytest.Config, name: str) -> str:
     return given if given is not None else os.environ.get(variable) or default
 
 
+def pytest_addhooks(pluginmanager: pytest.PytestPluginManager) -> None:
+    """What a conftest.py can say."""
+    from ranger_sim.harness.testing import hooks
+
+    pluginmanager.add_hookspecs(hooks)
+
+
 def pytest_configure(config: pytest.Config) -> None:
     """Markers, and options that can be wrong."""
     for marker in MARKERS:
@@ -133,24 +144,53 @@ def scope_of(fixture_name: str, config: pytest.Config) -> str:
     return option(config, "scope")
 
 
-def order_for(node: Any, config: pytest.Config) -> Order:
-    """The robot that a test (or module, or class) asks for by its marks and the options. UserError for a wrong mark."""
-    from ranger_sim.foundation.user_error import UserError
-    from ranger_sim.harness.testing.robots import order_of
+def order_for(node: Any, config: pytest.Config, fixture: str = "ranger") -> Order:
+    """The machine that a test (or module, or class) asks for by its marks and the options. UserError for a wrong mark.
 
-    wanted: dict[str, Any] = {
-        "backend": option(config, "backend"),
-        "profile": option(config, "profile") or None,
-        "speed": float(option(config, "speed")),
-        "trace": bool(option(config, "trace")),
-    }
-    for mark in reversed(list(node.iter_markers("ranger"))):
+    fixture: `ranger`, or `machine`, the project's own.
+    """
+    from ranger_sim.foundation.user_error import UserError
+
+    wanted: dict[str, Any] = {"trace": bool(option(config, "trace"))}
+    if fixture == "ranger":
+        wanted["backend"] = option(config, "backend")
+        wanted["profile"] = option(config, "profile") or None
+        wanted["speed"] = float(option(config, "speed"))
+    for mark in reversed(list(node.iter_markers(fixture))):
         if mark.args:
-            raise UserError(f"mark ranger: {mark.args[0]!r} has no name; it reads like ranger(seed=3)")
+            raise UserError(f"mark {fixture}: {mark.args[0]!r} has no name; it reads like {fixture}(seed=3)")
         wanted |= mark.kwargs
     if option(config, "seed"):
         wanted["seed"] = int(option(config, "seed"))
-    return order_of(wanted)
+    if fixture == "ranger":
+        from ranger_sim.harness.testing.robots import order_of
+
+        return order_of(wanted)
+    from ranger_sim.harness.testing.making import machine_order
+
+    return machine_order(Maker(node.ihook), wanted)
+
+
+class Maker:
+    """Makes machines by a folder's conftest.py. Two that make them by the same functions are equal."""
+
+    def __init__(self, hook: Any) -> None:
+        self.hook = hook
+        self.functions = tuple(each.function for each in hook.pytest_machine.get_hookimpls())
+
+    def __call__(self, **wanted: Any) -> Machine:
+        from ranger_sim.foundation.user_error import UserError
+
+        machine: Machine | None = self.hook.pytest_machine(wanted=wanted)
+        if machine is None:
+            raise UserError("fixture machine: which one? conftest.py says it: def pytest_machine(wanted): return ...")
+        return machine
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Maker) and other.functions == self.functions
+
+    def __hash__(self) -> int:
+        return hash(self.functions)
 
 
 # --- running a test ---------------------------------------------------------------------------------------
@@ -163,33 +203,34 @@ def pytest_runtest_protocol(item: pytest.Item, nextitem: pytest.Item | None) -> 
         return None
     from ranger_sim.harness.testing import forking
 
-    if not forking.possible(item.config) or not item.config.stash[WARMED_UP].prepare(order_for(item, item.config)):
+    order = order_for(item, item.config, wants_branch(item))
+    if not forking.possible(item.config) or not item.config.stash[WARMED_UP].prepare(order):
         return None
     item.stash[BRANCH] = True
     forking.run(item, nextitem)
     return True
 
 
-def wants_branch(item: pytest.Item) -> bool:
-    """Whether the robot of a test is a branch of one that others have as well."""
-    if "ranger" not in getattr(item, "fixturenames", ()) or item.get_closest_marker("ranger") is None:
-        return False
+def wants_branch(item: pytest.Item) -> str:
+    """The fixture whose machine is a branch of one that other tests have as well; empty: none."""
     if option(item.config, "fork") == "no" or option(item.config, "scope") != "function":
-        return False
-    from ranger_sim.foundation.user_error import UserError
+        return ""
+    for fixture in FIXTURES:
+        if fixture in getattr(item, "fixturenames", ()) and item.get_closest_marker(fixture) is not None:
+            from ranger_sim.foundation.user_error import UserError
 
-    try:
-        order = order_for(item, item.config)
-    except UserError:
-        return False  # the fixture says it
-    return bool(order.warmed_up) and order.backend == "sim" and order.log != "full"
+            try:
+                return fixture if order_for(item, item.config, fixture).branches else ""
+            except UserError:
+                return ""  # the fixture says it
+    return ""
 
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_runtest_setup(item: pytest.Item) -> None:
     """Skip what the backend cannot carry; a mark that a robot of a wider scope could not heed is a mistake."""
     scope = option(item.config, "scope")
-    if scope != "function" and any(mark.name in ("ranger", "board", "can_bus") for mark in item.own_markers):
+    if scope != "function" and any(mark.name in ("ranger", "machine", "board", "can_bus") for mark in item.own_markers):
         pytest.fail(f"the fixtures have the scope {scope}: their marks belong there (pytestmark = ...)", pytrace=False)
     things = tuple(thing for mark in item.iter_markers("requires") for thing in mark.args)
     expects = item.get_closest_marker("expects") or item.get_closest_marker("expects_errors")
@@ -199,7 +240,11 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
 
         wrong = reason = ""
         try:
-            expected_of(item)
+            expected = expected_of(item)
+            if uses_ranger(item):
+                from ranger_sim.harness import ranger_names, wiring
+
+                expected.check(ranger_names.RANGER, wiring.BOARDS)
             reason = missing(backend_of(item), things)
         except UserError as mistake:
             wrong = str(mistake)
@@ -231,8 +276,21 @@ def pytest_runtest_call(item: pytest.Item) -> Generator[None, Any, Any]:
     for watched in robots_of(item):
         unhealthy += watched.health.faults(expected_of(item))
     if unhealthy:
-        pytest.fail("\n".join(["the robot is not healthy:", *(f"  {line}" for line in unhealthy)]), pytrace=False)
+        pytest.fail(
+            "\n".join(
+                [
+                    "the robot is not healthy:" if uses_ranger(item) else "the machine is not healthy:",
+                    *(f"  {line}" for line in unhealthy),
+                ]
+            ),
+            pytrace=False,
+        )
     return result
+
+
+def uses_ranger(item: pytest.Item) -> bool:
+    """Whether it is about the robot that is ours."""
+    return "ranger" in getattr(item, "fixturenames", ())
 
 
 def robots_of(item: pytest.Item) -> list[Watched]:
@@ -301,14 +359,13 @@ def pytest_runtest_makereport(item: pytest.Item, call: pytest.CallInfo[None]) ->
 def properties(watched: Watched) -> list[tuple[str, object]]:
     """What JUnit XML shows of a robot."""
     from ranger_sim import __version__, loading
-    from ranger_sim.datatable.generated import all_variables
 
     found: list[tuple[str, object]] = [
         ("ranger_sim_version", __version__),
         ("ranger_sim_runs", "compiled" if loading.RUNS_COMPILED else "interpreted"),
-        ("ranger_sim_table", all_variables.TABLE_HASH),
+        ("ranger_sim_table", watched.robot.names.hash),
         ("ranger_sim_backend", watched.order.backend),
-        ("ranger_sim_seed", watched.order.scenario.seed),
+        ("ranger_sim_seed", watched.order.seed),
     ]
     return found + [(figure.name, figure.text()) for figure in watched.robot.observed.figures]
 
@@ -316,15 +373,13 @@ def properties(watched: Watched) -> list[tuple[str, object]]:
 def description(item: pytest.Item, watched: Watched) -> str:
     """Seed, command, what came last, and the trace, for a person who reads of a failure."""
     robot, order = watched.robot, watched.order
-    command = ["pytest", item.nodeid, "--ranger-seed", str(order.scenario.seed), "--ranger-backend", order.backend]
-    if order.profile:
-        command += ["--ranger-profile", order.profile]
+    command = ["pytest", item.nodeid, *order.arguments()]
+    where = robot.whereabouts().replace(", in ", ", ")
     lines = [
-        f"seed {order.scenario.seed}, controller {order.scenario.controller}, body {order.scenario.body}, "
-        f"backend {order.backend}; {robot.time_s:.6f} s since power-up, step {robot.steps}",
+        f"{order.told()}; {robot.time_s:.6f} s since power-up{where}",
         f"once more: {shlex.join(command)}",
         *(f"also: {line}" for line in ([] if robot.lost else watched.health.faults(expected_of(item)))),
-        "last errors that boards sent, beyond what is normal in a walk:",
+        "last errors that boards sent, beyond what is normal:",
         *last_errors(robot),
         "last frames:",
         *([f"  {frame.text()}" for frame in robot.observed.keeper.latest(LAST_FRAMES)] or ["  none"]),
@@ -332,19 +387,12 @@ def description(item: pytest.Item, watched: Watched) -> str:
     return "\n".join(lines + trace_of(item, watched))
 
 
-def last_errors(robot: Ranger) -> list[str]:
+def last_errors(robot: Machine) -> list[str]:
     """The error frames that came last, those of errors that are normal on their board left out."""
-    from ranger_sim.datatable.generated import all_variables
-    from ranger_sim.datatable.generated import errors as error_table
-    from ranger_sim.datatable.packing import parts_of_error_word
-
-    numbers = {all_variables.ID_OF[f"ERROR_{name}"] for name in robot.boards if name != "MB"}
-    keeper = robot.observed.keeper
-    found = []
-    for frame in sorted(frame for bus in keeper.streams for frame in keeper.frames(bus, numbers)):
-        code, board, _ = parts_of_error_word(frame.lo)
-        if all_variables.BOARD_NAMES.get(board) not in error_table.NORMAL_PER_S.get(code, {}):
-            found.append(f"  {frame.text()}")
+    names, keeper = robot.names, robot.observed.keeper
+    numbers = names.error_variables()
+    frames = sorted(frame for bus in keeper.streams for frame in keeper.frames(bus, numbers))
+    found = [f"  {frame.text()}" for frame in frames if not names.is_normal(frame.lo)]
     return found[-LAST_ERRORS:] or ["  none"]
 
 
@@ -371,17 +419,28 @@ def trace_of(item: pytest.Item, watched: Watched) -> list[str]:
 @pytest.fixture(scope=scope_of)  # type: ignore[arg-type]
 def ranger(request: pytest.FixtureRequest) -> Iterator[Ranger]:
     """A robot as the mark `ranger` says: fresh, or warmed up. It is looked at for its health after each test."""
+    yield from watched_machine(request, "ranger")
+
+
+@pytest.fixture(scope=scope_of)  # type: ignore[arg-type]
+def machine(request: pytest.FixtureRequest) -> Iterator[Machine]:
+    """The project's own machine, as its conftest.py makes it and the mark `machine` says; looked at as the robot is."""
+    yield from watched_machine(request, "machine")
+
+
+def watched_machine(request: pytest.FixtureRequest, fixture: str) -> Iterator[Any]:
+    """What a fixture gives, and what happens to it afterwards."""
     from ranger_sim.foundation.user_error import UserError
     from ranger_sim.harness.testing.backends import MissingError
     from ranger_sim.harness.testing.health import Health
-    from ranger_sim.harness.testing.robots import robot_of
+    from ranger_sim.harness.testing.making import made
 
     node, config = request.node, request.config
     missing = wrong = ""
     try:
-        order = order_for(node, config)
+        order = order_for(node, config, fixture)
         branch = node.stash.get(BRANCH, False)
-        robot = config.stash[WARMED_UP].kept[order] if branch else robot_of(order)
+        robot = config.stash[WARMED_UP].kept[order] if branch else made(order)
     except MissingError as reason:
         missing = str(reason)
     except (UserError, AssertionError) as mistake:

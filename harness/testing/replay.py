@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING
 from ranger_sim.can_bus.edge.logs import read_log as read_frames
 from ranger_sim.can_bus.frame import frame_bits
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.testing.frames import Frame
+from ranger_sim.harness.ranger_names import RANGER
+from ranger_sim.harness.testing.frames import Frame, frame_type
 
 if TYPE_CHECKING:
     from ranger_sim.harness.testing.bench import BoardAlone
@@ -34,7 +35,7 @@ def read_log(path: str | pathlib.Path, bus: str | None = None) -> list[Frame]:
     found = []
     for file, name in files:
         for channel, time_ns, identifier, flags, lo, hi in read_frames(file):
-            found.append(Frame(time_ns, name or channel, identifier, flags, lo, hi))
+            found.append(frame_type(RANGER)(time_ns, name or channel, identifier, flags, lo, hi))
     if not found:
         raise UserError(f"{source}: there is no frame in this recording")
     return sorted(found)

@@ -13,18 +13,15 @@ from typing import Any
 
 from ranger_sim.boards.quirks import Quirks
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.profile import Profile
 from ranger_sim.harness.profile import load as load_profile
 from ranger_sim.harness.ranger import Ranger
 from ranger_sim.harness.scenario import Scenario
 from ranger_sim.harness.testing.backends import HARDWARE, PROCESSES, SIM, VCAN, check_backend
 from ranger_sim.harness.testing.health import Expected, Health
-from ranger_sim.harness.testing.wire import observe
+from ranger_sim.harness.testing.making import made
 
 SCENARIO_FIELDS = tuple(field.name for field in dataclasses.fields(Scenario))
 OTHERS = ("quirks", "profile", "warmed_up", "backend", "speed", "log", "trace")
-TRACED_S = 10.0  # how much of a robot's last time its timeline keeps: some 16 steps
-WARM_UP_LIMIT = "1 h"  # of virtual time: the warm-up of a test is told to have failed after it
 
 
 @dataclasses.dataclass(frozen=True)
@@ -43,6 +40,40 @@ class Order:
     speed: float = 1.0
     log: str = "none"
     trace: bool = False  # keep a timeline (`robot.observed.timeline`)
+
+    @property
+    def seed(self) -> int:
+        """Of the scenario."""
+        return self.scenario.seed
+
+    @property
+    def branches(self) -> bool:
+        """Whether a robot that is warmed up can be branched by forking."""
+        return bool(self.warmed_up) and self.backend == SIM and self.log != "full"
+
+    def told(self) -> str:
+        """What it was made of, in a line of a report."""
+        scenario = self.scenario
+        return f"seed {scenario.seed}, controller {scenario.controller}, body {scenario.body}, backend {self.backend}"
+
+    def arguments(self) -> list[str]:
+        """Options of pytest that give it again."""
+        chosen = ["--ranger-seed", str(self.seed), "--ranger-backend", self.backend]
+        return chosen + (["--ranger-profile", self.profile] if self.profile else [])
+
+    def fresh(self) -> Ranger:
+        """The robot at power-up, on its backend."""
+        profile = load_profile(self.profile) if self.profile is not None else None
+        if self.backend == PROCESSES:
+            from ranger_sim.harness.testing.process_robot import ProcessRobot
+
+            return ProcessRobot(self.scenario, self.log, self.quirks, profile)
+        if self.backend in (VCAN, HARDWARE):
+            from ranger_sim.harness.testing.outside_robot import OutsideRobot, buses_of_profile, vcan_buses
+
+            outside = vcan_buses() if self.backend == VCAN else buses_of_profile(profile)
+            return OutsideRobot(self.scenario, self.log, self.quirks, profile, outside, self.speed)
+        return Ranger(self.scenario, self.log, self.quirks, profile)
 
 
 def order_of(wanted: Mapping[str, Any]) -> Order:
@@ -67,35 +98,8 @@ def new_robot(**wanted: Any) -> Ranger:
 
 def robot_of(order: Order) -> Ranger:
     """The robot that was ordered, warmed up."""
-    profile = load_profile(order.profile) if order.profile is not None else None
-    robot = fresh(order, profile)
-    observed = observe(robot)
-    if order.trace:
-        from ranger_sim.harness.timeline import Timeline
-
-        observed.timeline = Timeline(robot, TRACED_S)
-    if order.warmed_up:
-        try:
-            robot.until(order.warmed_up, within=WARM_UP_LIMIT)
-        except BaseException:
-            robot.close()
-            raise
+    robot: Ranger = made(order)
     return robot
-
-
-def fresh(order: Order, profile: Profile | None) -> Ranger:
-    """The robot at power-up, on its backend."""
-    if order.backend == PROCESSES:
-        from ranger_sim.harness.testing.process_robot import ProcessRobot
-
-        return ProcessRobot(order.scenario, order.log, order.quirks, profile)
-    if order.backend in (VCAN, HARDWARE):
-        from ranger_sim.harness.testing.outside_robot import OutsideRobot, buses_of_profile, vcan_buses
-
-        if order.backend == VCAN:
-            return OutsideRobot(order.scenario, order.log, order.quirks, profile, vcan_buses(), order.speed)
-        return OutsideRobot(order.scenario, order.log, order.quirks, profile, buses_of_profile(profile), order.speed)
-    return Ranger(order.scenario, order.log, order.quirks, profile)
 
 
 def assert_healthy(robot: Ranger, **expected: Any) -> None:

@@ -15,7 +15,7 @@ from typing import Any, NoReturn
 
 from ranger_sim.foundation.quantities import duration_text, nanoseconds
 from ranger_sim.harness.testing.figures import Observed
-from ranger_sim.harness.testing.frames import Frame, FrameKeeper, identifier_of
+from ranger_sim.harness.testing.frames import Frame, FrameKeeper
 
 SHOWN = 3  # offending places in a message
 
@@ -81,7 +81,7 @@ class Wire:
 
     def frames(self, *names: str | int) -> list[Frame]:
         """Frames of these variables (or identifiers), in their order; without a name, all."""
-        wanted = {identifier_of(name) for name in names} if names else None
+        wanted = {self.keeper.names.identifier(name) for name in names} if names else None
         return list(self.keeper.frames(self.bus, wanted, round(self.since_s * 1e9)))
 
     # --- periods ------------------------------------------------------------------------------------------
@@ -156,7 +156,8 @@ class Wire:
         """The longest slot that `board` itself measured and sent is not longer; returns it in s."""
         __tracebackhide__ = True
         allowed = nanoseconds(at_most, "at_most")
-        names = (f"{board}_EXECUTION_TIME", f"{board}_MAX_EXECUTION_TIME")
+        known = self.keeper.names.ids
+        names = [f"{board}_EXECUTION_TIME", *(each for each in [f"{board}_MAX_EXECUTION_TIME"] if each in known)]
         frames = self.frames(*names)
         if not frames:
             self._fail(f"{' and '.join(names)} on {self.bus}: no frame", [])
@@ -201,7 +202,7 @@ def observe(robot: Any) -> Observed:
     """What is kept beside `robot`; from the first call on its frames are kept."""
     if robot.observed is None:
         streams = {bus.name: stream for bus, stream in zip(robot.buses, robot.recorder.frames, strict=True)}
-        robot.observed = Observed(FrameKeeper(streams))
+        robot.observed = Observed(FrameKeeper(streams, robot.names))
     return robot.observed
 
 

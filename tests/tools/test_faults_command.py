@@ -8,8 +8,10 @@ import sys
 import pytest
 
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.faults import catalogue, text
+from ranger_sim.harness.faults import text
+from ranger_sim.harness.faults.catalogue import MODES, mode
 from ranger_sim.harness.faults.names import NameParameter
+from ranger_sim.harness.faults.ranger_catalogue import CATALOGUE
 from ranger_sim.tools import cli, faults
 
 OWN = faults.DOCUMENT.read_text(encoding="utf-8").split("```python\n")[2].partition("```")[0]
@@ -31,7 +33,7 @@ def refused(capsys, *arguments):
 
 def test_the_list_has_every_place_with_its_modes(capsys):
     printed = "\n".join(lines_of(capsys, "faults"))
-    for place in catalogue.PLACES:
+    for place in CATALOGUE.places:
         assert place in printed
     assert "jammed" in printed
 
@@ -47,7 +49,7 @@ def test_a_place_tells_its_modes_parameters_limits_sources_and_what_it_refuses(c
 
 def test_the_json_has_the_same_for_programs(capsys):
     listed = json.loads("\n".join(lines_of(capsys, "faults", "--json")))
-    assert [place["place"] for place in listed] == list(catalogue.PLACES)
+    assert [place["place"] for place in listed] == list(CATALOGUE.places)
     (word,) = json.loads("\n".join(lines_of(capsys, "faults", "MCH.absolute_encoder", "--json")))
     offset = next(mode for mode in word["modes"] if mode["mode"] == "offset")
     assert offset["unit"] == "counts"
@@ -83,22 +85,22 @@ def test_a_place_that_is_not_there_is_refused_by_the_list_too(capsys):
 
 
 def test_a_fault_reads_back_as_it_was_typed():
-    catalogue.load()
+    CATALOGUE.load()
     for typed in (
         "MCH.joint_encoder:stuck@step 12..step 14",
         "MCH.joint_encoder:stuck,level=3@0.3 s",
         "UI.imu:gyro_bias,rate=-0.1",
         "world.robot:push,force=-20@hip in HI_premid",
     ):
-        assert catalogue.typed(typed).text() == typed
-    assert catalogue.typed("UI.imu:gyro_bias , rate=0.2@ 3 s .. 4 s").text() == "UI.imu:gyro_bias@3 s..4 s"
+        assert CATALOGUE.typed(typed).text() == typed
+    assert CATALOGUE.typed("UI.imu:gyro_bias , rate=0.2@ 3 s .. 4 s").text() == "UI.imu:gyro_bias@3 s..4 s"
     assert text.parse("a:b@x").end is None
 
 
 def test_a_fault_gives_every_digit_of_its_parameters():
-    catalogue.load()
-    fault = catalogue.fault("world.robot", "push", None, None, {"force": 1.0 / 3.0})
-    assert catalogue.typed(fault.text()).values["force"] == 1.0 / 3.0
+    CATALOGUE.load()
+    fault = CATALOGUE.fault("world.robot", "push", None, None, {"force": 1.0 / 3.0})
+    assert CATALOGUE.typed(fault.text()).values["force"] == 1.0 / 3.0
 
 
 def walk(capsys, *arguments):
@@ -189,8 +191,8 @@ def test_the_tables_of_the_document_are_those_of_the_catalogue():
 
 
 def test_every_parameter_has_a_source_limits_around_its_default_and_every_mode_a_meaning():
-    catalogue.load()
-    for (place_kind, name), kind in catalogue.MODES.items():
+    CATALOGUE.load()
+    for (place_kind, name), kind in MODES.items():
         assert kind.meaning, (place_kind, name)
         for parameter in kind.parameters:
             where = (place_kind, name, parameter.name)
@@ -205,12 +207,12 @@ def test_every_parameter_has_a_source_limits_around_its_default_and_every_mode_a
 
 
 def test_a_mode_or_a_place_that_is_there_already_is_refused():
-    catalogue.load()
-    kind = catalogue.MODES["robot", "push"]
+    CATALOGUE.load()
+    kind = MODES["robot", "push"]
     with pytest.raises(UserError, match="push at robot: it is in the catalogue already"):
-        catalogue.mode(kind)
+        mode(kind)
     with pytest.raises(UserError, match=r"world\.robot: it is in the catalogue already"):
-        catalogue.add_places([catalogue.PLACES["world.robot"]])
+        CATALOGUE.add_places([CATALOGUE.places["world.robot"]])
 
 
 TOLD = {

@@ -11,6 +11,7 @@ from plotly.offline import get_plotlyjs
 
 from ranger_sim import datatable
 from ranger_sim.harness import normal_errors
+from ranger_sim.harness.ranger_names import RANGER
 from ranger_sim.tools import unexpected
 from ranger_sim.tools.faults import fault_text
 from ranger_sim.tools.report import charts
@@ -165,7 +166,7 @@ def energy(summary: dict) -> dict:
 
 def errors(robot: Any, summary: dict) -> dict[str, list[dict]]:
     """{heading: rows} of the errors that boards noted, first those that a healthy walk has not."""
-    beyond = normal_errors.beyond(summary["errors"], summary["time_s"])
+    beyond = normal_errors.beyond(RANGER, summary["errors"], summary["time_s"])
     found: dict[str, list[dict]] = {"Unexpected": [], "As in every healthy walk": []}
     for board, names in summary["errors"].items():
         for name, count in names.items():

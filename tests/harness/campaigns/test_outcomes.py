@@ -7,9 +7,8 @@ import pytest
 from ranger_sim.datatable.generated import errors as error_table
 from ranger_sim.harness.campaigns import group, outcomes
 from ranger_sim.harness.campaigns.outcomes import Band, classify
-from ranger_sim.harness.faults.evidence import COLUMN
 from ranger_sim.harness.faults.proof import damage, gait, prove
-from tests.harness.faults.records import MS, STEP_MS, errors, record
+from tests.harness.faults.records import COLUMN, MS, STEP_MS, errors, record
 
 BEGAN = 1000 * MS
 LONG = 6000

@@ -211,15 +211,15 @@ def test_the_campaigns_that_come_with_the_project_can_be_read(path):
 
 
 def test_the_sensors_campaign_has_every_sensor_and_every_mode_that_it_takes():
-    from ranger_sim.harness.faults import catalogue
+    from ranger_sim.harness.faults.ranger_catalogue import CATALOGUE
 
-    catalogue.load()
+    CATALOGUE.load()
     found = {case.fault.partition("@")[0] for case in plan.load(ROOT / "campaigns" / "sensors.toml").cases()}
     sensors = ("encoder", "current", "voltage", "foot", "sensor", "imu")
     expected = {
         f"{place.name}:{mode}"
-        for place in catalogue.PLACES.values()
+        for place in CATALOGUE.places.values()
         if place.name.endswith(sensors)
-        for mode in catalogue.modes_of(place)
+        for mode in CATALOGUE.modes_of(place)
     }
     assert found == expected and len(found) > 300

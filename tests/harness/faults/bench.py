@@ -7,7 +7,8 @@ by step with one without.
 import math
 import types
 
-from ranger_sim.harness.faults import catalogue
+from ranger_sim.harness.conditions import condition
+from ranger_sim.harness.faults.ranger_catalogue import CATALOGUE
 from ranger_sim.plant.imu import HEADER_RATES, SET_MODE, SET_MODE_SECOND, SET_MODE_THIRD
 from ranger_sim.plant.incremental_encoder import IncrementalEncoder
 from ranger_sim.plant.ranger import RangerPlant
@@ -26,6 +27,13 @@ class Loop:
 class Bench:
     """Stands for a robot: `inject` and `step`. `seed`: of the faults' randomness."""
 
+    catalogue = CATALOGUE
+
+    @staticmethod
+    def condition(wanted):
+        """As Ranger.condition."""
+        return condition(wanted)
+
     def __init__(self, plant, seed=1):
         self.plant = plant
         self.seed = seed
@@ -36,7 +44,7 @@ class Bench:
 
     def inject(self, place, mode, at=None, until=None, **parameters):
         """As Ranger.inject; conditions are instants."""
-        fault = catalogue.fault(place, mode, at, until, parameters)
+        fault = CATALOGUE.fault(place, mode, at, until, parameters)
         fault.arm(self)
         self.faults.append(fault)
         return fault
@@ -101,7 +109,7 @@ class PlantBench(Bench):
     def after_the_step(self):
         plant = self.plant
         seen = {}
-        for place in catalogue.PLACES.values():
+        for place in CATALOGUE.places.values():
             details = place.details
             if "encoder" in details:
                 buffer = plant.encoders[details["encoder"]].edges
@@ -124,10 +132,10 @@ class EdgeBench(Bench):
     def __init__(self, angle, sign=1):
         self.encoder = IncrementalEncoder("test", 2048, 1.0, sign)
         self.angle = angle
-        self.leg = types.SimpleNamespace(angle=0.0, foot_angle=0.0, motor_angle=0.0)
-        other = types.SimpleNamespace(angle=0.0)
-        body = types.SimpleNamespace(outer=self.leg, inner=other)
-        plant = types.SimpleNamespace(encoders=[self.encoder] * 6, body=body, zero=0.0)
+        self.leg = types.SimpleNamespace(angle=0.0, foot_angle=0.0)
+        plant = types.SimpleNamespace(
+            encoders=[self.encoder] * 6, encoder_rad=lambda number: self.leg.angle + self.leg.foot_angle
+        )
         super().__init__(plant)
         self.place = self.PLACES[0 if sign > 0 else 1]
         self.sign = sign

@@ -4,11 +4,18 @@ import numpy as np
 
 from ranger_sim.datatable.generated import all_variables
 from ranger_sim.harness.conditions import STATE_VARIABLES
-from ranger_sim.harness.faults.evidence import COLUMN, Record
+from ranger_sim.harness.faults.error_rows import StateWord
+from ranger_sim.harness.faults.evidence import Record
+from ranger_sim.harness.ranger_names import RANGER
+from ranger_sim.plant.ranger import SAMPLES
 
 MS = 1_000_000
 BOARDS = ["MCH", "MCFO", "MB"]
-STATES = {machine: {0: "wait", 1: "swing", 2: "hold"} for machine in STATE_VARIABLES}
+MACHINES = {
+    machine: StateWord(all_variables.ID_OF[variable], {0: "wait", 1: "swing", 2: "hold"})
+    for machine, variable in STATE_VARIABLES.items()
+}
+COLUMN = {name: place for place, name in enumerate(SAMPLES, start=1)}  # of `Record.samples`
 STEP_MS = 500
 
 
@@ -32,7 +39,10 @@ def record(until_ms=2000):
         words=words,
         errors=np.zeros((0, 4), dtype=np.int64),
         boards=BOARDS,
-        states=STATES,
+        names=RANGER,
+        quantities=tuple(SAMPLES),
+        machines=MACHINES,
+        memory="MB",
     )
 
 

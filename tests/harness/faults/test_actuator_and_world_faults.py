@@ -5,7 +5,7 @@ import math
 import pytest
 
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.faults import catalogue
+from ranger_sim.harness.faults.ranger_catalogue import CATALOGUE
 from ranger_sim.plant import body_files
 from ranger_sim.plant import wiring_points as point
 from tests.harness.faults.bench import PlantBench
@@ -348,6 +348,6 @@ def test_a_slippery_floor_has_less_friction_until_its_end_and_needs_a_body_that_
 
 
 def test_every_place_of_actuators_and_world_has_a_mode():
-    catalogue.load()
-    for place in catalogue.PLACES.values():
-        assert catalogue.modes_of(place), place.name
+    CATALOGUE.load()
+    for place in CATALOGUE.places.values():
+        assert CATALOGUE.modes_of(place), place.name

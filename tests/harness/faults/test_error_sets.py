@@ -3,8 +3,8 @@
 import pytest
 
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.faults import catalogue
 from ranger_sim.harness.faults.error_sets import ErrorConfiguration, ErrorPort, ErrorSet
+from ranger_sim.harness.faults.ranger_catalogue import CATALOGUE
 from tests.harness.faults.bench import PlantBench
 
 
@@ -137,7 +137,7 @@ def test_a_fault_of_a_length_ends_so_long_after_it_began():
     fault = bench.inject("MCH.absolute_encoder", "offset", "10 ms", "+3 ms")
     bench.step(80)
     assert (fault.activated_ns, fault.ended_ns) == (10_000_000, 13_000_000)
-    assert catalogue.typed("MCH.absolute_encoder:offset@10 ms..+3 ms").text() == (
+    assert CATALOGUE.typed("MCH.absolute_encoder:offset@10 ms..+3 ms").text() == (
         "MCH.absolute_encoder:offset@10 ms..+3 ms"
     )
     with pytest.raises(UserError, match="its length '3'"):

@@ -6,7 +6,7 @@ import re
 
 import pytest
 
-from ranger_sim.harness.faults import catalogue
+from ranger_sim.harness.faults.ranger_catalogue import CATALOGUE
 
 PAGE = pathlib.Path(__file__).resolve().parents[3] / "docs/faults.md"
 PARAMETER = re.compile(r"`(\w+)`([^`()]*)\((\S+) to (\S+?)(?: [^()]*)?\)")
@@ -30,10 +30,10 @@ def told():
 
 
 def test_every_parameter_of_every_fault_has_the_limits_and_the_default_of_the_page():
-    catalogue.load()
+    CATALOGUE.load()
     compared = 0
     for place, mode, rows in told():
-        kind = catalogue.modes_of(catalogue.find(place))[mode]
+        kind = CATALOGUE.modes_of(CATALOGUE.find(place))[mode]
         declared = {each.name: each for each in kind.parameters}
         for name, default, low, high in rows:
             each = declared[name]
@@ -44,8 +44,8 @@ def test_every_parameter_of_every_fault_has_the_limits_and_the_default_of_the_pa
 
 
 def test_a_parameter_takes_its_limits_and_nothing_beyond():
-    catalogue.load()
-    share = catalogue.modes_of(catalogue.find("MCH.motor"))["short"].parameters[0]
+    CATALOGUE.load()
+    share = CATALOGUE.modes_of(CATALOGUE.find("MCH.motor"))["short"].parameters[0]
     assert share.checked("0", "here") == 0.0 and share.checked(0.95, "here") == 0.95
     for wrong in (-0.01, 0.96, "much", None, math.nan):
         with pytest.raises(Exception, match=r"^here: share is .*, allowed are 0 to 0.95$"):

@@ -8,7 +8,7 @@ from ranger_sim.can_bus.node import OPERATING
 from ranger_sim.datatable.generated import all_variables
 from ranger_sim.datatable.generated import errors as codes
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.faults import catalogue
+from ranger_sim.harness.faults.ranger_catalogue import CATALOGUE
 from ranger_sim.harness.ranger import Ranger
 from ranger_sim.harness.scenario import Scenario
 
@@ -226,5 +226,5 @@ def test_a_fault_that_is_armed_and_does_not_begin_changes_no_byte():
 
 
 def test_faults_are_typed_as_they_are_told():
-    fault = catalogue.typed("MCH.can1:ACK,frame=MCH_ANGLE,every=3@60 ms..70 ms")
+    fault = CATALOGUE.typed("MCH.can1:ACK,frame=MCH_ANGLE,every=3@60 ms..70 ms")
     assert fault.text() == "MCH.can1:ACK,frame=MCH_ANGLE,every=3@60 ms..70 ms"

@@ -10,9 +10,8 @@ from ranger_sim.datatable.generated import all_variables
 from ranger_sim.datatable.generated import errors as error_table
 from ranger_sim.datatable.packing import word_of_value
 from ranger_sim.harness.faults import proof
-from ranger_sim.harness.faults.evidence import COLUMN
 from ranger_sim.harness.faults.proof import Healthy
-from tests.harness.faults.records import MS, errors, frames, record, word
+from tests.harness.faults.records import COLUMN, MS, errors, frames, record, word
 
 SPIKE, LIMIT = error_table.AE_SPIKE, error_table.MC_PWM_LIMIT
 BEGAN = 1000 * MS

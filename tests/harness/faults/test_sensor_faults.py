@@ -11,7 +11,8 @@ import struct
 import pytest
 
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.faults import catalogue, places
+from ranger_sim.harness.faults import places
+from ranger_sim.harness.faults.ranger_catalogue import CATALOGUE
 from tests.harness.faults.bench import PlantBench
 
 START, END, LAST = 80, 160, 260  # steps: 20, 40 and 65 ms
@@ -26,12 +27,12 @@ PARAMETERS = {
     "lost_edges": {"share": 1.0},
     "scale": {"factor": 2.0},
 }
-catalogue.load()
+CATALOGUE.load()
 SENSORS = (
     places.EDGES, places.WORD, places.MOTOR_CURRENT, places.BATTERY_CURRENT, places.BATTERY_VOLTAGE, places.FOOT,
     places.STEERING_ANGLE, places.SUPPLY_CURRENT, places.SUPPLY_VOLTAGE, places.IMU,
 )  # fmt: skip
-HERE = [place for place in catalogue.PLACES.values() if place.kind in SENSORS]
+HERE = [place for place in CATALOGUE.places.values() if place.kind in SENSORS]
 
 
 @functools.cache
@@ -53,7 +54,7 @@ def differing(bench):
 
 
 @pytest.mark.parametrize(
-    ("place", "mode"), [(place.name, mode) for place in HERE for mode in catalogue.modes_of(place)], ids=str
+    ("place", "mode"), [(place.name, mode) for place in HERE for mode in CATALOGUE.modes_of(place)], ids=str
 )
 def test_it_differs_at_its_place_from_its_start_to_its_end_and_nowhere_else(place, mode):
     bench = PlantBench()
@@ -83,8 +84,8 @@ def test_every_kind_of_sensor_takes_every_mode_or_says_what_is_missing():
     )  # fmt: skip
     for place in HERE:
         for mode in asked:
-            taken = mode in catalogue.modes_of(place)
-            assert taken != bool(catalogue.refusal(place, mode)), (place.name, mode)
+            taken = mode in CATALOGUE.modes_of(place)
+            assert taken != bool(CATALOGUE.refusal(place, mode)), (place.name, mode)
 
 
 @pytest.mark.parametrize("place", [place.name for place in HERE if place.kind == places.WORD])

@@ -5,13 +5,15 @@ from types import SimpleNamespace as Made
 import pytest
 
 from ranger_sim.foundation.user_error import UserError
+from ranger_sim.harness.names import Names
+from ranger_sim.harness.ranger_names import RANGER
 from ranger_sim.harness.testing import frames
 
 
 def test_blocks_of_the_window_are_kept_and_passed_on():
     heard, flushed = [], []
     stream = Made(sink=lambda last_ns, block: heard.append((last_ns, block)), flush=lambda: flushed.append(1))
-    keeper = frames.FrameKeeper({"can0": stream}, window_s=2.0)
+    keeper = frames.FrameKeeper({"can0": stream}, Names(), window_s=2.0)
     assert flushed == [1] and keeper.window_ns == 2_000_000_000
     for last_s, block in ((1, b"a"), (2, b"b"), (3, b"c"), (4, b"d")):
         stream.sink(last_s * 10**9, block)
@@ -21,7 +23,7 @@ def test_blocks_of_the_window_are_kept_and_passed_on():
 
 def test_a_keeper_needs_no_other_listener_and_knows_its_buses():
     stream = Made(sink=None, flush=lambda: None)
-    keeper = frames.FrameKeeper({"can0": stream})
+    keeper = frames.FrameKeeper({"can0": stream}, Names())
     stream.sink(5, b"")
     assert len(keeper.blocks["can0"]) == 1
     with pytest.raises(UserError, match="^bus 'can9': there is none of this name, but can0$"):
@@ -29,6 +31,6 @@ def test_a_keeper_needs_no_other_listener_and_knows_its_buses():
 
 
 def test_a_variable_is_known_by_name_or_number():
-    assert frames.identifier_of(77) == 77
+    assert RANGER.identifier(77) == 77
     with pytest.raises(UserError, match="frame 'MCH_ANGEL': no variable .* meant was perhaps .*MCH_ANGLE"):
-        frames.identifier_of("MCH_ANGEL")
+        RANGER.identifier("MCH_ANGEL")

@@ -6,8 +6,10 @@ import pytest
 
 from ranger_sim.datatable.generated import errors as error_table
 from ranger_sim.foundation.user_error import UserError
+from ranger_sim.harness import wiring
 from ranger_sim.harness.normal_errors import BURST_S
 from ranger_sim.harness.ranger import Ranger
+from ranger_sim.harness.ranger_names import RANGER
 from ranger_sim.harness.scenario import Scenario
 from ranger_sim.harness.testing.health import Expected, Health, amount
 from ranger_sim.harness.testing.robots import assert_healthy, new_robot
@@ -165,6 +167,6 @@ def test_amounts_are_held_exactly():
 
 def test_an_error_that_the_table_has_not_cannot_be_expected():
     with pytest.raises(UserError, match="expected error 'AE_SPYKE': .*meant was perhaps AE_SPIKE"):
-        Expected(("AE_SPYKE",))
+        Expected(("AE_SPYKE",)).check(RANGER, wiring.BOARDS)
     with pytest.raises(UserError, match="board 'MCX' is none of MCH"):
-        Expected(("MCX:AE_SPIKE",))
+        Expected(("MCX:AE_SPIKE",)).check(RANGER, wiring.BOARDS)

@@ -7,6 +7,7 @@ from ranger_sim.foundation.numbers import word_of_float
 from ranger_sim.foundation.row_stream import FrameStream
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.ranger import Ranger
+from ranger_sim.harness.ranger_names import RANGER
 from ranger_sim.harness.scenario import Scenario
 from ranger_sim.harness.testing.figures import Observed
 from ranger_sim.harness.testing.frames import FrameKeeper
@@ -23,7 +24,7 @@ class Recording:
 
     def __init__(self):
         self.streams = {"can1": FrameStream(0), "can3": FrameStream(2)}
-        self.observed = Observed(FrameKeeper(self.streams))
+        self.observed = Observed(FrameKeeper(self.streams, RANGER))
 
     def add(self, name, identifier, *times_ns, value=0.5):
         for time_ns in times_ns:
@@ -134,7 +135,7 @@ def test_what_is_not_there_is_told_with_what_is_near(recording):
 
 def test_of_more_frames_than_fit_the_last_ones_are_kept():
     stream = FrameStream(0)
-    keeper = FrameKeeper({"can1": stream}, window_s=0.1)
+    keeper = FrameKeeper({"can1": stream}, RANGER, window_s=0.1)
     for number in range(4000):
         stream.add(number * MS, ANGLE, 8, 0, 0)
     kept = [frame.time_ns for frame in keeper.frames("can1")]

@@ -1,18 +1,17 @@
-"""The slots of a robot's board: where the recording of one begins, and which slots a condition of the robot selects."""
+"""The slots of a machine's board: where their recording begins, and which of them a condition selects."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any, Self
 
 import numpy as np
 
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.activity import activity_of
-from ranger_sim.harness.conditions import Condition, condition
 from ranger_sim.harness.step_watch import StepWatch
 from ranger_sim.harness.timing.recording import Recording
 from ranger_sim.harness.timing.slots import SlotView
+from ranger_sim.harness.waiting import Condition, Wanted
 
 
 class Held(StepWatch):
@@ -35,21 +34,21 @@ class Held(StepWatch):
         return held
 
 
-class RobotSlots(SlotView):
-    """The slots of a robot's board since the recording began, or a selection of them."""
+class MachineSlots(SlotView):
+    """The slots of a machine's board since the recording began, or a selection of them."""
 
     def __init__(self, recording: Recording, robot: Any) -> None:
         SlotView.__init__(self, recording)
         self.robot = robot
 
-    def where(self, wanted: str | Condition | Callable[[Any], Any]) -> Self:
-        """Only slots that begin while a condition holds (harness/conditions.py); it is looked at from now on."""
-        held = Held(self.robot, condition(wanted))
+    def where(self, wanted: Wanted) -> Self:
+        """Only slots that begin while a condition of the machine holds; it is looked at from now on."""
+        held = Held(self.robot, self.robot.condition(wanted))
         self.robot.loop.watchers.append(held)
         return self.during(f"where {held.wanted.text}", held.at)
 
 
-def slot_view(robot: Any, name: str) -> RobotSlots:
+def slot_view(robot: Any, name: str) -> MachineSlots:
     """Begin to record board `name` of `robot`, wherever it runs. UserError for a board that has no activity to show."""
     if name not in robot.boards:
         robot.board(name)  # says which there are
@@ -65,4 +64,4 @@ def slot_view(robot: Any, name: str) -> RobotSlots:
 
     begun_ns = robot.loop.time - robot.start_ns
     recording = Recording(robot.boards[name], robot.start_ns, begun_ns, find_log=find_log, find_board=find_board)
-    return RobotSlots(recording, robot)
+    return MachineSlots(recording, robot)

@@ -1,0 +1,75 @@
+"""Firmware in C for a board of any machine: compiled with the generated C of its master table."""
+
+import dataclasses
+import pathlib
+import re
+
+from ranger_sim.firmware_sim.native import build as compiling
+from ranger_sim.firmware_sim.native import manifest as manifests
+from ranger_sim.foundation.user_error import UserError
+
+GENERATED_C = pathlib.Path("generated") / "c"  # below a folder of master files
+VERSION_FILE = "ranger_table.h"
+
+
+@dataclasses.dataclass(frozen=True)
+class Firmware:
+    """A folder of firmware, built. `warnings` of the compiler; `sanitize`, `coverage`: how it was built.
+
+    table: folder of the generated C that it was compiled with.
+    """
+
+    folder: pathlib.Path
+    library: pathlib.Path
+    manifest: manifests.Manifest
+    table: pathlib.Path
+    warnings: tuple[str, ...] = ()
+    was_made: bool = True
+    sanitize: bool = False
+    coverage: bool = False
+
+
+def build(
+    folder: str | pathlib.Path, table: pathlib.Path | None = None, sanitize: bool = False, coverage: bool = False
+) -> Firmware:
+    """Compile a folder of firmware, with the generated C of the tables that it names, unless it is up to date.
+
+    The manifest's `master` says where that C is; without it, it is in `table`. UserError when it is not that of the
+    master files as they are now.
+    """
+    manifest = manifests.load(folder)
+    place = table if manifest.master is None else fresh_c(manifest.master)
+    if place is None:
+        raise UserError(f"{manifest.folder}: firmware.master is missing: the folder of the master table")
+    sources = []
+    for name in manifest.tables:
+        source = place / f"{name.lower()}_table.c"
+        if not source.is_file():
+            there = ", ".join(sorted(each.name.removesuffix("_table.c") for each in place.glob("*_table.c")))
+            raise UserError(f"{manifest.folder}: firmware.tables: no board {name!r}; there are {there}")
+        sources.append(source)
+    built = compiling.build(manifest, sanitize, coverage, compiling.Addition((place,), tuple(sources)))
+    return Firmware(manifest.folder, built.path, manifest, place, built.warnings, built.was_made, sanitize, coverage)
+
+
+def fresh_c(master: pathlib.Path) -> pathlib.Path:
+    """The generated C below a folder of master files. UserError when it was made of another state of them."""
+    from ranger_sim.datatable import generate
+    from ranger_sim.datatable.loader import load_table
+
+    stale = generate.stale(load_table(master), master / "generated")
+    if stale:
+        raise UserError(
+            f"{master}: what was generated is not of the table as it is now ({stale[0]}): "
+            f"ranger-sim table generate --master {master}"
+        )
+    return master / GENERATED_C
+
+
+def table_version(table: pathlib.Path) -> int:
+    """RANGER_TABLE_VERSION of a folder of generated C."""
+    path = table / VERSION_FILE
+    found = re.search(r"#define RANGER_TABLE_VERSION 0x([0-9A-F]{8})u", path.read_text(encoding="utf-8"))
+    if found is None:
+        raise UserError(f"{path}: no version; `ranger-sim table generate` writes it")
+    return int(found[1], 16)

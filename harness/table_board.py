@@ -1,0 +1,43 @@
+"""A board with firmware in C and variables of a master table. Apart from native_firmware.py: it loads cffi."""
+
+from typing import Any
+
+from ranger_sim.firmware_sim.native.hardware import Hardware
+from ranger_sim.firmware_sim.native.native_board import NativeBoard
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.harness.native_firmware import Firmware, table_version
+
+
+class TableBoard(NativeBoard):
+    """Board `name` with `firmware` from `power_up_ns` (ns) on; its CAN controller `controller` hangs on a bus.
+
+    UserError for a program that was compiled with another state of the table, or does not start its controller.
+    hardware: what hangs on its chip, where the manifest does not say.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        firmware: Firmware,
+        controller: int,
+        crystal: Any = None,
+        power_up_ns: int = 0,
+        hardware: Hardware | None = None,
+        version: int | None = None,
+    ) -> None:
+        given = firmware.manifest.hardware
+        NativeBoard.__init__(
+            self, name, firmware.library, crystal, power_up_ns, given if given is not None else hardware
+        )
+        wanted = table_version(firmware.table) if version is None else version
+        compiled = self.library.table_version
+        if compiled is not None and compiled != wanted:
+            raise UserError(
+                f"{firmware.library}: compiled with version 0x{compiled:08X} of the master table, "
+                f"this robot has 0x{wanted:08X}: build it again"
+            )
+        if controller and controller not in self.devices.cans:
+            raise UserError(
+                f"{firmware.library}: firmware_start() does not start CAN controller {controller}, "
+                f"on which {name}'s bus hangs (fw_can_start)"
+            )
