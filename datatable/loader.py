@@ -508,7 +508,7 @@ class VariableChecker:
                 report("bus", f"unknown bus {shown(name)}")
         for name in repeated(names):
             report("bus", f"{shown(name)} is named twice")
-        if number in XCP_IDS and names:
+        if self.routed and number in XCP_IDS and names:
             report(
                 "id", f"{number} is an identifier of XCP on CAN ({' and '.join(map(str, XCP_IDS))}); take another one"
             )
