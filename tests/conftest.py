@@ -15,6 +15,8 @@ register_profiles()
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
 COMPILERS = ("cc", "gcc", "clang")
+CROSS_COMPILERS = ("arm-none-eabi-gcc",)
+DEBUGGERS = ("gdb-multiarch", "arm-none-eabi-gdb")
 OURS = ("anon_inode", "pipe", "socket")  # kinds of descriptors that a test may leave open only by mistake
 
 # Files that take longest, the longest first: side by side they begin before the many short ones, so that at the end
@@ -70,8 +72,10 @@ def pytest_configure(config):
 
 
 def missing_for_ci():
-    """What tests would skip for in silence: a browser, a C compiler, the compiled library where it was asked for."""
-    missing = [names[0] for names in (BROWSERS, COMPILERS) if not any(map(shutil.which, names))]
+    """What tests would skip for in silence: a browser, C compilers, a debugger, the compiled library if asked for."""
+    missing = [
+        names[0] for names in (BROWSERS, COMPILERS, CROSS_COMPILERS, DEBUGGERS) if not any(map(shutil.which, names))
+    ]
     if not (loading.RUNS_COMPILED or loading.interpreted_is_forced()):
         missing.append(f"the compiled library ({loading.RUNS_INTERPRETED_BECAUSE})")
     return missing

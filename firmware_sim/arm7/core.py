@@ -99,7 +99,8 @@ class Core:
     both raise LookupError where nothing is. `lines` holds the two interrupt inputs (IRQ_LINE, FIQ_LINE), levels set by
     devices. `r` holds the registers of the present mode, `pc` the address of the next instruction (`r[15]` is only
     valid inside an instruction). `cycles` and `instructions` count from the start; `began` is what `cycles` was when
-    the present instruction began: devices take that as the instant of its accesses.
+    the present instruction began: devices take that as the instant of its accesses. The fields are so many
+    because a processor's state is, and because in one object what an instruction touches lies together in memory.
     """
 
     def __init__(
@@ -232,6 +233,10 @@ class Core:
         if mode == UNDEFINED:
             return 5
         return 0
+
+    def bank_now(self) -> int:
+        """Which of the six banks runs: 0 user and system, 1 FIQ, 2 IRQ, 3 supervisor, 4 abort, 5 undefined."""
+        return self.bank(self.control & 0x1F)
 
     def switch_mode(self, mode: cython.longlong) -> cython.int:
         old = self.bank(self.control & 0x1F)
@@ -526,16 +531,20 @@ class Core:
 
     def run_debugged(self, until: cython.longlong) -> cython.int:
         """As `run`."""
-        while self.cycles < until and not self.stopped:
-            if self.cycles >= self.next_look:
-                self.next_look = self.cycles + LOOK_CYCLES
-                self.debugger.look()
-            if self.armed:
-                self.debugged()
-                continue
-            if self.lines and self.interrupt():
-                continue
-            self.one()
+        try:
+            while self.cycles < until and not self.stopped:
+                if self.cycles >= self.next_look:
+                    self.next_look = self.cycles + LOOK_CYCLES
+                    self.debugger.poll()
+                if self.armed:
+                    self.debugged()
+                    continue
+                if self.lines and self.interrupt():
+                    continue
+                self.one()
+        except UserError as error:
+            self.halt(error)
+            raise
         return 0
 
     def debugged(self) -> cython.int:
@@ -559,11 +568,7 @@ class Core:
             self.passing = -1
         if self.stepping and self.return_pc < 0:
             self.stepping = 2
-        try:
-            self.one()
-        except UserError as error:
-            self.halt(error)
-            raise
+        self.one()
         if self.hit is not None:
             self.halt(None)
         return 0
@@ -573,7 +578,6 @@ class Core:
         self.stepping = 0
         self.return_pc = -1
         self.debugger.halted(error)
-        self.passing = self.pc
         self.hit = None
         self.rearm()
 
@@ -611,9 +615,10 @@ class Core:
             self.open_memory()
         self.rearm()
 
-    def set_step(self) -> None:
-        """Halt again after one instruction."""
-        self.stepping = 1
+    def go_on(self, step) -> None:
+        """What the debugger wants after a halt: on from here, over a point that may be here, or one instruction."""
+        self.passing = self.pc
+        self.stepping = 1 if step else 0
         self.rearm()
 
     def rearm(self) -> None:
