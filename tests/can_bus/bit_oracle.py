@@ -190,6 +190,7 @@ class Node:
         self.sent = []  # bits of it
         self.drive = RECESSIVE
         self.events = []  # (bit, what, ...)
+        self.failures = []  # (bit, Frame): it was sending that when it met an error
         self.recessive = 0
         self.sequences = 0
         self.count = 0
@@ -403,6 +404,8 @@ class Node:
         self.count = 0
         self.flag_level = None
         self.after_dominant = 0
+        if frame is not None:
+            self.failures.append((bit, frame))
         if frame is not None and frame.single_shot:
             self.drop(frame)
             self.events.append((bit, "single shot dropped", frame))

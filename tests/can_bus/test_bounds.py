@@ -234,6 +234,9 @@ def test_no_answer_exceeds_its_bound_over_random_sets():
     assert figures["sets"] == 120 and figures["exceeded"] == 0 and figures["unbounded"] == 0
     assert figures["worst_in_a_later_instance"] > 0  # else the corrected part of the analysis was not asked
     assert figures["reached_as_sent_90_percent"] > 0.99
+    for shares in ("reached", "reached_as_sent"):  # of the bounds, which nothing exceeds
+        assert 0.3 < figures[f"{shares}_min"] <= figures[f"{shares}_median"] <= 1.0
+    assert 2 * 120 <= figures["messages"] <= 12 * 120 and 0.2 < figures["load_mean"] < 0.95
     assert figures["reached_90_percent"] > 0.8  # short frames cannot have all the stuff bits that they are allowed
 
 

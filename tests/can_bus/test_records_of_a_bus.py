@@ -109,6 +109,10 @@ def test_every_request_ends_once_and_is_counted_as_it_ended(scenarios):
             for event in node.events
         )
         assert seen.ends[TX_LOST] == counters.single_shot_dropped == dropped
+        assert [node.retries for node in nodes] == [
+            sum(not frame.single_shot and bit not in off[number] for bit, frame in node.failures)
+            for number, node in enumerate(seen.nodes)
+        ]
         for of_bus, of_nodes in (
             (counters.flushed, "flushed"),
             (counters.aborted, "aborted"),

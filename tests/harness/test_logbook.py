@@ -140,7 +140,7 @@ def test_who_listens_gets_every_row_and_takes_none_away(mode, recorded):
 
 
 def test_the_digest_is_that_of_the_bytes_of_buses_and_body_in_order(recorded):
-    """As harness/recorder.py tells it: BLAKE2b-256 over a line and the digests of each bus's rows and of the samples."""
+    """harness/recorder.py: BLAKE2b-256 over a line and the digests of each bus's rows and of the samples."""
     _, recorder = recorded("none")
     parts = []
     for number in range(3):
