@@ -1,7 +1,7 @@
 """Tells the pytest plugin of ranger-sim which machine the fixture `machine` is."""
 
-from servo import Servo
+from servo import new
 
 
 def pytest_machine(wanted):
-    return Servo(**wanted)
+    return new(**wanted)

@@ -62,3 +62,8 @@ class Servo(Machine):
         stream = RandomStream(seed, f"board {name}")
         crystal = seeded_crystal(stream)
         return TableBoard(name, build(folder), 1, crystal, stream.integer(POWER_UP_SPREAD_NS))
+
+
+def new(seed: int = 1, log: str = "none", **numbers: float) -> Servo:
+    """One with these of its `Numbers`, as marks of tests and campaigns give them."""
+    return Servo(seed, Numbers(**numbers), log)

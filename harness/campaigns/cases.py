@@ -1,4 +1,4 @@
-"""One run of a campaign: what is set before power-up, and the fault; and the robot that it makes."""
+"""One run of a campaign: what is set before power-up, and the fault; and the machine that it makes."""
 
 import dataclasses
 import hashlib
@@ -10,6 +10,8 @@ from typing import Any
 
 from ranger_sim import __version__, datatable, loading
 from ranger_sim.foundation.user_error import UserError
+from ranger_sim.harness.campaigns.subjects import own_machine
+from ranger_sim.harness.campaigns.walks import WALKS
 from ranger_sim.harness.ranger import Ranger
 from ranger_sim.harness.scenario import Scenario
 
@@ -18,14 +20,18 @@ ROOMS = ("foundation", "datatable", "can_bus", "plant", "firmware_sim", "boards"
 SOURCES = {".py", ".pxd", ".toml", ".csv"}
 
 
-def version() -> str:
-    """Package version, table hash and digest of the sources: results of another version are not this one's."""
+def version(machine: str = "") -> str:
+    """Package version, table hash and digest of the sources: results of another version are not this one's.
+
+    machine: as of Settings; its own files count as well.
+    """
     total = hashlib.blake2b(digest_size=16)
     for room in ROOMS:
         for path in sorted((loading.HOUSE / room).rglob("*")):
             if path.suffix in SOURCES and "__pycache__" not in path.parts:
                 total.update(path.relative_to(loading.HOUSE).as_posix().encode() + b"\0" + path.read_bytes() + b"\0")
-    return f"{__version__}+{datatable.table_hash()[:12]}.{total.hexdigest()[:16]}"
+    own = subject_of(machine).version()
+    return f"{__version__}+{datatable.table_hash()[:12]}.{total.hexdigest()[:16]}" + (f".{own}" if own else "")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -33,37 +39,35 @@ class Settings:
     """What is set before power-up.
 
     walk: fields of Scenario; controller, body: single values over those of the sets that `walk` names; costs:
-    {"MCH.mc_compliant_control": factor} on the modelled cycles of a task.
+    {"MCH.mc_compliant_control": factor} on the modelled cycles of a task. machine: FILE.py:NAME of the user's own one
+    (subjects.py); `walk` then has its keywords. Empty: Ranger.
     """
 
     walk: dict[str, Any] = dataclasses.field(default_factory=dict)
     controller: dict[str, float] = dataclasses.field(default_factory=dict)
     body: dict[str, float] = dataclasses.field(default_factory=dict)
     costs: dict[str, float] = dataclasses.field(default_factory=dict)
+    machine: str = ""
+
+    @property
+    def subject(self) -> Any:
+        """What it is of: makes it, knows its faults, judges it."""
+        return subject_of(self.machine)
 
     def as_dict(self) -> dict[str, Any]:
         """As JSON can carry it; the same settings give the same text."""
-        return {name: dict(sorted(value.items())) for name, value in dataclasses.asdict(self).items()}
+        found: dict[str, Any] = {
+            name: dict(sorted(value.items())) for name, value in dataclasses.asdict(self).items() if name != "machine"
+        }
+        return {**found, "machine": self.machine} if self.machine else found
 
     def text(self) -> str:
         """Canonical, for keys and for grouping."""
         return json.dumps(self.as_dict(), sort_keys=True)
 
-    def robot(self) -> Ranger:
-        """A fresh robot with these settings. UserError for what it does not have."""
-        with tempfile.TemporaryDirectory(prefix="ranger-sim-campaign-") as name:
-            folder = pathlib.Path(name)
-            walk = dict(self.walk)
-            if self.controller:
-                base = walk.get("controller", Scenario.controller)
-                walk["controller"] = written(folder / "controller.toml", base, self.controller, "reasons")
-            if self.body:
-                base = walk.get("body", Scenario.body)
-                walk["body"] = written(folder / "body.toml", base, self.body, "sources")
-            try:
-                robot = Ranger(Scenario(**walk))
-            except TypeError as error:
-                raise UserError(f"campaign: walk: {error}") from None
+    def robot(self) -> Any:
+        """A fresh robot, or machine, with these settings. UserError for what it does not have."""
+        robot = self.subject.machine(self.walk) if self.machine else self._ranger()
         for task, factor in self.costs.items():
             board, _, entry = task.partition(".")
             if board not in robot.boards:
@@ -76,6 +80,26 @@ class Settings:
                 raise UserError(f"campaign: cost.{task} is {factor:g}, a factor of 0 or more is expected")
             found.cost, found.per_item = round(found.cost * factor), round(found.per_item * factor)
         return robot
+
+    def _ranger(self) -> Ranger:
+        with tempfile.TemporaryDirectory(prefix="ranger-sim-campaign-") as name:
+            folder = pathlib.Path(name)
+            walk = dict(self.walk)
+            if self.controller:
+                base = walk.get("controller", Scenario.controller)
+                walk["controller"] = written(folder / "controller.toml", base, self.controller, "reasons")
+            if self.body:
+                base = walk.get("body", Scenario.body)
+                walk["body"] = written(folder / "body.toml", base, self.body, "sources")
+            try:
+                return Ranger(Scenario(**walk))
+            except TypeError as error:
+                raise UserError(f"campaign: walk: {error}") from None
+
+
+def subject_of(machine: str) -> Any:
+    """Of Settings.machine."""
+    return own_machine(machine) if machine else WALKS
 
 
 def written(path: pathlib.Path, base: str, values: dict[str, float], explained: str) -> str:
@@ -101,9 +125,13 @@ class Case:
 
     def key(self, version: str, watch: dict[str, Any]) -> str:
         """By this a result is known: what was run, by which version, and how it was watched."""
-        whole = {"settings": self.settings.as_dict(), "fault": self.fault, "version": version, "watch": watch}
+        settings = self.settings.as_dict()
+        whole: dict[str, Any] = {"settings": settings, "fault": self.fault, "version": version, "watch": watch}
         if self.reference is not None:
             whole["reference"] = self.reference.as_dict()
+        if self.settings.machine:  # wherever its folder is; what is in it, the version says
+            for each in (settings, whole.get("reference", {})):
+                each.pop("machine", None)
         return hashlib.blake2b(json.dumps(whole, sort_keys=True).encode(), digest_size=10).hexdigest()
 
     def golden(self) -> Settings:

@@ -36,7 +36,7 @@ class Campaign:
     def __init__(self, plan: Plan, folder: pathlib.Path) -> None:
         self.plan = plan
         self.folder = folder
-        self.version = version()
+        self.version = version(plan.machine)
         self.store = Store(jsonl(folder))
         self.cases: list[Case] = []
         self.stopped_at: int | None = None  # look at which a sample had told enough

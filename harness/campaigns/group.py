@@ -21,21 +21,21 @@ from ranger_sim.foundation import wallclock
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.branching import BranchError, branch, die_with
 from ranger_sim.harness.campaigns.cases import Case, Settings, version
-from ranger_sim.harness.campaigns.outcomes import Band, against_fallen, classify, deviation
-from ranger_sim.harness.conditions import condition
+from ranger_sim.harness.campaigns.outcomes import Band
 from ranger_sim.harness.faults import text as typed_text
 from ranger_sim.harness.faults.evidence import Evidence, Record
-from ranger_sim.harness.faults.proof import Difference, Healthy, Proof, Reaction, damage, false_alarms, gait, prove
-from ranger_sim.harness.faults.ranger_catalogue import CATALOGUE
-from ranger_sim.harness.ranger import GRID_NS, Ranger
-from ranger_sim.harness.scenario import StopRule
+from ranger_sim.harness.faults.proof import Difference, Healthy, Proof, Reaction, false_alarms, gait, prove
+from ranger_sim.harness.machine import GRID_NS, Machine
 from ranger_sim.harness.step_watch import StepWatch
+from ranger_sim.harness.stop_rule import StopRule
 
 # Before the fault begins, so that what looks back a little (a delay line, the last edge) has something to look at:
 # chosen by us, a tenth of a step.
 BRANCH_EARLY_NS = 60_000_000
 SLICE_NS = 250_000_000
 WALL_PER_CPU = 20.0  # a run that got so little of the processor hangs
+
+BAND = tuple(field.name for field in dataclasses.fields(Band))  # of Ranger's walks
 
 Result = dict[str, Any]
 
@@ -44,14 +44,15 @@ Result = dict[str, Any]
 class Watch:
     """How runs are watched: `after_s` from the fault's start on; golden runs look for starts until `patience_s`.
 
-    from_s: where the gait of a run without a fault is judged from. limit_s: of computing, per run.
+    from_s: where the gait of a run without a fault is judged from. limit_s: of computing, per run. band: of a machine
+    of one's own {quantity: how far it may be from the golden run's}.
     """
 
     after_s: float = 7.0
     from_s: float = 5.0
     patience_s: float = 30.0
     limit_s: float = 300.0
-    band: Band = dataclasses.field(default_factory=Band)
+    band: Band | dict[str, float] = dataclasses.field(default_factory=Band)
 
     def as_dict(self) -> dict[str, Any]:
         """As JSON can carry it."""
@@ -60,16 +61,17 @@ class Watch:
     @classmethod
     def from_dict(cls, found: dict[str, Any]) -> "Watch":
         """The same from what `as_dict` gave."""
-        return cls(**{**found, "band": Band(**found["band"])})
+        band = found["band"]
+        return cls(**{**found, "band": Band(**band) if set(band) == set(BAND) else band})
 
 
 class Probe(StepWatch):
     """When a start condition first holds in a run without the fault, `met_ns`; -1: not yet."""
 
-    def __init__(self, robot: Ranger, text: str) -> None:
+    def __init__(self, robot: Machine, text: str) -> None:
         StepWatch.__init__(self)
         self.robot = robot
-        self.wanted = condition(text)
+        self.wanted = robot.condition(text)
         self.wanted.begin(robot)
         self.met_ns = -1
 
@@ -92,7 +94,7 @@ def start_of(fault: str) -> str:
     return typed_text.parse(fault).start or "0 s"
 
 
-def walk_until(robot: Ranger, end_ns: int) -> None:
+def walk_until(robot: Machine, end_ns: int) -> None:
     """Pass time until `end_ns`, or until the robot falls."""
     while robot.loop.time < end_ns and not robot.ended:
         robot.run(StopRule(time_s=(end_ns - robot.start_ns) * 1e-9), (end_ns - robot.loop.time) * 1e-9)
@@ -102,6 +104,7 @@ class Golden:
     """The golden run of a group: its record, when each start came, and what its gait is from there on."""
 
     def __init__(self, settings: Settings, starts: set[str], watch: Watch) -> None:
+        self.subject = settings.subject
         robot = settings.robot()
         evidence = Evidence(robot)
         probes = {text: Probe(robot, text) for text in sorted(starts)}
@@ -143,17 +146,17 @@ def run_group(request: dict[str, Any], emit: Callable[[Result], None]) -> None:
     (name and digest, or None), cases: [{key, fault, settings}].
     UserError when this installation has other sources than the one that asks.
     """
-    if request["version"] != version():
-        raise UserError(f"campaign: this worker runs {version()}, asked for is {request['version']}")
+    settings = Settings(**request["settings"])
+    here = version(settings.machine)
+    if request["version"] != here:
+        raise UserError(f"campaign: this worker runs {here}, asked for is {request['version']}")
     if request.get("fault_module"):
         name, digest = request["fault_module"]
-        CATALOGUE.load()
-        CATALOGUE.load_file(name)
+        settings.subject.catalogue.load_file(name)
         if digest_of(name) != digest:
             raise UserError(f"campaign: fault module {name}: it is not the file that was asked for")
     watch = Watch.from_dict(request["watch"])
     healthy = Healthy.from_dict(request["healthy"]) if request.get("healthy") else None
-    settings = Settings(**request["settings"])
     cases = request["cases"]
     golden = Golden(settings, {start_of(each["fault"]) for each in cases if each["fault"]}, watch)
     for case in cases:
@@ -191,11 +194,11 @@ def finished(case: dict[str, Any], work: Callable[[], Result], watch: Watch) -> 
 
 
 def fault_run(
-    text: str, robot: Ranger, evidence: Evidence, golden: Golden, healthy: Healthy | None, watch: Watch
+    text: str, robot: Machine, evidence: Evidence, golden: Golden, healthy: Healthy | None, watch: Watch
 ) -> Result:
     """In the branch: inject, walk on, and hold the record against the golden one."""
     try:
-        fault = robot.arm(CATALOGUE.typed(text))
+        fault = robot.arm(robot.catalogue.typed(text))
     except UserError as refused:
         return {"outcome": "invalid", "why": f"refused: {refused}"}
     start_ns = golden.starts[start_of(text)]
@@ -206,7 +209,7 @@ def fault_run(
     proof = prove(golden.record, record, began_ns, fault.acted, normal)
     until = golden.record.until(start_ns + round(watch.after_s * 1e9))
     return {
-        **judged(proof, until, record, began_ns, watch),
+        **judged(golden.subject, proof, until, record, began_ns, watch),
         "fault": {name: rounded(value) for name, value in fault.summary().items()},
         "digest": robot.trace_digest(),
         "cpu_s": round(wallclock.process_cpu_s(), 3),
@@ -238,14 +241,14 @@ def sweep_run(case: dict[str, Any], golden: Golden, healthy: Healthy | None, wat
     normal = golden.healthy(healthy, end_ns)
     proof = prove(golden.record, record, robot.start_ns, True, normal)
     return {
-        **judged(proof, golden.record.until(end_ns), record, since_ns, watch, is_sweep=True),
+        **judged(golden.subject, proof, golden.record.until(end_ns), record, since_ns, watch, is_sweep=True),
         "slots": slots_of(robot),
         "digest": robot.trace_digest(),
         "cpu_s": round(wallclock.process_cpu_s(), 3),
     }
 
 
-def slots_of(robot: Ranger) -> Result:
+def slots_of(robot: Machine) -> Result:
     """{board: {margin, overruns}} since power-up; margin: the share of its slot that the longest one left."""
     told = {}
     for board, counted in robot.counters().items():
@@ -255,17 +258,14 @@ def slots_of(robot: Ranger) -> Result:
     return told
 
 
-def judged(proof: Proof, golden: Record, record: Record, since_ns: int, watch: Watch, is_sweep: bool = False) -> Result:
+def judged(
+    subject: Any, proof: Proof, golden: Record, record: Record, since_ns: int, watch: Watch, is_sweep: bool = False
+) -> Result:
     """Outcome, reason and what the proof has, as JSON can carry it; times in ms from the fault's start.
 
     golden: its record until the instant at which this run was to end.
     """
-    here = gait(record, since_ns)
-    there = gait(golden, since_ns, record.end_ns)
-    outcome, why = classify(proof, here, there, damage(record, since_ns), watch.band)
-    if outcome != "invalid":
-        fell_ms = None if golden.fell_ns < 0 else (golden.fell_ns - since_ns) * 1e-6
-        outcome, why = against_fallen(outcome, why, fell_ms, golden.fall_cause, is_sweep)
+    verdict = subject.judge(proof, golden, record, since_ns, watch.band, is_sweep)
 
     def difference(found: Difference | None) -> Result | None:
         if found is None:
@@ -279,8 +279,8 @@ def judged(proof: Proof, golden: Record, record: Record, since_ns: int, watch: W
         return {**words, "ms": rounded(proof.after_ms(found))}
 
     return {
-        "outcome": outcome,
-        "why": why,
+        "outcome": verdict["outcome"],
+        "why": verdict["why"],
         "first": difference(proof.first),
         "first_firmware": difference(proof.first_firmware),
         "detected": [
@@ -290,9 +290,9 @@ def judged(proof: Proof, golden: Record, record: Record, since_ns: int, watch: W
         "reaction": change(proof.reaction),
         "unusual": change(proof.unusual),
         "fall_ms": rounded(proof.fall_ms),
-        "gait": {name: rounded(value) for name, value in dataclasses.asdict(here).items()},
-        "golden_gait": {name: rounded(value) for name, value in dataclasses.asdict(there).items()},
-        "deviation": rounded(deviation(here, there, watch.band)),
+        "gait": {name: rounded(value) for name, value in verdict["gait"].items()},
+        "golden_gait": {name: rounded(value) for name, value in verdict["golden_gait"].items()},
+        "deviation": rounded(verdict["deviation"]),
     }
 
 
@@ -305,16 +305,17 @@ def healthy_walks(settings: Settings, seeds: list[int], watch: Watch) -> Result:
     """What walks of these seeds without a fault raise, and how often the rule for detection would cry wolf at them."""
     records = []
     falls = []
+    starts_s = settings.subject.starts_s
     for seed in seeds:
         of_seed = dataclasses.replace(settings, walk={**settings.walk, "seed": seed})
-        golden = Golden(of_seed, set(), dataclasses.replace(watch, from_s=max(watch.from_s, 7.0)))
+        golden = Golden(of_seed, set(), dataclasses.replace(watch, from_s=max(watch.from_s, starts_s[-1])))
         if golden.record.fell_ns >= 0:
             falls.append(seed)
         else:
             records.append(golden.record)
-    starts = [round(each * 1e9) for each in (4.0, 5.0, 6.0, 7.0)]
+    starts = [round(each * 1e9) for each in starts_s]
     count, total, which = false_alarms(records, starts) if len(records) > 1 else (0, 0, [])
-    gaits = [dataclasses.asdict(gait(record, starts[-1])) for record in records]
+    gaits = [] if settings.machine else [dataclasses.asdict(gait(record, starts[-1])) for record in records]
     return {
         "healthy": Healthy.of(records).as_dict(),
         "seeds": [seed for seed in seeds if seed not in falls],

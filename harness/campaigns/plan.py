@@ -16,16 +16,15 @@ from typing import Any
 from ranger_sim.foundation.quantities import LENGTHS, SHARES, in_base_units, nanoseconds
 from ranger_sim.foundation.random_stream import RandomStream
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.campaigns.cases import Case, Settings
+from ranger_sim.harness.campaigns.cases import Case, Settings, subject_of
 from ranger_sim.harness.campaigns.group import Watch, digest_of, rounded, start_of
 from ranger_sim.harness.campaigns.outcomes import OUTCOMES, Band, severity
 from ranger_sim.harness.campaigns.statistics import CONFIDENCE, INTERVALS, Stopping
-from ranger_sim.harness.conditions import condition
-from ranger_sim.harness.faults.ranger_catalogue import CATALOGUE
+from ranger_sim.harness.faults.catalogue import Catalogue
 from ranger_sim.harness.scenario import Scenario
 
 TEXTS = ("title", "description", "fault_module")
-TABLES = (*TEXTS, "walk", "watch", "band", "healthy", "vary", "faults", "tolerance", "sample", "search")
+TABLES = (*TEXTS, "walk", "machine", "watch", "band", "healthy", "vary", "faults", "tolerance", "sample", "search")
 # What may stand in [walk] and, with several values, in [vary]: the field of Scenario, and its units.
 WALK: dict[str, tuple[str, dict[str, float] | None]] = {
     "controller": ("controller", None),
@@ -38,6 +37,7 @@ WALK: dict[str, tuple[str, dict[str, float] | None]] = {
     "battery_capacity": ("battery_capacity_Wh", {"Wh": 1.0}),
 }
 PREFIXES = ("controller.", "body.", "cost.")
+OWN_PREFIXES = ("machine.", "cost.")  # of a machine of one's own
 MOST_RUNS = 1_000_000
 MOST_CHECKED = 10_000  # texts of one fault that are read before anything runs; of more, so many
 
@@ -150,6 +150,12 @@ class Plan:
     sample: Sample | None = None
     search: Search | None = None
     fault_module: str | None = None  # a user's file of modes and places
+    machine: str = ""  # FILE.py:NAME of the user's own, whose keywords `walk` has; empty: Ranger
+
+    @property
+    def subject(self) -> Any:
+        """What the runs are of (subjects.py)."""
+        return subject_of(self.machine)
 
     @property
     def name(self) -> str:
@@ -183,7 +189,9 @@ class Plan:
         """The run at one value per axis. UserError when a fault's text is not in the catalogue."""
         walk, controller, body, costs = dict(self.walk), {}, {}, {}
         for name, value in point.items():
-            if name in WALK:
+            if self.machine and (name == "seed" or name.startswith("machine.")):
+                walk[name.removeprefix("machine.")] = value
+            elif not self.machine and name in WALK:
                 walk[WALK[name][0]] = walk_value(name, value, self.path)
             elif name.startswith("controller."):
                 controller[name.partition(".")[2]] = float(value)
@@ -192,12 +200,12 @@ class Plan:
             elif name.startswith("cost."):
                 costs[name.partition(".")[2]] = float(value)
         walk = {"seed": 1} | walk
-        settings = Settings(walk, controller, body, costs)
+        settings = Settings(walk, controller, body, costs, self.machine)
         fault = point.get("fault")
         if fault:
             text = str(fault).format_map({name: shown(value) for name, value in point.items()})
             return Case(settings, text, None, point)
-        base = Settings({**self.walk, "seed": walk["seed"]})
+        base = Settings({**self.walk, "seed": walk["seed"]}, machine=self.machine)
         return Case(settings, None, base, point)
 
     def census(self) -> Iterator[Case]:
@@ -265,12 +273,15 @@ def load(name: str | pathlib.Path) -> Plan:
 def of_data(data: dict[str, Any], path: str) -> Plan:
     """The plan in a file's content."""
     only(data, TABLES, path)
-    module = module_of(data, path)
-    walk = table(data, "walk", path)
-    only(walk, tuple(WALK), f"{path}: [walk]")
-    fields = {WALK[name][0]: walk_value(name, value, path) for name, value in walk.items()}
-    check_settings(Settings(fields), f"{path}: [walk]")
-    axes = axes_of(data, path)
+    machine, fields = machine_of(data, path)
+    subject = subject_of(machine)
+    module = module_of(data, path, subject)
+    if not machine:
+        walk = table(data, "walk", path)
+        only(walk, tuple(WALK), f"{path}: [walk]")
+        fields = {WALK[name][0]: walk_value(name, value, path) for name, value in walk.items()}
+    check_settings(Settings(fields, machine=machine), f"{path}: [{'machine' if machine else 'walk'}]")
+    axes = axes_of(data, path, machine)
     sample = sample_of(data, path)
     search = search_of(data, path)
     if sample and search:
@@ -306,20 +317,39 @@ def of_data(data: dict[str, Any], path: str) -> Plan:
         title=text(data, "title", path, pathlib.Path(path).stem),
         description=text(data, "description", path, ""),
         walk=fields,
-        watch=watch_of(data, path),
+        watch=watch_of(data, path, machine),
         healthy_seeds=tuple(seeds),
         axes=axes,
         tolerances=tolerances,
         sample=sample,
         search=search,
         fault_module=module,
+        machine=machine,
     )
     check_axes(plan)
     check_faults(plan)
     return plan
 
 
-def module_of(data: dict[str, Any], path: str) -> str | None:
+def machine_of(data: dict[str, Any], path: str) -> tuple[str, dict[str, Any]]:
+    """[machine]: (FILE.py:NAME with the whole path, the keywords that all runs have); ("", {}) without it."""
+    if "machine" not in data:
+        return "", {}
+    found = dict(table(data, "machine", path))
+    if "walk" in data:
+        raise UserError(f"{path}: [walk] and [machine]: one of them; [walk] is Ranger's")
+    make = found.pop("make", None)
+    if not isinstance(make, str) or not make:
+        raise UserError(f"{path}: [machine] make = {make!r}: FILE.py:NAME is expected, relative to the plan")
+    try:
+        machine = str((pathlib.Path(path).parent / make).resolve())
+        subject_of(machine)
+    except (UserError, ValueError) as error:
+        raise UserError(f"{path}: {error}") from None
+    return machine, found
+
+
+def module_of(data: dict[str, Any], path: str, subject: Any) -> str | None:
     """`fault_module`, a file beside the plan: its modes and places are in the catalogue from here on."""
     name = data.get("fault_module")
     if name is None:
@@ -327,9 +357,8 @@ def module_of(data: dict[str, Any], path: str) -> str | None:
     if not isinstance(name, str) or not name:
         raise UserError(f"{path}: fault_module = {name!r}: the name of a .py file is expected, relative to the plan")
     found = (pathlib.Path(path).parent / name).resolve()
-    CATALOGUE.load()
     try:
-        CATALOGUE.load_file(found)
+        subject.catalogue.load_file(found)
     except UserError as error:
         raise UserError(f"{path}: {error}") from None
     return str(found)
@@ -338,8 +367,9 @@ def module_of(data: dict[str, Any], path: str) -> str | None:
 def check_settings(settings: Settings, where: str) -> None:
     """UserError, naming `where`, for settings of which no robot can be made."""
     try:
-        Scenario(**settings.walk)
-        settings.robot()
+        if not settings.machine:
+            Scenario(**settings.walk)
+        settings.robot().close()
     except UserError as error:
         raise UserError(f"{where}: {error}") from None
 
@@ -347,7 +377,7 @@ def check_settings(settings: Settings, where: str) -> None:
 def check_axes(plan: Plan) -> None:
     """UserError for a value of [vary] with which no robot can be made, before anything is run: names, and both ends."""
     for name, values in plan.axes.items():
-        if name not in WALK and not name.startswith(PREFIXES):
+        if not is_setting(name, plan.machine):
             continue
         some = ends(values) if not isinstance(ends(values)[0], str) else values
         for value in some:  # type: ignore[union-attr]
@@ -377,8 +407,8 @@ def check_faults(plan: Plan) -> None:
             except (ValueError, IndexError, AttributeError) as error:
                 raise UserError(f"{plan.path}: fault {fault!r}: {error}") from None
             try:
-                condition(start_of(text))
-                CATALOGUE.typed(text)
+                plan.subject.condition(start_of(text))
+                plan.subject.catalogue.typed(text)
             except UserError as error:
                 raise UserError(f"{plan.path}: {error}") from None
 
@@ -391,7 +421,14 @@ def names_in(fault: str, path: str) -> set[str]:
         raise UserError(f"{path}: fault {fault!r}: {error}") from None
 
 
-def axes_of(data: dict[str, Any], path: str) -> dict[str, list[Any] | Range]:
+def is_setting(name: str, machine: str) -> bool:
+    """Whether an axis is something that is set before power-up, and not a name in a fault's text."""
+    if machine:
+        return name == "seed" or name.startswith(OWN_PREFIXES)
+    return name in WALK or name.startswith(PREFIXES)
+
+
+def axes_of(data: dict[str, Any], path: str, machine: str = "") -> dict[str, list[Any] | Range]:
     """[vary], and the faults of [[faults]] as its axis `fault`."""
     axes: dict[str, list[Any] | Range] = {}
     for name, values in flattened(table(data, "vary", path)).items():
@@ -399,7 +436,7 @@ def axes_of(data: dict[str, Any], path: str) -> dict[str, list[Any] | Range]:
     groups = data.get("faults", [])
     if not isinstance(groups, list):
         raise UserError(f"{path}: faults = {groups!r}: tables [[faults]] are expected")
-    listed = [fault for group in groups for fault in faults_of(group, path)]
+    listed = [fault for group in groups for fault in faults_of(group, path, subject_of(machine).catalogue)]
     if listed:
         if "fault" in axes:
             raise UserError(f"{path}: [vary] fault and [[faults]]: one of them")
@@ -408,11 +445,17 @@ def axes_of(data: dict[str, Any], path: str) -> dict[str, list[Any] | Range]:
     for fault in axes.get("fault", []):  # type: ignore[union-attr]
         used |= names_in(fault, path)
     for name in axes:
-        if name not in WALK and name != "fault" and not name.startswith(PREFIXES) and name not in used:
+        if name == "fault" or name in used or is_setting(name, machine):
+            continue
+        if machine:
             raise UserError(
-                f"{path}: [vary] {name}: it is no setting of a walk ({', '.join(WALK)}, controller.PARAMETER, "
-                f"body.PARAMETER, cost.BOARD.TASK) and no fault's text has {{{name}}}"
+                f"{path}: [vary] {name}: it is no setting (seed, machine.KEYWORD, cost.BOARD.TASK) and no fault's text "
+                f"has {{{name}}}"
             )
+        raise UserError(
+            f"{path}: [vary] {name}: it is no setting of a walk ({', '.join(WALK)}, controller.PARAMETER, "
+            f"body.PARAMETER, cost.BOARD.TASK) and no fault's text has {{{name}}}"
+        )
     return axes
 
 
@@ -465,7 +508,7 @@ def number(value: Any) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 
-def faults_of(group: Any, path: str) -> Iterator[str]:
+def faults_of(group: Any, path: str, catalogue: Catalogue) -> Iterator[str]:
     """The faults of one [[faults]]: every mode at every place that takes it, both by patterns with * and ?."""
     where = f"{path}: [[faults]]"
     if not isinstance(group, dict):
@@ -477,12 +520,11 @@ def faults_of(group: Any, path: str) -> Iterator[str]:
     without = patterns(group, "without", where, [])
     period = group.get("period", "")
     values = "".join(f",{name}={value}" for name, value in table(group, "values", where).items())
-    CATALOGUE.load()
     count = 0
-    for place in CATALOGUE.places.values():
+    for place in catalogue.places.values():
         if not matches(place.name, places) or not matches(place.kind, kinds):
             continue
-        for mode in sorted(CATALOGUE.modes_of(place)):
+        for mode in sorted(catalogue.modes_of(place)):
             text = f"{place.name}:{mode}"
             if matches(mode, modes) and not matches(text, without):
                 count += 1
@@ -505,8 +547,9 @@ def matches(name: str, listed: list[str]) -> bool:
     return any(fnmatch.fnmatchcase(name, each) for each in listed)
 
 
-def watch_of(data: dict[str, Any], path: str) -> Watch:
+def watch_of(data: dict[str, Any], path: str, machine: str = "") -> Watch:
     """[watch] and [band]."""
+    subject = subject_of(machine)
     found = table(data, "watch", path)
     only(found, ("after", "from", "patience", "limit"), f"{path}: [watch]")
     times = {f"{name}_s": nanoseconds(value, f"{path}: [watch] {name}") * 1e-9 for name, value in found.items()}
@@ -514,6 +557,16 @@ def watch_of(data: dict[str, Any], path: str) -> Watch:
         if times.get(f"{name}_s") == 0.0:
             raise UserError(f"{path}: [watch] {name} = {found[name]!r}: it must be above 0")
     band = table(data, "band", path)
+    if machine:
+        for name, value in band.items():
+            if not number(value) or not 0.0 < value < math.inf:
+                raise UserError(f"{path}: [band] {name} = {value!r}: a number above 0 is expected, in its unit")
+        try:
+            subject.check_band(band)
+        except UserError as error:
+            raise UserError(f"{path}: {error}") from None
+        usual = {"after_s": subject.after_s, "from_s": subject.from_s, "patience_s": subject.patience_s}
+        return Watch(**{**usual, **times}, band={name: float(value) for name, value in band.items()})
     names = tuple(field.name for field in dataclasses.fields(Band))
     only(band, names, f"{path}: [band]")
     shares = {}

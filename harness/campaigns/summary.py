@@ -9,7 +9,7 @@ from typing import Any
 
 from ranger_sim.harness.campaigns.cases import Case
 from ranger_sim.harness.campaigns.engine import Campaign
-from ranger_sim.harness.campaigns.outcomes import CRITERIA, OUTCOMES, SEVERITY, severity
+from ranger_sim.harness.campaigns.outcomes import OUTCOMES, SEVERITY, severity
 from ranger_sim.harness.campaigns.plan import WALK, Plan, Range, Tolerance
 from ranger_sim.harness.campaigns.statistics import (
     INTERVALS,
@@ -49,9 +49,10 @@ def of(campaign: Campaign) -> dict[str, Any]:
         "finished": is_finished(campaign, rows),
         "stopped_at_look": campaign.stopped_at,
         "interval": interval_text(plan, is_finished(campaign, rows)),
-        "criteria": CRITERIA,
+        "criteria": plan.subject.criteria,
         "outcomes": {
-            name: as_dict(share(sum(result["outcome"] == name for _, result in rows), len(rows))) for name in OUTCOMES
+            name: as_dict(share(sum(result["outcome"] == name for _, result in rows), len(rows)))
+            for name in plan.subject.criteria
         },
         "coverage": {
             "detected, of the runs whose fault reached the firmware": as_dict(
@@ -308,7 +309,7 @@ def worst_row(plan: Plan, row: Row) -> dict[str, Any]:
 def replay(plan: Plan, row: Row) -> str:
     """A command that runs the case again from power-up."""
     case, result = row
-    if not case.fault or case.settings.controller or case.settings.body or case.settings.costs:
+    if not case.fault or plan.machine or case.settings.controller or case.settings.body or case.settings.costs:
         return f"ranger-sim campaign {shlex.quote(plan.path)} --replay {result['key']}"
     parts = ["ranger-sim", "walk", "--fault", case.fault]
     if plan.fault_module is not None:

@@ -7,6 +7,7 @@ import pytest
 from ranger_sim.datatable.generated import errors as error_table
 from ranger_sim.harness.campaigns import group, outcomes
 from ranger_sim.harness.campaigns.outcomes import Band, classify
+from ranger_sim.harness.campaigns.walks import WALKS
 from ranger_sim.harness.faults.proof import damage, gait, prove
 from tests.harness.faults.records import COLUMN, MS, STEP_MS, errors, record
 
@@ -90,8 +91,8 @@ def test_a_golden_run_counts_until_the_run_was_to_end():
     fallen = dataclasses.replace(golden, fell_ns=5000 * MS, fall_cause="fell forward")
     proven = prove(golden, faulty, BEGAN, True)
     watch = group.Watch(after_s=3.0)
-    assert group.judged(proven, fallen.until(4000 * MS), faulty, BEGAN, watch)["outcome"] == "masked"
-    assert group.judged(proven, fallen.until(5000 * MS), faulty, BEGAN, watch)["outcome"] == "invalid"
+    assert group.judged(WALKS, proven, fallen.until(4000 * MS), faulty, BEGAN, watch)["outcome"] == "masked"
+    assert group.judged(WALKS, proven, fallen.until(5000 * MS), faulty, BEGAN, watch)["outcome"] == "invalid"
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,160 @@
+"""What the runs of a campaign are of: Ranger's walks, or a machine of one's own, `[machine] make = "servo.py:new"`.
+
+A subject makes the machine, knows its faults and conditions, and judges a run against the golden one. The outcomes are
+the same for all (outcomes.py); what "the gait" is differs: of an own machine the quantities of its body that [band]
+names, each with how far it may be from the golden run's at the same instant.
+"""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import importlib
+import inspect
+import pathlib
+import sys
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.harness.faults.evidence import Record
+from ranger_sim.harness.faults.proof import Proof
+
+# What decides the outcome of a run beside our own sources: these files of the folder that the machine is made in.
+SOURCES = {".py", ".toml", ".csv", ".c", ".h"}
+
+CRITERIA = {
+    "crashed": "the simulation raised an exception, or its process died: a defect, not the machine's behaviour",
+    "timed out": "the run took more computing than its limit, or hung",
+    "invalid": "the fault never acted, cannot act there, or the golden run does not get that far, or ends itself: it "
+    "proves nothing",
+    "fall": "the machine could go no further: its plant says so",
+    "no effect": "the fault acted, and no frame and no error count differs",
+    "masked": "the firmware differs, no error tells of it, and the body stays inside its band",
+    "detected and safe": "an error, or its rate, that healthy runs do not have; the body stays inside its band",
+    "degraded gait": "detected; a quantity of the body leaves its band",
+    "undetected wrong": "a quantity of the body leaves its band, and no error tells of it",
+}
+
+
+class OwnMachine:
+    """A machine that `make` of a file makes: `reference` is FILE.py:NAME, relative to the folder of the plan."""
+
+    criteria = CRITERIA
+    after_s, from_s, patience_s = 1.0, 0.5, 10.0  # of [watch], where the plan does not say; chosen by us
+    starts_s = (0.5, 0.75, 1.0)  # instants at which healthy runs are judged as if a fault had begun; chosen by us
+
+    def __init__(self, reference: str) -> None:
+        self.reference = reference
+        name, _, self.name = reference.rpartition(":")
+        self.file = pathlib.Path(name)
+        if not self.name.isidentifier() or self.file.suffix != ".py":
+            raise UserError(f"machine {reference!r}: FILE.py:NAME is expected, as servo.py:new")
+        if not self.file.is_file():
+            raise UserError(f"machine {reference!r}: there is no file {self.file}")
+
+    @functools.cached_property
+    def make(self) -> Callable[..., Any]:
+        """What makes one."""
+        folder = str(self.file.resolve().parent)
+        if folder not in sys.path:
+            sys.path.insert(0, folder)
+        try:
+            module = importlib.import_module(self.file.stem)
+        except UserError:
+            raise
+        except Exception as error:  # whatever a user's program raises
+            raise UserError(f"machine {self.file}: {type(error).__name__}: {error}") from error
+        found: Callable[..., Any] | None = getattr(module, self.name, None)
+        if not callable(found):
+            raise UserError(f"machine {self.file}: there is no function or class {self.name!r} in it")
+        return found
+
+    def machine(self, settings: Mapping[str, Any]) -> Any:
+        """One with these keywords, fresh. UserError for a keyword that `make` does not take."""
+        try:
+            inspect.signature(self.make).bind(**settings)
+            return self.make(**settings)
+        except TypeError as error:
+            raise UserError(f"machine {self.file.name}:{self.name}: {error}") from None
+
+    @functools.cached_property
+    def shown(self) -> Any:
+        """One of them, never run, for what all have in common."""
+        machine = self.machine({})
+        machine.close()
+        return machine
+
+    @property
+    def catalogue(self) -> Any:
+        """Of its faults."""
+        return self.shown.catalogue
+
+    def condition(self, wanted: str) -> Any:
+        """A condition of it."""
+        return self.shown.condition(wanted)
+
+    def version(self) -> str:
+        """Digest of the files that it is made of."""
+        total = hashlib.blake2b(digest_size=8)
+        folder = self.file.resolve().parent
+        for path in sorted(folder.rglob("*")):
+            inside = path.relative_to(folder)
+            if path.suffix in SOURCES and not {"build", "runs", "__pycache__"} & set(inside.parts):
+                total.update(inside.as_posix().encode() + b"\0" + path.read_bytes() + b"\0")
+        return total.hexdigest()
+
+    def check_band(self, band: Mapping[str, float]) -> None:
+        """UserError for a quantity that its body does not have."""
+        for name in band:
+            if name not in self.shown.plant.sample_names:
+                known = ", ".join(self.shown.plant.sample_names) or "none"
+                raise UserError(f"[band] {name}: it is no quantity of the body, but {known}")
+
+    def judge(
+        self, proof: Proof, golden: Record, record: Record, since_ns: int, band: Mapping[str, float], is_sweep: bool
+    ) -> dict[str, Any]:
+        """Outcome, why, the largest differences by quantity, and the largest of them in parts of its band."""
+        off = {name: farthest(golden.sample(name), record.sample(name), golden, record, since_ns) for name in band}
+        parts = {name: value / band[name] for name, value in off.items()}
+        worst = max(parts, key=lambda name: parts[name], default="")
+        beyond = ""
+        if worst and parts[worst] > 1.0:
+            unit = self.shown.plant.sample_names[worst]
+            beyond = f"{worst} off by {off[worst]:.4g} {unit}".rstrip()
+        told = f"{proof.detected.code} from {proof.detected.board}" if proof.detected is not None else ""
+        if not proof.acted:
+            outcome, why = "invalid", "the fault never acted"
+        elif golden.fell_ns >= 0 and not (is_sweep and proof.fell_ns is not None):
+            outcome, why = "invalid", f"the golden run ended as well ({golden.fall_cause})"
+        elif proof.fell_ns is not None:
+            outcome, why = "fall", proof.fall_cause
+        elif proof.first_firmware is None:
+            outcome, why = "no effect", ""
+        elif beyond:
+            outcome = "degraded gait" if told else "undetected wrong"
+            why = "; ".join(part for part in (beyond, told) if part)
+        else:
+            outcome, why = ("detected and safe", told) if told else ("masked", "")
+        return {
+            "outcome": outcome,
+            "why": why,
+            "gait": {f"{name}_off": value for name, value in off.items()},
+            "golden_gait": {},
+            "deviation": max(parts.values(), default=0.0),
+        }
+
+
+def farthest(there: np.ndarray, here: np.ndarray, golden: Record, record: Record, since_ns: int) -> float:
+    """How far a quantity was at most from the golden run's of the same instant, from `since_ns` on."""
+    common = min(len(there), len(here))
+    window = record.samples[:common, 0] >= since_ns * 1e-9
+    return float(np.abs(here[:common] - there[:common])[window].max()) if window.any() else 0.0
+
+
+@functools.cache
+def own_machine(reference: str) -> OwnMachine:
+    """The machine of a reference, made ready once per process."""
+    return OwnMachine(reference)
