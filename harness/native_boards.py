@@ -10,6 +10,7 @@ from ranger_sim.boards import ankle_board, hip, motor_board, steering
 from ranger_sim.datatable import generated
 from ranger_sim.datatable.generated import mcfi, mcfo, mch, mcsi
 from ranger_sim.firmware_sim.native import build as compiling
+from ranger_sim.firmware_sim.native import image_build
 from ranger_sim.firmware_sim.native.hardware import ExternalConverter, Hardware, InternalConverter
 from ranger_sim.firmware_sim.peripherals.adc_external import CONVERSION_NS as FASTEST_CONVERSION_NS
 from ranger_sim.foundation.user_error import UserError
@@ -52,6 +53,11 @@ def hardware_of(board: str) -> Hardware:
 def build(folder: str | pathlib.Path, sanitize: bool = False, coverage: bool = False) -> Firmware:
     """Compile a folder of firmware, with the generated C of the tables that it names, unless it is up to date."""
     return native_firmware.build(folder, generated_c(), sanitize, coverage)
+
+
+def build_image(folder: str | pathlib.Path) -> image_build.Image:
+    """The same for the chip: an image for an LPC2194."""
+    return native_firmware.build_image(folder, generated_c())
 
 
 def built(wanted: Mapping[str, Firmware | str | os.PathLike]) -> dict[str, Firmware]:

@@ -5,6 +5,7 @@ import pathlib
 import re
 
 from ranger_sim.firmware_sim.native import build as compiling
+from ranger_sim.firmware_sim.native import image_build
 from ranger_sim.firmware_sim.native import manifest as manifests
 from ranger_sim.foundation.user_error import UserError
 
@@ -38,9 +39,27 @@ def build(
     master files as they are now.
     """
     manifest = manifests.load(folder)
+    place = place_of_tables(manifest, table)
+    built = compiling.build(manifest, sanitize, coverage, table_sources(manifest, place))
+    return Firmware(manifest.folder, built.path, manifest, place, built.warnings, built.was_made, sanitize, coverage)
+
+
+def build_image(folder: str | pathlib.Path, table: pathlib.Path | None = None) -> image_build.Image:
+    """The same for the chip: an image for an LPC2194."""
+    manifest = manifests.load(folder)
+    return image_build.build_image(manifest, table_sources(manifest, place_of_tables(manifest, table)))
+
+
+def place_of_tables(manifest: manifests.Manifest, table: pathlib.Path | None) -> pathlib.Path:
+    """The folder of the generated C."""
     place = table if manifest.master is None else fresh_c(manifest.master)
     if place is None:
         raise UserError(f"{manifest.folder}: firmware.master is missing: the folder of the master table")
+    return place
+
+
+def table_sources(manifest: manifests.Manifest, place: pathlib.Path) -> compiling.Addition:
+    """The generated C of the tables that a manifest names."""
     sources = []
     for name in manifest.tables:
         source = place / f"{name.lower()}_table.c"
@@ -48,8 +67,7 @@ def build(
             there = ", ".join(sorted(each.name.removesuffix("_table.c") for each in place.glob("*_table.c")))
             raise UserError(f"{manifest.folder}: firmware.tables: no board {name!r}; there are {there}")
         sources.append(source)
-    built = compiling.build(manifest, sanitize, coverage, compiling.Addition((place,), tuple(sources)))
-    return Firmware(manifest.folder, built.path, manifest, place, built.warnings, built.was_made, sanitize, coverage)
+    return compiling.Addition((place,), tuple(sources))
 
 
 def fresh_c(master: pathlib.Path) -> pathlib.Path:

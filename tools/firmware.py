@@ -1,4 +1,4 @@
-"""`ranger-sim firmware`: firmware in C, compiled for this computer."""
+"""`ranger-sim firmware`: firmware in C, compiled for this computer or for the chip."""
 
 import argparse
 import os
@@ -7,9 +7,10 @@ import signal
 import subprocess
 import sys
 import tempfile
+from collections.abc import Sequence
 from typing import Any
 
-from ranger_sim.firmware_sim.native import sanitizers
+from ranger_sim.firmware_sim.native import image_build, sanitizers
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness import native_boards
 from ranger_sim.harness.processes import kernel
@@ -31,6 +32,7 @@ SANITIZE = Option(
     of_run=False,
 )
 OPTIONS = (FIRMWARE, SANITIZE)
+TARGETS = ("host", "lpc2194")
 EXIT_FOUND = 1
 
 
@@ -38,12 +40,18 @@ def register(commands: Any) -> None:
     """Add the subcommand to the command line."""
     command = commands.add_parser(
         "firmware",
-        help="compile a board's firmware from C for this computer",
+        help="compile a board's firmware from C for this computer or for the chip",
         description="Firmware in C against the header ranger_sim/firmware.h; walk or up --firmware BOARD=DIR runs it.",
     )
     parts = command.add_subparsers(dest="part", required=True, metavar="build|include")
     build = parts.add_parser("build", help="compile the folder of a firmware.toml into a library")
     build.add_argument("folder", metavar="DIR", help="folder with firmware.toml")
+    build.add_argument(
+        "--target",
+        choices=TARGETS,
+        default=TARGETS[0],
+        help="host: a library for this computer; lpc2194: an image for the chip, by arm-none-eabi-gcc (default: host)",
+    )
     build.add_argument("--sanitize", action="store_true", help="find what is out of bounds or undefined at run time")
     build.add_argument("--coverage", action="store_true", help="count the lines that run")
     build.set_defaults(run=run_build)
@@ -53,13 +61,35 @@ def register(commands: Any) -> None:
 
 def run_build(options: argparse.Namespace) -> int:
     """Build, and print warnings and the library's place."""
+    if options.target == "lpc2194":
+        return run_build_image(options)
     if options.sanitize and not sanitizers.is_ready():  # a library is looked at when it is built: loaded
         return run_sanitized(options, [options.folder])
     firmware = native_boards.build(options.folder, options.sanitize, options.coverage)
-    console = terminal.console(stderr=True)
-    for line in firmware.warnings:
-        console.print(line, highlight=False, markup=False, soft_wrap=True)
+    _tell(firmware.warnings)
     print(f"{firmware.library}{'' if firmware.was_made else ' is up to date'}")
+    return 0
+
+
+def _tell(warnings: Sequence[str]) -> None:
+    """The compiler's warnings, a line each."""
+    console = terminal.console(stderr=True)
+    for line in warnings:
+        console.print(line, highlight=False, markup=False, soft_wrap=True)
+
+
+def run_build_image(options: argparse.Namespace) -> int:
+    """Build for the chip, and print warnings, sizes and the image's places."""
+    if options.sanitize or options.coverage:
+        asked = "--sanitize" if options.sanitize else "--coverage"
+        raise UserError(f"{asked}: only on this computer, not with --target {options.target}")
+    image = native_boards.build_image(options.folder)
+    _tell(image.warnings)
+    print(f"{image.path}{'' if image.was_made else ' is up to date'}")
+    print(
+        f"{image.hex_path}: {image.flash_bytes} of {image_build.FLASH_BYTES} bytes of flash, "
+        f"{image.ram_bytes} of {image_build.RAM_BYTES} bytes of RAM"
+    )
     return 0
 
 

@@ -91,7 +91,9 @@ def build(
     folder = manifest.folder / "build"
     path = folder / f"{manifest.name}{kind}.so"
     stamp = path.with_suffix(".stamp")
-    state = _state([program, *options], [*sources, RUNTIME, *_headers((*manifest.include, *addition.include, INCLUDE))])
+    state = state_of(
+        [program, *options], [*sources, RUNTIME, *headers_in((*manifest.include, *addition.include, INCLUDE))]
+    )
     if path.is_file() and stamp.is_file() and stamp.read_text(encoding="utf-8") == state:
         return Built(path, was_made=False)
     try:
@@ -126,26 +128,26 @@ def _compile(
     """Compile and link in the folder `making`; returns the warnings. The runtime is not watched itself."""
     said: list[str] = []
     objects = [str(making / "runtime.o")]
-    code, text = _run([program, *OPTIONS, f"-I{INCLUDE}", "-c", str(RUNTIME), "-o", objects[0]])
+    code, text = run_compiler([program, *OPTIONS, f"-I{INCLUDE}", "-c", str(RUNTIME), "-o", objects[0]])
     if code:
         raise UserError(f"{RUNTIME} does not compile with {program}:", *text[:20])
     failed = False
     for number, source in enumerate(sources):
         place = making / f"{number}-{source.stem}.o"
-        code, text = _run([program, *options, "-c", str(source), "-o", str(place)])
+        code, text = run_compiler([program, *options, "-c", str(source), "-o", str(place)])
         objects.append(str(place))
         failed |= code != 0
         said += text
     if not failed:
-        code, text = _run([program, *watching, *objects, *LINKING, "-lm", "-o", str(making / "library.so")])
+        code, text = run_compiler([program, *watching, *objects, *LINKING, "-lm", "-o", str(making / "library.so")])
         failed = code != 0
         said += text
     if failed:
-        raise UserError(*_errors(manifest, said))
-    return tuple(line for line in map(_message, said) if line and " warning: " in line)
+        raise UserError(*errors_in(manifest, said))
+    return tuple(line for line in map(message_of, said) if line and " warning: " in line)
 
 
-def _run(command: list[str]) -> tuple[int, list[str]]:
+def run_compiler(command: list[str]) -> tuple[int, list[str]]:
     """Exit code and lines of a compiler, told in English."""
     setting = {**os.environ, "LC_ALL": "C"}
     try:
@@ -155,15 +157,15 @@ def _run(command: list[str]) -> tuple[int, list[str]]:
     return done.returncode, (done.stderr + done.stdout).decode(errors="replace").splitlines()
 
 
-def _message(line: str) -> str | None:
+def message_of(line: str) -> str | None:
     """A compiler's line as we tell it; None for those that only explain."""
     found = MESSAGE.match(line)
     return f"{found['file']}:{found['line']}: {found['kind']}: {found['text']}" if found else None
 
 
-def _errors(manifest: Manifest, said: list[str]) -> list[str]:
+def errors_in(manifest: Manifest, said: list[str]) -> list[str]:
     """What went wrong: compiler's errors, or what the linker misses, or, where neither reads so, all it said."""
-    errors = [line for line in map(_message, said) if line and "error: " in line]
+    errors = [line for line in map(message_of, said) if line and "error: " in line]
     for line in said:
         found = UNDEFINED.search(line)
         if found:
@@ -172,11 +174,11 @@ def _errors(manifest: Manifest, said: list[str]) -> list[str]:
     return [f"{manifest.folder}: {manifest.name} does not compile:", *errors]
 
 
-def _headers(folders: Sequence[pathlib.Path]) -> list[pathlib.Path]:
+def headers_in(folders: Sequence[pathlib.Path]) -> list[pathlib.Path]:
     return sorted({path for folder in folders for path in folder.rglob("*.h")})
 
 
-def _state(words: Sequence[str], files: Sequence[pathlib.Path]) -> str:
+def state_of(words: Sequence[str], files: Sequence[pathlib.Path]) -> str:
     """A digest of everything that the library depends on."""
     digest = hashlib.blake2b(digest_size=16)
     for word in words:
