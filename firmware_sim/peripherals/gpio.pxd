@@ -1,9 +1,6 @@
 from ranger_sim.firmware_sim.peripheral cimport Peripheral
 from ranger_sim.foundation.events cimport PIN_OUTPUT
 
-cimport cython
-
-@cython.final
 cdef class Gpio(Peripheral):
     cdef public long long[64] outputs
     cpdef long long level(self, long long pin) except? <long long>-1

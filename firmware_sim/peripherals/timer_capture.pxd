@@ -14,7 +14,6 @@ cpdef enum:
     CCR_MASK = 0x7
     CCR_BITS = 3
 
-@cython.final
 cdef class TimerCapture(Peripheral):
     # what an edge touches
     cdef public long long IR, CCR

@@ -3,12 +3,10 @@
 from collections.abc import MutableSequence
 from ranger_sim.firmware_sim.peripheral import Peripheral
 from typing import Any
-from typing import final
 
 def p0(bit: Any) -> int: ...
 def p1(bit: Any) -> int: ...
 
-@final
 class Gpio(Peripheral):
     outputs: MutableSequence[int]
     def __init__(self, chip: Any) -> None: ...

@@ -6,7 +6,6 @@ from ranger_sim.firmware_sim.clock import TickTrain
 from ranger_sim.firmware_sim.peripheral import Peripheral
 from ranger_sim.firmware_sim.vic import InterruptSource
 from typing import Any
-from typing import final
 
 IR_MR0: int
 IR_CR0: int
@@ -16,7 +15,6 @@ CCR_INTERRUPT: int
 CCR_MASK: int
 CCR_BITS: int
 
-@final
 class TimerCapture(Peripheral):
     IR: int
     CCR: int

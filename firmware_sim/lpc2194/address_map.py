@@ -1,0 +1,124 @@
+# cython: boundscheck=False, wraparound=False
+# (the place of a block is worked out from the address's bits, below the size of the table)
+"""Where the processor's loads and stores go that are neither flash nor RAM: the blocks, by address.
+
+An access acts at the instant at which its instruction begins: what happens in the chip from then on comes after it.
+"""
+
+import cython
+
+from ranger_sim.firmware_sim.lpc2194.block import Block, NotModelledError
+from ranger_sim.foundation.user_error import UserError
+
+if not cython.compiled:
+    BLOCK_BITS = 14  # a block of the peripheral bus has 16 KB
+    BLOCKS = 128
+
+NAME_OF_ACCESS = {1: "byte", 2: "half-word", 4: "word"}
+
+
+class NotModelledAccess(UserError):  # noqa: N818  (it is what the program did)
+    """The program reached for what is not modelled; `address` and `pc` say where, as numbers."""
+
+    def __init__(self, text, address, pc) -> None:
+        UserError.__init__(self, text)
+        self.address = address
+        self.pc = pc
+
+
+class AddressMap:
+    """Blocks of the peripheral bus (0xE...), the fast GPIO and the VIC.
+
+    `touched` counts accesses that may do something or give another value another time, `looks` the others.
+    """
+
+    def __init__(self, board) -> None:
+        self.board = board
+        self.places = [None] * BLOCKS
+        self.fast_gpio = None
+        self.vic = None
+        self.touched = 0
+        self.looks = 0
+
+    def add(self, block) -> None:
+        """Put a block at its address."""
+        if block.base == 0x3FFFC000:
+            self.fast_gpio = block
+        elif block.base == 0xFFFFF000:
+            self.vic = block
+        else:
+            self.places[(block.base & 0x1FFFFF) >> BLOCK_BITS] = block
+
+    def blocks(self) -> list:
+        """All of them, by address."""
+        return [self.fast_gpio, *(block for block in self.places if block is not None), self.vic]
+
+    def find(self, address: cython.longlong):
+        """The block that an address belongs to, or None."""
+        page: cython.longlong = address >> BLOCK_BITS
+        if page >> 7 == 0x700:  # 0xE0000000 ... 0xE01FFFFF
+            return self.places[page & 127]
+        if page == 0xFFFF:  # 0x3FFFC000
+            return self.fast_gpio
+        if address >> 12 == 0xFFFFF:
+            return self.vic
+        return None
+
+    def read(self, address: cython.longlong, size: cython.longlong) -> cython.longlong:
+        """A load."""
+        block: Block = self.find(address)
+        value: cython.longlong
+        offset: cython.longlong
+        if block is None:
+            self.fail(address, size, False, 0, "no device is modelled there")
+        offset = (address - block.base) & ~3
+        self.board.reach()
+        block.steady = False
+        try:
+            value = block.read(offset)
+        except NotModelledError as error:
+            self.fail(address, size, False, 0, str(error))
+        if block.steady:
+            self.looks += 1
+        else:
+            self.touched += 1
+            self.board.settle(block)
+        if size == 4:
+            return value
+        value >>= 8 * (address & 3)
+        return value & 0xFF if size == 1 else value & 0xFFFF
+
+    def write(self, address: cython.longlong, size: cython.longlong, value: cython.longlong) -> cython.int:
+        """A store."""
+        block: Block = self.find(address)
+        if block is None:
+            self.fail(address, size, True, value, "no device is modelled there")
+        self.board.reach()
+        self.touched += 1
+        try:
+            if size == 4:
+                block.write(address - block.base, value)
+            else:
+                block.write_part(address - block.base, size, value)
+        except NotModelledError as error:
+            self.fail(address, size, True, value, str(error))
+        self.board.settle(block)
+        return 0
+
+    def fail(self, address, size, writing, value, why) -> None:
+        """End the run: the access, where the program is, and why it cannot be."""
+        board = self.board
+        block = self.find(address)
+        name = ""
+        if block is not None:
+            register = block.REGISTERS.get((address - block.base) & ~3)
+            name = f" ({block.name}: {register[0]})" if register is not None else f" ({block.name})"
+        pc = board.core.pc
+        inside = board.image.place_of(pc) if board.image is not None else ""
+        what = f"writes {value:#x} to" if writing else "reads"
+        raise NotModelledAccess(
+            f"{board.name}: the program {what} {address:#010x}{name} as a {NAME_OF_ACCESS[size]} at pc {pc:#010x}"
+            f"{f' in {inside}' if inside else ''}: {why}",
+            address,
+            pc,
+        )

@@ -1,0 +1,77 @@
+"""What all blocks of registers share, and the clocks that they run on."""
+
+import cython
+
+from ranger_sim.firmware_sim.peripheral import Peripheral
+
+
+class NotModelledError(Exception):
+    """The program asks a register for what no device here does; the text says what."""
+
+
+class Clocks:
+    """The processor's clock (Hz) and the peripherals', which is it divided by VPBDIV."""
+
+    def __init__(self, crystal_hz) -> None:
+        self.crystal_hz = crystal_hz
+        self.cclk = crystal_hz  # until the PLL is connected
+        self.divider = 4  # VPBDIV after reset
+
+    @property
+    def pclk(self) -> int:
+        """Clock of the peripherals, Hz."""
+        return self.cclk // self.divider
+
+
+class Block(Peripheral):
+    """Registers from `base` on, the front of one device of firmware_sim/peripherals.
+
+    `read` and `write` take the offset of a register, a multiple of 4; what they do not know ends in `unknown`. `steady`
+    is set by a read that does nothing and gives the same until a write or an event of the chip: a loop that does
+    nothing else can be skipped. `mask`: the inputs of the VIC that it drives, `requests` their levels.
+    """
+
+    # {offset: (name, "r", "w" or "rw")}: what the reference lists, and a test holds against `read` and `write`
+    REGISTERS: dict[int, tuple[str, ...]] = {}
+
+    def __init__(self, chip, clocks, name, base, mask=0) -> None:
+        Peripheral.__init__(self, chip)
+        self.clocks = clocks
+        self.name = name
+        self.base = base
+        self.mask = mask
+        self.steady = False
+        self.partner = None  # a block whose levels an access to this one can change
+
+    def read(self, offset: cython.longlong) -> cython.longlong:
+        """Read the register at `offset`."""
+        return self.unknown(offset, False)
+
+    def write(self, offset: cython.longlong, value: cython.longlong) -> cython.int:
+        """Write it."""
+        self.unknown(offset, True)
+        return 0
+
+    def write_part(self, offset: cython.longlong, size: cython.longlong, value: cython.longlong) -> cython.int:
+        """Write `size` bytes, 1 or 2: the register's other bytes are zero, as STRB and STRH to a device are meant."""
+        if offset & 3:
+            self.not_modelled("bytes inside this register")
+        return self.write(offset, value)
+
+    def requests(self) -> cython.longlong:
+        """Levels of its inputs of the VIC."""
+        return 0
+
+    def clocked(self) -> None:
+        """The peripherals' clock is another one from now on."""
+
+    def unknown(self, offset: cython.longlong, writing: cython.bint) -> cython.longlong:
+        """An access that `read` and `write` do not know."""
+        register = self.REGISTERS.get(offset)
+        if register is None:
+            raise NotModelledError("no register is modelled there")
+        raise NotModelledError(f"{register[0]} can only be {'read' if writing else 'written'}")
+
+    def not_modelled(self, what) -> None:
+        """The register is known, what is asked of it is not."""
+        raise NotModelledError(f"{what} is not modelled")

@@ -1,0 +1,498 @@
+# cython: boundscheck=False, wraparound=False
+# (every index below is a register's number, a place in RAM, or a pin 0 ... 63 that whoever wires the board has checked)
+"""A board whose processor runs a firmware image, instruction by instruction, on the models of the chip's devices.
+
+How time passes: an instruction acts, on memory and devices, at the instant at which it begins; it begins when the one
+before it has taken its cycles. What comes in, an edge, a message, an alarm of a device, is taken in at its stamp:
+before every instruction that begins then or later. Interrupt lines are levels, looked at before each instruction. So a
+run does not depend on the steps in which `advance` is called.
+
+A loop that waits is skipped: when memory, registers and the flash accelerator are after a number of instructions what
+they were before them, and no device was asked or told anything that could matter, then nothing changes until the next
+event but the cycles. `skips_idle = False` executes every pass; results are the same.
+"""
+
+import array
+import dataclasses
+
+import cython
+
+from ranger_sim.firmware_sim.alarm import Alarm
+from ranger_sim.firmware_sim.arm7.core import Core
+from ranger_sim.firmware_sim.clock import Crystal
+from ranger_sim.firmware_sim.counters import BoardCounters, CanCounters
+from ranger_sim.firmware_sim.edge_line import EdgeLine
+from ranger_sim.firmware_sim.lpc2194.address_map import AddressMap
+from ranger_sim.firmware_sim.lpc2194.block import Block, Clocks
+from ranger_sim.firmware_sim.lpc2194.can import CanBlock, CanFilterBlock
+from ranger_sim.firmware_sim.lpc2194.converter import ConverterBlock
+from ranger_sim.firmware_sim.lpc2194.hardware import BoardHardware
+from ranger_sim.firmware_sim.lpc2194.image import Image
+from ranger_sim.firmware_sim.lpc2194.pins import FastGpioBlock, OldGpioBlock, PinSelectBlock, Ports
+from ranger_sim.firmware_sim.lpc2194.pwm import PwmBlock
+from ranger_sim.firmware_sim.lpc2194.spi import SpiBlock
+from ranger_sim.firmware_sim.lpc2194.ssp import SegmentLink, SerialConverter, SspBlock, SspDevice
+from ranger_sim.firmware_sim.lpc2194.system import SystemBlock
+from ranger_sim.firmware_sim.lpc2194.timer import TimerBlock
+from ranger_sim.firmware_sim.lpc2194.uart import UartBlock
+from ranger_sim.firmware_sim.lpc2194.vic import VicBlock
+from ranger_sim.firmware_sim.microcontroller import Microcontroller
+from ranger_sim.firmware_sim.peripheral import Peripheral
+from ranger_sim.firmware_sim.peripherals.adc_external import Ads7871
+from ranger_sim.foundation.events import EventQueue
+
+if not cython.compiled:
+    from ranger_sim.firmware_sim.lpc2194.can import AFMR_BYPASS
+    from ranger_sim.firmware_sim.microcontroller import INDICES_PER_KIND, MESSAGE_KINDS
+    from ranger_sim.foundation.events import CAN_RX, NEVER, PIN_EDGE
+
+    # Chosen by us: how many cycles pass before it is asked whether the program waits, and how long a loop that waits
+    # may be. A slot of the robot's boards takes some 10,000 cycles, their main loops below 200 instructions.
+    STINT = 256
+    LONGEST_PASS = 600
+    DOUBTS = 8  # of so many stints elsewhere one is asked
+    REGISTERS = 57  # that are compared
+
+
+@dataclasses.dataclass(frozen=True)
+class ImageCounters(BoardCounters):
+    """A board that runs an image. Executed and skipped make up all that the program did; cycles are the processor's."""
+
+    instructions: int = 0
+    cycles: int = 0
+    idle_instructions: int = 0  # of them, in passes of waiting loops that were skipped
+    idle_cycles: int = 0
+
+
+class ImageBoard(Microcontroller):
+    """Board `name` with `image` in its memory, powered up at `phase_ns` (ns).
+
+    `core` is the processor, `map` its devices by address, `skips_idle` whether loops that wait are skipped.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        image: Image,
+        crystal: Crystal | None = None,
+        phase_ns: int = 0,
+        hardware: BoardHardware | None = None,
+    ) -> None:
+        hardware = hardware if hardware is not None else BoardHardware()
+        Microcontroller.__init__(self, name, hardware.hz, crystal)
+        self.image = image
+        self.now = self.instant = phase_ns
+        self.clocks = Clocks(self.crystal.nominal_hz)
+        self.core = Core(name=name)
+        self._build(hardware)
+        for address, content in image.segments:
+            self.core.place(address, content)
+        for pin in hardware.pulled_up:
+            self.pins[pin] = 1
+        self.skips_idle = True
+        self.base_cycles = 0  # cycles and instant from which time is counted: the clock's latest change
+        self.base_ns = phase_ns
+        self.asleep = False
+        self.idle = False
+        self.pass_cycles = 0
+        self.pass_instructions = 0
+        self.pass_looks = False
+        self.idle_cycles = 0
+        self.idle_instructions = 0
+        self.kept_registers = array.array("q", [0]) * 57  # REGISTERS
+        self.now_registers = array.array("q", [0]) * 57
+        self.kept_ram = array.array("q", [0]) * len(self.core.ram)
+        self.waits = array.array("q", [0]) * (self.core.flash_size >> 2)  # words of flash in loops that waited
+        self.doubts = 0
+        self.next_time = phase_ns
+
+    def _build(self, hardware) -> None:
+        """The chip's blocks and what hangs on them."""
+        clocks = self.clocks
+        self.map = AddressMap(self)
+        self.vic_block = VicBlock(self, clocks)
+        external = hardware.external if not hardware.segment_link else None
+        converter = None
+        device: SspDevice
+        if external is not None:
+            it = external
+            converter = Ads7871(self, it.eint, it.reference_V, it.conversion_ns, it.scale, it.offset_counts)
+            converter.inputs = [it.inputs.get(code, code) for code in range(16)]
+            device = SerialConverter(self, converter)
+        elif hardware.segment_link:
+            device = SegmentLink(self)
+        else:
+            device = SspDevice(self)
+        self.system = SystemBlock(self, clocks, converter)
+        timers = [TimerBlock(self, clocks, number) for number in (0, 1)]
+        pin_select = PinSelectBlock(self, clocks, [block.timer for block in timers])
+        pin_select.external = self.system
+        self.pin_select = pin_select
+        ports = Ports(self)
+        self.acceptance = CanFilterBlock(self, clocks)
+        self.can_blocks = [CanBlock(self, clocks, number, self.acceptance) for number in (1, 2, 3, 4)]
+        blocks = [
+            self.vic_block,
+            FastGpioBlock(self, clocks, ports),
+            OldGpioBlock(self, clocks, ports),
+            self.system,
+            pin_select,
+            *timers,
+            UartBlock(self, clocks, 0),
+            UartBlock(self, clocks, 1),
+            PwmBlock(self, clocks),
+            SpiBlock(self, clocks, hardware.spi.get(0)),
+            SspBlock(self, clocks, device),
+            ConverterBlock(self, clocks, hardware.internal),
+            *self.can_blocks,
+            self.acceptance,
+        ]
+        for block in blocks:
+            self.map.add(block)
+        self.asking = [block for block in blocks if block.mask]
+        self.core.device = self.map
+
+    # --- the processor's clock ----------------------------------------------------------------------------
+
+    def time_of(self, cycles: cython.longlong) -> cython.longlong:
+        """The instant (ns, rounded down) at which the processor has passed so many cycles."""
+        return self.base_ns + self.crystal.cycles_to_ns(cycles - self.base_cycles, self.clocks.cclk)
+
+    def cycles_at(self, time: cython.longlong) -> cython.longlong:
+        """The first cycle that begins at `time` (ns) or later."""
+        cycles: cython.longlong
+        if time <= self.base_ns:
+            return self.base_cycles
+        cycles = self.base_cycles + self.crystal.ns_to_cycles(time - self.base_ns, self.clocks.cclk)
+        while self.time_of(cycles) < time:
+            cycles += 1
+        return cycles
+
+    def set_clocks(self, cclk, divider) -> None:
+        """The program sets PLL or VPBDIV: the instruction that does it is the last one at the old rate."""
+        if (cclk, divider) == (self.clocks.cclk, self.clocks.divider):
+            return
+        self.base_ns = self.time_of(self.core.began)
+        self.base_cycles = self.core.began
+        self.clocks.cclk = cclk
+        self.clocks.divider = divider
+        self.core.stop()
+        for block in self.map.blocks():
+            block.clocked()
+
+    def retune(self, ppb, now) -> None:
+        """As the chip's; the processor goes on in the middle of its loop."""
+        self._catch_up(now)
+        cycles = self.cycles_at(now)
+        Microcontroller.retune(self, ppb, now)
+        self.base_cycles = cycles
+        self.base_ns = now
+
+    def sleep(self) -> None:
+        """The program asks for idle mode: no cycles until an interrupt."""
+        self.asleep = True
+        self.core.stop()
+
+    # --- what the address map calls -----------------------------------------------------------------------
+
+    def reach(self) -> cython.void:
+        """The present instruction reaches for a device: devices see the instant at which it began."""
+        self.now = self.time_of(self.core.began)
+
+    def settle(self, block: Block) -> cython.int:
+        """After an access: the levels of what the block drives, and how far the processor may run on."""
+        vic: VicBlock = self.vic_block
+        if block.mask:
+            vic.raw = vic.raw & ~block.mask | block.requests()
+        if block.partner is not None:
+            vic.raw = vic.raw & ~block.partner.mask | block.partner.requests()
+        self.core.lines = vic.settle()
+        if self.stop_time < self.running_to:
+            self.core.stop()
+        return 0
+
+    # --- passing time -------------------------------------------------------------------------------------
+
+    def advance(self, until: cython.longlong) -> cython.longlong:
+        """Run everything with an instant before `until` (ns), or before `horizon` where an output brought that nearer.
+
+        Returns `next_time`. NotModelledAccess, a UserError, for what the program wants and no device here does.
+        """
+        core: Core = self.core
+        inbox: EventQueue = self.inbox
+        first: cython.longlong
+        own: cython.longlong
+        stop: cython.longlong
+        self.horizon = until
+        while True:
+            first = self.alarm_time
+            if inbox.head_time < first:
+                first = inbox.head_time
+            if self.edge_time < first:
+                first = self.edge_time
+            own = NEVER
+            if not self.idle and not self.asleep:
+                own = self.time_of(core.cycles)
+                stop = first if first < self.horizon else self.horizon
+                if own < stop:
+                    self._run(stop)
+                    continue
+            if first >= self.horizon:
+                break
+            self._take_in(first)
+        if self.alarm_time < own:
+            own = self.alarm_time
+        self.next_time = own
+        return own
+
+    def _run(self, stop: cython.longlong) -> cython.int:
+        """The processor runs until the instant `stop` (ns), or less far where an access asks for it."""
+        core: Core = self.core
+        target: cython.longlong
+        touched: cython.longlong
+        end: cython.longlong
+        self.stop_time = stop
+        self.running_to = stop
+        target = self.cycles_at(stop)
+        if not self.skips_idle:
+            core.run(target)
+            return 0
+        while core.cycles < target:
+            touched = self.map.touched
+            end = core.cycles + STINT
+            core.run(end if end < target else target)
+            if core.stopped:
+                return 0
+            if self.map.touched == touched and core.cycles < target and self._may_wait():
+                if self._waits(target):
+                    return 0
+                if core.stopped:
+                    return 0
+        return 0
+
+    def _may_wait(self) -> cython.bint:
+        """It is worth asking whether the program waits: where it waited before always, elsewhere now and then."""
+        if self.waits[self._flash_place(self.core.pc)]:
+            return True
+        self.doubts += 1
+        return self.doubts % DOUBTS == 0
+
+    def _waits(self, target: cython.longlong) -> cython.bint:
+        """Execute until everything is as it was, or `target` cycles, or some hundred instructions. True: it waits."""
+        core: Core = self.core
+        pc: cython.longlong = core.pc
+        cycles: cython.longlong = core.cycles
+        instructions: cython.longlong = core.instructions
+        touched: cython.longlong = self.map.touched
+        looks: cython.longlong = self.map.looks
+        left: cython.longlong = LONGEST_PASS
+        self._keep()
+        core.stopped = 0
+        while left:
+            left -= 1
+            core.step()
+            if self.map.touched != touched or core.stopped or core.cycles >= target:
+                return False
+            if core.pc == pc and self._is_as_kept():
+                self.idle = True
+                self.pass_cycles = core.cycles - cycles
+                self.pass_instructions = core.instructions - instructions
+                self.pass_looks = self.map.looks != looks
+                if not self.waits[self._flash_place(pc)]:
+                    self._learn(self.pass_instructions)
+                return True
+        return False
+
+    def _flash_place(self, pc: cython.longlong) -> cython.longlong:
+        """The word of flash of an instruction; 0 for one in RAM."""
+        place: cython.longlong = pc - self.core.flash_base
+        return place >> 2 if 0 <= place < self.core.flash_size else 0
+
+    def _learn(self, instructions) -> None:
+        """Execute another pass, and note where the program is when it waits."""
+        core: Core = self.core
+        for _ in range(instructions):
+            self.waits[self._flash_place(core.pc)] = 1
+            core.step()
+
+    def _registers(self, into: cython.longlong[::1]) -> cython.void:
+        """What an instruction can depend on, beside memory."""
+        core: Core = self.core
+        i: cython.longlong
+        for i in range(15):
+            into[i] = core.r[i]
+        for i in range(10):
+            into[15 + i] = core.high[i]
+        for i in range(12):
+            into[25 + i] = core.banked[i]
+        for i in range(6):
+            into[37 + i] = core.saved[i]
+        into[43] = core.pc
+        into[44] = core.n
+        into[45] = core.z
+        into[46] = core.c
+        into[47] = core.v
+        into[48] = core.control
+        into[49] = core.line
+        into[50] = core.data_line
+        for i in range(2):
+            into[51 + i] = core.trail[i]
+            into[53 + i] = core.ahead[i]
+            into[55 + i] = core.ready[i] - core.cycles if core.ready[i] > core.cycles else 0
+
+    def _keep(self) -> cython.void:
+        """Keep registers and RAM as they are."""
+        ram: cython.longlong[::1] = self.core.ram
+        self._registers(self.kept_registers)
+        self.kept_ram[:] = ram
+
+    def _is_as_kept(self) -> cython.bint:
+        """Registers and RAM are as they were kept."""
+        core: Core = self.core
+        ram: cython.longlong[::1] = core.ram
+        i: cython.longlong
+        if core.r[13] != self.kept_registers[13] or core.r[14] != self.kept_registers[14]:
+            return False
+        self._registers(self.now_registers)
+        for i in range(REGISTERS):
+            if self.now_registers[i] != self.kept_registers[i]:
+                return False
+        for i in range(len(ram)):
+            if ram[i] != self.kept_ram[i]:
+                return False
+        return True
+
+    def _catch_up(self, time: cython.longlong) -> cython.int:
+        """A processor that waits: pass the loop as often as it fits until `time` (ns), and its begin once more."""
+        core: Core = self.core
+        target: cython.longlong
+        passes: cython.longlong
+        i: cython.longlong
+        if not self.idle:
+            return 0
+        self.idle = False
+        target = self.cycles_at(time)
+        passes = (target - core.cycles) // self.pass_cycles
+        if passes > 0:
+            for i in range(2):
+                if core.ready[i] > core.cycles:
+                    core.ready[i] += passes * self.pass_cycles
+            core.cycles += passes * self.pass_cycles
+            core.instructions += passes * self.pass_instructions
+            self.idle_cycles += passes * self.pass_cycles
+            self.idle_instructions += passes * self.pass_instructions
+        self.stop_time = self.running_to = time
+        if core.cycles < target:
+            core.run(target)
+        return 0
+
+    def _wake(self, time: cython.longlong) -> cython.int:
+        """A processor in idle mode goes on at `time` (ns): an interrupt asks for it."""
+        cycles: cython.longlong = self.cycles_at(time)
+        self.asleep = False
+        if cycles > self.core.cycles:
+            self.idle_cycles += cycles - self.core.cycles
+            self.core.cycles = cycles
+        return 0
+
+    def _take_in(self, time: cython.longlong) -> cython.int:
+        """The first of what comes at `time` (ns): edges before messages before alarms."""
+        vic: VicBlock = self.vic_block
+        inbox: EventQueue = self.inbox
+        line: EdgeLine
+        block: Block
+        level: cython.longlong
+        if self.idle and self.pass_looks:
+            self._catch_up(time)  # the loop reads devices: they are as they were until now
+        self.instant = self.now = time
+        if self.edge_time == time:
+            line = self.first_line if self.first_line.next_time == time else self.second_line
+            level = line.levels >> 1
+            self.pins[line.pin] = level
+            self.pins[line.partner_pin] = line.levels & 1
+            line.buffer.read += 1
+            line.find_next()
+            self.edge_time = min(self.first_line.next_time, self.second_line.next_time)
+            self.pin_select.on_pin(line.pin, level, time)
+        elif inbox.head_time == time:
+            inbox.take()
+            self._message(inbox)
+        else:
+            cython.cast(Alarm, self.alarms[self.alarm_places[self.alarms_set - 1]]).ring(time)
+        for each in self.asking:
+            block = each
+            vic.raw = vic.raw & ~block.mask | block.requests()
+        vic.settle()
+        if vic.lines:
+            self._catch_up(time)
+            if self.asleep:
+                self._wake(time)
+        self.core.lines = vic.lines
+        return 0
+
+    def _message(self, queue: EventQueue) -> cython.int:
+        """The message just taken."""
+        if queue.kind == PIN_EDGE:
+            self.pins[queue.a] = queue.b
+            if queue.c >= 0:
+                self.pins[queue.c] = queue.d
+            self.pin_select.on_pin(queue.a, queue.b, queue.time)
+        elif 0 <= queue.kind < MESSAGE_KINDS and 0 <= queue.a < INDICES_PER_KIND:
+            if queue.kind != CAN_RX or self.acceptance.mode & AFMR_BYPASS:
+                cython.cast(Peripheral, self.message_table[queue.a * MESSAGE_KINDS + queue.kind]).on_message(queue)
+        else:
+            self.others.on_message(queue)
+        return 0
+
+    # --- what whoever passes time asks ---------------------------------------------------------------------
+
+    def speaks_from(self) -> cython.longlong:
+        """Before this instant (ns) the board puts nothing on a bus, unless something comes in."""
+        return self.next_time
+
+    def quiet_until(self) -> cython.longlong:
+        """Whatever comes in may be answered at once by a handler."""
+        return 0
+
+    def stop_at(self, time: cython.longlong) -> cython.longlong:
+        """While it runs: run no further than to `time` (ns), which is later than now. Returns where it stops."""
+        if time < self.horizon:
+            self.horizon = time
+            if time < self.stop_time:
+                self.stop_time = time
+        return self.horizon
+
+    # --- looking in ---------------------------------------------------------------------------------------
+
+    def catch_up(self) -> None:
+        """Bring the processor to the instant up to which the board has run: a loop that waits is only noted."""
+        self._catch_up(self.horizon)
+
+    def counters(self) -> object:
+        """What the board counted, by name. Its program's own queues and slots are not known."""
+        self.catch_up()
+        return ImageCounters(
+            hz=self.hz,
+            unclaimed=self.unclaimed,
+            slots=self.scheduler.counters(),
+            can=self.can_counters(),
+            instructions=self.core.instructions,
+            cycles=self.core.cycles,
+            idle_instructions=self.idle_instructions,
+            idle_cycles=self.idle_cycles,
+        )
+
+    def can_counters(self) -> list:
+        """Of each controller that the program has taken out of reset mode."""
+        return [
+            CanCounters(
+                block.number,
+                block.can.received,
+                block.can.sent,
+                block.can.data_overruns,
+                receive_lost=0,
+                queue_full=block.can.refused,
+            )
+            for block in self.can_blocks
+            if block.set_up
+        ]

@@ -1,0 +1,189 @@
+"""Firmware images: what a linker or a programmer's file puts into flash and RAM, and the names of its addresses.
+
+ELF (also Keil's .axf) and Intel HEX. The file's first bytes say which.
+"""
+
+import bisect
+import dataclasses
+import io
+import os
+import pathlib
+
+from elftools.common.exceptions import ELFError
+from elftools.elf.elffile import ELFFile
+from elftools.elf.sections import SymbolTableSection
+
+from ranger_sim.foundation.user_error import UserError
+
+# LPC2194 user manual, memory map
+FLASH = (0x00000000, 0x40000)
+RAM = (0x40000000, 0x4000)
+
+HEX_DATA, HEX_END, HEX_SEGMENT, HEX_SEGMENT_START, HEX_LINEAR, HEX_LINEAR_START = range(6)
+# record type -> (what its bytes mean, how many they are)
+HEX_FIXED = {HEX_END: 0, HEX_SEGMENT: 2, HEX_SEGMENT_START: 4, HEX_LINEAR: 2, HEX_LINEAR_START: 4}
+
+
+@dataclasses.dataclass(frozen=True)
+class Symbol:
+    """A name of the program: address, size in bytes (0: not told)."""
+
+    address: int
+    size: int
+    name: str
+
+
+@dataclasses.dataclass(frozen=True)
+class Image:
+    """A program as it stands in memory before reset. `segments`: (address, bytes), sorted, none over another.
+
+    `symbols`, sorted by address, are empty where the file has none (HEX).
+    """
+
+    path: pathlib.Path
+    segments: tuple[tuple[int, bytes], ...]
+    symbols: tuple[Symbol, ...] = ()
+
+    def place_of(self, address: int) -> str:
+        """`name+0x10` of the function or variable that holds an address; empty when the file names none before it."""
+        found = bisect.bisect_right([each.address for each in self.symbols], address)
+        if not found:
+            return ""
+        symbol = self.symbols[found - 1]
+        behind = address - symbol.address
+        if symbol.size and behind >= symbol.size and behind > 0x1000:
+            return ""
+        return f"{symbol.name}+{behind:#x}" if behind else symbol.name
+
+    def address_of(self, name: str) -> int:
+        """Where a symbol is. UserError when the file has none of this name."""
+        for symbol in self.symbols:
+            if symbol.name == name:
+                return symbol.address
+        raise UserError(f"{self.path}: there is no symbol {name!r}")
+
+
+def read(path: str | os.PathLike) -> Image:
+    """The image in a file. UserError, one line, for what is none that this chip could run."""
+    path = pathlib.Path(path)
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise UserError(f"{path}: {error.strerror or error}") from None
+    if not content:
+        raise UserError(f"{path}: the file is empty")
+    if content.startswith(b"\x7fELF"):
+        image = _from_elf(path, content)
+    elif content.lstrip().startswith(b":"):
+        image = _from_hex(path, content)
+    else:
+        raise UserError(f"{path}: neither an ELF file nor Intel HEX: it begins with {content[:4]!r}")
+    if not image.segments:
+        raise UserError(f"{path}: there is nothing in it for flash or RAM")
+    return image
+
+
+def _checked(path: pathlib.Path, pieces: list[tuple[int, bytes]]) -> tuple[tuple[int, bytes], ...]:
+    """The pieces sorted and joined; UserError for one outside memory or over another."""
+    joined: list[tuple[int, bytes]] = []
+    for address, content in sorted(pieces):
+        end = address + len(content)
+        if not any(base <= address and end <= base + size for base, size in (FLASH, RAM)):
+            raise UserError(
+                f"{path}: {len(content)} bytes at {address:#010x} are outside the chip's flash "
+                f"({FLASH[0]:#010x}, {FLASH[1]} bytes) and RAM ({RAM[0]:#010x}, {RAM[1]} bytes)"
+            )
+        if joined and address < joined[-1][0] + len(joined[-1][1]):
+            raise UserError(f"{path}: two pieces of it are at {address:#010x}")
+        if joined and address == joined[-1][0] + len(joined[-1][1]):
+            joined[-1] = (joined[-1][0], joined[-1][1] + content)
+        else:
+            joined.append((address, content))
+    return tuple(joined)
+
+
+def _from_elf(path: pathlib.Path, content: bytes) -> Image:
+    """Segments are loaded where their physical address says: initialised data lie in flash behind the code."""
+    try:
+        elf = ELFFile(io.BytesIO(content))
+        machine = elf["e_machine"]
+        if elf.elfclass != 32 or not elf.little_endian or machine != "EM_ARM":
+            order = "little" if elf.little_endian else "big"
+            machine = machine if isinstance(machine, str) else f"machine {machine}"
+            raise UserError(
+                f"{path}: an ELF file for {elf.elfclass} bit, {order}-endian {machine.removeprefix('EM_')}; "
+                "the LPC2194 is a 32 bit, little-endian ARM"
+            )
+        if elf["e_type"] != "ET_EXEC":
+            raise UserError(f"{path}: an ELF file that is not linked into an image ({elf['e_type']}, not ET_EXEC)")
+        pieces = []
+        for segment in elf.iter_segments("PT_LOAD"):
+            start, size = segment["p_offset"], segment["p_filesz"]
+            if start + size > len(content):
+                raise UserError(
+                    f"{path}: truncated: a segment of {size} bytes begins at byte {start}, the file has {len(content)}"
+                )
+            if size:
+                pieces.append((segment["p_paddr"], content[start : start + size]))
+        if elf["e_shoff"] + elf["e_shnum"] * elf["e_shentsize"] > len(content):
+            raise UserError(f"{path}: truncated: the file has {len(content)} bytes, its section table ends behind them")
+        symbols = _symbols(elf)
+    except (ELFError, ValueError, KeyError, AssertionError, UnicodeDecodeError) as error:
+        reason = str(error) or type(error).__name__
+        raise UserError(f"{path}: a damaged or truncated ELF file: {reason}") from None
+    return Image(path, _checked(path, pieces), symbols)
+
+
+def _symbols(elf: ELFFile) -> tuple[Symbol, ...]:
+    """Functions and variables, without the mapping symbols ($a, $t, $d) and sections' own."""
+    found = []
+    for section in elf.iter_sections():
+        if not isinstance(section, SymbolTableSection):
+            continue
+        for symbol in section.iter_symbols():
+            kind = symbol["st_info"]["type"]
+            named = symbol.name and not symbol.name.startswith("$") and isinstance(symbol["st_shndx"], int)
+            if named and kind in ("STT_FUNC", "STT_OBJECT", "STT_NOTYPE"):
+                address = symbol["st_value"] & ~1 if kind == "STT_FUNC" else symbol["st_value"]  # bit 0: Thumb
+                found.append(Symbol(address, symbol["st_size"], symbol.name))
+    return tuple(sorted(found, key=lambda each: (each.address, each.size, each.name)))
+
+
+def _from_hex(path: pathlib.Path, content: bytes) -> Image:
+    """Intel HEX: data records, with the upper half of their addresses in records of their own."""
+    pieces: list[tuple[int, bytes]] = []
+    upper = 0
+    ended = False
+    for number, line in enumerate(content.splitlines(), start=1):
+        line = line.strip()
+        if not line:
+            continue
+        where = f"{path}:{number}"
+        if ended:
+            raise UserError(f"{where}: more lines behind the end record")
+        try:
+            record = bytes.fromhex(line[1:].decode("ascii")) if line.startswith(b":") else b""
+        except (ValueError, UnicodeDecodeError):
+            record = b""
+        if len(record) < 5 or len(record) != record[0] + 5:
+            raise UserError(f"{where}: no whole record of Intel HEX")
+        if sum(record) & 0xFF:
+            right = -sum(record[:-1]) & 0xFF
+            raise UserError(f"{where}: checksum {record[-1]:#04x} is wrong: the record's bytes ask for {right:#04x}")
+        offset, kind, data = record[1] << 8 | record[2], record[3], record[4:-1]
+        if kind in HEX_FIXED and len(data) != HEX_FIXED[kind]:
+            raise UserError(f"{where}: a record of type {kind} has {HEX_FIXED[kind]} bytes, this one {len(data)}")
+        if kind == HEX_DATA:
+            if data:
+                pieces.append((upper + offset, data))
+        elif kind == HEX_END:
+            ended = True
+        elif kind == HEX_SEGMENT:
+            upper = int.from_bytes(data, "big") << 4
+        elif kind == HEX_LINEAR:
+            upper = int.from_bytes(data, "big") << 16
+        elif kind not in HEX_FIXED:
+            raise UserError(f"{where}: record type {kind} is none of Intel HEX (0 ... 5)")
+    if not ended:
+        raise UserError(f"{path}: truncated: there is no end record")
+    return Image(path, _checked(path, pieces))

@@ -1,0 +1,53 @@
+cimport cython
+
+from ranger_sim.firmware_sim.alarm cimport Alarm
+from ranger_sim.firmware_sim.lpc2194.block cimport Block
+from ranger_sim.firmware_sim.lpc2194.vic cimport SSP_INPUT
+from ranger_sim.firmware_sim.peripheral cimport Peripheral
+from ranger_sim.firmware_sim.peripherals.adc_external cimport START, Ads7871
+from ranger_sim.firmware_sim.peripherals.ssp cimport SspPort, SspSegment
+from ranger_sim.firmware_sim.vic cimport InterruptSource
+
+cpdef enum:
+    DEPTH = 8
+    WORD_ALARM = 0
+    SILENCE_ALARM = 1
+    SILENT_BITS = 32
+    SR_TFE = 1
+    SR_TNF = 2
+    SR_RNE = 4
+    SR_RFF = 8
+    SR_BSY = 16
+    ROR = 1
+    RT = 2
+    RX = 4
+    TX = 8
+    CR1_LOOPBACK = 1
+    CR1_ENABLE = 2
+    CR1_SLAVE = 4
+
+cdef class SspDevice(Peripheral):
+    cpdef int begin(self, long long time) except -1
+    cpdef long long exchange(self, long long word, long long time) except? <long long>-1
+
+@cython.final
+cdef class SerialConverter(SspDevice):
+    cdef public Ads7871 adc
+
+@cython.final
+cdef class SegmentLink(SspDevice):
+    cdef public SspPort port
+    cdef public long long sent
+    cdef public list words, coming
+
+@cython.final
+cdef class SspBlock(Block):
+    cdef public SspDevice device
+    cdef public long long CR0, CR1, CPSR, IMSC, flags
+    cdef public long long[8] going, came
+    cdef public long long going_count, came_count, word, word_ns, bit_ns, words
+    cdef public bint busy
+    cdef public Alarm word_alarm, silence_alarm
+    cdef long long raw(self) noexcept
+    cpdef object _set_rate(self)
+    cdef int _start(self, long long time) except -1

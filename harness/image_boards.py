@@ -1,0 +1,70 @@
+"""Boards of the robot that can run a firmware image: what hangs on their chips."""
+
+import os
+import pathlib
+from collections.abc import Mapping
+
+from ranger_sim.boards import ankle_board, can_router, hip, motor_board, steering
+from ranger_sim.firmware_sim.lpc2194 import image as images
+from ranger_sim.firmware_sim.lpc2194.hardware import BoardHardware
+from ranger_sim.firmware_sim.lpc2194.image import Image
+from ranger_sim.firmware_sim.native.hardware import ExternalConverter, InternalConverter, SpiDevice
+from ranger_sim.foundation.user_error import UserError
+
+BATTERY_VOLTAGE_CHANNEL = 1  # AIN1, P0.28
+SEQUENCES = {
+    "MCH": hip.SEQUENCE,
+    "MCFO": ankle_board.SEQUENCE,
+    "MCFI": ankle_board.SEQUENCE,
+    "MCSI": steering.SEQUENCE,
+}
+BOARDS = (*SEQUENCES, "UI", "CSR")
+
+
+def hardware_of(board: str) -> BoardHardware:
+    """What hangs on the chip of a board of the robot."""
+    if board in SEQUENCES:
+        switches = tuple(motor_board.PINS[name] for name in ("limit_switch_left", "limit_switch_right"))
+        return BoardHardware(
+            external=ExternalConverter(
+                eint=1,
+                conversion_ns=motor_board.CONVERSION_NS,
+                inputs={code: motor_board.ANALOG[name] for name, code, _ in SEQUENCES[board]},
+            ),
+            internal=InternalConverter(inputs={BATTERY_VOLTAGE_CHANNEL: motor_board.ANALOG["battery_voltage"]}),
+            spi={0: SpiDevice(word=motor_board.WORDS["absolute_encoder"])},
+            pulled_up=switches,
+        )
+    if board == "CSR":
+        return BoardHardware(
+            external=None,
+            internal=InternalConverter(
+                inputs={0: can_router.ANALOG["supply_current"], 1: can_router.ANALOG["supply_voltage"]}
+            ),
+            spi={},
+            segment_link=True,
+        )
+    return BoardHardware(external=None, spi={})
+
+
+def known(board: str) -> str:
+    """A board that can run an image."""
+    if board not in BOARDS:
+        raise UserError(f"image for board {board!r}: boards that can run a firmware image are {', '.join(BOARDS)}")
+    return board
+
+
+def placed(text: str) -> tuple[str, str]:
+    """Board and file of `MCH=FILE`; UserError for what does not read so."""
+    board, equals, path = text.partition("=")
+    if not equals or not path:
+        raise UserError(f"image {text!r}: BOARD=FILE is expected, as in MCH=B2A_Hip_Motor_Controller.axf")
+    return known(board), path
+
+
+def loaded(wanted: Mapping[str, Image | str | os.PathLike]) -> dict[str, Image]:
+    """The image of each board, files read. UserError for a board that takes none, and for a file that is none."""
+    return {
+        known(board): each if isinstance(each, Image) else images.read(pathlib.Path(each))
+        for board, each in wanted.items()
+    }

@@ -1,0 +1,33 @@
+# Generated from firmware_sim/lpc2194/block.py and firmware_sim/lpc2194/block.pxd (python -m ranger_sim.tools.stubs); do not edit.
+
+from ranger_sim.firmware_sim.peripheral import Peripheral
+from typing import Any
+from typing import final
+
+class NotModelledError(Exception):
+    pass
+
+@final
+class Clocks:
+    crystal_hz: int
+    cclk: int
+    divider: int
+    def __init__(self, crystal_hz: int) -> None: ...
+    @property
+    def pclk(self) -> int: ...
+
+class Block(Peripheral):
+    clocks: Clocks
+    name: str
+    base: int
+    mask: int
+    steady: bool
+    partner: Block
+    REGISTERS: dict[int, tuple[str, ...]] = ...
+    def __init__(self, chip: Any, clocks: Clocks, name: str, base: int, mask: int = 0) -> None: ...
+    def read(self, offset: int) -> int: ...
+    def write(self, offset: int, value: int) -> int: ...
+    def write_part(self, offset: int, size: int, value: int) -> int: ...
+    def requests(self) -> int: ...
+    def clocked(self) -> None: ...
+    def not_modelled(self, what: Any) -> None: ...
