@@ -17,6 +17,7 @@ PRINTED = {
         r"^ff 05 80 08 08 00 01 01$",
         r"^ff 72 61 6e 67 65 72$",
     ),
+    "docs/how-to/co-simulation.md": (r"^fell at \d\.\d{3} s, -?\d\.\d\d A$",),
     "docs/how-to/can-tools.md": (r"ID: +123 .*'ranger'", r"^BusState\.ERROR$"),
     "docs/slot-timing.md": (r"^3 7460 53% left$",),
     "docs/faults.md": (r"^True 100 counts True$",),
@@ -81,3 +82,13 @@ def test_recordings_to_try_a_diagnosis_on_are_written_with_the_fault_that_is_cho
     assert capsys.readouterr().err == "spring at hip_joint has no part in this bench\n"
     assert bench_recording.main([str(tmp_path / "none.toml")], tmp_path, 0.5) == 2
     assert capsys.readouterr().err.count("\n") == 1
+
+
+def test_the_example_of_co_simulation_lets_the_robot_fall_six_times(tmp_path):
+    pytest.importorskip("pythonfmu3")
+    pytest.importorskip("fmpy")
+    unit = tmp_path / "body.fmu"
+    for command in (["-m", "ranger_sim", "fmu", unit], ["-W", "error", ROOT / "examples" / "co_simulation.py", unit]):
+        done = subprocess.run([sys.executable, *command], cwd=ROOT, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stderr
+    assert len(re.findall(r"^ ?\d+\.91 kg, duty \d+%: fell after [01]\.\d{3} s, motor at most", done.stdout, re.M)) == 6

@@ -65,6 +65,7 @@ def parser() -> argparse.ArgumentParser:
     from ranger_sim.tools.compare_walk import command as compare_walk
     from ranger_sim.tools.diagnose import command as diagnose
     from ranger_sim.tools.figures import command as figures
+    from ranger_sim.tools.fmu import command as fmu
     from ranger_sim.tools.fuzz import command as fuzz
     from ranger_sim.tools.identify import command as identify
     from ranger_sim.tools.vm import command as vm
@@ -97,6 +98,7 @@ def parser() -> argparse.ArgumentParser:
     causes.register(commands)
     diagnose.register(commands)
     figures.register(commands)
+    fmu.register(commands)
     identify.register(commands)
     compare_walk.register(commands)
     completion.register(commands)

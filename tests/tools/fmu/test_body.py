@@ -1,0 +1,168 @@
+"""The body behind the interface: the same trajectory as inside, and what it refuses. Without any FMI."""
+
+import json
+
+import pytest
+
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.harness.scenario import Scenario
+from ranger_sim.plant import body_files
+from ranger_sim.tools.fmu.body import ExportedBody, given_of
+from ranger_sim.tools.fmu.units import exponents
+from tests.tools.fmu.recording import recorded
+
+SCENARIO = Scenario(seed=3, floor_roughness_m=0.001, slope_rad=0.001, battery_charge=0.9)
+
+
+def body_of(scenario, **changes):
+    made = ExportedBody(json.loads(json.dumps(given_of(scenario))))
+    for name, value in changes.items():
+        made.set(name.replace("__", "."), value)
+    return made
+
+
+def test_with_the_inputs_of_a_walk_every_output_is_that_of_the_walk_bit_for_bit():
+    inputs, outputs, steps = recorded(SCENARIO, 3.0)
+    assert steps >= 3 and len(inputs) == 12_000
+    assert max(row["hip.delay_s"] for row in inputs) > 0.0  # a slot wrote inside a step
+    body = body_of(SCENARIO)
+    for number, (row, expected) in enumerate(zip(inputs, outputs, strict=True)):
+        for name, value in row.items():
+            body.set(name, value)
+        assert body.advance(1)
+        found = {name: body.get(name) for name in expected}
+        assert found == expected, f"step {number}"
+
+
+def test_every_number_of_the_bodys_table_is_a_parameter_with_its_unit_limits_and_source():
+    body = body_of(SCENARIO)
+    for key in body_files.keys().values():
+        each = body.quantities[f"body.{key.name}"]
+        assert each.causality == "parameter" and each.start == body_files.load("ranger").values[key.name]
+        assert each.unit == key.metadata["unit"].replace("1", "", 1 if key.metadata["unit"] == "1" else 0)
+        assert key.metadata["source"] in each.description and each.limits == key.metadata.get("limits")
+
+
+def test_a_parameter_acts_and_is_fixed_once_the_body_has_moved():
+    heavy = body_of(SCENARIO, body__total_mass_kg=20.0)
+    light = body_of(SCENARIO)
+    assert heavy.advance(1) and light.advance(1)
+    force = heavy.get("state.outer_Fy_N") - light.get("state.outer_Fy_N")
+    assert force == pytest.approx((20.0 - 9.91) * 9.81, rel=1e-4)  # held standing on the outer legs
+    with pytest.raises(UserError, match="fixed once"):
+        heavy.set("body.total_mass_kg", 9.91)
+
+
+def test_several_steps_at_once_are_those_one_by_one():
+    together, alone = body_of(SCENARIO), body_of(SCENARIO)
+    for body in (together, alone):
+        body.set("hip.match_2", 300)
+        body.set("hip.watchdog", True)
+        body.set("held.now", False)
+    for _ in range(40):
+        together.advance(4)
+    for _ in range(160):
+        alone.advance(1)
+    assert together.values == alone.values and together.get("state.hip_A") != 0.0
+
+
+def test_the_bridge_loses_its_power_when_the_watchdog_line_stands_still():
+    body = body_of(SCENARIO)
+    body.set("hip.match_2", 300)
+    body.set("hip.watchdog", True)
+    body.advance(8)
+    body.set("hip.watchdog", False)
+    body.advance(38)  # the last edge was at 1.75 ms, at the begin of step 7; it is 11.5 ms now
+    assert body.plant.bridges[0].powered and body.get("state.hip_A") > 1.0
+    body.advance(1)
+    assert not body.plant.bridges[0].powered
+
+
+def test_a_body_that_has_fallen_moves_no_more():
+    body = body_of(SCENARIO)
+    body.set("held.now", False)
+    moved = [body.advance(100) for _ in range(200)]  # 5 s without a motor
+    assert moved[0] and not moved[-1] and body.get("state.fell")
+    where, steps = body.get("state.hip_x_m"), body.steps
+    assert not body.advance(100) and body.steps == steps and body.get("state.hip_x_m") == where
+
+
+@pytest.mark.parametrize(
+    ("time_s", "length_s", "count"),
+    [(0.0, 0.00025, 1), (0.0, 0.002, 8), (5e-8, 0.00025 + 5e-8, 1), (0.0, 1.0, 4000)],
+)
+def test_a_communication_step_is_whole_steps_of_the_plant(time_s, length_s, count):
+    assert body_of(SCENARIO).steps_in(time_s, length_s, 0.0) == count
+    assert body_of(SCENARIO).steps_in(7.0 + time_s, length_s, 7.0) == count
+
+
+@pytest.mark.parametrize(
+    ("time_s", "length_s", "told"),
+    [
+        (0.0, 0.0001, "100 us.*steps of 250 us"),
+        (0.0, 0.0003, "300 us"),
+        (0.0, 0.0, "0 us"),
+        (0.0, -0.00025, "-250 us"),
+        (0.001, 0.00025, "from 0.001 s is asked for, the body is at 0 s"),
+        (float("nan"), 0.00025, "is asked for"),
+        (0.0, float("inf"), "inf us"),
+    ],
+)
+def test_another_step_or_another_time_is_refused(time_s, length_s, told):
+    with pytest.raises(UserError, match=told):
+        body_of(SCENARIO).steps_in(time_s, length_s, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "told"),
+    [
+        ("body.total_mass_kg", 0.0, r"body.total_mass_kg is 0.0, allowed are 0.1 to 1000 kg"),
+        ("body.total_mass_kg", float("nan"), "nan"),
+        ("hip.match_2", -1, "hip.match_2 is -1"),
+        ("hip.period", 0, "hip.period is 0"),
+        ("hip.delay_s", 0.00025, "hip.delay_s"),
+        ("imu.mode", 1, "allowed are 0, 194, 207"),
+        ("seed", -1, "seed is -1"),
+    ],
+)
+def test_a_number_beyond_its_limits_is_refused(name, value, told):
+    with pytest.raises(UserError, match=told):
+        body_of(SCENARIO).set(name, value)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "told"),
+    [
+        ("held.stance", "left", "held.stance is 'left', allowed are 'outer' and 'inner'|outer and inner"),
+        ("body.contact", "glue", "contact"),
+        ("floor.slope_rad", 2.0, "slope"),
+        ("battery.charge", 0.0, "battery_charge"),
+    ],
+)
+def test_parameters_that_make_no_body_are_told_when_it_begins(name, value, told):
+    body = body_of(SCENARIO)
+    body.set(name, value)
+    with pytest.raises(UserError, match=told):
+        body.advance(1)
+
+
+@pytest.mark.parametrize(
+    ("unit", "found"),
+    [
+        ("N m s/rad", ({"kg": 1, "m": 2, "s": -1, "rad": -1}, 1.0)),
+        ("kg m^2", ({"kg": 1, "m": 2}, 1.0)),
+        ("V", ({"kg": 1, "m": 2, "s": -3, "A": -1}, 1.0)),
+        ("ohm", ({"kg": 1, "m": 2, "s": -3, "A": -2}, 1.0)),
+        ("m/s^2", ({"m": 1, "s": -2}, 1.0)),
+        ("W h", ({"kg": 1, "m": 2, "s": -2}, 3600.0)),
+        ("s/m", ({"m": -1, "s": 1}, 1.0)),
+        ("1", ({}, 1.0)),
+    ],
+)
+def test_units_are_powers_of_si_base_units(unit, found):
+    assert exponents(unit) == found
+
+
+def test_a_unit_that_nobody_knows_is_told():
+    with pytest.raises(UserError, match="'furlong'"):
+        exponents("m/furlong")

@@ -1,0 +1,45 @@
+"""`ranger-sim fmu`: mistakes are one line, and no file is left."""
+
+import importlib.util
+import os
+
+import pytest
+
+from ranger_sim.tools import cli
+
+
+def told(capsys, *arguments):
+    try:
+        code = cli.main(["fmu", *arguments])
+    except SystemExit as ended:
+        code = ended.code
+    out, err = capsys.readouterr()
+    assert code == 2 and out == "" and err.count("\n") == 1, err
+    return err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "expected"),
+    [
+        (["body.zip"], ".fmu is expected"),
+        (["body.fmu", "--body", "nobody"], "nobody"),
+        (["body.fmu", "--slope", "2rad"], "slope"),
+        (["folder.fmu"], "this is a folder"),
+        (["none/at/../all.fmu/x.fmu"], "all.fmu"),
+    ],
+)
+def test_a_mistake_is_one_line(arguments, expected, tmp_path, monkeypatch, capsys):
+    pytest.importorskip("pythonfmu3")
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "folder.fmu").mkdir()
+    (tmp_path / "none").mkdir()
+    (tmp_path / "none" / "all.fmu").write_bytes(b"")
+    (tmp_path / "none" / "at").mkdir()
+    assert expected in told(capsys, *arguments)
+    assert [each for each in os.listdir(tmp_path) if each.startswith("body")] == []
+
+
+def test_without_pythonfmu3_it_says_what_to_install(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
+    assert "pip install 'ranger-sim[fmi]'" in told(capsys, str(tmp_path / "body.fmu"))
+    assert not list(tmp_path.iterdir())
