@@ -63,7 +63,7 @@ class HipBoard(MotorBoard):
         self.motor = self.cap23
         self.add_absolute_encoder(second_connector=0, zero=4590, sign=1, rpm=94)
         self.safety = HipSafety(self.encoder, self.current_control, self.heartbeat)
-        self.begin(phase_ns)
+        self.start_slots(phase_ns)
 
     def schedule(self) -> Schedule:
         """One pass takes 2 ms; each row's variable goes out at 500 Hz, the occasional ones at 45.45 Hz."""

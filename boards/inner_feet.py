@@ -46,7 +46,7 @@ class InnerFeetBoard(AnkleBoard):
             rezero_share=REZERO_SHARE,
             right_off_level=quirks.inner_right_off_level,
         )
-        self.begin(phase_ns)
+        self.start_slots(phase_ns)
 
     def schedule(self) -> Schedule:
         """One pass takes 4 ms; each row's variable goes out at 250 Hz, the occasional ones at 16.67 Hz."""

@@ -263,7 +263,7 @@ class MotorBoard(SatelliteBoard):
             SPI_DONE, 0, board.on_absolute_encoder, cost=2 * 35 - IRQ_LATENCY, slot=SPI_SLOT, name="ae_read"
         )
 
-    def begin(self, phase_ns) -> None:
+    def start_slots(self, phase_ns) -> None:
         """Start the scheduler; the first slot comes when the start values are set."""
         self.start(self.schedule(), phase_ns + SLOTS_BEGIN_NS)
 

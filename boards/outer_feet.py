@@ -44,7 +44,7 @@ class OuterFeetBoard(AnkleBoard):
             rezero_share=REZERO_SHARE,
             right_off_level=FOOT_OFF_LEVEL,
         )
-        self.begin(phase_ns)
+        self.start_slots(phase_ns)
 
     def schedule(self) -> Schedule:
         """One pass takes 4.5 ms; each row's variable goes out at 222.2 Hz, the occasional ones at 14.81 Hz."""

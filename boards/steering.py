@@ -70,7 +70,7 @@ class SteeringBoard(MotorBoard):
         self.direct = self.quirks.steering_output in ("duty", "duty_then_current")
         self.closed_loop = self.quirks.steering_output in ("current", "duty_then_current")
         self.check_limits = self.quirks.steering_limit_check
-        self.begin(phase_ns)
+        self.start_slots(phase_ns)
 
     def schedule(self) -> Schedule:
         """One pass takes 2 ms; each row's variable goes out at 500 Hz, the occasional ones at 100 Hz.

@@ -7,13 +7,14 @@ from ranger_sim.harness import bus_schedule, wiring
 Message = tuple[Any, ...]
 
 
-def fresh_board(robot: Any, name: str, power_up_ns: int) -> Any:
+def fresh_board(robot: Any, name: str, power_up_ns: int, record: Any = None) -> Any:
     """A new board `name` at the sensors of `robot`; gets its power at `power_up_ns`.
 
     What a power-up forgets is forgotten: the router's time begins at 0, the main brain has its parameter set again.
+    record: memory in which a program in C leaves where it was when it ended this process.
     What its program puts out while it starts waits in its outbox (`first_outputs`).
     """
-    board = robot.new_board(name, power_up_ns)
+    board = robot.new_board(name, power_up_ns, record)
     if robot.profile is not None:
         bus_schedule.apply(board, robot.profile.schedules())
     loop, plant = robot.loop, robot.plant

@@ -4,10 +4,12 @@ Follow the loop here: `Ranger.__init__` builds the plant and the boards; harness
 by the tables of harness/wiring.py; `harness/lockstep.py` then passes time and carries what goes over the wires.
 """
 
+from __future__ import annotations
+
 import difflib
 import os
 from collections.abc import Callable, Mapping
-from typing import Any, Literal, overload
+from typing import TYPE_CHECKING, Any, Literal, overload
 
 from ranger_sim import datatable
 from ranger_sim.boards.can_router import CanRouterBoard
@@ -24,10 +26,12 @@ from ranger_sim.boards.user_interface import UserInterfaceBoard
 from ranger_sim.datatable import parameters
 from ranger_sim.datatable.generated import all_variables
 from ranger_sim.firmware_sim.clock import seeded_crystal
+from ranger_sim.firmware_sim.native import crash
+from ranger_sim.firmware_sim.native.trial import tried
 from ranger_sim.foundation.random_stream import RandomStream
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness import bus_schedule, native_boards, wiring
-from ranger_sim.harness.conditions import STATE_VARIABLES, Condition, condition
+from ranger_sim.harness.conditions import STATE_VARIABLES, Condition, ErrorNoted, condition
 from ranger_sim.harness.faults.error_rows import StateWord
 from ranger_sim.harness.faults.error_watch import ErrorWatch
 from ranger_sim.harness.faults.ranger_catalogue import CATALOGUE
@@ -36,6 +40,7 @@ from ranger_sim.harness.imu_wire import ImuWire
 from ranger_sim.harness.machine import Machine
 from ranger_sim.harness.native_firmware import Firmware
 from ranger_sim.harness.operator import Operator
+from ranger_sim.harness.processes.kinds import SET_WORD
 from ranger_sim.harness.profile import Profile
 from ranger_sim.harness.ranger_names import RANGER
 from ranger_sim.harness.scenario import Scenario, StopRule
@@ -44,6 +49,9 @@ from ranger_sim.harness.timing.machine_slots import MachineSlots
 from ranger_sim.harness.waiting import Wanted
 from ranger_sim.plant import body_files
 from ranger_sim.plant.ranger import RangerPlant
+
+if TYPE_CHECKING:
+    from ranger_sim.harness.processes.apart import Apart
 
 BUS_BIT_RATE = 3_000_000  # bit/s, appendix 3.11
 # Boards get their power together but their resets and start-up code differ: first slots spread over 2 ms.
@@ -77,6 +85,7 @@ class Ranger(Machine):
         quirks: Quirks | None = None,
         profile: Profile | None = None,  # its bit rates and schedules; boards that it has outside are emulated here
         firmware: Mapping[str, Firmware | str | os.PathLike] | None = None,  # boards that run C, by folder
+        in_process: bool = False,  # their programs run here: faster, but a crash of one of them ends this process
     ) -> None:
         self.scenario = scenario if scenario is not None else Scenario()
         self.controller = controllers.load(self.scenario.controller)
@@ -97,7 +106,12 @@ class Ranger(Machine):
             parameters=self.body.parameters,
             electrics=self.scenario.electrics(self.body.electrics),
         )
+        self.is_watched = False
         self.firmware: dict[str, Firmware] = native_boards.built(firmware if firmware is not None else {})
+        self._try_firmware(start_ns)
+        self.in_own_process: tuple[str, ...] = () if in_process else tuple(self.firmware)
+        self.processes: Apart | None = None
+        self.deaths: list[dict[str, Any]] = []  # boards whose process has ended (harness/processes/apart.py)
         # interrupts and slots: each board on its own crystal, powered up in its own moment
         boards = {name: self.new_board(name, start_ns + self._stream(name)[1]) for name in BOARD_CLASSES}
         boards["CSR"].time.ms = self.scenario.start_uptime_ms
@@ -129,13 +143,29 @@ class Ranger(Machine):
         stream = RandomStream(self.scenario.seed, f"board {board}")
         return seeded_crystal(stream), stream.integer(POWER_UP_SPREAD_NS)
 
-    def new_board(self, name: str, power_up_ns: int) -> Any:
-        """A board fresh from the shelf, with its own crystal, powered up at `power_up_ns`; not wired."""
+    def _try_firmware(self, start_ns: int) -> None:
+        """Start each program once in a process that it may end. UserError where it does."""
+        for name, firmware in self.firmware.items():
+
+            def start(record: Any, name: str = name) -> None:
+                board = self.new_board(name, start_ns + self._stream(name)[1], record)
+                board.counters()
+
+            tried(f"{firmware.folder}: {name}", firmware.library, firmware.folder, start)
+
+    def new_board(self, name: str, power_up_ns: int, record: Any = None) -> Any:
+        """A board fresh from the shelf, with its own crystal, powered up at `power_up_ns`; not wired.
+
+        record: memory in which a program in C leaves where it was when it ended this process.
+        """
         crystal = self._stream(name)[0]
         if name in self.firmware:
             from ranger_sim.harness.robot_native_board import RobotNativeBoard  # only here: it loads cffi
 
-            return RobotNativeBoard(name, self.firmware[name], crystal, power_up_ns)
+            board = RobotNativeBoard(name, self.firmware[name], crystal, power_up_ns, record)
+            if record is None and self.is_watched:  # one that takes another's place
+                self._watch(board)
+            return board
         if name == "MB":
             return MainBrainBoard(crystal, self.quirks, power_up_ns, controller=self.controller)
         return BOARD_CLASSES[name](crystal, self.quirks, power_up_ns)
@@ -153,6 +183,71 @@ class Ranger(Machine):
         loop.strikes = StrikeWatch(self.plant, boards["MB"])
 
     # --- passing time -------------------------------------------------------------------------------------
+
+    def start(self) -> Apart | None:
+        """Give each board that is to have a process of its own that process, if that has not been done.
+
+        A program in C that runs in this process is watched from now on.
+        """
+        if self.processes is None and self.in_own_process:
+            from ranger_sim.harness.processes.apart import Apart
+
+            self.processes = Apart(self, self.in_own_process)
+            self.deaths = self.processes.deaths
+        if not self.is_watched:
+            self.is_watched = True
+            for name in self.firmware:
+                if not self.loop.board(name).apart:
+                    self._watch(self.loop.board(name))
+        return self.processes
+
+    def _watch(self, board: Any) -> None:
+        """From now on the program of a board in this process says where it was when it ends it."""
+        firmware = self.firmware[board.name]
+        board.leave_record_in(*crash.record_of(board.name, firmware.library, firmware.folder))
+
+    def run(self, stop: StopRule, slice_s: float = 1.0) -> bool:
+        """Pass up to `slice_s` of virtual time; True when the stop rule is met, the robot fell or has no charge left.
+
+        A board whose process ends meanwhile is off its buses from then on, and stands in `deaths`.
+        """
+        __tracebackhide__ = True
+        apart = self.start()
+        if apart is None:
+            return Machine.run(self, stop, slice_s)
+        with apart.processor():
+            return Machine.run(self, stop, slice_s)
+
+    def until(self, wanted: Wanted, within: str = "60 s") -> float:
+        """Pass time until a condition holds, as any machine does.
+
+        What boards noted that run in processes of their own is asked of them at each step then, which takes time.
+        """
+        __tracebackhide__ = True
+        wanted = self.condition(wanted)
+        apart = self.start()
+        if apart is None or not isinstance(wanted, ErrorNoted):
+            return Machine.until(self, wanted, within)
+        asking = apart.asking(wanted.boards)
+        self.loop.watchers.append(asking)
+        try:
+            return Machine.until(self, wanted, within)
+        finally:
+            self.loop.watchers.remove(asking)
+
+    def counters(self) -> dict[str, Any]:
+        """What every board counted by now, by its name."""
+        if self.processes is not None:
+            self.processes.fetch_counters()
+        return Machine.counters(self)
+
+    def inject(self, *place_and_mode: Any, **more: Any) -> Any:
+        """Arm a fault, as any machine does.
+
+        Processes of boards begin now, so that a fault that would have to be inside one is refused.
+        """
+        self.start()
+        return Machine.inject(self, *place_and_mode, **more)
 
     def act(self, end_ns: int) -> None:
         """The operator: holds the robot, lets it go, presses keys."""
@@ -209,8 +304,14 @@ class Ranger(Machine):
     @overload
     def board(self, name: Literal["MB"]) -> MainBrainBoard: ...
     def board(self, name: str) -> Any:
-        """The board MCH, MCFO, MCFI, MCSI, UI, CSR or MB. UserError for any other name."""
-        return Machine.board(self, name)
+        """The board MCH, MCFO, MCFI, MCSI, UI, CSR or MB. UserError for another name, or one that is elsewhere."""
+        board = Machine.board(self, name)
+        if self.processes is not None and name in self.processes.names:
+            raise UserError(
+                f"{name} runs in a process of its own, its memory is out of reach: variable(), counters(), wire() and "
+                "until() see it; or Ranger(in_process=True)"
+            )
+        return board
 
     def set_parameter(self, name: str, value: float) -> None:
         """Write a parameter into the main brain's table now, as the computer's link would.
@@ -221,7 +322,10 @@ class Ranger(Machine):
         self._write_word(row.id, parameters.checked_word(row, value))
 
     def _write_word(self, number: int, word: int) -> None:
-        """Into the main brain's table, as of its own clock."""
+        """Into the main brain's table, as of its own clock; through the channel when it is in another process."""
+        if self.loop.board("MB").apart:
+            self.loop.board("MB").send(SET_WORD, self.loop.time, number, word)
+            return
         board = self.boards["MB"]
         board.store.set_word(number, word, board.time.ms)
 
@@ -243,6 +347,8 @@ class Ranger(Machine):
         self, board: BoardName, task: str, function: Callable[[], int | None], cost: int, limit: int | None = None
     ) -> None:
         """Put your own function in a schedule entry; it declares its cost in cycles."""
+        if self.processes is not None and board in self.processes.names:
+            raise UserError(f"replace {task} of {board}: its process runs already; replace before time passes")
         Machine.replace(self, board, task, function, cost, limit)
 
     def slots(self, board: BoardName) -> MachineSlots:
@@ -276,6 +382,12 @@ class Ranger(Machine):
 
     def error_watch(self) -> Any:
         return ErrorWatch(self.loop.boards, max(self.names.errors) + 1)
+
+    def close(self) -> None:
+        """Give back the log's files, the ends that lead outside, golden runs and the processes of boards."""
+        if self.processes is not None:
+            self.processes.close()
+        Machine.close(self)
 
     def summary(self) -> dict:
         """The walk in numbers: what `--json` prints."""

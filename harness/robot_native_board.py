@@ -15,10 +15,10 @@ from ranger_sim.harness.table_board import TableBoard
 class RobotNativeBoard(TableBoard):
     """Board `name` of the robot with a firmware in C, in the place of the emulated one."""
 
-    def __init__(self, name: str, firmware: Firmware, crystal: Any, power_up_ns: int) -> None:
+    def __init__(self, name: str, firmware: Firmware, crystal: Any, power_up_ns: int, record: Any = None) -> None:
         table = PLACES[name].table
         TableBoard.__init__(
-            self, name, firmware, table.CONTROLLER, crystal, power_up_ns, hardware_of(name), table_version()
+            self, name, firmware, table.CONTROLLER, crystal, power_up_ns, hardware_of(name), table_version(), record
         )
         self.module = ErrorModule(table.BOARD_NUMBER, NetworkTime())
 

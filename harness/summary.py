@@ -65,6 +65,7 @@ def of(robot: Any) -> dict:
         "slope_rad": robot.scenario.slope_rad,
         "floor_roughness_m": robot.scenario.floor_roughness_m,
         "electronics_off": list(robot.scenario.electronics_off),
+        "firmware": {name: firmware(robot, name) for name in robot.firmware},
         "faults": [fault.summary() for fault in robot.faults],
         "trace_digest": robot.trace_digest(),
     }
@@ -150,3 +151,16 @@ def slots(counters: RangerCounters) -> dict:
 def errors(counters: RangerCounters) -> dict:
     """Errors the board itself noted, by name."""
     return {name: counters.errors[code] for code, name in error_table.NAMES.items() if counters.errors[code]}
+
+
+def firmware(robot: Any, board: str) -> dict:
+    """What became of a board's program in C."""
+    made = robot.firmware[board]
+    death = next((each for each in robot.deaths if each["board"] == board), None)
+    return {
+        "name": made.manifest.name,
+        "folder": str(made.folder),
+        "own_process": bool(robot.loop.board(board).apart),
+        "lost_s": death["time_s"] if death is not None else None,
+        "why": (death["why"] or None) if death is not None else None,
+    }

@@ -171,6 +171,12 @@ FIGURES = (
     Figure("command", TEXT, "", "walks the same again: equal digest, as long as nothing came in from outside"),
     Figure("complete", FLAG, "", "every file of the run's folder is whole"),
     Figure("files.{file}", TEXT, "", "`complete`, or `incomplete` and why: then it has `.partial` in its name"),
+    # programs in C
+    Figure("firmware.{board}.name", TEXT, "", "of the program in C that this board ran"),
+    Figure("firmware.{board}.folder", TEXT, "", "where its sources are, as asked for"),
+    Figure("firmware.{board}.own_process", FLAG, "", "it had a process of its own, which it could end alone"),
+    Figure("firmware.{board}.lost_s", REAL, "s", "when its process was gone, since power-up", "it was not"),
+    Figure("firmware.{board}.why", TEXT, "", "signal, function, file and line that ended it", "nothing is known"),
     # faults that were injected
     Figure("faults[].fault", TEXT, "", "as it is typed: place, mode, parameters, begin, end"),
     Figure("faults[].armed_s", REAL, "s", "when it was armed, since power-up", NOT_YET),

@@ -12,7 +12,7 @@ class TableBoard(NativeBoard):
     """Board `name` with `firmware` from `power_up_ns` (ns) on; its CAN controller `controller` hangs on a bus.
 
     UserError for a program that was compiled with another state of the table, or does not start its controller.
-    hardware: what hangs on its chip, where the manifest does not say.
+    hardware: what hangs on its chip, where the manifest does not say. record: as of NativeBoard.
     """
 
     def __init__(
@@ -24,13 +24,14 @@ class TableBoard(NativeBoard):
         power_up_ns: int = 0,
         hardware: Hardware | None = None,
         version: int | None = None,
+        record: Any = None,
     ) -> None:
         given = firmware.manifest.hardware
         NativeBoard.__init__(
-            self, name, firmware.library, crystal, power_up_ns, given if given is not None else hardware
+            self, name, firmware.library, crystal, power_up_ns, given if given is not None else hardware, record
         )
         wanted = table_version(firmware.table) if version is None else version
-        compiled = self.library.table_version
+        compiled = self.library.table_version()
         if compiled is not None and compiled != wanted:
             raise UserError(
                 f"{firmware.library}: compiled with version 0x{compiled:08X} of the master table, "

@@ -31,6 +31,11 @@ SANITIZE = Option(
     "file and line, and makes exit code 1",
     of_run=False,
 )
+IN_PROCESS = Option(
+    "--in-process",
+    "run the firmware in the walk's own process instead of one of its own: faster, but a crash ends the walk",
+    of_run=False,
+)
 OPTIONS = (FIRMWARE, SANITIZE)
 TARGETS = ("host", "lpc2194")
 EXIT_FOUND = 1

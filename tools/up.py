@@ -224,7 +224,8 @@ def run(options: argparse.Namespace) -> int:
     for name in firmware:
         if name not in settings.boards:
             raise UserError(f"--firmware {name}={firmware[name].folder}: {name} is not emulated in this profile")
-    with contextlib.closing(Ranger(scenario, log, quirks, profile, firmware)) as robot:
+    # in_process: the supervisor gives every board its process
+    with contextlib.closing(Ranger(scenario, log, quirks, profile, firmware, in_process=True)) as robot:
         outside, openers = external_buses(options, robot, profile)
         ends, lines = serial_options.connect(robot, options)
         servers, more = bus.open_servers({each.name: each for each in robot.buses}, options)
@@ -360,8 +361,7 @@ def print_processes(found: dict, console: Console) -> None:
     for door, counts in found["sent_away"].items():
         console.print(f"{door}: sent away {told(counts)}", highlight=False, soft_wrap=True)
     for death in found["deaths"]:
-        why = f": {death['why']}" if death["why"] else ""
-        console.print(f"{death['board']} was lost at {death['time_s']:.3f} s{why}", highlight=False, soft_wrap=True)
+        console.print(walk.loss_text(death), highlight=False, soft_wrap=True)
 
 
 def micro(value: float | None) -> str:

@@ -109,7 +109,7 @@ def run_scenario(scenario: Scenario, stop: StopRule, options: argparse.Namespace
     wanted = [CATALOGUE.typed(text) for text in options.fault]
     log = log_of(options)
     firmware = firmware_of(options, console)
-    with contextlib.closing(Ranger(scenario, log, quirks, profile, firmware)) as robot:
+    with contextlib.closing(Ranger(scenario, log, quirks, profile, firmware, options.in_process)) as robot:
         arm(robot, wanted, options.proof)
         timeline = trace.attach(robot, options)
         ends, places = serial_options.connect(robot, options)
@@ -156,6 +156,8 @@ def arm(robot: Ranger, wanted: list[Fault], proof: bool) -> None:
     """Arm the faults; with `proof` all of them beside one golden run without any."""
     if proof and not wanted:
         raise UserError("--proof: there is no --fault to hold against the walk without it")
+    if wanted:
+        robot.start()
     twin = None
     if proof:
         from ranger_sim.harness.faults.twin import Twin
@@ -252,9 +254,12 @@ def walk(robot: Ranger, stop: StopRule, console: Console, interrupted: list[bool
     ) as progress:
         task = progress.add_task("walk", total=1.0, told="")
         tell_at = started + TELL_EVERY_S
-        done = False
+        done, told = False, 0
         while not done:
             done = robot.run(stop, PACED_SLICE_S if paced else SLICE_S) or bool(interrupted)
+            for death in robot.deaths[told:]:
+                told += 1
+                console.print(loss_text(death), highlight=False, soft_wrap=True)
             wall = wallclock.monotonic_s() - started
             if paced and not done and robot.time_s > wall:
                 wallclock.sleep_s(robot.time_s - wall)
@@ -263,6 +268,12 @@ def walk(robot: Ranger, stop: StopRule, console: Console, interrupted: list[bool
             elif started + wall >= tell_at:
                 tell_at += TELL_EVERY_S
                 console.print(progress_text(robot, stop, wall), highlight=False, soft_wrap=True)
+
+
+def loss_text(death: dict) -> str:
+    """Which board was lost, when, and where its program was."""
+    why = death["why"] or f"its process {death.get('how', 'ended')}"
+    return f"{death['board']} was lost at {death['time_s']:.3f} s: {why}"
 
 
 def progress_text(robot: Ranger, stop: StopRule, wall_s: float) -> str:

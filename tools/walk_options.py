@@ -8,6 +8,7 @@ from ranger_sim.harness.scenario import LIMITS, Scenario
 from ranger_sim.harness.stop_rule import MOST_DISTANCE_M, MOST_STEPS, MOST_TIME_S, StopRule
 from ranger_sim.plant.electronics import SWITCHES
 from ranger_sim.tools import faults, serial_options, trace
+from ranger_sim.tools.firmware import IN_PROCESS
 from ranger_sim.tools.firmware import OPTIONS as FIRMWARE
 from ranger_sim.tools.options import Option, add_all
 from ranger_sim.tools.units import (
@@ -129,7 +130,7 @@ PROOF = Option(
 )
 
 RUN = (*END, *SCENARIO, *FILES)  # of every command that lets the robot walk
-WALK = (*RUN, *serial_options.OPTIONS, faults.FAULT, PROOF, faults.MODULE, *FIRMWARE, *trace.OPTIONS)
+WALK = (*RUN, *serial_options.OPTIONS, faults.FAULT, PROOF, faults.MODULE, *FIRMWARE, IN_PROCESS, *trace.OPTIONS)
 
 
 def add_run_options(command: Any) -> None:
@@ -141,7 +142,7 @@ def add_run_options(command: Any) -> None:
 def add_walk_options(command: Any) -> None:
     """All options of `walk`."""
     add_run_options(command)
-    add_all(command, (faults.FAULT, PROOF, faults.MODULE, *FIRMWARE))
+    add_all(command, (faults.FAULT, PROOF, faults.MODULE, *FIRMWARE, IN_PROCESS))
     trace.add_options(command)
 
 

@@ -10,8 +10,10 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Sequence
+from typing import Any
 
 from ranger_sim.firmware_sim.native.manifest import Manifest
+from ranger_sim.firmware_sim.native.trial import tried
 from ranger_sim.foundation.user_error import UserError
 
 HERE = pathlib.Path(__file__).resolve().parent
@@ -101,7 +103,7 @@ def build(
         with tempfile.TemporaryDirectory(prefix=".making-", dir=folder) as making:
             warnings = _compile(program, options, watching, sources, pathlib.Path(making), manifest)
             made = pathlib.Path(making) / "library.so"
-            _looked_at(made, path)
+            tried(f"{path}", path, manifest.folder, lambda record: _look_at(made, path, record))
             stamp.unlink(missing_ok=True)
             made.replace(path)
             stamp.write_text(state, encoding="utf-8")
@@ -110,11 +112,11 @@ def build(
     return Built(path, warnings)
 
 
-def _looked_at(made: pathlib.Path, shown: pathlib.Path) -> None:
+def _look_at(made: pathlib.Path, shown: pathlib.Path, record: Any) -> None:
     """UserError for a library without the entry points."""
     from ranger_sim.firmware_sim.native.library import Library  # only here: it loads cffi
 
-    Library(made, shown)
+    Library(made, shown).leave_record_in(record)
 
 
 def _compile(

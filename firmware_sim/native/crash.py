@@ -4,17 +4,62 @@ The record is `RECORD` numbers: the signal, plus `OVERFLOW` when the stack was l
 from its beginning, the innermost function first, 0 for none.
 """
 
+import json
+import mmap
 import pathlib
 import shutil
 import signal
 import subprocess
 from collections.abc import Sequence
+from typing import Any
 
 RECORD = 7
 OVERFLOW = 256  # OVERFLOW_FLAG of runtime.c
 ASKED = signal.SIGXCPU  # sent to a program that lets no time pass, to be told where it is
 LONGEST_S = 20.0  # binutils read some megabytes of debug information at most
 UNKNOWN = "??"  # what addr2line says for what it does not know
+
+ENTRY_WORDS = 256  # of a notebook: a record, and what it is about as JSON, its length in bytes before it
+ENTRIES = 16
+
+
+class Notebook:
+    """Memory for records of a process that runs programs in C itself, for who forked it: `told` says what ended it."""
+
+    def __init__(self) -> None:
+        self.words = memoryview(mmap.mmap(-1, 8 * ENTRIES * ENTRY_WORDS)).cast("q")
+        self.used = 0
+
+    def new_record(self, board: str, library: pathlib.Path, sources: pathlib.Path) -> Any:
+        """In that process: memory for the record of a board, whose program stands in `library`."""
+        entry = self.words[self.used % ENTRIES * ENTRY_WORDS :][:ENTRY_WORDS]
+        self.used += 1
+        about = json.dumps([board, str(library), str(sources)]).encode()[: 8 * (ENTRY_WORDS - RECORD - 1)]
+        entry[RECORD] = len(about)
+        padded = memoryview(about + bytes(-len(about) % 8)).cast("q")
+        entry[RECORD + 1 : RECORD + 1 + len(padded)] = padded
+        return entry[:RECORD]
+
+    def told(self) -> str:
+        """`MCH: SIGSEGV ... in control() at hip.c:42`; empty when no program has ended its process."""
+        for number in range(ENTRIES):
+            entry = self.words[number * ENTRY_WORDS :][:ENTRY_WORDS]
+            if entry[0]:
+                board, library, sources = json.loads(entry[RECORD + 1 :].tobytes()[: entry[RECORD]])
+                return f"{board}: {told(pathlib.Path(library), pathlib.Path(sources), entry[:RECORD].tolist())}"
+        return ""
+
+
+# Who has forked this process and will tell of its end; None: nobody, and the program's last word goes to the terminal.
+notebook: Notebook | None = None
+
+
+def record_of(board: str, library: pathlib.Path, sources: pathlib.Path) -> tuple[Any, str]:
+    """Memory for the record of a program that runs in this process, and what is to be printed at its end."""
+    if notebook is not None:
+        return notebook.new_record(board, library, sources), ""
+    words = memoryview(bytearray(8 * RECORD)).cast("q")
+    return words, f"ranger-sim: {board}: its program has ended this process, where: addr2line -f -e {library}"
 
 
 def told(library: pathlib.Path, sources: pathlib.Path, record: Sequence[int]) -> str:

@@ -12,10 +12,14 @@ from typing import Any
 
 import cffi
 
-from ranger_sim.firmware_sim.native import sanitizers
+from ranger_sim.firmware_sim.native import crash, sanitizers
 from ranger_sim.foundation.user_error import UserError
 
 VERSION = 1  # of the header: FW_VERSION
+# Of the processor's time, not the clock's: how busy the machine is does not matter. A turn is some slots at most and
+# takes microseconds; a chip that needs so long for one has missed thousands of slots. Chosen by us. Counted in whole
+# ticks, so that it may be up to twice as long.
+TURN_LIMIT_S = 1
 
 # The structures of firmware.h and what runtime.c shows. A library says the sizes that its compiler gave them.
 DECLARATIONS = """
@@ -49,10 +53,15 @@ extern host_call fw_calls[];
 extern const int64_t *fw_pin_levels;
 extern int64_t fw_mail[32];
 int64_t fw_turn(void);
-int32_t fw_watch(int64_t *record);
+extern uint32_t fw_turns;
+int32_t fw_watch(int64_t *record, int32_t limit_s, const char *message);
+int32_t fw_write_counts(void);
+int32_t fw_forget_counts(void);
 """
 SIZED = ("fw_task", "fw_step", "fw_schedule", "fw_interrupt")  # in the order of fw_sizes
 ENTRY_POINTS = "firmware_start() and one of firmware_schedule() and firmware_main()"
+
+WATCHED: list[Any] = []  # libraries whose code handles signals of this process: they stay loaded
 
 ffi: Any = cffi.FFI()
 ffi.cdef(DECLARATIONS)
@@ -61,8 +70,8 @@ ffi.cdef(DECLARATIONS)
 class Library:
     """One loaded copy of the firmware in the file `path`, which messages call `shown`.
 
-    `schedule`: whether it offers a schedule, else it has a main loop. `table_version`: of the master table that it was
-    compiled with, None where it does not say. UserError for a file that is no such library.
+    `schedule`: whether it offers a schedule, else it has a main loop. UserError for a file that is no such library.
+    What the program itself does is not looked at: none of its functions is called.
     """
 
     def __init__(self, path: pathlib.Path, shown: pathlib.Path | None = None) -> None:
@@ -72,7 +81,7 @@ class Library:
         self.code = _loaded_copy(path)
         sanitizers.lead_findings()
         path = shown if shown is not None else path
-        for name in ("fw_compiled_version", "fw_sizes", "fw_call_names", "fw_turn", "fw_watch"):
+        for name in ("fw_compiled_version", "fw_sizes", "fw_call_names", "fw_turn", "fw_watch", "fw_turns"):
             if not self.has(name):
                 raise UserError(f"{path}: no {name} in it: not made by `ranger-sim firmware build`")
         version = self.code.fw_compiled_version
@@ -90,7 +99,24 @@ class Library:
         if len(kinds) == 2:
             raise UserError(f"{path}: firmware_schedule() and firmware_main() are both there: one of them is too many")
         self.schedule = kinds == ["firmware_schedule"]
-        self.table_version = self.code.firmware_table_version() if self.has("firmware_table_version") else None
+        self.turns = ffi.addressof(self.code, "fw_turns")
+
+    def table_version(self) -> int | None:
+        """Of the master table that it was compiled with; None where it does not say."""
+        return self.code.firmware_table_version() if self.has("firmware_table_version") else None
+
+    def leave_record_in(self, words: Any, message: str = "") -> None:
+        """From now on a signal that ends this process leaves in `words` where the program was (crash.py).
+
+        A turn of the program that takes longer than TURN_LIMIT_S of this process's computing is ended in that way, too.
+        message: printed then, with the places behind it.
+        """
+        self.record = ffi.from_buffer("int64_t[]", words, require_writable=True)
+        if len(self.record) < crash.RECORD:
+            raise ValueError(f"a record has {crash.RECORD} numbers, not {len(self.record)}")
+        self.message = ffi.new("char[]", message.encode()) if message else ffi.NULL
+        WATCHED.append(self)
+        self.code.fw_watch(self.record, TURN_LIMIT_S, self.message)
 
     def has(self, name: str) -> bool:
         """True when the library defines `name`."""

@@ -4,12 +4,13 @@ What the program calls (firmware.h) arrives at the methods of `Calls`, one for e
 """
 
 import array
+import contextlib
 import pathlib
+from collections.abc import Iterator
 from typing import Any
 
 from ranger_sim.firmware_sim.counters import CanCounters, ProgramCounters
 from ranger_sim.firmware_sim.microcontroller import Microcontroller
-from ranger_sim.firmware_sim.native import crash
 from ranger_sim.firmware_sim.native.hardware import Hardware
 from ranger_sim.firmware_sim.native.library import Library, ffi, text
 from ranger_sim.firmware_sim.peripheral import Peripheral
@@ -32,6 +33,7 @@ LER_OF_MATCH = 1  # PWMLER: bit n is match register n
 CMR_AT, CMR_CDO, CMR_STB1 = 0x2, 0x8, 0x20  # CxCMR
 USUAL_LATENCY = -1
 WORD = 0xFFFF_FFFF
+LONGEST_TURN_NS = 10_000_000  # of a program that nobody stops earlier; chosen by us: some slots
 MAIN_ENDED, NO_STACK = -1, -2  # what a turn of a main loop returns beside cycles
 
 
@@ -378,7 +380,7 @@ class NativeBoard(Microcontroller):
     """A chip with the devices of `hardware` that runs the firmware in the library `path` from `phase_ns` (ns) on.
 
     What the program does wrong towards the devices, and the chip would not survive, ends the run with a UserError
-    that names the call. `devices` has what the program has started.
+    that names the call. `devices` has what the program has started. record: as for `leave_record_in`, from the start.
     """
 
     def __init__(
@@ -388,10 +390,13 @@ class NativeBoard(Microcontroller):
         crystal: Any = None,
         phase_ns: int = 0,
         hardware: Hardware | None = None,
+        record: Any = None,
     ) -> None:
         hardware = hardware if hardware is not None else Hardware()
         Microcontroller.__init__(self, name, hardware.hz, crystal)
         self.library = Library(pathlib.Path(path))
+        if record is not None:
+            self.leave_record_in(record)
         self.failure: UserError | None = None
         self.phase_ns = phase_ns
         self.now = phase_ns
@@ -401,9 +406,13 @@ class NativeBoard(Microcontroller):
         self.pin_levels = ffi.from_buffer("int64_t[]", levels)
         self.library.code.fw_pin_levels = self.pin_levels
         self.callbacks = [self._callback(call, name) for call, name in enumerate(self.library.call_names())]
-        self.library.code.firmware_start()
+        self.turn = 0
+        self.reached = phase_ns
+        with self._running():
+            self.library.code.firmware_start()
         self._raise_failure()
-        self.error_counts = self.library.code.firmware_errors() if self.library.has("firmware_errors") else None
+        with self._running():
+            self.error_counts = self.library.code.firmware_errors() if self.library.has("firmware_errors") else None
         if self.library.schedule:
             self._take_schedule()
         else:
@@ -439,19 +448,41 @@ class NativeBoard(Microcontroller):
         if self.failure is not None:
             raise self.failure
 
+    @contextlib.contextmanager
+    def _running(self) -> Iterator[None]:
+        """Inside, the program runs: a turn of it, which is not endless (`leave_record_in`)."""
+        self.turn = (self.turn + 2) & WORD
+        self.library.turns[0] = self.turn | 1
+        try:
+            yield
+        finally:
+            self.library.turns[0] = self.turn
+
     def advance(self, until: int) -> int:
         """Run everything before `until` (ns); UserError for what the program did wrong."""
-        next_time: int = Microcontroller.advance(self, until)
+        while until - self.reached > LONGEST_TURN_NS:
+            end = self.reached + LONGEST_TURN_NS
+            self._turn_until(end)
+            if self.horizon < end:
+                return self.next_time
+        return self._turn_until(until)
+
+    def _turn_until(self, until: int) -> int:
+        turns = self.library.turns
+        self.turn = (self.turn + 2) & WORD
+        turns[0] = self.turn | 1
+        try:
+            next_time: int = Microcontroller.advance(self, until)
+        finally:
+            turns[0] = self.turn
+        self.reached = until
         if self.failure is not None:
             raise self.failure
         return next_time
 
-    def leave_record_in(self, words: memoryview) -> None:
-        """From now on a signal that ends this process leaves in `words` where the program was (crash.py)."""
-        self.record = ffi.from_buffer("int64_t[]", words, require_writable=True)
-        if len(self.record) < crash.RECORD:
-            raise ValueError(f"a record has {crash.RECORD} numbers, not {len(self.record)}")
-        self.library.code.fw_watch(self.record)
+    def leave_record_in(self, words: Any, message: str = "") -> None:
+        """From now on a signal that ends this process leaves in `words` where the program was (library.py)."""
+        self.library.leave_record_in(words, message)
 
     def listen_to_edges(self, buffer: Any, pin: int, partner_pin: int) -> None:
         """As the chip's; the program need not capture the pin."""
@@ -463,7 +494,8 @@ class NativeBoard(Microcontroller):
 
     def _take_schedule(self) -> None:
         """Ask the program for its schedule and start it."""
-        given = self.library.code.firmware_schedule()
+        with self._running():
+            given = self.library.code.firmware_schedule()
         self._raise_failure()
         if given == ffi.NULL:
             raise UserError(f"{self.library.path}: firmware_schedule() returned NULL")
@@ -544,7 +576,10 @@ class NativeBoard(Microcontroller):
 
     def network_time_ms(self) -> int:
         """The robot's time as the program has it (ms); 0 where it does not say."""
-        return self.library.code.firmware_time_ms() if self.library.has("firmware_time_ms") else 0
+        if not self.library.has("firmware_time_ms"):
+            return 0
+        with self._running():
+            return self.library.code.firmware_time_ms()
 
     def error_totals(self, count: int) -> Any:
         """How often the program noted the errors 0 ... count - 1; zeros where it does not say."""

@@ -68,7 +68,10 @@ class Evidence:
 
     def __init__(self, robot: Any) -> None:
         if any(board.apart for board in robot.loop.boards):
-            raise UserError("proof of a fault: every board must run in this process (backend sim)")
+            raise UserError(
+                "proof of a fault: every board must run in this process (backend sim; firmware in C: --in-process, "
+                "or Ranger(in_process=True))"
+            )
         self.robot = robot
         self.begin_ns = robot.loop.time
         self.blocks: dict[str, list[bytes]] = {}

@@ -33,7 +33,8 @@ def serve(robot: Any, name: str, block: Block, stage: tuple, settings: Settings,
         first = turns + 1 if turns == block.words[places.ANSWERED] else turns
         while not bell.wait(first):
             pass
-        board = fresh_board(robot, name, block.words[places.POWER_UP])
+        record = crash_record if name in robot.firmware else None
+        board = fresh_board(robot, name, block.words[places.POWER_UP], record)
         said = first_outputs(board)
     if name in robot.firmware:
         board.leave_record_in(crash_record)

@@ -44,6 +44,7 @@ class PlantRun:
         self.stopping = False
         self.mourned: set[str] = set()
         self.deaths: list[dict] = []
+        robot.deaths = self.deaths
         self.next_status_s = 0.0
         self.orders = 0  # that changed the robot at `orders_ns` of its time
         self.orders_ns = -1

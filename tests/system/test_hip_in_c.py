@@ -32,7 +32,7 @@ def hip(tmp_path_factory):
 def seen(firmware, seconds, scenario=None, quirks=None, fault=None):
     """What a run shows from outside, with the hip board in C (`firmware`) or in Python (None)."""
     firmware = {"MCH": firmware} if firmware is not None else None
-    with contextlib.closing(Ranger(scenario, quirks=quirks, firmware=firmware)) as robot:
+    with contextlib.closing(Ranger(scenario, quirks=quirks, firmware=firmware, in_process=True)) as robot:
         acted = True
         if fault is not None:
             place, mode, parameters = fault

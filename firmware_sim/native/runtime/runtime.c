@@ -13,6 +13,7 @@
 #ifdef __linux__
 #include <link.h>
 #include <signal.h>
+#include <sys/time.h>
 #include <sys/uio.h>
 #include <unistd.h>
 #endif
@@ -67,7 +68,11 @@ static struct {
     enum call asked;
     int64_t arguments[5];
     int64_t answer;
+    void *frame;
 } loop;
+
+/* The frame of the program's call that the harness is carrying out, NULL between two: for who asks where it was. */
+static void *volatile asking;
 
 static void loop_body(void)
 {
@@ -108,20 +113,27 @@ EXPORTED int64_t fw_turn(void)
         if (loop.asked == CALL_idle)
             return 0;
         const int64_t *with = loop.arguments;
+        asking = loop.frame;
         loop.answer = fw_calls[loop.asked](with[0], with[1], with[2], with[3], with[4]);
+        asking = NULL;
     }
 }
 
 static int64_t host(enum call asked, int64_t a, int64_t b, int64_t c, int64_t d, int64_t e)
 {
-    if (!loop.running)
-        return fw_calls[asked](a, b, c, d, e);
+    if (!loop.running) {
+        asking = __builtin_frame_address(0);
+        const int64_t answer = fw_calls[asked](a, b, c, d, e);
+        asking = NULL;
+        return answer;
+    }
     loop.asked = asked;
     loop.arguments[0] = a;
     loop.arguments[1] = b;
     loop.arguments[2] = c;
     loop.arguments[3] = d;
     loop.arguments[4] = e;
+    loop.frame = __builtin_frame_address(0);
     swapcontext(&loop.program, &loop.harness);
     return loop.answer;
 }
@@ -261,14 +273,50 @@ void fw_can_write_IER(uint32_t controller, uint32_t value) { HOST2(can_write_IER
 #define NEAR_WORDS 1024u    /* of the stack, looked at where there are no frames */
 #define NEAR_STACK 65536u   /* bytes: an access so near to the stack pointer that fails has left the stack */
 
+/* Odd while the harness runs the program; another number for every time that it does. */
+EXPORTED volatile uint32_t fw_turns;
+
+#ifdef FW_COVERAGE
+void __gcov_dump(void);
+void __gcov_reset(void);
+#endif
+
+/* Coverage: write what was counted, or forget it. 0 where nothing is counted. */
+EXPORTED int32_t fw_write_counts(void)
+{
+#ifdef FW_COVERAGE
+    __gcov_dump();
+    __gcov_reset();
+    return 1;
+#else
+    return 0;
+#endif
+}
+EXPORTED int32_t fw_forget_counts(void)
+{
+#ifdef FW_COVERAGE
+    __gcov_reset();
+    return 1;
+#else
+    return 0;
+#endif
+}
+
 #ifdef __linux__
+
+static const int ENDS[] = {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT, SIGTRAP, SIGXCPU};
+#define END_COUNT (sizeof ENDS / sizeof *ENDS)
 
 static struct {
     int64_t *record;
+    const char *message;     /* NULL: who reads the record tells of it */
+    uint32_t seen;           /* fw_turns at the last tick of the processor's time */
+    struct sigaction before[END_COUNT];
+    struct sigaction before_tick;
     uintptr_t base; /* of this library; its code is within first ... end */
     uintptr_t first;
     uintptr_t end;
-    char stack[65536]; /* the handler's own: the program's may be what is used up */
+    char stack[131072]; /* the handler's own: the program's may be what is used up */
 } watch;
 
 /* The two words of a frame: the frame before, and where it goes on. By the kernel, as nothing need be there. */
@@ -287,9 +335,21 @@ static uint32_t noted(uint32_t count, uintptr_t address)
     return count + 1;
 }
 
-static void note_signal(int number, siginfo_t *what, void *context)
+static uint32_t note_frames(uint32_t count, uintptr_t frame)
 {
-    const ucontext_t *at = context;
+    uintptr_t words[2];
+    for (uint32_t i = 0; i < MOST_FRAMES && count < PLACES && frame_at(frame, words); i++) {
+        count = noted(count, words[1] - 1); /* the call, not what comes behind it */
+        if (words[0] <= frame)
+            break;
+        frame = words[0];
+    }
+    return count;
+}
+
+/* The program's places, innermost first; returns how many. */
+static uint32_t note_places(const ucontext_t *at, uintptr_t *top)
+{
     uintptr_t pc = 0, frame = 0, stack = 0, words[2];
 #if defined __x86_64__
     pc = (uintptr_t)at->uc_mcontext.gregs[REG_RIP];
@@ -302,8 +362,10 @@ static void note_signal(int number, siginfo_t *what, void *context)
 #else
     (void)at;
 #endif
-    const uintptr_t top = stack;
+    *top = stack;
     uint32_t count = noted(0, pc);
+    if (count == 0 && asking != NULL) /* the harness works for a call of the program's: where that was made */
+        return note_frames(0, (uintptr_t)asking);
     /* A function without a frame of its own is not in the chain of frames. Of the program: its caller's address is on
        top of the stack. Of another library: the program's address nearest to the top is where it was called. */
     const uint32_t looked_at = count > 0 ? 1 : NEAR_WORDS, before = count;
@@ -311,17 +373,75 @@ static void note_signal(int number, siginfo_t *what, void *context)
         count = noted(count, words[0] - 1);
         stack += sizeof *words;
     }
-    for (uint32_t i = 0; i < MOST_FRAMES && count < PLACES && frame_at(frame, words); i++) {
-        count = noted(count, words[1] - 1); /* the call, not what comes behind it */
-        if (words[0] <= frame)
-            break;
-        frame = words[0];
+    return note_frames(count, frame);
+}
+
+static char *hexadecimal(char *to, uint64_t number)
+{
+    int shift = 60;
+    while (shift > 0 && number >> shift == 0)
+        shift -= 4;
+    for (; shift >= 0; shift -= 4)
+        *to++ = "0123456789abcdef"[number >> shift & 15];
+    return to;
+}
+
+/* Only what is allowed in a signal's handler. */
+static void tell_places(uint32_t count)
+{
+    char text[32 * PLACES], *to = text;
+    for (uint32_t i = 0; i < count; i++) {
+        *to++ = ' ';
+        *to++ = '0';
+        *to++ = 'x';
+        to = hexadecimal(to, (uint64_t)watch.record[1 + i]);
+    }
+    *to++ = '\n';
+    const char *end = watch.message;
+    while (*end)
+        end++;
+    if (write(2, watch.message, (size_t)(end - watch.message)) >= 0 && write(2, text, (size_t)(to - text)) >= 0)
+        return;
+}
+
+static void note_signal(int number, siginfo_t *what, void *context)
+{
+    uintptr_t top = 0;
+    for (uint32_t i = 0; i <= PLACES; i++)
+        watch.record[i] = 0;
+    const uint32_t count = note_places(context, &top);
+    const struct sigaction *before = NULL;
+    for (uint32_t i = 0; i < END_COUNT; i++)
+        if (ENDS[i] == number)
+            before = &watch.before[i];
+    if (count == 0 && before != NULL && before->sa_flags & SA_SIGINFO && before->sa_sigaction != NULL) {
+        before->sa_sigaction(number, what, context); /* another board's program, in the same process */
+        return;
     }
     const int overflow = (number == SIGSEGV || number == SIGBUS)
         && (uintptr_t)what->si_addr + NEAR_STACK - top < 2 * (uintptr_t)NEAR_STACK;
     watch.record[0] = number + (overflow ? OVERFLOW_FLAG : 0);
+    if (watch.message != NULL)
+        tell_places(count);
+#ifdef FW_COVERAGE
+    /* Not meant for a handler; but what is lost without it is the way to the crash. If it fails, so does the rest. */
+    for (uint32_t i = 0; i < END_COUNT; i++)
+        signal(ENDS[i], SIG_DFL);
+    __gcov_dump();
+#endif
     signal(number, SIG_DFL);
     raise(number); /* ends the process when this function returns */
+}
+
+/* A tick of the processor's time that this process has used: two of them in one turn, and the program is endless. */
+static void tick(int number, siginfo_t *what, void *context)
+{
+    const uint32_t turns = fw_turns;
+    if (turns & 1 && turns == watch.seen)
+        note_signal(SIGXCPU, what, context);
+    watch.seen = turns;
+    if (watch.before_tick.sa_flags & SA_SIGINFO && watch.before_tick.sa_sigaction != NULL)
+        watch.before_tick.sa_sigaction(number, what, context); /* another board's program, in the same process */
 }
 
 static int own_code(struct dl_phdr_info *library, size_t size, void *unused)
@@ -341,25 +461,34 @@ static int own_code(struct dl_phdr_info *library, size_t size, void *unused)
     return 0;
 }
 
-/* From now on a signal that ends this process leaves the signal and up to six places in `record` (seven numbers). */
-EXPORTED int32_t fw_watch(int64_t *record)
+/* From now on a signal that ends this process leaves the signal and up to six places in `record` (seven numbers), and
+ * a turn of the program that takes `limit_s` to twice that of the processor's time is ended so, as by SIGXCPU.
+ * message: written to the terminal then, with the places behind it; NULL: somebody else tells of it. */
+EXPORTED int32_t fw_watch(int64_t *record, int32_t limit_s, const char *message)
 {
-    static const int signals[] = {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT, SIGTRAP, SIGXCPU};
+    const int again = watch.record != NULL;
     stack_t own = {.ss_sp = watch.stack, .ss_size = sizeof watch.stack};
     struct sigaction action = {.sa_sigaction = note_signal, .sa_flags = SA_SIGINFO | SA_ONSTACK};
+    struct sigaction ticking = {.sa_sigaction = tick, .sa_flags = SA_SIGINFO | SA_ONSTACK | SA_RESTART};
+    const struct itimerval each = {.it_interval = {.tv_sec = limit_s}, .it_value = {.tv_sec = limit_s}};
     watch.record = record;
+    watch.message = message;
     if (!dl_iterate_phdr(own_code, NULL) || sigaltstack(&own, NULL) != 0)
         return 0;
-    for (uint32_t i = 0; i < sizeof signals / sizeof *signals; i++)
-        sigaction(signals[i], &action, NULL);
-    return 1;
+    for (uint32_t i = 0; i < END_COUNT && !again; i++)
+        sigaction(ENDS[i], &action, &watch.before[i]);
+    if (!again)
+        sigaction(SIGPROF, &ticking, &watch.before_tick);
+    return setitimer(ITIMER_PROF, &each, NULL) == 0;
 }
 
 #else
 
-EXPORTED int32_t fw_watch(int64_t *record)
+EXPORTED int32_t fw_watch(int64_t *record, int32_t limit_s, const char *message)
 {
     (void)record;
+    (void)limit_s;
+    (void)message;
     return 0;
 }
 

@@ -20,7 +20,7 @@ from ranger_sim.harness.processes.lone_board import LoneBoard
 from ranger_sim.harness.processes.settings import Settings
 from ranger_sim.harness.processes.supervisor import Supervisor
 from ranger_sim.harness.ranger import Ranger
-from ranger_sim.harness.scenario import StopRule
+from ranger_sim.harness.scenario import Scenario, StopRule
 from tests.firmware_sim.native.support import COMPILER, folder_with
 from tests.harness.processes.test_supervisor import Said
 
@@ -183,10 +183,131 @@ def test_firmware_that_never_returns_is_ended_and_the_robot_goes_on(tmp_path):
 def test_firmware_in_a_process_of_its_own_makes_the_same_run_as_within_the_walk(tmp_path):
     folder = folder_with(tmp_path / "fw", program(WELL)[0], MANIFEST)
     up(folder, tmp_path / "up.json")
-    with contextlib.closing(Ranger(firmware={"MCH": folder})) as robot:
+    with contextlib.closing(Ranger(firmware={"MCH": folder}, in_process=True)) as robot:
         robot.run_for(0.2)
         within = robot.summary()["trace_digest"]
     assert json.loads((tmp_path / "up.json").read_text(encoding="utf-8"))["trace_digest"] == within
+
+
+def walked(folder, *more):
+    """`walk` with the program in the hip board's place for 200 ms; the run, and its summary."""
+    done = subprocess.run(
+        [sys.executable, "-m", "ranger_sim", "walk", "--time", "200ms", "--firmware", f"MCH={folder}", "--json", "-"]
+        + list(more),
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE_S,
+        check=False,
+    )
+    return done, json.loads(done.stdout) if done.stdout else None
+
+
+@needs_compiler
+@needs_addr2line
+def test_a_walk_goes_on_without_a_board_whose_program_crashes_and_says_where(tmp_path):
+    source, remarks = program(NULL_WRITE, slots=100)
+    done, found = walked(folder_with(tmp_path / "fw", source, MANIFEST), "--log", "none")
+    assert (done.returncode, done.stderr) == (1, "")  # --json -: nothing else is printed
+    assert found["failed_boards"] == ["MCH"]
+    assert found["time_s"] == pytest.approx(0.2)
+    lost = found["firmware"]["MCH"]
+    # 3 ms of start-up, then the 101st slot of 0.5 ms; the body's next step begins within 0.25 ms
+    assert lost["lost_s"] == pytest.approx(0.0515, abs=0.002)
+    assert lost["why"].startswith(f"SIGSEGV (Segmentation fault) in break_down() at small.c:{remarks['HERE']}, called")
+
+
+@needs_compiler
+@needs_addr2line
+@pytest.mark.parametrize(
+    "loop",
+    [ENDLESS, ENDLESS.replace("sink++;", "sink += fw_slot_cycles();")],
+    ids=["computing", "asking the chip"],
+)
+def test_a_walk_finds_a_program_that_lets_no_time_pass_and_makes_the_run_of_one_that_crashes_there(tmp_path, loop):
+    """Virtual time stands while it is looked for, so how long that took, and on what machine, changes nothing."""
+    _, found = walked(folder_with(tmp_path / "endless", program(loop, slots=100)[0], MANIFEST))
+    assert re.match(r"its program let no time pass in break_down\(\) at small\.c:\d+", found["firmware"]["MCH"]["why"])
+    crashed = folder_with(tmp_path / "crash", program(NULL_WRITE, slots=100)[0], MANIFEST)
+    with contextlib.closing(Ranger(firmware={"MCH": crashed})) as robot:
+        for slice_s in (0.0313, 0.0191, 0.0496, 0.1):  # however it is sliced
+            robot.run_for(slice_s)
+        assert [death["board"] for death in robot.deaths] == ["MCH"]
+        assert robot.trace_digest() == found["trace_digest"]
+
+
+@needs_compiler
+def test_a_program_in_a_process_of_its_own_makes_the_same_bytes_as_in_the_walks_with_the_robots_other_boards(tmp_path):
+    folder = folder_with(tmp_path / "fw", program(WELL)[0], MANIFEST)
+    found = []
+    for in_process in (False, True):
+        with contextlib.closing(Ranger(Scenario(seed=5), firmware={"MCH": folder}, in_process=in_process)) as robot:
+            robot.run_for(0.1)
+            robot.until("error MC_NOT_RUNNING from MCSI", within="100 ms")
+            robot.run_for(0.0373)
+            counters = robot.counters()["MCH"]
+            found.append((robot.trace_digest(), robot.time_s, counters.slots.count, counters.slots.max_cycles))
+    assert found[0] == found[1]
+
+
+@needs_compiler
+def test_what_is_in_the_process_of_a_program_in_c_is_out_of_reach_and_said_so(tmp_path):
+    folder = folder_with(tmp_path / "fw", program(WELL)[0], MANIFEST)
+    with contextlib.closing(Ranger(firmware={"MCH": folder})) as robot:
+        assert robot.board("MCH").name == "MCH"  # before time passes it is here
+        with pytest.raises(UserError, match=r"MCH is not emulated in this process.*Ranger\(in_process=True\)"):
+            robot.inject("MCH.processor", "extra_cycles", task="control")
+        robot.run_for(0.001)
+        with pytest.raises(UserError, match=r"MCH runs in a process of its own.*Ranger\(in_process=True\)"):
+            robot.board("MCH")
+        with pytest.raises(UserError, match="its process runs already; replace before time passes"):
+            robot.replace("MCH", "control", lambda: None, cost=1)
+        with pytest.raises(UserError, match="proof of a fault: every board must run in this process"):
+            robot.inject("MCH.absolute_encoder", "stuck", proof=True)
+        assert robot.board("MCFI").name == "MCFI"  # the others are here
+        children = [robot.processes.guard, *robot.processes.children.values()]
+    for process in children:
+        with pytest.raises(ProcessLookupError):
+            os.kill(process, 0)
+
+
+@needs_compiler
+@needs_addr2line
+def test_in_the_walks_own_process_a_crash_ends_the_walk_and_its_last_line_says_where_to_look(tmp_path):
+    source, remarks = program(NULL_WRITE, slots=100)
+    done, found = walked(folder_with(tmp_path / "fw", source, MANIFEST), "--in-process")
+    assert (done.returncode, found) == (-signal.SIGSEGV, None)
+    said = re.search(r"^ranger-sim: MCH: its program has ended this process, where: (addr2line .*)$", done.stderr, re.M)
+    assert said, done.stderr
+    told = subprocess.run(said[1].split(), capture_output=True, text=True, check=True).stdout.split()
+    assert told[0] == "break_down"
+    assert told[1].endswith(f"small.c:{remarks['HERE']}")
+
+
+@needs_compiler
+@needs_addr2line
+def test_in_the_walks_own_process_an_endless_loop_ends_the_walk_in_the_same_way(tmp_path):
+    folder = folder_with(tmp_path / "fw", program(ENDLESS, slots=100)[0], MANIFEST)
+    done, found = walked(folder, "--in-process")
+    assert (done.returncode, found) == (-signal.SIGXCPU, None)
+    assert "MCH: its program has ended this process, where: addr2line " in done.stderr
+
+
+@needs_compiler
+@needs_addr2line
+@pytest.mark.parametrize(
+    ("start", "told"),
+    [
+        ("*(volatile uint32_t *)8 = 1;", r"SIGSEGV \(Segmentation fault\) in firmware_start\(\) at small\.c:\d+"),
+        ("while (1) sink++;", r"its program let no time pass in firmware_start\(\) at small\.c:\d+"),
+        ("_exit(5);", "it ended its process with code 5"),
+    ],
+)
+def test_a_program_that_does_not_get_through_its_start_is_refused_in_one_line(tmp_path, start, told):
+    source = program(WELL)[0].replace("{ fw_can_start", "{ " + start + " fw_can_start").replace("stdlib", "unistd")
+    done, found = walked(folder_with(tmp_path / "fw", source, MANIFEST))
+    assert (done.returncode, found) == (2, None)
+    assert re.fullmatch(rf"ranger-sim: \S+fw: MCH: its program does not get through its start: {told}\n", done.stderr)
 
 
 def up(folder, summary):

@@ -1,0 +1,225 @@
+"""Some boards of a robot, or all, each in a process of its own; the rest of the robot is in this one and passes time.
+
+It is the lockstep of this folder without a supervisor: virtual time, the same bytes as in one process. The processes
+begin when time first passes, so that something may be done to the boards before. A process beside them watches: nobody
+waits for a board that is gone or stands still. They end with `close`, or with this process, however that ends.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import gc
+import os
+import signal
+import sys
+import warnings
+from collections.abc import Callable, Iterator
+from typing import Any, NoReturn
+
+from ranger_sim.firmware_sim.native import crash
+from ranger_sim.foundation import descriptors
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.harness import wiring
+from ranger_sim.harness.processes import board_process, kernel, places
+from ranger_sim.harness.processes.block import Block, new_stage
+from ranger_sim.harness.processes.remote_board import RemoteBoard
+from ranger_sim.harness.processes.settings import Settings
+from ranger_sim.harness.processes.stage import Stage
+from ranger_sim.harness.step_watch import StepWatch
+
+PATIENCE_S = 60.0  # a turn takes some microseconds; the rest is for a busy machine
+RESET = 1  # mode of a bus node
+STOPPED = ("T", "t")  # states of a process that somebody has stopped, a debugger perhaps
+
+
+class Apart:
+    """The boards `names` of the wired, never run `robot`, each in its process.
+
+    `deaths`: of each that has ended by itself, in their order: {"board", "time_s", "how" its process ended, "why"}, the
+    last as far as its program or what it left says so.
+    """
+
+    def __init__(self, robot: Any, names: tuple[str, ...]) -> None:
+        self.robot = robot
+        if not sys.platform.startswith("linux"):
+            raise UserError(
+                f"{', '.join(names)}: a process of its own needs Linux (eventfd, pidfd); elsewhere --in-process, or "
+                "Ranger(in_process=True)"
+            )
+        self.names = names
+        self.used = processor_for_this_worker()
+        self.settings = Settings(speed=None, real_time=False, processor=self.used)
+        words, doubles = stage = new_stage()
+        place = {name: number for number, name in enumerate(wiring.BOARDS)}
+        table_words = len(robot.boards["MB"].store.words)
+        self.blocks = {name: Block(name, place[name], table_words if name == "MB" else 0) for name in names}
+        self.ended = False
+        self.deaths: list[dict[str, Any]] = []
+        self.children = {name: fork(self._board(name, stage)) for name in names}
+        self.watches = {name: os.pidfd_open(process) for name, process in self.children.items()}
+        self.guard = fork(self._look_after)
+        loop = robot.loop
+        show = Stage(words, doubles, robot.plant, loop.step_times, loop.word_wires)
+        self.remotes = {
+            name: RemoteBoard(robot.boards[name], self.blocks[name], show, place[name], name == "MB") for name in names
+        }
+        for name, remote in self.remotes.items():
+            loop.replace(remote)
+            robot.boards[name].apart = True  # it will not run here
+        loop.watchers.append(Undertaker(self))
+
+    def _board(self, name: str, stage: tuple[Any, Any]) -> Callable[[], int]:
+        def body() -> int:
+            return board_process.serve(self.robot, name, self.blocks[name], stage, self.settings, False)
+
+        return body
+
+    def _look_after(self) -> int:
+        """In a process of its own: mark the block of a board that has ended, and wake who waits for it."""
+        open_watches = {descriptor: name for name, descriptor in self.watches.items()}
+        turns: dict[str, int] = {}
+        while open_watches:
+            ready, _ = descriptors.wait(list(open_watches), [], PATIENCE_S)
+            for descriptor in ready:
+                block = self.blocks[open_watches.pop(descriptor)]
+                block.words[places.FATE] = places.GONE
+                os.eventfd_write(block.answer_descriptor, 1)
+            for name, block in self.blocks.items() if not ready else ():
+                turn = block.words[places.ASKED]
+                stands = turn != block.words[places.ANSWERED] and turns.get(name) == turn
+                if stands and kernel.state_of(self.children[name]) not in STOPPED:
+                    block.leave_fault(f"no answer for {PATIENCE_S:g} s; it is killed")
+                    os.kill(self.children[name], signal.SIGKILL)
+                turns[name] = turn
+        return 0
+
+    @contextlib.contextmanager
+    def processor(self) -> Iterator[None]:
+        """Body and boards take turns, which is fastest on one processor (README.md)."""
+        allowed = os.sched_getaffinity(0)
+        kernel.stay_on(self.used)
+        try:
+            yield
+        finally:
+            os.sched_setaffinity(0, allowed)
+
+    def bury(self) -> None:
+        """Boards that went away are off their buses; their pins stay, so that the watchdogs of bridges run out."""
+        for name, remote in self.remotes.items():
+            if remote.gone and name in self.children and not self.ended:
+                code = os.waitstatus_to_exitcode(os.waitpid(self.children.pop(name), 0)[1])
+                how = f"was killed by signal {-code}" if code < 0 else f"ended with code {code}"
+                why = self._where(name) or self.blocks[name].fault()
+                loop = self.robot.loop
+                self.deaths.append({"board": name, "time_s": self.robot.time_s, "how": how, "why": why})
+                wires = loop.wires[loop.place(name)]
+                for controller, bus in enumerate(wires.buses):
+                    if bus is not None:
+                        bus.set_mode(wires.nodes[controller], RESET, loop.time)
+
+    def _where(self, name: str) -> str:
+        """Where its program in C was when it ended its process; empty when it did not."""
+        block = self.blocks[name]
+        if name in self.robot.firmware and block.words[places.CRASH]:
+            firmware = self.robot.firmware[name]
+            record = block.words[places.CRASH : places.CRASH + places.CRASH_WORDS].tolist()
+            return crash.told(firmware.library, firmware.folder, record)
+        return ""
+
+    def asking(self, names: tuple[str, ...]) -> StepWatch:
+        """What fetches the counters of these boards before each step, as long as it watches."""
+        return Asking(self, names)
+
+    def fetch_counters(self, names: tuple[str, ...] | None = None) -> None:
+        """Bring boards to the present instant and ask them what they counted."""
+        for name in names if names is not None else self.names:
+            if name in self.remotes and not self.ended:
+                self.remotes[name].catch_up(self.robot.loop.time)
+                self.remotes[name].fetch_counters()
+        self.bury()
+
+    def dismiss(self) -> None:
+        """Let all processes end by themselves, each with what it has to write; wait for that."""
+        for name, remote in self.remotes.items():
+            if name in self.children and not remote.gone:
+                remote.catch_up(self.robot.loop.time)
+                remote.fetch_counters()
+        self.bury()
+        for name, process in list(self.children.items()):
+            self.remotes[name].dismiss()
+            descriptors.wait([self.watches[name]], [], PATIENCE_S)
+            del self.children[name]
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(process, signal.SIGKILL)
+            os.waitpid(process, 0)
+
+    def close(self) -> None:
+        """End all processes; they are gone after this."""
+        if self.ended:
+            return
+        self.ended = True
+        for process in (self.guard, *self.children.values()):
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(process, signal.SIGKILL)
+        for process in (self.guard, *self.children.values()):
+            os.waitpid(process, 0)
+        self.children.clear()
+        for descriptor in self.watches.values():
+            os.close(descriptor)
+        for block in self.blocks.values():
+            block.close()
+
+
+class Undertaker(StepWatch):
+    """Before each step it looks for boards that are gone: so when they leave their buses depends on virtual time."""
+
+    def __init__(self, apart: Apart) -> None:
+        StepWatch.__init__(self)
+        self.apart = apart
+
+    def before_step(self, now_ns: int) -> None:
+        self.apart.bury()
+
+
+class Asking(StepWatch):
+    """Before each step it fetches what these boards have counted."""
+
+    def __init__(self, apart: Apart, names: tuple[str, ...]) -> None:
+        StepWatch.__init__(self)
+        self.apart = apart
+        self.names = names
+
+    def before_step(self, now_ns: int) -> None:
+        self.apart.fetch_counters(self.names)
+
+
+def processor_for_this_worker() -> int:
+    """The processor for a robot of processes; workers of pytest-xdist get different ones, as far as there are."""
+    allowed = sorted(os.sched_getaffinity(0), reverse=True)
+    number = os.environ.get("PYTEST_XDIST_WORKER", "").removeprefix("gw")
+    return allowed[int(number) % len(allowed) if number.isdecimal() else 0]
+
+
+def fork(body: Callable[[], int]) -> int:
+    """A process that runs `body`, leaves with what that returns, and does not outlive this one; its number."""
+    parent = os.getpid()
+    sys.stdout.flush()
+    sys.stderr.flush()
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)  # other threads: nothing in the child needs them
+        process = os.fork()
+    if process:
+        return process
+    _live(parent, body)
+
+
+def _live(parent: int, body: Callable[[], int]) -> NoReturn:
+    code = board_process.FAILED
+    try:
+        kernel.die_with_parent(parent)
+        gc.freeze()  # what lies about in the parent's program is not for this process to finalize
+        code = body()
+    except BaseException as error:  # noqa: BLE001  (a child must never return into the parent's program)
+        print(f"ranger-sim: {type(error).__name__}: {error}", file=sys.stderr, flush=True)
+    finally:
+        os._exit(code)
