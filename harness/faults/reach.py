@@ -12,7 +12,8 @@ def emulated(robot: Any, name: str, where: str) -> Any:
     """The board `name`, emulated in this process. UserError, naming `where`, when it runs anywhere else."""
     board = robot.loop.board(name)
     if not isinstance(board, Microcontroller):
-        hint = " (firmware in C: --in-process, or Ranger(in_process=True))" if name in getattr(robot, "firmware", ()) else ""
+        in_c = name in getattr(robot, "firmware", ())
+        hint = " (firmware in C: --in-process, or Ranger(in_process=True))" if in_c else ""
         raise UserError(
             f"{where}: {name} is not emulated in this process: its processor cannot be reached from here{hint}"
         )
