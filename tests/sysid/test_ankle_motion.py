@@ -1,0 +1,140 @@
+"""The ankle's free simulation beside another integrator, on the equations of its module's text written once more.
+
+Every term is large here, so that none hides behind another; steps of 0.2 ms, for the current is one of first order.
+"""
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.sysid.machines import ankle_motion
+from ranger_sim.sysid.machines.ankle_motion import PARAMETERS, Drive, REST_rad, simulated
+
+T = np.arange(0.0, 0.8, 0.0002)
+VALUES = {
+    "inertia_kg_m2": 0.02,
+    "return_stiffness_Nm_per_rad": 1.3,
+    "return_torque_Nm": 0.15,
+    "coulomb_friction_Nm": 0.12,
+    "viscous_friction_Nms": 0.03,
+    "load_friction": 0.08,
+    "cable_stiffness_Nm_per_rad": 9.0,
+    "rotor_inertia_kg_m2": 0.004,
+    "joint_zero_rad": 0.05,
+    "law_lag_s": 0.006,
+    "target_late_s": 0.01,
+    "motor_spring_Nm_per_rad": 0.9,
+    "torque_constant_Nm_per_A": 0.7,
+}
+START = (0.4, 0.5, 0.42, -0.3)
+CREEP = 0.3
+K, D = 3.0, 0.12
+
+
+def command(t):
+    return 1.2 + 2.0 * np.sin(11.0 * t) + 0.7 * np.cos(23.0 * t)
+
+
+def another_integrator(values, filter_s, at_motor, at_foot, start=START):
+    """p, u, a, w, I at T."""
+    v = {**VALUES, **values}
+
+    def rates(t, y):
+        p, u, a, w, r, current = y
+        seen = r if filter_s else u
+        late = max(t - v["target_late_s"], 0.0)
+        asked = command(late) - K * p - D * seen
+        constant = v["torque_constant_Nm_per_A"]
+        slip = np.tanh(u / CREEP)
+        motor = constant * current - v["viscous_friction_Nms"] * u
+        motor -= (v["coulomb_friction_Nm"] + v["load_friction"] * abs(constant * current)) * slip
+        cable = v["cable_stiffness_Nm_per_rad"] * (p + v["joint_zero_rad"] - a)
+        foot = cable - v["return_stiffness_Nm_per_rad"] * (a - REST_rad) + v["return_torque_Nm"]
+        return (
+            u,
+            (motor - cable - v["motor_spring_Nm_per_rad"] * p + at_motor(p, u, a)) / v["rotor_inertia_kg_m2"],
+            w,
+            (foot + at_foot(p, u, a)) / v["inertia_kg_m2"],
+            (u - r) / filter_s if filter_s else 0.0,
+            (asked - current) / v["law_lag_s"],
+        )
+
+    p, u, _, _ = start
+    begin = (*start, u, command(0.0) - K * p - D * u)
+    done = solve_ivp(rates, (0.0, T[-1]), begin, t_eval=T, rtol=1e-8, atol=1e-10, max_step=0.001)
+    return done.y[[0, 1, 2, 3, 5]]
+
+
+def none(p, u, a):
+    return 0.0 * p
+
+
+CASES = {
+    "as it stands": ({}, 0.0),
+    "behind a filter": ({}, 0.02),
+    "behind the board's filter": ({}, ankle_motion.RATE_FILTER_S),
+    "no load friction": ({"load_friction": 0.0}, 0.0),
+    "no springs": ({"return_stiffness_Nm_per_rad": 0.0, "motor_spring_Nm_per_rad": 0.0}, 0.0),
+    "on time": ({"target_late_s": 0.0}, 0.0),
+}
+
+
+@pytest.mark.parametrize("case", list(CASES))
+@pytest.mark.parametrize("pushed", [False, True])
+def test_a_motion_is_that_of_another_integrator(case, pushed):
+    values, filter_s = CASES[case]
+    at_motor, at_foot = none, none
+    torques = None
+    if pushed:
+
+        def at_motor(p, u, a):
+            return 0.2 * np.sin(3.0 * p)
+
+        def at_foot(p, u, a):
+            return -0.5 * a**2
+
+        def torques(m):
+            return at_motor(m.p, m.u, m.a), at_foot(m.p, m.u, m.a)
+
+    found = simulated(Drive(T, command(T), K, D, filter_s), {**VALUES, **values}, START, torques, creep_rad_s=CREEP)
+    wanted = another_integrator(values, filter_s, at_motor, at_foot)
+    assert found.rows == slice(None, None, 1) and len(found.p) == len(T)
+    for name, course in zip("puawI", wanted, strict=True):
+        # the current's step of first order errs by half of 0.2 ms of its rate, some part in a thousand of the motion
+        assert np.abs(getattr(found, name) - course).max() < 4e-3 * np.ptp(course), name
+    assert found.twist == pytest.approx(found.p + 0.05 - found.a) and found.cable == pytest.approx(9.0 * found.twist)
+    # rates of the states are those that the states have
+    inside = slice(5, -5)
+    for state, slope in ((found.p, found.slopes[0]), (found.a, found.slopes[2]), (found.w, found.slopes[3])):
+        assert np.abs(np.gradient(state, 0.0002) - slope)[inside].max() < 5e-3 * np.ptp(slope)
+    assert np.abs(np.gradient(found.u, 0.0002) - found.slopes[1])[inside].max() < 0.03 * np.ptp(found.slopes[1])
+
+
+def test_a_log_of_longer_steps_is_simulated_between_its_rows():
+    """Steps of 10 ms are cut into five, so that what is simulated is nearly that of short ones."""
+    every = 50
+    coarse = simulated(Drive(T[::every], command(T[::every]), K, D), VALUES, START, creep_rad_s=CREEP)
+    assert coarse.rows == slice(None, None, 5)
+    assert coarse.time_s[coarse.rows] == pytest.approx(T[::every], abs=1e-9)
+    fine = simulated(Drive(T, command(T), K, D), VALUES, START, creep_rad_s=CREEP)
+    assert np.abs(coarse.p[coarse.rows] - fine.p[::every]).max() < 0.05 * np.ptp(fine.p)
+
+
+def test_small_torques_and_changes_of_the_current_answer_as_whole_simulations_do():
+    drive = Drive(T, command(T), K, D, 0.02)
+    base = simulated(drive, VALUES, START, creep_rad_s=CREEP)
+    motor, foot = 1e-4 * np.sin(9.0 * T), 1e-4 * np.cos(5.0 * T)
+    answer = base.answer(np.column_stack((motor, 0.0 * T)), np.column_stack((0.0 * T, foot)))
+    for number, (m, f) in enumerate(((motor, 0.0 * T), (0.0 * T, foot))):
+        moved = simulated(drive, VALUES, START, lambda _, m=m, f=f: (m, f), creep_rad_s=CREEP)
+        change = moved.states - base.states
+        for state in range(6):
+            size = np.abs(change[state]).max()
+            assert np.abs(answer[:, state, number] - change[state]).max() < 5e-3 * size, state
+
+
+def test_what_no_machine_does_is_refused_with_its_values():
+    with pytest.raises(UserError, match="cannot be simulated with .*rotor_inertia_kg_m2"):
+        simulated(Drive(T, 1e9 + 0.0 * T, 0.0, 0.0), {**VALUES, "rotor_inertia_kg_m2": 1e-5}, START)
+    assert set(VALUES) == set(PARAMETERS)
