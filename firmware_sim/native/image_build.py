@@ -33,12 +33,12 @@ RAM_BYTES = 16 * 1024
 # mathematics: floats are the compiler's own library's, rounded as IEEE 754 says.
 OPTIONS = (
     "-mcpu=arm7tdmi", "-marm", "-std=c99", "-ffreestanding", "-O2", "-g",
-    "-ffunction-sections", "-fdata-sections", "-ffp-contract=off", "-fno-fast-math",
+    "-flto", "-ffunction-sections", "-fdata-sections", "-ffp-contract=off", "-fno-fast-math",
     "-Wall", "-Wextra", "-Wno-missing-field-initializers",
     "-Werror=implicit-function-declaration", "-Werror=incompatible-pointer-types", "-Werror=int-conversion",
 )  # fmt: skip
 # What stands in support.c would else be made a call of itself.
-OWN_OPTIONS = ("-fno-tree-loop-distribute-patterns",)
+SUPPORT_OPTIONS = ("-fno-tree-loop-distribute-patterns", "-fno-lto")
 LINKING = ("-nostdlib", "-Wl,--gc-sections", "-Wl,--no-warn-rwx-segments", "-Wl,--build-id=none")
 SIZES = re.compile(r"^\s*(?P<text>\d+)\s+(?P<data>\d+)\s+(?P<bss>\d+)\s", re.MULTILINE)
 TOO_LARGE = re.compile(r"region `(?P<region>flash|ram)' overflowed by (?P<bytes>\d+) bytes?")
@@ -116,7 +116,9 @@ def _compile(
     failed = False
     for number, source in enumerate([*own, *sources]):
         place = making / f"{number}-{source.stem}.o"
-        with_options = [*OPTIONS, *OWN_OPTIONS, f"-I{INCLUDE}"] if source in own else options
+        with_options = [*OPTIONS, f"-I{INCLUDE}"] if source in own else list(options)
+        if source.parent == CHIP and source.name == "support.c":
+            with_options += SUPPORT_OPTIONS
         code, text = run_compiler([gcc, *with_options, "-c", str(source), "-o", str(place)])
         if code and source in own:
             raise UserError(f"{source} does not compile with {gcc}:", *text[:20])
@@ -126,7 +128,7 @@ def _compile(
     if not failed:
         image = making / "image.elf"
         script = ["-T", str(CHIP / "lpc2194.ld")]
-        code, text = run_compiler([gcc, *OPTIONS[:2], *LINKING, *script, *objects, "-lgcc", "-o", str(image)])
+        code, text = run_compiler([gcc, *OPTIONS, *LINKING, *script, *objects, "-lgcc", "-o", str(image)])
         failed = code != 0
         said += text
     if failed:

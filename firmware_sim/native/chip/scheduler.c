@@ -141,11 +141,9 @@ void chip_run_schedule(const fw_schedule *schedule)
     TxTCR(SLOT_TIMER) = 0;
     TxTC(SLOT_TIMER) = period - 1u; /* the first slot begins at once */
     TxTCR(SLOT_TIMER) = TCR_ENABLE;
-    for (;;) {
-        uint32_t slot = chip_slots.slots;
+    for (;;)
         if (!done)
-            run_slot(slot);
-    }
+            run_slot(chip_slots.slots); /* looked at after `done`, which a tick clears before it counts */
 }
 
 __attribute__((used)) void chip_main(void);
