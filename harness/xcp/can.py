@@ -5,8 +5,8 @@ program could answer and measure once per slot of 2 ms. So the slave is no board
 a control unit that is to be measured faster than its program allows: it reads the memory directly and costs the program
 nothing. Its frames are frames of the bus like all others: they arbitrate, add to the load, and are lost with it.
 
-ROBOT PARITY: the robot had no such probe. The router hears its frames and spends time on them; its table, which names
-the identifiers of XCP, sends them nowhere.
+ROBOT PARITY: the robot had no such probe. The router and the boards of that bus hear its frames and spend their receive
+interrupt on them; the router's table, which names the identifiers of XCP, sends them nowhere.
 
 Time is virtual. The probe looks at every step of the plant (250 us), when all boards stand at one instant: it obeys the
 commands that have come, measures, and puts its packets into a queue. Its controller sends that queue frame by frame,

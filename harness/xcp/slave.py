@@ -405,6 +405,9 @@ class Slave:
         if packet[1] > 2:
             raise XcpError(ERR_MODE_NOT_VALID)
         chosen = self.lists if packet[1] == 0 else [each for each in self.lists if each.selected]
+        if packet[1] == 1:  # it may have been changed since it was selected
+            for each in chosen:
+                self._may_run(each)
         for each in chosen:
             if packet[1] == 1 and not each.running:
                 each.passed = 0

@@ -1,8 +1,11 @@
 """The XCP slave by packets whose bytes follow from the standard's tables (ASAM MCD-1 XCP part 2)."""
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
-from ranger_sim.harness.xcp.slave import FINE, Slave, XcpError
+from ranger_sim.harness.xcp.slave import COMMANDS, FINE, MOST_LISTS, Slave, XcpError
+from tests.examples import examples
 
 MS = 1_000_000
 
@@ -200,3 +203,42 @@ def test_a_list_that_the_transport_does_not_bear_is_refused_beside_those_that_ru
     assert asked[-1] == [(7, 6 * MS), (3, 6 * MS)]  # identifier, stamp and four bytes; the third of each 2 ms
     slave.bears = lambda packets: False
     assert say(slave, "DE 02 0000") == "FE 2A"
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        ("E0 10 0000 0000 01 00",),  # from every third 2 ms to 0.5 ms
+        ("D3 00 0000 00 02",),  # an entry that nobody wrote
+    ],
+)
+def test_a_list_that_was_changed_after_it_was_selected_is_looked_at_again(slave, change):
+    slave.bears = lambda packets: all(period_ns > MS for _, period_ns in packets)
+    for command in ("D6", "D500 0100", "D400 0000 01", "D300 0000 00 01", "E200 0000 00 00", "E1FF0400 00010000",
+                    "E010 0000 0200 03 00", "DE02 0000", *change):  # fmt: skip
+        assert say(slave, command)[:2] == "FF", command
+    assert say(slave, "DD01") == "FE 2A" and not slave.running
+
+
+PACKETS = st.builds(
+    lambda code, rest: bytes((code, *rest)),
+    st.one_of(st.sampled_from(sorted(COMMANDS)), st.integers(0, 255)),
+    st.lists(st.one_of(st.integers(0, 3), st.integers(0, 255)), max_size=7),
+)
+
+
+@settings(max_examples=examples(100))
+@given(st.lists(PACKETS, max_size=25))
+def test_whatever_is_sent_each_packet_has_one_short_answer_or_none_and_the_lists_stay_bounded(packets):
+    memory = Bytes()
+    slave = Slave(memory, bears=lambda asked: sum(size for size, _ in asked) < 40)
+    slave.command(b"\xff\x00", 0)
+    for time, packet in enumerate(packets):
+        connected = slave.connected
+        answer = slave.command(packet, time * MS)
+        assert len(answer) <= 8 and (answer[:1] in (b"\xff", b"\xfe") or not answer)
+        if not answer:  # not connected, or a block goes on
+            assert not connected or slave.block is not None
+        assert len(slave.lists) <= MOST_LISTS and sum(len(each.tables) for each in slave.lists) <= 252
+        measured = slave.sample(time * MS, time * MS)
+        assert all(len(each) <= 8 and each[0] <= 251 for each in measured) and sum(map(len, measured)) < 40
