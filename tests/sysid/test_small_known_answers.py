@@ -1,6 +1,7 @@
 """Small functions of the diagnosis on rows that can be worked by hand."""
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ import pytest
 from ranger_sim.foundation.random_arrays import generator
 from ranger_sim.sysid import gain, misfit, plausibility, signals
 from ranger_sim.sysid.dataset import Table
+from ranger_sim.sysid.machines.ankle import behind
 from ranger_sim.sysid.machines.motor_bench import stand_ins
 from ranger_sim.sysid.readers import read
 
@@ -174,3 +176,22 @@ def test_a_number_with_an_underscore_is_none(tmp_path):
     (finding,) = [each for each in data.findings if each.kind == "unreadable"]
     assert "'1_0'" in finding.text and "line 12" in finding.text
     assert 10.0 not in data["current_A"].value[np.isfinite(data["current_A"].value)]
+
+
+# ---- a lag of first order along a motion
+
+
+@pytest.mark.parametrize("begin_s", [0.0, 7.0])
+@pytest.mark.parametrize("columns", [None, 2])
+def test_straight_lines_behind_a_lag_have_their_closed_form(begin_s, columns):
+    """Of c + s t from rest there: c + s (t - tau (1 - exp(-t / tau))), whatever the stamps begin with."""
+    t = 0.002 * np.arange(400)
+    run = SimpleNamespace(motion=SimpleNamespace(time_s=begin_s + t))
+    lines = 2.0 + 3.0 * t
+    values = lines if columns is None else np.column_stack([lines, -lines])
+    wanted = 2.0 + 3.0 * (t - 0.05 * (1.0 - np.exp(-t / 0.05)))
+    found = behind(values, run, 0.05)
+    if columns is None:
+        assert found == pytest.approx(wanted, abs=1e-12)
+    else:
+        assert found == pytest.approx(np.column_stack([wanted, -wanted]), abs=1e-12)
