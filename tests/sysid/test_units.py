@@ -1,0 +1,119 @@
+"""Units beside what prefixes, degrees, turns and minutes are: a known word is a prefix and a base, or one of few."""
+
+import math
+
+import pytest
+
+from ranger_sim.sysid import units
+from ranger_sim.sysid.units import unit_of
+
+PREFIXES = {"": 1.0, "n": 1e-9, "u": 1e-6, "µ": 1e-6, "μ": 1e-6, "m": 1e-3, "c": 1e-2, "k": 1e3, "M": 1e6}
+BASES = ("s", "A", "V", "W", "ohm", "H", "rad", "m", "N", "Nm", "Pa", "Hz", "K")
+HOUR_s = 60.0 * 60.0
+OTHERS = {  # a word: (what it is in SI, its SI unit)
+    "min": (60.0, "s"), "h": (HOUR_s, "s"), "sec": (1.0, "s"), "Amp": (1.0, "A"), "Volt": (1.0, "V"), "J": (1.0, "J"),
+    "Wh": (HOUR_s, "J"), "kWh": (1e3 * HOUR_s, "J"), "Ohm": (1.0, "ohm"), "Ω": (1.0, "ohm"), "bar": (1e5, "Pa"),
+    "deg": (math.radians(1.0), "rad"), "°": (math.radians(1.0), "rad"), "degree": (math.radians(1.0), "rad"),
+    "degrees": (math.radians(1.0), "rad"), "rev": (math.radians(360.0), "rad"), "turn": (math.radians(360.0), "rad"),
+    "turns": (math.radians(360.0), "rad"), "kg": (1.0, "kg"), "counts": (1.0, "counts"), "count": (1.0, "counts"),
+    "Nmm": (1e-3, "Nm"), "Ncm": (1e-2, "Nm"),
+}  # fmt: skip
+
+
+def meant(word):
+    """(factor, SI unit) of a word by its prefix and base."""
+    if word in OTHERS:
+        return OTHERS[word]
+    for base in sorted(BASES, key=len, reverse=True):
+        if word.endswith(base) and word[: len(word) - len(base)] in PREFIXES:
+            return PREFIXES[word[: len(word) - len(base)]], base
+    raise AssertionError(f"{word}: no prefix and base of which it is made")
+
+
+@pytest.mark.parametrize("word", sorted(units.ATOMS))
+def test_each_word_is_worth_what_its_prefix_says(word):
+    factor, base = meant(word)
+    # beside something else, for K alone is a temperature
+    found = unit_of(f"W {word}")
+    assert found.factor == pytest.approx(factor, rel=1e-15) and found.numerator == ("W", base)
+    below = unit_of(f"W/{word}2")
+    assert below.factor == pytest.approx(factor**-2, rel=1e-14) and below.denominator == (f"{base}2",)
+
+
+@pytest.mark.parametrize(
+    ("text", "one", "zero", "kind"),
+    [
+        ("rpm", math.radians(360.0) / 60.0, 0.0, "rad/s"),
+        ("rps", math.radians(360.0), 0.0, "rad/s"),
+        ("dps", math.radians(1.0), 0.0, "rad/s"),
+        ("K", 1.0 - 273.15, -273.15, "C"),
+        ("degC", 1.0, 0.0, "C"),
+        ("%", 0.01, 0.0, ""),
+        ("percent", 0.01, 0.0, ""),
+        ("1", 1.0, 0.0, ""),
+        ("-", 1.0, 0.0, ""),
+        ("", 1.0, 0.0, ""),
+    ],
+)
+def test_one_and_nothing_of_a_unit_are_what_they_are_in_si(text, one, zero, kind):
+    found = unit_of(text)
+    assert found.factor * 1.0 + found.offset == pytest.approx(one, rel=1e-15)
+    assert found.offset == zero and found.text == kind
+    assert found.is_si == (one == 1.0 and zero == 0.0)
+
+
+@pytest.mark.parametrize(
+    ("text", "kind", "suffix", "factor"),
+    [
+        ("N m", "N m", "Nm", 1.0),
+        ("mN m/deg", "N m/rad", "Nm_per_rad", 1e-3 / math.radians(1.0)),
+        ("A s/rad", "A s/rad", "A_s_per_rad", 1.0),
+        ("mA ms/deg", "A s/rad", "A_s_per_rad", 1e-6 / math.radians(1.0)),
+        ("deg/s", "rad/s", "rad_per_s", math.radians(1.0)),
+        ("deg/s^2", "rad/s2", "rad_per_s2", math.radians(1.0)),
+        ("deg/ms²", "rad/s2", "rad_per_s2", math.radians(1.0) * 1e6),
+        ("1/ms", "1/s", "per_s", 1e3),
+        ("kg m^2", "kg m2", "kg_m2", 1.0),
+        ("kg cm²", "kg m2", "kg_m2", 1e-4),
+        ("mm^3", "m3", "m3", 1e-9),
+        ("(mm) / (ms)", "m/s", "m_per_s", 1.0),
+        ("N·mm·s", "N m s", "N_m_s", 1e-3),
+    ],
+)
+def test_products_quotients_and_powers_multiply_their_factors(text, kind, suffix, factor):
+    found = unit_of(text)
+    assert found is not None
+    assert found.factor == pytest.approx(factor, rel=1e-14)
+    if text != "N·mm·s":  # N and m side by side are one
+        assert (found.text, found.suffix) == (kind, suffix)
+    assert found.same_kind(unit_of(text)) and not found.same_kind(unit_of("V/K"))
+
+
+@pytest.mark.parametrize("text", ["furlong", "A/", "/per/s", "A per s per V", "m5", "per"])
+def test_what_is_no_unit_is_none(text):
+    assert unit_of(text) is None
+
+
+@pytest.mark.parametrize(
+    ("column", "stem", "suffix", "factor"),
+    [
+        ("current_mA", "current", "A", 1e-3),
+        ("speed_deg_s", "speed", "rad_per_s", math.radians(1.0)),
+        ("accel_mm_s2", "accel", "m_per_s2", 1e-3),
+        ("cmd_dampness_A_s_per_rad", "cmd_dampness", "A_s_per_rad", 1.0),
+        ("Motor current [mA]", "Motor_current", "A", 1e-3),
+        ("torque_N_mm", "torque", "Nm", 1e-3),
+        ("time_min", "time", "s", 60.0),
+        ("t_h", "t", "s", HOUR_s),
+        ("load (%)", "load", "", 0.01),
+    ],
+)
+def test_a_column_is_split_where_its_unit_begins(column, stem, suffix, factor):
+    found, unit = units.split(column)
+    assert (found, unit.suffix) == (stem, suffix) and unit.factor == pytest.approx(factor, rel=1e-14)
+    assert units.si_name(found, unit) == (f"{stem}_{suffix}" if suffix else stem)
+
+
+@pytest.mark.parametrize("column", ["current_min", "current_1", "height_h", "A", "motor [furlong]", "V_V_V_V_V_V_V_x"])
+def test_what_only_looks_like_a_unit_stays_in_the_name(column):
+    assert units.split(column)[1] is None
