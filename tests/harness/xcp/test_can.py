@@ -8,16 +8,19 @@ import subprocess
 import sys
 
 import can
+import numpy
 import pytest
 
+from ranger_sim.can_bus.bounds import message
 from ranger_sim.can_bus.edge.attach import AttachServer
 from ranger_sim.can_bus.edge.external_bus import ExternalBus, opener
 from ranger_sim.can_bus.edge.taps import RECEIVED, Tap
+from ranger_sim.can_bus.frame_log import TIMES_ASKED, TIMES_COLUMNS, TIMES_END, TIMES_IDENTIFIER, FrameTimes
 from ranger_sim.datatable import parameters
 from ranger_sim.datatable.addresses import XCP_MASTER_ID, XCP_SLAVE_ID, address_of
 from ranger_sim.datatable.generated import errors, routes
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness import wiring
+from ranger_sim.harness import bus_schedule, profile, wiring
 from ranger_sim.harness.processes.outside import move_bus
 from ranger_sim.harness.ranger import Ranger
 from ranger_sim.harness.scenario import Scenario
@@ -206,6 +209,43 @@ def test_more_lists_than_the_bus_bears_are_refused_and_those_that_are_borne_lose
         counted = probe.counters()
         assert counted["packets_dropped"] == counted["packets_lost"] == 0 and len(probe.station.waiting) <= 8
         assert 0.5 < robot.buses[1].load.windows()[-1] < 0.8
+
+
+def test_at_full_measurement_every_frame_of_the_robot_and_every_packet_keeps_its_proven_bound():
+    table, schedules = bus_schedule.robots_table(), profile.default().schedules()
+    lists = [
+        bus_schedule.Stream(message(f"list {number}", XCP_SLAVE_ID, 500_000, 7, queue="XCP"), (), "XCP")
+        for number in range(8)
+    ]
+    own = bus_schedule.streams(table, "can2", schedules)
+    before = bus_schedule.bounds_of(table, "can2", 3_000_000, own).bounds
+    *bounds, packet = bus_schedule.bounds_of(table, "can2", 3_000_000, own + lists).bounds
+    bounds = bounds[: len(own)]
+    frame_ns = 125 * 1000 // 3 + 1  # the longest packet may have begun
+    assert all(0 <= new.response_ns - old.response_ns <= frame_ns for new, old in zip(bounds, before, strict=True))
+    limits = {
+        table.variable(name).id: bound.response_ns
+        for stream, bound in zip(own, bounds, strict=True)
+        for name in stream.variables
+    }
+    with attached() as (robot, _, master):
+        master.say("FF00")
+        assert master.measure(["MCH_ANGLE"], event=0, lists=8) == []
+        assert master.say("DD01") == "FF"
+        times = robot.buses[1].log.times = FrameTimes()
+        blocks = []
+        times.sink = lambda last_time_ns, block: blocks.append(block)
+        master.frames.clear()
+        master.pass_time(1.0)
+        times.flush()
+    rows = numpy.frombuffer(b"".join(blocks), dtype=numpy.int64).reshape(-1, TIMES_COLUMNS)
+    longest = {}
+    for number, took in zip(rows[:, TIMES_IDENTIFIER], rows[:, TIMES_END] - rows[:, TIMES_ASKED], strict=True):
+        longest[int(number)] = max(longest.get(int(number), 0), int(took))
+    heard = {number for number in longest if number not in (XCP_MASTER_ID, XCP_SLAVE_ID)}
+    assert len(heard) >= 5 and all(longest[number] <= limits[number] for number in heard)
+    late_us = [10 * ((at // 10_000 - struct.unpack_from("<H", data, 1)[0]) % 65536) for at, data in master.frames]
+    assert len(late_us) >= 15_000 and max(late_us) * 1000 <= packet.response_ns
 
 
 def test_the_router_hears_xcp_and_sends_it_nowhere():
