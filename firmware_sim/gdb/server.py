@@ -6,14 +6,14 @@ robot waits here: no virtual time passes for anybody. When it leaves, its points
 
 from __future__ import annotations
 
-import select
 import socket
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 
 from ranger_sim.firmware_sim.gdb import packets
 from ranger_sim.firmware_sim.gdb.stub import SIGNAL_BAD_ACCESS, SIGNAL_INTERRUPT, SIGNAL_TRAP, Stub
 from ranger_sim.firmware_sim.gdb.target import Debuggable, Target
+from ranger_sim.foundation import descriptors
 from ranger_sim.foundation.peers import (
     LIMITS,
     MALFORMED,
@@ -26,7 +26,7 @@ from ranger_sim.foundation.peers import (
 from ranger_sim.foundation.user_error import UserError
 
 # Chosen by us: so long a held process waits before it asks whether it is to end (Ctrl-C at its own terminal).
-WAIT_MS = 200
+WAIT_S = 0.2
 
 
 class _Client(Peer):
@@ -44,11 +44,15 @@ def never() -> bool:
     return False
 
 
+def unseen(_stands: bool) -> None:
+    """Nobody wants to know that the process waits for a debugger."""
+
+
 class GdbServer(Door[_Client]):
     """A debugger's door to `board`, on `host`:`port` (0: a free one; see `port`).
 
-    `ends` is asked while the board is held: True lets it go. UserError when the port cannot be had, or would be open to
-    the network without `allow_network`.
+    `ends` is asked while the board is held: True lets it go. `stands` is told when the process begins and ends to wait
+    for a debugger. UserError when the port cannot be had, or would be open to the network without `allow_network`.
     """
 
     def __init__(
@@ -58,6 +62,7 @@ class GdbServer(Door[_Client]):
         host: str = "127.0.0.1",
         allow_network: bool = False,
         ends: Callable[[], bool] = never,
+        stands: Callable[[bool], None] = unseen,
     ) -> None:
         what = f"gdb for {board.name} on {host}:{port}"
         address = listening_address(host, what, allow_network)
@@ -73,29 +78,34 @@ class GdbServer(Door[_Client]):
             raise UserError(f"{what}: {reason}") from None
         super().__init__("gdb", listener)
         self.host, self.port = listener.getsockname()
-        self.board = board
         self.ends = ends
-        self.target = Target(board)
-        self.stub = Stub(self.target)
+        self.stands = stands
         self.client: _Client | None = None
         self.held = False
         self.seen = 0  # debuggers so far
         self.halts = 0
-        self.skips_idle = bool(getattr(board, "skips_idle", False))
         self.doors: list[GdbServer] = [self]
-        board.core.debugger = self
+        self.leads_to(board)
 
     # ---- for whoever runs the board
+
+    def leads_to(self, board: Debuggable) -> None:
+        """From now on this is the board: at first, and when a new one takes its place."""
+        self.board = board
+        self.target = Target(board)
+        self.stub = Stub(self.target)
+        self.skips_idle = bool(getattr(board, "skips_idle", False))
+        board.core.debugger = self
 
     def together(self, doors: list[GdbServer]) -> None:
         """The doors of one process, this one among them: while one board is held, all are looked at."""
         self.doors = doors
 
     def wait_for_debugger(self) -> None:
-        """Wait until one has come and let the board go, or until `ends` says so."""
-        while not self.seen and not self.ends():
-            self._wait()
-            self._attend()
+        """Wait until one has come to each of the doors and let its board go, or until `ends` says so."""
+        with self._standing():
+            while not all(door.seen for door in self.doors) and not self.ends():
+                self._wait()
         self._stand()
 
     def close(self) -> None:
@@ -129,14 +139,24 @@ class GdbServer(Door[_Client]):
 
     def _stand(self) -> None:
         """Nothing runs until no board of this process is held any more."""
-        while any(door.held for door in self.doors):
-            if self.ends():
-                for door in self.doors:
-                    door._let_go()
-                return
-            self._wait()
-            for door in self.doors:
-                door._attend()
+        if not any(door.held for door in self.doors):
+            return
+        with self._standing():
+            while any(door.held for door in self.doors):
+                if self.ends():
+                    for door in self.doors:
+                        door._let_go()
+                    return
+                self._wait()
+
+    @contextmanager
+    def _standing(self) -> Iterator[None]:
+        """Inside, the process waits for a debugger."""
+        self.stands(True)
+        try:
+            yield
+        finally:
+            self.stands(False)
 
     # ---- a look at the door
 
@@ -146,18 +166,16 @@ class GdbServer(Door[_Client]):
         self.write()
 
     def _wait(self) -> None:
-        """Until a door has something to do, at most WAIT_MS."""
-        watch = select.poll()
+        """Until a door has something to do, at most WAIT_S; then it is done."""
+        to_read, to_write = [], []
         for door in self.doors:
             door.write()
-            if door.left_over:
-                return
-            events = dict.fromkeys(door.filenos(), select.POLLIN)
-            for number in door.filenos_to_write():
-                events[number] = events.get(number, 0) | select.POLLOUT
-            for number, wanted in events.items():
-                watch.register(number, wanted)
-        watch.poll(WAIT_MS)
+            to_read += door.filenos()
+            to_write += door.filenos_to_write()
+        if not any(door.left_over for door in self.doors):
+            descriptors.wait(to_read, to_write, WAIT_S)
+        for door in self.doors:
+            door._attend()
 
     def _welcome(self, connection: socket.socket) -> _Client:
         return _Client(connection)

@@ -15,4 +15,6 @@ cdef class AddressMap:
     cdef public long long touched, looks
     cpdef Block find(self, long long address)
     cpdef long long read(self, long long address, long long size) except? <long long>-1
+    @cython.locals(offset=cython.longlong, value=cython.longlong)
+    cpdef long long peek(self, long long address, long long size) except? <long long>-1
     cpdef int write(self, long long address, long long size, long long value) except -1

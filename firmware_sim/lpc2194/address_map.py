@@ -88,6 +88,21 @@ class AddressMap:
         value >>= 8 * (address & 3)
         return value & 0xFF if size == 1 else value & 0xFFFF
 
+    def peek(self, address: cython.longlong, size: cython.longlong) -> cython.longlong:
+        """What a load would give, for a debugger: it does nothing. LookupError where it would, or where nothing is."""
+        block: Block = self.find(address)
+        if block is None:
+            raise LookupError(f"no device is modelled at {address:#010x}")
+        offset = (address - block.base) & ~3
+        if offset in block.READ_ACTS:
+            raise LookupError(f"a read of {block.name} {block.REGISTERS[offset][0]} does something")
+        try:
+            value = block.read(offset)
+        except NotModelledError as error:
+            raise LookupError(str(error)) from None
+        value >>= 8 * (address & 3)
+        return value if size == 4 else value & (0xFF if size == 1 else 0xFFFF)
+
     def write(self, address: cython.longlong, size: cython.longlong, value: cython.longlong) -> cython.int:
         """A store."""
         block: Block = self.find(address)

@@ -35,7 +35,7 @@ cdef class ImageBoard(Microcontroller):
     cdef public long long pass_cycles, pass_instructions, idle_cycles, idle_instructions, doubts
     cdef public long long[::1] kept_registers, now_registers, kept_ram
     cdef public long long[::1] waits
-    cdef long long time_of(self, long long cycles) except? <long long>-1
+    cpdef long long time_of(self, long long cycles) except? <long long>-1
     cdef long long cycles_at(self, long long time) except? <long long>-1
     cpdef object set_clocks(self, cclk, divider)
     cpdef object sleep(self)

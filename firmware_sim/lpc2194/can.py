@@ -99,6 +99,7 @@ class CanFilterBlock(Block):
 class CanBlock(Block):
     """Controller `number`. In reset mode after power-up, as the chip."""
 
+    READ_ACTS = frozenset({0x0C})
     REGISTERS = dict(NAMES)
 
     def __init__(self, chip, clocks, number, acceptance) -> None:

@@ -23,6 +23,7 @@ DONE = 0x80000000  # ADGDR and ADDRn; a C variable when compiled (.pxd)
 class ConverterBlock(Block):
     """`inten`: ADINTEN. `done`: channels whose ADDR has a result that was not read."""
 
+    READ_ACTS = frozenset({0x04, *range(0x10, 0x30, 4)})
     REGISTERS = {
         0x00: ("ADCR", "rw"),
         0x04: ("ADGDR", "r"),

@@ -21,6 +21,7 @@ if not cython.compiled:
 class SpiBlock(Block):
     """`SPINT`: the interrupt flag."""
 
+    READ_ACTS = frozenset({0x04, 0x08})
     REGISTERS = {
         0x00: ("S0SPCR", "rw"),
         0x04: ("S0SPSR", "r"),

@@ -131,6 +131,7 @@ def used_of(words) -> int:
 class SspBlock(Block):
     """Words that wait to go out and those that came in, the oldest first."""
 
+    READ_ACTS = frozenset({0x08})
     REGISTERS = {
         0x00: ("SSPCR0", "rw"),
         0x04: ("SSPCR1", "rw"),

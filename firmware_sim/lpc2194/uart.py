@@ -25,6 +25,7 @@ TRIGGERS = (1, 4, 8, 14)  # by UnFCR bits 6-7
 class UartBlock(Block):
     """`holds`: the transmit FIFO became empty, which asks for an interrupt until it is told."""
 
+    READ_ACTS = frozenset({0x00, 0x08, 0x14})
     REGISTERS = {
         0x00: ("RBR/THR/DLL", "rw"),
         0x04: ("IER/DLM", "rw"),

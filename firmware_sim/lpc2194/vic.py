@@ -49,6 +49,7 @@ NAMES = {
 class VicBlock(Block):
     """`raw`: levels of the 32 inputs, without the software's; `lines` what the processor sees (IRQ_LINE, FIQ_LINE)."""
 
+    READ_ACTS = frozenset({0x30})
     REGISTERS = dict(NAMES)
 
     def __init__(self, chip, clocks) -> None:

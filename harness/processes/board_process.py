@@ -4,6 +4,8 @@ import os
 import traceback
 from typing import Any
 
+from ranger_sim.firmware_sim.gdb.server import GdbServer
+from ranger_sim.foundation import wallclock
 from ranger_sim.harness import wiring
 from ranger_sim.harness.fresh_board import first_outputs, fresh_board, pass_on
 from ranger_sim.harness.processes import kernel, places
@@ -16,10 +18,40 @@ from ranger_sim.harness.processes.stage import Audience
 FAILED = 4  # exit code: the board's program raised
 
 
-def serve(robot: Any, name: str, block: Block, stage: tuple, settings: Settings, fresh: bool) -> int:
+class Hold:
+    """What the other processes are told while a debugger has the board: it does not hang, and the pace waits for it.
+
+    The pace is set on by who held it: whoever else writes it, the plant's process, waits for this board's answer. Of
+    several that were held at once each sets it on by what the others have not.
+    """
+
+    def __init__(self, block: Block, stage: tuple) -> None:
+        self.words = block.words
+        self.pace = stage[0]
+        self.since_ns = 0
+
+    def stands(self, stands: bool) -> None:
+        """The board begins or ends to wait for a debugger."""
+        now_ns = wallclock.monotonic_ns()
+        if stands:
+            self.since_ns = now_ns
+        else:
+            self.pace[places.PACE_WALL_NS] += now_ns - max(self.since_ns, self.pace[places.PACE_BEGUN_NS])
+            self.pace[places.PACE_BEGUN_NS] = now_ns
+        self.words[places.HELD] = int(stands)
+
+    def ends(self) -> bool:
+        """The run is to end."""
+        return bool(self.words[places.LET_GO])
+
+
+def serve(
+    robot: Any, name: str, block: Block, stage: tuple, settings: Settings, fresh: bool, door: GdbServer | None = None
+) -> int:
     """Run board `name` of the wired, never run `robot` until told to stop; returns the exit code.
 
     fresh: not the board that was built with the robot but a new one, powered up when the plant's process says.
+    door: where a debugger of this board comes in; the board that was built waits for one.
     """
     kernel.begin_process(f"ranger-{name}", settings)
     place = wiring.BOARDS.index(name)
@@ -49,6 +81,12 @@ def serve(robot: Any, name: str, block: Block, stage: tuple, settings: Settings,
     try:
         endpoint = Endpoint(board, block, stage, audience, place)  # gives the board another outbox
         pass_on(said, board.outbox, 0)
+        if door is not None:
+            hold = Hold(block, stage)
+            door.ends, door.stands = hold.ends, hold.stands
+            door.leads_to(board)
+            if not fresh:
+                door.wait_for_debugger()
         endpoint.serve()
     except BaseException as error:  # noqa: BLE001  (whatever a program on a board raises is said by the supervisor)
         where = traceback.extract_tb(error.__traceback__)[-1:]

@@ -22,7 +22,7 @@ class Pace:
     def start(self, time_ns: int) -> None:
         """The wall clock of now belongs to virtual time `time_ns`: at the start, and after a pause."""
         self.words[places.PACE_TIME_NS] = time_ns
-        self.words[places.PACE_WALL_NS] = wallclock.monotonic_ns()
+        self.words[places.PACE_WALL_NS] = self.words[places.PACE_BEGUN_NS] = wallclock.monotonic_ns()
         if self.speed is not None:
             self.doubles[places.PACE_WALL_PER_TIME] = 1.0 / self.speed
             self.words[places.PACED] = 1

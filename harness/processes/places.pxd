@@ -31,6 +31,8 @@ cpdef enum:
     LATE_COUNT = 47
     TURNS = 48
     URGENT = 49
+    HELD = 50
+    LET_GO = 55
     FATE = 56
     ALIVE = 0
     GONE = 1
@@ -53,6 +55,7 @@ cpdef enum:
     PACE_WALL_NS = 4
     PACE_TIME_NS = 5
     PACE_WALL_PER_TIME = 6
+    PACE_BEGUN_NS = 7
     HEARTBEAT_NS = 8
     STAGE_FIRST = 64
     STAGE_RING = 64

@@ -43,7 +43,9 @@ if not cython.compiled:
     LATE_COUNT = 47
     TURNS = 48
     URGENT = 49  # message kinds (bits) that the board may answer at once
+    HELD = 50  # 1 while a debugger has the board, or is waited for: it keeps its turn and does not hang
     # the supervisor's words
+    LET_GO = 55  # 1: the run is to end, debuggers have to let the board go
     FATE = 56  # ALIVE or GONE: nobody will answer
     ALIVE = 0
     GONE = 1
@@ -71,6 +73,7 @@ if not cython.compiled:
     PACE_WALL_NS = 4  # monotonic clock when virtual time was PACE_TIME_NS
     PACE_TIME_NS = 5
     PACE_WALL_PER_TIME = 6  # a double: 1 / speed
+    PACE_BEGUN_NS = 7  # monotonic clock when the pace last began anew, or was set on because a debugger held a board
     HEARTBEAT_NS = 8  # monotonic clock when the plant process last went round its loop
     STAGE_FIRST = 64
     STAGE_RING = 64

@@ -14,9 +14,10 @@ import signal
 import socket
 import sys
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
+from ranger_sim.firmware_sim.gdb.server import GdbServer
 from ranger_sim.firmware_sim.native import crash
 from ranger_sim.foundation import descriptors, wallclock
 from ranger_sim.foundation.peers import REASONS
@@ -80,8 +81,11 @@ class Supervisor:
         finish: Callable[[Any, Any, bool], int],
         view: View,
         begin: Callable[[Any], None] = lambda _robot: None,
+        doors: Sequence[GdbServer] = (),
     ) -> None:
         self.robot = robot
+        self.doors = {door.board.name: door for door in doors}  # of debuggers; each is its board's process's
+        self.held: set[str] = set()  # boards that a debugger has, as far as it was said
         self.begin = begin
         self.settings = settings
         self.stop_rule = stop
@@ -149,17 +153,27 @@ class Supervisor:
         def body() -> int:
             self.plant_link.close()
             self.robot.logbook.close()
-            return board_process.serve(self.robot, name, block, self.stage, self.settings, fresh)
+            door = self.doors.pop(name, None)
+            self.close_doors()
+            return board_process.serve(self.robot, name, block, self.stage, self.settings, fresh, door)
 
         block.words[places.FATE] = 0
         block.words[places.FAULT_TEXT] = 0
         block.words[places.CRASH] = 0
+        block.words[places.HELD] = 0
         self.fork(name, body)
+
+    def close_doors(self) -> None:
+        """In a process that has nothing to do with them."""
+        for door in self.doors.values():
+            door.close()
+        self.doors.clear()
 
     def start_plant(self) -> None:
         """The plant's process."""
 
         def body() -> int:
+            self.close_doors()
             return plant_process.serve(
                 self.robot,
                 self.blocks,
@@ -205,6 +219,7 @@ class Supervisor:
             each.close()
         for block in self.blocks.values():
             block.close()
+        self.close_doors()
 
     @contextlib.contextmanager
     def signals_noted(self) -> Iterator[None]:
@@ -282,6 +297,8 @@ class Supervisor:
             self.exit_code = 130
             return
         self.order({"do": "stop"})
+        for block in self.blocks.values():
+            block.words[places.LET_GO] = 1
         for child in self.children.values():
             if child.state == STOPPED:
                 os.kill(child.process, signal.SIGCONT)  # it has to finish as well
@@ -419,6 +436,9 @@ class Supervisor:
                 child.turn, child.turn_since_s = turn, now
                 child.turn_cpu_s = kernel.processor_time_s(child.process) if turn != words[places.ANSWERED] else 0.0
                 continue
+            if self.is_held(name, words):
+                child.turn_since_s = now
+                continue
             held_s = now - child.turn_since_s
             if held_s < HANG_S or kernel.state_of(child.process) in ("T", "t", "Z", ""):
                 continue
@@ -439,6 +459,16 @@ class Supervisor:
         self.say_who_was_sent_away()
         if not self.ending:
             self.view.show(self.state())
+
+    def is_held(self, name: str, words: Any) -> bool:
+        """A debugger has the board, or is waited for; said when that begins."""
+        if not words[places.HELD]:
+            self.held.discard(name)
+            return False
+        if name not in self.held:
+            self.held.add(name)
+            self.view.say(f"{name} is held by its debugger, or waits for it: all wait")
+        return True
 
     def say_who_was_sent_away(self) -> None:
         """A line when a door begins to send clients away for a reason; how many it were is told at the end."""

@@ -30,6 +30,7 @@ class CanBlock(Block):
     acceptance: CanFilterBlock
     number: int
     set_up: bool
+    READ_ACTS: Any
     REGISTERS: Any
     def __init__(self, chip: Any, clocks: Any, number: int, acceptance: CanFilterBlock) -> None: ...
     def requests(self) -> int: ...

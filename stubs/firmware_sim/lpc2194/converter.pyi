@@ -15,6 +15,7 @@ class ConverterBlock(Block):
     seen: bool
     data: MutableSequence[int]
     burst_read: MutableSequence[int]
+    READ_ACTS: Any
     REGISTERS: dict[int, Any]
     def __init__(self, chip: Any, clocks: Any, hardware: Any) -> None: ...
     def requests(self) -> int: ...

@@ -17,6 +17,7 @@ class SpiBlock(Block):
     SPINT: int
     under_way: bool
     status_read: bool
+    READ_ACTS: Any
     REGISTERS: dict[int, tuple[str, ...]]
     def __init__(self, chip: Any, clocks: Any, hardware: Any) -> None: ...
     def requests(self) -> int: ...

@@ -69,6 +69,7 @@ class SspBlock(Block):
     busy: bool
     word_alarm: Alarm
     silence_alarm: Alarm
+    READ_ACTS: Any
     REGISTERS: dict[int, tuple[str, ...]]
     def __init__(self, chip: Any, clocks: Any, device: SspDevice) -> None: ...
     def requests(self) -> int: ...

@@ -25,6 +25,7 @@ class UartBlock(Block):
     TER: int
     divisor: int
     holds: bool
+    READ_ACTS: Any
     REGISTERS: dict[int, tuple[str, ...]]
     def __init__(self, chip: Any, clocks: Any, number: Any) -> None: ...
     def clocked(self) -> None: ...

@@ -37,6 +37,7 @@ class VicBlock(Block):
     controls: MutableSequence[int]
     slot_of: MutableSequence[int]
     served: MutableSequence[int]
+    READ_ACTS: Any
     REGISTERS: Any
     def __init__(self, chip: Any, clocks: Any) -> None: ...
     def place_slots(self) -> None: ...

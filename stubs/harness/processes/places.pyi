@@ -32,6 +32,8 @@ LATE_MAX: int
 LATE_COUNT: int
 TURNS: int
 URGENT: int
+HELD: int
+LET_GO: int
 FATE: int
 ALIVE: int
 GONE: int
@@ -54,6 +56,7 @@ PACED: int
 PACE_WALL_NS: int
 PACE_TIME_NS: int
 PACE_WALL_PER_TIME: int
+PACE_BEGUN_NS: int
 HEARTBEAT_NS: int
 STAGE_FIRST: int
 STAGE_RING: int

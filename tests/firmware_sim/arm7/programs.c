@@ -134,3 +134,21 @@ int dispatch(int seed)
     }
     return handled + (int)variables[seed & 63];
 }
+
+/* ---- all of it, again and again: what the speed is measured on */
+
+volatile float result;
+volatile int last;
+
+void forever(void)
+{
+    for (int i = 0;; i++) {
+        last = search_table(i % 4000 - 2000);
+        last = control(1000 * (i % 7), 900 * (i % 5) - 300);
+        result = scale((float)i * 0.37f - 3.0f);
+        last = comply(13 * i % 900);
+        last = dispatch(i);
+        if (i % 16 == 0)
+            last = copy_and_sum(i);
+    }
+}

@@ -68,11 +68,13 @@ class Client:
         self.socket.close()
 
 
-def session(machine, until, talk, clients=1, beside=(), **options):
+def session(machine, until, talk, clients=1, beside=(), run=None, **options):
     """What `talk(client, ...)` returns, with so many clients connected, and the door.
 
-    The machine has run to `until` (None: for as long as the talk takes); `beside`: doors of the same process.
+    The machine has run to `until` (None: for as long as the talk takes); `beside`: doors of the same process. `run`
+    is how it passes time to an instant, in units of `until`.
     """
+    run = run or machine.run
     with contextlib.ExitStack() as stack:
         pool = stack.enter_context(concurrent.futures.ThreadPoolExecutor(1))
         server = GdbServer(machine, 0, **options)
@@ -89,6 +91,6 @@ def session(machine, until, talk, clients=1, beside=(), **options):
             each.together([server, *beside])
         server.wait_for_debugger()
         while until is None and not future.done():
-            machine.run(machine.core.cycles + 10_000)
-        machine.run(until or 0)
+            run(machine.core.cycles + 10_000)
+        run(until or 0)
         return future.result(), server

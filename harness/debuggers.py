@@ -1,0 +1,57 @@
+"""Doors for debuggers at boards of a machine that run machine code."""
+
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any, NamedTuple
+
+from ranger_sim.firmware_sim.gdb.server import GdbServer, never
+from ranger_sim.foundation.user_error import UserError
+
+
+class Place(NamedTuple):
+    """Where the debugger of `board` comes in."""
+
+    board: str
+    host: str
+    port: int
+
+
+def placed(text: str) -> Place:
+    """`MCH=3333` or `MCH=192.168.1.2:3333`; UserError for what does not read so."""
+    board, _, where = text.partition("=")
+    host, _, port = where.rpartition(":")
+    if not board or not port.isdecimal():
+        raise UserError(f"gdb {text!r}: BOARD=PORT or BOARD=HOST:PORT is expected, as in MCH=3333")
+    return Place(board, host or "127.0.0.1", int(port))
+
+
+def open_doors(
+    boards: Mapping[str, Any], wanted: Iterable[str], allow_network: bool = False, ends: Callable[[], bool] = never
+) -> list[GdbServer]:
+    """A door for each of `wanted` ("MCH=3333"), whose boards have a processor of their own.
+
+    UserError for a board that has none or is named twice, and for a port that cannot be had.
+    """
+    doors: list[GdbServer] = []
+    try:
+        for text in wanted:
+            place = placed(text)
+            if place.board not in boards:
+                raise UserError(f"gdb {text}: there is no board {place.board}; there are {', '.join(boards)}")
+            board = boards[place.board]
+            if getattr(board, "core", None) is None:
+                raise UserError(f"gdb {text}: {place.board} runs no machine code, so give it an --image")
+            if any(door.board is board for door in doors):
+                raise UserError(f"gdb {text}: {place.board} has a door already")
+            doors.append(GdbServer(board, place.port, place.host, allow_network, ends))
+    except BaseException:
+        close_doors(doors)
+        raise
+    for door in doors:
+        door.together(doors)
+    return doors
+
+
+def close_doors(doors: Iterable[GdbServer]) -> None:
+    """Debuggers are sent home."""
+    for door in doors:
+        door.close()
