@@ -30,7 +30,10 @@ LATER = {
     "pyvcd",
     "scipy",
     "shtab",
-}  # reads users' DBC files and firmware, fits, writes timelines, completes commands: a first walk need not wait
+    "starlette",
+    "uvicorn",
+    "websockets",
+}  # DBC files and firmware of users, fits, timelines, completion, the panel in a browser: a first walk need not wait
 
 
 class SetUpError(Exception):

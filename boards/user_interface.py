@@ -1,7 +1,8 @@
 """The user interface board (UI, B8A): IMU, keys, radio control, display, colour lights, buzzer.
 
 Source: robot.md N3.6, N4.10-N4.12, N4.16; appendix 3.7, 3.8. What a person sees and hears is public state:
-`board.lcd.text()`, `board.leds.colour(i)`, `board.buzzer.hertz`, `board.sync_light.lit`.
+`board.lcd.text()`, `board.leds.colour(i)`, `board.buzzer.hertz`, `board.sync_light.lit`; `board.memory` has all of it
+as words, also where the board runs in a process of its own (modules/front_panel.py).
 """
 
 import cython
@@ -10,6 +11,7 @@ from ranger_sim.boards.firmware_board import TICK_CYCLES, SatelliteBoard
 from ranger_sim.boards.modules.buzzer import Buzzer, BuzzerFrequency, ErrorSound, TuneStart
 from ranger_sim.boards.modules.can_link import TRANSMIT_CYCLES
 from ranger_sim.boards.modules.colour_leds import CYCLES_PER_WRITE, ColourLeds, LedReceiver
+from ranger_sim.boards.modules.front_panel import FrontPanel
 from ranger_sim.boards.modules.imu_parser import (
     HEADER_ANGLES_AND_RATES,
     HEADER_RATES_ONLY,
@@ -90,6 +92,8 @@ class UserInterfaceBoard(SatelliteBoard):
         self.leds = ColourLeds()
         self.buzzer = Buzzer(quirks.buzzer_beeps, quirks.song_repeats_for_ever)
         self.sync_light = SyncLight(self.gpio, self.keypad, self.leds)
+        self.panel = FrontPanel(self.lcd, self.leds, self.buzzer, self.sync_light, self.keypad)
+        self.memory = self.panel.words
         self.listen()
         self.on_timer_tick = self.lcd_tick
         self.start(self.schedule(), phase_ns)
@@ -188,6 +192,12 @@ class UserInterfaceBoard(SatelliteBoard):
             self.extra_cycles += LCD_BYTE_CYCLES
         else:
             self.extra_cycles += LCD_IDLE_CYCLES
+        self.panel.show()
+
+    def move_memory(self, words) -> None:
+        """What the panel shows stands in `words` from now on."""
+        self.panel.move(words)
+        self.memory = words
 
     # --- tasks of every slot ----------------------------------------------------------------------------
 

@@ -1,7 +1,7 @@
 """Peers: programs that connect from outside. One rule says what they may ask of us, and LIMITS is that rule as a table.
 
-Whatever listens keeps it: attach, slcan, socketcand, the supervisor's requests, the serial lines, gdb, `trace open`.
-Nothing here blocks, has a thread, or raises because of a peer.
+Whatever listens keeps it: attach, slcan, socketcand, the supervisor's requests, the serial lines, gdb, the feed, `trace
+open`. Nothing here blocks, has a thread, or raises because of a peer.
 
 1. A look (`Door.look`) reads at most `read_bytes` of each peer and carries out at most `burst` requests of all, one of
    each in turn; over time at most `requests` in a millisecond of the robot's. At most ARRIVALS_PER_S connections in a
@@ -61,7 +61,7 @@ class Limits:
 # reason; slcan, an extended frame has 26; socketcand, a send has 45; control, a request has below 100;
 # gdb, the packet size that its stub tells, with what is around it; a look of it is one of a board that stands, or one
 # in a millisecond. trace, the head of a browser's request, cookies of other servers of this machine included.
-# backlog: 8,000 frames, 0.3 s of a full bus of 3 Mbit/s.
+# backlog: 8,000 frames, 0.3 s of a full bus of 3 Mbit/s; feed, 3 s of all that a robot records (2.6 MB a second).
 KB = 1024
 LIMITS = {
     #                    peers  requests  burst  longest  read_bytes  write_bytes  unread    backlog
@@ -71,6 +71,7 @@ LIMITS = {
     "control":    Limits(   32,        4,     8,    4096,    4 * KB,     64 * KB,  64 * KB,   64 * KB),
     "serial":     Limits(    1,        0,     0,       0,    2 * KB,      4 * KB,        0,         0),
     "gdb":        Limits(    1,        0,    64, 17 * KB,   16 * KB,     64 * KB,  64 * KB,         0),
+    "feed":       Limits(    4,        0,     8,      64,    4 * KB,   1024 * KB,  64 * KB, 8192 * KB),
     "trace":      Limits(    8,        0,     8, 16 * KB,    4 * KB,    256 * KB,  64 * KB,         0),
 }  # fmt: skip
 

@@ -68,6 +68,7 @@ def parser() -> argparse.ArgumentParser:
     from ranger_sim.tools.fmu import command as fmu
     from ranger_sim.tools.fuzz import command as fuzz
     from ranger_sim.tools.identify import command as identify
+    from ranger_sim.tools.panel import command as panel
     from ranger_sim.tools.vm import command as vm
 
     top = OneLineParser(
@@ -89,6 +90,7 @@ def parser() -> argparse.ArgumentParser:
     can_bounds.register(commands)
     check_bus.register(commands)
     daq.register(commands)
+    panel.register(commands)
     vm.register(commands)
     faults.register(commands)
     firmware.register(commands)

@@ -18,14 +18,14 @@ from ranger_sim.foundation import wallclock
 from ranger_sim.foundation.peers import told
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness import wiring
-from ranger_sim.harness.conditions import ErrorNoted
 from ranger_sim.harness.faults.ranger_catalogue import CATALOGUE
+from ranger_sim.harness.feed.server import FeedServer
 from ranger_sim.harness.processes import control, places
 from ranger_sim.harness.processes.hardware import HardwareInTheLoop
 from ranger_sim.harness.processes.lateness import figures
 from ranger_sim.harness.processes.outside import move_bus
 from ranger_sim.harness.processes.plant_process import sent_away
-from ranger_sim.harness.processes.requests import admitted
+from ranger_sim.harness.processes.requests import admitted, can_be_armed
 from ranger_sim.harness.processes.settings import FASTEST, NEVER, ON_FAILURE, SLOWEST, Settings, one_processor
 from ranger_sim.harness.processes.supervisor import ELSEWHERE, RUNNING, Supervisor, View, check_platform
 from ranger_sim.harness.profile import Profile
@@ -40,14 +40,21 @@ from ranger_sim.tools.units import number, whole_number, word
 
 if TYPE_CHECKING:
     from ranger_sim.can_bus.edge.external_bus import ExternalBus
-    from ranger_sim.harness.faults.fault import Fault
     from ranger_sim.harness.processes.plant_process import PlantRun
     from ranger_sim.harness.ranger import Ranger
     from ranger_sim.harness.timeline import Timeline
     from ranger_sim.tools.run_logs import RunLogs
 
 PLAIN_S = 2.0  # between two lines where there is no terminal
-FIELDS = {"restart": ("board",), "key": ("key",), "set": ("name", "value")}  # of a request, as ctl gives them
+# Fields of a request, as ctl gives them, and what each is called there.
+FIELDS = {
+    "restart": {"board": "BOARD"},
+    "key": {"key": "N"},
+    "set": {"name": "NAME", "value": "VALUE"},
+    "fault": {"fault": "PLACE:MODE"},
+    "clear": {"which": "N"},
+    "radio": {"stick": "-1...1"},
+}
 PACE = number(least=SLOWEST, most=FASTEST)
 FOREVER = StopRule(steps=MOST_STEPS)
 
@@ -144,11 +151,11 @@ def register(commands: Any) -> None:
         "ctl",
         help="look at, pause, resume or change a robot that `up` runs",
         description="status, pause, resume; restart BOARD; key N: press a key for 0.2 s (1: walk; 2: stop, and a "
-        "walking robot falls); set NAME VALUE: write a parameter, within its limits (ranger-sim table show NAME).",
+        "walking robot falls); set NAME VALUE: write a parameter, within its limits (ranger-sim table show NAME); "
+        "fault PLACE:MODE: arm a fault, as --fault of `up` has it; clear N: end the fault that was armed as number N, "
+        "from 0; radio STICK: steer, -1 (left) to 1 (right).",
     )
-    ctl.add_argument(
-        "request", choices=("status", "pause", "resume", "restart", "key", "set"), help="what is asked for"
-    )
+    ctl.add_argument("request", choices=("status", "pause", "resume", *FIELDS), help="what is asked for")
     ctl.add_argument("values", nargs="*", metavar="VALUE", help="its board, key, or name and value")
     ctl.add_argument("--name", default="ranger", help="name of the robot (default ranger)")
     ctl.set_defaults(run=run_ctl)
@@ -199,7 +206,7 @@ def run(options: argparse.Namespace) -> int:
         return run_sanitized(options, folders_of(options))
     trace.check(options)
     faults.load_modules(options)
-    wanted = [CATALOGUE.typed(text) for text in options.fault]
+    wanted = [can_be_armed(CATALOGUE.typed(text)) for text in options.fault]
     settings = Settings(
         speed=options.speed,
         restart=options.restart,
@@ -235,7 +242,7 @@ def run(options: argparse.Namespace) -> int:
             xcp = XcpUdpServer(robot, options.xcp_udp)
             robot.attach(xcp)
             more.append(f"XCP on UDP: {xcp.host}:{xcp.port}, described by ranger.a2l of the generated files")
-        for server in servers:
+        for server in (*servers, FeedServer(robot, settings.name)):
             robot.attach(server)
         for line in lines + more:
             console.print(line, highlight=False, soft_wrap=True)
@@ -291,7 +298,8 @@ def run(options: argparse.Namespace) -> int:
                 )
             if profile is not None and (profile.external() or profile.absent()):
                 elsewhere.append(HardwareInTheLoop(robot, profile, outside))
-            arm(robot, wanted)
+            for fault in wanted:
+                robot.arm(fault)
             logs.append(walk.logs_of(robot, options, folder))
             timelines.append(trace.attach(robot, options))
             for each in outside:
@@ -304,18 +312,6 @@ def run(options: argparse.Namespace) -> int:
         folder = walk.claimed(options, stop, console) if options.out else None
         supervisor = Supervisor(robot, settings, stop, finish, view, begin)
         return supervisor.run()
-
-
-def arm(robot: Ranger, wanted: list[Fault]) -> None:
-    """Arm the faults in the plant's process. UserError for one that would have to act inside a board's."""
-    for fault in wanted:
-        for each in (fault.start, fault.end):
-            if isinstance(each, ErrorNoted):
-                raise UserError(
-                    f"fault {fault.text()}: {each.text!r} is counted in the process of its board, and asked for only "
-                    "at the end; a time, a step, a state or a variable can be waited for here"
-                )
-        robot.arm(fault)
 
 
 def processes_summary(
@@ -475,13 +471,13 @@ class LiveView(View):
 def run_ctl(options: argparse.Namespace) -> int:
     """Send the request and print the answer."""
     what, values = options.request, options.values
-    wanted = {"restart": ("BOARD",), "key": ("N",), "set": ("NAME", "VALUE")}.get(what, ())
+    wanted = FIELDS.get(what, {})
     if len(values) != len(wanted):
-        raise UserError(f"ctl {what} takes {' '.join(wanted) or 'no value'}, got {' '.join(values) or 'none'}")
-    request: dict = {"do": what, **dict(zip(FIELDS.get(what, ()), values, strict=True))}
-    for name in ("key", "value"):
+        raise UserError(f"ctl {what} takes {' '.join(wanted.values()) or 'no value'}, got {' '.join(values) or 'none'}")
+    request: dict = {"do": what, **dict(zip(wanted, values, strict=True))}
+    for name in ("key", "which", "value", "stick"):
         with contextlib.suppress(KeyError, ValueError):  # what is no number is told so by the model of requests
-            request[name] = int(request[name]) if name == "key" else float(request[name])
+            request[name] = int(request[name]) if name in ("key", "which") else float(request[name])
     try:
         admitted(json.dumps(request).encode())  # what the robot would refuse is told without one
     except UserError as fault:

@@ -72,7 +72,7 @@ class Block:
                 raise UserError(f"channel of {self.name}: {what} in its header is {self.words[word]}, not {value}")
 
     def table(self) -> Any:
-        """The words of the main brain's data table."""
+        """The words of its memory that the board shows: the main brain its data table, the user interface its panel."""
         return self.words[TABLE : TABLE + self.table_words]
 
     def fault(self) -> str:

@@ -9,10 +9,12 @@ from ranger_sim.datatable.generated import all_variables
 from ranger_sim.foundation import descriptors, wallclock
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness import wiring
+from ranger_sim.harness.faults.ranger_catalogue import CATALOGUE
 from ranger_sim.harness.processes import kernel, places
 from ranger_sim.harness.processes.kinds import SET_WORD
 from ranger_sim.harness.processes.pace import Pace
 from ranger_sim.harness.processes.remote_board import RemoteBoard
+from ranger_sim.harness.processes.requests import MOST_FAULTS
 from ranger_sim.harness.processes.settings import Settings
 from ranger_sim.harness.processes.stage import Stage
 from ranger_sim.harness.scenario import StopRule
@@ -144,7 +146,7 @@ class PlantRun:
         if robot.loop.time != self.orders_ns:
             self.orders_ns, self.orders = robot.loop.time, 0
         try:
-            if what in ("key", "set"):
+            if what in ("key", "set", "fault", "clear", "radio"):
                 self.orders += 1
                 if self.orders > ORDERS_LIMIT:
                     raise UserError(f"{what}: {ORDERS_LIMIT} requests wait for the robot's time to pass")
@@ -160,6 +162,12 @@ class PlantRun:
                 robot.operator.press(order["key"], robot.loop.time, KEY_HOLD_NS)
             elif what == "set":
                 self.set_parameter(order["name"], order["word"])
+            elif what == "radio":
+                robot.operator.stick = order["stick"]
+            elif what == "fault":
+                self.arm(order["fault"])
+            elif what == "clear":
+                self.clear(order["which"])
             elif what == "make_room":
                 self.make_room(order["board"])
             elif what == "revive":
@@ -173,6 +181,19 @@ class PlantRun:
     def set_parameter(self, name: str, word: int) -> None:
         """Write a parameter into the main brain's table at this instant; the supervisor's door has checked it."""
         self.remotes["MB"].send(SET_WORD, self.robot.loop.time, all_variables.ID_OF[name], word)
+
+    def arm(self, text: str) -> None:
+        """Arm a fault that the supervisor's door has admitted. UserError where it cannot act on this robot."""
+        if len(self.robot.faults) > MOST_FAULTS:
+            raise UserError(f"fault: {MOST_FAULTS + 1} faults of one run are enough")
+        self.robot.arm(CATALOGUE.typed(text))
+
+    def clear(self, which: int) -> None:
+        """End a fault with the next step of the body."""
+        faults = self.robot.faults
+        if which >= len(faults):
+            raise UserError(f"clear: there is no fault {which}; {len(faults)} were armed, counted from 0")
+        faults[which].stop()
 
     def status(self) -> dict:
         """What the live view shows."""

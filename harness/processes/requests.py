@@ -15,16 +15,27 @@ from ranger_sim.datatable import parameters
 from ranger_sim.datatable.parameters import shown
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness import wiring
+from ranger_sim.harness.conditions import ErrorNoted
+from ranger_sim.harness.faults.fault import Fault
+from ranger_sim.harness.faults.ranger_catalogue import CATALOGUE
 
 KEYS = 6  # of the robot's panel: 0 ... 5
+MOST_FAULTS = 255  # of one run, by request; chosen by us: each that waits is looked at in every step of the body
 
 
 @dataclasses.dataclass(frozen=True)
 class Request:
-    """An admitted request; of the fields those count that its kind has. word: the value as the robot keeps it."""
+    """An admitted request; of the fields those count that its kind has. word: the value as the robot keeps it.
+
+    fault: as it is typed after --fault. which: of the faults, in the order in which they were armed, from 0.
+    stick: of the radio, -1 (left) to 1.
+    """
 
     do: str
     key: int = 0
+    fault: str = ""
+    which: int = 0
+    stick: float = 0.0
     board: str = ""
     name: str = ""
     value: float = 0.0
@@ -49,6 +60,36 @@ def _parameter(value: Any) -> str:
     return parameters.parameter(value).name
 
 
+def _fault(value: Any) -> str:
+    if not isinstance(value, str):
+        raise UserError(f"fault: {shown(value)} is no fault, as PLACE:MODE")
+    return can_be_armed(CATALOGUE.typed(value)).text()
+
+
+def can_be_armed(fault: Fault) -> Fault:
+    """The fault, if the body's process can arm it. UserError for one that waits for what another process counts."""
+    for each in (fault.start, fault.end):
+        if isinstance(each, ErrorNoted):
+            raise UserError(
+                f"fault {fault.text()}: {each.text!r} is counted in the process of its board, and asked for only "
+                "at the end; a time, a step, a state or a variable can be waited for here"
+            )
+    return fault
+
+
+def _which(value: Any) -> int:
+    if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value <= MOST_FAULTS:
+        raise UserError(f"clear: {shown(value)} is no number of a fault, 0 to {MOST_FAULTS}")
+    return value
+
+
+def _stick(value: Any) -> float:
+    number = parameters.number_of(value)
+    if number is None or not -1.0 <= number <= 1.0:
+        raise UserError(f"radio: {shown(value)} is not -1 (left) to 1 (right)")
+    return number
+
+
 def _anything(value: Any) -> Any:
     """A value to `set`: the table's row decides, once the name is known."""
     return value
@@ -62,6 +103,9 @@ REQUESTS: dict[str, dict[str, Callable[[Any], Any]]] = {
     "key": {"key": _key},
     "set": {"name": _parameter, "value": _anything},
     "restart": {"board": _board},
+    "fault": {"fault": _fault},
+    "clear": {"which": _which},
+    "radio": {"stick": _stick},
 }
 
 

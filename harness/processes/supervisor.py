@@ -95,9 +95,8 @@ class Supervisor:
         self.next_ask_s = self.next_look_s = 0.0
         self.sent_away: dict[str, dict[str, int]] = {}  # clients by door and reason, as far as it was said
         self.stage = new_stage()
-        table_words = len(robot.boards["MB"].store.words)
         self.blocks = {
-            name: Block(name, place, table_words if name == "MB" else 0) for place, name in enumerate(wiring.BOARDS)
+            name: Block(name, place, words_shown(robot.boards[name])) for place, name in enumerate(wiring.BOARDS)
         }
         self.children: dict[str, Child] = {}
         self.link, self.plant_link = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
@@ -556,6 +555,11 @@ class Supervisor:
             if child.state != GONE:
                 with contextlib.suppress(ChildProcessError):
                     os.waitpid(child.process, 0)
+
+
+def words_shown(board: Any) -> int:
+    """How many words of its memory a board shows."""
+    return 0 if board.memory is None else len(board.memory)
 
 
 def check_platform() -> None:

@@ -38,10 +38,24 @@ POLLS_TO_ANSWER = 400  # of a well-behaved program, whatever others do: its turn
 POLLS_TO_REPEAT = 50
 LONGEST_JSON = 70_000
 NUMBERS = ("0", "5", "-1", "1.5", "1e20", "100000000000000000000", "1e999", "NaN", "-Infinity", "true", "null", "500")
-TEXTS = ('""', '"abc"', "[]", "{}", '{"do": "status"}', '"\\ud800"', "[[[[[]]]]]", '"MCH"', '"P_UI_LCD_TIME"')
+TEXTS = (
+    *('""', '"abc"', "[]", "{}", '{"do": "status"}', '"\\ud800"', "[[[[[]]]]]"),
+    *('"MCH"', '"P_UI_LCD_TIME"', '"MCH.absolute_encoder:stuck"'),
+)
 VALUES = (*NUMBERS, *TEXTS)
-NAMES = ("do", "key", "name", "value", "board", "number", "", "\\u0000", "answer")
-ORDERS = ("status", "pause", "resume", "key", "set", "restart", "stop", "make_room", "revive", "finish", "")
+NAMES = ("do", "key", "name", "value", "board", "fault", "which", "stick", "number", "", "\\u0000", "answer")
+ORDERS = (
+    *("status", "pause", "resume", "key", "set", "restart", "fault", "clear", "radio"),
+    *("stop", "make_room", "revive", "finish", ""),
+)
+FIELDS = {
+    "key": {"key"},
+    "set": {"name", "value"},
+    "restart": {"board"},
+    "fault": {"fault"},
+    "clear": {"which"},
+    "radio": {"stick"},
+}
 WORDS = (
     "open",
     "rawmode",
@@ -207,7 +221,7 @@ class Fuzz:
             return self.one_of((b"[", b'{"do":', b"[{", b"9")) * self.number(LONGEST_JSON // 6) + b"\n"
         order = self.one_of(ORDERS)
         if kind < 4:
-            fields = {"key": {"key"}, "set": {"name", "value"}, "restart": {"board"}}.get(order, set())
+            fields = FIELDS.get(order, set())
             names = {**dict.fromkeys(fields), "do": None}
         else:
             names = dict.fromkeys(self.one_of(NAMES) for _ in range(self.number(5)))
@@ -256,6 +270,9 @@ class Fuzz:
             "resume": True,
             "key": type(request.key) is int and request.key in range(6),
             "restart": request.board in ("MCH", "MCFO", "MCFI", "MCSI", "UI", "CSR", "MB"),
+            "fault": request.fault == "MCH.absolute_encoder:stuck",  # the only text of a fault among the values
+            "clear": type(request.which) is int and 0 <= request.which <= 255,
+            "radio": type(request.stick) is float and -1.0 <= request.stick <= 1.0,
             "set": request.name in self.limits
             and type(request.value) is float
             and self.limits[request.name][0] <= request.value <= self.limits[request.name][1],

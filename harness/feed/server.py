@@ -1,0 +1,157 @@
+"""The feed's door, in the process that passes the robot's time. Who looks says nothing, and changes nothing."""
+
+from __future__ import annotations
+
+import socket
+from collections import Counter
+from typing import Any
+
+from ranger_sim import datatable
+from ranger_sim.foundation.peers import LIMITS, MALFORMED, REASONS, Door, Peer, SocketStream
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.harness.conditions import STATE_VARIABLES
+from ranger_sim.harness.feed import records
+
+LOOK_NS = 20_000_000  # virtual time between two looks: 50 pictures a second at real time
+STATE_NS = 100_000_000
+
+
+class FeedServer(Door[Peer]):
+    """Shows `robot` under `name`. Give it to `robot.attach`. UserError when the name is taken.
+
+    While nobody looks, it costs a look for connections every 20 ms of the robot's time.
+    """
+
+    def __init__(self, robot: Any, name: str) -> None:
+        listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        try:
+            listener.bind(records.address(name))
+        except OSError:
+            listener.close()
+            raise UserError(f"a robot named {name} shows itself already: give this one another --name") from None
+        listener.listen(LIMITS["feed"].peers)
+        listener.setblocking(False)
+        super().__init__("feed", listener)
+        self.robot = robot
+        self.name = name
+        self.streams = list(robot.recorder.streams())
+        self.left_out: dict[int, Counter[str]] = {}  # by peer, since it was told
+        self.next_state_ns = 0
+        self.totals = {"viewers_seen": 0, "rows_left_out": 0}
+        for number, stream in enumerate(self.streams):
+            robot.logbook.listen(stream, self._taker(number, stream))
+
+    def _taker(self, number: int, stream: str) -> Any:
+        head = bytes([number])
+
+        def take(rows: Any) -> None:
+            if self.peers:
+                record = records.record(records.ROWS, head + rows.tobytes())
+                for peer in self.peers:
+                    self._offer(peer, record, stream, len(rows))
+
+        return take
+
+    def _offer(self, peer: Peer, record: bytes, stream: str, rows: int) -> None:
+        """A record that nobody asked for: left out while too much waits for this peer."""
+        if peer.ending:
+            return
+        missed = self.left_out[id(peer)]
+        if len(peer.outgoing) + len(record) > self.limits.backlog:
+            missed[stream] += rows
+            self.totals["rows_left_out"] += rows
+            return
+        if missed:
+            peer.outgoing += records.text_record(records.GAP, dict(missed))
+            missed.clear()
+        peer.outgoing += record
+
+    def poll(self, now_ns: int) -> int:
+        """New viewers in, what happened out; returns the latest instant for the next poll, ns."""
+        self.look(now_ns)
+        if self.peers:
+            self.robot.logbook.flush()
+            if now_ns >= self.next_state_ns or self.robot.ended:
+                self.next_state_ns = now_ns + STATE_NS
+                record = records.text_record(records.STATE, self.state(now_ns))
+                for peer in self.peers:
+                    self._offer(peer, record, "state", 1)
+            self.write()
+        return now_ns + LOOK_NS
+
+    def state(self, now_ns: int) -> dict[str, Any]:
+        """What is in no stream: the panel of the user interface board, faults, how far it walked."""
+        robot = self.robot
+        panel = robot.loop.board("UI").memory
+        return {
+            "time_ns": now_ns,
+            "panel": None if panel is None else list(panel),
+            "steps": robot.steps,
+            "distance_m": robot.distance_m,
+            "speed_m_per_s": robot.mean_speed_m_per_s(),
+            "ended": robot.ended,
+            "faults": [fault.summary() | {"unit": fault.unit} for fault in robot.faults if fault.twin is None],
+        }
+
+    def hello(self) -> dict[str, Any]:
+        """Who it is, and what the streams hold."""
+        robot = self.robot
+        return {
+            "version": records.VERSION,
+            "name": self.name,
+            "start_ns": robot.start_ns,
+            "table": datatable.table_hash(),
+            "seed": robot.scenario.seed,
+            "controller": robot.scenario.controller,
+            "body": robot.scenario.body,
+            "log": robot.logbook.mode,
+            "streams": [
+                {
+                    "name": stream,
+                    "columns": robot.recorder.streams()[stream].columns,
+                    "reals": robot.recorder.streams()[stream].is_real,
+                }
+                for stream in self.streams
+            ],
+            "samples": dict(robot.plant.sample_names),
+            "states": state_names(robot),
+            "geometry": robot.plant.geometry(),
+        }
+
+    def _welcome(self, connection: socket.socket) -> Peer:
+        peer = Peer(SocketStream(connection))
+        self.left_out[id(peer)] = Counter()
+        self.robot.loop.sampler.words = self.robot.recorder.words  # also of a robot that keeps no log
+        self.totals["viewers_seen"] += 1
+        peer.outgoing += records.text_record(records.HELLO, self.hello())
+        return peer
+
+    def _takes_part(self, peer: Peer) -> bool:
+        """Whoever looks keeps its place."""
+        return True
+
+    def _take(self, peer: Peer) -> bool:
+        """Nothing may be said here: requests have a door of their own (`ranger-sim ctl`)."""
+        if peer.incoming:
+            self.send_away(peer, MALFORMED)
+        return False
+
+    def _closed(self, peer: Peer) -> None:
+        self.left_out.pop(id(peer), None)
+        if not self.left_out and not self.robot.logbook.records_words:
+            self.robot.loop.sampler.words = None
+
+    def counters(self) -> dict[str, int]:
+        """Whole numbers by name: viewers now and seen, rows left out, and who was sent away, by reason."""
+        away = {f"sent_away_{reason}": self.sent_away[reason] for reason in REASONS}
+        return {"viewers": len(self.peers), **self.totals, **away}
+
+
+def state_names(robot: Any) -> dict[str, dict[int, str]]:
+    """{variable: {number: state}} of the machines of the main brain's program."""
+    modes = robot.boards["MB"].modes
+    return {
+        variable: {state.number: state.name for state in getattr(modes, machine).machine.states}
+        for machine, variable in STATE_VARIABLES.items()
+        if hasattr(modes, machine)
+    }

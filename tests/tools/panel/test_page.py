@@ -1,0 +1,139 @@
+"""The page in a real browser, on a robot that walks beside it and on what was recorded."""
+
+import contextlib
+import json
+import re
+import signal
+import subprocess
+import sys
+
+import pytest
+
+from ranger_sim import Ranger
+from ranger_sim.harness.processes import control
+from tests import browser
+
+pytestmark = pytest.mark.skipif(browser.BROWSER is None, reason="no browser here")
+PATIENCE_S = 120
+
+
+class Address:
+    """Where a page is, as tests.browser takes it."""
+
+    def __init__(self, text):
+        self.text = text
+
+    def as_uri(self):
+        return self.text
+
+
+@contextlib.contextmanager
+def served(*arguments):
+    """(address of a panel, its process)."""
+    command = [sys.executable, "-m", "ranger_sim", "panel", *arguments, "--http-port", "0"]
+    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+    try:
+        for line in process.stderr:
+            if found := re.search(r"http://\S+", line):
+                break
+        else:
+            raise AssertionError("the panel ended without an address")
+        yield found[0], process
+    finally:
+        process.send_signal(signal.SIGINT)
+        process.communicate(timeout=PATIENCE_S)
+
+
+@contextlib.contextmanager
+def page_of(address, folder, width=1400):
+    with browser.opened(folder / "browser") as page:
+        page.open(Address(address), width, 1000, 1)
+        page.until("document.body?.dataset.connected === 'yes' && window.rangerPanel?.shown() > 0")
+        yield page
+        assert not page.errors
+
+
+def robot_name(page):
+    return page.value("document.getElementById('title').textContent").partition(":")[0]
+
+
+def typed(parameter, value):
+    """A script that gives a parameter another value."""
+    return f"{{ const p = document.querySelector('[aria-label={parameter}]'); p.value = '{value}'; p.onchange(); 0 }}"
+
+
+def test_a_person_at_the_panel_of_a_walking_robot(tmp_path):
+    with served("--walk") as (address, _), page_of(address, tmp_path) as page:
+        name = robot_name(page)
+        # it walks, and the plots go on with it
+        page.until("window.rangerPanel.span()[1] > 2.5")
+        pictures = page.value("window.rangerPanel.shown()")
+        page.until(f"window.rangerPanel.shown() > {pictures} + 10")
+        # a channel is found by its words and drawn
+        page.value("{ const s = document.getElementById('search'); s.value = 'legs absolute encoder'; s.oninput(); 0 }")
+        page.value("document.getElementById('add-plot').click()")
+        page.value("[...document.querySelectorAll('#channels button')].find((b) => b.textContent.startsWith('MCH_ANGLE')).click()")
+        page.until("window.rangerPanel.plots.all().at(-1).drawn > 2")
+        drawn = page.value("window.rangerPanel.plots.all().at(-1).found[0].low.at(-1)")
+        assert -0.6 < drawn < 0.6  # rad between the legs of a walking robot
+        assert "MCH_ANGLE" in page.value("location.hash")
+        # a parameter is changed and the robot has it
+        page.value("document.querySelector('[data-view=parameters]').click()")
+        page.until("document.querySelector('[aria-label=P_UI_LCD_TIME]')?.value > 0")
+        page.value(typed("P_UI_LCD_TIME", 700))
+        page.until("document.querySelector('[aria-label=P_UI_LCD_TIME]').closest('tr').classList.contains('changed')")
+        page.value(typed("P_UI_LCD_TIME", 5))
+        page.until("document.getElementById('parameter-note').textContent.includes('outside 100 to 60000')")
+        # a fault is armed, acts and is cleared
+        page.value("document.querySelector('[data-view=faults]').click()")
+        page.value("{ const f = document.getElementById('fault-place'); f.value = 'MCH.joint_encoder'; f.onchange(); 0 }")
+        page.value("document.getElementById('fault-mode').value = 'offset'; document.getElementById('fault-form').requestSubmit(); 0")
+        page.until("window.rangerPanel.state().faults?.[0]?.acted === true")
+        page.value("[...document.querySelectorAll('#fault-list button')][0].click()")
+        page.until("window.rangerPanel.state().faults[0].ended_s !== null")
+        # slots and frames
+        page.value("document.querySelector('[data-view=inside]').click()")
+        page.until("document.querySelectorAll('#boards tr').length === 8 && document.querySelectorAll('#frames tr').length > 5")
+        # a key of the panel is the robot's key: the controller stops and the robot falls
+        page.value("document.querySelectorAll('.keys button')[2].click()")
+        page.until("window.rangerPanel.state().ended !== ''")
+        page.until("document.getElementById('light').className.includes('bad') || document.getElementById('light').className.includes('off')")
+        assert name.startswith("panel-")
+
+
+def test_the_page_comes_back_when_the_connection_was_lost_and_the_robot_ends_with_its_panel(tmp_path):
+    with served("--walk") as (address, process), page_of(address, tmp_path) as page:
+        name = robot_name(page)
+        page.until("window.rangerPanel.span()[1] > 0.5")
+        page.call("Network.enable")
+        page.call("Network.emulateNetworkConditions", offline=True, latency=0, downloadThroughput=0, uploadThroughput=0)
+        assert control.ask(name, {"do": "status"})["name"] == name  # the robot does not mind
+        page.call("Network.emulateNetworkConditions", offline=False, latency=0, downloadThroughput=-1, uploadThroughput=-1)
+        pictures = page.value("window.rangerPanel.shown()")
+        page.until(f"window.rangerPanel.shown() > {pictures} + 5")
+        process.send_signal(signal.SIGTERM)
+        process.wait(timeout=PATIENCE_S)
+        page.until("document.body.dataset.connected === 'no'")
+        with pytest.raises(Exception, match="no robot named"):
+            control.ask(name, {"do": "status"})
+        page.errors.clear()  # the browser tells of the refused connections
+
+
+@pytest.mark.parametrize("width", [390, 768, 1400])
+def test_a_recording_is_scrubbed_and_nothing_is_wider_than_the_window(tmp_path, width):
+    from ranger_sim.tools import cli
+
+    assert cli.main(["walk", "--time", "3s", "--log", "full", "--out", str(tmp_path / "run")]) == 0
+    with served(str(tmp_path / "run")) as (address, _), page_of(address, tmp_path, width) as page:
+        page.value("{ const p = document.getElementById('position'); p.value = 2.5; p.oninput(); 0 }")
+        page.until("document.getElementById('clock').textContent === '2.500 s'")
+        assert page.value("document.documentElement.scrollWidth <= innerWidth")
+        shown = page.value("Array.from(window.rangerPanel.pose())")
+        page.until("document.querySelector('.chip b').textContent !== ''")
+        body = page.value("document.querySelector('.chip b').textContent")
+        robot = Ranger()
+        robot.run_for(2.5)
+        assert float(body) == pytest.approx(robot.quantities()["hip_rad"], abs=1e-4)
+        assert shown[4] == pytest.approx(robot.quantities()["hip_x_m"], abs=0.01)
+        robot.close()
+        assert json.loads(page.value("JSON.stringify(window.rangerPanel.held())"))[0] <= 2.5

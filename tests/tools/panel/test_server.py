@@ -1,0 +1,246 @@
+"""The panel's door: who is served, what a page may say, and that nothing it does stops the others."""
+
+import asyncio
+import contextlib
+import json
+import threading
+
+import numpy as np
+import pytest
+import uvicorn
+from websockets.exceptions import ConnectionClosed
+from websockets.sync.client import connect
+
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.tools.panel import messages, server
+from ranger_sim.tools.panel.channels import Channel, Trace
+from ranger_sim.tools.panel.command import listening
+from ranger_sim.tools.panel.server import BURST, COOKIE, MOST_CHANNELS, PLACES, PanelServer
+from ranger_sim.tools.panel.source import Source
+
+TOKEN = "a-word"
+PATIENCE_S = 20
+
+
+class Ramp(Source):
+    """A recording of one channel, value = time; it notes what it is asked to do."""
+
+    title = "a ramp"
+    can = frozenset({"live", "keys"})
+
+    def __init__(self):
+        super().__init__()
+        self.channels = [Channel("RAMP", "s", "a ramp", "test")]
+        self.pose_names = ("EST_STATE_TH0",)
+        self.asked = []
+
+    def span(self):
+        return (0.0, 10.0)
+
+    def trace(self, channel, begin, end, points):
+        x = np.linspace(begin, end, points)
+        return Trace(x, x.astype(np.float32), None)
+
+    def values(self, wanted, at):
+        return [at for _ in wanted]
+
+    def pose(self, at):
+        return (10.0 if at is None else at, [0.25])
+
+    def state(self, at):
+        return {"time_s": 10.0}
+
+    async def request(self, wish):
+        if wish.get("do") != "key":
+            raise UserError(f"{wish.get('do')!r} is no request")
+        self.asked.append(wish)
+        return {"time_s": 1.5}
+
+
+@pytest.fixture
+def panel():
+    """(server, its address, what it told)."""
+    told = []
+    with listening("127.0.0.1", 0) as listener:
+        port = listener.getsockname()[1]
+        it = PanelServer(Ramp(), TOKEN, ("127.0.0.1", "localhost"), told.append)
+        config = uvicorn.Config(it.app, log_level="critical", ws="websockets-sansio", timeout_graceful_shutdown=1)
+        served = uvicorn.Server(config)
+        served.install_signal_handlers = lambda: None
+        thread = threading.Thread(target=lambda: asyncio.run(served.serve(sockets=[listener])))
+        thread.start()
+        try:
+            yield it, f"127.0.0.1:{port}", told
+        finally:
+            served.should_exit = True
+            thread.join(PATIENCE_S)
+            assert not thread.is_alive()
+
+
+@contextlib.contextmanager
+def page(address, token=TOKEN, **settings):
+    with connect(f"ws://{address}/socket?token={token}", max_size=None, open_timeout=PATIENCE_S, **settings) as socket:
+        yield socket
+
+
+def heard(socket, wanted):
+    """The first message for which wanted(kind, body) is true; pictures are taken."""
+    while True:
+        data = socket.recv(PATIENCE_S)
+        kind = data[1]
+        body = json.loads(data[16:]) if kind == messages.TEXT else data
+        if kind == messages.TEXT and "picture" in body:
+            socket.send('{"do": "shown"}')
+        if wanted(kind, body):
+            return body
+
+
+def answer(socket, **wish):
+    """What the server answers to a wish."""
+    socket.send(json.dumps({**wish, "number": 7}))
+    return heard(socket, lambda kind, body: kind == messages.TEXT and body.get("answer") == 7)
+
+
+def get(address, path, **headers):
+    """(status, headers, body) of a request, as written by hand."""
+    import http.client
+
+    host, port = address.split(":")
+    link = http.client.HTTPConnection(host, int(port), timeout=PATIENCE_S)
+    link.request("GET", path, headers=headers)
+    response = link.getresponse()
+    found = response.status, dict(response.getheaders()), response.read()
+    link.close()
+    return found
+
+
+def test_the_page_is_served_to_who_has_the_token_and_leaves_it_in_a_cookie(panel):
+    _, address, _ = panel
+    status, headers, body = get(address, f"/?token={TOKEN}")
+    assert status == 200 and b"<title>" in body
+    assert headers["set-cookie"].startswith(f"{COOKIE}={TOKEN}; HttpOnly")
+    for name in server.FILES:
+        status, headers, body = get(address, f"/{name}", Cookie=f"{COOKIE}={TOKEN}")
+        assert status == 200 and body, name
+    status, _, body = get(address, "/panel.py", Cookie=f"{COOKIE}={TOKEN}")
+    assert status == 404 and b"there is no such file" in body
+
+
+@pytest.mark.parametrize(
+    ("path", "headers", "reason"),
+    [
+        ("/", {}, "a wrong token"),
+        ("/?token=another", {}, "a wrong token"),
+        (f"/?token={TOKEN}", {"Host": "evil.example:80"}, "another host's name"),
+        (f"/?token={TOKEN}", {"Origin": "http://evil.example"}, "a page of another site"),
+    ],
+)
+def test_who_has_no_token_or_comes_from_elsewhere_is_refused_with_a_reason(panel, path, headers, reason):
+    it, address, told = panel
+    status, _, body = get(address, path, **headers)
+    assert status == 403 and body.startswith(reason.encode())
+    assert it.refused == {reason: 1} and reason in told[0]
+
+
+def test_a_page_with_a_wrong_token_is_told_why(panel):
+    _, address, _ = panel
+    with pytest.raises(ConnectionClosed) as closed, page(address, "wrong") as socket:
+        socket.recv(PATIENCE_S)
+    assert (closed.value.rcvd.code, closed.value.rcvd.reason) == (1008, "a wrong token")
+
+
+def test_a_page_sees_its_plots_the_robot_and_the_state(panel):
+    _, address, _ = panel
+    with page(address) as socket:
+        hello = heard(socket, lambda kind, body: kind == messages.TEXT and "hello" in body)["hello"]
+        assert hello["channels"][0]["name"] == "RAMP" and hello["title"] == "a ramp"
+        socket.send('{"do": "look", "plots": [{"channels": [0], "span": 2, "points": 5}]}')
+        data = heard(socket, lambda kind, body: kind == messages.TRACES)
+        assert messages.HEAD.unpack_from(data)[:4] == (1, messages.TRACES, 0, 1)
+        assert messages.TRACE_HEAD.unpack_from(data, 16) == (0, 0, 5, 0)
+        assert np.frombuffer(data, "<f8", 5, 32).tolist() == [8.0, 8.5, 9.0, 9.5, 10.0]
+        assert np.frombuffer(data, "<f4", 5, 72).tolist() == [8.0, 8.5, 9.0, 9.5, 10.0]
+        pose = heard(socket, lambda kind, body: kind == messages.POSE)
+        assert np.frombuffer(pose, "<f8", 1, 16)[0] == 10.0 and np.frombuffer(pose, "<f4", 1, 24)[0] == 0.25
+        assert heard(socket, lambda kind, body: kind == messages.TEXT and "state" in body)["state"]["time_s"] == 10.0
+
+
+def test_requests_reach_the_robot_and_what_it_refuses_is_answered(panel):
+    it, address, _ = panel
+    with page(address) as socket:
+        assert answer(socket, do="key", key=1) == {"answer": 7, "time_s": 1.5}
+        assert it.source.asked == [{"do": "key", "key": 1}]
+        assert "is no request" in answer(socket, do="jump")["error"]
+        assert answer(socket, do="values", channels=[0], at=3)["values"] == [3.0]
+
+
+@pytest.mark.parametrize(
+    ("wish", "words"),
+    [
+        ({"do": "look"}, "a list of up to"),
+        ({"do": "look", "plots": [1]}, "plot 0 is no object"),
+        ({"do": "look", "plots": [{"channels": [1], "points": 5}]}, "1 is not 0 to 0"),
+        ({"do": "look", "plots": [{"channels": [True], "points": 5}]}, "True is not 0 to 0"),
+        ({"do": "look", "plots": [{"channels": [0], "points": 0}]}, "points: 0 is not 1 to"),
+        ({"do": "look", "plots": [{"channels": [0], "points": 5, "begin": "x"}]}, "begin: x is no time"),
+        ({"do": "look", "plots": [{"channels": [0], "points": 5, "end": 1e300}]}, "is no time"),
+        ({"do": "look", "plots": [{"channels": [0] * (MOST_CHANNELS + 1), "points": 5}]}, "channels at a time"),
+        ({"do": "values", "channels": "RAMP"}, "a list of numbers"),
+        ({"do": None}, "is no request"),
+    ],
+)
+def test_a_wish_that_cannot_be_is_answered_with_its_fault(panel, wish, words):
+    _, address, _ = panel
+    with page(address) as socket:
+        assert words in answer(socket, **wish)["error"]
+        assert answer(socket, do="key", key=1)["time_s"] == 1.5  # and the page goes on
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [("{", "a message that is no JSON"), ("[" * 50_000, "a message that is no JSON"), ("[]", "no JSON object")],
+)
+def test_who_does_not_speak_json_is_sent_away_with_a_reason(panel, text, reason):
+    it, address, _ = panel
+    with pytest.raises(ConnectionClosed) as closed, page(address) as socket:
+        socket.send(text)
+        heard(socket, lambda kind, body: False)
+    assert closed.value.rcvd.code == 1008 and reason in closed.value.rcvd.reason
+    assert sum(it.refused.values()) == 1
+
+
+def test_who_asks_without_end_is_sent_away(panel):
+    _, address, _ = panel
+    with pytest.raises(ConnectionClosed) as closed, page(address) as socket:
+        for _ in range(int(BURST) + 100):
+            socket.send('{"do": "key", "key": 1}')
+        heard(socket, lambda kind, body: False)
+    assert closed.value.rcvd.reason == "too many requests"
+
+
+def test_when_all_places_are_taken_one_more_is_told_and_pages_that_never_read_keep_nobody_waiting(panel):
+    it, address, _ = panel
+    with contextlib.ExitStack() as stack:
+        pages = [stack.enter_context(page(address)) for _ in range(PLACES)]
+        for each in pages[:-1]:  # they ask for much and never read
+            each.send('{"do": "look", "plots": [{"channels": [0], "span": 2, "points": 4000}]}')
+        assert answer(pages[-1], do="key", key=1)["time_s"] == 1.5
+        with pytest.raises(ConnectionClosed) as closed:
+            stack.enter_context(page(address)).recv(PATIENCE_S)
+        assert closed.value.rcvd.code == 1013 and "no place free" in closed.value.rcvd.reason
+        assert len(it.sessions) == PLACES
+
+
+def test_a_page_that_shows_nothing_gets_no_second_picture(panel):
+    """The bound of what a dead page costs: one picture."""
+    _, address, _ = panel
+    with page(address) as socket:
+        pictures = 0
+        for number in range(20):
+            socket.send(json.dumps({"do": "look", "plots": [], "number": number}))
+            answered = False
+            while not answered:
+                data = socket.recv(PATIENCE_S)
+                pictures += b'"picture"' in data[:40]
+                answered = b'"answer"' in data[:40]
+        assert pictures == 1

@@ -1,0 +1,201 @@
+"""What the page is shown: a robot that runs, a recording, a data link; each against what is known of it otherwise."""
+
+import asyncio
+import threading
+
+import numpy as np
+import pytest
+
+from ranger_sim import Ranger, Scenario
+from ranger_sim.datatable.generated import all_variables
+from ranger_sim.datatable.packing import error_word
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.harness.feed.server import FeedServer
+from ranger_sim.tools import run_logs
+from ranger_sim.tools.panel.link import LinkSource
+from ranger_sim.tools.panel.recording import RecordingSource
+from ranger_sim.tools.panel.robot import ErrorList, RobotSource
+
+SECONDS = 0.6
+
+
+@pytest.fixture(scope="module")
+def walked():
+    """(robot that has walked a little and kept all of it, the source that looked at it meanwhile)."""
+    robot = Ranger(Scenario(seed=2), log="full")
+    feed = FeedServer(robot, "panel-of-a-test")
+    robot.attach(feed)
+    seen = threading.Event()
+
+    def walk():
+        while not seen.is_set():  # it is looked at from its first instant on: until then its time stands
+            robot.poll_now()
+        for _ in range(round(SECONDS / 0.02)):
+            robot.run_for(0.02)
+        robot.poll_now()
+        while feed.peers and feed.peers[0].outgoing:
+            feed.write()
+        feed.close()  # the robot has ended
+
+    thread = threading.Thread(target=walk)
+    thread.start()
+    source = RobotSource("panel-of-a-test")
+    seen.set()
+    asyncio.run(source.run())
+    thread.join()
+    log = robot.logbook
+    yield {"samples": log.samples(), "words": log.words(), "frames": log.frames()}, source
+    robot.close()
+
+
+def number_of(source, name):
+    return next(place for place, channel in enumerate(source.channels) if channel.name == name)
+
+
+def test_the_body_is_shown_as_the_log_has_it(walked):
+    kept, source = walked
+    trace = source.trace(number_of(source, "hip_rad"), -1.0, 10.0, 4000)
+    column = [channel.name for channel in source.body].index("hip_rad")
+    assert trace.high is None
+    np.testing.assert_array_equal(trace.x, kept["samples"][:, 0])
+    np.testing.assert_array_equal(trace.low, kept["samples"][:, 1 + column].astype(np.float32))
+
+
+@pytest.mark.parametrize("name", ["MCH_ANGLE", "UI_BUTTONS", "FSM_HIP", "MCH_EXECUTION_TIME"])
+def test_variables_are_shown_as_their_types_have_them(walked, name):
+    kept, source = walked
+    times, words = kept["words"]
+    word = words[:, all_variables.ID_OF[name]].astype(np.uint32)
+    kind = {"f32": np.float32, "i32": np.int32, "u32": np.uint32}[all_variables.TYPES[all_variables.ID_OF[name]]]
+    trace = source.trace(number_of(source, name), -1.0, 10.0, 4000)
+    np.testing.assert_array_equal(trace.low, word.view(kind).astype(np.float32))
+    assert source.values([number_of(source, name)], None) == [pytest.approx(float(word.view(kind)[-1]))]
+    assert source.values([number_of(source, name)], -5.0) == [None]
+
+
+def test_the_newest_frames_are_those_of_the_bus(walked):
+    kept, source = walked
+    frames = kept["frames"]
+    on_bus = frames["bus"] == 0
+    shown = source.state(None)["frames"][0]
+    assert [row["id"] for row in shown] == frames["identifier"][on_bus][::-1][: len(shown)].tolist()
+    first = shown[0]
+    data = bytes.fromhex(first["data"])
+    assert int.from_bytes(data[:4], "little") == frames["word0"][on_bus][-1] & 0xFFFFFFFF
+    assert int.from_bytes(data[4:], "little") == frames["word1"][on_bus][-1] & 0xFFFFFFFF
+    identifiers = frames["identifier"][on_bus]
+    assert first["count"] == np.sum(identifiers == first["id"])
+    earlier = source.state(0.3)["frames"][0]
+    assert all(row["time_s"] <= 0.3 for row in earlier) and earlier[0]["time_s"] > 0.29
+
+
+def test_the_robot_stands_at_an_instant_as_its_body_did(walked):
+    kept, source = walked
+    time, values = source.pose(0.2)
+    row = kept["samples"][np.searchsorted(kept["samples"][:, 0], 0.2, "right") - 1]
+    names = [channel.name for channel in source.body]
+    assert time == row[0]
+    assert dict(zip(source.pose_names, values, strict=True))["leg_outer_rad"] == pytest.approx(
+        row[1 + names.index("leg_outer_rad")], rel=1e-6
+    )
+
+
+def test_what_nobody_may_wish_is_refused(walked):
+    _, source = walked
+    with pytest.raises(UserError, match="'stop' is no request"):
+        asyncio.run(source.request({"do": "stop"}))
+    assert source.lost == "the robot panel-of-a-test has ended"
+
+
+def test_a_name_that_nobody_has_is_told():
+    with pytest.raises(UserError, match="no robot named nobody-here is running"):
+        RobotSource("nobody-here")
+
+
+def test_errors_are_counted_by_board_and_code_and_those_of_a_healthy_walk_stand_apart():
+    errors = ErrorList()
+    code = next(code for code, boards in all_normal().items() if "MCH" in boards)
+    for time, count in ((1.0, 1), (2.5, 3)):
+        errors.note(error_word(code, 3, count), time)
+    errors.note(error_word(1, 3, 900), 3.0)
+    errors.note(0, 4.0)
+    rows = errors.content(10.0)
+    assert [(row["board"], row["count"], row["first_s"], row["last_s"], row["normal"]) for row in rows] == [
+        ("MCH", 900, 3.0, 3.0, False),
+        ("MCH", 4, 1.0, 2.5, True),
+    ]
+
+
+def all_normal():
+    from ranger_sim.datatable.generated import errors
+
+    return errors.NORMAL_PER_S
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A walk's folder."""
+    from ranger_sim.tools import cli
+
+    place = tmp_path_factory.mktemp("panel") / "run"
+    assert cli.main(["walk", "--time", "2s", "--log", "full", "--out", str(place)]) == 0
+    return place
+
+
+def test_a_runs_folder_is_shown_with_its_body_and_its_variables(folder):
+    source = RecordingSource([str(folder)])
+    begin, end = source.span()
+    assert (begin, end) == (0.0, pytest.approx(2.0, abs=0.01))
+    groups = {channel.name: channel.group for channel in source.channels}
+    assert groups["hip_rad"] == "body" and groups["MCH_ANGLE"] == "MCH" and groups["FSM_HIP"] == "MB"
+    time, values = source.pose(1.9)
+    assert time == 1.9 and len(values) == len(source.pose_names)
+    trace = source.trace(number_of(source, "FSM_HIP"), 0.0, 2.0, 500)  # told when it changes: it stands in between
+    assert trace.x[-1] == 2.0 and np.isfinite(trace.low).all()
+    angle, body = (source.values([number_of(source, name)], 1.9)[0] for name in ("MCH_ANGLE", "hip_rad"))
+    assert angle == pytest.approx(body, abs=0.02)
+
+
+def test_a_second_recording_lies_over_the_first_moved_in_time(folder):
+    source = RecordingSource([str(folder), str(folder)], shift_s=0.5)
+    first, second = (number_of(source, name) for name in ("hip_rad", "hip_rad (run)"))
+    assert source.values([first], 1.0) == source.values([second], 1.5)
+    assert source.span()[1] == pytest.approx(2.5, abs=0.01)
+
+
+@pytest.mark.parametrize(("path", "words"), [("nowhere.mf4", "there is no such file"), (".", "no folder of a walk")])
+def test_what_is_no_recording_is_told(tmp_path, monkeypatch, path, words):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(UserError, match=words):
+        RecordingSource([path])
+
+
+def test_a_port_that_is_not_there_is_told():
+    with pytest.raises(UserError, match="serial port"):
+        LinkSource("/dev/no-such-port")
+
+
+def test_the_links_silences_are_gaps_and_never_lines():
+    """Points every 2 ms, then 0.3 s of nothing."""
+    source = LinkSource("loop://")
+    number = all_variables.ID_OF["MCH_ANGLE"]
+    for ms in [*range(0, 400, 2), *range(700, 1000, 2)]:
+        source._hear((number, 0x3F800000, 5000 + ms))
+    channel = number_of(source, "MCH_ANGLE")
+    trace = source.trace(channel, 0.0, 1.0, 2000)
+    in_gap = (trace.x > 0.399) & (trace.x < 0.699)
+    assert np.isnan(trace.low[in_gap]).all() and in_gap.any()
+    assert source.values([channel], None) == [1.0]
+    source.close()
+
+
+def test_the_robot_is_asked_to_send_often_what_the_plots_show():
+    source = LinkSource("loop://")
+    channel = number_of(source, "MCH_ANGLE")
+    source.want([channel])
+    assert all_variables.ID_OF["MCH_ANGLE"] in {word & 0x7FFF for word in source.session.selection}
+    sent = source.session.outgoing(0.0)
+    assert sent
+    source.want([channel])
+    assert source.session.outgoing(0.1) == b"" or len(source.session.writes) > 0
+    source.close()

@@ -1,0 +1,189 @@
+"""`ranger-sim panel`: what is to be shown, and where the browser finds it."""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import contextlib
+import os
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from typing import Any
+
+from ranger_sim.foundation import wallclock
+from ranger_sim.foundation.peers import listening_address
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.harness.processes import kernel
+from ranger_sim.tools import terminal
+from ranger_sim.tools.units import number, whole_number, word
+
+PORT = 8311  # chosen by us: among those that IANA has given to nobody
+HERE = "127.0.0.1"
+START_S = 60.0  # an interpreted robot takes so long to be there
+LOOK_S = 0.05
+END_S = 10.0
+
+
+def register(commands: Any) -> None:
+    """Add the subcommand."""
+    command = commands.add_parser(
+        "panel",
+        help="RoboDAQ and the robot's front panel in a browser: a running robot, a data link, recordings",
+        description="Without RECORDING: the robot that `up` runs (--name), one of its own (--walk), or a serial port "
+        "with the data link (--port). A second RECORDING is laid over the first.",
+    )
+    command.add_argument(
+        "recordings", nargs="*", metavar="RECORDING", help="a walk's folder, MF4, CSV, RoboDAQ's text, candump"
+    )
+    command.add_argument("--dbc", action="append", default=[], metavar="FILE", help="messages of frames (repeatable)")
+    command.add_argument(
+        "--shift", type=number(), default=0.0, metavar="S", help="seconds by which the second one is later"
+    )
+    command.add_argument(
+        "--name", type=word("a name"), default="ranger", help="the robot that `up` runs (default ranger)"
+    )
+    command.add_argument("--walk", action="store_true", help="start a robot to look at; it ends with the panel")
+    command.add_argument("--port", metavar="PORT", help="a serial port with the data link, real or of `up --daq-port`")
+    command.add_argument("--host", default=HERE, help=f"address to listen on (default {HERE})")
+    command.add_argument(
+        "--http-port", type=whole_number(0, 65535), default=PORT, metavar="N", help=f"default {PORT}; 0: a free one"
+    )
+    command.add_argument(
+        "--allow-network", action="store_true", help="let --host be beyond this machine; who has the token may then act"
+    )
+    command.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Serve until Ctrl-C."""
+    console = terminal.console(stderr=True)
+
+    def say(text: str) -> None:
+        console.print(text, highlight=False, soft_wrap=True)
+
+    wanted = bool(options.recordings) + bool(options.walk) + bool(options.port)
+    if wanted > 1:
+        raise UserError("panel: RECORDING, --walk and --port exclude each other")
+    if len(options.recordings) > 2:
+        raise UserError(f"panel: {len(options.recordings)} recordings; one, or two over each other, are possible")
+    address = listening_address(options.host, f"panel on {options.host}", options.allow_network)
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # ends it as Ctrl-C does
+    with contextlib.ExitStack() as stack:
+        listener = stack.enter_context(listening(address, options.http_port))
+        source = stack.enter_context(source_of(options, say))
+        return serve(source, listener, options.host, say)
+
+
+@contextlib.contextmanager
+def source_of(options: argparse.Namespace, say: Any) -> Iterator[Any]:
+    """What is to be shown."""
+    if options.recordings:
+        from ranger_sim.tools.panel.recording import RecordingSource
+
+        yield RecordingSource(options.recordings, options.dbc, options.shift)
+    elif options.port:
+        from ranger_sim.tools.panel.link import LinkSource
+
+        with contextlib.closing(LinkSource(options.port)) as link:
+            yield link
+    elif options.walk:
+        with own_robot(say) as source:
+            yield source
+    else:
+        from ranger_sim.tools.panel.robot import RobotSource
+
+        yield RobotSource(options.name)
+
+
+@contextlib.contextmanager
+def own_robot(say: Any) -> Iterator[Any]:
+    """A robot that walks in real time until the panel ends, however that ends."""
+    from ranger_sim.tools.panel.robot import RobotSource
+
+    name, parent = f"panel-{os.getpid()}", os.getpid()
+    command = [sys.executable, "-m", "ranger_sim", "up", "--name", name, "--no-real-time", "--processor", "all"]
+    with tempfile.TemporaryFile("w+", prefix="ranger-sim-") as said:
+        robot = subprocess.Popen(
+            command,
+            stdout=subprocess.DEVNULL,
+            stderr=said,
+            start_new_session=True,  # Ctrl-C is ours
+            preexec_fn=lambda: kernel.die_with_parent(parent),
+        )
+        try:
+            end_s = wallclock.monotonic_s() + START_S
+            while True:
+                try:
+                    source = RobotSource(name)
+                    break
+                except UserError:
+                    if robot.poll() is not None:
+                        said.seek(0)
+                        lines = said.read().strip().splitlines()
+                        raise UserError(
+                            f"panel: the robot did not start: {lines[-1] if lines else 'no word'}"
+                        ) from None
+                    if wallclock.monotonic_s() > end_s:
+                        raise UserError(f"panel: the robot was not there after {START_S:.0f} s") from None
+                    wallclock.sleep_s(LOOK_S)
+            say(f"a robot walks in real time, name {name}")
+            yield source
+        finally:
+            robot.terminate()
+            try:
+                robot.wait(timeout=END_S)
+            except subprocess.TimeoutExpired:
+                robot.kill()
+                robot.wait()
+
+
+@contextlib.contextmanager
+def listening(address: str, port: int) -> Iterator[socket.socket]:
+    """A socket for the browser's requests. UserError when it cannot be had."""
+    family = socket.AF_INET6 if ":" in address else socket.AF_INET
+    listener = socket.socket(family, socket.SOCK_STREAM)
+    with contextlib.closing(listener):
+        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            listener.bind((address, port))
+        except OSError as error:
+            raise UserError(f"panel on {address}:{port}: {error.strerror} (--http-port chooses another)") from None
+        listener.listen()
+        yield listener
+
+
+def serve(source: Any, listener: socket.socket, host: str, say: Any) -> int:
+    """Until Ctrl-C, or the robot has ended and everybody has left."""
+    import uvicorn
+
+    from ranger_sim.tools.panel.server import LONGEST_WISH, PanelServer, new_token
+
+    address, port = listener.getsockname()[:2]
+    token = new_token()
+    names = (
+        (HERE, "localhost", host, address)
+        if address in (HERE, "::1")
+        else (HERE, "localhost", host, address, socket.gethostname())
+    )
+    panel = PanelServer(source, token, names, say)
+    shown = HERE if address in ("0.0.0.0", "::") else address
+    say(f"{source.title}: http://{shown}:{port}/?token={token}   (Ctrl-C ends it)")
+    config = uvicorn.Config(
+        panel.app,
+        log_level="critical",
+        access_log=False,
+        ws="websockets-sansio",
+        ws_max_size=LONGEST_WISH,
+        ws_ping_interval=10.0,
+        ws_ping_timeout=20.0,
+        timeout_graceful_shutdown=1,
+        h11_max_incomplete_event_size=16384,
+    )
+    server = uvicorn.Server(config)
+    with contextlib.suppress(KeyboardInterrupt):
+        asyncio.run(server.serve(sockets=[listener]))
+    return 0

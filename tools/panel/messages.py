@@ -1,0 +1,57 @@
+"""What server and page say to each other over the one WebSocket, version 1 (README.md has the page's side).
+
+From the page: text, JSON objects with `do`. To the page: binary, a head of 16 bytes and a body, little-endian.
+
+    head    version (u8), kind (u8), plot (u16), channels (u16), flags (u16), points (u32), 0 (u32)
+    TEXT    the body is JSON
+    TRACES  of one plot: per channel its number (u32), flags (u32), points (u32), 0 (u32); then x (f64), low (f32),
+            high (f32, only with ENVELOPE), padded to 8 bytes; NaN is a gap
+    POSE    time (f64), then angles and lengths of the robot (f32), as the channels of `pose` in HELLO say
+"""
+
+from __future__ import annotations
+
+import json
+import struct
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from ranger_sim.tools.panel.channels import Trace
+
+VERSION = 1
+TEXT, TRACES, POSE = 1, 2, 3
+ENVELOPE = 1
+HEAD = struct.Struct("<BBHHHII")
+TRACE_HEAD = struct.Struct("<IIII")
+
+
+def text(content: Any) -> bytes:
+    """A message of JSON; numbers that do not exist are null."""
+    body = json.dumps(content, separators=(",", ":"), allow_nan=False).encode()
+    return HEAD.pack(VERSION, TEXT, 0, 0, 0, len(body), 0) + body
+
+
+def traces(plot: int, channels: Sequence[int], found: Sequence[Trace]) -> bytes:
+    """All traces of one plot."""
+    parts = [HEAD.pack(VERSION, TRACES, plot, len(channels), 0, 0, 0)]
+    for channel, trace in zip(channels, found, strict=True):
+        count = len(trace.x)
+        flags = 0 if trace.high is None else ENVELOPE
+        parts.append(TRACE_HEAD.pack(channel, flags, count, 0))
+        parts.append(trace.x.astype("<f8").tobytes())
+        body = trace.low.astype("<f4").tobytes()
+        if trace.high is not None:
+            body += trace.high.astype("<f4").tobytes()
+        parts.append(body + bytes(-len(body) % 8))
+    return b"".join(parts)
+
+
+def pose(time_s: float, values: Sequence[float]) -> bytes:
+    """Where the robot's parts are."""
+    return (
+        HEAD.pack(VERSION, POSE, 0, 0, 0, len(values), 0)
+        + struct.pack("<d", time_s)
+        + np.array(values, "<f4").tobytes()
+    )

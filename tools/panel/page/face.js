@@ -1,0 +1,55 @@
+// The front panel as the user interface board drives it: display, lights, tone, sync light; keys are the robot's.
+const KEYS = ["", "walk", "stop", "", "sync light", ""];   // of the record walk's program; others give them other meanings
+const LIGHTS = 16, TONE = 22, SYNC = 23, PRESSED = 24;
+
+export function makeFace(box, press, steer) {
+  box.innerHTML = '<div class="top"><div class="lcd" role="img" aria-label="display"></div><div><label><input type="checkbox" id="hear"> hear the buzzer</label><p class="note" id="tone"></p></div></div>' +
+    '<div class="lights"></div><div class="keys"></div>' +
+    '<label class="stick">radio <input type="range" min="-1" max="1" step="0.05" value="0" aria-label="radio stick, left to right"> <output>0</output></label>';
+  const lights = box.querySelector(".lights"), keys = box.querySelector(".keys"), lcd = box.querySelector(".lcd"), stick = box.querySelector(".stick input");
+  for (let k = 0; k < 6; k++) lights.append(Object.assign(document.createElement("div"), { innerHTML: `<i></i>${k + 1}` }));
+  lights.append(Object.assign(document.createElement("div"), { innerHTML: "<i></i>sync" }));
+  KEYS.forEach((name, k) => {
+    const button = Object.assign(document.createElement("button"), { type: "button", innerHTML: `key ${k}<small></small>` });
+    button.querySelector("small").textContent = name;
+    button.onclick = () => press(k);
+    keys.append(button);
+  });
+  stick.oninput = () => { box.querySelector("output").textContent = stick.value; };
+  stick.onchange = () => steer(Number(stick.value));
+  let audio = null, tone = null, gain = null;
+  box.querySelector("#hear").onchange = (event) => {
+    if (!event.target.checked) { gain && (gain.gain.value = 0); return; }
+    if (!audio) {
+      audio = new AudioContext();
+      tone = audio.createOscillator();
+      gain = audio.createGain();
+      tone.type = "square";
+      gain.gain.value = 0;
+      tone.connect(gain).connect(audio.destination);
+      tone.start();
+    }
+    audio.resume();
+  };
+
+  function show(words) {
+    if (!words) { lcd.textContent = "not shown"; return; }
+    const text = words.slice(0, 16).map((code) => code >= 32 && code < 127 ? String.fromCharCode(code) : " ").join("");
+    lcd.textContent = `${text.slice(0, 8)}\n${text.slice(8)}`;
+    lcd.setAttribute("aria-label", `display: ${text.trim() || "empty"}`);
+    for (let k = 0; k < 6; k++) {
+      const word = words[LIGHTS + k], rgb = [word & 255, word >> 8 & 255, word >> 16 & 255];
+      const lamp = lights.children[k].firstChild;
+      lamp.style.background = word ? `rgb(${rgb.join()})` : "transparent";
+      lights.children[k].title = word ? `red ${rgb[0]}, green ${rgb[1]}, blue ${rgb[2]}` : "off";
+    }
+    lights.children[6].firstChild.style.background = words[SYNC] ? "#fff3a0" : "transparent";
+    for (let k = 0; k < 6; k++) keys.children[k].classList.toggle("down", (words[PRESSED] >> k & 1) === 1);
+    box.querySelector("#tone").textContent = words[TONE] ? `buzzer: ${words[TONE]} Hz` : "buzzer: silent";
+    if (gain) {
+      tone.frequency.value = words[TONE] || 1;
+      gain.gain.value = words[TONE] && box.querySelector("#hear").checked ? 0.05 : 0;
+    }
+  }
+  return { show };
+}

@@ -1,0 +1,424 @@
+// The page: what it shows is in the address, what comes from the server is handed to the parts.
+import { connect } from "./connection.js";
+import { makeFace } from "./face.js";
+import { download, makeParameters } from "./parameters.js";
+import { figure, makePlots } from "./plots.js";
+import { makeStage } from "./stage.js";
+import * as tables from "./tables.js";
+
+const by = (id) => document.getElementById(id);
+const VALUES_MS = 500;
+const FIRST = [["hip_rad", "ankle_outer_rad", "ankle_inner_rad"], ["hip_A", "outer_A", "inner_A"], ["FSM_HIP", "FSM_FO", "FSM_FI"]];
+const FIRST_OF_A_LOG = [["MCH_ANGLE", "MCFO_RIGHT_ANKLE_ANGLE", "MCFI_MID_ANKLE_ANGLE"], ["MCH_MOTOR_CURRENT"], ["FSM_HIP"]];
+const CURRENTS = [["hip", "hip_A", "MCH_MOTOR_CURRENT", "hip"], ["outer ankle", "outer_A", "MCFO_MOTOR_CURRENT", "outer"], ["inner ankle", "inner_A", "MCFI_MOTOR_CURRENT", "inner"], ["steering", "steering_A", "MCSI_MOTOR_CURRENT", "steering"]];
+const FULL_BAR_A = 10;
+
+let colours = {};
+const colour = (name) => colours[name] ??= getComputedStyle(document.documentElement).getPropertyValue("--" + name).trim();
+
+let hello = null, can = new Set(), number = new Map();
+let span = [0, 0], held = null, window_s = 10, zooms = [], view = "plots", state = {}, pose = null, poses = [];
+let playing = false, played = 0, at = null, trigger = null, shown = 0;
+
+const stage = makeStage(by("stage"), colour);
+const plots = makePlots(by("plots"), {
+  changed: () => { look(); remember(); channelList(); atMark(); },
+  cursor: (time) => { at = time; look(); },
+  zoom: (begin, end) => { zooms.push(range()); hold([begin, end]); },
+  widen: () => { const before = zooms.pop(); hold(before && !before.follows ? [before.begin, before.end] : null); },
+  marked: () => { atMark(); remember(); },
+}, colour);
+const face = makeFace(by("face"), (key) => tell({ do: "key", key }, `key ${key} pressed`),
+  (stick) => tell({ do: "radio", stick }, `radio stick at ${stick}`));
+const parameters = makeParameters(by("parameter-groups"), {
+  search: by("parameter-search"), changed: by("changed-only"), undo: by("undo"), save: by("save-set"), load: by("load-set"), compare: by("compare-set"),
+  note: (text, bad) => { by("parameter-note").textContent = text; by("parameter-note").classList.toggle("bad", !!bad); },
+}, (wish) => link.ask(wish));
+
+const link = connect({
+  hello: greet,
+  picture: (found, lost) => { span = found; shown++; light(lost); if (lost) by("light-text").textContent = lost; scrubber(); if (!held) triggered(); },
+  traces: (place, found) => { const r = range(); plots.show(place, found, [r.begin, r.end]); plots.values(); },
+  pose: (time, values) => { pose = values; by("clock").textContent = `${time.toFixed(3)} s`; stage.draw(values); bars(); },
+  values: (found, time) => { if (time === instant()) plots.stands(found, plots.cursor()); },
+  state: (found) => { state = found; tell_state(); },
+  closed: (reason, refused) => { light("x"); by("light-text").textContent = refused ? `refused: ${reason}` : `${reason}: trying again`; document.body.dataset.connected = "no"; },
+});
+
+// ---- the beginning
+
+function greet(found) {
+  hello = found;
+  can = new Set(hello.can);
+  span = hello.span;
+  number = new Map(hello.channels.map((channel, k) => [channel.name, k]));
+  by("title").textContent = hello.title;
+  document.title = `${hello.title} – panel`;
+  plots.know(hello.channels);
+  stage.know(hello);
+  parameters.know(hello.parameters);
+  const live = can.has("live");
+  by("scrub").hidden = live;
+  by("freeze").hidden = !live;
+  by("pace").hidden = !can.has("pace");
+  by("face").hidden = !can.has("panel");
+  for (const [name, needs] of [["parameters", "parameters"], ["errors", "errors"], ["inside", "boards"], ["faults", "faults"]])
+    document.querySelector(`[data-view=${name}]`).hidden = !can.has(needs);
+  by("pose-note").textContent = hello.pose.includes("hip_y_m") ? "as its body is; contact forces green" : hello.pose.length ? "as it estimates itself; the lower foot stands" : "no leg angles in this source";
+  by("names").replaceChildren(...hello.channels.map((channel) => Object.assign(document.createElement("option"), { value: channel.name })));
+  by("bars").replaceChildren(...CURRENTS.map(([name, , , swatch]) => {
+    const row = document.createElement("div");
+    row.innerHTML = '<span></span><div class="bar"><i></i></div><span></span>';
+    row.firstChild.textContent = name;
+    row.style.setProperty("--swatch", `var(--${swatch})`);
+    return row;
+  }));
+  faultForm();
+  if (!plots.all().length) recall();
+  if (!live) hold(held ?? [span[0], Math.min(span[1], span[0] + window_s)]);
+  channelList();
+  document.body.dataset.connected = "yes";
+  look();
+}
+
+// ---- what is looked at
+
+const range = () => held ? { begin: held[0], end: held[1], follows: false } : { begin: span[1] - window_s, end: span[1], follows: true };
+
+// Where robot, values and frames stand: at the cursor, of a recording where it is played; null: at the newest.
+const instant = () => at ?? (can.has("live") ? null : played);
+
+async function atMark() {
+  const time = plots.mark(), channels = [...new Set(plots.all().flatMap((plot) => plot.numbers))];
+  if (time === null || !channels.length) return;
+  try {
+    const { values } = await link.ask({ do: "values", channels, at: time });
+    plots.stoodAtMark(Object.fromEntries(channels.map((channel, k) => [channel, values[k]])));
+  } catch { /* told by the light */ }
+}
+
+function look() {
+  if (!hello) return;
+  const wanted = plots.wanted().map((plot) => ({ channels: plot.numbers, begin: held ? held[0] : null, end: held ? held[1] : null, span: window_s, points: plots.points() }));
+  link.send({ do: "look", plots: view === "plots" ? wanted : [], at: instant() });
+}
+
+function hold(window) {
+  held = window;
+  by("freeze").setAttribute("aria-pressed", String(!!held));
+  by("freeze").textContent = held ? "Go on" : "Hold";
+  if (!held) zooms = [];
+  look();
+  remember();
+}
+
+// name, comparison, number: the plots are held when it comes true
+function triggered() {
+  if (!trigger) return;
+  const plot = plots.all().find((each) => each.numbers.includes(trigger.channel));
+  const trace = plot?.found?.find((each) => each.channel === trigger.channel);
+  if (!trace || !trace.x.length) return;
+  for (let k = 1; k < trace.x.length; k++) {
+    if (trace.x[k] <= trigger.since) continue;
+    const low = trace.low[k], high = trace.high ? trace.high[k] : low, before = trace.low[k - 1];
+    const is = (value) => trigger.sign === ">" ? value > trigger.value : trigger.sign === "<" ? value < trigger.value : value === trigger.value;
+    if ((is(low) || is(high)) && !is(before)) {
+      by("trigger-note").textContent = `held at ${trace.x[k].toFixed(3)} s`;
+      plots.setMark(trace.x[k]);
+      const half = window_s / 2;
+      trigger = null;
+      by("trigger").value = "";
+      hold([trace.x[k] - half, trace.x[k] + half]);
+      return;
+    }
+  }
+  trigger.since = Math.max(trigger.since, trace.x[trace.x.length - 1] - 0.2);
+}
+
+by("trigger").onchange = () => {
+  const parts = by("trigger").value.match(/^\s*(\S+)\s*(=|<|>|becomes)\s*(\S+)\s*$/);
+  trigger = null;
+  by("trigger-note").textContent = "";
+  if (!by("trigger").value.trim()) return;
+  const channel = parts && number.get(parts[1]);
+  const states = channel !== undefined && parts ? hello.channels[channel].states : {};
+  const named = parts && Object.keys(states).find((each) => states[each] === parts[3]);
+  const value = parts ? Number(named ?? parts[3]) : NaN;
+  if (channel === undefined || !Number.isFinite(value)) { by("trigger-note").textContent = "a name, then =, < or >, then a number or a state"; return; }
+  if (!plots.all().some((plot) => plot.numbers.includes(channel))) plots.put(plots.last(), channel);
+  trigger = { channel, sign: parts[2] === "becomes" ? "=" : parts[2], value, since: span[1] };
+  by("trigger-note").textContent = "waiting";
+};
+
+// ---- what it shows, in the address
+
+function remember() {
+  const names = plots.all().map((plot) => plot.numbers.map((each) => hello.channels[each].name).join(","));
+  const parts = new URLSearchParams({ view, span: window_s, plots: names.join(";") });
+  if (held) parts.set("from", held[0].toFixed(6)), parts.set("to", held[1].toFixed(6));
+  if (plots.mark() !== null) parts.set("mark", plots.mark().toFixed(6));
+  history.replaceState(null, "", `${location.search}#${parts}`);
+}
+
+function recall() {
+  const parts = new URLSearchParams(location.hash.slice(1));
+  const wanted = parts.get("plots");
+  const usual = can.has("live") && number.has("hip_rad") || number.has("hip_rad") ? FIRST : FIRST_OF_A_LOG;
+  const sets = wanted !== null ? wanted.split(";").map((each) => each.split(",").filter(Boolean)) : usual;
+  for (const names of sets) plots.add(names.map((name) => number.get(name)).filter((each) => each !== undefined));
+  window_s = Number(parts.get("span")) || window_s;
+  by("span").value = String(window_s);
+  if (parts.get("from") !== null) hold([Number(parts.get("from")), Number(parts.get("to"))]);
+  if (parts.get("mark") !== null) plots.setMark(Number(parts.get("mark")));
+  choose(parts.get("view") ?? "plots");
+}
+
+function choose(name) {
+  const tab = document.querySelector(`[data-view=${CSS.escape(name)}]`);
+  view = tab && !tab.hidden ? name : "plots";
+  for (const each of document.querySelectorAll("nav [role=tab]")) {
+    const on = each.dataset.view === view;
+    each.setAttribute("aria-selected", String(on));
+    each.tabIndex = on ? 0 : -1;
+    by(`view-${each.dataset.view}`).hidden = !on;
+  }
+  if (view === "plots") plots.resize();
+  if (hello) { look(); remember(); tell_state(); }
+}
+
+// ---- the list of channels
+
+function channelList() {
+  if (!hello) return;
+  const wanted = by("search").value.trim().toLowerCase().split(/\s+/).filter(Boolean);
+  const drawn = new Set(plots.all().flatMap((plot) => plot.numbers));
+  const rows = [];
+  let group = null, count = 0;
+  hello.channels.forEach((channel, k) => {
+    const words = `${channel.name} ${channel.unit} ${channel.description} ${channel.group}`.toLowerCase();
+    if (!wanted.every((each) => words.includes(each))) return;
+    count++;
+    if (channel.group !== group) { group = channel.group; rows.push(Object.assign(document.createElement("li"), { className: "group", textContent: group })); }
+    const item = document.createElement("li"), button = Object.assign(document.createElement("button"), { type: "button", draggable: true });
+    button.className = drawn.has(k) ? "on" : "";
+    button.setAttribute("aria-pressed", String(drawn.has(k)));
+    button.title = channel.description;
+    button.append(channel.name, Object.assign(document.createElement("small"), { textContent: channel.unit ? ` ${channel.unit}` : "" }));
+    button.ondragstart = (event) => event.dataTransfer.setData("text/plain", String(k));
+    button.onclick = () => plots.put(plots.last(), k);
+    item.append(button);
+    rows.push(item);
+  });
+  const top = by("channels").scrollTop;
+  by("channels").replaceChildren(...(count ? rows : [tables.note("no channel has these words")]));
+  by("channels").scrollTop = top;
+}
+
+// ---- what is in no channel
+
+function light(lost) {
+  const unexpected = (state.errors ?? []).filter((row) => !row.normal).length, box = by("light");
+  box.className = `light ${lost ? "off" : unexpected || state.ended ? "bad" : "good"}`;
+  if (!lost) by("light-text").textContent = state.ended ? `ended: ${state.ended}` : unexpected ? `${unexpected} unexpected error${unexpected > 1 ? "s" : ""}` : can.has("live") ? "no unexpected error" : "recording";
+}
+
+function tell_state() {
+  if (!hello) return;
+  by("walked").textContent = state.steps === undefined ? "" : `${state.steps} steps, ${figure(state.distance_m)} m, ${(state.speed_m_per_s ?? 0).toFixed(2)} m/s`;
+  const pace = state.pace ?? {};
+  by("pause").textContent = pace.paused ? "Let the robot go on" : "Pause robot";
+  by("pace-text").textContent = pace.behind_s > 0.05 ? ` ${pace.behind_s.toFixed(2)} s late` : "";
+  const errors = state.errors ?? [], unexpected = errors.filter((row) => !row.normal);
+  by("error-count").textContent = unexpected.length || "";
+  if (can.has("panel")) face.show(state.panel);
+  if (view === "errors") {
+    by("errors-unexpected").replaceChildren(tables.errors(unexpected, "none"));
+    by("errors-normal").replaceChildren(tables.errors(errors.filter((row) => row.normal), "none"));
+  }
+  if (view === "inside") {
+    if (!by("view-inside").contains(document.activeElement) || document.activeElement.tagName !== "BUTTON") by("boards").replaceChildren(tables.boards(state.boards ?? {}, tell));
+    by("buses").replaceChildren(tables.buses(state.buses ?? {}));
+    const chosen = by("bus").value || "0";
+    if (by("bus").length !== (state.frames ?? []).length) by("bus").replaceChildren(...(state.frames ?? []).map((_, k) => new Option(`can${k + 1}`, k)));
+    by("bus").value = chosen;
+    by("frames").replaceChildren(tables.frames((state.frames ?? [])[+chosen] ?? [], by("frame-search").value));
+  }
+  if (view === "faults") by("fault-list").replaceChildren(tables.faults(state.faults ?? [], tell));
+  if (state.link) by("readout").textContent = `${state.link.state}; ${state.link.points.toLocaleString("en")} points, ${state.link.gaps} gaps (longest ${state.link.longest_gap_ms} ms), ${state.link.bad_checksums} bad checksums`;
+  else if (state.left_out && Object.keys(state.left_out).length) by("readout").textContent = `left out because this program was too slow: ${Object.entries(state.left_out).map(([name, rows]) => `${rows} rows of ${name}`).join(", ")}`;
+}
+
+function bars() {
+  if (!hello || !pose) return;
+  CURRENTS.forEach(([, name], k) => {
+    const place = hello.pose.indexOf(name), row = by("bars").children[k];
+    row.hidden = place < 0;
+    if (place < 0) return;
+    const value = pose[place], share = Math.min(50, 50 * Math.abs(value) / FULL_BAR_A), bar = row.querySelector("i");
+    bar.style.width = `${share}%`;
+    bar.style.left = `${value < 0 ? 50 - share : 50}%`;
+    row.lastChild.textContent = `${value.toFixed(2)} A`;
+  });
+}
+
+async function tell(wish, done) {
+  try {
+    await link.ask(wish);
+    say(done ?? `${wish.do}: done`);
+  } catch (fault) { say(String(fault)); }
+}
+
+let hiding = 0;
+function say(text) {
+  by("message").textContent = text;
+  by("message").hidden = false;
+  clearTimeout(hiding);
+  hiding = setTimeout(() => { by("message").hidden = true; }, 4000);
+}
+
+// ---- parameters: their values now, some times a second while they are looked at
+
+setInterval(async () => {
+  if (!hello || view !== "parameters") return;
+  const names = hello.parameters.map((row) => row.name).filter((name) => number.has(name));
+  try {
+    const { values } = await link.ask({ do: "values", channels: names.map((name) => number.get(name)), at: null });
+    parameters.show(Object.fromEntries(names.map((name, k) => [name, values[k]])));
+  } catch { /* told by the light */ }
+}, VALUES_MS);
+
+// ---- faults
+
+function faultForm() {
+  const { places = [], modes = {} } = hello.faults;
+  by("fault-place").replaceChildren(...places.map((place) => new Option(`${place.name}: ${place.what}`, place.name)));
+  const renew = () => {
+    const place = places.find((each) => each.name === by("fault-place").value), found = place ? modes[place.kind] ?? [] : [];
+    by("fault-mode").replaceChildren(...found.map((each) => new Option(each.mode, each.mode)));
+    meaning();
+  };
+  const meaning = () => {
+    const place = places.find((each) => each.name === by("fault-place").value);
+    by("fault-meaning").textContent = place ? (modes[place.kind] ?? []).find((each) => each.mode === by("fault-mode").value)?.meaning ?? "" : "";
+  };
+  by("fault-place").onchange = renew;
+  by("fault-mode").onchange = meaning;
+  renew();
+}
+
+by("fault-form").onsubmit = async (event) => {
+  event.preventDefault();
+  const start = by("fault-start").value.trim().replace(/^now$/, ""), end = by("fault-end").value.trim();
+  const text = `${by("fault-place").value}:${by("fault-mode").value}${start || end ? `@${start || "0 s"}` : ""}${end ? `..${end}` : ""}`;
+  try {
+    const answer = await link.ask({ do: "fault", fault: text });
+    by("fault-note").className = "note";
+    by("fault-note").textContent = `armed at ${answer.time_s.toFixed(3)} s: ${text}`;
+  } catch (fault) { by("fault-note").className = "note bad"; by("fault-note").textContent = String(fault); }
+};
+
+// ---- recordings: play, scrub, loop
+
+function scrubber() {
+  if (can.has("live")) return;
+  const bar = by("position");
+  bar.min = span[0];
+  bar.max = span[1];
+  if (document.activeElement !== bar) bar.value = played || span[0];
+}
+
+function goTo(time) {   // of a recording
+  played = Math.max(span[0], Math.min(span[1], time));
+  const width = held ? held[1] - held[0] : window_s;
+  if (!held || played < held[0] || played > held[1]) hold([Math.max(span[0], played - width / 2), Math.max(span[0], played - width / 2) + width]);
+  at = null;
+  plots.setCursor(played);
+  by("position").value = played;
+  look();
+}
+
+let tick = null;
+function play(on) {
+  playing = on;
+  by("play").textContent = on ? "Pause" : "Play";
+  let before = performance.now();
+  if (played >= span[1] && on) played = span[0];
+  const step = (now) => {
+    if (!playing) return;
+    const next = (played || span[0]) + (now - before) / 1000 * Number(by("speed").value);
+    before = now;
+    if (next >= span[1] && !by("loop").checked) { goTo(span[1]); play(false); return; }
+    goTo(next >= span[1] ? span[0] : next);
+    tick = requestAnimationFrame(step);
+  };
+  if (on) tick = requestAnimationFrame(step);
+}
+
+// ---- controls
+
+for (const tab of document.querySelectorAll("nav [role=tab]")) tab.onclick = () => choose(tab.dataset.view);
+document.querySelector("nav").onkeydown = (event) => {
+  const tabs = [...document.querySelectorAll("nav [role=tab]:not([hidden])")], here = tabs.indexOf(document.activeElement);
+  const next = tabs[(here + ({ ArrowRight: 1, ArrowLeft: -1 }[event.key] ?? 0) + tabs.length) % tabs.length];
+  if (event.key.startsWith("Arrow") && here >= 0) { event.preventDefault(); event.stopPropagation(); next.focus(); choose(next.dataset.view); }
+};
+by("search").oninput = channelList;
+by("add-plot").onclick = () => { plots.add(); remember(); };
+by("freeze").onclick = () => hold(held ? null : [span[1] - window_s, span[1]]);
+by("span").onchange = () => { window_s = Number(by("span").value); if (held) hold([held[1] - window_s, held[1]]); look(); remember(); };
+by("pause").onclick = () => tell({ do: state.pace?.paused ? "resume" : "pause" }, state.pace?.paused ? "the robot goes on" : "the robot is paused");
+by("play").onclick = () => play(!playing);
+by("position").oninput = () => { play(false); goTo(Number(by("position").value)); };
+by("frame-search").oninput = () => tell_state();
+by("bus").onchange = () => tell_state();
+
+by("export").onclick = () => {
+  const lines = [["time_s", "channel", "unit", "low", "high"].join()];
+  for (const plot of plots.wanted()) for (const trace of plot.found ?? []) {
+    const channel = hello.channels[trace.channel];
+    for (let k = 0; k < trace.x.length; k++) if (Number.isFinite(trace.low[k])) lines.push([trace.x[k].toFixed(6), channel.name, channel.unit, trace.low[k], trace.high ? trace.high[k] : trace.low[k]].join());
+  }
+  download("selection.csv", lines.join("\n") + "\n");
+};
+by("picture").onclick = () => {
+  const drawn = plots.wanted().filter((plot) => plot.chart).map((plot) => [plot.chart.ctx.canvas, plot.numbers.map((each) => hello.channels[each].name).join(", ")]);
+  if (!drawn.length) return;
+  const all = document.createElement("canvas"), title = 26;
+  all.width = Math.max(...drawn.map(([canvas]) => canvas.width));
+  all.height = drawn.reduce((sum, [canvas]) => sum + canvas.height + title, 0);
+  const context = all.getContext("2d");
+  context.fillStyle = colour("paper");
+  context.fillRect(0, 0, all.width, all.height);
+  let y = 0;
+  for (const [canvas, names] of drawn) {
+    context.fillStyle = colour("ink");
+    context.font = "16px system-ui, sans-serif";
+    context.fillText(names, 10, y + 19);
+    context.drawImage(canvas, 0, y + title);
+    y += canvas.height + title;
+  }
+  all.toBlob((blob) => download("plots.png", blob));
+};
+
+document.addEventListener("keydown", (event) => {
+  const typing = event.target.matches("input, select, textarea");
+  if (event.altKey && /^[0-5]$/.test(event.key) && can.has("keys")) { event.preventDefault(); tell({ do: "key", key: Number(event.key) }, `key ${event.key} pressed`); return; }
+  if (event.key === "Escape") { plots.setMark(null); plots.setCursor(null); at = null; look(); remember(); return; }
+  if (typing || event.ctrlKey || event.metaKey || event.altKey) return;
+  if (event.key === "/") { event.preventDefault(); choose("plots"); by("search").focus(); }
+  if (event.key === "h" && can.has("live")) by("freeze").click();
+  if (event.key === " " && !can.has("live") && !event.target.matches("button")) { event.preventDefault(); play(!playing); }
+  const step = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
+  if (step && !event.target.closest("nav")) {
+    event.preventDefault();
+    const by_s = step * (event.shiftKey ? 0.1 : 0.01);
+    if (can.has("live")) { if (!held) hold([span[1] - window_s, span[1]]); at = (at ?? plots.cursor() ?? held[1]) + by_s; plots.setCursor(at); look(); }
+    else { play(false); goTo((played || span[0]) + by_s); }
+  }
+});
+
+let width = 0;
+new ResizeObserver(() => { if (width !== by("plots").clientWidth) { width = by("plots").clientWidth; plots.resize(); look(); } if (pose) stage.draw(pose); }).observe(by("plots"));
+window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { colours = {}; plots.restyle(); if (pose) stage.draw(pose); });
+window.rangerPanel = { plots, shown: () => shown, state: () => state, span: () => span, held: () => held, channel: (name) => number.get(name), pose: () => pose };
+choose("plots");

@@ -1,0 +1,217 @@
+// The plots: uPlot shows what the server has thinned; an axis for each unit; one cursor for all.
+const COLOURS = ["#1f6fb2", "#d9731a", "#2c9a5b", "#a8499a", "#b3261e", "#0f8b8d", "#8a6d00", "#6a5acd", "#7a4a1e", "#4a7fb0", "#c2577a", "#5c7d1e"];
+const DASHES = [[], [7, 4], [2, 3]];   // beside colours: also for who cannot tell them apart
+const HEIGHT = 230, MOST_AXES = 4;
+
+export function makePlots(box, on, colour) {
+  let plots = [], channels = [], shared = null;   // shared: {begin, end} while held
+  let mark = null, at = null;
+  let exact = { at: null, values: {} }, marked = {};   // what the server says stands at the cursor, and at the mark
+
+  function add(numbers = []) {
+    const element = document.createElement("div");
+    element.className = "plot";
+    element.innerHTML = '<div class="head"></div><div class="chart"></div>';
+    const plot = { element, numbers: [...numbers], chart: null, signature: "", data: null, drawn: 0 };
+    element.addEventListener("dragover", (event) => { event.preventDefault(); element.classList.add("over"); });
+    element.addEventListener("dragleave", () => element.classList.remove("over"));
+    element.addEventListener("drop", (event) => {
+      event.preventDefault();
+      element.classList.remove("over");
+      const number = parseInt(event.dataTransfer.getData("text/plain"), 10);
+      if (Number.isInteger(number)) put(plot, number);
+    });
+    box.append(element);
+    plots.push(plot);
+    head(plot);
+    return plot;
+  }
+
+  function put(plot, number) {
+    if (!channels[number] || plot.numbers.includes(number)) return;
+    plot.numbers.push(number);
+    head(plot);
+    on.changed();
+  }
+
+  function take(plot, number) {
+    plot.numbers = plot.numbers.filter((each) => each !== number);
+    head(plot);
+    on.changed();
+  }
+
+  function close(plot) {
+    plot.chart?.destroy();
+    plot.element.remove();
+    plots = plots.filter((each) => each !== plot);
+    if (!plots.length) add();
+    on.changed();
+  }
+
+  const place = (plot, number) => plot.numbers.indexOf(number);
+  const shade = (plot, number) => COLOURS[place(plot, number) % COLOURS.length];
+
+  function head(plot) {
+    const row = plot.element.querySelector(".head");
+    row.replaceChildren(...plot.numbers.map((number) => {
+      const chip = document.createElement("button");
+      chip.type = "button";
+      chip.className = "chip";
+      chip.style.setProperty("--swatch", shade(plot, number));
+      chip.title = `${channels[number].description}; click to take it out`;
+      chip.innerHTML = "<i></i><span></span><b></b>";
+      chip.children[1].textContent = channels[number].name + (channels[number].unit ? `, ${channels[number].unit}` : "");
+      chip.dataset.channel = number;
+      chip.onclick = () => take(plot, number);
+      return chip;
+    }));
+    if (!plot.numbers.length) {
+      const hint = document.createElement("span");
+      hint.className = "note";
+      hint.textContent = "click a channel, or drag it here";
+      row.append(hint);
+    }
+    const closer = document.createElement("button");
+    closer.type = "button";
+    closer.className = "close";
+    closer.textContent = "×";
+    closer.setAttribute("aria-label", "close this plot");
+    closer.onclick = () => close(plot);
+    row.append(closer);
+    if (!plot.numbers.length && plot.chart) { plot.chart.destroy(); plot.chart = null; plot.signature = ""; }
+  }
+
+  // Two points of each bucket, low and high; NaN becomes null, where uPlot leaves a gap.
+  function drawable({ x, low, high }) {
+    const nulls = (values) => {
+      for (let k = 0; k < values.length; k++) if (values[k] !== values[k]) return Array.from(values, (v) => v === v ? v : null);
+      return values;
+    };
+    if (!high) return [x, nulls(low)];
+    const count = x.length, xs = new Float64Array(2 * count), ys = new Float32Array(2 * count);
+    const half = count > 1 ? (x[count - 1] - x[0]) / (count - 1) / 2 : 0;
+    for (let k = 0; k < count; k++) {
+      xs[2 * k] = x[k];
+      xs[2 * k + 1] = x[k] + half;
+      const rising = k > 0 && low[k] + high[k] >= low[k - 1] + high[k - 1];
+      ys[2 * k] = rising ? low[k] : high[k];
+      ys[2 * k + 1] = rising ? high[k] : low[k];
+    }
+    return [xs, nulls(ys)];
+  }
+
+  function joined(tables) {
+    const [first] = tables;
+    const same = tables.every(([x]) => x.length === first[0].length && x[0] === first[0][0] && x[x.length - 1] === first[0][x.length - 1]);
+    return same ? [first[0], ...tables.map(([, y]) => y)] : uPlot.join(tables.map((table) => [table[0], table[1]]));
+  }
+
+  function units(plot) {
+    return [...new Set(plot.numbers.map((number) => channels[number].unit || "1"))];
+  }
+
+  function build(plot) {
+    plot.chart?.destroy();
+    const scales = { x: { time: false } };
+    const ink = colour("soft"), line = colour("line");
+    const axes = [{ stroke: ink, grid: { stroke: line, width: 1 }, ticks: { stroke: line }, values: (_, ticks) => ticks.map((each) => `${+each.toFixed(6)} s`) }];
+    units(plot).forEach((unit, k) => {
+      scales[unit] = { auto: true };
+      if (k < MOST_AXES) axes.push({ scale: unit, side: k % 2 ? 1 : 3, stroke: ink, size: 62, label: unit === "1" ? "" : unit, labelSize: 16, labelGap: 0,
+        grid: { show: k === 0, stroke: line, width: 1 }, ticks: { stroke: line } });
+    });
+    const series = [{}, ...plot.numbers.map((number, k) => ({
+      label: channels[number].name, scale: channels[number].unit || "1", stroke: shade(plot, number), width: 1.25,
+      dash: DASHES[Math.floor(k / COLOURS.length) % DASHES.length], points: { show: false }, spanGaps: false }))];
+    plot.chart = new uPlot({
+      width: width(plot), height: HEIGHT, scales, axes, series, legend: { show: false },
+      cursor: { drag: { x: true, y: false, setScale: false }, sync: { key: "time" }, y: false, points: { size: 6 } },
+      hooks: {
+        setCursor: [(chart) => {
+          if (chart.cursor.event && chart.cursor.left >= 0) { at = chart.posToVal(chart.cursor.left, "x"); on.cursor(at); values(); }
+        }],
+        setSelect: [(chart) => {
+          if (chart.select.width > 3) {
+            const begin = chart.posToVal(chart.select.left, "x"), end = chart.posToVal(chart.select.left + chart.select.width, "x");
+            chart.setSelect({ left: 0, width: 0, top: 0, height: 0 }, false);
+            on.zoom(begin, end);
+          }
+        }],
+        draw: [(chart) => marks(chart)],
+      },
+    }, [[0, 1], ...plot.numbers.map(() => [null, null])], plot.element.querySelector(".chart"));
+    plot.chart.over.addEventListener("dblclick", () => on.widen());
+    plot.chart.over.addEventListener("click", (event) => { if (event.detail === 1 && at !== null) { mark = at; on.marked(mark); redraw(); } });
+    plot.chart.over.addEventListener("mouseleave", () => { at = null; on.cursor(null); values(); });
+  }
+
+  function marks(chart) {
+    if (mark === null) return;
+    const x = chart.valToPos(mark, "x", true), { ctx, bbox } = chart;
+    if (x < bbox.left || x > bbox.left + bbox.width) return;
+    ctx.save();
+    ctx.strokeStyle = colour("bad");
+    ctx.setLineDash([6, 4]);
+    ctx.beginPath();
+    ctx.moveTo(x, bbox.top);
+    ctx.lineTo(x, bbox.top + bbox.height);
+    ctx.stroke();
+    ctx.restore();
+  }
+
+  const width = (plot) => Math.max(200, plot.element.clientWidth - 10);
+
+  function show(place, found, window) {
+    const plot = wanted()[place];
+    if (!plot || !plot.numbers.length || found.length !== plot.numbers.length || found.some((each, k) => each.channel !== plot.numbers[k])) return;
+    const signature = plot.numbers.join();
+    if (!plot.chart || plot.signature !== signature) { build(plot); plot.signature = signature; }
+    plot.found = found;
+    plot.chart.batch(() => {
+      plot.chart.setData(joined(found.map(drawable)), true);
+      plot.chart.setScale("x", { min: window[0], max: window[1] });
+    });
+    plot.drawn++;
+  }
+
+  // Beside each name: the value at the cursor as the server has it, without a cursor the newest that is drawn.
+  function values() {
+    for (const plot of plots) {
+      for (const chip of plot.element.querySelectorAll(".chip")) {
+        const number = +chip.dataset.channel, trace = plot.found?.find((each) => each.channel === number);
+        const value = at !== null ? (exact.at === at ? exact.values[number] ?? null : undefined) : trace && trace.low.length ? trace.low[trace.low.length - 1] : null;
+        if (value === undefined) continue;   // it is on its way
+        const before = at !== null && mark !== null ? marked[number] ?? null : null, states = channels[number].states;
+        let text = value === null ? "" : states[Math.round(value)] ?? figure(value);
+        if (value !== null && before !== null && !(Math.round(value) in states)) text += ` (Δ ${figure(value - before)})`;
+        chip.children[2].textContent = text;
+      }
+    }
+  }
+
+  function redraw() { for (const plot of plots) plot.chart?.redraw(false); }
+  function resize() { for (const plot of plots) plot.chart?.setSize({ width: width(plot), height: HEIGHT }); }
+  function restyle() { for (const plot of plots) plot.signature = ""; }
+  const wanted = () => plots.filter((plot) => plot.numbers.length);
+  const points = () => Math.max(100, Math.min(2000, Math.round(box.clientWidth)));
+
+  return {
+    add, put, close, show, values, redraw, resize, restyle, wanted, points,
+    know: (found) => { channels = found; },
+    all: () => plots,
+    last: () => plots[plots.length - 1] ?? add(),
+    cursor: () => at,
+    setCursor: (time) => { at = time; values(); for (const plot of plots) if (plot.chart) plot.chart.setCursor(time === null ? { left: -10, top: -10 } : { left: plot.chart.valToPos(time, "x"), top: 10 }, false); },
+    mark: () => mark,
+    setMark: (time) => { mark = time; redraw(); values(); },
+    stands: (values_there, time) => { exact = { at: time, values: values_there }; values(); },
+    stoodAtMark: (values_there) => { marked = values_there; values(); },
+  };
+}
+
+export const figure = (value) => {
+  if (value === null || value === undefined || !Number.isFinite(value)) return "–";
+  const size = Math.abs(value);
+  if (value === Math.round(value) && size < 1e7) return String(value);
+  return size >= 1e5 || size < 1e-3 ? value.toExponential(3) : value.toPrecision(5);
+};

@@ -1,0 +1,89 @@
+// Tables of the page: errors, boards, buses, frames, parameters, faults. Text only ever enters as text.
+import { figure } from "./plots.js";
+
+export function table(headings, rows) {
+  const box = document.createElement("div");
+  box.className = "scroll";
+  const element = document.createElement("table");
+  const head = element.createTHead().insertRow();
+  for (const heading of headings) {
+    const cell = document.createElement("th");
+    cell.textContent = heading.replace(/^#/, "");
+    if (heading.startsWith("#")) cell.className = "number";
+    head.append(cell);
+  }
+  const body = element.createTBody();
+  for (const row of rows) {
+    const line = body.insertRow();
+    row.forEach((content, k) => {
+      const cell = line.insertCell();
+      if (headings[k].startsWith("#")) cell.className = "number";
+      content instanceof Node ? cell.append(content) : cell.textContent = content ?? "–";
+    });
+  }
+  box.append(element);
+  return box;
+}
+
+export const note = (text) => Object.assign(document.createElement("p"), { className: "note", textContent: text });
+
+export function meter(share, text) {
+  const box = document.createElement("div");
+  box.className = "meter" + (share > 0.9 ? " high" : "");
+  box.setAttribute("role", "meter");
+  box.setAttribute("aria-valuenow", Math.round(100 * share));
+  box.setAttribute("aria-label", text);
+  const bar = document.createElement("i");
+  bar.style.width = `${Math.max(0, Math.min(100, 100 * share))}%`;
+  box.append(bar);
+  return box;
+}
+
+const seconds = (value) => value === null || value === undefined ? "–" : `${value.toFixed(3)} s`;
+
+export function errors(rows, nothing) {
+  if (!rows.length) return note(nothing);
+  return table(["board", "error", "meaning", "#count", "#first", "#last"],
+    rows.map((row) => [row.board, row.name, row.text, row.count.toLocaleString("en"), seconds(row.first_s), seconds(row.last_s)]));
+}
+
+const late = (us) => us === undefined || us === null ? "–" : us < 1e3 ? `${Math.round(us)} µs` : us < 1e6 ? `${(us / 1e3).toFixed(1)} ms` : `${(us / 1e6).toFixed(1)} s`;
+
+const SLOT_US = { MCH: 500, MCFO: 500, MCFI: 500, MCSI: 500, UI: 1000, CSR: 1000, MB: 2000 };
+
+export function boards(found, ask) {
+  const names = Object.keys(found);
+  if (!names.length) return note("nothing is known of the boards yet");
+  return table(["board", "state", "#slots", "longest slot", "#µs", "#margin", "#overruns", "#errors", "#late, 99 of 100", ""], names.map((name) => {
+    const board = found[name], share = board.max_slot_us / SLOT_US[name];
+    const restart = Object.assign(document.createElement("button"), { type: "button", textContent: "Restart" });
+    restart.onclick = () => ask({ do: "restart", board: name });
+    return [name, board.state, board.slots.toLocaleString("en"), meter(share, `${name}: ${Math.round(100 * share)} % of its slot`), board.max_slot_us.toFixed(0),
+      `${(100 * (1 - share)).toFixed(0)} %`, board.overruns, board.errors, late(board.lateness?.p99_us), restart];
+  }));
+}
+
+export function buses(found) {
+  const names = Object.keys(found);
+  if (!names.length) return note("nothing is known of the buses yet");
+  return table(["bus", "load in 10 ms", "#", "#error frames"], names.map((name) =>
+    [name, meter(found[name].load, `${name}: ${Math.round(100 * found[name].load)} %`), `${(100 * found[name].load).toFixed(1)} %`, found[name].errors]));
+}
+
+export function frames(rows, filter) {
+  const wanted = filter.trim().toUpperCase();
+  const shown = rows.filter((row) => !wanted || row.name.includes(wanted) || String(row.id) === wanted);
+  if (!shown.length) return note("no frames");
+  return table(["#time", "#id", "name", "#value", "data", "#so far"], shown.map((row) =>
+    [seconds(row.time_s), row.id, row.name, figure(row.value), Object.assign(document.createElement("code"), { textContent: row.data }), row.count.toLocaleString("en")]));
+}
+
+export function faults(rows, ask) {
+  if (!rows.length) return note("none was armed");
+  return table(["#", "fault", "#armed", "#active since", "acted", "largest difference", "#ended", "#clear", ""], rows.map((row, k) => {
+    const clear = Object.assign(document.createElement("button"), { type: "button", textContent: "Clear", disabled: row.ended_s !== null });
+    clear.onclick = () => ask({ do: "clear", which: k });
+    return [k, row.fault, seconds(row.armed_s), seconds(row.activated_s), row.acted ? `yes, ${row.acted_count}×, first at ${seconds(row.acted_s)}` : "not yet",
+      row.acted ? `${figure(row.largest_difference)} ${row.unit}` : "–", seconds(row.ended_s), row.cleared_s === null && row.permanent ? `after ${row.permanent}` : seconds(row.cleared_s), clear];
+  }));
+}

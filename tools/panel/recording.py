@@ -1,0 +1,80 @@
+"""The page's source for what was recorded: a run's folder, MF4, RoboDAQ's text, CSV, or frames with their DBC files."""
+
+from __future__ import annotations
+
+import pathlib
+from collections.abc import Sequence
+
+import numpy as np
+
+from ranger_sim import datatable
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.sysid.dataset import Dataset
+from ranger_sim.sysid.readers import run_folder
+from ranger_sim.tools import recordings
+from ranger_sim.tools.panel.channels import EMPTY, Channel, Trace, thinned
+from ranger_sim.tools.panel.source import ESTIMATED_POSE, TRUE_POSE, Source
+
+TRUTH = "plant."  # begins the names of what only a simulation knows of the body
+
+
+class RecordingSource(Source):
+    """One or two recordings, the second laid over the first (`shift_s` later). UserError for what cannot be read."""
+
+    can = frozenset({"play"})
+
+    def __init__(self, paths: Sequence[str], databases: Sequence[str] = (), shift_s: float = 0.0) -> None:
+        super().__init__()
+        self.title = " and ".join(pathlib.Path(path).name for path in paths)
+        known = {row.name: row for row in datatable.load().variables}
+        self.data: list[tuple[np.ndarray, np.ndarray, float | None]] = []
+        for number, path in enumerate(paths):
+            group = "" if number == 0 else f" ({pathlib.Path(path).name})"
+            steps = (pathlib.Path(path) / run_folder.VARIABLES).is_file()  # it keeps changes, not samples
+            for name, channel in read(path, databases).channels.items():
+                row = known.get(name)
+                whose = "body" if name.startswith(TRUTH) else row.publisher if row is not None else "recording"
+                description = row.description if row is not None else ""
+                self.channels.append(
+                    Channel(name.removeprefix(TRUTH) + group, channel.unit, description, whose + group)
+                )
+                times = channel.time_s + (shift_s if number else 0.0)
+                period = None if steps or len(times) < 3 else float(np.median(np.diff(times))) or None
+                self.data.append((times, channel.value.astype(np.float32), period))
+        if not self.data:
+            raise UserError(f"{paths[0]}: there is no channel in it")
+        self.number = {channel.name: place for place, channel in reversed(list(enumerate(self.channels)))}
+        self.pose_names = next(
+            (names for names in (TRUE_POSE, ESTIMATED_POSE) if all(name in self.number for name in names)), ()
+        )
+
+    def span(self) -> tuple[float, float]:
+        times = [times for times, _, _ in self.data if len(times)]
+        return (min(float(each[0]) for each in times), max(float(each[-1]) for each in times)) if times else (0.0, 0.0)
+
+    def trace(self, channel: int, begin: float, end: float, points: int) -> Trace:
+        times, values, period = self.data[channel]
+        return thinned(times, values, begin, end, points, period) if len(times) else EMPTY
+
+    def values(self, wanted: list[int], at: float | None) -> list[float | None]:
+        found: list[float | None] = []
+        for channel in wanted:
+            times, values, _ = self.data[channel]
+            place = len(times) - 1 if at is None else int(np.searchsorted(times, at, side="right")) - 1
+            value = float(values[place]) if place >= 0 else None
+            found.append(value if value is not None and np.isfinite(value) else None)
+        return found
+
+    def pose(self, at: float | None) -> tuple[float, list[float]] | None:
+        if not self.pose_names:
+            return None
+        values = self.values([self.number[name] for name in self.pose_names], at)
+        known = [value for value in values if value is not None]
+        return (self.span()[1] if at is None else at, known) if len(known) == len(values) else None
+
+
+def read(path: str, databases: Sequence[str]) -> Dataset:
+    """The channels of one recording, those of a simulated body among them."""
+    if (pathlib.Path(path) / run_folder.VARIABLES).is_file():
+        return run_folder.read(path, truth=True)
+    return recordings.open_recording(path, databases=databases)

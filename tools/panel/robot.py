@@ -1,0 +1,295 @@
+"""The page's source for a robot that `up` runs: the feed shows it, `ctl` carries out what is wished."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from collections import Counter, deque
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from ranger_sim import datatable
+from ranger_sim.datatable.generated import all_variables
+from ranger_sim.datatable.packing import parts_of_error_word, value_of_word
+from ranger_sim.foundation import peers
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.harness import logbook, normal_errors
+from ranger_sim.harness.feed import records
+from ranger_sim.harness.processes import control
+from ranger_sim.harness.sampler import PERIOD_NS
+from ranger_sim.tools.panel.channels import Channel, Memory, Trace
+from ranger_sim.tools.panel.source import TRUE_POSE, Source, error_rows, table_channels
+
+CONNECT_S = 5.0
+READ_BYTES = 1 << 18
+STATUS_S = 0.5
+IDENTIFIERS = 2048
+FRAMES_KEPT = 1 << 20  # of all buses: 50 s of a walking robot
+FRAMES_SHOWN = 40
+ERRORS = {
+    all_variables.ID_OF[name]: name.removeprefix("ERROR_")
+    for name in all_variables.ID_OF
+    if name.startswith("ERROR_") and name.removeprefix("ERROR_") in all_variables.BOARD_NAMES.values()
+}
+REQUESTS = frozenset({"key", "set", "pause", "resume", "restart", "fault", "clear", "radio"})
+
+
+class RobotSource(Source):
+    """The robot that runs under `name`. UserError when there is none, or it speaks another version."""
+
+    can = frozenset({"live", "keys", "parameters", "pace", "faults", "restart", "frames", "panel", "boards", "errors"})
+
+    def __init__(self, name: str) -> None:
+        super().__init__()
+        self.name = name
+        try:
+            self.connection = peers.connected(records.address(name), f"the robot named {name}", CONNECT_S)
+        except OSError:
+            raise UserError(f"no robot named {name} is running here (ranger-sim up --name {name})") from None
+        self.incoming = bytearray()
+        hello = self._greeting()
+        if hello["table"] != datatable.table_hash():
+            raise UserError(f"the robot named {name} has another master table than this program")
+        self.title = f"{name}: {hello['controller']} on {hello['body']}, seed {hello['seed']}"
+        self.geometry = hello["geometry"]
+        self.start_ns: int = hello["start_ns"]
+        self.streams = hello["streams"]
+        self.body = [
+            Channel(column, unit, column.replace("_", " "), "body") for column, unit in hello["samples"].items()
+        ]
+        states = {name: {int(n): text for n, text in each.items()} for name, each in hello["states"].items()}
+        table = table_channels(states)
+        self.channels = [*self.body, *table.values()]
+        self.identifiers = np.array(list(table))
+        self.pose_names = TRUE_POSE
+        self.pose_columns = [list(hello["samples"]).index(column) for column in TRUE_POSE]
+        period_s = PERIOD_NS * 1e-9
+        self.samples = Memory(len(self.body), period_s)
+        self.words = Memory(len(table), period_s)
+        kinds = [all_variables.TYPES[number] for number in table]
+        self.floats = np.array([kind == "f32" for kind in kinds])
+        self.signed = np.array([kind == "i32" for kind in kinds])
+        self.shown: dict[str, Any] = {}  # the newest STATE
+        self.status: dict[str, Any] = {}  # the supervisor's
+        self.buses = [Traffic() for stream in self.streams if stream["name"].startswith("can")]
+        self.errors = ErrorList()
+        self.gaps: Counter[str] = Counter()
+        self.table_errors = {number: 0 for number in ERRORS if number in table}
+
+    def _greeting(self) -> dict[str, Any]:
+        """The first record."""
+        while True:
+            for kind, body in records.taken(self.incoming):
+                hello: dict[str, Any] = json.loads(body)
+                if kind != records.HELLO or hello.get("version") != records.VERSION:
+                    raise UserError(f"the robot named {self.name} speaks another version of the feed")
+                return hello
+            data = self.connection.recv(READ_BYTES)
+            if not data:
+                raise UserError(f"the robot named {self.name} shows itself to {peers.LIMITS['feed'].peers} already")
+            self.incoming += data
+
+    # --- what comes -----------------------------------------------------------------------------------------
+
+    async def run(self) -> None:
+        """Take in what comes until the robot ends."""
+        self.connection.setblocking(False)
+        reader, writer = await asyncio.open_connection(sock=self.connection, limit=READ_BYTES)
+        asking = asyncio.create_task(self._ask_status())
+        try:
+            while True:
+                for kind, body in records.taken(self.incoming):
+                    self._take(kind, body)
+                data = await reader.read(READ_BYTES)
+                if not data:
+                    break
+                self.incoming += data
+        except OSError:
+            pass
+        finally:
+            asking.cancel()
+            writer.close()
+            self.lost = f"the robot {self.name} has ended"
+
+    async def _ask_status(self) -> None:
+        """The supervisor's view, some times a second: in a thread, because it may take its time."""
+        while True:
+            try:
+                self.status = await asyncio.to_thread(control.ask, self.name, {"do": "status"})
+            except UserError:
+                self.status = {}
+            await asyncio.sleep(STATUS_S)
+
+    def _take(self, kind: int, body: bytes) -> None:
+        if kind == records.STATE:
+            self.shown = json.loads(body)
+        elif kind == records.GAP:
+            self.gaps.update(json.loads(body))
+        elif kind == records.ROWS:
+            stream = self.streams[body[0]]
+            rows: Any = np.frombuffer(body[1:], np.float64 if stream["reals"] else np.int64)
+            rows = rows.reshape(-1, stream["columns"])
+            if stream["name"] == "samples":
+                self.samples.append(rows[:, 0] - self.start_ns * 1e-9, rows[:, 1:].astype(np.float32))
+            elif stream["name"] == "words":
+                self._take_words(rows)
+            else:
+                self._take_frames(int(stream["name"].removeprefix("can")) - 1, rows)
+
+    def _take_words(self, rows: Any) -> None:
+        words = rows[:, 1:][:, self.identifiers]
+        values = words.astype(np.float32)  # of whole numbers above 2^24 the last digits
+        raw = np.ascontiguousarray(words.astype(np.uint32))
+        values[:, self.floats] = raw[:, self.floats].view(np.float32)
+        values[:, self.signed] = raw[:, self.signed].view(np.int32)
+        self.words.append((rows[:, 0] - self.start_ns) * 1e-9, values)
+        for number in self.table_errors:  # the router's and the main brain's own errors are on no bus
+            if ERRORS[number] in ("CSR", "MB"):
+                for word, time_ns in _changes(rows[:, 1 + number], rows[:, 0], self.table_errors[number]):
+                    self.errors.note(word, (time_ns - self.start_ns) * 1e-9)
+                self.table_errors[number] = int(rows[-1, 1 + number])
+
+    def _take_frames(self, bus: int, rows: Any) -> None:
+        self.buses[bus].take(rows)
+        identifiers = rows[:, 2] & 0x1FFFFFFF
+        for row in rows[np.isin(identifiers, list(ERRORS))]:
+            self.errors.note(int(row[1]) >> 12, (int(row[0]) - self.start_ns) * 1e-9)
+
+    # --- what is shown --------------------------------------------------------------------------------------
+
+    def span(self) -> tuple[float, float]:
+        end = self.samples.newest or 0.0
+        return (max(0.0, end - 3600.0), end)
+
+    def _place(self, channel: int) -> tuple[Memory, int]:
+        body = len(self.body)
+        return (self.samples, channel) if channel < body else (self.words, channel - body)
+
+    def trace(self, channel: int, begin: float, end: float, points: int) -> Trace:
+        memory, column = self._place(channel)
+        return memory.trace(column, begin, end, points)
+
+    def values(self, wanted: list[int], at: float | None) -> list[float | None]:
+        found: list[float | None] = []
+        for channel in wanted:
+            memory, column = self._place(channel)
+            row = memory.row(np.inf if at is None else at)
+            value = None if row is None else float(row[1][column])
+            found.append(value if value is not None and np.isfinite(value) else None)
+        return found
+
+    def pose(self, at: float | None) -> tuple[float, list[float]] | None:
+        row = self.samples.row(np.inf if at is None else at)
+        return None if row is None else (row[0], [float(row[1][column]) for column in self.pose_columns])
+
+    def state(self, at: float | None) -> dict[str, Any]:
+        return {
+            "time_s": self.span()[1],
+            "panel": self.shown.get("panel"),
+            "steps": self.shown.get("steps", 0),
+            "distance_m": self.shown.get("distance_m", 0.0),
+            "speed_m_per_s": self.shown.get("speed_m_per_s", 0.0),
+            "ended": self.shown.get("ended", ""),
+            "faults": self.shown.get("faults", []),
+            "boards": self.status.get("boards", {}),
+            "buses": self.status.get("buses", {}),
+            "pace": {key: self.status.get(key) for key in ("speed", "behind_s", "paused", "scheduling")},
+            "errors": self.errors.content(self.span()[1]),
+            "frames": [traffic.newest(self.start_ns, at) for traffic in self.buses],
+            "left_out": dict(self.gaps),
+        }
+
+    async def request(self, wish: dict[str, Any]) -> dict[str, Any]:
+        if wish.get("do") not in REQUESTS:
+            raise UserError(f"{wish.get('do')!r} is no request to a robot")
+        answer: dict[str, Any] = await asyncio.to_thread(control.ask, self.name, wish)
+        return answer
+
+
+def _changes(words: Any, times_ns: Any, before: int) -> Iterator[tuple[int, int]]:
+    """(word, time) of every change to another word than none."""
+    for place in np.flatnonzero(np.diff(words, prepend=before)):
+        if words[place]:
+            yield int(words[place]), int(times_ns[place])
+
+
+class ErrorList:
+    """Errors by board and code: how often, first and last time; those of a healthy walk apart."""
+
+    def __init__(self) -> None:
+        self.rows: dict[tuple[int, int], dict[str, Any]] = {}
+
+    def note(self, word: int, time_s: float) -> None:
+        """An error word came at this time of the robot."""
+        code, board, count = parts_of_error_word(word)
+        if code == 0:
+            return
+        row = self.rows.setdefault((board, code), {"first_s": time_s, "count": 0})
+        row["count"] += max(1, count)
+        row["last_s"] = time_s
+
+    def content(self, now_s: float) -> list[dict[str, Any]]:
+        """As the page gets it, the newest first."""
+        found = []
+        for (board, code), row in self.rows.items():
+            name, text = error_rows().get(code, (f"error {code}", "not in the table"))
+            whose = all_variables.BOARD_NAMES.get(board, f"board {board}")
+            normal = row["count"] <= normal_errors.most_normal(whose, code, now_s, True)
+            found.append({"board": whose, "name": name, "text": text, "normal": normal, **row})
+        return sorted(found, key=lambda row: -row["last_s"])
+
+
+class Traffic:
+    """The frames of one bus: the newest of all, and how many of each identifier."""
+
+    def __init__(self) -> None:
+        self.blocks: deque[Any] = deque()
+        self.kept = 0
+        self.counts = np.zeros(IDENTIFIERS, np.int64)
+
+    def take(self, rows: Any) -> None:
+        """Rows of a frame stream (foundation/row_stream.py)."""
+        self.blocks.append(rows)
+        self.kept += len(rows)
+        while self.kept > FRAMES_KEPT // 4:
+            self.kept -= len(self.blocks.popleft())
+        identifiers = rows[:, 2] & 0x1FFFFFFF
+        self.counts += np.bincount(identifiers[identifiers < IDENTIFIERS], minlength=IDENTIFIERS)
+
+    def newest(self, start_ns: int, at: float | None) -> list[dict[str, Any]]:
+        """The last frames until an instant, the newest first, with what they carry."""
+        until = None if at is None else start_ns + round(at * 1e9)
+        found: list[Any] = []
+        for rows in reversed(self.blocks):
+            if until is not None and rows[0, 0] > until:
+                continue
+            part = rows if until is None else rows[rows[:, 0] <= until]
+            found.extend(part[::-1][: FRAMES_SHOWN - len(found)])
+            if len(found) >= FRAMES_SHOWN:
+                break
+        if not found:
+            return []
+        frames = logbook.decoded(np.array(found))
+        return [
+            {
+                "time_s": (int(time_ns) - start_ns) * 1e-9,
+                "id": int(number),
+                "name": all_variables.NAMES.get(int(number), ""),
+                "data": (int(low) | int(high) << 32).to_bytes(8, "little").hex(" "),
+                "value": value_of(int(number), int(low)),
+                "count": int(self.counts[number]) if number < IDENTIFIERS else 0,
+            }
+            for time_ns, number, low, high in zip(
+                frames["time_ns"], frames["identifier"], frames["word0"], frames["word1"], strict=True
+            )
+        ]
+
+
+def value_of(number: int, word: int) -> float | int | None:
+    """What a frame of the robot carries; None for one that is not of its table, or no number."""
+    if number not in all_variables.TYPES:
+        return None
+    value = value_of_word(all_variables.TYPES[number], word & 0xFFFFFFFF)
+    return value if np.isfinite(value) else None

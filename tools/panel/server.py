@@ -1,0 +1,347 @@
+"""The page and its WebSocket, on this machine unless the user says otherwise. A page never slows the robot.
+
+A page gets the next picture when it has shown the one before, so a slow one gets fewer, and one that is dead gets none.
+Whoever asks must have the token, in the address or in the cookie that the first visit leaves; a page of another site
+is refused by its Origin, also when its name was made to lead here.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import math
+import os
+import pathlib
+from collections import Counter
+from collections.abc import Callable
+from typing import Any
+from urllib.parse import urlsplit
+
+from starlette.applications import Starlette
+from starlette.requests import HTTPConnection, Request
+from starlette.responses import FileResponse, PlainTextResponse, Response
+from starlette.routing import Route, WebSocketRoute
+from starlette.websockets import WebSocket, WebSocketDisconnect
+
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.tools.panel import messages
+from ranger_sim.tools.panel.source import Source
+
+PAGE = pathlib.Path(__file__).parent / "page"
+TYPES = {
+    ".html": "text/html; charset=utf-8",
+    ".js": "text/javascript; charset=utf-8",
+    ".css": "text/css; charset=utf-8",
+    ".svg": "image/svg+xml",
+}
+COOKIE = "ranger-sim-panel"
+
+# Chosen by us: what a page may take.
+PLACES = 16  # pages at a time: each costs a picture 30 times a second
+PICTURE_S = 1 / 30
+STATE_S = 0.2
+LONGEST_WISH = 1 << 16  # bytes: a parameter set by name has below 20,000
+WISHES_PER_S = 50.0
+BURST = 100.0
+MOST_PLOTS = 24
+MOST_CHANNELS = 48  # of all plots, as RoboDAQ
+MOST_POINTS = 4000
+PATIENCE_S = 30.0  # without a sign of the page
+CLOSE_POLICY, CLOSE_FULL = 1008, 1013  # RFC 6455 and its registry
+
+
+class PanelServer:
+    """Serves one source. `app` is the ASGI application; `log` hears what the user should know."""
+
+    def __init__(self, source: Source, token: str, hosts: tuple[str, ...], log: Callable[[str], None]) -> None:
+        self.source = source
+        self.token = token
+        self.hosts = hosts  # names by which a browser may call this server
+        self.log = log
+        self.sessions: set[Session] = set()
+        self.refused: Counter[str] = Counter()
+        self.feeding: asyncio.Task[None] | None = None
+        self.app = Starlette(
+            routes=[Route("/", self.page), Route("/{name}", self.file), WebSocketRoute("/socket", self.socket)],
+            lifespan=self.life,
+        )
+
+    @contextlib.asynccontextmanager
+    async def life(self, app: Starlette) -> Any:
+        """The source runs as long as the server."""
+        self.feeding = asyncio.create_task(self.source.run())
+        try:
+            yield
+        finally:
+            self.feeding.cancel()
+
+    # --- who may ask ----------------------------------------------------------------------------------------
+
+    def fault_of(self, asked: HTTPConnection) -> str | None:
+        """Why this request is not served; None when it is."""
+        host = asked.headers.get("host", "")
+        if host.rpartition(":")[0].strip("[]") not in self.hosts:
+            return "another host's name"
+        origin = asked.headers.get("origin")
+        if origin is not None and urlsplit(origin).netloc != host:
+            return "a page of another site"
+        token = asked.query_params.get("token") or asked.cookies.get(COOKIE)
+        return None if token == self.token else "a wrong token"
+
+    async def page(self, request: Request) -> Response:
+        """The page; its first visit leaves the token in a cookie."""
+        fault = self.fault_of(request)
+        if fault is not None:
+            return self.refusal(fault)
+        answer = FileResponse(PAGE / "index.html", media_type=TYPES[".html"])
+        answer.set_cookie(COOKIE, self.token, httponly=True, samesite="strict")
+        answer.headers["Content-Security-Policy"] = (
+            "default-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data:"
+        )
+        answer.headers["Cache-Control"] = "no-store"
+        return answer
+
+    async def file(self, request: Request) -> Response:
+        """A file of the page."""
+        fault = self.fault_of(request)
+        if fault is not None:
+            return self.refusal(fault)
+        name = request.path_params["name"]
+        if name not in FILES:
+            return PlainTextResponse(f"{name[:60]!r}: there is no such file", 404)
+        return FileResponse(PAGE / name, media_type=TYPES[pathlib.Path(name).suffix])
+
+    def refusal(self, fault: str) -> Response:
+        """Told and counted."""
+        self.refuse(fault)
+        return PlainTextResponse(f"{fault}: the address that `ranger-sim panel` printed has the right one\n", 403)
+
+    def refuse(self, fault: str) -> None:
+        """Count it; the first of a kind is told."""
+        self.refused[fault] += 1
+        if self.refused[fault] == 1:
+            self.log(f"panel: a request with {fault} was refused; others of this kind are counted")
+
+    def want(self) -> None:
+        """Tell the source what all pages show."""
+        plots = (plot for session in self.sessions for plot in session.plots.values())
+        self.source.want(sorted({channel for plot in plots for channel in plot.channels}))
+
+    async def socket(self, socket: WebSocket) -> None:
+        """One page, until it leaves or is sent away with a reason."""
+        fault = self.fault_of(socket)
+        if fault is None and len(self.sessions) >= PLACES:
+            fault = f"no place free ({PLACES} pages)"
+        if fault is not None:
+            self.refuse(fault)
+            await socket.accept()
+            await socket.close(CLOSE_FULL if "place" in fault else CLOSE_POLICY, fault)
+            return
+        await socket.accept()
+        session = Session(self.source, socket, self.want)
+        self.sessions.add(session)
+        try:
+            reason = await session.serve()
+            if reason:
+                self.refuse(reason)
+                with contextlib.suppress(Exception):
+                    await socket.close(CLOSE_POLICY, reason)
+        finally:
+            self.sessions.discard(session)
+
+
+FILES = frozenset(path.name for path in PAGE.iterdir() if path.suffix in TYPES) if PAGE.is_dir() else frozenset()
+
+
+class Session:
+    """One page: what it wants to see, and what it was shown."""
+
+    def __init__(self, source: Source, socket: WebSocket, wants: Callable[[], None]) -> None:
+        self.source = source
+        self.wants = wants  # called when its plots are others
+        self.socket = socket
+        self.plots: dict[int, Plot] = {}
+        self.at: float | None = None  # the page's cursor; None: the newest
+        self.shown = asyncio.Event()  # the page has shown what it was sent
+        self.shown.set()
+        self.changed = asyncio.Event()  # it wants to see something else
+        self.wishes = BURST
+        self.wished_s = 0.0
+        self.next_state_s = 0.0
+        self.sending = asyncio.Lock()
+
+    async def serve(self) -> str:
+        """Until it leaves; returns why it had to, or nothing."""
+        await self.send(messages.text({"hello": self.source.hello(), "version": messages.VERSION}))
+        showing = asyncio.create_task(self.show())
+        try:
+            while True:
+                try:
+                    async with asyncio.timeout(PATIENCE_S):
+                        text = await self.socket.receive_text()
+                except TimeoutError:
+                    return "silence"
+                except (WebSocketDisconnect, RuntimeError, KeyError):  # gone, or it sent bytes
+                    return ""
+                if showing.done():
+                    return ""
+                reason = await self.hear(text)
+                if reason:
+                    return reason
+        finally:
+            showing.cancel()
+
+    async def send(self, message: bytes) -> None:
+        """One message at a time."""
+        async with self.sending:
+            await self.socket.send_bytes(message)
+
+    # --- what the page says ---------------------------------------------------------------------------------
+
+    async def hear(self, text: str) -> str:
+        """One message of the page; returns why it must leave, or nothing."""
+        now_s = asyncio.get_running_loop().time()
+        self.wishes = min(BURST, self.wishes + WISHES_PER_S * (now_s - self.wished_s))
+        self.wished_s = now_s
+        if self.wishes < 1.0:
+            return "too many requests"
+        self.wishes -= 1.0
+        try:
+            wish = json.loads(text)
+        except (ValueError, RecursionError):
+            return "a message that is no JSON"
+        if not isinstance(wish, dict):
+            return "a message that is no JSON object"
+        number = wish.pop("number", None)
+        try:
+            answer = await self.carry_out(wish)
+        except UserError as fault:
+            answer = {"error": str(fault)}
+        if number is not None:
+            await self.send(messages.text({"answer": number if isinstance(number, int) else 0, **answer}))
+        return ""
+
+    async def carry_out(self, wish: dict[str, Any]) -> dict[str, Any]:
+        """What the page wishes. UserError for what cannot be."""
+        what = wish.get("do")
+        if what == "shown":
+            self.wishes += 1.0  # it keeps the pace, and is no request
+            self.shown.set()
+            return {}
+        if what == "look":
+            self.look(wish)
+            return {}
+        if what == "values":
+            channels = self.channels_of(wish.get("channels"))
+            return {"values": self.source.values(channels, seconds(wish.get("at"), "at"))}
+        return await self.source.request(wish)
+
+    def look(self, wish: dict[str, Any]) -> None:
+        """All plots of the page, and its cursor."""
+        plots = wish.get("plots")
+        if not isinstance(plots, list) or len(plots) > MOST_PLOTS:
+            raise UserError(f"look: a list of up to {MOST_PLOTS} plots is expected")
+        found = {}
+        for number, plot in enumerate(plots):
+            if not isinstance(plot, dict):
+                raise UserError(f"look: plot {number} is no object")
+            found[number] = Plot(
+                self.channels_of(plot.get("channels")),
+                seconds(plot.get("begin"), "begin"),
+                seconds(plot.get("end"), "end"),
+                seconds(plot.get("span"), "span") or 10.0,
+                points_of(plot.get("points")),
+            )
+        if sum(len(plot.channels) for plot in found.values()) > MOST_CHANNELS:
+            raise UserError(f"look: {MOST_CHANNELS} channels at a time are possible")
+        before, self.plots = self.plots, found
+        if [plot.channels for plot in before.values()] != [plot.channels for plot in found.values()]:
+            self.wants()
+        self.at = seconds(wish.get("at"), "at")
+        self.changed.set()
+
+    def channels_of(self, wanted: Any) -> list[int]:
+        """Numbers of channels that are there."""
+        if not isinstance(wanted, list):
+            raise UserError("channels: a list of numbers is expected")
+        for each in wanted:
+            if isinstance(each, bool) or not isinstance(each, int) or not 0 <= each < len(self.source.channels):
+                raise UserError(f"channels: {str(each)[:20]} is not 0 to {len(self.source.channels) - 1}")
+        return wanted
+
+    # --- what the page sees ---------------------------------------------------------------------------------
+
+    async def show(self) -> None:
+        """Pictures, as fast as the page takes them, 30 in a second at most."""
+        loop = asyncio.get_running_loop()
+        live = "live" in self.source.can
+        while True:
+            begun_s = loop.time()
+            self.changed.clear()
+            self.shown.clear()
+            for message in self.picture(begun_s):
+                await self.send(message)
+            await self.send(messages.text({"picture": self.source.span(), "lost": self.source.lost}))
+            await self.shown.wait()
+            if live and self.at is None and not self.source.lost:
+                await asyncio.sleep(max(0.0, begun_s + PICTURE_S - loop.time()))
+            else:
+                with contextlib.suppress(TimeoutError):
+                    async with asyncio.timeout(STATE_S if live else None):
+                        await self.changed.wait()
+
+    def picture(self, now_s: float) -> list[bytes]:
+        """The messages of one picture."""
+        begin, end = self.source.span()
+        found = []
+        for number, plot in self.plots.items():
+            first, last = plot.window(end)
+            traces = [self.source.trace(channel, first, last, plot.points) for channel in plot.channels]
+            found.append(messages.traces(number, plot.channels, traces))
+        pose = self.source.pose(self.at)
+        if pose is not None:
+            found.append(messages.pose(*pose))
+        if self.at is not None:  # what stands there; the traces have the extremes of a pixel's time
+            channels = sorted({channel for plot in self.plots.values() for channel in plot.channels})
+            values = dict(zip(channels, self.source.values(channels, self.at), strict=True))
+            found.append(messages.text({"values": values, "at": self.at}))
+        if now_s >= self.next_state_s or self.at is not None:
+            self.next_state_s = now_s + STATE_S
+            found.append(messages.text({"state": self.source.state(self.at)}))
+        return found
+
+
+class Plot:
+    """A plot of the page: `begin` to `end`, or the last `span` seconds while both are None."""
+
+    def __init__(self, channels: list[int], begin: float | None, end: float | None, span: float, points: int) -> None:
+        self.channels, self.begin, self.end, self.points = channels, begin, end, points
+        self.span = min(max(span, 1e-3), 36_000.0)
+
+    def window(self, newest: float) -> tuple[float, float]:
+        """(begin, end), s."""
+        if self.begin is not None and self.end is not None:
+            return self.begin, self.end
+        return newest - self.span, newest
+
+
+def seconds(value: Any, what: str) -> float | None:
+    """A time of a message, s; None where there is none. UserError for what is no finite number."""
+    if value is None:
+        return None
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value) or abs(value) > 1e9:
+        raise UserError(f"{what}: {str(value)[:20]} is no time in seconds")
+    return float(value)
+
+
+def points_of(value: Any) -> int:
+    """How many points a plot can show."""
+    if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= MOST_POINTS:
+        raise UserError(f"points: {str(value)[:20]} is not 1 to {MOST_POINTS}")
+    return value
+
+
+def new_token() -> str:
+    """A word that nobody guesses; what it is changes nothing of any run."""
+    return os.urandom(16).hex()

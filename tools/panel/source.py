@@ -1,0 +1,140 @@
+"""What the page shows: one model for a running robot, a data link and a recording."""
+
+from __future__ import annotations
+
+import functools
+from typing import Any
+
+from ranger_sim import datatable
+from ranger_sim.datatable import parameters
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.tools.panel.channels import EMPTY, Channel, Trace
+
+# Where the robot's parts are, as the main brain estimates them: the same for a robot, real or not, and its recordings.
+# Angles against gravity, rad; robot.md N4.17.
+ESTIMATED_POSE = ("EST_STATE_TH0", "EST_STATE_TH1", "EST_STATE_PHI0", "EST_STATE_PHI1")
+# As the body has them, where a body is simulated; rad, m, N, A.
+TRUE_POSE = (
+    *("leg_outer_rad", "leg_inner_rad", "foot_outer_rad", "foot_inner_rad", "hip_x_m", "hip_y_m"),
+    *("outer_Fx_N", "outer_Fy_N", "inner_Fx_N", "inner_Fy_N", "hip_A", "outer_A", "inner_A", "steering_A"),
+)
+
+
+class Source:
+    """`channels`, and what can be done with them: `can` names it, the page shows nothing else.
+
+    keys, parameters, pace, faults, restart: requests of these kinds are carried out. frames, panel, boards, errors: the
+    state has them. live: time passes by itself.
+    """
+
+    title = ""
+    can: frozenset[str] = frozenset()
+    pose_names: tuple[str, ...] = ()
+
+    def __init__(self) -> None:
+        self.channels: list[Channel] = []
+        self.geometry: dict[str, Any] = {}
+        self.lost = ""  # why nothing more will come
+
+    async def run(self) -> None:
+        """Take in what comes, until nothing more does."""
+
+    def want(self, channels: list[int]) -> None:
+        """All pages together show these channels."""
+
+    def span(self) -> tuple[float, float]:
+        """(begin, end) of what can be shown, s."""
+        return (0.0, 0.0)
+
+    def trace(self, channel: int, begin: float, end: float, points: int) -> Trace:
+        """A channel in a window."""
+        return EMPTY
+
+    def values(self, wanted: list[int], at: float | None) -> list[float | None]:
+        """Of these channels at an instant (None: the newest); None where there is none."""
+        return [None] * len(wanted)
+
+    def pose(self, at: float | None) -> tuple[float, list[float]] | None:
+        """(time, values of `pose_names`) at an instant; None: nothing is known of it."""
+        return None
+
+    def state(self, at: float | None) -> dict[str, Any]:
+        """What is in no channel: boards, buses, panel, errors, frames, faults."""
+        return {}
+
+    async def request(self, wish: dict[str, Any]) -> dict[str, Any]:
+        """Carry out a wish of the page that goes to the robot. UserError says why not."""
+        raise UserError("a recording takes no requests")
+
+    def hello(self) -> dict[str, Any]:
+        """What the page must know at its beginning."""
+        return {
+            "title": self.title,
+            "can": sorted(self.can),
+            "channels": [channel.content() for channel in self.channels],
+            "pose": list(self.pose_names),
+            "geometry": self.geometry,
+            "parameters": parameter_rows() if "parameters" in self.can else [],
+            "faults": fault_rows() if "faults" in self.can else {},
+            "span": self.span(),
+        }
+
+
+@functools.cache
+def parameter_rows() -> list[dict[str, Any]]:
+    """Every parameter: name, unit, limits, default, description, and the group that its name begins with."""
+    return [
+        {
+            "name": row.name,
+            "unit": row.unit,
+            "least": row.minimum,
+            "most": row.maximum,
+            "default": row.initial_as_stored,
+            "description": row.description,
+            "group": group_of(row.name),
+        }
+        for row in parameters.parameters()
+    ]
+
+
+def group_of(name: str) -> str:
+    """P_H_PM_H_TRATE is one of P_H, CTRL_FSM_LED of CTRL."""
+    first, _, rest = name.partition("_")
+    return f"{first}_{rest.partition('_')[0]}" if first == "P" and rest else first
+
+
+@functools.cache
+def fault_rows() -> dict[str, Any]:
+    """{places: what can be faulted; modes: how, by kind of place}."""
+    from ranger_sim.harness.faults.catalogue import MODES
+    from ranger_sim.harness.faults.ranger_catalogue import CATALOGUE
+
+    places = [{"name": place.name, "kind": place.kind, "what": place.what} for place in CATALOGUE.places.values()]
+    modes: dict[str, list[dict[str, str]]] = {}
+    for (kind, name), mode in MODES.items():
+        modes.setdefault(kind, []).append({"mode": name, "meaning": mode.meaning})
+    return {"places": places, "modes": modes}
+
+
+@functools.cache
+def error_rows() -> dict[int, tuple[str, str]]:
+    """{code: (name, meaning)} of the master table."""
+    return {row.id: (row.name, row.description) for row in datatable.load().errors}
+
+
+def table_channels(states: dict[str, dict[int, str]] | None = None) -> dict[int, Channel]:
+    """{identifier: channel} of the master table's variables, in their order, without spares and the link's own.
+
+    states: names of the numbers that a variable takes, by its name.
+    """
+    return {
+        row.id: Channel(
+            row.name,
+            row.unit,
+            row.description,
+            "parameters" if row.publisher == "PC" else row.publisher,
+            (states or {}).get(row.name, {}),
+        )
+        for row in datatable.load().variables
+        if not row.is_spare and not row.name.startswith(parameters.CHANNEL_PREFIX)
+    }
