@@ -10,6 +10,7 @@ import sys
 import pytest
 
 from ranger_sim import Ranger
+from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.processes import control
 from tests import browser
 
@@ -53,52 +54,79 @@ def page_of(address, folder, width=1400):
         assert not page.errors
 
 
+class Hand:
+    """What a person does on the page."""
+
+    def __init__(self, page):
+        self.page = page
+
+    def click(self, css, text=""):
+        """The first element of these whose words begin so."""
+        found = f"[...document.querySelectorAll({json.dumps(css)})].find((e) => e.textContent.startsWith('{text}'))"
+        self.page.until(f"{found} !== undefined")
+        self.page.value(f"{found}.click()")
+
+    def view(self, name):
+        """Another tab."""
+        self.click(f"[data-view={name}]")
+
+    def give(self, css, value):
+        """Another value for a field or a list."""
+        element = f"document.querySelector({json.dumps(css)})"
+        self.page.value(f"{{ const e = {element}; e.value = '{value}'; e.oninput?.(); e.onchange?.(); 0 }}")
+
+    def sees(self, condition):
+        """Wait for what the page shows; `state` is the robot's, `text(id)` what an element says."""
+        self.page.until(
+            "((state, text) => "
+            + condition
+            + ")(window.rangerPanel.state(), (id) => document.getElementById(id).textContent)"
+        )
+
+
 def robot_name(page):
     return page.value("document.getElementById('title').textContent").partition(":")[0]
 
 
-def typed(parameter, value):
-    """A script that gives a parameter another value."""
-    return f"{{ const p = document.querySelector('[aria-label={parameter}]'); p.value = '{value}'; p.onchange(); 0 }}"
-
-
 def test_a_person_at_the_panel_of_a_walking_robot(tmp_path):
     with served("--walk") as (address, _), page_of(address, tmp_path) as page:
-        name = robot_name(page)
+        hand = Hand(page)
         # it walks, and the plots go on with it
         page.until("window.rangerPanel.span()[1] > 2.5")
         pictures = page.value("window.rangerPanel.shown()")
         page.until(f"window.rangerPanel.shown() > {pictures} + 10")
         # a channel is found by its words and drawn
-        page.value("{ const s = document.getElementById('search'); s.value = 'legs absolute encoder'; s.oninput(); 0 }")
-        page.value("document.getElementById('add-plot').click()")
-        page.value("[...document.querySelectorAll('#channels button')].find((b) => b.textContent.startsWith('MCH_ANGLE')).click()")
+        hand.give("#search", "legs absolute encoder")
+        hand.click("#add-plot")
+        hand.click("#channels button", "MCH_ANGLE")
         page.until("window.rangerPanel.plots.all().at(-1).drawn > 2")
         drawn = page.value("window.rangerPanel.plots.all().at(-1).found[0].low.at(-1)")
         assert -0.6 < drawn < 0.6  # rad between the legs of a walking robot
         assert "MCH_ANGLE" in page.value("location.hash")
-        # a parameter is changed and the robot has it
-        page.value("document.querySelector('[data-view=parameters]').click()")
-        page.until("document.querySelector('[aria-label=P_UI_LCD_TIME]')?.value > 0")
-        page.value(typed("P_UI_LCD_TIME", 700))
-        page.until("document.querySelector('[aria-label=P_UI_LCD_TIME]').closest('tr').classList.contains('changed')")
-        page.value(typed("P_UI_LCD_TIME", 5))
-        page.until("document.getElementById('parameter-note').textContent.includes('outside 100 to 60000')")
+        # a parameter is changed and the robot has it; beyond its limits it is refused
+        hand.view("parameters")
+        field = "[aria-label=P_UI_LCD_TIME]"
+        page.until(f"document.querySelector('{field}')?.value > 0")
+        hand.give(field, 700)
+        page.until(f"document.querySelector('{field}').closest('tr').classList.contains('changed')")
+        hand.give(field, 5)
+        hand.sees("text('parameter-note').includes('outside 100 to 60000')")
         # a fault is armed, acts and is cleared
-        page.value("document.querySelector('[data-view=faults]').click()")
-        page.value("{ const f = document.getElementById('fault-place'); f.value = 'MCH.joint_encoder'; f.onchange(); 0 }")
-        page.value("document.getElementById('fault-mode').value = 'offset'; document.getElementById('fault-form').requestSubmit(); 0")
-        page.until("window.rangerPanel.state().faults?.[0]?.acted === true")
-        page.value("[...document.querySelectorAll('#fault-list button')][0].click()")
-        page.until("window.rangerPanel.state().faults[0].ended_s !== null")
+        hand.view("faults")
+        hand.give("#fault-place", "MCH.joint_encoder")
+        hand.give("#fault-mode", "offset")
+        hand.click("#fault-form button", "Arm")
+        hand.sees("state.faults?.[0]?.acted === true")
+        hand.click("#fault-list button", "Clear")
+        hand.sees("state.faults[0].ended_s !== null")
         # slots and frames
-        page.value("document.querySelector('[data-view=inside]').click()")
-        page.until("document.querySelectorAll('#boards tr').length === 8 && document.querySelectorAll('#frames tr').length > 5")
+        hand.view("inside")
+        page.until("document.querySelectorAll('#boards tr').length === 8")
+        page.until("document.querySelectorAll('#frames tr').length > 5")
         # a key of the panel is the robot's key: the controller stops and the robot falls
-        page.value("document.querySelectorAll('.keys button')[2].click()")
-        page.until("window.rangerPanel.state().ended !== ''")
-        page.until("document.getElementById('light').className.includes('bad') || document.getElementById('light').className.includes('off')")
-        assert name.startswith("panel-")
+        hand.click(".keys button", "key 2")
+        hand.sees("state.ended !== ''")
+        page.until("document.getElementById('light').className !== 'light good'")
 
 
 def test_the_page_comes_back_when_the_connection_was_lost_and_the_robot_ends_with_its_panel(tmp_path):
@@ -106,15 +134,16 @@ def test_the_page_comes_back_when_the_connection_was_lost_and_the_robot_ends_wit
         name = robot_name(page)
         page.until("window.rangerPanel.span()[1] > 0.5")
         page.call("Network.enable")
-        page.call("Network.emulateNetworkConditions", offline=True, latency=0, downloadThroughput=0, uploadThroughput=0)
+        link = {"latency": 0, "downloadThroughput": -1, "uploadThroughput": -1}
+        page.call("Network.emulateNetworkConditions", offline=True, **link)
         assert control.ask(name, {"do": "status"})["name"] == name  # the robot does not mind
-        page.call("Network.emulateNetworkConditions", offline=False, latency=0, downloadThroughput=-1, uploadThroughput=-1)
+        page.call("Network.emulateNetworkConditions", offline=False, **link)
         pictures = page.value("window.rangerPanel.shown()")
         page.until(f"window.rangerPanel.shown() > {pictures} + 5")
         process.send_signal(signal.SIGTERM)
         process.wait(timeout=PATIENCE_S)
         page.until("document.body.dataset.connected === 'no'")
-        with pytest.raises(Exception, match="no robot named"):
+        with pytest.raises(UserError, match="no robot named"):
             control.ask(name, {"do": "status"})
         page.errors.clear()  # the browser tells of the refused connections
 
@@ -125,7 +154,7 @@ def test_a_recording_is_scrubbed_and_nothing_is_wider_than_the_window(tmp_path, 
 
     assert cli.main(["walk", "--time", "3s", "--log", "full", "--out", str(tmp_path / "run")]) == 0
     with served(str(tmp_path / "run")) as (address, _), page_of(address, tmp_path, width) as page:
-        page.value("{ const p = document.getElementById('position'); p.value = 2.5; p.oninput(); 0 }")
+        Hand(page).give("#position", 2.5)
         page.until("document.getElementById('clock').textContent === '2.500 s'")
         assert page.value("document.documentElement.scrollWidth <= innerWidth")
         shown = page.value("Array.from(window.rangerPanel.pose())")

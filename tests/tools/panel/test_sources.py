@@ -11,7 +11,6 @@ from ranger_sim.datatable.generated import all_variables
 from ranger_sim.datatable.packing import error_word
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.feed.server import FeedServer
-from ranger_sim.tools import run_logs
 from ranger_sim.tools.panel.link import LinkSource
 from ranger_sim.tools.panel.recording import RecordingSource
 from ranger_sim.tools.panel.robot import ErrorList, RobotSource
