@@ -13,6 +13,7 @@ from ranger_sim.datatable.generated import all_variables
 from ranger_sim.datatable.packing import value_of_word
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness import normal_errors
+from ranger_sim.harness.ranger_names import RANGER
 from ranger_sim.harness.serial_ports import DAQ_BAUD, RealPort, reason_of
 from ranger_sim.tools.panel.channels import EMPTY, Trace, thinned
 from ranger_sim.tools.panel.source import ESTIMATED_POSE, Source, table_channels
@@ -139,7 +140,7 @@ class LinkSource(Source):
         for key, line in self.session.errors.items():
             last_s = self._seconds(line.stamp)
             first_s = self.first_errors.setdefault(key, last_s)
-            normal = line.count <= normal_errors.most_normal(line.board, line.code, now_s, True)
+            normal = line.count <= normal_errors.most_normal(RANGER, line.board, line.code, now_s, True)
             rows.append(
                 {"board": line.board, "name": line.name, "text": line.text, "normal": normal}
                 | {"first_s": first_s, "last_s": last_s, "count": line.count}

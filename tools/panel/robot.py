@@ -18,6 +18,7 @@ from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness import logbook, normal_errors
 from ranger_sim.harness.feed import records
 from ranger_sim.harness.processes import control
+from ranger_sim.harness.ranger_names import RANGER
 from ranger_sim.harness.sampler import PERIOD_NS
 from ranger_sim.tools.panel.channels import Channel, Memory, Trace
 from ranger_sim.tools.panel.source import TRUE_POSE, Source, error_rows, table_channels
@@ -236,7 +237,7 @@ class ErrorList:
         for (board, code), row in self.rows.items():
             name, text = error_rows().get(code, (f"error {code}", "not in the table"))
             whose = all_variables.BOARD_NAMES.get(board, f"board {board}")
-            normal = row["count"] <= normal_errors.most_normal(whose, code, now_s, True)
+            normal = row["count"] <= normal_errors.most_normal(RANGER, whose, code, now_s, True)
             found.append({"board": whose, "name": name, "text": text, "normal": normal, **row})
         return sorted(found, key=lambda row: -row["last_s"])
 
