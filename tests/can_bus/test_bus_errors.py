@@ -382,3 +382,25 @@ def test_a_frame_that_is_hit_anywhere_is_hit_in_its_middle_or_behind_its_arbitra
         assert error[4] == max((bits - 1) // 2, behind)
         assert error[2] == flags | FLAG_ERROR
     assert lengths == {0, 1} or flags == 0
+
+
+def test_what_is_taken_out_of_a_disturbed_bus_is_not_sent_any_more():
+    """A frame that met an error and waits to be repeated, and one that has not begun."""
+    wired = Wired(3)
+    bus = wired.bus
+    bus.inject_errors(1)
+    wired.send(0, 0x100, lo=1, hi=2)
+    wired.send(0, 0x200, buffer=2, lo=3, hi=4)
+    wired.send(1, 0x300, buffer=3)
+    bus.advance(edge(70))  # in the error frame of the first
+    assert bus.disturbed and bus.counters.errors == 1
+    assert sorted(bus.take_out(0, edge(70))) == [(1, 0x100, 8, 1, 2), (2, 0x200, 8, 3, 4)]
+    bus.look_again()
+    bus.advance(edge(2000))
+    assert [(identifier, node) for _, identifier, flags, _, _, node in wired.log() if not flags & FLAG_ERROR] == [
+        (0x300, 1)
+    ]
+    assert bus.nodes[0].sent == 0 and wired.of(0, "done") == []
+    assert wired.send(0, 0x101, time=edge(2000), buffer=1) and wired.send(0, 0x102, time=edge(2000), buffer=2)
+    bus.advance(edge(3000))
+    assert bus.nodes[0].sent == 2
