@@ -11,6 +11,7 @@ from ranger_sim.foundation.peers import LIMITS, MALFORMED, REASONS, Door, Peer, 
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.conditions import STATE_VARIABLES
 from ranger_sim.harness.feed import records
+from ranger_sim.harness.summary import energy
 
 LOOK_NS = 20_000_000  # virtual time between two looks: 50 pictures a second at real time
 STATE_NS = 100_000_000
@@ -89,6 +90,7 @@ class FeedServer(Door[Peer]):
             "steps": robot.steps,
             "distance_m": robot.distance_m,
             "speed_m_per_s": robot.mean_speed_m_per_s(),
+            "energy_Wh": energy(robot),
             "ended": robot.ended,
             "faults": [fault.summary() | {"unit": fault.unit} for fault in robot.faults if fault.twin is None],
         }
@@ -116,6 +118,7 @@ class FeedServer(Door[Peer]):
             "samples": dict(robot.plant.sample_names),
             "states": state_names(robot),
             "geometry": robot.plant.geometry(),
+            "weight_N": robot.plant.parameters.total_mass_kg * robot.plant.parameters.gravity_m_per_s2,
         }
 
     def _welcome(self, connection: socket.socket) -> Peer:

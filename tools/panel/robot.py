@@ -20,6 +20,7 @@ from ranger_sim.harness.feed import records
 from ranger_sim.harness.processes import control
 from ranger_sim.harness.ranger_names import RANGER
 from ranger_sim.harness.sampler import PERIOD_NS
+from ranger_sim.harness.summary import JOULES_PER_WH
 from ranger_sim.tools.panel.channels import Channel, Memory, Trace
 from ranger_sim.tools.panel.source import TRUE_POSE, Source, error_rows, table_channels
 
@@ -55,6 +56,7 @@ class RobotSource(Source):
             raise UserError(f"the robot named {name} has another master table than this program")
         self.title = f"{name}: {hello['controller']} on {hello['body']}, seed {hello['seed']}"
         self.geometry = hello["geometry"]
+        self.weight_N: float = hello["weight_N"]
         self.start_ns: int = hello["start_ns"]
         self.streams = hello["streams"]
         self.body = [
@@ -192,6 +194,8 @@ class RobotSource(Source):
             "steps": self.shown.get("steps", 0),
             "distance_m": self.shown.get("distance_m", 0.0),
             "speed_m_per_s": self.shown.get("speed_m_per_s", 0.0),
+            "energy_Wh": self.shown.get("energy_Wh", {}),
+            "tcot": self._cost_of_transport(),
             "ended": self.shown.get("ended", ""),
             "faults": self.shown.get("faults", []),
             "boards": self.status.get("boards", {}),
@@ -201,6 +205,14 @@ class RobotSource(Source):
             "frames": [traffic.newest(self.start_ns, at) for traffic in self.buses],
             "left_out": dict(self.gaps),
         }
+
+    def _cost_of_transport(self) -> float | None:
+        """Energy from the battery over weight and distance (appendix 1); None before a step."""
+        distance_m = self.shown.get("distance_m", 0.0)
+        if not distance_m > 0.0:
+            return None
+        total_Wh: float = self.shown["energy_Wh"]["total"]
+        return total_Wh * JOULES_PER_WH / (self.weight_N * distance_m)
 
     async def request(self, wish: dict[str, Any]) -> dict[str, Any]:
         if wish.get("do") not in REQUESTS:

@@ -198,3 +198,12 @@ def test_the_robot_is_asked_to_send_often_what_the_plots_show():
     source.want([channel])
     assert source.session.outgoing(0.1) == b"" or len(source.session.writes) > 0
     source.close()
+
+
+def test_the_cost_of_transport_is_energy_over_weight_and_way(walked):
+    """The robot of this test has not walked; 1 Wh over 10 m of 98.1 N is 3.67 (3600 / 981)."""
+    _, source = walked
+    assert source.state(None)["tcot"] is None
+    source.shown = {**source.shown, "distance_m": 10.0, "energy_Wh": {"total": 1.0}}
+    source.weight_N = 98.1
+    assert source.state(None)["tcot"] == pytest.approx(3600.0 / 981.0)

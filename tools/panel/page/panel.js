@@ -225,6 +225,8 @@ function light(lost) {
 function tell_state() {
   if (!hello) return;
   by("walked").textContent = state.steps === undefined ? "" : `${state.steps} steps, ${figure(state.distance_m)} m, ${(state.speed_m_per_s ?? 0).toFixed(2)} m/s`;
+  const spent = Object.entries(state.energy_Wh ?? {});
+  by("energy").textContent = spent.length ? `from the battery: ${spent.map(([name, value]) => `${name.replaceAll("_", " ")} ${(1e3 * value).toFixed(1)} mWh`).join(", ")}` + (state.tcot ? `; cost of transport ${state.tcot.toFixed(3)}` : "") : "";
   const pace = state.pace ?? {};
   by("pause").textContent = pace.paused ? "Let the robot go on" : "Pause robot";
   by("pace-text").textContent = pace.behind_s > 0.05 ? ` ${pace.behind_s.toFixed(2)} s late` : "";
