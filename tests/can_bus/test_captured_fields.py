@@ -6,6 +6,7 @@ manual UM10114, table of CANICR: codes of the fields, bits 16 to 20; what kind o
 
 import pytest
 
+from ranger_sim.can_bus.frame import wire
 from ranger_sim.can_bus.node import (
     ICR_BUS_ERROR,
     ICR_FIELD_MASK,
@@ -16,6 +17,7 @@ from ranger_sim.can_bus.node import (
     KIND_FORM,
     KIND_OTHER,
 )
+from ranger_sim.can_bus.tampering import error_name, places_of_error
 from ranger_sim.foundation.events import CAN_STATUS
 
 from .bit_oracle import Frame, stuffed
@@ -111,3 +113,29 @@ def test_an_overload_flag_that_does_not_show_is_an_error_in_it(first):
 def test_an_undisturbed_frame_and_an_overload_frame_are_no_errors():
     behind = START + len(fields_of(STANDARD))
     assert met(STANDARD) == met(STANDARD, behind) == {0: [], 1: [], 2: []}
+
+
+def test_a_captured_error_has_one_of_six_names_or_is_no_new_one():
+    """By field and kind of UM10114: 0 bit, 1 form, 2 stuff, 3 other; whatever else the interrupt word tells."""
+    for rest in (0, ICR_RECEIVING, ICR_BUS_ERROR | 0x4, 0xFF000000 | ICR_RECEIVING | 0xFFFF):
+
+        def name(field, kind, rest=rest):
+            return error_name(rest & ~(0x1F << 16 | 3 << 22) | field << 16 | kind << 22)
+
+        for kind in range(4):
+            assert [name(field, kind) for field in (17, 23, 28)] == ["BROKEN_ERROR_FRAME"] * 3
+            assert [name(field, kind) for field in (19, 22)] == ["", ""]
+        for field in (2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 18, 24, 25, 26, 27):
+            wanted = ["BIT", "FORM", "BIT_STUFFING", "ACK" if field == 25 else "CRC"]
+            assert [name(field, kind) for kind in range(4)] == wanted
+
+
+def test_of_a_broken_error_frame_the_third_bit_of_the_flag_is_misread():
+    """The flag begins behind the error; of the sender's own error that is behind the arbitration, of a receiver's
+    behind the CRC."""
+    bits, fields = wire(STANDARD.identifier, 4, 0x55555555, 0)
+    for of_sender, first in ((True, 14), (False, fields.index(24))):
+        error, misread = places_of_error("BROKEN_ERROR_FRAME", of_sender, bits, fields)
+        assert (error, misread) == (first, first + 3)
+        found = met(STANDARD, START + error, START + misread)
+        assert found[SENDER][1][:2] == (START + misread, ACTIVE_FLAG)

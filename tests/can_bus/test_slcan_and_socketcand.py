@@ -94,6 +94,19 @@ def test_slcan_commands_have_the_answers_of_the_protocol(line):
     assert say("C\r") == "\r"
 
 
+@pytest.mark.parametrize(
+    ("length", "answer"), [(31, "Z\r"), (32, "Z\r"), (33, "\a"), (64, "\a"), (65, "\a"), (200, "\a")]
+)
+def test_slcan_a_command_has_32_bytes_at_most_and_the_next_one_is_heard(line, length, answer):
+    """An extended frame has 26 and may carry a stamp behind it; what is longer is no command, however much comes."""
+    _, say = line
+    say("O\r")
+    frame = "T0000012380102030405060708"
+    told = say(frame + "0" * (length - len(frame)) + "\r")
+    assert told == answer if length > 32 else told in (answer, "\a")
+    assert say("V\r") == "V0101\r"
+
+
 def test_slcan_flags_are_bit_5_for_a_passive_controller_and_bit_7_for_one_off_the_bus(line):
     owner, say = line
     say("O\r")
