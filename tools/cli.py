@@ -68,6 +68,7 @@ def parser() -> argparse.ArgumentParser:
     from ranger_sim.tools.fmu import command as fmu
     from ranger_sim.tools.fuzz import command as fuzz
     from ranger_sim.tools.identify import command as identify
+    from ranger_sim.tools.new import command as new
     from ranger_sim.tools.panel import command as panel
     from ranger_sim.tools.vm import command as vm
 
@@ -94,6 +95,7 @@ def parser() -> argparse.ArgumentParser:
     vm.register(commands)
     faults.register(commands)
     firmware.register(commands)
+    new.register(commands)
     slots.register(commands)
     summary_schema.register(commands)
     campaign.register(commands)

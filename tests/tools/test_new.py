@@ -1,0 +1,91 @@
+"""`ranger-sim new`: a project whose tests pass at once, written whole or not at all."""
+
+import pathlib
+import re
+import subprocess
+import sys
+
+import pytest
+
+from ranger_sim.datatable import generate
+from ranger_sim.datatable.loader import load_table
+from ranger_sim.tools import cli
+from ranger_sim.tools.new import command
+from tests.firmware_sim.native.support import COMPILER
+from tests.harness.testing.project import environment, how_to_find_the_plugin
+
+
+def everything(folder):
+    return sorted(path.relative_to(folder).as_posix() for path in folder.rglob("*"))
+
+
+def test_what_is_written_is_what_the_list_says_with_the_folders_name(tmp_path, capsys):
+    assert cli.main(["new", str(tmp_path / "my-wheel")]) == 0
+    project = tmp_path / "my-wheel"
+    assert capsys.readouterr().out == f"{project}: written. cd {project}; pytest\n"
+    files = {path for path in everything(project) if (project / path).is_file()}
+    generated = {path for path in files if path.startswith("table/generated/")}
+    assert files - generated == {*command.FILES, *command.WRITTEN}
+    assert generate.stale(load_table(project / "table"), project / "table" / "generated") == []
+    assert (project / "README.md").read_text().startswith("# my-wheel\n")
+    assert not [path for path in files if "[%" in (project / path).read_text()]
+    assert everything(tmp_path) == sorted(["my-wheel", *(f"my-wheel/{path}" for path in everything(project))])
+
+
+def test_an_empty_folder_is_taken_also_the_one_that_a_shell_stands_in(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert cli.main(["new", "."]) == 0
+    assert (tmp_path / "machine.py").is_file() and not list(tmp_path.glob(".ranger-sim-new-*"))
+
+
+@pytest.mark.parametrize(
+    ("there", "asked", "line"),
+    [
+        ("dir/a.txt", "dir", "the folder is not empty"),
+        ("a.txt", "a.txt", "it is there already and is no folder"),
+        ("a.txt", "a.txt/below", "Not a directory|File exists"),
+        ("a.txt", "na\tme", "letters, digits, spaces"),
+        ("a.txt", "x" * 61, "60 at most"),
+    ],
+)
+def test_what_cannot_be_a_project_is_refused_in_a_line_and_nothing_is_left(tmp_path, capsys, there, asked, line):
+    (tmp_path / there).parent.mkdir(exist_ok=True)
+    (tmp_path / there).write_text("mine")
+    before = everything(tmp_path)
+    assert cli.main(["new", str(tmp_path / asked)]) == 2
+    said = capsys.readouterr().err
+    assert re.search(line, said) and len(said.splitlines()) == 1
+    assert everything(tmp_path) == before and (tmp_path / there).read_text() == "mine"
+
+
+def test_a_write_that_fails_half_way_leaves_nothing(tmp_path, monkeypatch, capsys):
+    def fails(table, folder):
+        raise OSError(28, "No space left on device", str(folder))
+
+    monkeypatch.setattr(generate, "write", fails)
+    assert cli.main(["new", str(tmp_path / "wheel")]) == 2
+    assert "No space left on device" in capsys.readouterr().err
+    assert everything(tmp_path) == []
+
+
+@pytest.mark.skipif(not COMPILER, reason="no C compiler is installed here")
+def test_its_tests_pass_at_once_and_it_needs_nothing_of_ranger(tmp_path):
+    assert cli.main(["new", str(tmp_path / "wheel")]) == 0
+    (tmp_path / "wheel" / "test_imports.py").write_text(
+        "import sys\n\n\ndef test_nothing_of_ranger_is_needed(machine):\n"
+        "    machine.run_for(0.01)\n"
+        "    rangers = ('ranger_sim.boards', 'ranger_sim.datatable.generated', 'ranger_sim.harness.ranger')\n"
+        "    assert [name for name in sys.modules if name.startswith(rangers)] == []\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *how_to_find_the_plugin(), "."],
+        cwd=tmp_path / "wheel",
+        env=environment() | {"PYTHONPATH": str(pathlib.Path(__file__).resolve().parents[2])},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout
+    assert "4 passed" in done.stdout
+    libraries = [path for path in everything(tmp_path / "wheel") if path.endswith(".so")]
+    assert libraries == ["panel/build/panel.so", "wheel/build/wheel.so"]

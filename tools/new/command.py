@@ -1,0 +1,103 @@
+"""`ranger-sim new DIR`: a project for a machine of one's own, whose first test passes at once."""
+
+import argparse
+import pathlib
+import re
+import shutil
+import tempfile
+from typing import Any
+
+from ranger_sim.foundation.user_error import UserError
+
+HERE = pathlib.Path(__file__).resolve().parent
+# file of the project: (template beside this module, what stands in it for "board")
+FILES: dict[str, tuple[str, str]] = {
+    "README.md": ("README.md.j2", ""),
+    "body.py": ("body.py.j2", ""),
+    "campaign.toml": ("campaign.toml.j2", ""),
+    "common.h": ("common.h.j2", ""),
+    "conftest.py": ("conftest.py.j2", ""),
+    "machine.py": ("machine.py.j2", ""),
+    "test_machine.py": ("test_machine.py.j2", ""),
+    "table/boards.toml": ("boards.toml.j2", ""),
+    "table/variables.csv": ("variables.csv.j2", ""),
+    "table/errors.csv": ("errors.csv.j2", ""),
+    "wheel/firmware.toml": ("firmware.toml.j2", "wheel"),
+    "wheel/wheel.c": ("wheel.c.j2", ""),
+    "panel/firmware.toml": ("firmware.toml.j2", "panel"),
+    "panel/panel.c": ("panel.c.j2", ""),
+}
+# Of its own, so that a configuration above does not reach in; and what is not for a repository.
+WRITTEN = {"pytest.ini": "[pytest]\naddopts = --strict-markers\n", ".gitignore": "build/\nruns/\n__pycache__/\n"}
+NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9 ._-]{0,59}")
+
+
+def register(commands: Any) -> None:
+    """Add the subcommand to the command line."""
+    command = commands.add_parser(
+        "new",
+        help="write a project for a machine of your own to start from",
+        description="Two boards in C, a body, a master table, tests and a campaign. `pytest` in DIR passes at once.",
+        epilog="docs/how-to/machine.md goes through it; examples/servo is a larger one.",
+    )
+    command.add_argument("folder", metavar="DIR", help="a folder that is not there yet, or is empty")
+    command.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Write it whole or not at all."""
+    folder = pathlib.Path(options.folder)
+    name = folder.resolve().name
+    if not NAME.fullmatch(name):
+        raise UserError(
+            f"new {options.folder!r}: a folder's name of letters, digits, spaces and ._- is needed, 60 at most"
+        )
+    check(folder)
+    try:
+        folder.resolve().parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(prefix=".ranger-sim-new-", dir=folder.resolve().parent) as making:
+            write(pathlib.Path(making) / "project", name)
+            check(folder)
+            take_over(pathlib.Path(making) / "project", folder)
+    except OSError as error:
+        raise UserError(f"new {folder}: {error.filename or folder}: {error.strerror}") from None
+    print(f"{folder}: written. cd {folder}; pytest")
+    return 0
+
+
+def check(folder: pathlib.Path) -> None:
+    """UserError for a place at which something is."""
+    if folder.is_symlink() or (folder.exists() and not folder.is_dir()):
+        raise UserError(f"new {folder}: it is there already and is no folder")
+    if folder.is_dir() and any(folder.iterdir()):
+        raise UserError(f"new {folder}: the folder is not empty; give one that is not there yet")
+
+
+def write(project: pathlib.Path, name: str) -> None:
+    """The whole project, with what is generated from its table."""
+    from ranger_sim.datatable import generate
+    from ranger_sim.datatable.loader import load_table
+
+    for path, (template, board) in FILES.items():
+        text = (HERE / template).read_text(encoding="utf-8").replace("[% name %]", name).replace("[% board %]", board)
+        (project / path).parent.mkdir(parents=True, exist_ok=True)
+        (project / path).write_text(text, encoding="utf-8")
+    for path, text in WRITTEN.items():
+        (project / path).write_text(text, encoding="utf-8")
+    generate.write(load_table(project / "table"), project / "table" / "generated")
+
+
+def take_over(project: pathlib.Path, folder: pathlib.Path) -> None:
+    """The finished project becomes `folder`; into an empty one, in which a shell may stand, its parts move."""
+    if not folder.exists():
+        project.rename(folder)
+        return
+    moved = []
+    try:
+        for each in sorted(project.iterdir()):
+            each.rename(folder / each.name)
+            moved.append(folder / each.name)
+    except OSError:
+        for each in moved:
+            shutil.rmtree(each) if each.is_dir() else each.unlink()
+        raise
