@@ -76,6 +76,7 @@ class Arm(Plant):
         self.encoders = [self.encoder]
         self.noise = RandomStream(seed, "current amplifier")
         self.angle_rad = self.rate_rad_per_s = self.current_A = self.voltage_V = 0.0
+        self.mean_A = 0.0  # over the latest step
         self.analog_start[0] = self.analog_end[0] = ZERO_CURRENT_V
         self.step_s = STEP_NS * 1e-9
         self.decay = math.exp(-self.step_s * n.resistance_ohm / n.inductance_H)
@@ -86,14 +87,14 @@ class Arm(Plant):
         n, h, rate, angle = self.numbers, self.step_s, self.rate_rad_per_s, self.angle_rad
         emf_V = n.torque_Nm_per_A * rate
         if self.lead.open:
-            self.voltage_V, self.current_A, mean_A = emf_V, 0.0, 0.0
+            self.voltage_V, self.current_A, self.mean_A = emf_V, 0.0, 0.0
         else:
             self.voltage_V = self.lead.duty * self.lead.supply_V
             final_A = (self.voltage_V - emf_V) / n.resistance_ohm
             off_A = self.current_A - final_A
-            mean_A = final_A + off_A * self.decayed_s / h
+            self.mean_A = final_A + off_A * self.decayed_s / h
             self.current_A = final_A + off_A * self.decay
-        torque = n.torque_Nm_per_A * mean_A - n.weight_Nm * math.sin(angle)
+        torque = n.torque_Nm_per_A * self.mean_A - n.weight_Nm * math.sin(angle)
         torque -= n.viscous_Nms * rate + n.cable_Nm_per_rad * angle
         free = rate + h * torque / n.inertia_kg_m2
         held = h * n.coulomb_Nm / n.inertia_kg_m2
