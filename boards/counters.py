@@ -3,7 +3,7 @@
 import dataclasses
 from typing import Any
 
-from ranger_sim.firmware_sim.counters import CanCounters, ProgramCounters, SlotCounters
+from ranger_sim.firmware_sim.counters import CanCounters, ProcessorCounters, ProgramCounters, SlotCounters
 
 
 @dataclasses.dataclass(frozen=True)
@@ -29,10 +29,11 @@ class RouterCounters:
 
 @dataclasses.dataclass(frozen=True)
 class RangerCounters(ProgramCounters):
-    """A board of the robot. `time_ms`: its network time."""
+    """A board of the robot. `time_ms`: its network time; `processor`: of one that runs a firmware image."""
 
     link: LinkCounters | None = None
     router: RouterCounters | None = None
+    processor: ProcessorCounters | None = None
 
 
 def of_board(board: Any, can: list[CanCounters], link: Any = None, router: Any = None) -> RangerCounters:
@@ -95,11 +96,12 @@ def as_dict(counters: RangerCounters) -> dict:
 
 def from_dict(found: dict) -> RangerCounters:
     """The same from what `as_dict` gave; TypeError when a name is missing or strange."""
-    link, router = found["link"], found["router"]
+    link, router, processor = found["link"], found["router"], found["processor"]
     nested: dict[str, Any] = {
         "slots": SlotCounters(**found["slots"]),
         "can": [CanCounters(**each) for each in found["can"]],
         "link": None if link is None else LinkCounters(**link),
         "router": None if router is None else RouterCounters(**router),
+        "processor": None if processor is None else ProcessorCounters(**processor),
     }
     return RangerCounters(**{**found, **nested})

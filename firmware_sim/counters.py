@@ -43,6 +43,18 @@ class BoardCounters:
 
 
 @dataclasses.dataclass(frozen=True)
+class ProcessorCounters:
+    """A processor that executes a firmware image: all instructions and cycles, and those of them that were skipped in
+    loops that waited, which alone depend on the steps in which time was passed.
+    """
+
+    instructions: int
+    cycles: int
+    idle_instructions: int
+    idle_cycles: int
+
+
+@dataclasses.dataclass(frozen=True)
 class ProgramCounters(BoardCounters):
     """What its program tells besides. `time_ms`: the machine's time as it has it; `errors`: how often it noted each
     error, by error number.

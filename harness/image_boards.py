@@ -5,9 +5,8 @@ import pathlib
 from collections.abc import Mapping
 
 from ranger_sim.boards import ankle_board, can_router, hip, motor_board, steering
-from ranger_sim.firmware_sim.lpc2194 import image as images
 from ranger_sim.firmware_sim.lpc2194.hardware import BoardHardware
-from ranger_sim.firmware_sim.lpc2194.image import Image
+from ranger_sim.firmware_sim.lpc2194.image import Image, read
 from ranger_sim.firmware_sim.native.hardware import ExternalConverter, InternalConverter, SpiDevice
 from ranger_sim.foundation.user_error import UserError
 
@@ -43,6 +42,7 @@ def hardware_of(board: str) -> BoardHardware:
             ),
             spi={},
             segment_link=True,
+            slot_timer=0,
         )
     return BoardHardware(external=None, spi={})
 
@@ -65,6 +65,5 @@ def placed(text: str) -> tuple[str, str]:
 def loaded(wanted: Mapping[str, Image | str | os.PathLike]) -> dict[str, Image]:
     """The image of each board, files read. UserError for a board that takes none, and for a file that is none."""
     return {
-        known(board): each if isinstance(each, Image) else images.read(pathlib.Path(each))
-        for board, each in wanted.items()
+        known(board): each if isinstance(each, Image) else read(pathlib.Path(each)) for board, each in wanted.items()
     }

@@ -26,11 +26,12 @@ from ranger_sim.boards.user_interface import UserInterfaceBoard
 from ranger_sim.datatable import parameters
 from ranger_sim.datatable.generated import all_variables
 from ranger_sim.firmware_sim.clock import seeded_crystal
+from ranger_sim.firmware_sim.lpc2194.image import Image
 from ranger_sim.firmware_sim.native import crash
 from ranger_sim.firmware_sim.native.trial import tried
 from ranger_sim.foundation.random_stream import RandomStream
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness import bus_schedule, native_boards, wiring
+from ranger_sim.harness import bus_schedule, image_boards, native_boards, wiring
 from ranger_sim.harness.conditions import STATE_VARIABLES, Condition, ErrorNoted, condition
 from ranger_sim.harness.faults.error_rows import StateWord
 from ranger_sim.harness.faults.error_watch import ErrorWatch
@@ -86,6 +87,7 @@ class Ranger(Machine):
         profile: Profile | None = None,  # its bit rates and schedules; boards that it has outside are emulated here
         firmware: Mapping[str, Firmware | str | os.PathLike] | None = None,  # boards that run C, by folder
         in_process: bool = False,  # their programs run here: faster, but a crash of one of them ends this process
+        images: Mapping[str, Image | str | os.PathLike] | None = None,  # boards that run a firmware image, by file
     ) -> None:
         self.scenario = scenario if scenario is not None else Scenario()
         self.controller = controllers.load(self.scenario.controller)
@@ -112,9 +114,14 @@ class Ranger(Machine):
         self.in_own_process: tuple[str, ...] = () if in_process else tuple(self.firmware)
         self.processes: Apart | None = None
         self.deaths: list[dict[str, Any]] = []  # boards whose process has ended (harness/processes/apart.py)
+        self.images: dict[str, Image] = image_boards.loaded(images if images is not None else {})
+        for name in self.images:
+            if name in self.firmware:
+                raise UserError(f"{name} is to run both {self.firmware[name].folder} and {self.images[name].path}")
         # interrupts and slots: each board on its own crystal, powered up in its own moment
         boards = {name: self.new_board(name, start_ns + self._stream(name)[1]) for name in BOARD_CLASSES}
-        boards["CSR"].time.ms = self.scenario.start_uptime_ms
+        if "CSR" not in self.images:
+            boards["CSR"].time.ms = self.scenario.start_uptime_ms
         said = {name: first_outputs(boards[name]) for name in self.firmware}  # while their programs started
         # CAN
         self.profile = profile
@@ -166,6 +173,10 @@ class Ranger(Machine):
             if record is None and self.is_watched:  # one that takes another's place
                 self._watch(board)
             return board
+        if name in self.images:
+            from ranger_sim.harness.robot_image_board import RobotImageBoard  # only here: a processor, and ELF files
+
+            return RobotImageBoard(name, self.images[name], crystal, power_up_ns)
         if name == "MB":
             return MainBrainBoard(crystal, self.quirks, power_up_ns, controller=self.controller)
         return BOARD_CLASSES[name](crystal, self.quirks, power_up_ns)
@@ -175,6 +186,8 @@ class Ranger(Machine):
         Machine._connect(self)
         loop, boards = self.loop, self.boards
         for name in wiring.HEAR_IN_SLOTS:
+            if name in self.images:
+                continue  # nobody knows what its handlers do
             if name not in self.firmware or boards[name].scheduler.announces:  # else its handlers may send
                 loop.hears_in_its_slots(boards[name])
         loop.connect_link(boards["CSR"], boards["MB"], EXCHANGE_NS, empty_segment())

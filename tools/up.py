@@ -35,6 +35,8 @@ from ranger_sim.tools import faults, serial_options, server_options, terminal, t
 from ranger_sim.tools.files import json_target, writable_folder
 from ranger_sim.tools.firmware import OPTIONS as FIRMWARE
 from ranger_sim.tools.firmware import folders_of, run_sanitized, wants_another_process
+from ranger_sim.tools.images import OPTIONS as IMAGES
+from ranger_sim.tools.images import images_of
 from ranger_sim.tools.options import add_all
 from ranger_sim.tools.units import number, whole_number, word
 
@@ -143,7 +145,7 @@ def register(commands: Any) -> None:
         "needed ('can1=slcan:/dev/ttyACM0 --bitrate 1000000'); can1= asks python-can's configuration, section can1; "
         "MCH=... gives one board of such a bus a place of its own (repeatable). The run is then asynchronous",
     )
-    add_all(up, (faults.FAULT, faults.MODULE, *FIRMWARE))
+    add_all(up, (faults.FAULT, faults.MODULE, *FIRMWARE, *IMAGES))
     trace.add_options(up)
     up.set_defaults(run=run)
 
@@ -231,8 +233,12 @@ def run(options: argparse.Namespace) -> int:
     for name in firmware:
         if name not in settings.boards:
             raise UserError(f"--firmware {name}={firmware[name].folder}: {name} is not emulated in this profile")
+    images = images_of(options)
+    for name in images:
+        if name not in settings.boards:
+            raise UserError(f"--image {name}={images[name].path}: {name} is not emulated in this profile")
     # in_process: the supervisor gives every board its process
-    with contextlib.closing(Ranger(scenario, log, quirks, profile, firmware, in_process=True)) as robot:
+    with contextlib.closing(Ranger(scenario, log, quirks, profile, firmware, in_process=True, images=images)) as robot:
         outside, openers = external_buses(options, robot, profile)
         ends, lines = serial_options.connect(robot, options)
         servers, more = bus.open_servers({each.name: each for each in robot.buses}, options)

@@ -26,6 +26,7 @@ from ranger_sim.plant import terms
 from ranger_sim.tools import faults, serial_options, terminal, trace, unexpected
 from ranger_sim.tools.files import json_target, replace_file, writable_folder
 from ranger_sim.tools.firmware import folders_of, run_sanitized, wants_another_process
+from ranger_sim.tools.images import images_of
 from ranger_sim.tools.run_folder import REPORT, SUMMARY, RunFolder
 from ranger_sim.tools.run_logs import RunLogs, write_frames
 from ranger_sim.tools.units import duration_text, figure, length_text
@@ -109,7 +110,8 @@ def run_scenario(scenario: Scenario, stop: StopRule, options: argparse.Namespace
     wanted = [CATALOGUE.typed(text) for text in options.fault]
     log = log_of(options)
     firmware = firmware_of(options, console)
-    with contextlib.closing(Ranger(scenario, log, quirks, profile, firmware, options.in_process)) as robot:
+    images = images_of(options)
+    with contextlib.closing(Ranger(scenario, log, quirks, profile, firmware, options.in_process, images)) as robot:
         arm(robot, wanted, options.proof)
         timeline = trace.attach(robot, options)
         ends, places = serial_options.connect(robot, options)

@@ -10,6 +10,7 @@ from ranger_sim.plant.electronics import SWITCHES
 from ranger_sim.tools import faults, serial_options, trace
 from ranger_sim.tools.firmware import IN_PROCESS
 from ranger_sim.tools.firmware import OPTIONS as FIRMWARE
+from ranger_sim.tools.images import OPTIONS as IMAGES
 from ranger_sim.tools.options import Option, add_all
 from ranger_sim.tools.units import (
     ANGLES,
@@ -130,7 +131,17 @@ PROOF = Option(
 )
 
 RUN = (*END, *SCENARIO, *FILES)  # of every command that lets the robot walk
-WALK = (*RUN, *serial_options.OPTIONS, faults.FAULT, PROOF, faults.MODULE, *FIRMWARE, IN_PROCESS, *trace.OPTIONS)
+WALK = (
+    *RUN,
+    *serial_options.OPTIONS,
+    faults.FAULT,
+    PROOF,
+    faults.MODULE,
+    *FIRMWARE,
+    IN_PROCESS,
+    *IMAGES,
+    *trace.OPTIONS,
+)
 
 
 def add_run_options(command: Any) -> None:
@@ -142,7 +153,7 @@ def add_run_options(command: Any) -> None:
 def add_walk_options(command: Any) -> None:
     """All options of `walk`."""
     add_run_options(command)
-    add_all(command, (faults.FAULT, PROOF, faults.MODULE, *FIRMWARE, IN_PROCESS))
+    add_all(command, (faults.FAULT, PROOF, faults.MODULE, *FIRMWARE, IN_PROCESS, *IMAGES))
     trace.add_options(command)
 
 

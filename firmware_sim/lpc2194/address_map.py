@@ -82,6 +82,7 @@ class AddressMap:
             self.looks += 1
         else:
             self.touched += 1
+            self.board.work()
             self.board.settle(block)
         if size == 4:
             return value
@@ -109,6 +110,7 @@ class AddressMap:
         if block is None:
             self.fail(address, size, True, value, "no device is modelled there")
         self.board.reach()
+        self.board.work()
         self.touched += 1
         try:
             if size == 4:

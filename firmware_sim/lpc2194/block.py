@@ -67,11 +67,13 @@ class Block(Peripheral):
         """The peripherals' clock is another one from now on."""
 
     def unknown(self, offset: cython.longlong, writing: cython.bint) -> cython.longlong:
-        """An access that `read` and `write` do not know."""
-        register = self.REGISTERS.get(offset)
-        if register is None:
+        """An access that `read` and `write` do not know: to no register, or one that the chip has the other way only.
+
+        What can only be written reads 0; a write to what can only be read does nothing.
+        """
+        if offset not in self.REGISTERS:
             raise NotModelledError("no register is modelled there")
-        raise NotModelledError(f"{register[0]} can only be {'read' if writing else 'written'}")
+        return 0
 
     def not_modelled(self, what) -> None:
         """The register is known, what is asked of it is not."""

@@ -10,6 +10,9 @@ run does not depend on the steps in which `advance` is called.
 A loop that waits is skipped: when memory, registers and the flash accelerator are after a number of instructions what
 they were before them, and no device was asked or told anything that could matter, then nothing changes until the next
 event but the cycles. `skips_idle = False` executes every pass; results are the same.
+
+A slot begins with the match of one timer; its work lasts until the main program's last access to a device, as those
+that look at a status are none, and those of interrupts are not the main program's.
 """
 
 import array
@@ -20,7 +23,7 @@ import cython
 from ranger_sim.firmware_sim.alarm import Alarm
 from ranger_sim.firmware_sim.arm7.core import Core
 from ranger_sim.firmware_sim.clock import Crystal
-from ranger_sim.firmware_sim.counters import BoardCounters, CanCounters
+from ranger_sim.firmware_sim.counters import BoardCounters, CanCounters, ProcessorCounters, SlotCounters
 from ranger_sim.firmware_sim.edge_line import EdgeLine
 from ranger_sim.firmware_sim.lpc2194.address_map import AddressMap
 from ranger_sim.firmware_sim.lpc2194.block import Block, Clocks
@@ -42,6 +45,7 @@ from ranger_sim.firmware_sim.peripherals.adc_external import Ads7871
 from ranger_sim.foundation.events import EventQueue
 
 if not cython.compiled:
+    from ranger_sim.firmware_sim.arm7.core import FAST, INTERRUPT
     from ranger_sim.firmware_sim.lpc2194.can import AFMR_BYPASS
     from ranger_sim.firmware_sim.microcontroller import INDICES_PER_KIND, MESSAGE_KINDS
     from ranger_sim.foundation.events import CAN_RX, NEVER, PIN_EDGE
@@ -51,17 +55,15 @@ if not cython.compiled:
     STINT = 256
     LONGEST_PASS = 600
     DOUBTS = 8  # of so many stints elsewhere one is asked
+    SLOT_SHARES = 20
     REGISTERS = 57  # that are compared
 
 
 @dataclasses.dataclass(frozen=True)
 class ImageCounters(BoardCounters):
-    """A board that runs an image. Executed and skipped make up all that the program did; cycles are the processor's."""
+    """A board that runs an image."""
 
-    instructions: int = 0
-    cycles: int = 0
-    idle_instructions: int = 0  # of them, in passes of waiting loops that were skipped
-    idle_cycles: int = 0
+    processor: ProcessorCounters | None = None
 
 
 class ImageBoard(Microcontroller):
@@ -90,6 +92,12 @@ class ImageBoard(Microcontroller):
         for pin in hardware.pulled_up:
             self.pins[pin] = 1
         self.skips_idle = True
+        self.slots_begun = 0
+        self.slot_begin = 0
+        self.worked_until = 0
+        self.most_cycles = 0
+        self.all_cycles = 0
+        self.slots_by_cycles = [0] * 21
         self.base_cycles = 0  # cycles and instant from which time is counted: the clock's latest change
         self.base_ns = phase_ns
         self.asleep = False
@@ -125,12 +133,14 @@ class ImageBoard(Microcontroller):
             device = SspDevice(self)
         self.system = SystemBlock(self, clocks, converter)
         timers = [TimerBlock(self, clocks, number) for number in (0, 1)]
+        self.slot_match = timers[hardware.slot_timer].timer
         pin_select = PinSelectBlock(self, clocks, [block.timer for block in timers])
         pin_select.external = self.system
         self.pin_select = pin_select
         ports = Ports(self)
         self.acceptance = CanFilterBlock(self, clocks)
         self.can_blocks = [CanBlock(self, clocks, number, self.acceptance) for number in (1, 2, 3, 4)]
+        self.converter = ConverterBlock(self, clocks, hardware.internal)
         blocks = [
             self.vic_block,
             FastGpioBlock(self, clocks, ports),
@@ -141,9 +151,10 @@ class ImageBoard(Microcontroller):
             UartBlock(self, clocks, 0),
             UartBlock(self, clocks, 1),
             PwmBlock(self, clocks),
-            SpiBlock(self, clocks, hardware.spi.get(0)),
+            SpiBlock(self, clocks, 0, hardware.spi.get(0)),
+            SpiBlock(self, clocks, 1, None),
             SspBlock(self, clocks, device),
-            ConverterBlock(self, clocks, hardware.internal),
+            self.converter,
             *self.can_blocks,
             self.acceptance,
         ]
@@ -198,6 +209,31 @@ class ImageBoard(Microcontroller):
     def reach(self) -> cython.void:
         """The present instruction reaches for a device: devices see the instant at which it began."""
         self.now = self.time_of(self.core.began)
+
+    def work(self) -> cython.void:
+        """The present access does something: when the main program makes it, it works."""
+        mode: cython.longlong = self.core.control & 0x1F
+        if mode != FAST and mode != INTERRUPT:
+            self.worked_until = self.now
+
+    def _begin_slot(self, time: cython.longlong) -> cython.void:
+        """The slot timer matched at `time` (ns): the slot before is over."""
+        cycles: cython.longlong
+        place: cython.longlong = SLOT_SHARES
+        length: cython.longlong = time - self.slot_begin
+        if self.slots_begun:
+            cycles = 0
+            if self.worked_until > self.slot_begin:
+                cycles = int((self.worked_until - self.slot_begin) * self.cycles_per_ns)
+                place = SLOT_SHARES * (self.worked_until - self.slot_begin) // length
+            else:
+                place = 0
+            self.slots_by_cycles[place if place < SLOT_SHARES else SLOT_SHARES] += 1
+            self.all_cycles += cycles
+            if cycles > self.most_cycles:
+                self.most_cycles = cycles
+        self.slots_begun += 1
+        self.slot_begin = time
 
     def settle(self, block: Block) -> cython.int:
         """After an access: the levels of what the block drives, and how far the processor may run on."""
@@ -419,6 +455,8 @@ class ImageBoard(Microcontroller):
             self._message(inbox)
         else:
             cython.cast(Alarm, self.alarms[self.alarm_places[self.alarms_set - 1]]).ring(time)
+        if self.slot_match.match_time > self.slot_begin:
+            self._begin_slot(self.slot_match.match_time)
         for each in self.asking:
             block = each
             vic.raw = vic.raw & ~block.mask | block.requests()
@@ -470,17 +508,38 @@ class ImageBoard(Microcontroller):
 
     def counters(self) -> object:
         """What the board counted, by name. Its program's own queues and slots are not known."""
-        self.catch_up()
         return ImageCounters(
             hz=self.hz,
             unclaimed=self.unclaimed,
-            slots=self.scheduler.counters(),
+            slots=self.slot_counters(),
             can=self.can_counters(),
-            instructions=self.core.instructions,
-            cycles=self.core.cycles,
-            idle_instructions=self.idle_instructions,
-            idle_cycles=self.idle_cycles,
+            processor=self.processor_counters(),
         )
+
+    def latest_slot(self) -> cython.longlong:
+        """Start of its latest slot (ns); 0 before the first."""
+        return self.slot_begin if self.slots_begun else 0
+
+    def slot_counters(self) -> SlotCounters:
+        """Its slots: whether one was left unfinished, or tasks were dropped, only its program knows."""
+        return SlotCounters(
+            count=self.slots_begun,
+            latest_ns=self.latest_slot(),
+            finished_ns=self.worked_until,
+            overruns=0,
+            dropped_tasks=0,
+            near_limits=self.slots_by_cycles[18] + self.slots_by_cycles[19],
+            max_cycles=self.most_cycles,
+            total_cycles=self.all_cycles,
+            histogram=list(self.slots_by_cycles),
+            slot_ns=self.slot_match.period_ns,
+        )
+
+    def processor_counters(self) -> ProcessorCounters:
+        """What its processor did up to now."""
+        self.catch_up()
+        core: Core = self.core
+        return ProcessorCounters(core.instructions, core.cycles, self.idle_instructions, self.idle_cycles)
 
     def can_counters(self) -> list:
         """Of each controller that the program has taken out of reset mode."""

@@ -1,6 +1,7 @@
-"""SPI 0's registers, with an absolute encoder at it. LPC2194 user manual, SPI.
+"""SPI 0's registers, with an absolute encoder at it, and SPI 1's, with nothing. LPC2194 user manual, SPI.
 
-The encoder is peripherals/spi_encoder.py: what the program sends reaches nobody. Not modelled: slave mode, mode fault.
+The encoder is peripherals/spi_encoder.py: what the program sends reaches nobody. Not modelled: slave mode, mode fault,
+a transfer of SPI 1, whose pins the SSP has.
 """
 
 import cython
@@ -23,15 +24,16 @@ class SpiBlock(Block):
 
     READ_ACTS = frozenset({0x04, 0x08})
     REGISTERS = {
-        0x00: ("S0SPCR", "rw"),
-        0x04: ("S0SPSR", "r"),
-        0x08: ("S0SPDR", "rw"),
-        0x0C: ("S0SPCCR", "rw"),
-        0x1C: ("S0SPINT", "rw"),
+        0x00: ("SPCR", "rw"),
+        0x04: ("SPSR", "r"),
+        0x08: ("SPDR", "rw"),
+        0x0C: ("SPCCR", "rw"),
+        0x1C: ("SPINT", "rw"),
     }
 
-    def __init__(self, chip, clocks, hardware) -> None:
-        Block.__init__(self, chip, clocks, "SPI 0", 0xE0020000, 1 << SPI0_INPUT)
+    def __init__(self, chip, clocks, number, hardware) -> None:
+        mask = 1 << SPI0_INPUT if hardware is not None else 0
+        Block.__init__(self, chip, clocks, f"SPI {number}", 0xE0020000 + 0x10000 * number, mask)
         self.spi = None
         if hardware is not None:
             self.spi = SpiEncoder(chip, 0, hardware.word, hardware.bits, hardware.bit_rate, hardware.value_bits)
@@ -59,7 +61,7 @@ class SpiBlock(Block):
             return value
         if offset == 0x08:
             if self.spi is None:
-                self.not_modelled("a transfer without a device at SPI 0")
+                self.not_modelled("a transfer without a device at this SPI")
             if self.status_read:
                 self.status_read = False
                 return self.spi.read()
@@ -89,11 +91,11 @@ class SpiBlock(Block):
     def _transfer(self) -> None:
         """Write S0SPDR."""
         if not self.CR & CR_MASTER:
-            self.not_modelled("SPI 0 as a slave")
+            self.not_modelled("an SPI as a slave")
         if self.spi is None:
-            self.not_modelled("a transfer without a device at SPI 0")
+            self.not_modelled("a transfer without a device at this SPI")
         if self.CCR < 8:
-            self.not_modelled(f"S0SPCCR {self.CCR} (8 or more)")
+            self.not_modelled(f"a clock of SPCCR {self.CCR} (it is 8 or more)")
         bits = 8
         if self.CR & CR_BIT_ENABLE:
             bits = self.CR >> 8 & 15 or 16

@@ -17,7 +17,7 @@ cpdef enum:
 @cython.final
 cdef class ProgrammedTimer(TimerCapture):
     cdef public Clocks clocks
-    cdef public long long TCR, PR, MCR, held, passed, planned
+    cdef public long long TCR, PR, MCR, held, passed, planned, matches, match_time
     cdef public long long[4] match
     cpdef object stand(self, count)
     cpdef bint running(self) noexcept

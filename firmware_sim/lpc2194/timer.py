@@ -49,6 +49,8 @@ class ProgrammedTimer(TimerCapture):
         self.held = 0  # the count while it stands
         self.passed = 0  # matches of smaller counts have acted in this period
         self.planned = NEVER
+        self.matches = 0  # that asked for an interrupt
+        self.match_time = 0  # the latest of them
         self.stand(0)
 
     # --- what the program does ----------------------------------------------------------------------------
@@ -186,6 +188,8 @@ class ProgrammedTimer(TimerCapture):
             if self.match[n] == count:
                 if self.MCR >> MCR_BITS * n & MCR_INTERRUPT:
                     self.IR |= flag << n
+                    self.matches += 1
+                    self.match_time = at
                 if self.MCR >> MCR_BITS * n & MCR_STOP:
                     stops = True
         if at == self.next_wrap_time:

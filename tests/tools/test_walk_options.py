@@ -33,6 +33,7 @@ VALUES = {
     "daq_dropouts": st.just(True),
     "imu_port": NAMES,
     "firmware": st.lists(NAMES, min_size=1, max_size=2),
+    "image": st.lists(NAMES, min_size=1, max_size=2),
 }
 
 

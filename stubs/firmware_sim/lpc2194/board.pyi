@@ -4,13 +4,17 @@ from collections.abc import MutableSequence
 from ranger_sim.firmware_sim.arm7.core import Core
 from ranger_sim.firmware_sim.clock import Crystal
 from ranger_sim.firmware_sim.counters import BoardCounters
+from ranger_sim.firmware_sim.counters import ProcessorCounters
+from ranger_sim.firmware_sim.counters import SlotCounters
 from ranger_sim.firmware_sim.lpc2194.address_map import AddressMap
 from ranger_sim.firmware_sim.lpc2194.block import Clocks
 from ranger_sim.firmware_sim.lpc2194.can import CanFilterBlock
+from ranger_sim.firmware_sim.lpc2194.converter import ConverterBlock
 from ranger_sim.firmware_sim.lpc2194.hardware import BoardHardware
 from ranger_sim.firmware_sim.lpc2194.image import Image
 from ranger_sim.firmware_sim.lpc2194.pins import PinSelectBlock
 from ranger_sim.firmware_sim.lpc2194.system import SystemBlock
+from ranger_sim.firmware_sim.lpc2194.timer import ProgrammedTimer
 from ranger_sim.firmware_sim.lpc2194.vic import VicBlock
 from ranger_sim.firmware_sim.microcontroller import Microcontroller
 from typing import Any
@@ -20,13 +24,11 @@ STINT: int
 LONGEST_PASS: int
 DOUBTS: int
 REGISTERS: int
+SLOT_SHARES: int
 
 @dataclasses.dataclass(frozen=True)
 class ImageCounters(BoardCounters):
-    instructions: int = ...
-    cycles: int = ...
-    idle_instructions: int = ...
-    idle_cycles: int = ...
+    processor: ProcessorCounters | None = ...
 
 class ImageBoard(Microcontroller):
     core: Core
@@ -34,6 +36,7 @@ class ImageBoard(Microcontroller):
     vic_block: VicBlock
     system: SystemBlock
     pin_select: PinSelectBlock
+    converter: ConverterBlock
     acceptance: CanFilterBlock
     can_blocks: list[Any]
     asking: list[Any]
@@ -46,6 +49,13 @@ class ImageBoard(Microcontroller):
     base_cycles: int
     base_ns: int
     running_to: int
+    slot_match: ProgrammedTimer
+    slots_begun: int
+    slot_begin: int
+    worked_until: int
+    most_cycles: int
+    all_cycles: int
+    slots_by_cycles: MutableSequence[int]
     pass_cycles: int
     pass_instructions: int
     idle_cycles: int
@@ -68,4 +78,7 @@ class ImageBoard(Microcontroller):
     def stop_at(self, time: int) -> int: ...
     def catch_up(self) -> None: ...
     def counters(self) -> Any: ...
+    def latest_slot(self) -> int: ...
+    def slot_counters(self) -> SlotCounters: ...
+    def processor_counters(self) -> ProcessorCounters: ...
     def can_counters(self) -> list[Any]: ...

@@ -26,6 +26,8 @@ class ProgrammedTimer(TimerCapture):
     held: int
     passed: int
     planned: int
+    matches: int
+    match_time: int
     match: MutableSequence[int]
     def __init__(self, chip: Any, clocks: Clocks, number: Any) -> None: ...
     def stand(self, count: Any) -> None: ...

@@ -70,7 +70,7 @@ def test_a_crystal_that_changes_its_rate_changes_the_later_ticks_only():
 def everything(board):
     """All that a program can see or has done, and how long it took."""
     core = board.core
-    counts = board.counters()
+    counts = board.counters().processor
     return (list(core.r[:15]), core.pc, core.cpsr(), list(core.ram), counts.instructions, counts.cycles)
 
 
@@ -87,8 +87,8 @@ def test_loops_that_wait_are_skipped_and_nothing_but_the_time_it_takes_shows_it(
     one, other = Run(skipping).to(20_000_000, STEP), Run(executing).to(20_000_000, STEP)
     assert one.out == other.out
     assert everything(skipping) == everything(executing)
-    assert executing.counters().idle_instructions == 0
-    counts = skipping.counters()
+    assert executing.counters().processor.idle_instructions == 0
+    counts = skipping.counters().processor
     assert counts.idle_cycles > 0.8 * counts.cycles  # a service and a frame take some 130 of 6,000 cycles
 
 
