@@ -16,7 +16,7 @@ def ticker():
 
 def everything(board):
     core = board.core
-    counts = board.counters()
+    counts = board.counters().processor
     return (list(core.r[:15]), core.pc, core.cpsr(), list(core.ram), counts.instructions, counts.cycles)
 
 
@@ -96,4 +96,4 @@ def test_looking_at_a_board_of_the_chip_leaves_its_run_as_it_is():
     assert run.out == alone.out
     assert everything(board) == everything(alone.board)
     assert board.skips_idle
-    assert board.counters().idle_instructions > 0
+    assert board.counters().processor.idle_instructions > 0
