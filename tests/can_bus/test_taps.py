@@ -71,3 +71,45 @@ def test_a_client_that_left_is_gone_when_its_frame_was_sent():
         taps.poll(now)
     assert taps.leaving == 0 and leaver.sent == 1
     assert 100_000 < now < 200_000  # a frame of 8 bytes at 1 Mbit/s takes 111 bits and stuff bits
+
+
+def pass_time(taps, until_ns, step_ns=50_000):
+    for now in range(taps.time, until_ns + 1, step_ns):
+        taps.bus.advance(now)
+        taps.poll(now)
+
+
+def test_who_takes_the_place_of_another_is_a_new_client_under_its_own_name():
+    """Node, counters, queue, filters of state: nothing of the one before is left, and a bus has no more nodes."""
+    taps, (leaver, other) = clients(2)
+    leaver.offer(0x123, EIGHT_BYTES, 1, 2)
+    pass_time(taps, 2_000_000)
+    assert (leaver.sent, other.received) == (1, 1)
+    other.offer(0x124, EIGHT_BYTES, 3, 4)
+    pass_time(taps, 4_000_000)
+    assert leaver.received == 1 and leaver.events
+    leaver.controller.transmit_errors = 9
+    leaver.listen(taps.time)
+    taps.remove(leaver)
+    pass_time(taps, 5_000_000)
+    assert taps.spare == [leaver]
+    new = taps.add("the next one")
+    assert new is leaver and taps.taps == [other, new] and taps.spare == [] and len(taps.bus.nodes) == 2
+    assert (new.name, new.controller.name) == ("the next one", "the next one")
+    assert (new.sent, new.received, new.dropped, new.counters) == (0, 0, 0, (0, 0))
+    assert (new.controller.transmit_errors, new.controller.listening) == (0, True)
+    assert not (new.off or new.silent or new.leaving or new.held or new.waiting or new.loaded or new.events)
+    pass_time(taps, 7_000_000)
+    new.offer(0x125, EIGHT_BYTES, 5, 6)
+    other.offer(0x126, EIGHT_BYTES, 7, 8)
+    pass_time(taps, 9_000_000)
+    assert (new.sent, new.received, other.sent, other.received) == (1, 1, 2, 2)
+
+
+def test_a_bus_is_full_with_sixteen_clients():
+    taps, found = clients(15)
+    assert not taps.full
+    taps.add("one more")
+    assert taps.full
+    taps.remove(found[0])
+    assert not taps.full
