@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ranger_sim.boards.main_brain.data_link import CHANNELS
 from ranger_sim.datatable import parameters
 from ranger_sim.datatable.generated import all_variables
 from ranger_sim.datatable.packing import value_of_word
@@ -16,11 +17,12 @@ from ranger_sim.harness import normal_errors
 from ranger_sim.harness.ranger_names import RANGER
 from ranger_sim.harness.serial_ports import DAQ_BAUD, RealPort, reason_of
 from ranger_sim.tools.panel.channels import EMPTY, Trace, thinned
-from ranger_sim.tools.panel.source import ESTIMATED_POSE, Source, table_channels
+from ranger_sim.tools.panel.source import ANKLES, KNOWN_POSE, LEGS, Source, known_pose, table_channels
 from ranger_sim.tools.robodaq.codec import Point
-from ranger_sim.tools.robodaq.session import Session
+from ranger_sim.tools.robodaq.session import OWN, Session
 
 LOOK_S = 0.01
+MOST_CHOSEN = CHANNELS - len(OWN)
 MOST_POINTS = 60_000  # kept of each variable: two minutes of a fast one
 USUAL_OF = 50  # points whose median distance is the usual one
 SLOWEST_S = 0.5  # the slow list comes round in a third of a second (robot.md N4.15): what is later is a gap
@@ -61,7 +63,7 @@ class LinkSource(Source):
         self.place = {number: place for place, number in enumerate(table)}
         self.number = {channel.name: place for place, channel in enumerate(self.channels)}
         self.kept = [Kept() for _ in self.channels]
-        self.pose_names = ESTIMATED_POSE
+        self.pose_names = KNOWN_POSE
         self.wanted: tuple[int, ...] = ()
         self.first_ms: int | None = None
         self.first_errors: dict[tuple[int, int], float] = {}
@@ -111,7 +113,8 @@ class LinkSource(Source):
         if wanted != self.wanted:
             self.wanted = wanted
             rows = [parameters.find(self.channels[channel].name) for channel in wanted]
-            self.session.select(rows, [])
+            pose = [parameters.find(name) for name in (*LEGS[0], *LEGS[1], *ANKLES)]
+            self.session.select(rows, pose[: MOST_CHOSEN - len(rows)])
 
     def trace(self, channel: int, begin: float, end: float, points: int) -> Trace:
         kept = self.kept[channel]
@@ -130,9 +133,10 @@ class LinkSource(Source):
         return found
 
     def pose(self, at: float | None) -> tuple[float, list[float]] | None:
-        values = self.values([self.number[name] for name in self.pose_names], at)
-        known = [value for value in values if value is not None]
-        return (self.span()[1] if at is None else at, known) if len(known) == len(values) else None
+        names = [*LEGS[0], *LEGS[1], *ANKLES]
+        values = self.values([self.number[name] for name in names], at)
+        found = known_pose(dict(zip(names, values, strict=True)))
+        return None if found is None else (self.span()[1] if at is None else at, found)
 
     def state(self, at: float | None) -> dict[str, Any]:
         now_s = self.span()[1]

@@ -13,7 +13,7 @@ from ranger_sim.sysid.dataset import Dataset
 from ranger_sim.sysid.readers import run_folder
 from ranger_sim.tools import recordings
 from ranger_sim.tools.panel.channels import EMPTY, Channel, Trace, thinned
-from ranger_sim.tools.panel.source import ESTIMATED_POSE, TRUE_POSE, Source
+from ranger_sim.tools.panel.source import ANKLES, KNOWN_POSE, LEGS, TRUE_POSE, Source, known_pose
 
 TRUTH = "plant."  # begins the names of what only a simulation knows of the body
 
@@ -44,9 +44,11 @@ class RecordingSource(Source):
         if not self.data:
             raise UserError(f"{paths[0]}: there is no channel in it")
         self.number = {channel.name: place for place, channel in reversed(list(enumerate(self.channels)))}
-        self.pose_names = next(
-            (names for names in (TRUE_POSE, ESTIMATED_POSE) if all(name in self.number for name in names)), ()
-        )
+        legs_known = any(all(name in self.number for name in pair) for pair in LEGS)
+        if all(name in self.number for name in TRUE_POSE):
+            self.pose_names = TRUE_POSE
+        elif legs_known and all(name in self.number for name in ANKLES):
+            self.pose_names = KNOWN_POSE
 
     def span(self) -> tuple[float, float]:
         times = [times for times, _, _ in self.data if len(times)]
@@ -68,9 +70,15 @@ class RecordingSource(Source):
     def pose(self, at: float | None) -> tuple[float, list[float]] | None:
         if not self.pose_names:
             return None
-        values = self.values([self.number[name] for name in self.pose_names], at)
-        known = [value for value in values if value is not None]
-        return (self.span()[1] if at is None else at, known) if len(known) == len(values) else None
+        names = self.pose_names if self.pose_names is TRUE_POSE else (*LEGS[0], *LEGS[1], *ANKLES)
+        names = tuple(name for name in names if name in self.number)
+        values = dict(zip(names, self.values([self.number[name] for name in names], at), strict=True))
+        known = [value for value in values.values() if value is not None]
+        if self.pose_names is TRUE_POSE:
+            found = known if len(known) == len(values) else None
+        else:
+            found = known_pose(values)
+        return None if found is None else (self.span()[1] if at is None else at, found)
 
 
 def read(path: str, databases: Sequence[str]) -> Dataset:

@@ -10,9 +10,12 @@ from ranger_sim.datatable import parameters
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.tools.panel.channels import EMPTY, Channel, Trace
 
-# Where the robot's parts are, as the main brain estimates them: the same for a robot, real or not, and its recordings.
-# Angles against gravity, rad; robot.md N4.17.
-ESTIMATED_POSE = ("EST_STATE_TH0", "EST_STATE_TH1", "EST_STATE_PHI0", "EST_STATE_PHI1")
+# Where the robot's parts are, from what it knows itself: legs as its program of 2011 or those of 2015 and 2016 estimate
+# them, feet by the ankles' encoders. Angles against gravity, rad; robot.md N4.17, C1.
+LEGS = (("E_LO_ANGLE", "E_LI_ANGLE"), ("EST_STATE_TH0", "EST_STATE_TH1"))
+ANKLES = ("MCFO_RIGHT_ANKLE_ANGLE", "MCFI_MID_ANKLE_ANGLE")
+ANKLE_ZERO_RAD = 1.68  # between leg and foot, of the body `ranger` (plant/parameters.py); robot.md has 1.60 and 1.63
+KNOWN_POSE = ("leg_outer_rad", "leg_inner_rad", "foot_outer_rad", "foot_inner_rad")
 # As the body has them, where a body is simulated; rad, m, N, A.
 TRUE_POSE = (
     *("leg_outer_rad", "leg_inner_rad", "foot_outer_rad", "foot_inner_rad", "hip_x_m", "hip_y_m"),
@@ -78,6 +81,20 @@ class Source:
             "faults": fault_rows() if "faults" in self.can else {},
             "span": self.span(),
         }
+
+
+def known_pose(values: dict[str, float | None]) -> list[float] | None:
+    """KNOWN_POSE out of the variables LEGS and ANKLES; None where one of them is not known.
+
+    A robot's program leaves the other program's estimates at 0.
+    """
+    outer, inner = (values.get(name) for name in ANKLES)
+    estimates = [(values.get(first), values.get(second)) for first, second in LEGS]
+    there = [(first, second) for first, second in estimates if first is not None and second is not None]
+    if outer is None or inner is None or not there:
+        return None
+    legs = next((pair for pair in there if pair != (0.0, 0.0)), there[0])
+    return [*legs, legs[0] + outer - ANKLE_ZERO_RAD, legs[1] + inner - ANKLE_ZERO_RAD]
 
 
 @functools.cache

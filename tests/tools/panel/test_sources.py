@@ -14,6 +14,7 @@ from ranger_sim.harness.feed.server import FeedServer
 from ranger_sim.tools.panel.link import LinkSource
 from ranger_sim.tools.panel.recording import RecordingSource
 from ranger_sim.tools.panel.robot import ErrorList, RobotSource
+from ranger_sim.tools.panel.source import KNOWN_POSE, TRUE_POSE, known_pose
 
 SECONDS = 0.6
 
@@ -207,3 +208,23 @@ def test_the_cost_of_transport_is_energy_over_weight_and_way(walked):
     source.shown = {**source.shown, "distance_m": 10.0, "energy_Wh": {"total": 1.0}}
     source.weight_N = 98.1
     assert source.state(None)["tcot"] == pytest.approx(3600.0 / 981.0)
+
+
+def test_a_recording_without_a_body_shows_the_pose_that_the_robot_knows_itself(folder):
+    """Against the body's true angles in the same walk; the robot's estimate of its legs is some hundredths off."""
+    source = RecordingSource([str(folder)])
+    true = dict(zip(source.pose_names, source.pose(1.9)[1], strict=True))
+    source.number = {name: place for name, place in source.number.items() if name not in TRUE_POSE}
+    source.pose_names = KNOWN_POSE
+    known = dict(zip(KNOWN_POSE, source.pose(1.9)[1], strict=True))
+    assert all(known[name] == pytest.approx(true[name], abs=0.06) for name in KNOWN_POSE)
+
+
+def test_the_estimates_of_the_program_that_runs_are_taken():
+    feet = {"MCFO_RIGHT_ANKLE_ANGLE": 1.68, "MCFI_MID_ANKLE_ANGLE": 0.68}
+    record = {"E_LO_ANGLE": 0.1, "E_LI_ANGLE": -0.2, "EST_STATE_TH0": 0.0, "EST_STATE_TH1": 0.0}
+    later = {"EST_STATE_TH0": 0.3, "EST_STATE_TH1": 0.4, "E_LO_ANGLE": 0.0, "E_LI_ANGLE": 0.0}
+    assert known_pose({**feet, **record}) == pytest.approx([0.1, -0.2, 0.1, -1.2])
+    assert known_pose({**feet, **later}) == pytest.approx([0.3, 0.4, 0.3, -0.6])
+    assert known_pose({**record, "MCFO_RIGHT_ANKLE_ANGLE": 1.0}) is None
+    assert known_pose(feet) is None

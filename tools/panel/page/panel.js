@@ -16,7 +16,7 @@ const FULL_BAR_A = 10;
 let colours = {};
 const colour = (name) => colours[name] ??= getComputedStyle(document.documentElement).getPropertyValue("--" + name).trim();
 
-let hello = null, can = new Set(), number = new Map();
+let hello = null, can = new Set(), number = new Map(), listed = [];   // listed: channels, group by group
 let span = [0, 0], held = null, window_s = 10, zooms = [], view = "plots", state = {}, pose = null, poses = [];
 let playing = false, played = 0, at = null, trigger = null, shown = 0;
 
@@ -52,6 +52,8 @@ function greet(found) {
   can = new Set(hello.can);
   span = hello.span;
   number = new Map(hello.channels.map((channel, k) => [channel.name, k]));
+  const groups = [...new Set(hello.channels.map((channel) => channel.group))];
+  listed = [...hello.channels.keys()].sort((a, b) => groups.indexOf(hello.channels[a].group) - groups.indexOf(hello.channels[b].group) || a - b);
   by("title").textContent = hello.title;
   document.title = `${hello.title} – panel`;
   plots.know(hello.channels);
@@ -194,9 +196,10 @@ function channelList() {
   const drawn = new Set(plots.all().flatMap((plot) => plot.numbers));
   const rows = [];
   let group = null, count = 0;
-  hello.channels.forEach((channel, k) => {
+  for (const k of listed) {
+    const channel = hello.channels[k];
     const words = `${channel.name} ${channel.unit} ${channel.description} ${channel.group}`.toLowerCase();
-    if (!wanted.every((each) => words.includes(each))) return;
+    if (!wanted.every((each) => words.includes(each))) continue;
     count++;
     if (channel.group !== group) { group = channel.group; rows.push(Object.assign(document.createElement("li"), { className: "group", textContent: group })); }
     const item = document.createElement("li"), button = Object.assign(document.createElement("button"), { type: "button", draggable: true });
@@ -208,7 +211,7 @@ function channelList() {
     button.onclick = () => plots.put(plots.last(), k);
     item.append(button);
     rows.push(item);
-  });
+  }
   const top = by("channels").scrollTop;
   by("channels").replaceChildren(...(count ? rows : [tables.note("no channel has these words")]));
   by("channels").scrollTop = top;

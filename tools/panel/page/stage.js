@@ -15,7 +15,7 @@ export function makeStage(canvas, colour) {
         outer: { leg: of("leg_outer_rad"), foot: of("foot_outer_rad"), force: [of("outer_Fx_N"), of("outer_Fy_N")] },
         inner: { leg: of("leg_inner_rad"), foot: of("foot_inner_rad"), force: [of("inner_Fx_N"), of("inner_Fy_N")] } } };
     }
-    const legs = { outer: { leg: of("EST_STATE_TH0"), foot: of("EST_STATE_PHI0") }, inner: { leg: of("EST_STATE_TH1"), foot: of("EST_STATE_PHI1") } };
+    const legs = { outer: { leg: of("leg_outer_rad"), foot: of("foot_outer_rad") }, inner: { leg: of("leg_inner_rad"), foot: of("foot_inner_rad") } };
     const below = (side) => geometry.leg * Math.cos(legs[side].leg) - geometry.eccentricity[side] * Math.cos(legs[side].foot) + geometry.radius[side];
     return { hip: [0, Math.max(below("outer"), below("inner"))], legs };
   }
