@@ -41,6 +41,12 @@ def frames_of_the_image(name):
         ]
 
 
+def stimulus_of(name):
+    """The lines of a stimulus."""
+    with open(DATA / f"image_{name}_stimulus.csv", encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
 def frames_of_our_board(name, board, quirks, until_us):
     """What our board sends to the same stimulus."""
     bench = Bench(board, quirks, sync=False)
@@ -58,36 +64,35 @@ def frames_of_our_board(name, board, quirks, until_us):
         bench.now = until
 
     bench.volts("battery_voltage", 800 * 3.3 / 1024.0)  # 800 counts of the internal converter
-    with open(DATA / f"image_{name}_stimulus.csv", encoding="utf-8") as file:
-        for row in csv.DictReader(file):
-            at = round(float(row["t_us"]) * 1000.0)
-            if at / 1000.0 >= until_us:
-                break
-            while bench.now + 125_000 < at:
-                advance(bench.now + 125_000)
-            if row["kind"] == "can_rx":
-                identifier = getattr(table, row["name"])
-                word = int(row["value"]) if row["name"] in WHOLE else word_of_float(float(row["value"]))
-                stamp = int(row["value"]) if row["name"] in WHOLE else 0
-                inbox.push(at, ORDER_BUS, CAN_RX, bench.controller, identifier, 8, word, stamp)
-            elif row["kind"] == "edge":
-                pair = CHANNELS[row["name"]]
-                partner = int(row["more"].partition("=")[2])
-                inbox.push(
-                    at,
-                    ORDER_PINS,
-                    PIN_EDGE,
-                    PINS[f"encoder_{pair}_a"],
-                    int(row["value"]),
-                    PINS[f"encoder_{pair}_b"],
-                    partner,
-                )
-            else:
-                advance(max(at, bench.now))
-                if row["name"] == "absolute_encoder_word":
-                    bench.board.words[0] = int(row["value"])
-                elif row["name"] in COUNTS:
-                    bench.counts(COUNTS[row["name"]], int(row["value"]))
-        while bench.now / 1000.0 < until_us:
+    for row in stimulus_of(name):
+        at = round(float(row["t_us"]) * 1000.0)
+        if at / 1000.0 >= until_us:
+            break
+        while bench.now + 125_000 < at:
             advance(bench.now + 125_000)
+        if row["kind"] == "can_rx":
+            identifier = getattr(table, row["name"])
+            word = int(row["value"]) if row["name"] in WHOLE else word_of_float(float(row["value"]))
+            stamp = int(row["value"]) if row["name"] in WHOLE else 0
+            inbox.push(at, ORDER_BUS, CAN_RX, bench.controller, identifier, 8, word, stamp)
+        elif row["kind"] == "edge":
+            pair = CHANNELS[row["name"]]
+            partner = int(row["more"].partition("=")[2])
+            inbox.push(
+                at,
+                ORDER_PINS,
+                PIN_EDGE,
+                PINS[f"encoder_{pair}_a"],
+                int(row["value"]),
+                PINS[f"encoder_{pair}_b"],
+                partner,
+            )
+        else:
+            advance(max(at, bench.now))
+            if row["name"] == "absolute_encoder_word":
+                bench.board.words[0] = int(row["value"])
+            elif row["name"] in COUNTS:
+                bench.counts(COUNTS[row["name"]], int(row["value"]))
+    while bench.now / 1000.0 < until_us:
+        advance(bench.now + 125_000)
     return sent
