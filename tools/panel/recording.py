@@ -70,8 +70,8 @@ class RecordingSource(Source):
     def pose(self, at: float | None) -> tuple[float, list[float]] | None:
         if not self.pose_names:
             return None
-        names = self.pose_names if self.pose_names is TRUE_POSE else (*LEGS[0], *LEGS[1], *ANKLES)
-        names = tuple(name for name in names if name in self.number)
+        wanted = TRUE_POSE if self.pose_names is TRUE_POSE else (*LEGS[0], *LEGS[1], *ANKLES)
+        names = [name for name in wanted if name in self.number]
         values = dict(zip(names, self.values([self.number[name] for name in names], at), strict=True))
         known = [value for value in values.values() if value is not None]
         if self.pose_names is TRUE_POSE:
