@@ -248,8 +248,6 @@ class Slave:
         if missing > self.max_cto - 2 == len(packet) - 2:
             self.block = block + packet[2:]
             return b""
-        if missing > len(packet) - 2:
-            raise XcpError(ERR_CMD_SYNTAX)
         return self._write(block + packet[2 : 2 + missing], self.block_bytes)
 
     def _short_download(self, packet: bytes) -> bytes:

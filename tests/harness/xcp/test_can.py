@@ -6,6 +6,7 @@ import pathlib
 import struct
 import subprocess
 import sys
+from fractions import Fraction
 
 import can
 import numpy
@@ -51,6 +52,7 @@ class Master:
         self.tap.poll(self.robot.loop.time)
         for kind, time, identifier, flags, low, high in self.tap.events:
             if kind == RECEIVED and identifier == XCP_SLAVE_ID:
+                assert 1 <= flags <= 8  # a data frame with a standard identifier
                 self.frames.append((time, struct.pack("<II", low, high)[: flags & 15]))
         self.tap.events.clear()
 
@@ -114,12 +116,14 @@ def test_the_transport_layer_says_who_is_there_and_which_identifier_a_list_has()
     with attached() as (_, _, master):
         assert master.say("F2FF 584350 00") == "FF 58 43 50 D0 07 00 00"
         assert master.say("F2FF 584350 01") == "FF A7 BC AF D0 07 00 00"
-        assert master.say("F2FF 584351 00") == ""
+        assert master.say("F2FF 584350 00 0000") == "FF 58 43 50 D0 07 00 00"  # filled up
+        assert master.say("F2FF 584351 00") == master.say("F2FF 584350 02") == master.say("F2FF 584350") == ""
+        assert master.say("F2FE 0000") == ""  # nobody is connected
         master.say("FF00")
         assert master.say("F2FE 0000") == "FE 22"
         assert master.say("D6") == master.say("D500 0100") == "FF"
         assert master.say("F2FE 0000") == "FF 01 00 00 D1 07 00 00"
-        assert master.say("F2FD 0000 D2070000") == "FE 20"
+        assert master.say("F2FD 0000 D2070000") == master.say("F2FE") == master.say("F2") == "FE 20"
 
 
 def test_commands_that_need_more_than_a_frame_are_unknown_and_blocks_serve_instead():
@@ -265,7 +269,7 @@ def test_after_bus_off_the_probe_comes_back():
         node = next(each for each in bus.nodes if each.name == "XCP")
         node.transmit_errors = 250  # the next error is the last
         bus.set_bit_error_rate(0.01)
-        while not probe.counters()["bus_off"]:
+        while probe.counters()["bus_off"] < 1:
             assert robot.time_s < 0.1
             master.send("FD")
             master.pass_time(0.001)
@@ -306,6 +310,18 @@ def test_the_example_measures_over_python_can(tmp_path):
             printed = example.stdout.read()
     assert example.returncode == 0
     assert [line.split()[0] for line in printed.splitlines()] == ["0.00", "0.50", "1.00", "1.50", "2.00"]
+
+
+def test_a_bus_may_be_filled_to_the_bound_and_no_bit_further():
+    with attached() as (_, probe, _):
+        lists = [(7, 500_000), (5, 2_000_000)]
+        # 125 and 105 bits at the most, of 3 Mbit/s
+        assert probe.share_of(lists) == Fraction(125, 1500) + Fraction(105, 6000)
+        assert probe.robots_share == Fraction(126, 1000)
+        probe.robots_share = Fraction(4, 5) - probe.share_of(lists)
+        assert probe.bears(lists)
+        probe.robots_share += Fraction(1, 3_000_000)
+        assert not probe.bears(lists)
 
 
 def test_a_bus_that_there_is_not_is_told():

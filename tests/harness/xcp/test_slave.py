@@ -22,6 +22,8 @@ class Bytes:
         return bytes(self.data[address - 0x100 : address - 0x100 + count])
 
     def write(self, address, data):
+        if not 0x100 <= address <= 0x110 - len(data):
+            raise XcpError(0x22)
         if address != 0x10C or len(data) != 4:
             raise XcpError(0x24)
         self.data[12:16] = data
@@ -56,6 +58,10 @@ def test_nothing_but_connect_is_answered_before_connect():
         ("F4 02 00 00 04010000", "FF 04 05"),
         ("F4 08 00 00 00010000", "FE 22"),
         ("F4 02 00 01 04010000", "FE 22"),
+        ("F4 00 00 00 04010000", "FE 22"),
+        ("F5 00", "FE 22"),
+        ("F0 00 01", "FE 21"),
+        ("F0 01 01", "FE 22"),  # one byte at the pointer, where there is no memory yet
         ("F4 02 00 00 0F010000", "FE 22"),
         ("DA", "FF 13 20 00 03 00 00 00"),
         ("D9", "FF 01 04 01 00 42 01 00"),
@@ -131,6 +137,8 @@ def test_lists_are_allocated_in_the_order_of_the_standard(slave):
     assert say(slave, "D5 00 0100") == "FF"
     assert say(slave, "D3 00 0000 00 01") == "FE 29"
     assert say(slave, "D4 00 0000 FD") == "FE 30"
+    assert say(slave, "D4 00 0000 01") == "FF"
+    assert say(slave, "D3 00 0000 00 08") == "FE 30" and say(slave, "D3 00 0000 00 07") == "FF"
 
 
 def test_lists_are_not_changed_while_one_runs(slave):
@@ -186,11 +194,11 @@ def test_a_block_that_is_broken_off_writes_nothing(slave, packets, answer):
 def test_several_entries_are_written_by_one_command_where_a_packet_has_room():
     slave = Slave(Bytes(), 248, 1400, FINE)
     say(slave, "FF00")
-    for command in ("D6", "D500 0100", "D400 0000 01", "D300 0000 00 02", "E200 0000 00 00"):
+    for command in ("D6", "D500 0100", "D400 0000 01", "D300 0000 00 03", "E200 0000 00 00"):
         assert say(slave, command) == "FF"
-    assert say(slave, "C7 02 FF 04 00010000 00 00 FF 02 08010000 00 00") == "FF"
-    assert slave.lists[0].tables == [[(0x100, 4), (0x108, 2)]]
-    assert say(slave, "D8 00 0000") == "FF 04 01 02 00 00"
+    assert say(slave, "C7 03 FF 04 00010000 00 00 FF 02 08010000 00 00 FF 01 0A010000 00 00") == "FF"
+    assert slave.lists[0].tables == [[(0x100, 4), (0x108, 2), (0x10A, 1)]]
+    assert say(slave, "D8 00 0000") == "FF 04 01 03 00 00"
     assert say(slave, "C7 01 FF 04 00010000") == "FE 21"
     assert say(Slave(Bytes()), "C7 01") == ""
 
