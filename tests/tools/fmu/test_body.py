@@ -43,6 +43,62 @@ def test_every_number_of_the_bodys_table_is_a_parameter_with_its_unit_limits_and
         assert key.metadata["source"] in each.description and each.limits == key.metadata.get("limits")
 
 
+def test_the_inputs_start_as_a_bridge_does_at_power_up():
+    body = body_of(SCENARIO)
+    of_a_motor = {"match_2": 0, "match_6": 0, "period": 600, "delay_s": 0.0, "low_side_2": True, "low_side_6": True}
+    of_a_motor["watchdog"] = False
+    motors = ("hip", "outer_ankle", "inner_ankle", "steering")
+    inputs = {name: each.start for name, each in body.quantities.items() if each.causality == "input"}
+    wanted = {f"{motor}.{name}": value for motor in motors for name, value in of_a_motor.items()}
+    assert inputs == {**wanted, "imu.mode": 207, "held.now": True}
+    drive = body.plant.bridges[0]
+    assert (drive.mr2, drive.mr6, drive.mr0, drive.enable2, drive.enable6) == (0, 0, 600, True, True)
+    assert body.advance(1) and drive.count == 0  # nothing was written: all is as it was
+    assert len([each for each in body.quantities.values() if each.causality == "output"]) == 68
+    assert {"sensor.imu_roll_rad", "sensor.imu_rate_x_rad_s", "sensor.hip_absolute"} <= set(body.quantities)
+
+
+def test_a_bridge_is_told_only_what_has_changed():
+    body = body_of(SCENARIO)
+    told = []
+
+    class Bridge:
+        def __getattr__(self, name):
+            return lambda *values: told.append((name, *values))
+
+    plant = body.plant
+    body.set("hip.match_2", 7)
+    body.set("hip.delay_s", 3e-6)
+
+    class Plant:
+        time_ns = 1_000_000
+        bridges = [Bridge() for _ in range(4)]
+        imu = plant.imu
+
+    body._act(Plant)
+    body._act(Plant)
+    body.set("hip.low_side_6", False)
+    body.set("hip.watchdog", True)
+    body._act(Plant)
+    assert told == [
+        ("write_pwm", 1_003_000, 7, 0, 600),
+        ("low_side", 1_000_000, True, False),
+        ("watchdog_edge", 1_000_000),
+    ]
+    assert plant.imu.mode == 207
+
+
+def test_a_body_that_begins_again_is_as_new():
+    body = body_of(SCENARIO)
+    body.set("seed", 2**63 - 1)
+    body.set("seed", SCENARIO.seed)
+    first = dict(body_of(SCENARIO).values)
+    body.set("held.now", False)
+    assert body.advance(3) and body.steps == 3 and body.steps_in(0.00075, 0.00025, 0.0) == 1
+    body.begin()
+    assert body.steps == 0 and body.holding and body.values == {**first, "held.now": False}
+
+
 def test_a_parameter_acts_and_is_fixed_once_the_body_has_moved():
     heavy = body_of(SCENARIO, body__total_mass_kg=20.0)
     light = body_of(SCENARIO)
