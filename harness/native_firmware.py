@@ -5,7 +5,8 @@ import pathlib
 import re
 
 from ranger_sim.firmware_sim.native import build as compiling
-from ranger_sim.firmware_sim.native import image_build
+from ranger_sim.firmware_sim.native import coverage as counting
+from ranger_sim.firmware_sim.native import image_build, sanitizers
 from ranger_sim.firmware_sim.native import manifest as manifests
 from ranger_sim.foundation.user_error import UserError
 
@@ -17,7 +18,7 @@ VERSION_FILE = "ranger_table.h"
 class Firmware:
     """A folder of firmware, built. `warnings` of the compiler; `sanitize`, `coverage`: how it was built.
 
-    table: folder of the generated C that it was compiled with.
+    table: folder of the generated C that it was compiled with. counts: folder for what ran, with `coverage`.
     """
 
     folder: pathlib.Path
@@ -28,6 +29,23 @@ class Firmware:
     was_made: bool = True
     sanitize: bool = False
     coverage: bool = False
+    counts: pathlib.Path | None = None
+
+    def findings(self) -> list[sanitizers.Finding]:
+        """What the sanitizers have found in it so far, in this process and those that it has forked."""
+        logs = sanitizers.place_of_findings() if self.sanitize else None
+        return sanitizers.findings(logs, [self.program]) if logs is not None else []
+
+    @property
+    def program(self) -> sanitizers.Program:
+        """Whose findings are looked for."""
+        return sanitizers.Program(self.library, self.folder)
+
+    def ran(self) -> list[counting.FileCounts]:
+        """Which lines of it ran, as far as boards have written that."""
+        if not self.coverage or self.counts is None:
+            return []
+        return counting.read(self.library, self.folder, self.counts)
 
 
 def build(

@@ -6,8 +6,11 @@ by the tables of harness/wiring.py; `harness/lockstep.py` then passes time and c
 
 from __future__ import annotations
 
+import dataclasses
 import difflib
 import os
+import pathlib
+import tempfile
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, Literal, overload
 
@@ -110,6 +113,14 @@ class Ranger(Machine):
         )
         self.is_watched = False
         self.firmware: dict[str, Firmware] = native_boards.built(firmware if firmware is not None else {})
+        self.counts = None
+        if any(each.coverage and each.counts is None for each in self.firmware.values()):
+            self.counts = tempfile.TemporaryDirectory(prefix="ranger-sim-counts-")
+            place = pathlib.Path(self.counts.name)
+            self.firmware = {
+                name: dataclasses.replace(each, counts=each.counts or place / name) if each.coverage else each
+                for name, each in self.firmware.items()
+            }
         self._try_firmware(start_ns)
         self.in_own_process: tuple[str, ...] = () if in_process else tuple(self.firmware)
         self.processes: Apart | None = None
@@ -170,6 +181,7 @@ class Ranger(Machine):
             from ranger_sim.harness.robot_native_board import RobotNativeBoard  # only here: it loads cffi
 
             board = RobotNativeBoard(name, self.firmware[name], crystal, power_up_ns, record)
+            board.counts = self.firmware[name].counts
             if record is None and self.is_watched:  # one that takes another's place
                 self._watch(board)
             return board
@@ -400,6 +412,8 @@ class Ranger(Machine):
         """Give back the log's files, the ends that lead outside, golden runs and the processes of boards."""
         if self.processes is not None:
             self.processes.close()
+        if self.counts is not None:
+            self.counts.cleanup()
         Machine.close(self)
 
     def summary(self) -> dict:

@@ -1,5 +1,6 @@
 """The walk in numbers."""
 
+import dataclasses
 import math
 from typing import Any
 
@@ -9,6 +10,7 @@ from ranger_sim.datatable.generated import errors as error_table
 from ranger_sim.harness.vital_signs import alive, can
 
 JOULES_PER_WH = 3600.0
+COVERAGE = ("lines", "covered", "branches", "taken")
 SKIPPED_STEPS = 5  # the start is left out of means
 
 
@@ -154,13 +156,31 @@ def errors(counters: RangerCounters) -> dict:
 
 
 def firmware(robot: Any, board: str) -> dict:
-    """What became of a board's program in C."""
+    """What became of a board's program in C, what was found in it, and what of it ran."""
     made = robot.firmware[board]
     death = next((each for each in robot.deaths if each["board"] == board), None)
+    if not robot.loop.board(board).apart:
+        robot.loop.board(board).write_counts()
     return {
         "name": made.manifest.name,
         "folder": str(made.folder),
         "own_process": bool(robot.loop.board(board).apart),
         "lost_s": death["time_s"] if death is not None else None,
         "why": (death["why"] or None) if death is not None else None,
+        "findings": [dataclasses.asdict(each) for each in found_in(robot, board)],
+        "coverage": ran(made, is_whole=death is None or bool(death["why"])),
     }
+
+
+def found_in(robot: Any, board: str) -> list[Any]:
+    """Of a source that several boards run the first one tells."""
+    folder = robot.firmware[board].folder
+    first = next(name for name, each in robot.firmware.items() if each.folder == folder)
+    return robot.firmware[board].findings() if first == board else []
+
+
+def ran(made: Any, is_whole: bool) -> dict:
+    """How much of a program in C ran; None for all figures where nobody counted."""
+    files = [each.figures(made.folder) for each in made.ran()]
+    sums = {key: sum(each[key] for each in files) if made.coverage else None for key in COVERAGE}
+    return {**sums, "whole": is_whole if made.coverage else None, "files": files}

@@ -31,6 +31,8 @@ NO_TIME = "no time has passed"
 NOT_YET = "not yet"
 NO_STRIKE = "no step yet, or a contact whose strikes last"
 
+NO_COVERAGE = "--coverage was not asked for"
+
 FIGURES = (
     # the walk
     Figure("steps", COUNT, "", "steps walked"),
@@ -177,6 +179,27 @@ FIGURES = (
     Figure("firmware.{board}.own_process", FLAG, "", "it had a process of its own, which it could end alone"),
     Figure("firmware.{board}.lost_s", REAL, "s", "when its process was gone, since power-up", "it was not"),
     Figure("firmware.{board}.why", TEXT, "", "signal, function, file and line that ended it", "nothing is known"),
+    Figure("firmware.{board}.findings[].file", TEXT, "", "where a sanitizer found something, relative to the folder"),
+    Figure("firmware.{board}.findings[].line", COUNT, "", "its line; 0 where it is not known"),
+    Figure("firmware.{board}.findings[].function", TEXT, "", "its function; empty where it is not known"),
+    Figure("firmware.{board}.findings[].text", TEXT, "", "what is wrong there"),
+    Figure(
+        "firmware.{board}.findings[].count",
+        COUNT,
+        "",
+        "reports; a process tells of a place once. Of a source that several boards run the first board has them",
+    ),
+    Figure("firmware.{board}.coverage.lines", COUNT, "", "lines with code", NO_COVERAGE),
+    Figure("firmware.{board}.coverage.covered", COUNT, "", "of them those that ran", NO_COVERAGE),
+    Figure("firmware.{board}.coverage.branches", COUNT, "", "ways out of decisions", NO_COVERAGE),
+    Figure("firmware.{board}.coverage.taken", COUNT, "", "of them those that were taken", NO_COVERAGE),
+    Figure("firmware.{board}.coverage.whole", FLAG, "", "false: the board ended before it could write", NO_COVERAGE),
+    Figure("firmware.{board}.coverage.files[].file", TEXT, "", "a source, relative to the folder"),
+    Figure("firmware.{board}.coverage.files[].lines", COUNT, "", "its lines with code"),
+    Figure("firmware.{board}.coverage.files[].covered", COUNT, "", "of them those that ran"),
+    Figure("firmware.{board}.coverage.files[].branches", COUNT, "", "ways out of its decisions"),
+    Figure("firmware.{board}.coverage.files[].taken", COUNT, "", "of them those that were taken"),
+    Figure("firmware.{board}.coverage.files[].missed", TEXT, "", "lines that did not run, as 3-7, 12"),
     # faults that were injected
     Figure("faults[].fault", TEXT, "", "as it is typed: place, mode, parameters, begin, end"),
     Figure("faults[].armed_s", REAL, "s", "when it was armed, since power-up", NOT_YET),

@@ -36,7 +36,13 @@ IN_PROCESS = Option(
     "run the firmware in the walk's own process instead of one of its own: faster, but a crash ends the walk",
     of_run=False,
 )
-OPTIONS = (FIRMWARE, SANITIZE)
+COVERAGE = Option(
+    "--coverage",
+    "count which lines and branches of the firmware run, by gcc's gcov: figures in the summary, sources in the report, "
+    "lcov.info in --out",
+    of_run=False,
+)
+OPTIONS = (FIRMWARE, SANITIZE, COVERAGE)
 TARGETS = ("host", "lpc2194")
 EXIT_FOUND = 1
 
@@ -118,6 +124,31 @@ def folders_of(options: argparse.Namespace) -> list[str]:
     return [native_boards.placed(text)[1] for text in options.firmware]
 
 
+def programs_in(folders: list[str]) -> list[sanitizers.Program]:
+    """Every library that was built in the folders."""
+    return [
+        sanitizers.Program(library, pathlib.Path(folder))
+        for folder in dict.fromkeys(folders)
+        for library in (pathlib.Path(folder) / "build").glob("*-sanitize*.so")
+    ]
+
+
+def coverage_lines(summary: dict) -> list[str]:
+    """How much of each program ran, and which lines did not."""
+    lines = []
+    for board, each in summary["firmware"].items():
+        ran = each["coverage"]
+        if ran["lines"] is None:
+            continue
+        lost = "" if ran["whole"] else "; its process ended before it could write"
+        lines.append(
+            f"{board}: {each['name']}: {ran['covered']} of {ran['lines']} lines ran, "
+            f"{ran['taken']} of {ran['branches']} branches{lost}"
+        )
+        lines += [f"  {file['file']}: not run: {file['missed']}" for file in ran["files"] if file["missed"]]
+    return lines
+
+
 def run_sanitized(options: argparse.Namespace, folders: list[str]) -> int:
     """The same command in a process that can hold sanitizers; tells what they found, also when it ended by a signal."""
     with tempfile.TemporaryDirectory(prefix="ranger-sim-findings-") as logs:
@@ -132,9 +163,9 @@ def run_sanitized(options: argparse.Namespace, folders: list[str]) -> int:
         finally:
             signal.signal(signal.SIGINT, interrupt)
             signal.signal(signal.SIGTERM, end)
-        found = sanitizers.findings(place, [pathlib.Path(folder) for folder in folders])
-    for line in found:
-        print(f"ranger-sim: firmware: {line}", file=sys.stderr)
+        found = sanitizers.findings(place, programs_in(folders))
+    for each in found:
+        print(f"ranger-sim: firmware: {each.told()}", file=sys.stderr)
     if code < 0:
         print(f"ranger-sim: the run was ended by {signal.Signals(-code).name}", file=sys.stderr)
         return EXIT_FOUND

@@ -22,7 +22,8 @@ OPEN = "incomplete.json"
 BUS_LOGS = ("can1.log", "can2.log", "can3.log", "can4.log")
 VARIABLES = "variables.mf4"
 REPORT = "report.html"
-FILES = (*BUS_LOGS, VARIABLES, REPORT)  # beside the summary
+LCOV = "lcov.info"
+FILES = (*BUS_LOGS, VARIABLES, REPORT, LCOV)  # beside the summary
 # Bytes that incomplete.json takes from the disk at the start, so that a summary (some 20 kB) fits into it when the disk
 # is full at the end. Chosen by us.
 RESERVED = 65_536

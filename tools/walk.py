@@ -13,6 +13,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn
 
 from ranger_sim import loading
+from ranger_sim.firmware_sim.native import coverage
 from ranger_sim.foundation import wallclock
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness import native_boards, normal_errors
@@ -25,9 +26,9 @@ from ranger_sim.harness.scenario import Scenario, StopRule
 from ranger_sim.plant import terms
 from ranger_sim.tools import faults, serial_options, terminal, trace, unexpected
 from ranger_sim.tools.files import json_target, replace_file, writable_folder
-from ranger_sim.tools.firmware import folders_of, run_sanitized, wants_another_process
+from ranger_sim.tools.firmware import coverage_lines, folders_of, run_sanitized, wants_another_process
 from ranger_sim.tools.images import images_of
-from ranger_sim.tools.run_folder import REPORT, SUMMARY, RunFolder
+from ranger_sim.tools.run_folder import LCOV, REPORT, SUMMARY, RunFolder
 from ranger_sim.tools.run_logs import RunLogs, write_frames
 from ranger_sim.tools.units import duration_text, figure, length_text
 from ranger_sim.tools.walk_options import add_walk_options, command_again, log_of, scenario_of, stop_of
@@ -147,7 +148,13 @@ def firmware_of(options: argparse.Namespace, console: Console) -> dict[str, Firm
         if board in wanted:
             raise UserError(f"--firmware {text}: {board} has {wanted[board]} already")
         wanted[board] = folder
-    firmware = {board: native_boards.build(folder, options.sanitize) for board, folder in wanted.items()}
+    if options.coverage and not wanted:
+        raise UserError("--coverage: there is no firmware in C in this run; --firmware BOARD=DIR gives a board one")
+    if options.coverage:
+        coverage.gcov()  # told before anything runs
+    firmware = {
+        board: native_boards.build(folder, options.sanitize, options.coverage) for board, folder in wanted.items()
+    }
     for each in firmware.values():
         for line in each.warnings:
             console.print(line, highlight=False, markup=False, soft_wrap=True)
@@ -299,6 +306,9 @@ def clock_text(seconds: float) -> str:
 
 def write_files(robot: Ranger, summary: dict, folder: RunFolder, logs: RunLogs | None, console: Console) -> None:
     """Logs and report, as far as there is something to show, then the summary."""
+    if any(each.coverage for each in robot.firmware.values()):
+        with folder.file(LCOV) as path:
+            path.write_text(coverage.lcov(coverage.merged(each.ran() for each in robot.firmware.values())), "utf-8")
     if logs is not None:
         with console.status("writing logs and report ..."):
             logs.finish()
@@ -325,6 +335,8 @@ def print_summary(summary: dict, floor_friction: float, console: Console) -> Non
     console.print(energy_text(summary), highlight=False, soft_wrap=True)
     for fault in summary["faults"]:
         console.print(faults.fault_text(fault), highlight=False, soft_wrap=True)
+    for line in coverage_lines(summary):
+        console.print(line, highlight=False, soft_wrap=True)
     for line in [*unexpected.lines(summary, floor_friction), *usual_lines(summary["errors"], summary["time_s"])]:
         console.print(line, highlight=False, soft_wrap=True)
 

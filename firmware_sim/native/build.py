@@ -33,8 +33,14 @@ OPTIONS = (
 )  # fmt: skip
 # Its own functions come first, whatever else is loaded; what is missing is told now and not at loading.
 LINKING = ("-shared", "-Wl,-Bsymbolic", "-Wl,--no-undefined")
-# -O1 keeps lines and variables true; findings are told, and the program goes on.
-SANITIZING = ("-O1", "-fsanitize=address,undefined", "-fsanitize-recover=address,undefined", "-fno-sanitize=vptr")
+# -O1 and functions as they were written keep lines and variables true; findings are told, and the program goes on.
+SANITIZING = (
+    "-O1",
+    "-fno-inline",
+    "-fsanitize=address,undefined",
+    "-fsanitize-recover=address,undefined",
+    "-fno-sanitize=vptr",
+)
 COVERING = ("-O0", "--coverage")
 
 MESSAGE = re.compile(
@@ -106,10 +112,20 @@ def build(
             tried(f"{path}", path, manifest.folder, lambda record: _look_at(made, path, record))
             stamp.unlink(missing_ok=True)
             made.replace(path)
+            if coverage:
+                _keep_notes(pathlib.Path(making), path.with_suffix(".notes"))
             stamp.write_text(state, encoding="utf-8")
     except OSError as error:
         raise UserError(f"{error.filename or folder}: {error.strerror}: nothing can be built there") from None
     return Built(path, warnings)
+
+
+def _keep_notes(making: pathlib.Path, place: pathlib.Path) -> None:
+    """The compiler's notes on what it counts, for who reads the counts (coverage.py)."""
+    shutil.rmtree(place, ignore_errors=True)
+    place.mkdir()
+    for note in making.glob("*.gcno"):
+        note.replace(place / note.name)
 
 
 def _look_at(made: pathlib.Path, shown: pathlib.Path, record: Any) -> None:
@@ -130,7 +146,8 @@ def _compile(
     """Compile and link in the folder `making`; returns the warnings. The runtime is not watched itself."""
     said: list[str] = []
     objects = [str(making / "runtime.o")]
-    code, text = run_compiler([program, *OPTIONS, f"-I{INCLUDE}", "-c", str(RUNTIME), "-o", objects[0]])
+    counting = ["-DFW_COVERAGE"] if "--coverage" in watching else []
+    code, text = run_compiler([program, *OPTIONS, *counting, f"-I{INCLUDE}", "-c", str(RUNTIME), "-o", objects[0]])
     if code:
         raise UserError(f"{RUNTIME} does not compile with {program}:", *text[:20])
     failed = False

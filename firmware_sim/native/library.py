@@ -3,16 +3,18 @@
 Every board gets a copy of the file, so that two boards from one source share no variable.
 """
 
+import atexit
 import contextlib
 import os
 import pathlib
 import shutil
 import tempfile
+from collections.abc import Iterator
 from typing import Any
 
 import cffi
 
-from ranger_sim.firmware_sim.native import crash, sanitizers
+from ranger_sim.firmware_sim.native import coverage, crash, sanitizers
 from ranger_sim.foundation.user_error import UserError
 
 VERSION = 1  # of the header: FW_VERSION
@@ -55,13 +57,14 @@ extern int64_t fw_mail[32];
 int64_t fw_turn(void);
 extern uint32_t fw_turns;
 int32_t fw_watch(int64_t *record, int32_t limit_s, const char *message);
-int32_t fw_write_counts(void);
-int32_t fw_forget_counts(void);
+extern uint32_t fw_counts_lines;
+void fw_write_counts(void);
+void fw_end_counts(void);
 """
 SIZED = ("fw_task", "fw_step", "fw_schedule", "fw_interrupt")  # in the order of fw_sizes
 ENTRY_POINTS = "firmware_start() and one of firmware_schedule() and firmware_main()"
 
-WATCHED: list[Any] = []  # libraries whose code handles signals of this process: they stay loaded
+WATCHED: list[Any] = []  # libraries that stay loaded: their code handles signals of this process, or counts
 
 ffi: Any = cffi.FFI()
 ffi.cdef(DECLARATIONS)
@@ -100,6 +103,23 @@ class Library:
             raise UserError(f"{path}: firmware_schedule() and firmware_main() are both there: one of them is too many")
         self.schedule = kinds == ["firmware_schedule"]
         self.turns = ffi.addressof(self.code, "fw_turns")
+        if self.code.fw_counts_lines:
+            WATCHED.append(self)  # it would write its counts when it is unloaded
+            atexit.register(self._end_counts)
+
+    def write_counts(self, folder: pathlib.Path) -> None:
+        """Add what ran since the last time to the counts below `folder` (coverage.py); nothing where nothing counts."""
+        if self.code.fw_counts_lines:
+            with _setting({coverage.PREFIX: str(folder)}):
+                self.code.fw_write_counts()
+
+    def _end_counts(self) -> None:
+        """Who has wanted counts has got them; without this libgcov writes some at the end of the process."""
+        with (
+            tempfile.TemporaryDirectory(prefix="ranger-sim-counts-") as nobodys,
+            _setting({coverage.PREFIX: nobodys}),
+        ):
+            self.code.fw_end_counts()
 
     def table_version(self) -> int | None:
         """Of the master table that it was compiled with; None where it does not say."""
@@ -132,6 +152,21 @@ class Library:
         while self.code.fw_call_names[len(names)] != ffi.NULL:
             names.append(text(self.code.fw_call_names[len(names)]))
         return names
+
+
+@contextlib.contextmanager
+def _setting(variables: dict[str, str]) -> Iterator[None]:
+    """Inside, this process has these variables of the environment."""
+    before = {name: os.environ.get(name) for name in variables}
+    os.environ.update(variables)
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                os.environ.pop(name, None)
+            else:
+                os.environ[name] = value
 
 
 def _loaded_copy(path: pathlib.Path) -> Any:

@@ -406,6 +406,7 @@ class NativeBoard(Microcontroller):
         self.pin_levels = ffi.from_buffer("int64_t[]", levels)
         self.library.code.fw_pin_levels = self.pin_levels
         self.callbacks = [self._callback(call, name) for call, name in enumerate(self.library.call_names())]
+        self.counts: pathlib.Path | None = None  # folder for coverage
         self.turn = 0
         self.reached = phase_ns
         with self._running():
@@ -479,6 +480,11 @@ class NativeBoard(Microcontroller):
         if self.failure is not None:
             raise self.failure
         return next_time
+
+    def write_counts(self) -> None:
+        """Add which lines of its program ran to the counts below `counts`; nothing where that is not asked for."""
+        if self.counts is not None:
+            self.library.write_counts(self.counts)
 
     def leave_record_in(self, words: Any, message: str = "") -> None:
         """From now on a signal that ends this process leaves in `words` where the program was (library.py)."""

@@ -4,11 +4,15 @@ The runtime of the address sanitizer must be in a process before anything else, 
 own, started with LD_PRELOAD. What is found goes to files, and the run goes on.
 """
 
+import collections
 import contextlib
 import ctypes
+import dataclasses
+import functools
 import os
 import pathlib
 import re
+import shutil
 import subprocess
 from collections.abc import Iterable
 
@@ -60,32 +64,97 @@ def lead_findings() -> None:
             runtime.__sanitizer_set_report_path(f"{place}-undefined".encode())
 
 
-def findings(logs: pathlib.Path, folders: Iterable[pathlib.Path]) -> list[str]:
-    """What was found, a line each with file and line, each once; files relative to the firmware's folder."""
-    places = [folder.resolve() for folder in folders]
-    found = []
-    for log in logs.glob("findings*"):
+@dataclasses.dataclass(frozen=True)
+class Finding:
+    """One place at which something is wrong. `function`: empty where it is not known.
+
+    count: how often it was reported; each process tells of a place once, however often it runs through it.
+    """
+
+    file: str
+    line: int
+    function: str
+    text: str
+    count: int = 1
+
+    def told(self) -> str:
+        """`hip.c:42: signed integer overflow: ... in control()`."""
+        place = f"{self.file}:{self.line}: " if self.line else f"{self.file}: " if self.file else ""
+        return f"{place}{self.text}{f' in {self.function}()' if self.function else ''}"
+
+
+@dataclasses.dataclass(frozen=True)
+class Program:
+    """Whose findings are looked for: a library, and the folder of its sources."""
+
+    library: pathlib.Path
+    folder: pathlib.Path
+
+
+def place_of_findings() -> pathlib.Path | None:
+    """The folder to which this process and those it forks write what is found; None without sanitizers."""
+    place = os.environ.get(PLACE)
+    return pathlib.Path(place).parent if place is not None else None
+
+
+def findings(logs: pathlib.Path, programs: Iterable[Program]) -> list[Finding]:
+    """What was found so far, by file and line; files relative to the firmware's folder."""
+    programs = [dataclasses.replace(each, folder=each.folder.resolve()) for each in programs]
+    found: list[Finding] = []
+    for log in sorted(logs.glob("findings*")):
         text = log.read_text(encoding="utf-8", errors="replace")
-        found += [_undefined(each, places) for each in UNDEFINED.finditer(text)]
-        found += [_address(each[0], each["what"], places) for each in ADDRESS.finditer(text)]
-    return sorted(set(found))
+        found += [_undefined(each, programs) for each in UNDEFINED.finditer(text)]
+        found += [_address(each[0], each["what"], programs) for each in ADDRESS.finditer(text)]
+    times = collections.Counter(found)
+    order = sorted(times, key=lambda each: (each.file, each.line, each.text))
+    return [dataclasses.replace(each, count=times[each]) for each in order]
 
 
-def _undefined(found: re.Match[str], folders: list[pathlib.Path]) -> str:
-    path = pathlib.Path(found["file"]).resolve()
-    inside = [path.relative_to(folder) for folder in folders if path.is_relative_to(folder)]
+def _undefined(found: re.Match[str], programs: list[Program]) -> Finding:
+    path, line = pathlib.Path(found["file"]).resolve(), int(found["line"])
     text = re.sub(r"address 0x[0-9a-f]+", "an address", found["text"])  # another one in every run
-    return f"{inside[0] if inside else path.name}:{found['line']}: {text}"
+    for program in programs:
+        if path.is_relative_to(program.folder):
+            function = _function_at(program.library, path, line)
+            return Finding(str(path.relative_to(program.folder)), line, function, text)
+    return Finding(path.name, line, "", text)
 
 
-def _address(text: str, what: str, folders: list[pathlib.Path]) -> str:
+def _address(text: str, what: str, programs: list[Program]) -> Finding:
     if access := ACCESS.search(text):
         what = f"{what}: {access['access'].lower()} of {access['size']} bytes"
     for frame in FRAME.finditer(text):
-        for folder in folders:
-            library = folder / "build" / f"{frame['name']}.so"
-            if library.is_file():
-                (line,) = lines_of(library, folder, [int(frame["offset"], 16)])
-                function, at, place = line.partition(" at ")
-                return f"{place}: {what} in {function}" if at else f"{line}: {what}"
-    return f"{what}, outside of the program's code"
+        for program in programs:
+            if program.library.stem == frame["name"] and program.library.is_file():
+                (told,) = lines_of(program.library, program.folder, [int(frame["offset"], 16)])
+                function, at, place = told.partition("() at ")
+                file, _, line = place.rpartition(":")
+                return (
+                    Finding(file, int(line), function, what) if at and line.isdecimal() else Finding(told, 0, "", what)
+                )
+    return Finding("", 0, "", f"{what}, outside of the program's code")
+
+
+@functools.cache
+def _functions(library: pathlib.Path) -> tuple[tuple[str, int, str], ...]:
+    """(file, first line, name) of every function of a library, by nm of the binutils; none where there is no nm."""
+    program = shutil.which("nm")
+    if program is None or not library.is_file():
+        return ()
+    done = subprocess.run([program, "-l", "--defined-only", str(library)], capture_output=True, check=False, text=True)
+    found = []
+    for row in done.stdout.splitlines():
+        symbol, _, place = row.partition("\t")
+        file, _, line = place.rpartition(":")
+        words = symbol.split()
+        if len(words) == 3 and words[1] in "tT" and line.isdecimal():
+            found.append((file, int(line), words[2]))
+    return tuple(sorted(found))
+
+
+def _function_at(library: pathlib.Path, path: pathlib.Path, line: int) -> str:
+    """The function that begins last before a line of a file."""
+    before = [
+        name for file, first, name in _functions(library) if pathlib.Path(file).resolve() == path and first <= line
+    ]
+    return before[-1] if before else ""

@@ -5,6 +5,7 @@ import traceback
 from typing import Any
 
 from ranger_sim.firmware_sim.gdb.server import GdbServer
+from ranger_sim.firmware_sim.native import coverage
 from ranger_sim.foundation import wallclock
 from ranger_sim.harness import wiring
 from ranger_sim.harness.fresh_board import first_outputs, fresh_board, pass_on
@@ -70,6 +71,8 @@ def serve(
         said = first_outputs(board)
     if name in robot.firmware:
         board.leave_record_in(crash_record)
+        if board.counts is not None:
+            os.environ[coverage.PREFIX] = str(board.counts)  # for a crash, which writes them as well
     if block.table_words:
         board.move_memory(block.table())
     wires = [

@@ -44,7 +44,7 @@ from ranger_sim.harness.processes.stage cimport Audience
 
 cdef class Endpoint:
     cdef public Microcontroller board
-    cdef public bint counts_errors
+    cdef public bint counts_errors, runs_c
     cdef public object clock, shared, activity
     cdef public long long[::1] block, stage
     cdef public double[::1] stage_doubles

@@ -97,6 +97,7 @@ class Endpoint:
         )
         self.audience = audience
         self.counts_errors = hasattr(board, "errors")
+        self.runs_c = hasattr(board, "write_counts")
         self.activity: object = ActivityStore(board, shared.words)
         self.can_wait = SLOT_KINDS if board.name in HEAR_IN_SLOTS else 0
         self.promised = 0
@@ -119,6 +120,8 @@ class Endpoint:
                 self._advance()
             elif command == COMMAND_COUNTERS:
                 self.tell(NOTE_COUNTERS, json.dumps(as_dict(self.board.counters()), separators=(",", ":")).encode())
+                if self.runs_c:
+                    self.board.write_counts()
             elif command == COMMAND_ACTIVITY:
                 self.tell(NOTE_ACTIVITY, self.activity.next())
             self.block[RESULT] = RESULT_MORE if self._put_out() else RESULT_DONE

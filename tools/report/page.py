@@ -10,6 +10,7 @@ from markupsafe import Markup
 from plotly.offline import get_plotlyjs
 
 from ranger_sim import datatable
+from ranger_sim.firmware_sim.native import coverage
 from ranger_sim.harness import normal_errors
 from ranger_sim.harness.ranger_names import RANGER
 from ranger_sim.tools import unexpected
@@ -18,6 +19,7 @@ from ranger_sim.tools.report import charts
 from ranger_sim.tools.report.figures import packed
 from ranger_sim.tools.units import duration_text, figure, length_text
 
+MOST_LINES = 5000  # of a source in the page; chosen by us
 HERE = pathlib.Path(__file__).parent
 SCRIPTS = ("stage.js", "charts.js", "report.js")
 MACHINES = (("hip", "hip", "hip"), ("outer_foot", "outer ankle", "outer"), ("inner_foot", "inner ankle", "inner"))
@@ -63,6 +65,7 @@ def render(robot: Any, summary: dict) -> str:
         energy=energy(summary),
         errors=errors(robot, summary),
         fault_lines=[fault_text(fault) for fault in summary["faults"]],
+        firmware=firmware(robot, summary),
         lengths=length_text,
         durations=duration_text,
         plotly=packed(get_plotlyjs()),
@@ -71,6 +74,59 @@ def render(robot: Any, summary: dict) -> str:
         command=summary["command"],
         table_hash=datatable.table_hash(),
     )
+
+
+def firmware(robot: Any, summary: dict) -> list[dict]:
+    """Each program in C: what became of it, what was found, and its sources with how often each line ran."""
+    told = []
+    shown: set[pathlib.Path] = set()
+    for board, each in summary["firmware"].items():
+        made = robot.firmware[board]
+        why = each["why"] or "its process ended"
+        lost = f"lost at {each['lost_s']:.3f} s: {why}" if each["lost_s"] is not None else ""
+        sources = []
+        twins = [other for other in robot.firmware.values() if other.folder == made.folder]
+        for file in coverage.merged(twin.ran() for twin in twins) if made.folder not in shown else ():
+            figures = file.figures(made.folder)
+            sources.append({**figures, "rows": rows_of(file), "share": share(figures["covered"], figures["lines"])})
+        # boards of one source have figures each; its lines are shown once, with all their counts
+        shown.add(made.folder)
+        ran = each["coverage"]
+        told.append(
+            {
+                **each,
+                "board": board,
+                "lost": lost,
+                "sources": sources,
+                "share": share(ran["covered"], ran["lines"]) if ran["lines"] is not None else None,
+                "findings": [
+                    {**finding, "place": f"{finding['file']}:{finding['line']}" if finding["line"] else finding["file"]}
+                    for finding in each["findings"]
+                ],
+            }
+        )
+    return told
+
+
+def share(part: int, whole: int) -> str:
+    """Part of a whole, as text."""
+    return f"{100.0 * part / whole:.1f} %" if whole else "none"
+
+
+def rows_of(file: coverage.FileCounts) -> list[tuple[int, str, str, str]]:
+    """(line, how often it ran, what to colour it by, text) of a source; a branch never taken is "half"."""
+    try:
+        lines = file.path.read_text(encoding="utf-8", errors="replace").splitlines()[:MOST_LINES]
+    except OSError:
+        return []
+    rows = []
+    for number, line in enumerate(lines, 1):
+        count = file.lines.get(number)
+        kind = "" if count is None else "missed" if count == 0 else "ran"
+        if kind == "ran" and 0 in file.branches.get(number, ()):
+            kind = "half"
+        rows.append((number, "" if count is None else f"{count:,}", kind, line))
+    return rows
 
 
 def of_the_robot(what: str) -> str:

@@ -281,26 +281,27 @@ void __gcov_dump(void);
 void __gcov_reset(void);
 #endif
 
-/* Coverage: write what was counted, or forget it. 0 where nothing is counted. */
-EXPORTED int32_t fw_write_counts(void)
-{
 #ifdef FW_COVERAGE
+EXPORTED const uint32_t fw_counts_lines = 1;
+
+/* Write what was counted, and begin anew. */
+EXPORTED void fw_write_counts(void)
+{
     __gcov_dump();
     __gcov_reset();
-    return 1;
-#else
-    return 0;
-#endif
 }
-EXPORTED int32_t fw_forget_counts(void)
+
+/* Write it for the last time: nothing is written when the library or the process ends. */
+EXPORTED void fw_end_counts(void)
 {
-#ifdef FW_COVERAGE
     __gcov_reset();
-    return 1;
-#else
-    return 0;
-#endif
+    __gcov_dump();
 }
+#else
+EXPORTED const uint32_t fw_counts_lines = 0;
+EXPORTED void fw_write_counts(void) {}
+EXPORTED void fw_end_counts(void) {}
+#endif
 
 #ifdef __linux__
 

@@ -16,6 +16,7 @@ NOTE_BYTES: Any
 class Endpoint:
     board: Microcontroller
     counts_errors: bool
+    runs_c: bool
     clock: Any
     shared: Any
     activity: Any

@@ -87,11 +87,17 @@ def test_a_planted_write_out_of_bounds_and_an_overflow_are_found(tmp_path, how):
     place = "ranger-sim: firmware: small.c:"
     assert f"{place}{LINES['WRITE']}: global-buffer-overflow: write of 4 bytes in control()" in found
     overflow = "signed integer overflow: 2147483640 + 10 cannot be represented in type 'int'"
-    assert f"{place}{LINES['SUM']}: {overflow}" in found
+    assert f"{place}{LINES['SUM']}: {overflow} in control()" in found
     # the undefined-behaviour sanitizer may tell the write as well, where it knows the object's size
     assert all(line.startswith((f"{place}{LINES['WRITE']}:", f"{place}{LINES['SUM']}:")) for line in found)
     assert done.returncode == 1
     assert "AddressSanitizer" not in done.stderr
+    summary = json.loads(done.stdout)["firmware"]["MCH"]
+    assert {"file": "small.c", "line": LINES["SUM"], "function": "control", "text": overflow, "count": 1} in (
+        summary["findings"]
+    )
+    assert sorted(each["line"] for each in summary["findings"])[0] == LINES["WRITE"]
+    assert len(summary["findings"]) == len(found)
 
 
 @needs_sanitizers
@@ -154,9 +160,10 @@ def test_what_was_found_twice_is_told_once_without_its_address(tmp_path):
         "==8==ERROR: AddressSanitizer: stack-buffer-overflow on address 0x7f\nREAD of size 8 at 0x7f\n"
         "    #0 0x1 in memcpy (/lib/libc.so.6+0x1)\n"
     )
-    assert sanitizers.findings(tmp_path, [tmp_path / "fw"]) == [
-        "a.c:3: load of null pointer",
-        "b.c:4: store to an address with insufficient space",
-        "c.c:5: shift exponent 33 is too large",
-        "stack-buffer-overflow: read of 8 bytes, outside of the program's code",
+    found = sanitizers.findings(tmp_path, [sanitizers.Program(tmp_path / "fw" / "build" / "a.so", tmp_path / "fw")])
+    assert [(each.told(), each.count) for each in found] == [
+        ("stack-buffer-overflow: read of 8 bytes, outside of the program's code", 1),
+        ("a.c:3: load of null pointer", 1),
+        ("b.c:4: store to an address with insufficient space", 2),
+        ("c.c:5: shift exponent 33 is too large", 1),
     ]
