@@ -420,11 +420,23 @@ def test_ctrl_c_finishes_the_files_as_walk_does(up, tmp_path):
         (["--speed", "fast"], "'fast' is not a number, or max"),
         (["--processor", "99"], "processor is 99, allowed are"),
         (["--name", "a b"], "name is 'a b', allowed are"),
+        (["--xcp-can", "can5"], "can1"),
+        (["--xcp-udp", "65536"], "65535"),
     ],
 )
 def test_a_mistake_in_an_option_is_one_line(command, arguments, complaint):
     done = command("up", "--time", "0.01s", *arguments)
     assert done.returncode == 2 and complaint in done.stderr and "Traceback" not in done.stderr
+
+
+def test_a_probe_for_calibration_that_nobody_speaks_to_leaves_the_run_as_it_is(command):
+    run = ("up", "--time", "0.1s", "--speed", "max", "--json", "-", "--name", f"test-{uuid.uuid4().hex[:12]}")
+    digests = []
+    for more in ((), ("--xcp-can", "--xcp-udp", "0")):
+        done = command(*run, *more)
+        assert done.returncode == 0, done.stderr
+        digests.append(summary_of(done.stdout)["trace_digest"])
+    assert digests[0] == digests[1]
 
 
 def test_the_timeline_of_a_run_has_the_slots_of_every_board_in_its_process(command, tmp_path):
