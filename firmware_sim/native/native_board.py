@@ -476,7 +476,7 @@ class NativeBoard(Microcontroller):
             next_time: int = Microcontroller.advance(self, until)
         finally:
             turns[0] = self.turn
-        self.reached = until
+        self.reached = max(self.reached, until)  # it is asked before its power comes, too
         if self.failure is not None:
             raise self.failure
         return next_time
