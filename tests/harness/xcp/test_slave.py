@@ -191,6 +191,32 @@ def test_a_block_that_is_broken_off_writes_nothing(slave, packets, answer):
     assert slave.memory.data == bytearray(range(16))
 
 
+def test_a_short_download_brings_its_address_where_a_packet_has_room():
+    slave = Slave(Bytes(), 248, 1400, FINE)
+    say(slave, "FF00")
+    assert say(slave, "ED 04 00 00 0C010000 05060708") == "FF"
+    assert slave.memory.data[12:] == b"\5\6\7\x08" and slave.address == 0x110
+    assert say(slave, "ED 04 00 00 00010000 05060708") == "FE 24"
+    assert say(slave, "ED 04 00 00 0C010000 050607") == "FE 21"
+    assert say(slave, "ED 04 00 01 0C010000 05060708") == "FE 22"
+
+
+def test_a_list_tells_its_mode(slave):
+    arranged(slave, "0100", "03")
+    assert say(slave, "DF 00 0000") == "FF 50 00 00 01 00 03 00"  # running, with stamps; event 1, every third
+    say(slave, "DE 00 0000")
+    assert say(slave, "DF 00 0000") == "FF 10 00 00 01 00 03 00"
+    say(slave, "DE 02 0000")
+    assert say(slave, "DF 00 0000") == "FF 11 00 00 01 00 03 00"
+    assert say(slave, "DF 00 0100") == "FE 22"
+
+
+def test_disconnect_stops_everything_and_is_the_last_answer(slave):
+    arranged(slave)
+    assert say(slave, "FE") == "FF" and not slave.running and slave.lists == []
+    assert say(slave, "FD") == ""
+
+
 def test_several_entries_are_written_by_one_command_where_a_packet_has_room():
     slave = Slave(Bytes(), 248, 1400, FINE)
     say(slave, "FF00")
