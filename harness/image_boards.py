@@ -17,6 +17,10 @@ SEQUENCES = {
     "MCFI": ankle_board.SEQUENCE,
     "MCSI": steering.SEQUENCE,
 }
+# The router exchanges a segment every 200 us by its own crystal, 30 ppm off at most; its program feeds the words, so
+# the last of them is some us early or late. Nobody may start an exchange earlier than the loop looks ahead
+# (harness/lockstep.py): one that would be early waits.
+LEAST_INTERVAL_NS = 199_980
 BOARDS = (*SEQUENCES, "UI", "CSR")
 
 
@@ -41,7 +45,7 @@ def hardware_of(board: str) -> BoardHardware:
                 inputs={0: can_router.ANALOG["supply_current"], 1: can_router.ANALOG["supply_voltage"]}
             ),
             spi={},
-            segment_link=True,
+            segment_interval_ns=LEAST_INTERVAL_NS,
             slot_timer=0,
         )
     return BoardHardware(external=None, spi={})

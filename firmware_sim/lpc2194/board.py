@@ -119,7 +119,7 @@ class ImageBoard(Microcontroller):
         clocks = self.clocks
         self.map = AddressMap(self)
         self.vic_block = VicBlock(self, clocks)
-        external = hardware.external if not hardware.segment_link else None
+        external = hardware.external if not hardware.segment_interval_ns else None
         converter = None
         device: SspDevice
         if external is not None:
@@ -127,8 +127,8 @@ class ImageBoard(Microcontroller):
             converter = Ads7871(self, it.eint, it.reference_V, it.conversion_ns, it.scale, it.offset_counts)
             converter.inputs = [it.inputs.get(code, code) for code in range(16)]
             device = SerialConverter(self, converter)
-        elif hardware.segment_link:
-            device = SegmentLink(self)
+        elif hardware.segment_interval_ns:
+            device = SegmentLink(self, hardware.segment_interval_ns)
         else:
             device = SspDevice(self)
         self.system = SystemBlock(self, clocks, converter)

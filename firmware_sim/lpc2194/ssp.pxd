@@ -5,8 +5,9 @@ from ranger_sim.firmware_sim.lpc2194.block cimport Block
 from ranger_sim.firmware_sim.lpc2194.vic cimport SSP_INPUT
 from ranger_sim.firmware_sim.peripheral cimport Peripheral
 from ranger_sim.firmware_sim.peripherals.adc_external cimport START, Ads7871
-from ranger_sim.firmware_sim.peripherals.ssp cimport SspPort, SspSegment
+from ranger_sim.firmware_sim.peripherals.ssp cimport SspSegment
 from ranger_sim.firmware_sim.vic cimport InterruptSource
+from ranger_sim.foundation.events cimport SSP_START
 
 cpdef enum:
     DEPTH = 8
@@ -36,9 +37,11 @@ cdef class SerialConverter(SspDevice):
 
 @cython.final
 cdef class SegmentLink(SspDevice):
-    cdef public SspPort port
-    cdef public long long sent
-    cdef public list words, coming
+    cdef public long long sent, interval_ns, earliest
+    cdef public list words, coming, came
+    cdef public SspSegment going
+    cdef public Alarm alarm
+    cpdef object _start(self, time)
 
 @cython.final
 cdef class SspBlock(Block):

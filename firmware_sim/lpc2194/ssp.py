@@ -11,13 +11,14 @@ import cython
 from ranger_sim.firmware_sim.lpc2194.block import Block
 from ranger_sim.firmware_sim.peripheral import Peripheral
 from ranger_sim.firmware_sim.peripherals.adc_external import Ads7871
-from ranger_sim.firmware_sim.peripherals.ssp import SspPort, SspSegment
+from ranger_sim.firmware_sim.peripherals.ssp import SspSegment
 from ranger_sim.firmware_sim.vic import InterruptSource
-from ranger_sim.foundation.events import NEVER
+from ranger_sim.foundation.events import NEVER, SSP_SEGMENT
 
 if not cython.compiled:
     from ranger_sim.firmware_sim.lpc2194.vic import SSP_INPUT
     from ranger_sim.firmware_sim.peripherals.adc_external import START
+    from ranger_sim.foundation.events import SSP_START
 
     DEPTH = 8
     WORD_ALARM = 0
@@ -87,23 +88,32 @@ class SegmentLink(SspDevice):
     """The master's end of a link of segments (peripherals/ssp.py), word by word.
 
     Both ends of the link take a segment as a whole, the other one at the end of an exchange. So a segment of ours
-    starts when its last word is out, and what comes in goes to the program with the words of the next segment.
+    starts when its last word is out, not sooner after the one before than `interval_ns`, and what comes in goes to the
+    program with the words of the next segment.
     ROBOT PARITY: each way takes one segment, 200 us on Ranger, longer than on the robot.
     """
 
-    def __init__(self, chip) -> None:
+    def __init__(self, chip, interval_ns) -> None:
         SspDevice.__init__(self, chip)
-        self.port = SspPort(chip, 0)
+        self.interval_ns = interval_ns
+        self.earliest = 0  # start of the next exchange
+        self.going = None  # a segment that waits for that
+        self.alarm = chip.new_alarm(self, 0)
         self.sent = 0  # words of the present segment
         self.words = [0] * 31
-        self.coming = [0] * 31
-        self.coming[30] = 1  # the checksum of nothing
+        self.coming = [0] * 30 + [1]  # nothing, and its checksum
+        self.came = None  # half-words of the segment that came in last, until it is on its way to the program
+        chip.claim(SSP_SEGMENT, 0, self)
+
+    def on_message(self, queue) -> InterruptSource | None:
+        """The other end's segment is in. It is copied at once: the other end may fill it anew."""
+        self.came = queue.ref.words
+        return None
 
     def begin(self, time: cython.longlong) -> cython.int:
         if self.sent == 0:
-            segment = self.port.take()
-            if segment is not None:
-                self.coming = segment.words
+            self.coming = self.came if self.came is not None else [0] * 30 + [1]
+            self.came = None
         return 0
 
     def exchange(self, word: cython.longlong, time: cython.longlong) -> cython.longlong:
@@ -115,9 +125,22 @@ class SegmentLink(SspDevice):
             segment = SspSegment()
             segment.words = self.words
             segment.used = used_of(self.words)
-            self.port.start(segment)
-            self.coming = [0] * 30 + [1]
+            self.going = segment
+            if time < self.earliest:
+                self.alarm.set(self.earliest)
+            else:
+                self._start(time)
         return came
+
+    def on_alarm(self, alarm: cython.longlong, time: cython.longlong) -> InterruptSource | None:
+        """The segment that waits may start."""
+        self._start(time)
+        return None
+
+    def _start(self, time) -> None:
+        """The exchange begins."""
+        self.earliest = time + self.interval_ns
+        self.chip.outbox.push(time, 0, SSP_START, 0, 0, 0, 0, 0, 0, self.going)
 
 
 def used_of(words) -> int:

@@ -5,7 +5,7 @@ from ranger_sim.firmware_sim.alarm import Alarm
 from ranger_sim.firmware_sim.lpc2194.block import Block
 from ranger_sim.firmware_sim.peripheral import Peripheral
 from ranger_sim.firmware_sim.peripherals.adc_external import Ads7871
-from ranger_sim.firmware_sim.peripherals.ssp import SspPort
+from ranger_sim.firmware_sim.peripherals.ssp import SspSegment
 from ranger_sim.firmware_sim.vic import InterruptSource
 from typing import Any
 from typing import final
@@ -40,13 +40,20 @@ class SerialConverter(SspDevice):
 
 @final
 class SegmentLink(SspDevice):
-    port: SspPort
     sent: int
+    interval_ns: int
+    earliest: int
     words: list[Any]
     coming: list[Any]
-    def __init__(self, chip: Any) -> None: ...
+    came: list[Any] | None
+    going: SspSegment
+    alarm: Alarm
+    def __init__(self, chip: Any, interval_ns: int) -> None: ...
+    def on_message(self, queue: Any) -> InterruptSource | None: ...
     def begin(self, time: int) -> int: ...
     def exchange(self, word: int, time: int) -> int: ...
+    def on_alarm(self, alarm: int, time: int) -> InterruptSource | None: ...
+    def _start(self, time: Any) -> None: ...
 
 def used_of(words: Any) -> int: ...
 
