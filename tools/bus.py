@@ -56,7 +56,7 @@ def open_servers(buses: dict[str, Any], options: argparse.Namespace, epoch_ns: i
     `options`: those of `server_options`, and `name`.
     """
     name, socketcand = options.name, options.socketcand
-    if options.allow_network and socketcand is None:
+    if options.allow_network and socketcand is None and not getattr(options, "gdb", ()):
         raise UserError("--allow-network: nothing would listen there; give --socketcand HOST:PORT with it")
     with ExitStack() as opened:
         first = next(iter(buses))

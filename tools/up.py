@@ -31,7 +31,7 @@ from ranger_sim.harness.processes.supervisor import ELSEWHERE, RUNNING, Supervis
 from ranger_sim.harness.profile import Profile
 from ranger_sim.harness.profile import load as load_profile
 from ranger_sim.harness.stop_rule import MOST_STEPS, StopRule
-from ranger_sim.tools import faults, serial_options, server_options, terminal, trace, walk, walk_options
+from ranger_sim.tools import faults, gdb_options, serial_options, server_options, terminal, trace, walk, walk_options
 from ranger_sim.tools.files import json_target, writable_folder
 from ranger_sim.tools.firmware import OPTIONS as FIRMWARE
 from ranger_sim.tools.firmware import folders_of, run_sanitized, wants_another_process
@@ -145,7 +145,7 @@ def register(commands: Any) -> None:
         "needed ('can1=slcan:/dev/ttyACM0 --bitrate 1000000'); can1= asks python-can's configuration, section can1; "
         "MCH=... gives one board of such a bus a place of its own (repeatable). The run is then asynchronous",
     )
-    add_all(up, (faults.FAULT, faults.MODULE, *FIRMWARE, *IMAGES))
+    add_all(up, (faults.FAULT, faults.MODULE, *FIRMWARE, *IMAGES, gdb_options.GDB))
     trace.add_options(up)
     up.set_defaults(run=run)
 
@@ -315,9 +315,10 @@ def run(options: argparse.Namespace) -> int:
             view.say(f"ranger-sim up, name {settings.name}: {supervisor.describe()}")
 
         # written and finished in the plant's process; if that is lost, the folder says that the run broke off
-        folder = walk.claimed(options, stop, console) if options.out else None
-        supervisor = Supervisor(robot, settings, stop, finish, view, begin)
-        return supervisor.run()
+        with gdb_options.debuggers(robot, options, gdb_options.never, console) as doors:
+            folder = walk.claimed(options, stop, console) if options.out else None
+            supervisor = Supervisor(robot, settings, stop, finish, view, begin, doors)
+            return supervisor.run()
 
 
 def processes_summary(

@@ -24,7 +24,7 @@ from ranger_sim.harness.profile import load as load_profile
 from ranger_sim.harness.ranger_names import RANGER
 from ranger_sim.harness.scenario import Scenario, StopRule
 from ranger_sim.plant import terms
-from ranger_sim.tools import faults, serial_options, terminal, trace, unexpected
+from ranger_sim.tools import faults, gdb_options, serial_options, terminal, trace, unexpected
 from ranger_sim.tools.files import json_target, replace_file, writable_folder
 from ranger_sim.tools.firmware import coverage_lines, folders_of, run_sanitized, wants_another_process
 from ranger_sim.tools.images import images_of
@@ -122,8 +122,13 @@ def run_scenario(scenario: Scenario, stop: StopRule, options: argparse.Namespace
             console.print(
                 f"running interpreted, slowly: {loading.RUNS_INTERPRETED_BECAUSE}", highlight=False, soft_wrap=True
             )
-        with claimed(options, stop, console) if options.out else contextlib.nullcontext() as folder:
+        with (
+            gdb_options.debuggers(robot, options, lambda: bool(interrupted), console) as doors,
+            claimed(options, stop, console) if options.out else contextlib.nullcontext() as folder,
+        ):
             logs = logs_of(robot, options, folder)
+            if doors:
+                doors[0].wait_for_debugger()
             walk(robot, stop, console, interrupted, paced=bool(ends))
             for line in serial_options.report(ends):
                 console.print(line, highlight=False, soft_wrap=True)

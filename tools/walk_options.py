@@ -10,6 +10,7 @@ from ranger_sim.plant.electronics import SWITCHES
 from ranger_sim.tools import faults, serial_options, trace
 from ranger_sim.tools.firmware import IN_PROCESS
 from ranger_sim.tools.firmware import OPTIONS as FIRMWARE
+from ranger_sim.tools.gdb_options import ALLOW_NETWORK, GDB
 from ranger_sim.tools.images import OPTIONS as IMAGES
 from ranger_sim.tools.options import Option, add_all
 from ranger_sim.tools.units import (
@@ -140,6 +141,8 @@ WALK = (
     *FIRMWARE,
     IN_PROCESS,
     *IMAGES,
+    GDB,
+    ALLOW_NETWORK,
     *trace.OPTIONS,
 )
 
@@ -153,7 +156,7 @@ def add_run_options(command: Any) -> None:
 def add_walk_options(command: Any) -> None:
     """All options of `walk`."""
     add_run_options(command)
-    add_all(command, (faults.FAULT, PROOF, faults.MODULE, *FIRMWARE, IN_PROCESS, *IMAGES))
+    add_all(command, (faults.FAULT, PROOF, faults.MODULE, *FIRMWARE, IN_PROCESS, *IMAGES, GDB, ALLOW_NETWORK))
     trace.add_options(command)
 
 

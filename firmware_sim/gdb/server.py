@@ -15,7 +15,6 @@ from ranger_sim.firmware_sim.gdb.stub import SIGNAL_BAD_ACCESS, SIGNAL_INTERRUPT
 from ranger_sim.firmware_sim.gdb.target import Debuggable, Target
 from ranger_sim.foundation import descriptors
 from ranger_sim.foundation.peers import (
-    LIMITS,
     MALFORMED,
     REASONS,
     Door,
@@ -71,7 +70,6 @@ class GdbServer(Door[_Client]):
             listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
             listener.setblocking(False)
             listener.bind((address, port))
-            listener.listen(LIMITS["gdb"].peers)
         except (OSError, OverflowError) as error:
             listener.close()
             reason = error.strerror if isinstance(error, OSError) else "a port is 0 ... 65535"
@@ -89,6 +87,16 @@ class GdbServer(Door[_Client]):
 
     # ---- for whoever runs the board
 
+    def begin(self) -> None:
+        """From now on debuggers are heard. gdb gives up after 2 s without an answer, and tries again what is refused:
+        so the port is taken when the door is made, and opened when somebody looks at it. UserError: it cannot be."""
+        assert self.listener is not None
+        try:
+            self.listener.listen(self.limits.peers)
+        except OSError as error:
+            what = f"gdb for {self.board.name} on {self.host}:{self.port}"
+            raise UserError(f"{what}: {error.strerror}") from None
+
     def leads_to(self, board: Debuggable) -> None:
         """From now on this is the board: at first, and when a new one takes its place."""
         self.board = board
@@ -103,6 +111,8 @@ class GdbServer(Door[_Client]):
 
     def wait_for_debugger(self) -> None:
         """Wait until one has come to each of the doors and let its board go, or until `ends` says so."""
+        for door in self.doors:
+            door.begin()
         with self._standing():
             while not all(door.seen for door in self.doors) and not self.ends():
                 self._wait()

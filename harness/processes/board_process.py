@@ -88,7 +88,9 @@ def serve(
             hold = Hold(block, stage)
             door.ends, door.stands = hold.ends, hold.stands
             door.leads_to(board)
-            if not fresh:
+            if fresh:
+                door.begin()
+            else:
                 door.wait_for_debugger()
         endpoint.serve()
     except BaseException as error:  # noqa: BLE001  (whatever a program on a board raises is said by the supervisor)

@@ -78,6 +78,9 @@ def session(machine, until, talk, clients=1, beside=(), run=None, **options):
     with contextlib.ExitStack() as stack:
         pool = stack.enter_context(concurrent.futures.ThreadPoolExecutor(1))
         server = GdbServer(machine, 0, **options)
+        for each in (server, *beside):
+            each.begin()
+            each.together([server, *beside])
         stack.callback(server.close)  # first of all, so that no client waits for it
 
         def whole():
@@ -87,8 +90,6 @@ def session(machine, until, talk, clients=1, beside=(), run=None, **options):
 
         future = pool.submit(whole)
         server.ends = options.get("ends", future.done)
-        for each in (server, *beside):
-            each.together([server, *beside])
         server.wait_for_debugger()
         while until is None and not future.done():
             run(machine.core.cycles + 10_000)

@@ -466,6 +466,7 @@ def test_a_port_beyond_this_machine_must_be_asked_for_and_a_taken_one_is_told():
     with pytest.raises(UserError, match="gdb for TINY on 0.0.0.0:0: .*--allow-network"):
         GdbServer(tiny(), 0, host="0.0.0.0")  # noqa: S104
     first = GdbServer(tiny(), 0)
+    first.begin()
     try:
         with pytest.raises(UserError, match=f"gdb for TINY on 127.0.0.1:{first.port}: Address already in use"):
             GdbServer(tiny(), first.port)
