@@ -86,6 +86,7 @@ class Machine:
             self.logbook.close()
             raise
         self.faults: list[Any] = []  # armed so far
+        self.pace: Any = None  # an `outside.Pace` holds virtual time back to the wall clock's
         self.polled: list[Any] = []  # ends of wires that lead out of the simulation
         self.poll_due: list[int] = []  # when each of them asked to be looked at next, ns
         self.next_poll_ns = self.start_ns
@@ -154,9 +155,13 @@ class Machine:
         until = min(loop.time + round(slice_s * 1e9), limit)
         cpu, wall = wallclock.process_cpu_s(), wallclock.monotonic_s()
         reason = lockstep.REACHED_TIME
+        if self.pace is not None:
+            self.pace.begin(loop.time)
         while loop.time < until and reason == lockstep.REACHED_TIME:
             end = self.start_ns + ((loop.time - self.start_ns) // GRID_NS + 1) * GRID_NS
             self.act(end)
+            if self.pace is not None:
+                end = min(end, self.pace.release(loop.time))
             if self.polled:
                 end = min(end, self._poll())
             reason = loop.run(min(end, until))

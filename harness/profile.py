@@ -22,7 +22,7 @@ import tomllib
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from ranger_sim.datatable.model import Table
+from ranger_sim.datatable.model import ROUTER, Table
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness import wiring
 from ranger_sim.harness.bus_schedule import (
@@ -98,7 +98,7 @@ class BusProfile:
 
 @dataclasses.dataclass(frozen=True)
 class Profile:
-    """A checked profile: every board of `wiring.BOARDS` and all four buses are in it."""
+    """A checked profile: every board and every bus of the machine are in it."""
 
     name: str
     path: str
@@ -108,7 +108,7 @@ class Profile:
     buses: Mapping[str, BusProfile]
 
     def _boards(self, state: str) -> tuple[str, ...]:
-        return tuple(name for name in wiring.BOARDS if self.boards[name] == state)
+        return tuple(name for name, each in self.boards.items() if each == state)
 
     def emulated(self) -> tuple[str, ...]:
         """Boards that run here."""
@@ -286,10 +286,13 @@ def full_schedule() -> BusSchedule:
     return found
 
 
-def load(name: str | pathlib.Path, interfaces: Callable[[], tuple[str, ...]] | None = None) -> Profile:
+def load(
+    name: str | pathlib.Path, interfaces: Callable[[], tuple[str, ...]] | None = None, table: Table | None = None
+) -> Profile:
     """The profile `name` of those shipped, or the file at that path when it ends in .toml.
 
     ProfileError names all its faults. `interfaces` gives python-can's interface names, asked when a bus names one.
+    table: of a machine of one's own, whose boards and buses it is about; a schedule it cannot have.
     """
     text = str(name)
     if not text.endswith(".toml") and text not in available():
@@ -300,12 +303,18 @@ def load(name: str | pathlib.Path, interfaces: Callable[[], tuple[str, ...]] | N
     content = reader.content(path)
     if content is None:
         raise ProfileError(faults)
-    table = robots_table()
+    known = tuple(wiring.BOARDS)
+    buses_known: tuple[str, ...] = BUSES
+    if table is None:
+        table = robots_table()
+    else:
+        known = tuple(board.name for board in table.boards if board.firmware)
+        buses_known = tuple(bus.lower() for bus in table.channels)
     reader.only(content, ("title", "description", "boards", "buses"), "")
     title = reader.text(content, "title") or path.stem
     description = reader.text(content, "description") or ""
-    boards = _boards(reader, reader.table(content, "boards"))
-    buses = _buses(reader, reader.table(content, "buses"), path.parent, table, interfaces or _interfaces)
+    boards = _boards(reader, reader.table(content, "boards"), known)
+    buses = _buses(reader, reader.table(content, "buses"), path.parent, table, interfaces or _interfaces, buses_known)
     _together(reader, boards, buses, table)
     if faults:
         raise ProfileError(faults)
@@ -318,11 +327,11 @@ def _interfaces() -> tuple[str, ...]:
     return known_interfaces()
 
 
-def _boards(reader: _Reader, given: Mapping[str, Any]) -> dict[str, str]:
-    boards = dict.fromkeys(wiring.BOARDS, EMULATED)
+def _boards(reader: _Reader, given: Mapping[str, Any], known: tuple[str, ...]) -> dict[str, str]:
+    boards = dict.fromkeys(known, EMULATED)
     for name, state in given.items():
         if name not in boards:
-            reader.fault(f"boards.{name}", state, f"no such board; the boards are {', '.join(wiring.BOARDS)}")
+            reader.fault(f"boards.{name}", state, f"no such board; the boards are {', '.join(known)}")
         elif state not in STATES:
             reader.fault(f"boards.{name}", state, f"one of {', '.join(STATES)} is expected")
         else:
@@ -336,13 +345,16 @@ def _buses(
     folder: pathlib.Path,
     table: Table,
     interfaces: Callable[[], tuple[str, ...]],
+    known: tuple[str, ...],
 ) -> dict[str, BusProfile]:
     for name in given:
-        if name not in BUSES:
-            reader.fault(f"buses.{name}", given[name], f"no such bus; the buses are {', '.join(BUSES)}")
+        if name not in known:
+            reader.fault(f"buses.{name}", given[name], f"no such bus; the buses are {', '.join(known)}")
     schedules: dict[str, BusSchedule] = {}
+    if not table.with_role(ROUTER):
+        schedules[FULL] = BusSchedule(FULL, "as the firmware sends", "", {}, {}, 0)
     found = {}
-    for name in BUSES:
+    for name in known:
         place = f"buses.{name}"
         entry = reader.table(given, name, "buses")
         reader.only(entry, ("interface", "channel", "bit_rate", "schedule", "options"), place)
@@ -394,16 +406,10 @@ def _without_rate(interface: str, channel: str) -> bool:
 
 def _together(reader: _Reader, boards: Mapping[str, str], buses: Mapping[str, BusProfile], table: Table) -> None:
     """What only shows when boards and buses are seen together."""
-    brain, router = table.with_role("main brain")[0].name, table.with_role("router")[0].name
-    if EXTERNAL in (boards[brain], boards[router]) and boards[brain] != boards[router]:
-        external = brain if boards[brain] == EXTERNAL else router
-        reader.fault(f"boards.{external}", EXTERNAL, WITHOUT_CAN)
-    elif boards[router] == ABSENT and boards[brain] == EMULATED:
-        reader.fault(
-            f"boards.{router}", ABSENT, f"without the router {brain} reaches nobody: make {brain} absent as well"
-        )
-    for name in wiring.BOARDS:
-        if boards[name] == EXTERNAL:
+    if table.with_role(ROUTER):
+        _with_router(reader, boards, table)
+    for name, state in boards.items():
+        if state == EXTERNAL:
             for bus in table.board(name).buses:
                 if bus.lower() in buses and buses[bus.lower()].interface is None:
                     reader.fault(
@@ -418,3 +424,15 @@ def _together(reader: _Reader, boards: Mapping[str, str], buses: Mapping[str, Bu
             if first != name:
                 rule = f"{used.interface} {used.channel} is also what {first} uses"
                 reader.fault(f"buses.{name}.channel", used.channel, rule)
+
+
+def _with_router(reader: _Reader, boards: Mapping[str, str], table: Table) -> None:
+    """Main brain and router are outside together, or not at all."""
+    brain, router = table.with_role("main brain")[0].name, table.with_role("router")[0].name
+    if EXTERNAL in (boards[brain], boards[router]) and boards[brain] != boards[router]:
+        external = brain if boards[brain] == EXTERNAL else router
+        reader.fault(f"boards.{external}", EXTERNAL, WITHOUT_CAN)
+    elif boards[router] == ABSENT and boards[brain] == EMULATED:
+        reader.fault(
+            f"boards.{router}", ABSENT, f"without the router {brain} reaches nobody: make {brain} absent as well"
+        )

@@ -1,9 +1,8 @@
-"""Buses of the robot on interfaces outside: the boards' controllers leave the emulated bus and become peers there."""
+"""Buses of a machine on interfaces outside: the boards' controllers leave the emulated bus and become peers there."""
 
 from typing import Any
 
 from ranger_sim.foundation.events import STAGE_BUS
-from ranger_sim.harness import wiring
 
 
 def move_bus(robot: Any, external: Any, openers: dict, boards: tuple) -> None:
@@ -15,10 +14,10 @@ def move_bus(robot: Any, external: Any, openers: dict, boards: tuple) -> None:
     """
     loop = robot.loop
     number = next(place for place, bus in enumerate(robot.buses) if bus.name == external.name)
-    for wire in wiring.CAN:
+    for wire in robot.wiring.can:
         if wire.bus != number + 1:
             continue
-        place = wiring.BOARDS.index(wire.board)
+        place = list(robot.boards).index(wire.board)
         wires = loop.wires[place]
         wires.connect_bus(wire.controller, None, -1)
         if wire.board not in boards:

@@ -1,0 +1,99 @@
+"""A machine of which a part is outside: buses on interfaces of python-can, boards that are real or run elsewhere.
+
+    servo = new()
+    put_outside(servo, load(HERE / "control_outside.toml", table=load_table(TABLE)))
+    servo.until("angle_rad > 1", within="5 s")
+
+Boards that run here are in this process. Virtual time is released by the wall clock, at `speed`; while nobody passes
+time it stands still, and frames from outside wait in the interface.
+"""
+
+from typing import Any
+
+from ranger_sim.firmware_sim.board import Board
+from ranger_sim.foundation import descriptors, wallclock
+from ranger_sim.foundation.events import NEVER
+from ranger_sim.foundation.user_error import UserError
+
+SLICE_NS = 500_000  # virtual time between two looks at the wall clock: one slot of a motor board, as in `up`
+RESET = 1  # mode of a bus node
+
+
+class Elsewhere(Board):
+    """Stands for board `built`, which is outside or absent: it does nothing."""
+
+    def __init__(self, built: Any) -> None:
+        Board.__init__(self, built.name)
+        self.inbox = built.inbox
+        self.memory = built.memory
+        self.built = built
+
+    def advance(self, until: int) -> int:
+        """Nothing happens; what comes is lost."""
+        self.inbox.clear()
+        self.next_time = NEVER
+        return NEVER
+
+    def listen_to_edges(self, buffer: Any, pin: int, partner_pin: int) -> None:
+        """Edges at its pins are lost."""
+
+    def counters(self) -> Any:
+        """Nothing is counted."""
+        return self.built.counters()
+
+
+def leave_out(machine: Any, name: str) -> None:
+    """Board `name` is not run here, and is on no emulated bus."""
+    machine.loop.replace(Elsewhere(machine.boards[name]))
+    wires = machine.loop.wires[machine.loop.place(name)]
+    for bus, node in zip(wires.buses, wires.nodes, strict=True):
+        if bus is not None:
+            bus.set_mode(node, RESET, machine.loop.time)
+
+
+class Pace:
+    """Holds a machine's time back to the wall clock's; `speed`: virtual seconds per second."""
+
+    def __init__(self, machine: Any, speed: float) -> None:
+        if not 1e-4 <= speed <= 1000.0:
+            raise UserError(f"speed is {speed!r}, allowed are 0.0001 to 1000")
+        self.machine = machine
+        self.speed = speed
+        self.begun_ns = 0
+        self.begun_s = 0.0
+
+    def begin(self, now_ns: int) -> None:
+        """Time passes from now on."""
+        self.begun_ns, self.begun_s = now_ns, wallclock.monotonic_s()
+
+    def release(self, now_ns: int) -> int:
+        """Wait until the wall clock has come to `now_ns`; returns until when the machine may run then.
+
+        What comes from outside meanwhile is read at once.
+        """
+        due_s = self.begun_s + (now_ns - self.begun_ns) * 1e-9 / self.speed
+        numbers = [number for end in self.machine.polled for number in end.filenos()]
+        while (left := due_s - wallclock.monotonic_s()) > 0.0:
+            if descriptors.wait(numbers, [], min(left, SLICE_NS * 1e-9))[0]:
+                self.machine.poll_now()
+        return now_ns + SLICE_NS
+
+
+def put_outside(machine: Any, profile: Any, speed: float = 1.0) -> None:
+    """Do with a fresh machine what a profile (profile.py) says: its buses on interfaces, its boards elsewhere.
+
+    UserError when an interface cannot be opened.
+    """
+    from ranger_sim.can_bus.edge.external_bus import ExternalBus, opener  # python-can: only where it is used
+    from ranger_sim.harness.processes.outside import move_bus
+
+    machine.pace = Pace(machine, speed)
+    rates = {bus.name: bus.bitrate for bus in machine.buses}
+    here = profile.emulated()
+    for name in machine.boards:
+        if name not in here:
+            leave_out(machine, name)
+    for name, bus in profile.buses.items():
+        keywords = bus.python_can()
+        if keywords is not None:
+            move_bus(machine, ExternalBus(name, rates[name], opener(name, keywords)), {}, here)
