@@ -305,3 +305,37 @@ def fields_set(node):
         and isinstance(each.value, ast.Name)
         and each.value.id == "self"
     }
+
+
+# What of the harness is any machine's: loaded in a fresh process, it brings nothing that only Ranger has.
+OF_ANY_MACHINE = (
+    "faults.buses", "faults.catalogue", "faults.edges", "faults.error_rows", "faults.evidence", "faults.frames",
+    "faults.network_places", "faults.proof", "faults.twin", "faults.voltages", "lockstep", "logbook", "machine",
+    "names", "native_firmware", "normal_errors", "outside", "table_board", "testing.frames", "testing.health",
+    "testing.making", "testing.plugin", "testing.wire", "timing.machine_slots", "timing.slots", "vital_signs", "waiting", "wires",
+)  # fmt: skip
+ONLY_RANGERS = (
+    "ranger_sim.boards",
+    "ranger_sim.datatable.generated",
+    "ranger_sim.harness.conditions",
+    "ranger_sim.harness.faults.places",
+    "ranger_sim.harness.faults.ranger_",
+    "ranger_sim.harness.ranger",
+    "ranger_sim.harness.scenario",
+    "ranger_sim.harness.wiring",
+    "ranger_sim.plant.body",
+    "ranger_sim.plant.electrics",
+    "ranger_sim.plant.ranger",
+)
+
+
+def test_what_is_any_machines_brings_nothing_of_ranger():
+    program = (
+        "import importlib, sys\n"
+        f"for name in {OF_ANY_MACHINE!r}:\n"
+        "    importlib.import_module('ranger_sim.harness.' + name)\n"
+        f"    found = [each for each in sys.modules if each.startswith({ONLY_RANGERS!r})]\n"
+        "    assert not found, (name, found)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr.splitlines()[-1]

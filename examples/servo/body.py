@@ -47,7 +47,7 @@ class Numbers:
     viscous_Nms: float = 2e-5  # c
     supply_V: float = 24.0
     current_noise_V: float = 0.002
-    # s: a cable that winds up. The model of the machine knows nothing of it (diagnosis.py).
+    # s: a cable that winds up
     cable_Nm_per_rad: float = 0.0
 
 

@@ -16,7 +16,7 @@ from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.branching import fork
 from ranger_sim.harness.faults.evidence import Evidence, Record
 from ranger_sim.harness.faults.fault import Fault
-from ranger_sim.harness.scenario import StopRule
+from ranger_sim.harness.stop_rule import StopRule
 
 LENGTH_BYTES = 8
 
