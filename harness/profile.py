@@ -392,8 +392,8 @@ def _buses(
             if wanted in available_schedules(folder):
                 schedules[wanted] = _schedule(wanted, folder, table, reader.faults)
             else:
-                known = ", ".join(available_schedules(folder))
-                reader.fault(f"{place}.schedule", wanted, f"no such schedule; there are {known}")
+                there = ", ".join(available_schedules(folder))
+                reader.fault(f"{place}.schedule", wanted, f"no such schedule; there are {there}")
                 schedules[wanted] = full_schedule()
         found[name] = BusProfile(name, interface, channel, rate, wanted, schedules[wanted], options)
     return found
