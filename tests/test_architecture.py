@@ -312,8 +312,8 @@ OF_ANY_MACHINE = (
     "faults.buses", "faults.catalogue", "faults.edges", "faults.error_rows", "faults.evidence", "faults.frames",
     "faults.network_places", "faults.proof", "faults.twin", "faults.voltages", "lockstep", "logbook", "machine",
     "names", "native_firmware", "normal_errors", "outside", "table_board", "testing.frames", "testing.health",
-    "testing.making", "testing.plugin", "testing.wire", "timing.machine_slots", "timing.slots", "vital_signs", "waiting",
-    "wires",
+    "testing.making", "testing.plugin", "testing.wire", "timing.machine_slots", "timing.slots", "vital_signs",
+    "waiting", "wires",
 )  # fmt: skip
 ONLY_RANGERS = (
     "ranger_sim.boards",
