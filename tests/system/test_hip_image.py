@@ -1,5 +1,6 @@
 """examples/hip_in_c as an image for the chip gives the same frames and duties as compiled for this computer."""
 
+import contextlib
 import importlib.util
 import pathlib
 import shutil
@@ -10,6 +11,7 @@ import pytest
 from ranger_sim.firmware_sim.clock import Crystal
 from ranger_sim.firmware_sim.lpc2194 import image
 from ranger_sim.firmware_sim.lpc2194.board import ImageBoard
+from ranger_sim.harness.ranger import Ranger
 from tests.firmware_sim.native.support import COMPILER
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
@@ -95,3 +97,20 @@ def test_the_hex_file_is_the_same_program_as_the_elf_file(three):
     board = ImageBoard("MCH", image.read(built.hex_path), Crystal(10_000_000))
     board.advance(3_000_000)
     assert board.can_blocks[0].can.requests > 0
+
+
+def test_the_robot_walks_with_the_image_as_with_the_emulated_hip_board(three):
+    from ranger_sim.harness import native_boards
+
+    built = native_boards.build_image(three.FOLDER)
+    with contextlib.closing(Ranger(images={"MCH": built.path})) as robot, contextlib.closing(Ranger()) as other:
+        for each in (robot, other):
+            each.run_for(5.0)
+        assert not robot.ended and robot.steps == other.steps >= 3
+        (sent,) = (can.sent for can in robot.counters()["MCH"].can)
+        (expected,) = (can.sent for can in other.counters()["MCH"].can)
+        # 3 frames in 4 slots and one of the occasional list; an error's only when there is one, at most 45 a second
+        assert abs(sent - expected) <= 50 and expected > 5.0 * 1800
+        record = robot.board("MCH").image.address_of("chip_slots")
+        _, overruns, dropped = (robot.board("MCH").core.peek(record + 4 * place) for place in range(3))
+        assert (overruns, dropped) == (0, 0)
