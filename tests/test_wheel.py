@@ -127,6 +127,13 @@ def test_the_wheel_has_one_top_level_and_the_library_when_there_is_one_here(whee
         assert [name for name in names if name.startswith("ranger_sim/_compiled.")]
 
 
+@pytest.mark.skipif(not any(map(shutil.which, ("cc", "gcc", "clang"))), reason="no C compiler is installed here")
+def test_a_new_project_of_the_installed_package_passes_its_tests(installed, tmp_path):
+    python, _ = installed
+    run([python.with_name("ranger-sim"), "new", "wheel"], tmp_path)
+    assert "3 passed" in run([python, "-m", "pytest", "-q", "-p", "no:cacheprovider"], tmp_path / "wheel")
+
+
 def test_every_command_runs_from_a_project_with_folders_of_the_same_names(installed, tmp_path):
     python, project = installed
     command = python.with_name("ranger-sim")
