@@ -100,6 +100,7 @@ class ImageBoard(Microcontroller):
         self.slots_by_cycles = [0] * 21
         self.base_cycles = 0  # cycles and instant from which time is counted: the clock's latest change
         self.base_ns = phase_ns
+        self.running_to = 0
         self.asleep = False
         self.idle = False
         self.pass_cycles = 0

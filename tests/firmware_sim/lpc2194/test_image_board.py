@@ -1,10 +1,12 @@
 """A board that runs an image: boot, interrupts, frames, stamps; slicing changes nothing, nor does skipping loops."""
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from ranger_sim.firmware_sim.clock import Crystal
 from ranger_sim.firmware_sim.lpc2194 import image as images
-from ranger_sim.foundation.events import CAN_REQUEST, PIN_OUTPUT
+from ranger_sim.foundation.events import CAN_REQUEST, PIN_EDGE, PIN_OUTPUT
 from tests.firmware_sim.lpc2194.programs import ASSEMBLER, Run, board_with, linked, words_of
 
 TICK_NS = 100_000  # 6,000 counts at 60 MHz
@@ -15,16 +17,17 @@ def ticker(**how):
     return board_with(words_of("ticker"), **how)
 
 
-def test_the_words_are_what_the_assembler_makes_of_the_assembly(tmp_path):
+@pytest.mark.parametrize("name", ["ticker", "poller"])
+def test_the_words_are_what_the_assembler_makes_of_the_assembly(tmp_path, name):
     if ASSEMBLER is None:
         pytest.skip("no arm-none-eabi-as here: the words stand for it")
-    image = images.read(linked("ticker", tmp_path))
+    image = images.read(linked(name, tmp_path))
     assert len(image.segments) == 1
     address, content = image.segments[0]
-    words = words_of("ticker")
+    words = words_of(name)
     assert address == 0
     assert [int.from_bytes(content[i : i + 4], "little") for i in range(0, len(content), 4)] == words
-    assert image.address_of("wait") < image.address_of("look")
+    assert image.address_of("wait" if name == "ticker" else "loop") > 0
 
 
 def test_a_program_boots_and_serves_its_timer_every_hundred_microseconds():
@@ -90,6 +93,40 @@ def test_loops_that_wait_are_skipped_and_nothing_but_the_time_it_takes_shows_it(
     assert executing.counters().processor.idle_instructions == 0
     counts = skipping.counters().processor
     assert counts.idle_cycles > 0.8 * counts.cycles  # a service and a frame take some 130 of 6,000 cycles
+
+
+@given(
+    st.lists(st.integers(1_000, 400_000), min_size=1, max_size=12, unique=True),
+    st.lists(st.integers(1, 60_000), min_size=1, max_size=6),
+    st.sampled_from(["ticker", "poller"]),
+)
+def test_whatever_comes_in_and_however_it_is_sliced_skipping_changes_nothing(edges, steps, program):
+    found = []
+    for skips in (True, False):
+        board = board_with(words_of(program))
+        board.skips_idle = skips
+        for number, time in enumerate(sorted(edges)):
+            board.inbox.push(time, 256, PIN_EDGE, 3, 1 - (number & 1), -1, 0)
+        run = Run(board)
+        for step in steps if skips else [450_000]:
+            run.to(min(board.horizon + step, 450_000), STEP)
+        run.to(450_000, STEP)
+        found.append((run.out, everything(board)))
+    assert found[0] == found[1]
+
+
+def test_a_loop_that_looks_at_a_pin_sees_its_edge_in_the_next_pass():
+    board = board_with(words_of("poller"))
+    times = [100_000, 200_000, 300_000, 300_500]
+    for number, time in enumerate(times):
+        board.inbox.push(time, 256, PIN_EDGE, 3, 1 - (number & 1), -1, 0)
+    run = Run(board).to(2_000_000)
+    toggles = [row for row in run.of(PIN_OUTPUT)[1:]]
+    # four instructions of a pass and nine behind it, of at most 12 cycles each at 10 MHz, flash without its accelerator
+    assert all(0 < row[0] - time < 13 * 12 * 100 for row, time in zip(toggles, times[:2], strict=False))
+    assert len(toggles) in (2, 4)  # the last two edges are closer than a pass: it sees both or none
+    processor = board.counters().processor
+    assert processor.idle_cycles > 0.5 * processor.cycles
 
 
 def test_a_board_that_waits_is_not_due_before_its_next_event():
