@@ -1,7 +1,7 @@
 cimport cython
 
 from ranger_sim.firmware_sim.alarm cimport Alarm
-from ranger_sim.firmware_sim.arm7.core cimport FAST, INTERRUPT, Core
+from ranger_sim.firmware_sim.arm7.core cimport FAST, INTERRUPT, STATE, Core
 from ranger_sim.firmware_sim.edge_line cimport EdgeLine
 from ranger_sim.firmware_sim.lpc2194.address_map cimport AddressMap
 from ranger_sim.firmware_sim.lpc2194.block cimport Block, Clocks
@@ -20,7 +20,6 @@ cpdef enum:
     STINT = 256
     LONGEST_PASS = 600
     DOUBTS = 8
-    REGISTERS = 57
     SLOT_SHARES = 20
 
 cdef class ImageBoard(Microcontroller):
@@ -55,7 +54,6 @@ cdef class ImageBoard(Microcontroller):
     cdef bint _may_wait(self) noexcept
     cdef bint _waits(self, long long target) except? -1
     cdef long long _flash_place(self, long long pc) noexcept
-    cdef void _registers(self, long long[::1] into) noexcept
     cdef void _keep(self) noexcept
     cdef bint _is_as_kept(self) noexcept
     cdef int _catch_up(self, long long time) except -1

@@ -45,7 +45,7 @@ from ranger_sim.firmware_sim.peripherals.adc_external import Ads7871
 from ranger_sim.foundation.events import EventQueue
 
 if not cython.compiled:
-    from ranger_sim.firmware_sim.arm7.core import FAST, INTERRUPT
+    from ranger_sim.firmware_sim.arm7.core import FAST, INTERRUPT, STATE
     from ranger_sim.firmware_sim.lpc2194.can import AFMR_BYPASS
     from ranger_sim.firmware_sim.microcontroller import INDICES_PER_KIND, MESSAGE_KINDS
     from ranger_sim.foundation.events import CAN_RX, NEVER, PIN_EDGE
@@ -56,7 +56,6 @@ if not cython.compiled:
     LONGEST_PASS = 600
     DOUBTS = 8  # of so many stints elsewhere one is asked
     SLOT_SHARES = 20
-    REGISTERS = 57  # that are compared
 
 
 @dataclasses.dataclass(frozen=True)
@@ -108,8 +107,8 @@ class ImageBoard(Microcontroller):
         self.pass_looks = False
         self.idle_cycles = 0
         self.idle_instructions = 0
-        self.kept_registers = array.array("q", [0]) * 57  # REGISTERS
-        self.now_registers = array.array("q", [0]) * 57
+        self.kept_registers = array.array("q", [0]) * STATE
+        self.now_registers = array.array("q", [0]) * STATE
         self.kept_ram = array.array("q", [0]) * len(self.core.ram)
         self.waits = array.array("q", [0]) * (self.core.flash_size >> 2)  # words of flash in loops that waited
         self.doubts = 0
@@ -352,35 +351,10 @@ class ImageBoard(Microcontroller):
             self.waits[self._flash_place(core.pc)] = 1
             core.step()
 
-    def _registers(self, into: cython.longlong[::1]) -> cython.void:
-        """What an instruction can depend on, beside memory."""
-        core: Core = self.core
-        i: cython.longlong
-        for i in range(15):
-            into[i] = core.r[i]
-        for i in range(10):
-            into[15 + i] = core.high[i]
-        for i in range(12):
-            into[25 + i] = core.banked[i]
-        for i in range(6):
-            into[37 + i] = core.saved[i]
-        into[43] = core.pc
-        into[44] = core.n
-        into[45] = core.z
-        into[46] = core.c
-        into[47] = core.v
-        into[48] = core.control
-        into[49] = core.line
-        into[50] = core.data_line
-        for i in range(2):
-            into[51 + i] = core.trail[i]
-            into[53 + i] = core.ahead[i]
-            into[55 + i] = core.ready[i] - core.cycles if core.ready[i] > core.cycles else 0
-
     def _keep(self) -> cython.void:
         """Keep registers and RAM as they are."""
         ram: cython.longlong[::1] = self.core.ram
-        self._registers(self.kept_registers)
+        self.core.state_into(self.kept_registers)
         self.kept_ram[:] = ram
 
     def _is_as_kept(self) -> cython.bint:
@@ -390,8 +364,8 @@ class ImageBoard(Microcontroller):
         i: cython.longlong
         if core.r[13] != self.kept_registers[13] or core.r[14] != self.kept_registers[14]:
             return False
-        self._registers(self.now_registers)
-        for i in range(REGISTERS):
+        core.state_into(self.now_registers)
+        for i in range(STATE):
             if self.now_registers[i] != self.kept_registers[i]:
                 return False
         for i in range(len(ram)):

@@ -1,12 +1,14 @@
 """What runs in the process of one board."""
 
 import os
+import sys
 import traceback
 from typing import Any
 
 from ranger_sim.firmware_sim.gdb.server import GdbServer
 from ranger_sim.firmware_sim.native import coverage
 from ranger_sim.foundation import wallclock
+from ranger_sim.foundation.peers import told
 from ranger_sim.harness import wiring
 from ranger_sim.harness.fresh_board import first_outputs, fresh_board, pass_on
 from ranger_sim.harness.processes import kernel, places
@@ -93,6 +95,10 @@ def serve(
             else:
                 door.wait_for_debugger()
         endpoint.serve()
+        if door is not None:
+            door.close()
+            if away := told(door.sent_away):
+                print(f"gdb for {name}: {away}", file=sys.stderr, flush=True)
     except BaseException as error:  # noqa: BLE001  (whatever a program on a board raises is said by the supervisor)
         where = traceback.extract_tb(error.__traceback__)[-1:]
         place_text = f" ({os.path.basename(where[0].filename)}:{where[0].lineno})" if where else ""

@@ -23,7 +23,6 @@ import dataclasses
 STINT: int
 LONGEST_PASS: int
 DOUBTS: int
-REGISTERS: int
 SLOT_SHARES: int
 
 @dataclasses.dataclass(frozen=True)
