@@ -30,7 +30,7 @@ from ranger_sim.datatable import parameters
 from ranger_sim.datatable.generated import all_variables
 from ranger_sim.firmware_sim.clock import seeded_crystal
 from ranger_sim.firmware_sim.lpc2194.image import Image
-from ranger_sim.firmware_sim.native import crash
+from ranger_sim.firmware_sim.native import coverage, crash
 from ranger_sim.firmware_sim.native.trial import tried
 from ranger_sim.foundation.random_stream import RandomStream
 from ranger_sim.foundation.user_error import UserError
@@ -229,6 +229,8 @@ class Ranger(Machine):
     def _watch(self, board: Any) -> None:
         """From now on the program of a board in this process says where it was when it ends it."""
         firmware = self.firmware[board.name]
+        if board.counts is not None:
+            os.environ[coverage.PREFIX] = str(board.counts)  # for a crash, which writes them as well
         board.leave_record_in(*crash.record_of(board.name, firmware.library, firmware.folder))
 
     def run(self, stop: StopRule, slice_s: float = 1.0) -> bool:
@@ -408,8 +410,19 @@ class Ranger(Machine):
     def error_watch(self) -> Any:
         return ErrorWatch(self.loop.boards, max(self.names.errors) + 1)
 
+    def write_counts(self) -> None:
+        """Boards with programs compiled for coverage write which of their lines ran."""
+        for name, firmware in self.firmware.items():
+            board = self.loop.board(name)
+            if firmware.coverage and not board.apart:
+                board.write_counts()
+            elif firmware.coverage and self.processes is not None and not self.processes.ended:
+                self.processes.fetch_counters((name,))
+
     def close(self) -> None:
         """Give back the log's files, the ends that lead outside, golden runs and the processes of boards."""
+        if self.counts is None and not self.lost:  # somebody else reads them
+            self.write_counts()
         if self.processes is not None:
             self.processes.close()
         if self.counts is not None:

@@ -14,7 +14,7 @@ import pathlib
 import re
 import shutil
 import subprocess
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 
 from ranger_sim.firmware_sim.native.build import compiler
 from ranger_sim.firmware_sim.native.crash import lines_of
@@ -97,11 +97,18 @@ def place_of_findings() -> pathlib.Path | None:
     return pathlib.Path(place).parent if place is not None else None
 
 
-def findings(logs: pathlib.Path, programs: Iterable[Program]) -> list[Finding]:
-    """What was found so far, by file and line; files relative to the firmware's folder."""
+def findings(
+    logs: pathlib.Path, programs: Iterable[Program], processes: Collection[int] | None = None
+) -> list[Finding]:
+    """What was found so far, by file and line; files relative to the firmware's folder.
+
+    processes: only what was found in these.
+    """
     programs = [dataclasses.replace(each, folder=each.folder.resolve()) for each in programs]
     found: list[Finding] = []
     for log in sorted(logs.glob("findings*")):
+        if processes is not None and log.suffix not in {f".{process}" for process in processes}:
+            continue
         text = log.read_text(encoding="utf-8", errors="replace")
         found += [_undefined(each, programs) for each in UNDEFINED.finditer(text)]
         found += [_address(each[0], each["what"], programs) for each in ADDRESS.finditer(text)]

@@ -56,6 +56,7 @@ class Apart:
         self.ended = False
         self.deaths: list[dict[str, Any]] = []
         self.children = {name: fork(self._board(name, stage)) for name in names}
+        self.numbers = tuple(self.children.values())  # of the processes, also of those that have ended
         self.watches = {name: os.pidfd_open(process) for name, process in self.children.items()}
         self.guard = fork(self._look_after)
         loop = robot.loop

@@ -22,6 +22,8 @@ from ranger_sim.can_bus.bus import Bus
 from ranger_sim.datatable.generated import all_variables
 from ranger_sim.datatable.packing import word_of_value
 from ranger_sim.firmware_sim.clock import Crystal
+from ranger_sim.firmware_sim.native import crash
+from ranger_sim.firmware_sim.native.trial import tried
 from ranger_sim.foundation.edge_buffer import EdgeBuffer
 from ranger_sim.foundation.events import (
     CAN_ABORT,
@@ -46,9 +48,10 @@ from ranger_sim.foundation.events import (
 from ranger_sim.foundation.quantities import duration_text, nanoseconds
 from ranger_sim.foundation.row_stream import FrameStream
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness import wiring
+from ranger_sim.harness import native_boards, wiring
 from ranger_sim.harness.conditions import ConditionNotMetError
 from ranger_sim.harness.fresh_board import first_outputs, pass_on
+from ranger_sim.harness.native_firmware import Firmware
 from ranger_sim.harness.ranger import BOARD_CLASSES, BUS_BIT_RATE
 from ranger_sim.harness.ranger_names import RANGER
 from ranger_sim.harness.testing.figures import Figure, Observed
@@ -338,7 +341,8 @@ class BoardAlone(Bench):
     """Board `name` of the robot, alone. `chip` is the board itself: everything of it may be looked at.
 
     quirks: switches of the firmware; bit_rate of its buses; network_time: the router's time comes every ms, as the
-    board is used to; crystal_ppb: how far its clock is off; function names for `replace` are those of its schedule.
+    board is used to; crystal_ppb: how far its clock is off; firmware: a folder of C that the board runs, in this
+    process; function names for `replace` are those of its schedule.
     """
 
     def __init__(
@@ -348,13 +352,19 @@ class BoardAlone(Bench):
         bit_rate: int = BUS_BIT_RATE,
         network_time: bool = True,
         crystal_ppb: int = 0,
+        firmware: Any = None,
     ) -> None:
         if name not in BOARD_CLASSES:
             raise UserError(f"board {name!r}: there is none of this name, but {', '.join(BOARD_CLASSES)}")
         wires = [wire for wire in wiring.CAN if wire.board == name]
         Bench.__init__(self, {f"can{wire.bus}": bit_rate for wire in wires})
         self.name = name
-        self.chip: Any = BOARD_CLASSES[name](Crystal(10_000_000, crystal_ppb), quirks or Quirks(), 0)
+        crystal = Crystal(10_000_000, crystal_ppb)
+        self.firmware = native_boards.built({name: firmware})[name] if firmware is not None else None
+        if self.firmware is not None:
+            self.chip: Any = self._board_in_c(self.firmware, crystal)
+        else:
+            self.chip = BOARD_CLASSES[name](crystal, quirks or Quirks(), 0)
         said = first_outputs(self.chip)
         self.chip.outbox = Outputs(self)
         self.buses_of: dict[int, tuple[Bus, int]] = {}
@@ -374,6 +384,21 @@ class BoardAlone(Bench):
         pass_on(said, self.chip.outbox, 0)
         if network_time and name != "CSR":
             self.call_at(SYNC_NS, self._send_time, SYNC_NS)
+
+    def _board_in_c(self, firmware: Firmware, crystal: Crystal) -> Any:
+        """The board with a program in C, which was tried in another process before."""
+        from ranger_sim.harness.robot_native_board import RobotNativeBoard  # only here: it loads cffi
+
+        name = self.name
+
+        def start(record: Any) -> None:
+            RobotNativeBoard(name, firmware, crystal, 0, record)
+
+        tried(f"{firmware.folder}: {name}", firmware.library, firmware.folder, start)
+        board = RobotNativeBoard(name, firmware, crystal, 0)
+        board.counts = firmware.counts
+        board.leave_record_in(*crash.record_of(name, firmware.library, firmware.folder))
+        return board
 
     # --- driving it ---------------------------------------------------------------------------------------
 

@@ -61,6 +61,9 @@ class Child:
     """The process of one test, and the pipe from it."""
 
     def __init__(self, item: pytest.Item) -> None:
+        from ranger_sim.firmware_sim.native import crash  # only here: everybody's pytest imports this
+
+        self.notebook = crash.Notebook()  # a program in C may end the child
         self.read, write = os.pipe()
         self.status: int | None = None
         parent = os.getpid()
@@ -73,6 +76,7 @@ class Child:
             code = LOST
             try:
                 os.close(self.read)
+                crash.notebook = self.notebook
                 from ranger_sim.harness.branching import die_with  # only here: everybody's pytest imports this
 
                 die_with(parent)
@@ -148,6 +152,8 @@ def died(item: pytest.Item, child: Child) -> pytest.TestReport:
         text = f"{item.nodeid}: the process of the test was killed by signal {-code} ({name})"
     else:
         text = f"{item.nodeid}: the process of the test ended with code {code} before the test did"
+    if where := child.notebook.told():
+        text += f"\n{where}"
 
     def fail() -> None:
         pytest.fail(text, pytrace=False)

@@ -5,10 +5,15 @@ Everybody's pytest imports this module, so it imports nothing of the robot befor
 
 from __future__ import annotations
 
+import dataclasses
 import os
 import pathlib
 import re
 import shlex
+import shutil
+import subprocess
+import sys
+import tempfile
 from collections.abc import Generator, Iterator
 from typing import TYPE_CHECKING, Any
 
@@ -26,6 +31,7 @@ SCOPES = ("function", "class", "module", "package", "session")
 MOST_KEPT = 8  # warmed-up robots that wait to be branched, some 30 MB each; chosen by us
 LAST_FRAMES = 12  # in the report of a failure
 LAST_ERRORS = 8
+COUNTS = "RANGER_SIM_COUNTS"  # variable of the environment: the folder of what ran, as long as the tests run
 
 # option: (environment variable, default, help)
 OPTIONS = {
@@ -35,6 +41,8 @@ OPTIONS = {
     "scope": ("RANGER_SIM_SCOPE", "function", f"scope of the fixtures: {', '.join(SCOPES)}"),
     "speed": ("RANGER_SIM_SPEED", "1.0", "virtual seconds per second, on vcan and hardware"),
     "fork": ("RANGER_SIM_FORK", "yes", "no: warmed-up robots are not branched, each test warms up its own"),
+    "sanitize": ("RANGER_SIM_SANITIZE", "no", "yes: firmware in C with sanitizers; a test fails with what they find"),
+    "coverage": ("RANGER_SIM_COVERAGE", "", "count which lines of firmware in C run, into this file (lcov.info)"),
     "trace": ("RANGER_SIM_TRACE", "", "folder for a timeline of the last 10 s of every robot whose test fails"),
 }
 
@@ -84,8 +92,12 @@ class WarmedUp:
 
 
 WARMED_UP = pytest.StashKey[WarmedUp]()
+COUNTING = pytest.StashKey[str]()
+ALONE = pytest.StashKey[Any]()
+TOLD = pytest.StashKey[dict[Any, int]]()
 ROBOTS = pytest.StashKey[list[Watched]]()
 BRANCH = pytest.StashKey[bool]()
+SHELTERED = pytest.StashKey[bool]()  # in a process of its own, in which programs in C run as well
 
 
 # --- options ----------------------------------------------------------------------------------------------
@@ -124,8 +136,12 @@ def pytest_configure(config: pytest.Config) -> None:
     config.stash[WARMED_UP] = WarmedUp()
     if option(config, "scope") not in SCOPES:
         raise pytest.UsageError(f"--ranger-scope is {option(config, 'scope')!r}, allowed are {', '.join(SCOPES)}")
-    if option(config, "fork") not in ("yes", "no"):
-        raise pytest.UsageError(f"--ranger-fork is {option(config, 'fork')!r}, allowed are yes, no")
+    for name in ("fork", "sanitize"):
+        if option(config, name) not in ("yes", "no"):
+            raise pytest.UsageError(f"--ranger-{name} is {option(config, name)!r}, allowed are yes, no")
+    if option(config, "coverage") and COUNTS not in os.environ:
+        os.environ[COUNTS] = tempfile.mkdtemp(prefix="ranger-sim-counts-")  # for workers and branches as well
+        config.stash[COUNTING] = os.environ[COUNTS]
     for name, kind in (("seed", int), ("speed", float)):
         try:
             kind(option(config, name) or "1")
@@ -133,10 +149,59 @@ def pytest_configure(config: pytest.Config) -> None:
             raise pytest.UsageError(f"--ranger-{name} is {option(config, name)!r}, a number is expected") from None
 
 
+@pytest.hookimpl(tryfirst=True)
+def pytest_cmdline_main(config: pytest.Config) -> int | None:
+    """With --ranger-sanitize the tests run in a process that can hold sanitizers: the same command once more."""
+    if option(config, "sanitize") != "yes" or config.option.help:
+        return None
+    from ranger_sim.firmware_sim.native import sanitizers
+    from ranger_sim.foundation.user_error import UserError
+
+    if sanitizers.is_ready():
+        return None
+    capture = config.pluginmanager.getplugin("capturemanager")
+    if capture is not None:
+        capture.stop_global_capturing()
+    given = config.invocation_params
+    with tempfile.TemporaryDirectory(prefix="ranger-sim-findings-") as logs:
+        try:
+            environment = sanitizers.environment(pathlib.Path(logs))
+        except UserError as reason:
+            raise pytest.UsageError(str(reason)) from None
+        from ranger_sim.harness.processes import kernel
+
+        command = [sys.executable, "-m", "pytest", *map(str, given.args)]
+        return subprocess.run(
+            command, cwd=given.dir, env=environment, check=False, preexec_fn=kernel.fix_addresses
+        ).returncode
+
+
+def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> None:
+    """How much of the firmware in C ran in all tests."""
+    if COUNTING not in config.stash:
+        return
+    from ranger_sim.firmware_sim.native import coverage
+    from ranger_sim.harness.testing.robots import counted
+
+    files = counted(pathlib.Path(config.stash[COUNTING]))
+    path = pathlib.Path(option(config, "coverage"))
+    path.write_text(coverage.lcov(files), encoding="utf-8")
+    terminalreporter.section("ranger-sim: firmware in C")
+    for file in files:
+        missed = f"; not run: {coverage.spans(file.missed)}" if file.missed else ""
+        terminalreporter.write_line(
+            f"{file.path}: {len(file.lines) - len(file.missed)} of {len(file.lines)} lines{missed}"
+        )
+    terminalreporter.write_line(f"written: {path}")
+
+
 def pytest_unconfigure(config: pytest.Config) -> None:
     """Give back what was kept."""
     for robot in config.stash[WARMED_UP].kept.values() if WARMED_UP in config.stash else ():
         robot.close()
+    if COUNTING in config.stash:
+        shutil.rmtree(config.stash[COUNTING], ignore_errors=True)
+        os.environ.pop(COUNTS, None)
 
 
 def scope_of(fixture_name: str, config: pytest.Config) -> str:
@@ -156,6 +221,8 @@ def order_for(node: Any, config: pytest.Config, fixture: str = "ranger") -> Orde
         wanted["backend"] = option(config, "backend")
         wanted["profile"] = option(config, "profile") or None
         wanted["speed"] = float(option(config, "speed"))
+        wanted["sanitize"] = option(config, "sanitize") == "yes"
+        wanted["counts"] = os.environ.get(COUNTS, "")
     for mark in reversed(list(node.iter_markers(fixture))):
         if mark.args:
             raise UserError(f"mark {fixture}: {mark.args[0]!r} has no name; it reads like {fixture}(seed=3)")
@@ -198,17 +265,39 @@ class Maker:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_runtest_protocol(item: pytest.Item, nextitem: pytest.Item | None) -> bool | None:
-    """A test of a warmed-up robot runs in a branch of it: a forked process."""
-    if not wants_branch(item):
+    """A test of a warmed-up robot runs in a branch of it: a forked process; one of firmware in C in one of its own."""
+    sheltered = wants_shelter(item)
+    if not sheltered and not wants_branch(item):
         return None
     from ranger_sim.harness.testing import forking
 
+    if sheltered:
+        if not forking.possible(item.config):
+            return None
+        item.stash[SHELTERED] = True
+        forking.run(item, nextitem)
+        return True
     order = order_for(item, item.config, wants_branch(item))
     if not forking.possible(item.config) or not item.config.stash[WARMED_UP].prepare(order):
         return None
     item.stash[BRANCH] = True
     forking.run(item, nextitem)
     return True
+
+
+def wants_shelter(item: pytest.Item) -> bool:
+    """Whether a test has a board that runs C, in a fixture of its own.
+
+    The program is in the test's process then, where its memory, tasks and faults are within reach; and as that process
+    is the test's alone, a crash ends this test and no other.
+    """
+    if option(item.config, "fork") == "no" or option(item.config, "scope") != "function":
+        return False
+    return any(
+        name in getattr(item, "fixturenames", ()) and "firmware" in mark.kwargs
+        for name in ("ranger", "board")
+        for mark in item.iter_markers(name)
+    )
 
 
 def wants_branch(item: pytest.Item) -> str:
@@ -275,6 +364,7 @@ def pytest_runtest_call(item: pytest.Item) -> Generator[None, Any, Any]:
     unhealthy = []
     for watched in robots_of(item):
         unhealthy += watched.health.faults(expected_of(item))
+    unhealthy += [f"firmware: {each.told()}" for each in new_findings(item)]
     if unhealthy:
         pytest.fail(
             "\n".join(
@@ -291,6 +381,35 @@ def pytest_runtest_call(item: pytest.Item) -> Generator[None, Any, Any]:
 def uses_ranger(item: pytest.Item) -> bool:
     """Whether it is about the robot that is ours."""
     return "ranger" in getattr(item, "fixturenames", ())
+
+
+def new_findings(item: pytest.Item) -> list[Any]:
+    """What sanitizers have found in firmware in C since they were asked last."""
+    firmware = {
+        each.library: each for watched in robots_of(item) for each in getattr(watched.robot, "firmware", {}).values()
+    }
+    processes = [os.getpid()]
+    for watched in robots_of(item):
+        apart = getattr(watched.robot, "processes", None)
+        processes += apart.numbers if apart is not None else ()
+    for node in item.listchain():
+        alone = node.stash.get(ALONE, None)
+        if alone is not None and alone.firmware is not None:
+            firmware[alone.firmware.library] = alone.firmware
+    if not any(each.sanitize for each in firmware.values()):
+        return []
+    from ranger_sim.firmware_sim.native import sanitizers
+
+    logs = sanitizers.place_of_findings()
+    if logs is None:
+        return []
+    told = item.config.stash.setdefault(TOLD, {})
+    new = []
+    for each in sanitizers.findings(logs, [one.program for one in firmware.values()], processes):
+        if each.count > told.get(each.told(), 0):
+            new.append(each)
+        told[each.told()] = each.count
+    return new
 
 
 def robots_of(item: pytest.Item) -> list[Watched]:
@@ -438,8 +557,10 @@ def watched_machine(request: pytest.FixtureRequest, fixture: str) -> Iterator[An
     node, config = request.node, request.config
     missing = wrong = ""
     try:
-        order = order_for(node, config, fixture)
+        order: Any = order_for(node, config, fixture)
         branch = node.stash.get(BRANCH, False)
+        if getattr(order, "firmware", ()) and order.in_process is None:
+            order = dataclasses.replace(order, in_process=node.stash.get(SHELTERED, False))
         robot = config.stash[WARMED_UP].kept[order] if branch else made(order)
     except MissingError as reason:
         missing = str(reason)
@@ -460,18 +581,32 @@ def watched_machine(request: pytest.FixtureRequest, fixture: str) -> Iterator[An
 def board(request: pytest.FixtureRequest) -> Iterator[BoardAlone]:
     """One board alone, as the mark `board` says: `@pytest.mark.board("MCH")`."""
     from ranger_sim.foundation.user_error import UserError
-    from ranger_sim.harness.testing.bench import BoardAlone
 
     mark = request.node.get_closest_marker("board")
     wrong = 'fixture board: which one? @pytest.mark.board("MCH")'
     if mark is not None and mark.args:
         try:
-            alone, wrong = BoardAlone(*mark.args, **mark.kwargs), ""
+            alone, wrong = board_alone(mark, request.config), ""
         except (UserError, TypeError) as mistake:
             wrong = str(mistake)
     if wrong:
         pytest.fail(wrong, pytrace=False)
+    request.node.stash[ALONE] = alone
     yield alone
+    request.node.stash[ALONE] = None
+    if alone.firmware is not None:
+        alone.chip.write_counts()
+
+
+def board_alone(mark: pytest.Mark, config: pytest.Config) -> BoardAlone:
+    """The board of a mark."""
+    from ranger_sim.harness.testing.bench import BoardAlone
+    from ranger_sim.harness.testing.robots import built
+
+    wanted = dict(mark.kwargs)
+    if "firmware" in wanted:
+        wanted["firmware"] = built(wanted["firmware"], option(config, "sanitize") == "yes", os.environ.get(COUNTS, ""))
+    return BoardAlone(*mark.args, **wanted)
 
 
 @pytest.fixture(scope=scope_of)  # type: ignore[arg-type]

@@ -8,11 +8,19 @@ with contextlib.closing(new_robot(seed=3)) as robot:
 from __future__ import annotations
 
 import dataclasses
+import hashlib
+import json
+import os
+import pathlib
 from collections.abc import Mapping
 from typing import Any
 
 from ranger_sim.boards.quirks import Quirks
+from ranger_sim.firmware_sim.native import coverage
+from ranger_sim.firmware_sim.native.coverage import FileCounts
 from ranger_sim.foundation.user_error import UserError
+from ranger_sim.harness import native_boards
+from ranger_sim.harness.native_firmware import Firmware
 from ranger_sim.harness.profile import load as load_profile
 from ranger_sim.harness.ranger import Ranger
 from ranger_sim.harness.scenario import Scenario
@@ -20,8 +28,12 @@ from ranger_sim.harness.testing.backends import HARDWARE, PROCESSES, SIM, VCAN, 
 from ranger_sim.harness.testing.health import Expected, Health
 from ranger_sim.harness.testing.making import made
 
+ABOUT = "firmware.json"  # beside counts: whose they are
 SCENARIO_FIELDS = tuple(field.name for field in dataclasses.fields(Scenario))
-OTHERS = ("quirks", "profile", "warmed_up", "backend", "speed", "log", "trace")
+OTHERS = (
+    "quirks", "profile", "warmed_up", "backend", "speed", "log", "trace",
+    "firmware", "in_process", "sanitize", "counts",
+)  # fmt: skip
 
 
 @dataclasses.dataclass(frozen=True)
@@ -40,6 +52,10 @@ class Order:
     speed: float = 1.0
     log: str = "none"
     trace: bool = False  # keep a timeline (`robot.observed.timeline`)
+    firmware: tuple[tuple[str, str], ...] = ()  # (board, folder) of those that run C
+    in_process: bool | None = None  # their programs run in the test's process; None: whoever makes the robot says
+    sanitize: bool = False  # compiled with sanitizers
+    counts: str = ""  # compiled for coverage, which goes to this folder
 
     @property
     def seed(self) -> int:
@@ -49,7 +65,7 @@ class Order:
     @property
     def branches(self) -> bool:
         """Whether a robot that is warmed up can be branched by forking."""
-        return bool(self.warmed_up) and self.backend == SIM and self.log != "full"
+        return bool(self.warmed_up) and not self.firmware and self.backend == SIM and self.log != "full"
 
     def told(self) -> str:
         """What it was made of, in a line of a report."""
@@ -64,16 +80,41 @@ class Order:
     def fresh(self) -> Ranger:
         """The robot at power-up, on its backend."""
         profile = load_profile(self.profile) if self.profile is not None else None
+        firmware = {name: built(folder, self.sanitize, self.counts) for name, folder in self.firmware}
+        if firmware and self.backend in (VCAN, HARDWARE):
+            raise UserError(f"backend {self.backend}: firmware in C runs on the backends {SIM} and {PROCESSES}")
         if self.backend == PROCESSES:
             from ranger_sim.harness.testing.process_robot import ProcessRobot
 
-            return ProcessRobot(self.scenario, self.log, self.quirks, profile)
+            return ProcessRobot(self.scenario, self.log, self.quirks, profile, firmware)
         if self.backend in (VCAN, HARDWARE):
             from ranger_sim.harness.testing.outside_robot import OutsideRobot, buses_of_profile, vcan_buses
 
             outside = vcan_buses() if self.backend == VCAN else buses_of_profile(profile)
             return OutsideRobot(self.scenario, self.log, self.quirks, profile, outside, self.speed)
-        return Ranger(self.scenario, self.log, self.quirks, profile)
+        return Ranger(self.scenario, self.log, self.quirks, profile, firmware, bool(self.in_process))
+
+
+def built(folder: str | os.PathLike, sanitize: bool = False, counts: str = "") -> Firmware:
+    """A folder of firmware in C, compiled as a test wants it."""
+    firmware = native_boards.build(pathlib.Path(folder), sanitize, bool(counts))
+    if not counts:
+        return firmware
+    name = hashlib.blake2b(str(firmware.library.resolve()).encode(), digest_size=8).hexdigest()
+    place = pathlib.Path(counts) / name
+    place.mkdir(parents=True, exist_ok=True)
+    about = {"library": str(firmware.library.resolve()), "folder": str(firmware.folder.resolve())}
+    (place / ABOUT).write_text(json.dumps(about), encoding="utf-8")
+    return dataclasses.replace(firmware, counts=place)
+
+
+def counted(counts: pathlib.Path) -> list[FileCounts]:
+    """Which lines of firmware ran in all the tests that had `counts` as their folder."""
+    found = []
+    for about in sorted(counts.glob(f"*/{ABOUT}")):
+        told = json.loads(about.read_text(encoding="utf-8"))
+        found.append(coverage.read(pathlib.Path(told["library"]), pathlib.Path(told["folder"]), about.parent))
+    return coverage.merged(found)
 
 
 def order_of(wanted: Mapping[str, Any]) -> Order:
@@ -85,6 +126,11 @@ def order_of(wanted: Mapping[str, Any]) -> Order:
     scenario = Scenario(**{name: value for name, value in wanted.items() if name in SCENARIO_FIELDS})
     others = {name: value for name, value in wanted.items() if name in OTHERS and value is not None}
     check_backend(others.get("backend", SIM))
+    if "firmware" in others:
+        given = others["firmware"]
+        if not isinstance(given, Mapping):
+            raise UserError(f"ranger(firmware={given!r}): boards and folders are expected, as {{'MCH': 'hip'}}")
+        others["firmware"] = tuple(sorted((native_boards.known(name), str(folder)) for name, folder in given.items()))
     return Order(scenario, **others)
 
 
