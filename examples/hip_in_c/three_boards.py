@@ -172,7 +172,7 @@ def seconds_of(new, slots, rounds):
 def walking_seconds(firmware, rounds):
     """Processor time for a second of the whole walking robot, the quietest of several."""
     spent = []
-    with contextlib.closing(Ranger(firmware=firmware)) as robot:
+    with contextlib.closing(Ranger(firmware=firmware, in_process=True)) as robot:
         robot.run_for(3.0)
         for _ in range(rounds):
             begun = wallclock.process_cpu_s()
