@@ -14,7 +14,7 @@ from ranger_sim.tools.panel.channels import EMPTY, Channel, Trace
 # them, feet by the ankles' encoders. Angles against gravity, rad; robot.md N4.17, C1.
 LEGS = (("E_LO_ANGLE", "E_LI_ANGLE"), ("EST_STATE_TH0", "EST_STATE_TH1"))
 ANKLES = ("MCFO_RIGHT_ANKLE_ANGLE", "MCFI_MID_ANKLE_ANGLE")
-ANKLE_ZERO_RAD = 1.68  # between leg and foot, of the body `ranger` (plant/parameters.py); robot.md has 1.60 and 1.63
+ANKLE_ZERO_RAD = 1.68  # between leg and foot, of the body `ranger` (plant/parameters.py); 1.60, 1.63: robot.md N5
 KNOWN_POSE = ("leg_outer_rad", "leg_inner_rad", "foot_outer_rad", "foot_inner_rad")
 # As the body has them, where a body is simulated; rad, m, N, A.
 TRUE_POSE = (
