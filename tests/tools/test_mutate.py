@@ -146,6 +146,9 @@ def test_tests_that_last_too_long_or_start_processes_count_for_what_they_may_not
     built = work.TestsOf({"t": {"imported": [], "shared": [], "late": {}, "tests": every}})
     assert built.built_of(mutant, tests, 1.0) == (["t::near", "t::only compiled"], 1)
     assert built.built_of(mutant, tests, 2.0) == (["t::near", "t::only compiled", "t::walk"], 0)
+    # a function that runs compiled alone is reached by whoever runs anything of its module
+    of_file["tests"]["t::near"]["functions"], of_file["late"] = ["a/valve.py:99"], {}
+    assert built.built_of(mutant, work.TestsOf({"t": of_file}), 2.0)[0] == ["t::near", "t::only compiled", "t::walk"]
 
 
 def test_mutants_that_are_listed_as_equivalent_exist_and_have_reasons(tmp_path):

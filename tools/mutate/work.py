@@ -301,6 +301,8 @@ class TestsOf:
         place = f"{mutant.path}:{mutant.first_line}"
         reach = plain.by_module if plain.at_import(mutant) else plain.by_function
         seen = reach.get(mutant.path if plain.at_import(mutant) else place, set()) | plain.late.get(place, set())
+        # some functions run compiled alone
+        seen = seen or plain.by_module.get(mutant.path, set())
         names = [name for name in self.tests if name in seen | self.starting or name not in plain.known]
         chosen: list[str] = []
         total = 0.0
@@ -425,6 +427,8 @@ def judge(copy: Copy, ask: Asked, mutant: Mutant, tests: TestsOf, limit_s: float
             copy.put(mutant.path, original)
         if code == 1 and by in tests.tests and not tests.is_witness(by, ask, mutant, original):
             tests.leave_out(by)
+        elif code is None and by and verdict_of(copy, ask, mutant, tests, [by], original, original, chosen)[0] is None:
+            tests.leave_out(by)  # it needs what another test before it had made, which takes longer than itself
         elif code is None and not by and verdict_of(copy, ask, mutant, tests, chosen, original, original)[0] is None:
             return Verdict(mutant.key, mutant.line, TOO_SLOW, "", len(chosen), limit_of(tests, chosen), left)
         else:
@@ -440,11 +444,19 @@ def limit_of(tests: TestsOf, chosen: list[str]) -> float:
 
 
 def verdict_of(
-    copy: Copy, ask: Asked, mutant: Mutant, tests: TestsOf, chosen: list[str], original: str, text: str
+    copy: Copy,
+    ask: Asked,
+    mutant: Mutant,
+    tests: TestsOf,
+    chosen: list[str],
+    original: str,
+    text: str,
+    limits_of: list[str] | None = None,
 ) -> tuple[int | None, str]:
     """(pytest's exit code or None for too long, the test that failed), with `text` in the mutant's file.
 
     One of a function is tried in memory first; where that function also runs at import, in a new process after that.
+    limits_of: tests by which the limit of each is set, where they are others.
     """
     limit = limit_of(tests, chosen)
     code: int | None = 0
@@ -456,7 +468,7 @@ def verdict_of(
             after=text,
             tests=chosen,
             limit_s=limit,
-            limit_test_s=LOOP_S + SLOWER * max(tests.tests[name]["seconds"] for name in chosen),
+            limit_test_s=LOOP_S + SLOWER * max(tests.tests[name]["seconds"] for name in limits_of or chosen),
         )
         code, by = answer["code"], answer.get("by", "")
     if code == 0 and tests.at_import(mutant):
