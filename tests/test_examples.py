@@ -29,7 +29,13 @@ PRINTED = {
 
 
 # Read from top to bottom, files, commands and all: tests/pages/test_pages.py.
-WALKED = {"docs/tutorial.md", "docs/how-to/variable.md", "docs/how-to/c-firmware.md", "docs/how-to/machine.md"}
+WALKED = {
+    "docs/tutorial.md",
+    "docs/how-to/firmware-image.md",
+    "docs/how-to/variable.md",
+    "docs/how-to/c-firmware.md",
+    "docs/how-to/machine.md",
+}
 # Its examples, tests and a law beside them, are run in a project of their own: harness/testing/test_in_a_project.py.
 IN_A_PROJECT = "docs/testing.md"
 
