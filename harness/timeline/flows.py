@@ -75,8 +75,9 @@ def connect_all(
             if board == ROUTER:
                 came_in.append(Passing(processors[board].fast, rows, interrupt, bus))
             else:
-                listened = robot.boards[board].can.receivers
-                deliver(book, bus, listened, rows, interrupt, processors[board])
+                link = getattr(robot.boards[board], "can", None)
+                if link is not None:  # else nobody knows what its program listens to
+                    deliver(book, bus, link.receivers, rows, interrupt, processors[board])
     if ROUTER in processors and MAIN_BRAIN in processors:
         exchanges.connect(book, processors[ROUTER], processors[MAIN_BRAIN], came_in, buses)
 

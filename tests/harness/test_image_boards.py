@@ -9,6 +9,7 @@ from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness import image_boards
 from ranger_sim.harness.ranger import Ranger
 from ranger_sim.harness.scenario import Scenario
+from ranger_sim.harness.timeline.timeline import Timeline
 from tests.firmware_sim.lpc2194.programs import image_of, words_of
 
 
@@ -47,6 +48,25 @@ def test_a_program_that_reaches_for_nothing_ends_the_run_with_its_place():
     with robot_with("MCSI", [0xE3A0020E, 0xE5800008]) as robot:
         with pytest.raises(UserError, match="MCSI: the program writes 0xe0000000 to 0xe0000008 as a word at pc 0x0000"):
             robot.run_for(0.05)
+
+
+def test_a_reset_begins_the_program_anew():
+    with robot_with("MCH", words_of("ticker")) as robot:
+        wire = robot.wire("can1")
+        fault = robot.inject("MCH.processor", "reset", at="10 ms")
+        robot.run_for(0.03)
+        assert fault.acted
+        counts = [frame.lo for frame in wire.frames(14)]
+        again = counts.index(1, 1)
+        assert counts[: again + 2] == [*range(1, again + 1), 1, 2]
+
+
+def test_a_timeline_of_a_robot_with_images_can_be_written(tmp_path):
+    with robot_with("MCH", words_of("ticker")) as robot:
+        timeline = Timeline(robot)
+        robot.run_for(0.01)
+        timeline.write(tmp_path / "trace.vcd")
+    assert (tmp_path / "trace.vcd").stat().st_size > 1_000
 
 
 @pytest.mark.parametrize(
