@@ -61,6 +61,7 @@ class Limits:
 # reason; slcan, an extended frame has 26; socketcand, a send has 45; control, a request has below 100;
 # gdb, the packet size that its stub tells, with what is around it; a look of it is one of a board that stands, or one
 # in a millisecond. trace, the head of a browser's request, cookies of other servers of this machine included.
+# xcp-udp, a datagram in a frame of Ethernet, of which a look takes 16 and no more than `burst` commands.
 # backlog: 8,000 frames, 0.3 s of a full bus of 3 Mbit/s; feed, 3 s of all that a robot records (2.6 MB a second).
 KB = 1024
 LIMITS = {
@@ -69,6 +70,7 @@ LIMITS = {
     "slcan":      Limits(    1,        4,    32,      32,    4 * KB,      4 * KB,   4 * KB,   64 * KB),
     "socketcand": Limits(    8,        4,    32,     256,    4 * KB,     64 * KB,  64 * KB,  256 * KB),
     "control":    Limits(   32,        4,     8,    4096,    4 * KB,     64 * KB,  64 * KB,   64 * KB),
+    "xcp-udp":    Limits(    1,       32,    16,    1500,   24 * KB,     64 * KB,        0,         0),
     "serial":     Limits(    1,        0,     0,       0,    2 * KB,      4 * KB,        0,         0),
     "gdb":        Limits(    1,        0,    64, 17 * KB,   16 * KB,     64 * KB,  64 * KB,         0),
     "feed":       Limits(    4,        0,     8,      64,    4 * KB,   1024 * KB,  64 * KB, 8192 * KB),

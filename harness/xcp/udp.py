@@ -1,6 +1,7 @@
 """XCP on UDP: one master over datagrams (ASAM MCD-1 XCP, part 3: length and counter before each packet).
 
-It keeps the rule of `foundation/peers.py` as far as datagrams have it: a look takes a bounded number, one master
+It keeps the rule of `foundation/peers.py` as far as datagrams have it: a look carries out at most `burst` commands,
+however they are packed, and asks the kernel at most once whose a stranger's datagram is; one master
 has the place, who else speaks is not answered and counted by reason, and beyond this machine nobody is served unless
 that is asked for. A datagram that finds no room is dropped, and counted.
 """
@@ -14,14 +15,24 @@ from collections import Counter, deque
 from pathlib import Path
 from typing import Any
 
-from ranger_sim.foundation.peers import FOREIGN, FULL, MALFORMED, UNKNOWN, listening_address, loopback, trusted
+from ranger_sim.foundation.peers import (
+    FOREIGN,
+    FULL,
+    LIMITS,
+    MALFORMED,
+    UNKNOWN,
+    listening_address,
+    loopback,
+    trusted,
+)
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.step_watch import StepWatch
 from ranger_sim.harness.xcp.slave import FINE, Slave
 from ranger_sim.harness.xcp.table_memory import TableMemory
 
 MAX_CTO, MAX_DTO = 248, 1400  # bytes: a datagram fits into one frame of Ethernet
-DATAGRAMS_A_LOOK = 16  # chosen by us, as burst and read_bytes of the other doors: below 4 KB of commands
+RULE = LIMITS["xcp-udp"]
+DATAGRAMS_A_LOOK = RULE.read_bytes // RULE.longest
 WAITING = 4096  # packets of measurements kept for the next look; chosen by us: 2 s of one list at 0.5 ms
 LOOK_NS = 500_000  # virtual time between two looks: the fastest event
 DISCONNECT = b"\xfe"  # the command's code
@@ -68,6 +79,8 @@ class XcpUdpServer:
         self.sent_away: Counter[str] = Counter()
         self.totals = {"commands": 0, "packets_out": 0, "packets_dropped": 0}
         self.left_over = False  # datagrams may wait for the next look
+        self.rest, self.speaker = b"", ("", 0)  # of a datagram whose commands wait for the next look, and whose it is
+        self.room, self.asked = RULE.burst, False
         self.sampling = _Sampling(self)
         robot.loop.watchers.append(self.sampling)
 
@@ -85,7 +98,9 @@ class XcpUdpServer:
         """Commands that have come, measurements that wait; returns when it wants to be looked at next, ns."""
         while self.waiting:
             self._send(self.waiting.popleft())
-        for _ in range(DATAGRAMS_A_LOOK):
+        self.room, self.asked = RULE.burst, False
+        self._carry_out(now_ns)
+        for _ in range(DATAGRAMS_A_LOOK if not self.rest else 0):
             try:
                 data, sender = self.socket.recvfrom(2048)
             except (BlockingIOError, InterruptedError):
@@ -94,32 +109,46 @@ class XcpUdpServer:
             except OSError:  # an earlier datagram found nobody there
                 continue
             self._take(data, sender, now_ns)
+            if self.rest:
+                self.left_over = True
+                break
         else:
             self.left_over = True
         return now_ns + LOOK_NS
 
     def _take(self, data: bytes, sender: tuple[str, int], now_ns: int) -> None:
-        """The packets of a datagram, in their order."""
-        if sender != self.master and self._master_is_gone():
-            self.slave.command(DISCONNECT, now_ns)
-            self.master = None
-            self.waiting.clear()
-        if sender != self.master and (fault := self._fault_of(sender)) is not None:
-            self.sent_away[fault] += 1
-            return
-        at = 0
-        while at < len(data):
-            length = HEADER.unpack_from(data, at)[0] if len(data) - at >= HEADER.size else 0
-            packet = data[at + HEADER.size : at + HEADER.size + length]
-            at += HEADER.size + length
+        """A datagram, from whomever."""
+        if sender != self.master:
+            if self.asked:  # the kernel's table is read for one stranger in a look: it takes longest
+                self.sent_away[FULL] += 1
+                return
+            self.asked = True
+            if self._master_is_gone():
+                self.slave.command(DISCONNECT, now_ns)
+                self.master = None
+                self.waiting.clear()
+            if (fault := self._fault_of(sender)) is not None:
+                self.sent_away[fault] += 1
+                return
+        self.rest, self.speaker = data, sender
+        self._carry_out(now_ns)
+
+    def _carry_out(self, now_ns: int) -> None:
+        """The packets of a datagram, in their order, as far as there is room for commands in this look."""
+        while self.rest and self.room > 0:
+            data = self.rest
+            length = HEADER.unpack_from(data)[0] if len(data) >= HEADER.size else 0
+            packet, self.rest = data[HEADER.size : HEADER.size + length], data[HEADER.size + length :]
             if not 0 < length == len(packet):
                 self.sent_away[MALFORMED] += 1
+                self.rest = b""
                 return
+            self.room -= 1
             self.totals["commands"] += 1
             answer = self.slave.command(packet, now_ns)
             if not answer:
                 continue
-            self.master = sender
+            self.master = self.speaker
             self._send(answer)
             if not self.slave.connected:
                 self.master = None

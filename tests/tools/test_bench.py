@@ -190,7 +190,7 @@ def test_a_robot_under_floods_runs_as_fast_as_the_machine_can_hold(processors, s
 
 
 def test_every_flood_has_a_program_and_together_they_use_each_door():
-    doors = floods.Doors("x", "", 0, "")
+    doors = floods.Doors("x", "", 0, "", 0)
     assert [len(floods.programs(name, doors)) for name in floods.NAMES] == [0, 1, *[1] * (len(floods.FLOODS) + 1), 3]
     assert {name.split()[0] for name in floods.TOGETHER} == {"attach", "slcan", "socketcand"}
 
@@ -199,10 +199,10 @@ def test_a_sender_in_the_window_is_served_as_long_as_it_lasts():
     """The dearest client that keeps to the protocol, against a bus alone: it is never sent away."""
     with (
         hosted("can1", speed=50.0) as (name, host),
-        floods.flooded(floods.FRAMES_IN_WINDOW, floods.Doors(name, "", 0, "")),
+        floods.flooded(floods.FRAMES_IN_WINDOW, floods.Doors(name, "", 0, "", 0)),
     ):
         (server,) = host.servers
-        listener = floods.attached(floods.Doors(name, "", 0, ""))
+        listener = floods.attached(floods.Doors(name, "", 0, "", 0))
         with listener:
             heard = 0
             while heard < 40_000:  # some 1,000 frames

@@ -21,6 +21,7 @@ import re
 import signal
 import socket
 import statistics
+import struct
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
@@ -51,6 +52,7 @@ class Doors:
     terminal: str
     port: int
     data_link: str
+    xcp: int
 
 
 # --- ways in: each gives something with a file number that bytes can be written to -----------------------
@@ -86,6 +88,25 @@ def _local(address: str, greeting: bytes) -> socket.socket:
     return client
 
 
+def calibrating(doors: Doors) -> socket.socket:
+    """The XCP master that has the place."""
+    client = stranger(doors)
+    client.send(xcp_packets(b"\xff\x00"))
+    return client
+
+
+def stranger(doors: Doors) -> socket.socket:
+    """Somebody who sends datagrams to the XCP slave."""
+    client = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    client.connect(("127.0.0.1", doors.xcp))
+    return client
+
+
+def xcp_packets(*packets: bytes) -> bytes:
+    """A datagram of them."""
+    return b"".join(struct.pack("<HH", len(each), 0) + each for each in packets)
+
+
 def line(doors: Doors) -> int:
     """The pseudo-terminal of slcan, its channel open."""
     return _terminal(doors.terminal, b"O\r")
@@ -109,11 +130,15 @@ Way = Callable[[Doors], "socket.socket | int"]
 
 @dataclasses.dataclass(frozen=True)
 class Flood:
-    """`piece` over and over through `way`; an empty one: connections, opened and kept. clients: as many at once."""
+    """`piece` over and over through `way`; an empty one: connections, opened and kept. clients: as many at once.
+
+    whole: a piece is one datagram.
+    """
 
     way: Way
     piece: bytes
     clients: int = 1
+    whole: bool = False
 
 
 def asked(**request: object) -> bytes:
@@ -148,6 +173,10 @@ FLOODS = {
     "control nonsense": Flood(asking, b"{}\n"),
     "control no line": Flood(asking, b"x"),
     "control connections": Flood(asking, b""),
+    "xcp GET_STATUS": Flood(calibrating, xcp_packets(*[b"\xfd"] * 200), whole=True),
+    "xcp SHORT_UPLOAD": Flood(calibrating, xcp_packets(*[b"\xf4\x04\0\0" + bytes(4)] * 100), whole=True),
+    "xcp nonsense": Flood(calibrating, b"?" * 1000, whole=True),
+    "xcp strangers": Flood(stranger, xcp_packets(b"\xfd"), 8, whole=True),
     "data link noise": Flood(computer, bytes(range(256))),
     "data link packets": Flood(computer, write_packet(388, 0x43FA0000)),  # P_UI_LCD_TIME = 500
 }
@@ -176,7 +205,7 @@ def send_in_window(doors: Doors) -> None:
 
 def pour(flood: Flood, doors: Doors) -> None:
     """Flood until killed. Where a connection is ended or refused, over a new one."""
-    data = flood.piece * (CHUNK // max(1, len(flood.piece)))
+    data = flood.piece if flood.whole else flood.piece * (CHUNK // max(1, len(flood.piece)))
     ends: list[socket.socket | int] = []
     while True:
         try:
@@ -220,7 +249,7 @@ class Robot:
         self.name = f"flood-{os.getpid()}"
         call = [sys.executable, "-m", "ranger_sim", "up", "--name", self.name, "--slcan", "can1", "--socketcand", "0"]
         self.process = subprocess.Popen(
-            [*call, "--daq-port", "pty", "--speed", str(speed)],
+            [*call, "--daq-port", "pty", "--xcp-udp", "0", "--speed", str(speed)],
             stderr=subprocess.PIPE,
             env={**os.environ, "PYTHONUNBUFFERED": "1"},
         )
@@ -230,6 +259,7 @@ class Robot:
             self._told(r"slcan: can1 is (\S+)"),
             int(self._told(r"socketcand: [\d.]+:(\d+)")),
             self._told(r"data link: ranger-sim daq --port (\S+)"),
+            int(self._told(r"XCP on UDP: [\d.]+:(\d+)")),
         )
         self.status: dict = {}
         end = wallclock.monotonic_s() + PATIENCE_S

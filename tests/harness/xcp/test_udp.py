@@ -1,6 +1,7 @@
 """XCP on UDP with a whole robot behind it: by datagrams, and with pyxcp as the master."""
 
 import contextlib
+import os
 import socket
 import struct
 
@@ -8,9 +9,11 @@ import pytest
 
 from ranger_sim.datatable import parameters
 from ranger_sim.datatable.addresses import address_of
+from ranger_sim.foundation.peers import FULL
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.ranger import Ranger
 from ranger_sim.harness.scenario import Scenario
+from ranger_sim.harness.xcp import udp
 from ranger_sim.harness.xcp.udp import XcpUdpServer
 
 
@@ -110,3 +113,24 @@ def test_a_master_that_ended_without_a_word_makes_room_and_its_lists_stop(robot)
 def test_beyond_this_machine_it_listens_only_when_that_is_asked_for(robot):
     with pytest.raises(UserError, match="allow-network"):
         XcpUdpServer(robot, 0, "0.0.0.0")
+
+
+def test_a_look_carries_out_so_many_commands_however_packed_and_asks_once_whose_a_stranger_is(robot, monkeypatch):
+    asked = []
+    monkeypatch.setattr(udp, "owner_of", lambda sender: asked.append(sender) or os.getuid())
+    with contextlib.closing(XcpUdpServer(robot, 0)) as server, contextlib.closing(Client(robot, server)) as client:
+        get_status = struct.pack("<HH", 1, 0) + b"\xfd"
+        client.socket.send(struct.pack("<HH", 2, 0) + b"\xff\x00" + get_status * 99)
+        counts = []
+        for look in range(9):
+            server.poll(robot.loop.time + look)
+            counts.append(server.totals["commands"])
+        assert counts == [16, 32, 48, 64, 80, 96, 100, 100, 100]
+        assert len(client.heard()) == 100
+        asked.clear()
+        with contextlib.closing(Client(robot, server)) as stranger:
+            for _ in range(10):
+                stranger.socket.send(get_status)
+            server.poll(robot.loop.time)
+            assert len(asked) == 1  # whether the master is still there
+            assert server.sent_away == {FULL: 10}
