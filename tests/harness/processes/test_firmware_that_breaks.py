@@ -389,3 +389,24 @@ def test_a_python_board_that_hangs_is_killed_at_once(hung):
     for _ in range(2):
         made.look(watched)
     assert made.sent == [signal.SIGKILL]
+
+
+@needs_compiler
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        ("return RANGER_TABLE_VERSION;", "return 5;", "compiled with version 0x00000005 of the master table"),
+        ("{ fw_can_start(1, 0x00254001, 0); sink", "{ sink", "firmware_start() does not start CAN controller 1"),
+        ("return &schedule;", "return NULL;", "firmware_schedule() returned NULL"),
+    ],
+    ids=["another table", "no CAN controller", "no schedule"],
+)
+def test_what_a_program_offers_wrongly_is_refused_in_one_line_and_no_folder_is_touched(tmp_path, old, new, told):
+    source, _ = program(WELL)
+    assert old in source
+    folder = folder_with(tmp_path / "fw", source.replace(old, new), MANIFEST)
+    done, found = walked(folder, "--out", str(tmp_path / "out"))
+    assert (done.returncode, found) == (2, None)
+    (line,) = done.stderr.splitlines()
+    assert line.startswith("ranger-sim: ") and told in line
+    assert not list((tmp_path / "out").glob("*"))
