@@ -1,6 +1,7 @@
 cimport cython
 
 cpdef enum:
+    WRITTEN_BITS = 8
     USER = 0x10
     FAST = 0x11
     INTERRUPT = 0x12
@@ -16,6 +17,10 @@ cpdef enum:
 cdef long long _MASK
 cdef long long _SIGN
 cdef long long _STATUS
+
+cdef class Device:
+    cpdef long long read(self, long long address, long long size) except? <long long>-1
+    cpdef int write(self, long long address, long long size, long long value) except -1
 
 @cython.final
 cdef class Core:
@@ -35,6 +40,8 @@ cdef class Core:
     cdef public long long[::1] r, high, banked, saved
     cdef public long long[::1] flash, ram
     cdef public object device
+    cdef public Device bridge
+    cdef public long long[::1] written
     cdef public str name
 
     cpdef long long cpsr(self) noexcept

@@ -38,6 +38,7 @@ import cython
 from ranger_sim.foundation.user_error import UserError
 
 if not cython.compiled:
+    WRITTEN_BITS = 8
     # modes: low five bits of the CPSR
     USER = 0x10
     FAST = 0x11
@@ -92,15 +93,29 @@ def put(words, place, content):
         words[i >> 2] = words[i >> 2] & ~(0xFF << turn) | byte << turn
 
 
+class Device:
+    """What a program reaches beyond flash and RAM. A class of this kind is called without Python's way of calling."""
+
+    def read(self, address: cython.longlong, size: cython.longlong) -> cython.longlong:
+        """A load of `size` bytes, 1, 2 or 4."""
+        raise LookupError(address)
+
+    def write(self, address: cython.longlong, size: cython.longlong, value: cython.longlong) -> cython.int:
+        """A store."""
+        raise LookupError(address)
+
+
 class Core:
     """One processor with flash, RAM and a hook for everything else.
 
     `device`: an object with read(address, size) -> value and write(address, size, value), size in bytes 1, 2 or 4;
-    both raise LookupError where nothing is. `lines` holds the two interrupt inputs (IRQ_LINE, FIQ_LINE), levels set by
-    devices. `r` holds the registers of the present mode, `pc` the address of the next instruction (`r[15]` is only
-    valid inside an instruction). `cycles` and `instructions` count from the start; `began` is what `cycles` was when
-    the present instruction began: devices take that as the instant of its accesses. The fields are so many
-    because a processor's state is, and because in one object what an instruction touches lies together in memory.
+    both raise LookupError where nothing is. A `Device` is called faster, and ends the run itself where nothing is.
+    `written`: by part of RAM of 256 bytes, whether it was written since somebody set that to 0. `lines` holds the two
+    interrupt inputs (IRQ_LINE, FIQ_LINE), levels set by devices. `r` holds the registers of the present mode, `pc` the
+    address of the next instruction (`r[15]` is only valid inside an instruction). `cycles` and `instructions` count
+    from the start; `began` is what `cycles` was when the present instruction began: devices take that as the instant of
+    its accesses. The fields are so many because a processor's state is, and because in one object what an instruction
+    touches lies together in memory.
     """
 
     def __init__(
@@ -113,7 +128,8 @@ class Core:
         self.flash_size = flash_size
         self.ram_base = ram_base
         self.ram_size = ram_size
-        self.device = device
+        self.written = array.array("q", [1]) * ((ram_size >> WRITTEN_BITS) + 1)
+        self.connect(device)
         self.device_waits = DEVICE_WAITS
         self.bridge_base = BRIDGE_BASE
         self.mam_mode = 2
@@ -154,6 +170,11 @@ class Core:
         self.stopped = 0
         self.forget_flash()
 
+    def connect(self, device) -> None:
+        """From now on loads and stores beyond flash and RAM go to `device`; None: to nothing."""
+        self.device = device
+        self.bridge = device if isinstance(device, Device) else None
+
     def stop(self) -> None:
         """`run` ends after the present instruction; a device calls this."""
         self.stopped = 1
@@ -181,6 +202,8 @@ class Core:
             return
         if self.ram_base <= address and end <= self.ram_base + self.ram_size:
             put(self.ram, address - self.ram_base, content)
+            for i in range(len(self.written)):
+                self.written[i] = 1
             return
         raise UserError(
             f"{self.name}: {len(content)} bytes at {address:#010x} fit neither flash ({self.flash_base:#010x}, "
@@ -344,6 +367,8 @@ class Core:
         if self.device is not None:
             if address >= self.bridge_base:
                 self.cycles += self.device_waits
+            if self.bridge is not None:
+                return self.bridge.read(address, size)
             try:
                 return self.device.read(address, size)
             except LookupError:
@@ -357,6 +382,7 @@ class Core:
             self.line = -2  # the fetch after a store is an N cycle
         place = address - self.ram_base
         if 0 <= place < self.ram_open:
+            self.written[place >> WRITTEN_BITS] = 1
             if size == 4:
                 self.ram[place >> 2] = value
             else:
@@ -378,8 +404,11 @@ class Core:
         if self.device is not None and not 0 <= address - self.flash_base < self.flash_size:
             if address >= self.bridge_base:
                 self.cycles += self.device_waits
+            value = value if size == 4 else value & (0xFF if size == 1 else 0xFFFF)
+            if self.bridge is not None:
+                return self.bridge.write(address, size, value)
             try:
-                self.device.write(address, size, value if size == 4 else value & (0xFF if size == 1 else 0xFFFF))
+                self.device.write(address, size, value)
                 return 0
             except LookupError:
                 pass

@@ -7,6 +7,7 @@ An access acts at the instant at which its instruction begins: what happens in t
 
 import cython
 
+from ranger_sim.firmware_sim.arm7.core import Device
 from ranger_sim.firmware_sim.lpc2194.block import Block, NotModelledError
 from ranger_sim.foundation.user_error import UserError
 
@@ -26,7 +27,7 @@ class NotModelledAccess(UserError):  # noqa: N818  (it is what the program did)
         self.pc = pc
 
 
-class AddressMap:
+class AddressMap(Device):
     """Blocks of the peripheral bus (0xE...), the fast GPIO and the VIC.
 
     `touched` counts accesses that may do something or give another value another time, `looks` the others.

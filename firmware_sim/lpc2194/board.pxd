@@ -21,6 +21,7 @@ cpdef enum:
     LONGEST_PASS = 600
     DOUBTS = 8
     SLOT_SHARES = 20
+    PART_WORDS = 64
 
 cdef class ImageBoard(Microcontroller):
     cdef public Core core

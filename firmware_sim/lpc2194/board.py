@@ -56,6 +56,7 @@ if not cython.compiled:
     LONGEST_PASS = 600
     DOUBTS = 8  # of so many stints elsewhere one is asked
     SLOT_SHARES = 20
+    PART_WORDS = 64  # of Core.written
 
 
 @dataclasses.dataclass(frozen=True)
@@ -161,7 +162,7 @@ class ImageBoard(Microcontroller):
         for block in blocks:
             self.map.add(block)
         self.asking = [block for block in blocks if block.mask]
-        self.core.device = self.map
+        self.core.connect(self.map)
 
     # --- the processor's clock ----------------------------------------------------------------------------
 
@@ -352,15 +353,23 @@ class ImageBoard(Microcontroller):
             core.step()
 
     def _keep(self) -> cython.void:
-        """Keep registers and RAM as they are."""
-        ram: cython.longlong[::1] = self.core.ram
-        self.core.state_into(self.kept_registers)
-        self.kept_ram[:] = ram
+        """Keep registers and RAM as they are; RAM by the parts that were written since it was kept last."""
+        core: Core = self.core
+        ram: cython.longlong[::1] = core.ram
+        part: cython.longlong
+        i: cython.longlong
+        core.state_into(self.kept_registers)
+        for part in range(len(core.written)):
+            if core.written[part]:
+                core.written[part] = 0
+                for i in range(part * PART_WORDS, min((part + 1) * PART_WORDS, len(ram))):
+                    self.kept_ram[i] = ram[i]
 
     def _is_as_kept(self) -> cython.bint:
         """Registers and RAM are as they were kept."""
         core: Core = self.core
         ram: cython.longlong[::1] = core.ram
+        part: cython.longlong
         i: cython.longlong
         if core.r[13] != self.kept_registers[13] or core.r[14] != self.kept_registers[14]:
             return False
@@ -368,9 +377,11 @@ class ImageBoard(Microcontroller):
         for i in range(STATE):
             if self.now_registers[i] != self.kept_registers[i]:
                 return False
-        for i in range(len(ram)):
-            if ram[i] != self.kept_ram[i]:
-                return False
+        for part in range(len(core.written)):
+            if core.written[part]:
+                for i in range(part * PART_WORDS, min((part + 1) * PART_WORDS, len(ram))):
+                    if ram[i] != self.kept_ram[i]:
+                        return False
         return True
 
     def _catch_up(self, time: cython.longlong) -> cython.int:

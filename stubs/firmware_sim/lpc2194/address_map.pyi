@@ -1,5 +1,6 @@
 # Generated from firmware_sim/lpc2194/address_map.py and firmware_sim/lpc2194/address_map.pxd (python -m ranger_sim.tools.stubs); do not edit.
 
+from ranger_sim.firmware_sim.arm7.core import Device
 from ranger_sim.firmware_sim.lpc2194.block import Block
 from ranger_sim.firmware_sim.lpc2194.board import ImageBoard
 from ranger_sim.foundation.user_error import UserError
@@ -16,7 +17,7 @@ class NotModelledAccess(UserError):
     def __init__(self, text: Any, address: Any, pc: Any) -> None: ...
 
 @final
-class AddressMap:
+class AddressMap(Device):
     board: ImageBoard
     places: list[Any]
     fast_gpio: Block

@@ -24,6 +24,7 @@ STINT: int
 LONGEST_PASS: int
 DOUBTS: int
 SLOT_SHARES: int
+PART_WORDS: int
 
 @dataclasses.dataclass(frozen=True)
 class ImageCounters(BoardCounters):
