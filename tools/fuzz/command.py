@@ -19,8 +19,10 @@ TARGETS = {
     "can": "frames of every kind, and bytes that are none, from outside onto the buses of a walking robot",
     "channel": "damaged messages in the channel between a board's process and the body's",
     "doors": "hostile programs at every door: requests, connections, floods, answers never read; no robot behind",
+    "gdb": "hostile debuggers at the door of a board that runs machine code",
     "profiles": "profiles and bus schedules with pieces cut out, doubled and replaced",
     "serial": "wrong bytes on the line between main brain and computer, both ways",
+    "xcp": "hostile masters at the XCP slave's door on UDP, a robot behind",
 }
 
 

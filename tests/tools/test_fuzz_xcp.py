@@ -1,0 +1,41 @@
+"""The fuzzer of the XCP door: a sample stands, and what it looks for is found."""
+
+import pytest
+
+from ranger_sim.harness.xcp import slave, udp
+from ranger_sim.harness.xcp.table_memory import TableMemory
+from ranger_sim.tools.fuzz import Finding, xcp
+
+
+def test_hostile_masters_are_stood():
+    counted = xcp.run(600, seed=4)
+    assert counted["cases"] == 600 and counted["well_behaved_answered"] == 12
+    assert counted["commands"] > 1000 and counted["measurements"] > 50 and counted["sent_away_malformed"] > 0
+
+
+def test_the_same_seed_gives_the_same_cases():
+    assert xcp.run(200, seed=9) == xcp.run(200, seed=9)
+
+
+def test_a_slave_that_writes_what_is_no_parameter_is_found(monkeypatch):
+    def written(self, address, data):
+        if 0x10000 <= address < self.end:
+            self.robot.board("MB").memory[(address - 0x10000) // 4] = 1 + int.from_bytes(data[:3], "little")
+
+    monkeypatch.setattr(TableMemory, "write", written)
+    with pytest.raises(Finding, match="a variable that is no parameter was written"):
+        xcp.run(3000, seed=4)
+
+
+def test_a_slave_that_does_not_answer_is_found(monkeypatch):
+    monkeypatch.setattr(slave.Slave, "command", lambda self, packet, time_ns: b"")
+    with pytest.raises(Finding, match="a well-behaved master is not answered"):
+        xcp.run(200, seed=4)
+
+
+def test_a_door_that_takes_too_many_commands_in_a_look_is_found(monkeypatch):
+    import dataclasses
+
+    monkeypatch.setattr(udp, "RULE", dataclasses.replace(udp.RULE, burst=100_000))
+    with pytest.raises(Finding, match="more commands in a look"):
+        xcp.run(3000, seed=4)
