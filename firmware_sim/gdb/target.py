@@ -96,6 +96,8 @@ class Target:
     def set_register(self, number: int, value: int) -> None:
         """Write it. TargetError: there is none, or it takes no such value."""
         core = self.core
+        if not 0 <= value <= 0xFFFFFFFF:
+            raise TargetError(f"{value:#x} has more than the 32 bits of a register")
         if number < PC:
             core.r[number] = value
         elif number == PC:

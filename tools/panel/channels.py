@@ -117,6 +117,12 @@ def _standing(times: Times, values: Values, begin: float, end: float, points: in
     return Trace(edges[:-1], low, high)
 
 
+def between(times: Times, values: Values, begin: float, end: float) -> tuple[Times, Values]:
+    """The samples from `begin` to `end` (s), both included."""
+    first, last = np.searchsorted(times, begin), np.searchsorted(times, end, side="right")
+    return times[first:last], values[first:last]
+
+
 class Memory:
     """The last samples of `columns` quantities that are sampled together, and an hour of their extremes.
 

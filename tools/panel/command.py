@@ -44,6 +44,12 @@ def register(commands: Any) -> None:
         "--shift", type=number(), default=0.0, metavar="S", help="seconds by which the second one is later"
     )
     command.add_argument(
+        "--align",
+        type=word("an event"),
+        metavar="EVENT",
+        help="lay the second over the first so that this happens at one instant, e.g. 'FSM_HIP = 3'",
+    )
+    command.add_argument(
         "--name", type=word("a name"), default="ranger", help="the robot that `up` runs (default ranger)"
     )
     command.add_argument("--walk", action="store_true", help="start a robot to look at; it ends with the panel")
@@ -70,6 +76,8 @@ def run(options: argparse.Namespace) -> int:
         raise UserError("panel: RECORDING, --walk and --port exclude each other")
     if len(options.recordings) > 2:
         raise UserError(f"panel: {len(options.recordings)} recordings; one, or two over each other, are possible")
+    if options.align and len(options.recordings) != 2:
+        raise UserError("panel: --align lays two recordings over each other")
     address = listening_address(options.host, f"panel on {options.host}", options.allow_network)
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # ends it as Ctrl-C does
     with contextlib.ExitStack() as stack:
@@ -82,9 +90,10 @@ def run(options: argparse.Namespace) -> int:
 def source_of(options: argparse.Namespace, say: Any) -> Iterator[Any]:
     """What is to be shown."""
     if options.recordings:
-        from ranger_sim.tools.panel.recording import RecordingSource
+        from ranger_sim.tools.panel.recording import Event, RecordingSource
 
-        yield RecordingSource(options.recordings, options.dbc, options.shift)
+        align = Event.typed(options.align) if options.align else None
+        yield RecordingSource(options.recordings, options.dbc, options.shift, align)
     elif options.port:
         from ranger_sim.tools.panel.link import LinkSource
 

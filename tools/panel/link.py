@@ -16,7 +16,7 @@ from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness import normal_errors
 from ranger_sim.harness.ranger_names import RANGER
 from ranger_sim.harness.serial_ports import DAQ_BAUD, RealPort, reason_of
-from ranger_sim.tools.panel.channels import EMPTY, Trace, thinned
+from ranger_sim.tools.panel.channels import EMPTY, Times, Trace, Values, between, thinned
 from ranger_sim.tools.panel.source import ANKLES, KNOWN_POSE, LEGS, Source, known_pose, table_channels
 from ranger_sim.tools.robodaq.codec import Point
 from ranger_sim.tools.robodaq.session import OWN, Session
@@ -122,6 +122,10 @@ class LinkSource(Source):
             return EMPTY
         times, values = np.array(kept.times), np.array(kept.values, np.float32)
         return thinned(times, values, begin, end, points, min(kept.period_s(), SLOWEST_S))
+
+    def samples(self, channel: int, begin: float, end: float) -> tuple[Times, Values]:
+        kept = self.kept[channel]
+        return between(np.array(kept.times), np.array(kept.values, np.float32), begin, end)
 
     def values(self, wanted: list[int], at: float | None) -> list[float | None]:
         found: list[float | None] = []

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import dataclasses
+import math
 import pathlib
+import re
 from collections.abc import Sequence
 
 import numpy as np
@@ -12,26 +15,67 @@ from ranger_sim.foundation.user_error import UserError
 from ranger_sim.sysid.dataset import Dataset
 from ranger_sim.sysid.readers import run_folder
 from ranger_sim.tools import recordings
-from ranger_sim.tools.panel.channels import EMPTY, Channel, Trace, thinned
+from ranger_sim.tools.panel.channels import EMPTY, Channel, Times, Trace, Values, between, thinned
 from ranger_sim.tools.panel.source import ANKLES, KNOWN_POSE, LEGS, TRUE_POSE, Source, known_pose
 
 TRUTH = "plant."  # begins the names of what only a simulation knows of the body
 
 
+@dataclasses.dataclass(frozen=True)
+class Event:
+    """A channel becomes equal to, less or greater than a value: two recordings are aligned by their first one."""
+
+    channel: str
+    sign: str
+    value: float
+
+    @classmethod
+    def typed(cls, text: str) -> Event:
+        """`FSM_HIP = 3`, `hip_rad < -0.2`. UserError for what does not read so."""
+        found = re.fullmatch(r"\s*(\S+?)\s*([=<>])\s*(\S+)\s*", text)
+        try:
+            value = float(found[3]) if found else math.nan
+        except ValueError:
+            value = math.nan
+        if found is None or not math.isfinite(value):
+            raise UserError(f"event {text!r}: it reads like FSM_HIP = 3 or hip_rad < -0.2")
+        return cls(found[1], found[2], value)
+
+    def first(self, dataset: Dataset) -> float:
+        """When it happens first, s; not at the beginning, where it may have been so for long. UserError: never."""
+        channel = dataset.channels.get(self.channel) or dataset.channels.get(TRUTH + self.channel)
+        if channel is None:
+            raise UserError(f"{dataset.name}: there is no channel {self.channel}")
+        is_so = {"=": np.equal, "<": np.less, ">": np.greater}[self.sign](channel.value, self.value)
+        begins = np.flatnonzero(is_so[1:] & ~is_so[:-1]) + 1
+        if not len(begins):
+            raise UserError(f"{dataset.name}: {self.channel} {self.sign} {self.value:g} does not begin anywhere in it")
+        return float(channel.time_s[begins[0]])
+
+
 class RecordingSource(Source):
-    """One or two recordings, the second laid over the first (`shift_s` later). UserError for what cannot be read."""
+    """One or two recordings, the second laid over the first: `shift_s` later, after `align` has come at one instant.
+
+    UserError for what cannot be read, or an event that is in one of them never.
+    """
 
     can = frozenset({"play"})
 
-    def __init__(self, paths: Sequence[str], databases: Sequence[str] = (), shift_s: float = 0.0) -> None:
+    def __init__(
+        self, paths: Sequence[str], databases: Sequence[str] = (), shift_s: float = 0.0, align: Event | None = None
+    ) -> None:
         super().__init__()
+        read_in = [read(path, databases) for path in paths]
+        if align is not None:
+            first, second = (align.first(dataset) for dataset in read_in)
+            shift_s += first - second
         self.title = " and ".join(pathlib.Path(path).name for path in paths)
         known = {row.name: row for row in datatable.load().variables}
         self.data: list[tuple[np.ndarray, np.ndarray, float | None]] = []
-        for number, path in enumerate(paths):
+        for number, (path, dataset) in enumerate(zip(paths, read_in, strict=True)):
             group = "" if number == 0 else f" ({pathlib.Path(path).name})"
             steps = (pathlib.Path(path) / run_folder.VARIABLES).is_file()  # it keeps changes, not samples
-            for name, channel in read(path, databases).channels.items():
+            for name, channel in dataset.channels.items():
                 row = known.get(name)
                 whose = "body" if name.startswith(TRUTH) else row.publisher if row is not None else "recording"
                 description = row.description if row is not None else ""
@@ -57,6 +101,10 @@ class RecordingSource(Source):
     def trace(self, channel: int, begin: float, end: float, points: int) -> Trace:
         times, values, period = self.data[channel]
         return thinned(times, values, begin, end, points, period) if len(times) else EMPTY
+
+    def samples(self, channel: int, begin: float, end: float) -> tuple[Times, Values]:
+        times, values, _ = self.data[channel]
+        return between(times, values, begin, end)
 
     def values(self, wanted: list[int], at: float | None) -> list[float | None]:
         found: list[float | None] = []

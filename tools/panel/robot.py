@@ -21,7 +21,7 @@ from ranger_sim.harness.processes import control
 from ranger_sim.harness.ranger_names import RANGER
 from ranger_sim.harness.sampler import PERIOD_NS
 from ranger_sim.harness.summary import JOULES_PER_WH
-from ranger_sim.tools.panel.channels import Channel, Memory, Trace
+from ranger_sim.tools.panel.channels import Channel, Memory, Times, Trace, Values, between
 from ranger_sim.tools.panel.source import TRUE_POSE, Source, error_rows, table_channels
 
 CONNECT_S = 5.0
@@ -69,8 +69,8 @@ class RobotSource(Source):
         self.pose_names = TRUE_POSE
         self.pose_columns = [list(hello["samples"]).index(column) for column in TRUE_POSE]
         period_s = PERIOD_NS * 1e-9
-        self.samples = Memory(len(self.body), period_s)
-        self.words = Memory(len(table), period_s)
+        self.body_rows = Memory(len(self.body), period_s)
+        self.word_rows = Memory(len(table), period_s)
         kinds = [all_variables.TYPES[number] for number in table]
         self.floats = np.array([kind == "f32" for kind in kinds])
         self.signed = np.array([kind == "i32" for kind in kinds])
@@ -135,7 +135,7 @@ class RobotSource(Source):
             rows: Any = np.frombuffer(body[1:], np.float64 if stream["reals"] else np.int64)
             rows = rows.reshape(-1, stream["columns"])
             if stream["name"] == "samples":
-                self.samples.append(rows[:, 0] - self.start_ns * 1e-9, rows[:, 1:].astype(np.float32))
+                self.body_rows.append(rows[:, 0] - self.start_ns * 1e-9, rows[:, 1:].astype(np.float32))
             elif stream["name"] == "words":
                 self._take_words(rows)
             else:
@@ -147,7 +147,7 @@ class RobotSource(Source):
         raw = np.ascontiguousarray(words.astype(np.uint32))
         values[:, self.floats] = raw[:, self.floats].view(np.float32)
         values[:, self.signed] = raw[:, self.signed].view(np.int32)
-        self.words.append((rows[:, 0] - self.start_ns) * 1e-9, values)
+        self.word_rows.append((rows[:, 0] - self.start_ns) * 1e-9, values)
         for number in self.table_errors:  # the router's and the main brain's own errors are on no bus
             if ERRORS[number] in ("CSR", "MB"):
                 for word, time_ns in _changes(rows[:, 1 + number], rows[:, 0], self.table_errors[number]):
@@ -163,16 +163,21 @@ class RobotSource(Source):
     # --- what is shown --------------------------------------------------------------------------------------
 
     def span(self) -> tuple[float, float]:
-        end = self.samples.newest or 0.0
+        end = self.body_rows.newest or 0.0
         return (max(0.0, end - 3600.0), end)
 
     def _place(self, channel: int) -> tuple[Memory, int]:
         body = len(self.body)
-        return (self.samples, channel) if channel < body else (self.words, channel - body)
+        return (self.body_rows, channel) if channel < body else (self.word_rows, channel - body)
 
     def trace(self, channel: int, begin: float, end: float, points: int) -> Trace:
         memory, column = self._place(channel)
         return memory.trace(column, begin, end, points)
+
+    def samples(self, channel: int, begin: float, end: float) -> tuple[Times, Values]:
+        memory, column = self._place(channel)
+        times, values = memory.fine.rows()
+        return between(times, values[:, column], begin, end)
 
     def values(self, wanted: list[int], at: float | None) -> list[float | None]:
         found: list[float | None] = []
@@ -184,7 +189,7 @@ class RobotSource(Source):
         return found
 
     def pose(self, at: float | None) -> tuple[float, list[float]] | None:
-        row = self.samples.row(np.inf if at is None else at)
+        row = self.body_rows.row(np.inf if at is None else at)
         return None if row is None else (row[0], [float(row[1][column]) for column in self.pose_columns])
 
     def state(self, at: float | None) -> dict[str, Any]:

@@ -25,7 +25,7 @@ from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.tools.panel import messages
+from ranger_sim.tools.panel import export, messages
 from ranger_sim.tools.panel.source import Source
 
 PAGE = pathlib.Path(__file__).parent / "page"
@@ -63,7 +63,12 @@ class PanelServer:
         self.refused: Counter[str] = Counter()
         self.feeding: asyncio.Task[None] | None = None
         self.app = Starlette(
-            routes=[Route("/", self.page), Route("/{name}", self.file), WebSocketRoute("/socket", self.socket)],
+            routes=[
+                Route("/", self.page),
+                Route("/export/{kind}", self.export),
+                Route("/{name}", self.file),
+                WebSocketRoute("/socket", self.socket),
+            ],
             lifespan=self.life,
         )
 
@@ -111,6 +116,30 @@ class PanelServer:
         if name not in FILES:
             return PlainTextResponse(f"{name[:60]!r}: there is no such file", 404)
         return FileResponse(PAGE / name, media_type=TYPES[pathlib.Path(name).suffix])
+
+    async def export(self, request: Request) -> Response:
+        """Samples of channels in a window as a file, CSV or MF4."""
+        fault = self.fault_of(request)
+        if fault is not None:
+            return self.refusal(fault)
+        try:
+            kind = request.path_params["kind"]
+            if kind not in export.KINDS:
+                raise UserError(f"{kind[:20]!r} is no kind of file; there are {', '.join(export.KINDS)}")
+            asked = request.query_params
+            try:
+                numbers = [int(each) for each in asked.get("channels", "").split(",") if each]
+                begin, end = float(asked.get("begin", "nan")), float(asked.get("end", "nan"))
+            except ValueError:
+                raise UserError("export: channels, begin and end are numbers") from None
+            channels = channels_of(numbers, self.source)
+            seconds(begin, "begin")
+            seconds(end, "end")
+            data = await asyncio.to_thread(export.KINDS[kind], self.source, channels, begin, end)
+        except UserError as mistake:
+            return PlainTextResponse(f"{mistake}\n", 400)
+        headers = {"Content-Disposition": f'attachment; filename="selection.{kind}"'}
+        return Response(data, media_type="application/octet-stream", headers=headers)
 
     def refusal(self, fault: str) -> Response:
         """Told and counted."""
@@ -233,7 +262,7 @@ class Session:
             self.look(wish)
             return {}
         if what == "values":
-            channels = self.channels_of(wish.get("channels"))
+            channels = channels_of(wish.get("channels"), self.source)
             return {"values": self.source.values(channels, seconds(wish.get("at"), "at"))}
         return await self.source.request(wish)
 
@@ -247,7 +276,7 @@ class Session:
             if not isinstance(plot, dict):
                 raise UserError(f"look: plot {number} is no object")
             found[number] = Plot(
-                self.channels_of(plot.get("channels")),
+                channels_of(plot.get("channels"), self.source),
                 seconds(plot.get("begin"), "begin"),
                 seconds(plot.get("end"), "end"),
                 seconds(plot.get("span"), "span") or 10.0,
@@ -260,15 +289,6 @@ class Session:
             self.wants()
         self.at = seconds(wish.get("at"), "at")
         self.changed.set()
-
-    def channels_of(self, wanted: Any) -> list[int]:
-        """Numbers of channels that are there."""
-        if not isinstance(wanted, list):
-            raise UserError("channels: a list of numbers is expected")
-        for each in wanted:
-            if isinstance(each, bool) or not isinstance(each, int) or not 0 <= each < len(self.source.channels):
-                raise UserError(f"channels: {str(each)[:20]} is not 0 to {len(self.source.channels) - 1}")
-        return wanted
 
     # --- what the page sees ---------------------------------------------------------------------------------
 
@@ -324,6 +344,16 @@ class Plot:
         if self.begin is not None and self.end is not None:
             return self.begin, self.end
         return newest - self.span, newest
+
+
+def channels_of(wanted: Any, source: Source) -> list[int]:
+    """Numbers of channels that are there. UserError for anything else."""
+    if not isinstance(wanted, list):
+        raise UserError("channels: a list of numbers is expected")
+    for each in wanted:
+        if isinstance(each, bool) or not isinstance(each, int) or not 0 <= each < len(source.channels):
+            raise UserError(f"channels: {str(each)[:20]} is not 0 to {len(source.channels) - 1}")
+    return wanted
 
 
 def seconds(value: Any, what: str) -> float | None:

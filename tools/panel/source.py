@@ -8,7 +8,7 @@ from typing import Any
 from ranger_sim import datatable
 from ranger_sim.datatable import parameters
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.tools.panel.channels import EMPTY, Channel, Trace
+from ranger_sim.tools.panel.channels import EMPTY, Channel, Times, Trace, Values
 
 # Where the robot's parts are, from what it knows itself: legs as its program of 2011 or those of 2015 and 2016 estimate
 # them, feet by the ankles' encoders. Angles against gravity, rad; robot.md N4.17, C1.
@@ -52,6 +52,10 @@ class Source:
     def trace(self, channel: int, begin: float, end: float, points: int) -> Trace:
         """A channel in a window."""
         return EMPTY
+
+    def samples(self, channel: int, begin: float, end: float) -> tuple[Times, Values]:
+        """(times, values) of a window as they came, for a file."""
+        return EMPTY.x, EMPTY.low
 
     def values(self, wanted: list[int], at: float | None) -> list[float | None]:
         """Of these channels at an instant (None: the newest); None where there is none."""

@@ -379,6 +379,17 @@ def test_what_is_not_formed_as_it_should_is_an_error_and_nothing_more(request_):
     assert answer == ("E01", "T05thread:1;")
 
 
+@pytest.mark.parametrize("request_", ["c100000006", "s1ffffffff"])
+def test_an_address_of_more_than_32_bits_is_no_place_to_go_on_from(request_):
+    """A program counter beyond them once ended the run when the registers were asked for."""
+
+    def talk(client):
+        return client.ask("g"), client.ask(request_), client.ask("g")
+
+    (before, answer, after), _ = session(tiny(), 1000, talk)
+    assert answer == "E0e" and after == before
+
+
 def test_a_debugger_that_is_cut_off_takes_its_points_along_and_the_run_goes_on(alone):
     machine = tiny()
 

@@ -166,3 +166,12 @@ def test_a_recording_is_scrubbed_and_nothing_is_wider_than_the_window(tmp_path, 
         assert shown[4] == pytest.approx(robot.quantities()["hip_x_m"], abs=0.01)
         robot.close()
         assert json.loads(page.value("JSON.stringify(window.rangerPanel.held())"))[0] <= 2.5
+        page.value("window.rangerPanel.plots.setMark(2.5)")  # a note stands at the mark, and in the address
+        Hand(page).give("#note", "a step")
+        Hand(page).click("#note-form button", "Keep")
+        assert page.value("new URLSearchParams(location.hash.slice(1)).get('notes')") == '[[2.5,"a step"]]'
+        assert page.value("document.querySelector('#notes button').textContent") == "2.500 s: a step"
+        # what is selected is saved as it came
+        page.value("document.getElementById('save-csv').onclick()")
+        saved = page.value("fetch(document.getElementById('save-csv').href).then((answer) => answer.text())")
+        assert saved.startswith("time_s,channel,unit,value") and saved.count("hip_rad") > 1000

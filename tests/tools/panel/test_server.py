@@ -13,10 +13,11 @@ from websockets.sync.client import connect
 
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.tools.panel import messages, server
-from ranger_sim.tools.panel.channels import Channel, Trace
+from ranger_sim.tools.panel.channels import Channel, Trace, between
 from ranger_sim.tools.panel.command import listening
 from ranger_sim.tools.panel.server import BURST, COOKIE, MOST_CHANNELS, PLACES, PanelServer
 from ranger_sim.tools.panel.source import Source
+from ranger_sim.tools.recordings import open_recording
 
 TOKEN = "a-word"
 PATIENCE_S = 20
@@ -40,6 +41,10 @@ class Ramp(Source):
     def trace(self, channel, begin, end, points):
         x = np.linspace(begin, end, points)
         return Trace(x, x.astype(np.float32), None)
+
+    def samples(self, channel, begin, end):
+        x = np.arange(0.0, 10.0, 0.25)
+        return between(x, x.astype(np.float32), begin, end)
 
     def values(self, wanted, at):
         return [at for _ in wanted]
@@ -244,3 +249,46 @@ def test_a_page_that_shows_nothing_gets_no_second_picture(panel):
                 pictures += b'"picture"' in data[:40]
                 answered = b'"answer"' in data[:40]
         assert pictures == 1
+
+
+def exported(address, query, kind="csv"):
+    return get(address, f"/export/{kind}?{query}", Cookie=f"{COOKIE}={TOKEN}")
+
+
+def test_a_selection_is_saved_as_it_came(panel, tmp_path):
+    _, address, _ = panel
+    status, headers, body = exported(address, "channels=0&begin=1&end=1.5")
+    assert status == 200 and 'filename="selection.csv"' in headers["content-disposition"]
+    assert body.decode().splitlines() == [
+        "time_s,channel,unit,value",
+        *(f"{time:.6f},RAMP,s,{time:g}" for time in (1.0, 1.25, 1.5)),
+    ]
+    status, _, body = exported(address, "channels=0&begin=1&end=1.5", "mf4")
+    assert status == 200
+    (tmp_path / "selection.mf4").write_bytes(body)
+    dataset = open_recording(tmp_path / "selection.mf4")
+    assert dataset.channels["RAMP"].time_s.tolist() == [1.0, 1.25, 1.5]
+    assert dataset.channels["RAMP"].value.tolist() == [1.0, 1.25, 1.5] and dataset.channels["RAMP"].unit == "s"
+
+
+@pytest.mark.parametrize(
+    ("query", "kind", "words"),
+    [
+        ("channels=0&begin=0&end=1", "exe", "'exe' is no kind of file; there are csv, mf4"),
+        ("channels=1&begin=0&end=1", "csv", "1 is not 0 to 0"),
+        ("channels=x&begin=0&end=1", "csv", "channels, begin and end are numbers"),
+        ("channels=0&end=1", "csv", "begin: nan is no time"),
+        ("channels=0&begin=0&end=1e400", "csv", "end: inf is no time"),
+        ("channels=0&begin=50&end=60", "mf4", "there are no samples"),
+    ],
+)
+def test_a_selection_that_cannot_be_is_told(panel, query, kind, words):
+    _, address, _ = panel
+    status, _, body = exported(address, query, kind)
+    assert status == 400 and words in body.decode()
+
+
+def test_a_selection_is_for_who_has_the_token(panel):
+    _, address, _ = panel
+    status, _, body = get(address, "/export/csv?channels=0&begin=0&end=1")
+    assert status == 403 and b"a wrong token" in body

@@ -12,7 +12,7 @@ from ranger_sim.datatable.packing import error_word
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.feed.server import FeedServer
 from ranger_sim.tools.panel.link import LinkSource
-from ranger_sim.tools.panel.recording import RecordingSource
+from ranger_sim.tools.panel.recording import Event, RecordingSource
 from ranger_sim.tools.panel.robot import ErrorList, RobotSource
 from ranger_sim.tools.panel.source import KNOWN_POSE, TRUE_POSE, known_pose
 
@@ -59,6 +59,15 @@ def test_the_body_is_shown_as_the_log_has_it(walked):
     assert trace.high is None
     np.testing.assert_array_equal(trace.x, kept["samples"][:, 0])
     np.testing.assert_array_equal(trace.low, kept["samples"][:, 1 + column].astype(np.float32))
+
+
+def test_what_is_saved_is_what_the_log_has(walked):
+    kept, source = walked
+    column = [channel.name for channel in source.body].index("hip_rad")
+    times, values = source.samples(number_of(source, "hip_rad"), 0.1, 0.3)
+    rows = kept["samples"][(kept["samples"][:, 0] >= 0.1) & (kept["samples"][:, 0] <= 0.3)]
+    np.testing.assert_array_equal(times, rows[:, 0])
+    np.testing.assert_array_equal(values, rows[:, 1 + column].astype(np.float32))
 
 
 @pytest.mark.parametrize("name", ["MCH_ANGLE", "UI_BUTTONS", "FSM_HIP", "MCH_EXECUTION_TIME"])
@@ -228,3 +237,33 @@ def test_the_estimates_of_the_program_that_runs_are_taken():
     assert known_pose({**feet, **later}) == pytest.approx([0.3, 0.4, 0.3, -0.6])
     assert known_pose({**record, "MCFO_RIGHT_ANKLE_ANGLE": 1.0}) is None
     assert known_pose(feet) is None
+
+
+@pytest.fixture
+def stepped(tmp_path):
+    """Two recordings of a step, the second 0.7 s later."""
+    for name, at in (("one.csv", 1.0), ("two.csv", 1.7)):
+        rows = [f"{time:.2f},{int(time >= at)}" for time in np.arange(0.0, 3.0, 0.05)]
+        (tmp_path / name).write_text("t_s,level_V\n" + "\n".join(rows) + "\n", encoding="utf-8")
+    return [str(tmp_path / "one.csv"), str(tmp_path / "two.csv")]
+
+
+def test_two_recordings_are_laid_over_each_other_by_an_event(stepped):
+    source = RecordingSource(stepped, align=Event.typed("level_V > 0.5"))
+    assert source.values([0, 1], 0.97) == [0.0, 0.0] and source.values([0, 1], 1.01) == [1.0, 1.0]
+    apart = RecordingSource(stepped)
+    assert apart.values([0, 1], 1.5) == [1.0, 0.0]
+
+
+@pytest.mark.parametrize(
+    ("event", "words"),
+    [
+        ("level_V", "it reads like FSM_HIP = 3"),
+        ("level_V = much", "it reads like FSM_HIP = 3"),
+        ("level_V > 5", "level_V > 5 does not begin anywhere in it"),
+        ("nothing = 1", "there is no channel nothing"),
+    ],
+)
+def test_an_event_that_never_comes_is_told(stepped, event, words):
+    with pytest.raises(UserError, match=words):
+        RecordingSource(stepped, align=Event.typed(event))

@@ -19,6 +19,7 @@ const colour = (name) => colours[name] ??= getComputedStyle(document.documentEle
 let hello = null, can = new Set(), number = new Map(), listed = [];   // listed: channels, group by group
 let span = [0, 0], held = null, window_s = 10, zooms = [], view = "plots", state = {}, pose = null, poses = [];
 let playing = false, played = 0, at = null, trigger = null, shown = 0;
+const notes = [];   // {time, text}
 
 const stage = makeStage(by("stage"), colour);
 const plots = makePlots(by("plots"), {
@@ -159,6 +160,7 @@ function remember() {
   const parts = new URLSearchParams({ view, span: window_s, plots: names.join(";") });
   if (held) parts.set("from", held[0].toFixed(6)), parts.set("to", held[1].toFixed(6));
   if (plots.mark() !== null) parts.set("mark", plots.mark().toFixed(6));
+  if (notes.length) parts.set("notes", JSON.stringify(notes.map((each) => [each.time, each.text])));
   history.replaceState(null, "", `${location.search}#${parts}`);
 }
 
@@ -172,6 +174,10 @@ function recall() {
   by("span").value = String(window_s);
   if (parts.get("from") !== null) hold([Number(parts.get("from")), Number(parts.get("to"))]);
   if (parts.get("mark") !== null) plots.setMark(Number(parts.get("mark")));
+  try {
+    for (const [time, text] of JSON.parse(parts.get("notes") ?? "[]")) notes.push({ time: Number(time), text: String(text).slice(0, 80) });
+  } catch { say("the notes in the address cannot be read"); }
+  noteList();
   choose(parts.get("view") ?? "plots");
 }
 
@@ -377,14 +383,34 @@ by("position").oninput = () => { play(false); goTo(Number(by("position").value))
 by("frame-search").oninput = () => tell_state();
 by("bus").onchange = () => tell_state();
 
-by("export").onclick = () => {
-  const lines = [["time_s", "channel", "unit", "low", "high"].join()];
-  for (const plot of plots.wanted()) for (const trace of plot.found ?? []) {
-    const channel = hello.channels[trace.channel];
-    for (let k = 0; k < trace.x.length; k++) if (Number.isFinite(trace.low[k])) lines.push([trace.x[k].toFixed(6), channel.name, channel.unit, trace.low[k], trace.high ? trace.high[k] : trace.low[k]].join());
-  }
-  download("selection.csv", lines.join("\n") + "\n");
+for (const kind of ["csv", "mf4"]) by(`save-${kind}`).onclick = () => {
+  const { begin, end } = range(), channels = [...new Set(plots.all().flatMap((plot) => plot.numbers))];
+  by(`save-${kind}`).href = `export/${kind}?${new URLSearchParams({ channels: channels.join(","), begin, end })}`;
 };
+
+// Notes: marks that are kept with a word, in the address and on the plots; a click goes there.
+function noteList() {
+  by("notes").replaceChildren(...notes.map((each, k) => {
+    const chip = Object.assign(document.createElement("button"), { type: "button", className: "chip", textContent: `${each.time.toFixed(3)} s: ${each.text}` });
+    chip.title = "go there; Delete takes it away";
+    chip.onclick = () => { const half = (range().end - range().begin) / 2; plots.setMark(each.time); hold([each.time - half, each.time + half]); atMark(); };
+    chip.onkeydown = (event) => { if (event.key === "Delete" || event.key === "Backspace") { notes.splice(k, 1); noteList(); remember(); } };
+    return chip;
+  }));
+  plots.setNotes(notes);
+}
+
+by("note-form").onsubmit = (event) => {
+  event.preventDefault();
+  const text = by("note").value.trim(), time = plots.mark();
+  if (!text || time === null) { say(time === null ? "click a plot first: the note stands at the mark" : "a note has a word or more"); return; }
+  notes.push({ time, text });
+  notes.sort((one, other) => one.time - other.time);
+  by("note").value = "";
+  noteList();
+  remember();
+};
+
 by("picture").onclick = () => {
   const drawn = plots.wanted().filter((plot) => plot.chart).map((plot) => [plot.chart.ctx.canvas, plot.numbers.map((each) => hello.channels[each].name).join(", ")]);
   if (!drawn.length) return;

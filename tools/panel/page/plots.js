@@ -6,7 +6,7 @@ const HEIGHT = 230, MOST_AXES = 4;
 export function makePlots(box, on, colour) {
   let plots = [], channels = [], shared = null;   // shared: {begin, end} while held
   let mark = null, at = null;
-  let exact = { at: null, values: {} }, marked = {};   // what the server says stands at the cursor, and at the mark
+  let exact = { at: null, values: {} }, marked = {}, notes = [];   // what the server says stands at the cursor, and at the mark
 
   function add(numbers = []) {
     const element = document.createElement("div");
@@ -146,16 +146,22 @@ export function makePlots(box, on, colour) {
   }
 
   function marks(chart) {
-    if (mark === null) return;
-    const x = chart.valToPos(mark, "x", true), { ctx, bbox } = chart;
-    if (x < bbox.left || x > bbox.left + bbox.width) return;
+    if (mark !== null) upright(chart, mark, "bad", [6, 4], "");
+    for (const { time, text } of notes) upright(chart, time, "warn", [2, 3], text);
+  }
+
+  function upright(chart, time, name, dash, text) {
+    const x = chart.valToPos(time, "x", true), { ctx, bbox } = chart;
+    if (!(x >= bbox.left && x <= bbox.left + bbox.width)) return;
     ctx.save();
-    ctx.strokeStyle = colour("bad");
-    ctx.setLineDash([6, 4]);
+    ctx.strokeStyle = ctx.fillStyle = colour(name);
+    ctx.setLineDash(dash);
     ctx.beginPath();
     ctx.moveTo(x, bbox.top);
     ctx.lineTo(x, bbox.top + bbox.height);
     ctx.stroke();
+    ctx.font = `${11 * (window.devicePixelRatio || 1)}px system-ui, sans-serif`;
+    ctx.fillText(text, x + 4, bbox.top + 12 * (window.devicePixelRatio || 1));
     ctx.restore();
   }
 
@@ -205,6 +211,7 @@ export function makePlots(box, on, colour) {
     mark: () => mark,
     setMark: (time) => { mark = time; redraw(); values(); },
     stands: (values_there, time) => { exact = { at: time, values: values_there }; values(); },
+    setNotes: (found) => { notes = found; redraw(); },
     stoodAtMark: (values_there) => { marked = values_there; values(); },
   };
 }
