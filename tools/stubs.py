@@ -561,12 +561,23 @@ class Module:
                 yield f"    {name}: {self.say(kind)}" + (" = ..." if name in valued else "")
         for part in node.body:
             if isinstance(part, ast.FunctionDef):
-                method = declared.methods.get(part.name) if declared else None
+                method = self.declared_method(node, part.name)
                 if method is None or method.visible:
                     count += 1
                     yield from self.function_text(part, "    ", each, method)
         if not count:
             yield "    pass"
+
+    def declared_method(self, node: ast.ClassDef, name: str) -> DeclaredFunction | None:
+        """How a method is declared: here, or where a base says it first and this class only overrides it."""
+        declared = self.declaration.classes.get(node.name)
+        if declared and name in declared.methods:
+            return declared.methods[name]
+        for base in node.bases:
+            home, above = self.class_named(ast.unparse(base))
+            if home and above and (found := home.declared_method(above.node, name)):
+                return found
+        return None
 
     def function_text(
         self, node: ast.FunctionDef, indent: str, owner: Class | None, declared: DeclaredFunction | None

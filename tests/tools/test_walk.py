@@ -165,6 +165,7 @@ def test_where_no_screen_is_progress_comes_as_lines(monkeypatch):
 
     class Robot(Walked):
         runs = 0
+        deaths = ()
 
         def run(self, _stop, _slice_s):
             self.runs += 1
