@@ -561,8 +561,9 @@ class Module:
                 yield f"    {name}: {self.say(kind)}" + (" = ..." if name in valued else "")
         for part in node.body:
             if isinstance(part, ast.FunctionDef):
-                method = self.declared_method(node, part.name)
-                if method is None or method.visible:
+                method = declared.methods.get(part.name) if declared else None
+                known = self.declared_method(node, part.name)
+                if known is None or known.visible:
                     count += 1
                     yield from self.function_text(part, "    ", each, method)
         if not count:
