@@ -121,7 +121,7 @@ export function makePlots(box, on, colour) {
         grid: { show: k === 0, stroke: line, width: 1 }, ticks: { stroke: line } });
     });
     const series = [{}, ...plot.numbers.map((number, k) => ({
-      label: channels[number].name, scale: channels[number].unit || "1", stroke: shade(plot, number), width: 1.25,
+      label: channels[number].name, scale: channels[number].unit || "1", stroke: shade(plot, number), width: 1,
       dash: DASHES[Math.floor(k / COLOURS.length) % DASHES.length], points: { show: false }, spanGaps: false }))];
     plot.chart = new uPlot({
       width: width(plot), height: HEIGHT, scales, axes, series, legend: { show: false },
@@ -199,7 +199,7 @@ export function makePlots(box, on, colour) {
   function resize() { for (const plot of plots) plot.chart?.setSize({ width: width(plot), height: HEIGHT }); }
   function restyle() { for (const plot of plots) plot.signature = ""; }
   const wanted = () => plots.filter((plot) => plot.numbers.length);
-  const points = () => Math.max(100, Math.min(2000, Math.round(box.clientWidth)));
+  const points = () => Math.max(100, Math.min(2000, Math.round(box.clientWidth / 2)));   // two points of each: a pixel
 
   return {
     add, put, close, show, values, redraw, resize, restyle, wanted, points,
