@@ -92,7 +92,7 @@ class FeedServer(Door[Peer]):
             "speed_m_per_s": robot.mean_speed_m_per_s(),
             "energy_Wh": energy(robot),
             "ended": robot.ended,
-            "faults": [fault.summary() | {"unit": fault.unit} for fault in robot.faults if fault.twin is None],
+            "faults": [fault.summary() for fault in robot.faults if fault.twin is None],
         }
 
     def hello(self) -> dict[str, Any]:

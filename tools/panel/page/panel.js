@@ -10,14 +10,14 @@ const by = (id) => document.getElementById(id);
 const VALUES_MS = 500;
 const FIRST = [["hip_rad", "ankle_outer_rad", "ankle_inner_rad"], ["hip_A", "outer_A", "inner_A"], ["FSM_HIP", "FSM_FO", "FSM_FI"]];
 const FIRST_OF_A_LOG = [["MCH_ANGLE", "MCFO_RIGHT_ANKLE_ANGLE", "MCFI_MID_ANKLE_ANGLE"], ["MCH_MOTOR_CURRENT"], ["FSM_HIP"]];
-const CURRENTS = [["hip", "hip_A", "MCH_MOTOR_CURRENT", "hip"], ["outer ankle", "outer_A", "MCFO_MOTOR_CURRENT", "outer"], ["inner ankle", "inner_A", "MCFI_MOTOR_CURRENT", "inner"], ["steering", "steering_A", "MCSI_MOTOR_CURRENT", "steering"]];
+const CURRENTS = [["hip", "hip_A", "hip"], ["outer ankle", "outer_A", "outer"], ["inner ankle", "inner_A", "inner"], ["steering", "steering_A", "steering"]];
 const FULL_BAR_A = 10;
 
 let colours = {};
 const colour = (name) => colours[name] ??= getComputedStyle(document.documentElement).getPropertyValue("--" + name).trim();
 
 let hello = null, can = new Set(), number = new Map(), listed = [];   // listed: channels, group by group
-let span = [0, 0], held = null, window_s = 10, zooms = [], view = "plots", state = {}, pose = null, poses = [];
+let span = [0, 0], held = null, window_s = 10, zooms = [], view = "plots", state = {}, pose = null;
 let playing = false, played = 0, at = null, trigger = null, shown = 0;
 const notes = [];   // {time, text}
 
@@ -69,7 +69,7 @@ function greet(found) {
     document.querySelector(`[data-view=${name}]`).hidden = !can.has(needs);
   by("pose-note").textContent = hello.pose.includes("hip_y_m") ? "as its body is; contact forces green" : hello.pose.length ? "as it estimates itself; the lower foot stands" : "no leg angles in this source";
   by("names").replaceChildren(...hello.channels.map((channel) => Object.assign(document.createElement("option"), { value: channel.name })));
-  by("bars").replaceChildren(...CURRENTS.map(([name, , , swatch]) => {
+  by("bars").replaceChildren(...CURRENTS.map(([name, , swatch]) => {
     const row = document.createElement("div");
     row.innerHTML = '<span></span><div class="bar"><i></i></div><span></span>';
     row.firstChild.textContent = name;
@@ -167,7 +167,7 @@ function remember() {
 function recall() {
   const parts = new URLSearchParams(location.hash.slice(1));
   const wanted = parts.get("plots");
-  const usual = can.has("live") && number.has("hip_rad") || number.has("hip_rad") ? FIRST : FIRST_OF_A_LOG;
+  const usual = number.has("hip_rad") ? FIRST : FIRST_OF_A_LOG;
   const sets = wanted !== null ? wanted.split(";").map((each) => each.split(",").filter(Boolean)) : usual;
   for (const names of sets) plots.add(names.map((name) => number.get(name)).filter((each) => each !== undefined));
   window_s = Number(parts.get("span")) || window_s;
