@@ -83,6 +83,7 @@ class Source:
             "geometry": self.geometry,
             "parameters": parameter_rows() if "parameters" in self.can else [],
             "faults": fault_rows() if "faults" in self.can else {},
+            "slots_us": {board.name: board.slot_us for board in datatable.load().boards if board.slot_us},
             "span": self.span(),
         }
 

@@ -247,7 +247,7 @@ function tell_state() {
     by("errors-normal").replaceChildren(tables.errors(errors.filter((row) => row.normal), "none"));
   }
   if (view === "inside") {
-    if (!by("view-inside").contains(document.activeElement) || document.activeElement.tagName !== "BUTTON") by("boards").replaceChildren(tables.boards(state.boards ?? {}, tell));
+    if (!by("view-inside").contains(document.activeElement) || document.activeElement.tagName !== "BUTTON") by("boards").replaceChildren(tables.boards(state.boards ?? {}, hello.slots_us, tell));
     by("buses").replaceChildren(tables.buses(state.buses ?? {}));
     const chosen = by("bus").value || "0";
     if (by("bus").length !== (state.frames ?? []).length) by("bus").replaceChildren(...(state.frames ?? []).map((_, k) => new Option(`can${k + 1}`, k)));

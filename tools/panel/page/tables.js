@@ -49,13 +49,11 @@ export function errors(rows, nothing) {
 
 const late = (us) => us === undefined || us === null ? "–" : us < 1e3 ? `${Math.round(us)} µs` : us < 1e6 ? `${(us / 1e3).toFixed(1)} ms` : `${(us / 1e6).toFixed(1)} s`;
 
-const SLOT_US = { MCH: 500, MCFO: 500, MCFI: 500, MCSI: 500, UI: 1000, CSR: 1000, MB: 2000 };
-
-export function boards(found, ask) {
+export function boards(found, slots_us, ask) {
   const names = Object.keys(found);
   if (!names.length) return note("nothing is known of the boards yet");
   return table(["board", "state", "#slots", "longest slot", "#µs", "#margin", "#overruns", "#errors", "#late, 99 of 100", ""], names.map((name) => {
-    const board = found[name], share = board.max_slot_us / SLOT_US[name];
+    const board = found[name], share = board.max_slot_us / slots_us[name];
     const restart = Object.assign(document.createElement("button"), { type: "button", textContent: "Restart" });
     restart.onclick = () => ask({ do: "restart", board: name });
     return [name, board.state, board.slots.toLocaleString("en"), meter(share, `${name}: ${Math.round(100 * share)} % of its slot`), board.max_slot_us.toFixed(0),
