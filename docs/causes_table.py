@@ -9,7 +9,7 @@ import pathlib
 from ranger_sim.plant import terms
 from ranger_sim.sysid import causes, machines
 from ranger_sim.sysid.fit import Parameter
-from ranger_sim.tools.files import replace_file
+from ranger_sim.tools.command_line.files import replace_file
 
 PAGE = pathlib.Path(__file__).parent / "reference/causes.md"
 HEAD = """# Causes and unknowns

@@ -7,7 +7,7 @@ import pathlib
 
 from ranger_sim.firmware_sim.lpc2194.board import ImageBoard
 from ranger_sim.firmware_sim.lpc2194.image import Image
-from ranger_sim.tools.files import replace_file
+from ranger_sim.tools.command_line.files import replace_file
 
 PAGE = pathlib.Path(__file__).parent / "reference/registers.md"
 HEAD = """# Registers of the LPC2194

@@ -7,7 +7,7 @@ import pathlib
 
 from ranger_sim.firmware_sim.vic import FIQ
 from ranger_sim.harness.ranger import Ranger
-from ranger_sim.tools.files import replace_file
+from ranger_sim.tools.command_line.files import replace_file
 
 PAGE = pathlib.Path(__file__).parent / "reference/schedules.md"
 HEAD = """# Schedules

@@ -5,7 +5,7 @@ import json
 from typing import Any
 
 from ranger_sim.plant import body_files
-from ranger_sim.tools import terminal
+from ranger_sim.tools.command_line import terminal
 
 WIDE = 120  # columns of a window with room for sources beside their numbers
 

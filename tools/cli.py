@@ -7,8 +7,8 @@ from typing import Any, NoReturn
 
 from ranger_sim import __version__
 from ranger_sim.foundation.user_error import UserError, printable
-from ranger_sim.tools import terminal
-from ranger_sim.tools.units import NEGATIVE_VALUE
+from ranger_sim.tools.command_line import terminal
+from ranger_sim.tools.command_line.units import NEGATIVE_VALUE
 
 EXIT_DONE = 0
 EXIT_FELL = 1  # the robot fell or a board failed
@@ -42,34 +42,25 @@ class OneLineParser(argparse.ArgumentParser):
 def parser() -> argparse.ArgumentParser:
     """The whole command line."""
     from ranger_sim.datatable import cli as table_command
-    from ranger_sim.tools import (
-        body,
-        bus,
-        can_bounds,
-        causes,
-        check_bus,
-        completion,
-        daq,
-        faults,
-        firmware,
-        info,
-        slots,
-        summary_schema,
-        trace,
-        tune,
-        up,
-        walk,
-    )
+    from ranger_sim.tools import body, faults, info
     from ranger_sim.tools.bench import command as bench
+    from ranger_sim.tools.buses import bus, can_bounds, check_bus
     from ranger_sim.tools.campaign import command as campaign
+    from ranger_sim.tools.command_line import completion
     from ranger_sim.tools.compare_walk import command as compare_walk
+    from ranger_sim.tools.diagnose import causes
     from ranger_sim.tools.diagnose import command as diagnose
     from ranger_sim.tools.figures import command as figures
+    from ranger_sim.tools.firmware import command as firmware
     from ranger_sim.tools.fmu import command as fmu
     from ranger_sim.tools.fuzz import command as fuzz
     from ranger_sim.tools.identify import command as identify
     from ranger_sim.tools.new import command as new
     from ranger_sim.tools.panel import command as panel
+    from ranger_sim.tools.robodaq import command as daq
+    from ranger_sim.tools.run import summary_schema, up, walk
+    from ranger_sim.tools.timing import slots, trace
+    from ranger_sim.tools.tune import command as tune
     from ranger_sim.tools.vm import command as vm
 
     top = OneLineParser(

@@ -15,9 +15,9 @@ from rich.table import Table
 from ranger_sim.harness.faults.catalogue import MODES
 from ranger_sim.harness.faults.fault import Fault, Parameter, Place
 from ranger_sim.harness.faults.ranger_catalogue import CATALOGUE
-from ranger_sim.tools import terminal
-from ranger_sim.tools.options import Option
-from ranger_sim.tools.units import word
+from ranger_sim.tools.command_line import terminal
+from ranger_sim.tools.command_line.options import Option
+from ranger_sim.tools.command_line.units import word
 
 DOCUMENT = pathlib.Path(__file__).resolve().parent.parent / "docs" / "faults.md"
 EXIT_INVALID = 3  # of a run in which a fault did not act: it shows nothing

@@ -10,7 +10,7 @@ from rich.table import Table
 
 from ranger_sim import __version__, datatable, loading
 from ranger_sim.can_bus.edge import interfaces
-from ranger_sim.tools import terminal
+from ranger_sim.tools.command_line import terminal
 
 
 def register(commands: Any) -> None:

@@ -16,8 +16,8 @@ import pytest
 from ranger_sim.harness.ranger import Ranger
 from ranger_sim.harness.scenario import Scenario, StopRule
 from ranger_sim.harness.summary_schema import json_schema
-from ranger_sim.tools import variables_file
-from ranger_sim.tools.walk import write_frames
+from ranger_sim.tools.recordings import variables_file
+from ranger_sim.tools.run.walk import write_frames
 from tests.oracle import figures
 from tests.oracle.run_folder import Log, Variables, frame_bits
 from tests.oracle.test_summary_schema import violations

@@ -8,8 +8,8 @@ import pytest
 
 from ranger_sim.harness.ranger import Ranger
 from ranger_sim.harness.summary_schema import FIGURES, json_schema
-from ranger_sim.tools import summary_schema
 from ranger_sim.tools.cli import main
+from ranger_sim.tools.run import summary_schema
 
 KINDS = {
     "object": dict,
@@ -98,7 +98,9 @@ def test_every_figure_has_a_meaning_and_every_number_a_unit():
 
 def test_the_page_has_the_table_of_the_program():
     document = summary_schema.DOCUMENT.read_text(encoding="utf-8")
-    assert summary_schema.with_table(document) == document, "write it anew: python -m ranger_sim.tools.summary_schema"
+    assert summary_schema.with_table(document) == document, (
+        "write it anew: python -m ranger_sim.tools.run.summary_schema"
+    )
 
 
 def test_the_command_prints_the_schema(capsys):

@@ -21,9 +21,9 @@ from ranger_sim.foundation.user_error import UserError
 from ranger_sim.sysid.benches.ankle_sine import ankle_sine
 from ranger_sim.sysid.benches.motor_run import motor_run
 from ranger_sim.sysid.channels import named_for
-from ranger_sim.tools import recordings
 from ranger_sim.tools.cli import main as command_line
 from ranger_sim.tools.diagnose import work
+from ranger_sim.tools.recordings import datasets
 
 Columns = dict[str, np.ndarray]
 # What each unit is mistaken for: (what the column is in, its number for 1 of ours)
@@ -87,7 +87,7 @@ def _walk() -> Columns:
     with tempfile.TemporaryDirectory() as folder:
         out = pathlib.Path(folder) / "run"
         command_line(["walk", "--steps", "14", "--seed", "4", "--log", "full", "--out", str(out)])
-        data = named_for(recordings.open_recording(out), "walk")
+        data = named_for(datasets.open_recording(out), "walk")
     wanted = [
         "hip_angle_rad",
         "hip_rate_rad_per_s",

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.sysid import channels, repairs, units
 from ranger_sim.sysid.readers import columns, csv_file, read
-from ranger_sim.tools.recordings import open_recording
+from ranger_sim.tools.recordings.datasets import open_recording
 from tests.boards.original_images import DATA
 from tests.examples import examples
 
@@ -257,7 +257,7 @@ def test_a_log_without_names_keeps_its_numbers_and_says_so(tmp_path):
 
 
 def test_a_measurement_file_keeps_units_and_leaves_out_what_no_instrument_sees(tmp_path):
-    from ranger_sim.tools import variables_file
+    from ranger_sim.tools.recordings import variables_file
 
     time_s = np.arange(5) * 0.1
     variables_file.write_groups(
@@ -280,7 +280,7 @@ def test_a_measurement_file_keeps_units_and_leaves_out_what_no_instrument_sees(t
 
 
 def test_a_measurement_begins_at_zero_and_its_groups_keep_their_distance(tmp_path):
-    from ranger_sim.tools import variables_file
+    from ranger_sim.tools.recordings import variables_file
 
     start_s = 1.75e9  # of a calendar
     early, late = start_s + np.arange(5) * 0.5, start_s + 0.25 + np.arange(5) * 0.5

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.tools import recordings
+from ranger_sim.tools.recordings import datasets
 from tests.boards.original_images import DATA
 
 needs_data = pytest.mark.skipif(not (DATA / "emps_run1.csv").exists(), reason=f"no measured data in {DATA.name}/")
@@ -14,7 +14,7 @@ needs_data = pytest.mark.skipif(not (DATA / "emps_run1.csv").exists(), reason=f"
 
 def options(*arguments):
     parser = argparse.ArgumentParser()
-    recordings.add_options(parser)
+    datasets.add_options(parser)
     return parser.parse_args(arguments)
 
 
@@ -34,7 +34,7 @@ def bench(path, change=lambda name, value: value, count=400):
 
 
 def test_a_sound_file_becomes_a_table_without_doubts(tmp_path):
-    ready = recordings.prepared(options(), bench(tmp_path / "a.csv"), "motor-bench")
+    ready = datasets.prepared(options(), bench(tmp_path / "a.csv"), "motor-bench")
     assert set(ready.table.columns) == {"voltage_V", "current_A", "speed_rad_per_s", "torque_Nm"}
     assert (len(ready.table), ready.findings, ready.doubts, ready.dataset.repairs) == (400, [], [], [])
 
@@ -43,10 +43,10 @@ def test_the_command_lines_names_and_units_are_taken(tmp_path):
     path = bench(tmp_path / "a.csv")
     text = (tmp_path / "a.csv").read_text().replace("current_A", "strom", 1)
     (tmp_path / "a.csv").write_text(text)
-    ready = recordings.prepared(options("--map", "strom=current_mA"), path, "motor-bench")
+    ready = datasets.prepared(options("--map", "strom=current_mA"), path, "motor-bench")
     assert float(np.max(ready.table["current_A"])) == pytest.approx(1e-3, rel=0.02)
     with pytest.raises(UserError, match="motor-bench needs current_A"):
-        recordings.prepared(options(), path, "motor-bench")
+        datasets.prepared(options(), path, "motor-bench")
 
 
 @pytest.mark.parametrize(
@@ -63,19 +63,19 @@ def test_the_command_lines_names_and_units_are_taken(tmp_path):
     ids=["microamperes", "milliseconds", "holes", "a sensor that stands", "stamps of 50 ms"],
 )  # fmt: skip
 def test_data_that_are_not_what_they_are_said_to_be_are_doubted(tmp_path, change, kind):
-    ready = recordings.prepared(options(), bench(tmp_path / "a.csv", change), "motor-bench")
+    ready = datasets.prepared(options(), bench(tmp_path / "a.csv", change), "motor-bench")
     assert kind in {each.kind for each in ready.doubts}
     assert all(np.isfinite(column).all() for column in ready.table.columns.values())
 
 
 def test_a_file_of_another_experiment_is_refused_in_a_line(tmp_path):
     with pytest.raises(UserError, match="it has no channel of the experiment walk"):
-        recordings.prepared(options(), bench(tmp_path / "a.csv"), "walk")
+        datasets.prepared(options(), bench(tmp_path / "a.csv"), "walk")
 
 
 @needs_data
 def test_the_measured_files_are_ready_and_not_doubted():
     for name, experiment in (("emps_run1", "positioning"), ("ranger_foot_inertia_1", "ankle"),
                              ("ranger_ankle_sine_fast", "ankle"), ("ranger_walk_20150820", "walk")):  # fmt: skip
-        ready = recordings.prepared(options(), str(DATA / f"{name}.csv"), experiment)
+        ready = datasets.prepared(options(), str(DATA / f"{name}.csv"), experiment)
         assert ready.doubts == [] and len(ready.table) > 2000

@@ -10,8 +10,8 @@ from ranger_sim.sysid.dataset import Channel, Dataset, Table
 from ranger_sim.sysid.diagnose import diagnose
 from ranger_sim.sysid.machines.walk import Walk, mechanics, strikes, timebase
 from ranger_sim.sysid.machines.walk.mechanics import Motion, Numbers
-from ranger_sim.tools import recordings
 from ranger_sim.tools.cli import main
+from ranger_sim.tools.recordings import datasets
 
 STEPS = 30
 
@@ -26,7 +26,7 @@ def folder(tmp_path_factory):
 @pytest.fixture(scope="module")
 def table(folder):
     machine = Walk()
-    dataset = named_for(recordings.open_recording(folder), "walk")
+    dataset = named_for(datasets.open_recording(folder), "walk")
     return machine.table(dataset, [each.name for each in machine.quantities if each.name in dataset])
 
 

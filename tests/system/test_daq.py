@@ -22,7 +22,8 @@ from ranger_sim.foundation.numbers import float_of_word
 from ranger_sim.harness import serial_ports
 from ranger_sim.harness.ranger import Ranger
 from ranger_sim.harness.scenario import Scenario
-from ranger_sim.tools import cli, daq
+from ranger_sim.tools import cli
+from ranger_sim.tools.robodaq import command as daq
 from ranger_sim.tools.robodaq.codec import write_packet
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]

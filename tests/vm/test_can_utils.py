@@ -12,7 +12,7 @@ from ranger_sim.datatable.generate import GENERATED_FOLDER
 from ranger_sim.foundation.events import FLAG_EXTENDED, FLAG_REMOTE
 from ranger_sim.harness.ranger import Ranger
 from ranger_sim.harness.scenario import Scenario
-from ranger_sim.tools import walk
+from ranger_sim.tools.run import walk
 
 
 def test_python_can_finds_the_interfaces():

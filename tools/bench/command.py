@@ -20,9 +20,9 @@ from typing import Any
 from ranger_sim import loading
 from ranger_sim.foundation import wallclock
 from ranger_sim.tools.bench.cases import CASES, FRAMES, SIMULATED, YARDSTICK, measured
-from ranger_sim.tools.files import json_target, replace_file
-from ranger_sim.tools.help_text import named_lines
-from ranger_sim.tools.units import number, whole_number
+from ranger_sim.tools.command_line.files import json_target, replace_file
+from ranger_sim.tools.command_line.help_text import named_lines
+from ranger_sim.tools.command_line.units import number, whole_number
 
 SHOWN = {SIMULATED: "x real time", FRAMES: "frames"}
 EXIT_EXCEEDED = 1  # an answer came later than its bound

@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 from ranger_sim.harness.ranger import Ranger
 from ranger_sim.harness.scenario import Scenario, StopRule
-from ranger_sim.tools.units import figure
+from ranger_sim.tools.command_line.units import figure
 
 # parameter set, seeds, steps, roughness in m
 WALKS = (

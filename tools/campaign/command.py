@@ -3,7 +3,7 @@
 import argparse
 from typing import Any
 
-from ranger_sim.tools.units import whole_number
+from ranger_sim.tools.command_line.units import whole_number
 
 
 def register(commands: Any) -> None:

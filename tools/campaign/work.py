@@ -18,10 +18,10 @@ from ranger_sim import loading
 from ranger_sim.foundation import wallclock
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.campaigns import engine, group, plan, pools, summary
-from ranger_sim.tools import terminal
 from ranger_sim.tools.campaign import page
 from ranger_sim.tools.campaign.words import proof_text
-from ranger_sim.tools.files import replace_file, writable_folder
+from ranger_sim.tools.command_line import terminal
+from ranger_sim.tools.command_line.files import replace_file, writable_folder
 
 TELL_EVERY_S = 10.0  # where there is no terminal for a progress bar
 TABLES_BEGIN = "<!-- written by ranger-sim campaign --document: begin -->\n"

@@ -5,9 +5,9 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from ranger_sim.tools import recordings
-from ranger_sim.tools.units import ANGLES, whole_number
-from ranger_sim.tools.walk_options import of_scenario
+from ranger_sim.tools.command_line.units import ANGLES, whole_number
+from ranger_sim.tools.recordings import datasets
+from ranger_sim.tools.run.walk_options import of_scenario
 
 
 def register(commands: Any) -> None:
@@ -44,7 +44,7 @@ def register(commands: Any) -> None:
     command.add_argument("--causes", action="store_true", help="name causes: some 150 walks, a few minutes")
     command.add_argument("--out", metavar="DIR", help="folder for the plot, the answer, and the extended files")
     command.add_argument("--json", metavar="FILE|-", help="the answer as JSON; - prints it and nothing else")
-    recordings.add_options(command)
+    datasets.add_options(command)
     command.set_defaults(run=run)
 
 

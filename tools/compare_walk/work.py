@@ -26,10 +26,11 @@ from ranger_sim.harness.scenario import Scenario
 from ranger_sim.plant import body_files
 from ranger_sim.sysid import channels, inspection, sanity
 from ranger_sim.sysid.dataset import Array, Finding
-from ranger_sim.tools import recordings, terminal
+from ranger_sim.tools.command_line import terminal
+from ranger_sim.tools.command_line.files import json_target, replace_file, writable_folder
 from ranger_sim.tools.compare_walk import emulate, figure, gait, hip_law, naming
 from ranger_sim.tools.compare_walk.candidates import BY_NAME
-from ranger_sim.tools.files import json_target, replace_file, writable_folder
+from ranger_sim.tools.recordings import datasets
 
 FALSE_ALARM = 0.01  # of a difference that is none
 RESAMPLES = 2000
@@ -68,7 +69,7 @@ def run(options: argparse.Namespace) -> int:
 
 def read(options: argparse.Namespace) -> tuple[gait.Walk, list[Finding]]:
     """The measured walk, and what is odd about its channels."""
-    dataset = channels.named_for(recordings.open_with(options, options.log), "walk")
+    dataset = channels.named_for(datasets.open_with(options, options.log), "walk")
     for name in gait.CHANNELS:
         dataset[name]
     dataset.channels = {name: dataset.channels[name] for name in gait.CHANNELS}

@@ -6,8 +6,8 @@ import argparse
 from typing import Any
 
 from ranger_sim.sysid.machines import MACHINES
-from ranger_sim.tools import recordings
-from ranger_sim.tools.units import number, whole_number
+from ranger_sim.tools.command_line.units import number, whole_number
+from ranger_sim.tools.recordings import datasets
 
 
 def register(commands: Any) -> None:
@@ -50,7 +50,7 @@ def register(commands: Any) -> None:
         "--out", metavar="DIR", help="folder for report.html, diagnosis.json and extended.toml, made if missing"
     )
     command.add_argument("--json", metavar="FILE|-", help="the answer as JSON; - prints it and nothing else")
-    recordings.add_options(command)
+    datasets.add_options(command)
     command.set_defaults(run=run)
 
 

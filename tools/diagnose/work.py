@@ -26,9 +26,10 @@ from ranger_sim.sysid.diagnose import diagnose
 from ranger_sim.sysid.diagnosis import Diagnosis, KnownEffect
 from ranger_sim.sysid.machine import Machine
 from ranger_sim.sysid.machines import MACHINES, made
-from ranger_sim.tools import recordings, terminal
+from ranger_sim.tools.command_line import terminal
+from ranger_sim.tools.command_line.files import json_target, replace_file, writable_folder
 from ranger_sim.tools.diagnose import words
-from ranger_sim.tools.files import json_target, replace_file, writable_folder
+from ranger_sim.tools.recordings import datasets
 
 EXIT_CLEAN, EXIT_FOUND = 0, 1
 LEAST_ROWS = 50  # below, filters are longer than the data; what says anything has some hundreds
@@ -86,8 +87,8 @@ def of_options(options: argparse.Namespace, progress: Progressed = lambda what, 
     """The diagnosis that a command line asks for."""
     machine = machine_of(options.experiment, options.gear)
     known = model_file.read(options.model, machine).effects if options.model else []
-    data = [_prepared(recordings.open_with(options, path), machine, options.experiment) for path in options.data]
-    held = [_prepared(recordings.open_with(options, path), machine, options.experiment) for path in options.holdout]
+    data = [_prepared(datasets.open_with(options, path), machine, options.experiment) for path in options.data]
+    held = [_prepared(datasets.open_with(options, path), machine, options.experiment) for path in options.holdout]
     if options.holdout_part is not None:
         if held:
             raise UserError(f"--holdout-part {options.holdout_part:g}: there are files to hold out already (--holdout)")
@@ -117,7 +118,7 @@ def answer(
     """What `--json` prints, for programs: files and held-out files, or a part of each, of one experiment."""
     machine = machine_of(experiment)
     data, held = (
-        [_prepared(recordings.open_recording(path), machine, experiment) for path in each] for each in (files, holdout)
+        [_prepared(datasets.open_recording(path), machine, experiment) for path in each] for each in (files, holdout)
     )
     if holdout_part is not None:
         data, held = _parted(data, holdout_part)

@@ -16,7 +16,7 @@ from ranger_sim.harness.scenario import Scenario, StopRule
 from ranger_sim.plant import body_files
 from ranger_sim.plant.parameters import BodyParameters
 from ranger_sim.sysid.figures.question import Candidate, Outcome, Point
-from ranger_sim.tools.files import replace_file
+from ranger_sim.tools.command_line.files import replace_file
 
 LEAST_STEPS = 20  # that a walk is asked for: the summary leaves five of them out of its means
 # A walk that takes three times the time of such a walk stands still (chosen by us).

@@ -19,9 +19,9 @@ from ranger_sim.plant import body_files
 from ranger_sim.sysid.figures import file
 from ranger_sim.sysid.figures.diagnose import ROUNDS, Diagnosis, diagnose, values_of
 from ranger_sim.sysid.figures.question import Candidate, Figure, Question
-from ranger_sim.tools import terminal
+from ranger_sim.tools.command_line import terminal
+from ranger_sim.tools.command_line.files import json_target, replace_file, writable_folder
 from ranger_sim.tools.figures.walks import FIGURES, Setup, Walks
-from ranger_sim.tools.files import json_target, replace_file, writable_folder
 
 EXIT_CLEAN, EXIT_FOUND = 0, 1
 OURS = pathlib.Path(__file__).parent

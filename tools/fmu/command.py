@@ -13,10 +13,10 @@ from typing import Any
 
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.scenario import Scenario
-from ranger_sim.tools import walk_options
-from ranger_sim.tools.files import writable_folder
+from ranger_sim.tools.command_line.files import writable_folder
+from ranger_sim.tools.command_line.options import add_all
 from ranger_sim.tools.fmu.body import ExportedBody, given_of
-from ranger_sim.tools.options import add_all
+from ranger_sim.tools.run import walk_options
 
 SCENARIO = ("--controller", "--body", "--seed", "--floor-roughness", "--slope", "--battery", "--battery-capacity")
 OPTIONS = tuple(option for option in walk_options.SCENARIO if option.name in SCENARIO)

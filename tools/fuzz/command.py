@@ -8,10 +8,10 @@ import json
 import sys
 from typing import Any
 
-from ranger_sim.tools.files import json_target, replace_file
+from ranger_sim.tools.command_line.files import json_target, replace_file
+from ranger_sim.tools.command_line.help_text import named_lines
+from ranger_sim.tools.command_line.units import whole_number
 from ranger_sim.tools.fuzz import Finding
-from ranger_sim.tools.help_text import named_lines
-from ranger_sim.tools.units import whole_number
 
 EXIT_FOUND = 1
 CASES = 10_000

@@ -6,7 +6,7 @@ What does it is imported when it is asked for: a first walk needs no scipy.
 import argparse
 from typing import Any
 
-from ranger_sim.tools.units import number, whole_number
+from ranger_sim.tools.command_line.units import number, whole_number
 
 # as sysid/identify/registry.py has them; a test holds both together
 BENCHES = {

@@ -27,7 +27,7 @@ from ranger_sim.sysid.fit import Fit, Parameter
 from ranger_sim.sysid.identify import coverage, legs, motor
 from ranger_sim.sysid.identify.registry import BENCHES, OF_TABLES, alone, bench_of, by_virtual_benches
 from ranger_sim.sysid.readers.columns import mapping_of
-from ranger_sim.tools import files, terminal
+from ranger_sim.tools.command_line import files, terminal
 from ranger_sim.tools.identify import page
 
 ALL = "all"

@@ -19,7 +19,8 @@ from typing import Any
 
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.loading import HOUSE, ROOMS
-from ranger_sim.tools.files import json_target, replace_file
+from ranger_sim.tools.command_line.files import json_target, replace_file
+from ranger_sim.tools.command_line.units import whole_number
 from ranger_sim.tools.mutate.mutants import Mutant
 from ranger_sim.tools.mutate.work import (
     KILLED,
@@ -37,7 +38,6 @@ from ranger_sim.tools.mutate.work import (
     reach_of,
     sample,
 )
-from ranger_sim.tools.units import whole_number
 
 COMMAND = "python -m ranger_sim.tools.mutate"
 COUNT = 30
@@ -46,10 +46,10 @@ MAP_LIMIT_S = 900
 NOTICED = (KILLED, TIMEOUT)
 # Tests of a room that stand elsewhere, since what they go through is another room's door.
 ALSO = {
-    "datatable": ("tests/harness/test_requests.py", "tests/tools/test_robodaq.py"),
-    "can_bus": ("tests/tools/test_fuzz_can.py", "tests/tools/test_bus.py"),
+    "datatable": ("tests/harness/test_requests.py", "tests/tools/robodaq/test_robodaq.py"),
+    "can_bus": ("tests/tools/fuzz/test_can.py", "tests/tools/buses/test_bus.py"),
     "plant": ("tests/oracle/test_known_answers.py",),
-    "sysid": ("tests/blind/test_generator.py", "tests/tools/test_diagnose_bad_data.py", "tests/tools/test_identify.py"),
+    "sysid": ("tests/blind/test_generator.py", "tests/tools/diagnose/test_bad_data.py", "tests/tools/test_identify.py"),
 }
 # Walks, which end in time compiled alone; there they take part in what is tried.
 WALKS = {

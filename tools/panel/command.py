@@ -18,8 +18,8 @@ from ranger_sim.foundation import wallclock
 from ranger_sim.foundation.peers import listening_address
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.processes import kernel
-from ranger_sim.tools import terminal
-from ranger_sim.tools.units import number, whole_number, word
+from ranger_sim.tools.command_line import terminal
+from ranger_sim.tools.command_line.units import number, whole_number, word
 
 PORT = 8311  # chosen by us: among those that IANA has given to nobody
 HERE = "127.0.0.1"

@@ -14,9 +14,9 @@ from ranger_sim import datatable
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.sysid.dataset import Dataset
 from ranger_sim.sysid.readers import run_folder
-from ranger_sim.tools import recordings
 from ranger_sim.tools.panel.channels import EMPTY, Channel, Times, Trace, Values, between, thinned
 from ranger_sim.tools.panel.source import ANKLES, KNOWN_POSE, LEGS, TRUE_POSE, Source, known_pose
+from ranger_sim.tools.recordings import datasets
 
 TRUTH = "plant."  # begins the names of what only a simulation knows of the body
 
@@ -133,4 +133,4 @@ def read(path: str, databases: Sequence[str]) -> Dataset:
     """The channels of one recording, those of a simulated body among them."""
     if (pathlib.Path(path) / run_folder.VARIABLES).is_file():
         return run_folder.read(path, truth=True)
-    return recordings.open_recording(path, databases=databases)
+    return datasets.open_recording(path, databases=databases)

@@ -13,11 +13,11 @@ from ranger_sim import datatable
 from ranger_sim.firmware_sim.native import coverage
 from ranger_sim.harness import normal_errors
 from ranger_sim.harness.ranger_names import RANGER
-from ranger_sim.tools import unexpected
+from ranger_sim.tools.command_line.units import duration_text, figure, length_text
 from ranger_sim.tools.faults import fault_text
 from ranger_sim.tools.report import charts
 from ranger_sim.tools.report.figures import packed
-from ranger_sim.tools.units import duration_text, figure, length_text
+from ranger_sim.tools.run import unexpected
 
 MOST_LINES = 5000  # of a source in the page; chosen by us
 HERE = pathlib.Path(__file__).parent

@@ -10,7 +10,7 @@ from typing import IO, Any, Protocol
 from ranger_sim.datatable import parameters
 from ranger_sim.datatable.generated import all_variables
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.tools.files import writable_folder
+from ranger_sim.tools.command_line.files import writable_folder
 from ranger_sim.tools.robodaq import catalogue
 from ranger_sim.tools.robodaq.codec import Point
 
@@ -81,7 +81,7 @@ class MeasurementLog:
                 )
 
     def close(self) -> None:
-        from ranger_sim.tools import variables_file
+        from ranger_sim.tools.recordings import variables_file
 
         variables_file.write_groups(self.groups(), self.path)
 

@@ -12,7 +12,7 @@ from ranger_sim.boards.main_brain import controllers
 from ranger_sim.datatable import parameters
 from ranger_sim.datatable.packing import word_of_value
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.tools.files import replace_file
+from ranger_sim.tools.command_line.files import replace_file
 from ranger_sim.tools.robodaq import catalogue
 
 

@@ -9,7 +9,7 @@ import sys
 from typing import Any
 
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.tools.units import TIMES, quantity, whole_number
+from ranger_sim.tools.command_line.units import TIMES, quantity, whole_number
 from ranger_sim.tools.vm import machine
 
 

@@ -17,7 +17,7 @@ from ranger_sim.tools.panel.channels import Channel, Trace, between
 from ranger_sim.tools.panel.command import listening
 from ranger_sim.tools.panel.server import BURST, COOKIE, MOST_CHANNELS, PLACES, PanelServer
 from ranger_sim.tools.panel.source import Source
-from ranger_sim.tools.recordings import open_recording
+from ranger_sim.tools.recordings.datasets import open_recording
 
 TOKEN = "a-word"
 PATIENCE_S = 20

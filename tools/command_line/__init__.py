@@ -1,0 +1,1 @@
+"""What all commands share: how values are typed, options as tables, the console, files written whole."""

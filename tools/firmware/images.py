@@ -1,0 +1,31 @@
+"""`--image` of walk and up: firmware images in boards' places."""
+
+import argparse
+import pathlib
+
+from ranger_sim.firmware_sim.lpc2194 import image
+from ranger_sim.firmware_sim.lpc2194.image import Image
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.harness import image_boards
+from ranger_sim.tools.command_line.options import Option
+from ranger_sim.tools.command_line.units import word
+
+IMAGE = Option(
+    "--image",
+    "a firmware image instead of the emulated board, run instruction by instruction: an ELF file (.axf) or Intel HEX",
+    word("BOARD=FILE"),
+    "BOARD=FILE",
+    repeated=True,
+)
+OPTIONS = (IMAGE,)
+
+
+def images_of(options: argparse.Namespace) -> dict[str, Image]:
+    """The images that were asked for, by board, read."""
+    wanted: dict[str, str] = {}
+    for text in options.image:
+        board, path = image_boards.placed(text)
+        if board in wanted:
+            raise UserError(f"--image {text}: {board} has {wanted[board]} already")
+        wanted[board] = path
+    return {board: image.read(pathlib.Path(path)) for board, path in wanted.items()}

@@ -1,0 +1,178 @@
+"""The folder of one run: whose it is, what in it is complete, and what becomes of it when the run breaks off.
+
+While a run lasts, the folder holds `incomplete.json` and the files that grow, with `.partial` in their names. A file
+that is whole gets its own name. At the end `incomplete.json` becomes `summary.json`, last of all: where that stands,
+the run has ended and every other file is its own. After anything else, a full disk or a kill -9, what is there is named
+as what it is.
+"""
+
+import contextlib
+import fcntl
+import json
+import os
+import pathlib
+from collections.abc import Callable, Iterator
+from typing import Any, Self
+
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.tools.command_line.files import writable_folder
+
+SUMMARY = "summary.json"
+OPEN = "incomplete.json"
+BUS_LOGS = ("can1.log", "can2.log", "can3.log", "can4.log")
+VARIABLES = "variables.mf4"
+REPORT = "report.html"
+LCOV = "lcov.info"
+FILES = (*BUS_LOGS, VARIABLES, REPORT, LCOV)  # beside the summary
+# Bytes that incomplete.json takes from the disk at the start, so that a summary (some 20 kB) fits into it when the disk
+# is full at the end. Chosen by us.
+RESERVED = 65_536
+BROKEN_OFF = "the run has not ended, or was broken off: what is here is as far as it came"
+FAILURES = (OSError, MemoryError)  # of the machine: a file then stays partial, and the run goes on
+
+
+def partial(name: str) -> str:
+    """What a file is called as long as it is not whole."""
+    stem, dot, suffix = name.rpartition(".")
+    return f"{stem}.partial{dot}{suffix}"
+
+
+def cause_of(error: BaseException) -> str:
+    """A failure of the machine in its own words."""
+    if isinstance(error, MemoryError):
+        return "out of memory"
+    return (error.strerror if isinstance(error, OSError) else None) or str(error) or type(error).__name__
+
+
+class RunFolder:
+    """One run's folder. A context manager: left by an exception, it says so in `incomplete.json`.
+
+    What an older run left goes first: files of the names above, and only where a record of ours says that it was a run.
+    UserError for a folder in which a file of such a name is somebody else's, or in which another run is writing.
+    tell: called with a line for every file that could not be finished.
+    """
+
+    def __init__(self, name: str | pathlib.Path, command: str, tell: Callable[[str], None]) -> None:
+        self.path = writable_folder(name)
+        self.command = command
+        self.tell = tell
+        self.files: dict[str, str] = {}  # "complete", or why it is not
+        self.is_done = False
+        self._claim()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, _kind: Any, error: BaseException | None, _trace: Any) -> None:
+        if not self.is_done:
+            with contextlib.suppress(*FAILURES):  # what could not be kept is no reason to hide the error itself
+                why = f"{type(error).__name__}: {error}" if error is not None else BROKEN_OFF
+                self._write_record({**self._record(), "ended": why})
+        os.close(self.lock)
+
+    @contextlib.contextmanager
+    def file(self, name: str) -> Iterator[pathlib.Path]:
+        """Write the file `name` to the path that is given; it gets its name when it is whole.
+
+        A failure of the machine is told and noted, and hinders nothing else.
+        """
+        path = self.begin(name)
+        try:
+            yield path
+        except FAILURES as error:
+            self.failed(name, error)
+        else:
+            self.done(name)
+
+    def begin(self, name: str) -> pathlib.Path:
+        """Where `name` grows until it is `done` or has `failed`."""
+        self.files[name] = "incomplete"
+        return self.path / partial(name)
+
+    def done(self, name: str) -> None:
+        """`name` is whole."""
+        (self.path / partial(name)).replace(self.path / name)
+        self.files[name] = "complete"
+
+    def failed(self, name: str, error: BaseException, until: str = "") -> None:
+        """`name` stays as far as it came."""
+        self.files[name] = f"incomplete: {cause_of(error)}{until}"
+        self.tell(f"{self.path / partial(name)}: {cause_of(error)}: the file ends there{until}")
+
+    @property
+    def is_complete(self) -> bool:
+        """True when no file that was begun is missing anything."""
+        return all(state == "complete" for state in self.files.values())
+
+    def finish(self, summary: dict) -> None:
+        """Write the summary, told what is complete, in its reserved place, and give the folder its final state."""
+        summary.update(complete=self.is_complete, files=self.files)
+        self._write_record(summary)
+        try:
+            (self.path / OPEN).replace(self.path / SUMMARY)
+        except OSError as error:
+            raise UserError(f"{self.path / SUMMARY}: {cause_of(error)}; the summary is in {OPEN}") from None
+        self.is_done = True
+
+    # --- whose it is ----------------------------------------------------------------------------------------
+
+    def _claim(self) -> None:
+        record = self.path / OPEN
+        is_new = not record.exists()
+        try:
+            self.lock = os.open(record, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC, 0o644)
+        except OSError as error:
+            raise UserError(f"{record}: {cause_of(error)}") from None
+        try:
+            fcntl.flock(self.lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            self._remove_older_run(is_new)
+            self._write_record(self._record())
+        except BaseException as error:
+            if is_new:
+                record.unlink(missing_ok=True)
+            os.close(self.lock)
+            if isinstance(error, BlockingIOError):
+                raise UserError(f"{self.path}: another run is writing there") from None
+            if isinstance(error, OSError):
+                raise UserError(f"{record}: {cause_of(error)}") from None
+            raise
+
+    def _remove_older_run(self, is_new: bool) -> None:
+        names = [SUMMARY, *FILES, *map(partial, FILES)]
+        there = [name for name in names if (self.path / name).is_symlink() or (self.path / name).exists()]
+        if not there:
+            return
+        is_ours = is_run_record(self.path / SUMMARY) or (not is_new and is_run_record(self.path / OPEN))
+        foreign = there if not is_ours else [name for name in there if (self.path / name).is_dir()]
+        if SUMMARY in there and not is_run_record(self.path / SUMMARY):
+            foreign = [SUMMARY, *foreign]
+        if foreign:
+            raise UserError(
+                f"{self.path / foreign[0]}: is there, and of no run that this folder tells of; "
+                "remove it or choose another folder"
+            )
+        # the summary first: from here on nothing says that the rest is a whole run
+        for name in there:
+            (self.path / name).unlink()
+
+    def _record(self) -> dict:
+        return {"complete": False, "what": BROKEN_OFF, "command": self.command, "files": self.files}
+
+    def _write_record(self, content: dict) -> None:
+        """`content` into incomplete.json, padded with blanks to the reserved length, which JSON does not mind."""
+        data = (json.dumps(content, indent=2) + "\n").encode()
+        data = data.ljust(RESERVED if "what" in content else len(data))
+        at = 0
+        while at < len(data):
+            at += os.pwrite(self.lock, data[at:], at)
+        os.ftruncate(self.lock, len(data))
+        os.fsync(self.lock)
+
+
+def is_run_record(path: pathlib.Path) -> bool:
+    """True for a summary or an incomplete.json of a run, whatever version wrote it."""
+    try:
+        content = json.loads(path.read_bytes())
+    except (OSError, ValueError, RecursionError):
+        return False
+    return isinstance(content, dict) and ("trace_digest" in content or {"complete", "command"} <= content.keys())

@@ -1,0 +1,376 @@
+"""`ranger-sim walk`: let the robot walk, watch it, keep what it did."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import json
+import pathlib
+import signal
+from typing import TYPE_CHECKING, Any
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn
+
+from ranger_sim import loading
+from ranger_sim.firmware_sim.native import coverage
+from ranger_sim.foundation import wallclock
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.harness import native_boards, normal_errors
+from ranger_sim.harness.faults.ranger_catalogue import CATALOGUE
+from ranger_sim.harness.native_firmware import Firmware
+from ranger_sim.harness.profile import Profile
+from ranger_sim.harness.profile import load as load_profile
+from ranger_sim.harness.ranger_names import RANGER
+from ranger_sim.harness.scenario import Scenario, StopRule
+from ranger_sim.plant import terms
+from ranger_sim.tools import faults
+from ranger_sim.tools.command_line import terminal
+from ranger_sim.tools.command_line.files import json_target, replace_file, writable_folder
+from ranger_sim.tools.command_line.units import duration_text, figure, length_text
+from ranger_sim.tools.firmware import gdb_options
+from ranger_sim.tools.firmware.command import coverage_lines, folders_of, run_sanitized, wants_another_process
+from ranger_sim.tools.firmware.images import images_of
+from ranger_sim.tools.run import serial_options, unexpected
+from ranger_sim.tools.run.folder import LCOV, REPORT, SUMMARY, RunFolder
+from ranger_sim.tools.run.logs import RunLogs, write_frames
+from ranger_sim.tools.run.walk_options import add_walk_options, command_again, log_of, scenario_of, stop_of
+from ranger_sim.tools.timing import trace
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from types import FrameType
+
+    from ranger_sim.harness.faults.fault import Fault
+    from ranger_sim.harness.ranger import Ranger
+
+__all__ = ["walk", "write_frames"]
+
+DEFAULT_STEPS = 100
+ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+EXIT_INCOMPLETE = 2  # a file that was asked for is not whole: the disk is full
+SLICE_S = 0.05  # virtual seconds between two looks at the screen and at Ctrl-C
+TELL_EVERY_S = 60.0  # of the wall clock: a line of progress where there is no screen to draw it on (chosen by us)
+PACED_SLICE_S = 0.005  # the same when a serial port is connected: so long at most a byte waits
+
+
+def register(commands: Any) -> None:
+    """Add the subcommand to the command line."""
+    command = commands.add_parser(
+        "walk",
+        help="let Ranger walk in virtual time, as fast as it goes",
+        description="All seven boards, four buses and the body in virtual time. Without an end it walks 100 steps.",
+    )
+    add_walk_options(command)
+    command.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Walk, write the files, print the summary.
+
+    0 done, 1 fell or a board failed, 3 a fault did not act, 130 interrupted.
+    """
+    if wants_another_process(options):
+        return run_sanitized(options, folders_of(options))
+    stop = stop_of(options) or StopRule(steps=DEFAULT_STEPS)
+    with ctrl_c_noted() as interrupted:
+        return run_scenario(scenario_of(options), stop, options, interrupted)
+
+
+def profile_of(options: argparse.Namespace, console: Console) -> Profile | None:
+    """The profile that was asked for; in lockstep all its boards run here, and its buses inside."""
+    if options.profile is None:
+        return None
+    profile = load_profile(options.profile)
+    if profile.absent():
+        raise UserError(
+            f"{profile.path}: {', '.join(profile.absent())} absent: walk needs every board; up runs without some"
+        )
+    if profile.external():
+        console.print(
+            f"{', '.join(profile.external())}: emulated as well, and every bus inside: a walk is in virtual time",
+            highlight=False,
+            soft_wrap=True,
+        )
+    return profile
+
+
+def run_scenario(scenario: Scenario, stop: StopRule, options: argparse.Namespace, interrupted: list[bool]) -> int:
+    """`run` with everything checked; `interrupted` is filled by Ctrl-C."""
+    from ranger_sim.harness.ranger import Ranger  # the whole robot: only when it is to walk
+
+    if options.out:
+        writable_folder(options.out)
+    json_file = json_target(options.json)
+    quiet = options.json == "-"
+    console = terminal.console(stderr=True, quiet=quiet)
+    if options.log and not options.out:
+        console.print(f"--log {options.log} is ignored: there is no folder for logs (--out DIR)", soft_wrap=True)
+    quirks = serial_options.quirks_of(options)
+    profile = profile_of(options, console)
+    faults.load_modules(options)
+    if scenario.model_file is not None:
+        for name in terms.load(scenario.model_file).left_out:
+            console.print(f"{scenario.model_file}: {name} is left out", highlight=False, soft_wrap=True)
+    wanted = [CATALOGUE.typed(text) for text in options.fault]
+    log = log_of(options)
+    firmware = firmware_of(options, console)
+    images = images_of(options)
+    with contextlib.closing(Ranger(scenario, log, quirks, profile, firmware, options.in_process, images)) as robot:
+        arm(robot, wanted, options.proof)
+        timeline = trace.attach(robot, options)
+        ends, places = serial_options.connect(robot, options)
+        for place in places:
+            console.print(place, highlight=False, soft_wrap=True)
+        if not loading.RUNS_COMPILED:
+            console.print(
+                f"running interpreted, slowly: {loading.RUNS_INTERPRETED_BECAUSE}", highlight=False, soft_wrap=True
+            )
+        with (
+            gdb_options.debuggers(robot, options, lambda: bool(interrupted), console) as doors,
+            claimed(options, stop, console) if options.out else contextlib.nullcontext() as folder,
+        ):
+            logs = logs_of(robot, options, folder)
+            if doors:
+                doors[0].wait_for_debugger()
+            walk(robot, stop, console, interrupted, paced=bool(ends))
+            for line in serial_options.report(ends):
+                console.print(line, highlight=False, soft_wrap=True)
+            summary = {**robot.summary(), "interrupted": bool(interrupted)}
+            summary["command"] = command_again(options, StopRule(time_s=robot.time_s) if interrupted else stop)
+            is_complete = finish(robot, summary, options, folder, logs, json_file, console)
+        trace.write(timeline, options, console)
+    if not is_complete:
+        return EXIT_INCOMPLETE
+    if interrupted:
+        return 130
+    if not all(fault["acted"] for fault in summary["faults"]):
+        return faults.EXIT_INVALID
+    return 1 if summary["fell"] or summary["failed_boards"] else 0
+
+
+def firmware_of(options: argparse.Namespace, console: Console) -> dict[str, Firmware]:
+    """The firmware in C that was asked for, by board, compiled."""
+    wanted: dict[str, str] = {}
+    for text in options.firmware:
+        board, folder = native_boards.placed(text)
+        if board in wanted:
+            raise UserError(f"--firmware {text}: {board} has {wanted[board]} already")
+        wanted[board] = folder
+    if options.coverage and not wanted:
+        raise UserError("--coverage: there is no firmware in C in this run; --firmware BOARD=DIR gives a board one")
+    if options.coverage:
+        coverage.gcov()  # told before anything runs
+    firmware = {
+        board: native_boards.build(folder, options.sanitize, options.coverage) for board, folder in wanted.items()
+    }
+    for each in firmware.values():
+        for line in each.warnings:
+            console.print(line, highlight=False, markup=False, soft_wrap=True)
+    return firmware
+
+
+def arm(robot: Ranger, wanted: list[Fault], proof: bool) -> None:
+    """Arm the faults; with `proof` all of them beside one golden run without any."""
+    if proof and not wanted:
+        raise UserError("--proof: there is no --fault to hold against the walk without it")
+    if wanted:
+        robot.start()
+    twin = None
+    if proof:
+        from ranger_sim.harness.faults.twin import Twin
+
+        twin = Twin(robot)
+    for fault in wanted:
+        fault.twin = twin
+        robot.arm(fault)
+
+
+def claimed(options: argparse.Namespace, stop: StopRule, console: Console) -> RunFolder:
+    """The folder that was asked for, for this run alone. What is wrong with a run must have been told before."""
+
+    def tell(line: str) -> None:
+        console.print(line, highlight=False, soft_wrap=True)
+
+    return RunFolder(options.out, command_again(options, stop), tell)
+
+
+def logs_of(robot: Ranger, options: argparse.Namespace, folder: RunFolder | None) -> RunLogs | None:
+    """The logs of a folder; with --log full they are written from now on."""
+    if folder is None or robot.logbook.mode == "none":
+        return None
+    return RunLogs(robot, folder, follow=options.log == "full")
+
+
+def finish(
+    robot: Ranger,
+    summary: dict,
+    options: argparse.Namespace,
+    folder: RunFolder | None,
+    logs: RunLogs | None,
+    json_file: pathlib.Path | None,
+    console: Console,
+) -> bool:
+    """Print the summary and write the files that were asked for; False when one of them is not complete."""
+    if options.json != "-":
+        print_summary(summary, robot.plant.parameters.floor_friction, console)
+    summary.update(complete=folder is None, files={})
+    try:
+        if folder is not None:
+            write_files(robot, summary, folder, logs, console)
+    finally:  # whatever becomes of the folder
+        text = json.dumps(summary, indent=2)
+        if options.json == "-":
+            terminal.print_now(text)
+        elif json_file is not None:
+            replace_file(json_file, (text + "\n").encode())
+    if folder is None:
+        kept = "only the summary was kept" if json_file is not None or options.json else "nothing was kept"
+        console.print(f"{kept}: --out runs/NAME keeps summary, logs and report there", highlight=False, soft_wrap=True)
+        return True
+    name = SUMMARY if logs is None else REPORT
+    if folder.files.get(name, "complete") == "complete":
+        console.print(f"{pathlib.Path(name).stem}: {folder.path / name}", highlight=False, soft_wrap=True)
+    return folder.is_complete
+
+
+@contextlib.contextmanager
+def ctrl_c_noted() -> Iterator[list[bool]]:
+    """Inside, the first Ctrl-C only fills the list, so that the files are finished; the second one breaks off.
+
+    The signals by which a system ends programs, or a terminal takes its own along, count as Ctrl-C.
+    """
+    interrupted: list[bool] = []
+
+    def note(_number: int, _frame: FrameType | None) -> None:
+        if interrupted:
+            raise KeyboardInterrupt
+        interrupted.append(True)
+
+    signals = [each for each in ENDING if signal.getsignal(each) is not signal.SIG_IGN]  # nohup ignores one
+    previous = {each: signal.signal(each, note) for each in signals}
+    try:
+        yield interrupted
+    finally:
+        for each, handler in previous.items():
+            signal.signal(each, handler)
+
+
+def walk(robot: Ranger, stop: StopRule, console: Console, interrupted: list[bool], paced: bool = False) -> None:
+    """Run until the stop rule, a fall, empty batteries, or Ctrl-C (at least one slice, so that files have something).
+
+    paced: not faster than the wall clock, because something outside takes part.
+    """
+    started = wallclock.monotonic_s()
+    with Progress(
+        SpinnerColumn(),
+        BarColumn(bar_width=20),
+        TextColumn("{task.fields[told]}"),
+        console=console,
+        transient=False,
+        disable=not console.is_terminal,
+    ) as progress:
+        task = progress.add_task("walk", total=1.0, told="")
+        tell_at = started + TELL_EVERY_S
+        done, told = False, 0
+        while not done:
+            done = robot.run(stop, PACED_SLICE_S if paced else SLICE_S) or bool(interrupted)
+            for death in robot.deaths[told:]:
+                told += 1
+                console.print(loss_text(death), highlight=False, soft_wrap=True)
+            wall = wallclock.monotonic_s() - started
+            if paced and not done and robot.time_s > wall:
+                wallclock.sleep_s(robot.time_s - wall)
+            if console.is_terminal:
+                progress.update(task, completed=robot.fraction_done(stop), told=progress_text(robot, stop, wall))
+            elif started + wall >= tell_at:
+                tell_at += TELL_EVERY_S
+                console.print(progress_text(robot, stop, wall), highlight=False, soft_wrap=True)
+
+
+def loss_text(death: dict) -> str:
+    """Which board was lost, when, and where its program was."""
+    why = death["why"] or f"its process {death.get('how', 'ended')}"
+    return f"{death['board']} was lost at {death['time_s']:.3f} s: {why}"
+
+
+def progress_text(robot: Ranger, stop: StopRule, wall_s: float) -> str:
+    """Where the walk is after `wall_s` seconds of the wall clock, and how many more it will take at this rate."""
+    speed = robot.mean_speed_m_per_s()
+    share = robot.fraction_done(stop)
+    left = clock_text(wall_s * (1.0 - share) / share) if share > 0.0 else "?"
+    charge = max(0.0, robot.plant.electrics.battery.charge)
+    factor = robot.time_s / wall_s if wall_s > 0.0 else 0.0
+    return (  # what a narrow screen cuts off stands last
+        f"{length_text(robot.distance_m)}, {robot.steps} steps, {left} left; {clock_text(robot.time_s)} "
+        f"at {speed:.2f} m/s, {factor:.1f} x real time, battery {100.0 * charge:.0f} %"
+    )
+
+
+def clock_text(seconds: float) -> str:
+    """Hours, minutes and seconds."""
+    whole = round(seconds)
+    return f"{whole // 3600}:{whole // 60 % 60:02d}:{whole % 60:02d}"
+
+
+def write_files(robot: Ranger, summary: dict, folder: RunFolder, logs: RunLogs | None, console: Console) -> None:
+    """Logs and report, as far as there is something to show, then the summary."""
+    if any(each.coverage for each in robot.firmware.values()):
+        with folder.file(LCOV) as path:
+            path.write_text(coverage.lcov(coverage.merged(each.ran() for each in robot.firmware.values())), "utf-8")
+    if logs is not None:
+        with console.status("writing logs and report ..."):
+            logs.finish()
+            with folder.file(REPORT) as path:
+                from ranger_sim.tools.report import page  # half a second of imports
+
+                path.write_text(page.render(robot, summary), encoding="utf-8")
+    folder.finish(summary)
+
+
+def print_summary(summary: dict, floor_friction: float, console: Console) -> None:
+    """The walk in a few lines: what it did, then what a healthy one has not."""
+    console.print(
+        f"{summary['steps']} steps, {length_text(summary['distance_m'])} in {duration_text(summary['time_s'])}, "
+        f"{end_text(summary)}; "
+        f"controller {summary['controller']}, body {summary['body']}; "
+        f"step {figure(summary['mean_step_length_m'], '{:.3f} m')}, {figure(summary['mean_step_time_s'], '{:.3f} s')}; "
+        f"{figure(summary['total_power_W'], '{:.1f} W')}, TCOT {figure(summary['tcot'], '{:.3f}')}; "
+        f"{summary['realtime_factor']:.1f} x real time {'compiled' if summary['compiled'] else 'interpreted'}; "
+        f"trace {summary['trace_digest'][:16]}",
+        highlight=False,
+        soft_wrap=True,
+    )
+    console.print(energy_text(summary), highlight=False, soft_wrap=True)
+    for fault in summary["faults"]:
+        console.print(faults.fault_text(fault), highlight=False, soft_wrap=True)
+    for line in coverage_lines(summary):
+        console.print(line, highlight=False, soft_wrap=True)
+    for line in [*unexpected.lines(summary, floor_friction), *usual_lines(summary["errors"], summary["time_s"])]:
+        console.print(line, highlight=False, soft_wrap=True)
+
+
+def usual_lines(errors: dict, time_s: float) -> list[str]:
+    """How much of what boards noted was as in every healthy walk, in a line if there was any."""
+    unusual = normal_errors.beyond(RANGER, errors, time_s)
+    usual = sum(map(len, errors.values())) - sum(map(len, unusual.values()))
+    return [f"errors as in every healthy walk: {usual} kinds (report and summary have them)"] if usual else []
+
+
+def end_text(summary: dict) -> str:
+    """How the walk ended."""
+    if summary["battery"]["empty"]:
+        return f"{summary['fall_cause']}"
+    if summary["fell"]:
+        return f"fell: {summary['fall_cause']}"
+    return "interrupted, on its feet" if summary["interrupted"] else "on its feet"
+
+
+def energy_text(summary: dict) -> str:
+    """Where the energy went, and what is left."""
+    energy, battery = summary["energy_Wh"], summary["battery"]
+    parts = ", ".join(f"{name.replace('_', ' ')} {Wh:.3g}" for name, Wh in energy.items() if name != "total")
+    return (
+        f"{energy['total']:.3g} Wh since it was let go: {parts}; "
+        f"batteries {100.0 * battery['charge']:.1f} % of {battery['capacity_Wh']:.0f} Wh"
+    )

@@ -1,0 +1,1 @@
+"""`ranger-sim tune`: search controller parameters by walking the whole robot."""
