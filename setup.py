@@ -15,6 +15,7 @@ RANGER_SIM_BUILT=1: an editable install does not build again what `make` has jus
 """
 
 import contextlib
+import importlib.util
 import json
 import os
 import pathlib
@@ -31,17 +32,18 @@ from setuptools.command.build_py import build_py
 from setuptools.modified import newer_group
 
 HERE = pathlib.Path(__file__).resolve().parent
-ROOMS = (
-    "foundation",
-    "datatable",
-    "can_bus",
-    "plant",
-    "firmware_sim",
-    "boards",
-    "harness",
-    "sysid",
-    "tools",
-)
+
+
+def rooms_of_the_house():
+    """The module ranger_sim/rooms.py without its package, which would look for what is not yet built."""
+    spec = importlib.util.spec_from_file_location("rooms", HERE / "ranger_sim" / "rooms.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+rooms = rooms_of_the_house()
+ROOMS = rooms.ROOMS
 DATA_FOLDERS = ("profiles",)  # shipped like a room, no Python in them
 LIBRARY = "ranger_sim._compiled"
 SHARED = "ranger_sim._shared"  # Cython's helpers (memoryviews above all), once instead of in every module
@@ -162,7 +164,10 @@ static PyObject *create(PyObject *self, PyObject *spec) {
 }
 
 static int add_names(PyObject *self) {
-    return PyModule_AddStringConstant(self, "names", "%(names)s");
+    return PyModule_AddStringConstant(self, "names", "%(names)s") < 0
+                   || PyModule_AddStringConstant(self, "sources", "%(sources)s") < 0
+               ? -1
+               : 0;
 }
 
 static PyMethodDef functions[] = {{"create", create, METH_O, NULL}, {NULL}};
@@ -232,11 +237,12 @@ class OptionalBuild(build_ext):
             from Cython.Build import cythonize
         except ImportError as error:
             raise NotCompiledError(f"no Cython ({one_line(error)})") from error
+        self.marks = rooms.marks_of_sources(HERE)
         try:
             os.chdir(tree_of_links())
             translated = cythonize(
                 [
-                    *(Extension(name, [name.replace(".", "/") + ".py"]) for name in declared_modules()),
+                    *(Extension(name, [name.replace(".", "/") + ".py"]) for name in rooms.declared_modules(HERE)),
                     Extension(SHARED, [SHARED.replace(".", "/") + ".c"]),
                 ],
                 build_dir="../cython",
@@ -292,11 +298,12 @@ class OptionalBuild(build_ext):
         return compiled
 
     def write_directory(self):
-        """The C file with the names of all modules; left alone when it holds them already."""
+        """The C file with the names of all modules and marks of their sources; left alone when it holds them already."""
         text = DIRECTORY % {
             "declarations": "\n".join(f"PyObject *{entry(name)}(void);" for name in self.modules),
             "entries": "\n".join(f'    {{"{name}", {entry(name)}}},' for name in self.modules),
             "names": " ".join(self.modules),
+            "sources": " ".join(f"{path}={mark}" for path, mark in self.marks.items()),
             "library": LIBRARY,
         }
         path = pathlib.Path("build/cython/directory.c")
@@ -416,13 +423,6 @@ def try_out(compiler, compiling=(), linking=None):
         objects = compiler.compile([str(program)], output_dir=folder, extra_postargs=list(compiling))
         if linking is not None:
             compiler.link_shared_object(objects, str(program.with_suffix(".so")), extra_postargs=list(linking))
-
-
-def declared_modules():
-    """Names of the modules to compile."""
-    for room in ROOMS:
-        for declaration in sorted((HERE / room).rglob("*.pxd")):
-            yield ".".join(("ranger_sim", *declaration.relative_to(HERE).with_suffix("").parts))
 
 
 def tree_of_links():

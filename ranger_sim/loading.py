@@ -2,10 +2,11 @@
 
 The rooms are folders beside this package in a checkout and inside it when installed. Their compiled modules are all in
 one shared library, `ranger_sim._compiled` (setup.py builds it, and says why one). It is not used when the environment
-variable ``RANGER_SIM_INTERPRETED`` is set to anything but an empty string or ``0``, and not when the last build failed
-(setup.py leaves a record of it). A finder then loads a module of the rooms from the library, or else from its plain
-Python source, and from nothing else that may lie beside it. ``RANGER_SIM_TABLE`` names a folder with a master table
-of the user's own: what is generated from the table is then found there.
+variable ``RANGER_SIM_INTERPRETED`` is set to anything but an empty string or ``0``, not when the last build failed
+(setup.py leaves a record of it), and not when the sources of a checkout have changed since they were built: what runs is
+what stands there. A finder then loads a module of the rooms from the library, or else from its plain Python source, and
+from nothing else that may lie beside it. ``RANGER_SIM_TABLE`` names a folder with a master table of the user's own: what
+is generated from the table is then found there.
 """
 
 import importlib
@@ -19,19 +20,10 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from ranger_sim import rooms
 from ranger_sim.declared_fields import DeclaredFieldsLoader
+from ranger_sim.rooms import ROOMS
 
-ROOMS = (
-    "foundation",
-    "datatable",
-    "can_bus",
-    "plant",
-    "firmware_sim",
-    "boards",
-    "harness",
-    "sysid",
-    "tools",
-)
 SHARED = "ranger_sim._shared"  # Cython's helpers, which all compiled modules use
 PACKAGE = Path(__file__).resolve().parent
 # in a checkout the rooms stand beside this package
@@ -66,9 +58,22 @@ def load_library() -> tuple[Any, str]:
     if reason:
         return None, reason
     try:
-        return importlib.import_module("ranger_sim._compiled"), ""
+        library = importlib.import_module("ranger_sim._compiled")
     except ImportError as error:
         return None, f"the compiled modules cannot be loaded ({error}): build again"
+    reason = why_out_of_date(library) if HOUSE != PACKAGE else ""
+    return (None, reason) if reason else (library, "")
+
+
+def why_out_of_date(library: Any) -> str:
+    """Which sources of a checkout are not those of the library, in one line; empty when all are."""
+    built = dict(mark.split("=") for mark in getattr(library, "sources", "").split())
+    now = rooms.marks_of_sources(HOUSE)
+    other = sorted(path for path in built.keys() | now.keys() if built.get(path) != now.get(path))
+    if not other:
+        return ""
+    more = f" and {len(other) - 1} more" if len(other) > 1 else ""
+    return f"{other[0]}{more} changed since the library was built: `make setup` builds it again"
 
 
 class LibraryLoader(importlib.machinery.ExtensionFileLoader):
@@ -112,10 +117,8 @@ class RoomFinder:
 
 
 def declared_modules() -> Iterator[str]:
-    """Names of the modules that have a .pxd beside them: those that are compiled where a compiler is found."""
-    for room in ROOMS:
-        for declaration in sorted((HOUSE / room).rglob("*.pxd")):
-            yield ".".join(("ranger_sim", *declaration.relative_to(HOUSE).with_suffix("").parts))
+    """Names of the modules that are compiled where a compiler is found."""
+    return rooms.declared_modules(HOUSE)
 
 
 # decided once: modules are not exchanged while a process runs

@@ -194,6 +194,28 @@ def how_it_runs(folder):
     return list(files_of(names, folder).values()), done.stdout.strip()
 
 
+@needs_compiler
+def test_sources_that_changed_since_the_build_run_and_say_so_until_they_are_as_they_were(small_house):
+    build_in(small_house)
+    source = small_house / "foundation" / "numbers.py"
+    declaration = small_house / "foundation" / "events.pxd"
+    before = source.read_text(encoding="utf-8"), declaration.read_text(encoding="utf-8")
+    source.write_text(before[0] + "\nADDED = 1\n", encoding="utf-8")
+    files, reason = how_it_runs(small_house)
+    assert all(file.endswith(".py") for file in files)
+    assert reason == "foundation/numbers.py changed since the library was built: `make setup` builds it again"
+    declaration.write_text(before[1] + "\n", encoding="utf-8")
+    _, reason = how_it_runs(small_house)
+    assert reason.startswith("foundation/events.pxd and 1 more changed since the library was built")
+    source.write_text(before[0], encoding="utf-8")
+    declaration.write_text(before[1], encoding="utf-8")
+    files, reason = how_it_runs(small_house)
+    assert reason == "" and all(file.endswith(BUILT) for file in files)
+    (small_house / "foundation" / "later.pxd").write_text("", encoding="utf-8")
+    _, reason = how_it_runs(small_house)
+    assert reason.startswith("foundation/later.pxd and 1 more changed")
+
+
 def times_of_objects(folder):
     """{name of an object file: when it was written, ns}."""
     return {path.name: path.stat().st_mtime_ns for path in (folder / "build").rglob("*.o")}
@@ -374,11 +396,10 @@ def test_what_is_cited_is_this_version():
     assert re.findall(r"^license: (.+)$", citation, re.MULTILINE) == [PROJECT["project"]["license"]]
 
 
-def test_rooms_are_listed_alike_everywhere():
+def test_folders_of_data_are_listed_alike_everywhere():
     source = (ROOT / "setup.py").read_text(encoding="utf-8")
-    for listed, names in (("ROOMS", loading.ROOMS), ("DATA_FOLDERS", DATA_FOLDERS)):
-        in_setup = re.search(rf"{listed} = \((.*?)\)", source, re.DOTALL).group(1)
-        assert tuple(re.findall(r'"(\w+)"', in_setup)) == names
+    in_setup = re.search(r"DATA_FOLDERS = \((.*?)\)", source, re.DOTALL).group(1)
+    assert tuple(re.findall(r'"(\w+)"', in_setup)) == DATA_FOLDERS
 
 
 def test_type_checking_leaves_no_module_out():
