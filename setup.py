@@ -298,7 +298,7 @@ class OptionalBuild(build_ext):
         return compiled
 
     def write_directory(self):
-        """The C file with the names of all modules and marks of their sources; left alone when it holds them already."""
+        """The C file with the names of all modules and marks of their sources; left alone when it has them."""
         text = DIRECTORY % {
             "declarations": "\n".join(f"PyObject *{entry(name)}(void);" for name in self.modules),
             "entries": "\n".join(f'    {{"{name}", {entry(name)}}},' for name in self.modules),
