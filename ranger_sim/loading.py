@@ -5,8 +5,8 @@ one shared library, `ranger_sim._compiled` (setup.py builds it, and says why one
 variable ``RANGER_SIM_INTERPRETED`` is set to anything but an empty string or ``0``, not when the last build failed
 (setup.py leaves a record of it), and not when the sources of a checkout have changed since they were built: then what
 stands there runs. A finder then loads a module of the rooms from the library, or else from its plain Python source, and
-from nothing else that may lie beside it. ``RANGER_SIM_TABLE`` names a folder with a master table of the user's own: what is
-generated from the table is then found there.
+from nothing else that may lie beside it. ``RANGER_SIM_TABLE`` names a folder with a user's own master
+table: what is generated from the table is then found there.
 """
 
 import importlib

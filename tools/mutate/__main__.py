@@ -18,7 +18,8 @@ from collections import Counter
 from typing import Any
 
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.loading import HOUSE, ROOMS
+from ranger_sim.loading import HOUSE
+from ranger_sim.rooms import ROOMS
 from ranger_sim.tools.command_line.files import json_target, replace_file
 from ranger_sim.tools.command_line.units import whole_number
 from ranger_sim.tools.mutate.mutants import Mutant

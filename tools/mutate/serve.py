@@ -29,7 +29,8 @@ from typing import Any
 
 import pytest
 
-from ranger_sim.loading import HOUSE, ROOMS
+from ranger_sim.loading import HOUSE
+from ranger_sim.rooms import ROOMS
 
 ROOTS = tuple(str(HOUSE / room) + os.sep for room in ROOMS)
 ASKED_BY = "RANGER_SIM_MUTANTS"
