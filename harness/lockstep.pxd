@@ -3,8 +3,8 @@ cimport cython
 from ranger_sim.can_bus.bus cimport Bus
 from ranger_sim.firmware_sim.board cimport Board
 from ranger_sim.foundation.events cimport NEVER
-from ranger_sim.harness.board_wires cimport BoardWires, WordWire
-from ranger_sim.harness.sampler cimport Sampler
+from ranger_sim.harness.wiring.board_wires cimport BoardWires, WordWire
+from ranger_sim.harness.records.sampler cimport Sampler
 from ranger_sim.harness.step_watch cimport SerialDevice, StepEnd, StepWatch
 from ranger_sim.plant.plant cimport Plant
 

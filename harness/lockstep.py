@@ -39,9 +39,9 @@ from ranger_sim.can_bus.bus import Bus
 from ranger_sim.firmware_sim.board import Board
 from ranger_sim.foundation.numbers import integers
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.board_wires import BoardWires, SspWire, WordWire
-from ranger_sim.harness.sampler import Sampler
+from ranger_sim.harness.records.sampler import Sampler
 from ranger_sim.harness.step_watch import SerialDevice, StepEnd, StepWatch
+from ranger_sim.harness.wiring.board_wires import BoardWires, SspWire, WordWire
 from ranger_sim.plant.plant import Plant
 
 if not cython.compiled:

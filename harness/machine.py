@@ -24,13 +24,13 @@ from ranger_sim.harness.faults import network_places
 from ranger_sim.harness.faults.catalogue import Catalogue
 from ranger_sim.harness.faults.error_rows import ErrorRows, StateWord
 from ranger_sim.harness.faults.fault import Fault, Place
-from ranger_sim.harness.logbook import Logbook
 from ranger_sim.harness.names import Names
-from ranger_sim.harness.recorder import Recorder
-from ranger_sim.harness.sampler import Sampler
+from ranger_sim.harness.records.logbook import Logbook
+from ranger_sim.harness.records.recorder import Recorder
+from ranger_sim.harness.records.sampler import Sampler
 from ranger_sim.harness.stop_rule import StopRule
 from ranger_sim.harness.waiting import Condition, ConditionNotMetError, Waiting, Wanted
-from ranger_sim.harness.wires import Wiring
+from ranger_sim.harness.wiring.wires import Wiring
 
 GRID_NS = 20_000_000  # whoever acts from outside does so on this grid: a run does not depend on how it is sliced
 

@@ -1,7 +1,7 @@
 """The whole robot, wired: seven boards, four buses, one link, one body.
 
 Follow the loop here: `Ranger.__init__` builds the plant and the boards; harness/machine.py connects them and the buses
-by the tables of harness/wiring.py; `harness/lockstep.py` then passes time and carries what goes over the wires.
+by the tables of harness/wiring/ranger.py; `harness/lockstep.py` then passes time and carries what goes over the wires.
 """
 
 from __future__ import annotations
@@ -34,23 +34,25 @@ from ranger_sim.firmware_sim.native import coverage, crash
 from ranger_sim.firmware_sim.native.trial import tried
 from ranger_sim.foundation.random_stream import RandomStream
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness import bus_schedule, image_boards, native_boards, wiring
 from ranger_sim.harness.conditions import STATE_VARIABLES, Condition, ErrorNoted, condition
 from ranger_sim.harness.faults.error_rows import StateWord
 from ranger_sim.harness.faults.error_watch import ErrorWatch
 from ranger_sim.harness.faults.ranger_catalogue import CATALOGUE
-from ranger_sim.harness.fresh_board import first_outputs, pass_on
-from ranger_sim.harness.imu_wire import ImuWire
+from ranger_sim.harness.firmware import image_boards, native_boards
+from ranger_sim.harness.firmware.fresh_board import first_outputs, pass_on
+from ranger_sim.harness.firmware.native_firmware import Firmware
 from ranger_sim.harness.machine import Machine
-from ranger_sim.harness.native_firmware import Firmware
 from ranger_sim.harness.operator import Operator
+from ranger_sim.harness.outside import bus_schedule
+from ranger_sim.harness.outside.profile import Profile
 from ranger_sim.harness.processes.kinds import SET_WORD
-from ranger_sim.harness.profile import Profile
 from ranger_sim.harness.ranger_names import RANGER
+from ranger_sim.harness.records.strike_watch import StrikeWatch
 from ranger_sim.harness.scenario import Scenario, StopRule
-from ranger_sim.harness.strike_watch import StrikeWatch
 from ranger_sim.harness.timing.machine_slots import MachineSlots
 from ranger_sim.harness.waiting import Wanted
+from ranger_sim.harness.wiring import ranger as wiring
+from ranger_sim.harness.wiring.imu_wire import ImuWire
 from ranger_sim.plant import body_files
 from ranger_sim.plant.ranger import RangerPlant
 
@@ -178,7 +180,7 @@ class Ranger(Machine):
         """
         crystal = self._stream(name)[0]
         if name in self.firmware:
-            from ranger_sim.harness.robot_native_board import RobotNativeBoard  # only here: it loads cffi
+            from ranger_sim.harness.firmware.robot_native_board import RobotNativeBoard  # only here: it loads cffi
 
             board = RobotNativeBoard(name, self.firmware[name], crystal, power_up_ns, record)
             board.counts = self.firmware[name].counts
@@ -186,7 +188,9 @@ class Ranger(Machine):
                 self._watch(board)
             return board
         if name in self.images:
-            from ranger_sim.harness.robot_image_board import RobotImageBoard  # only here: a processor, and ELF files
+            from ranger_sim.harness.firmware.robot_image_board import (
+                RobotImageBoard,  # only here: a processor, and ELF files
+            )
 
             return RobotImageBoard(name, self.images[name], crystal, power_up_ns)
         if name == "MB":
@@ -385,7 +389,7 @@ class Ranger(Machine):
 
     def recorded(self) -> Any:
         """What the log kept, as arrays: a `harness.recorded.Recorded`."""
-        from ranger_sim.harness.recorded import Recorded
+        from ranger_sim.harness.records.recorded import Recorded
 
         return Recorded(self)
 
@@ -431,6 +435,6 @@ class Ranger(Machine):
 
     def summary(self) -> dict:
         """The walk in numbers: what `--json` prints."""
-        from ranger_sim.harness import summary
+        from ranger_sim.harness.records import summary
 
         return summary.of(self)

@@ -30,8 +30,8 @@ from ranger_sim import loading  # noqa: F401  (first: it finds the rooms)
 if TYPE_CHECKING:
     from ranger_sim.boards.quirks import Quirks
     from ranger_sim.foundation.user_error import UserError
-    from ranger_sim.harness.profile import Profile
-    from ranger_sim.harness.profile import load as load_profile
+    from ranger_sim.harness.outside.profile import Profile
+    from ranger_sim.harness.outside.profile import load as load_profile
     from ranger_sim.harness.ranger import Ranger
     from ranger_sim.harness.scenario import Scenario, StopRule
 
@@ -39,13 +39,13 @@ __all__ = ["Profile", "Quirks", "Ranger", "Scenario", "StopRule", "UserError", "
 __version__ = "0.1.0"
 
 _PLACES = {
-    "Profile": ("harness.profile", "Profile"),
+    "Profile": ("harness.outside.profile", "Profile"),
     "Quirks": ("boards.quirks", "Quirks"),
     "Ranger": ("harness.ranger", "Ranger"),
     "Scenario": ("harness.scenario", "Scenario"),
     "StopRule": ("harness.scenario", "StopRule"),
     "UserError": ("foundation.user_error", "UserError"),
-    "load_profile": ("harness.profile", "load"),
+    "load_profile": ("harness.outside.profile", "load"),
 }
 
 

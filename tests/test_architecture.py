@@ -310,10 +310,10 @@ def fields_set(node):
 # What of the harness is any machine's: loaded in a fresh process, it brings nothing that only Ranger has.
 OF_ANY_MACHINE = (
     "faults.buses", "faults.catalogue", "faults.edges", "faults.error_rows", "faults.evidence", "faults.frames",
-    "faults.network_places", "faults.proof", "faults.twin", "faults.voltages", "lockstep", "logbook", "machine",
-    "names", "native_firmware", "normal_errors", "outside", "table_board", "testing.frames", "testing.health",
-    "testing.making", "testing.plugin", "testing.wire", "timing.machine_slots", "timing.slots", "vital_signs",
-    "waiting", "wires",
+    "faults.network_places", "faults.proof", "faults.twin", "faults.voltages", "firmware.native_firmware",
+    "firmware.table_board", "lockstep", "machine", "names", "normal_errors", "outside.machine", "records.logbook",
+    "records.vital_signs", "testing.frames", "testing.health", "testing.making", "testing.plugin", "testing.wire",
+    "timing.machine_slots", "timing.slots", "waiting", "wiring.wires",
 )  # fmt: skip
 ONLY_RANGERS = (
     "ranger_sim.boards",
@@ -323,7 +323,7 @@ ONLY_RANGERS = (
     "ranger_sim.harness.faults.ranger_",
     "ranger_sim.harness.ranger",
     "ranger_sim.harness.scenario",
-    "ranger_sim.harness.wiring",
+    "ranger_sim.harness.wiring.ranger",
     "ranger_sim.plant.body",
     "ranger_sim.plant.electrics",
     "ranger_sim.plant.ranger",

@@ -15,11 +15,11 @@ from body import Arm, Numbers
 from ranger_sim.datatable.loader import load_table
 from ranger_sim.firmware_sim.clock import seeded_crystal
 from ranger_sim.foundation.random_stream import RandomStream
+from ranger_sim.harness.firmware.native_firmware import build
+from ranger_sim.harness.firmware.table_board import TableBoard
 from ranger_sim.harness.machine import Machine
 from ranger_sim.harness.names import Names
-from ranger_sim.harness.native_firmware import build
-from ranger_sim.harness.table_board import TableBoard
-from ranger_sim.harness.wires import AnalogInput, BridgeWire, CanWire, EncoderWire, Wiring
+from ranger_sim.harness.wiring.wires import AnalogInput, BridgeWire, CanWire, EncoderWire, Wiring
 
 HERE = pathlib.Path(__file__).resolve().parent
 TABLE = HERE / "table"

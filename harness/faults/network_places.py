@@ -4,7 +4,7 @@ from collections.abc import Iterable
 
 from ranger_sim.harness.faults.fault import Place
 from ranger_sim.harness.faults.kinds import BUS, CONTROLLER
-from ranger_sim.harness.wires import CanWire
+from ranger_sim.harness.wiring.wires import CanWire
 
 
 def controllers(wires: Iterable[CanWire]) -> list[Place]:

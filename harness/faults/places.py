@@ -1,9 +1,8 @@
-"""Every place of the robot at which the faults of this package can sit, from the tables of harness/wiring.py.
+"""Every place of the robot at which the faults of this package can sit, from the tables of harness/wiring/ranger.py.
 
 A place is named by the board that hears it, or whose motor it belongs to, and by what it is there.
 """
 
-from ranger_sim.harness import wiring
 from ranger_sim.harness.faults import network_places
 from ranger_sim.harness.faults.fault import Place
 from ranger_sim.harness.faults.kinds import (
@@ -28,6 +27,7 @@ from ranger_sim.harness.faults.kinds import (
     WORD,
 )
 from ranger_sim.harness.faults.ranger_catalogue import CATALOGUE
+from ranger_sim.harness.wiring import ranger as wiring
 from ranger_sim.plant import wiring_points as point
 
 # What hangs on each encoder of the plant's list: name at its board, what it is, joint, edges of channel A per turn.

@@ -9,13 +9,13 @@ from ranger_sim.boards.firmware_board import SatelliteBoard
 from ranger_sim.firmware_sim.clock import Crystal
 from ranger_sim.firmware_sim.scheduler import NORMAL_TASK
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness import wiring
 from ranger_sim.harness.faults.catalogue import mode
 from ranger_sim.harness.faults.fault import Fault, Parameter, Place, WholeNumber
 from ranger_sim.harness.faults.names import chosen, name_parameter
 from ranger_sim.harness.faults.power import Restart
 from ranger_sim.harness.faults.ranger_catalogue import CATALOGUE
 from ranger_sim.harness.faults.reach import emulated, reaching_into
+from ranger_sim.harness.wiring import ranger as wiring
 
 PROCESSOR = "processor"
 RECEIVE_RING = 63  # frames that a satellite's ring holds (robot.md N4.14: 64 places, of which one stays empty)

@@ -11,7 +11,7 @@ from ranger_sim.foundation.peers import LIMITS, MALFORMED, REASONS, Door, Peer, 
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.conditions import STATE_VARIABLES
 from ranger_sim.harness.feed import records
-from ranger_sim.harness.summary import energy
+from ranger_sim.harness.records.summary import energy
 
 LOOK_NS = 20_000_000  # virtual time between two looks: 50 pictures a second at real time
 STATE_NS = 100_000_000

@@ -19,13 +19,13 @@ from typing import Any, NoReturn
 from ranger_sim.firmware_sim.native import crash
 from ranger_sim.foundation import descriptors
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness import wiring
 from ranger_sim.harness.processes import board_process, kernel, places
 from ranger_sim.harness.processes.block import Block, new_stage
 from ranger_sim.harness.processes.remote_board import RemoteBoard
 from ranger_sim.harness.processes.settings import Settings
 from ranger_sim.harness.processes.stage import Stage
 from ranger_sim.harness.step_watch import StepWatch
+from ranger_sim.harness.wiring import ranger as wiring
 
 PATIENCE_S = 60.0  # a turn takes some microseconds; the rest is for a busy machine
 RESET = 1  # mode of a bus node

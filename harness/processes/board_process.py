@@ -9,14 +9,14 @@ from ranger_sim.firmware_sim.gdb.server import GdbServer
 from ranger_sim.firmware_sim.native import coverage
 from ranger_sim.foundation import wallclock
 from ranger_sim.foundation.peers import told
-from ranger_sim.harness import wiring
-from ranger_sim.harness.fresh_board import first_outputs, fresh_board, pass_on
+from ranger_sim.harness.firmware.fresh_board import first_outputs, fresh_board, pass_on
 from ranger_sim.harness.processes import kernel, places
 from ranger_sim.harness.processes.block import Block
 from ranger_sim.harness.processes.channel import Bell
 from ranger_sim.harness.processes.endpoint import Endpoint
 from ranger_sim.harness.processes.settings import Settings
 from ranger_sim.harness.processes.stage import Audience
+from ranger_sim.harness.wiring import ranger as wiring
 
 FAILED = 4  # exit code: the board's program raised
 

@@ -24,7 +24,7 @@ from ranger_sim.harness.processes.kinds import (
     TO_BOARD,
 )
 from ranger_sim.harness.processes.lateness import bin_of
-from ranger_sim.harness.wiring import HEAR_IN_SLOTS
+from ranger_sim.harness.wiring.ranger import HEAR_IN_SLOTS
 
 if not cython.compiled:
     from ranger_sim.harness.processes.channel import LONGEST

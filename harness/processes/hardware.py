@@ -7,10 +7,10 @@ from collections.abc import Callable
 from typing import Any
 
 from ranger_sim.foundation.events import CAN_REQUEST, CAN_TX_DONE, STAGE_BUS, EventQueue
-from ranger_sim.harness import wiring
-from ranger_sim.harness.profile import Profile
-from ranger_sim.harness.rest_bus import RestBus
-from ranger_sim.harness.supervision import Watch
+from ranger_sim.harness.outside.profile import Profile
+from ranger_sim.harness.outside.rest_bus import RestBus
+from ranger_sim.harness.outside.supervision import Watch
+from ranger_sim.harness.wiring import ranger as wiring
 
 CHECK_NS = 10_000_000  # between two looks for what has not come
 CONTROLLER = 1

@@ -10,11 +10,11 @@ from typing import Any
 
 from ranger_sim.foundation import descriptors
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness import wiring
 from ranger_sim.harness.processes import board_process, kernel, places
 from ranger_sim.harness.processes.block import Block, new_stage
 from ranger_sim.harness.processes.channel import Bell
 from ranger_sim.harness.processes.settings import Settings
+from ranger_sim.harness.wiring import ranger as wiring
 
 PATIENCE_S = 60.0  # a turn takes some microseconds; the rest is for a busy machine
 

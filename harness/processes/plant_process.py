@@ -8,7 +8,6 @@ from typing import Any
 from ranger_sim.datatable.generated import all_variables
 from ranger_sim.foundation import descriptors, wallclock
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness import wiring
 from ranger_sim.harness.faults.ranger_catalogue import CATALOGUE
 from ranger_sim.harness.processes import kernel, places
 from ranger_sim.harness.processes.kinds import SET_WORD
@@ -18,6 +17,7 @@ from ranger_sim.harness.processes.requests import MOST_FAULTS
 from ranger_sim.harness.processes.settings import Settings
 from ranger_sim.harness.processes.stage import Stage
 from ranger_sim.harness.scenario import StopRule
+from ranger_sim.harness.wiring import ranger as wiring
 
 SLICE_S = 0.0005  # virtual time between two looks at the wall clock: one slot of a motor board
 FAST_SLICE_S = 0.005  # the same when there is no pace to keep

@@ -1,4 +1,4 @@
-from ranger_sim.harness.board_wires cimport WordWire
+from ranger_sim.harness.wiring.board_wires cimport WordWire
 from ranger_sim.harness.processes.places cimport (
     MOST_VOLTAGES,
     MOST_WORDS,

@@ -8,7 +8,7 @@ import array
 import cython
 
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.board_wires import WordWire
+from ranger_sim.harness.wiring.board_wires import WordWire
 from ranger_sim.plant.ranger import RangerPlant
 
 if not cython.compiled:

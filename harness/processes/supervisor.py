@@ -22,7 +22,6 @@ from ranger_sim.firmware_sim.native import crash
 from ranger_sim.foundation import descriptors, wallclock
 from ranger_sim.foundation.peers import REASONS
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness import wiring
 from ranger_sim.harness.processes import board_process, kernel, places, plant_process
 from ranger_sim.harness.processes.block import Block, new_stage
 from ranger_sim.harness.processes.control import ControlServer
@@ -30,6 +29,7 @@ from ranger_sim.harness.processes.lateness import figures
 from ranger_sim.harness.processes.requests import Request
 from ranger_sim.harness.processes.settings import ON_FAILURE, Settings
 from ranger_sim.harness.scenario import StopRule
+from ranger_sim.harness.wiring import ranger as wiring
 
 PLANT = "plant"
 LOOK_S = 0.2  # between two looks at boards and screen

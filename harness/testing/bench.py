@@ -48,16 +48,17 @@ from ranger_sim.foundation.events import (
 from ranger_sim.foundation.quantities import duration_text, nanoseconds
 from ranger_sim.foundation.row_stream import FrameStream
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness import native_boards, wiring
 from ranger_sim.harness.conditions import ConditionNotMetError
-from ranger_sim.harness.fresh_board import first_outputs, pass_on
-from ranger_sim.harness.native_firmware import Firmware
+from ranger_sim.harness.firmware import native_boards
+from ranger_sim.harness.firmware.fresh_board import first_outputs, pass_on
+from ranger_sim.harness.firmware.native_firmware import Firmware
 from ranger_sim.harness.ranger import BOARD_CLASSES, BUS_BIT_RATE
 from ranger_sim.harness.ranger_names import RANGER
 from ranger_sim.harness.testing.figures import Figure, Observed
 from ranger_sim.harness.testing.frames import Frame, FrameKeeper, frame_type
 from ranger_sim.harness.testing.links import Link, link_of
 from ranger_sim.harness.testing.wire import Wire
+from ranger_sim.harness.wiring import ranger as wiring
 
 # Everybody runs at most so many bits ahead of a bus: a frame without data has passed its receivers after 41 bits or
 # more, so nothing reaches anybody in its past.
@@ -387,7 +388,7 @@ class BoardAlone(Bench):
 
     def _board_in_c(self, firmware: Firmware, crystal: Crystal) -> Any:
         """The board with a program in C, which was tried in another process before."""
-        from ranger_sim.harness.robot_native_board import RobotNativeBoard  # only here: it loads cffi
+        from ranger_sim.harness.firmware.robot_native_board import RobotNativeBoard  # only here: it loads cffi
 
         name = self.name
 
@@ -403,7 +404,7 @@ class BoardAlone(Bench):
     # --- driving it ---------------------------------------------------------------------------------------
 
     def pin(self, name: str) -> Pin:
-        """A digital pin, by the name that harness/wiring.py has for it: `board.pin("limit_switch_left").set(1)`."""
+        """A digital pin, as harness/wiring/ranger.py names it: `board.pin("limit_switch_left").set(1)`."""
         pins = wiring.PINS.get(self.name, {})
         pin = Pin(self, name, self._place("pin", name, pins))
         pin.log = self.pin_log[pin.number]
@@ -469,7 +470,7 @@ class BoardAlone(Bench):
 
     def errors(self) -> dict[str, int]:
         """How often it noted each error, by name."""
-        from ranger_sim.harness.summary import errors
+        from ranger_sim.harness.records.summary import errors
 
         return errors(self.chip.counters())
 

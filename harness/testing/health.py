@@ -14,9 +14,9 @@ from typing import Any
 from ranger_sim.can_bus.node import BUS_OFF
 from ranger_sim.firmware_sim.counters import ProgramCounters
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness import vital_signs
 from ranger_sim.harness.names import Names, meant
 from ranger_sim.harness.normal_errors import most_normal
+from ranger_sim.harness.records import vital_signs
 
 # What else a board notes when something that the test expects happens.
 OF_OVERRUNS = ("ASCHED_DNF", "SCHED_SLOT_NEAR_LIMIT", "SCHED_TASK_LIMIT")

@@ -12,14 +12,14 @@ from typing import Any
 
 from ranger_sim.boards.quirks import Quirks
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness import wiring
-from ranger_sim.harness.outside import Pace, leave_out
+from ranger_sim.harness.outside.machine import Pace, leave_out
+from ranger_sim.harness.outside.profile import Profile
 from ranger_sim.harness.processes.hardware import HardwareInTheLoop
 from ranger_sim.harness.processes.outside import move_bus
-from ranger_sim.harness.profile import Profile
 from ranger_sim.harness.ranger import Ranger
 from ranger_sim.harness.scenario import Scenario
 from ranger_sim.harness.testing.backends import HARDWARE, VCAN, MissingError
+from ranger_sim.harness.wiring import ranger as wiring
 
 
 class OutsideRobot(Ranger):

@@ -331,7 +331,8 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
         try:
             expected = expected_of(item)
             if uses_ranger(item):
-                from ranger_sim.harness import ranger_names, wiring
+                from ranger_sim.harness import ranger_names
+                from ranger_sim.harness.wiring import ranger as wiring
 
                 expected.check(ranger_names.RANGER, wiring.BOARDS)
             reason = missing(backend_of(item), things)

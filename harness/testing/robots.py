@@ -19,9 +19,9 @@ from ranger_sim.boards.quirks import Quirks
 from ranger_sim.firmware_sim.native import coverage
 from ranger_sim.firmware_sim.native.coverage import FileCounts
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness import native_boards
-from ranger_sim.harness.native_firmware import Firmware
-from ranger_sim.harness.profile import load as load_profile
+from ranger_sim.harness.firmware import native_boards
+from ranger_sim.harness.firmware.native_firmware import Firmware
+from ranger_sim.harness.outside.profile import load as load_profile
 from ranger_sim.harness.ranger import Ranger
 from ranger_sim.harness.scenario import Scenario
 from ranger_sim.harness.testing.backends import HARDWARE, PROCESSES, SIM, VCAN, check_backend

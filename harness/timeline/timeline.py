@@ -10,7 +10,7 @@ from ranger_sim.can_bus.frame_log import FrameTimes
 from ranger_sim.firmware_sim.activity import ACTIVITY_COLUMNS, COLUMN_END
 from ranger_sim.foundation.row_stream import RowStream
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.activity import activity_of
+from ranger_sim.harness.records.activity import activity_of
 from ranger_sim.harness.step_watch import StepWatch
 from ranger_sim.harness.timeline import files, flows, frames, happenings, signals
 from ranger_sim.harness.timeline.model import Events

@@ -7,7 +7,7 @@ from typing import Any, Self
 import numpy as np
 
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.activity import activity_of
+from ranger_sim.harness.records.activity import activity_of
 from ranger_sim.harness.step_watch import StepWatch
 from ranger_sim.harness.timing.recording import Recording
 from ranger_sim.harness.timing.slots import SlotView

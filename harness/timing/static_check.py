@@ -13,8 +13,8 @@ beside it what was seen.
 
 What is possible in one slot:
 - Edges: an encoder at the speed of its motor without load, RATED_SPEED_RPM; both edges of channel A.
-- Frames: every stream of the bus (harness/bus_schedule.py) as often as its period and its proven response time let it
-  fall into a slot, and never more than the wire can carry; `full_bus`: always as many as the wire can carry.
+- Frames: every stream of the bus (harness/outside/bus_schedule.py) as often as its period and its proven response time
+  let it fall into a slot, and never more than the wire can carry; `full_bus`: always as many as the wire can carry.
 - A function whose work is counted in edges or frames costs that many items; every other one may take its limit.
 - A wait ends when its conversions do: its limit counts from the function that starts them, CONVERSION_STARTS.
 - Interrupts: each source as often as RATES says. Errors of a bus come beside a fault and are not counted.
@@ -43,7 +43,8 @@ from ranger_sim.firmware_sim.vic import (
 )
 from ranger_sim.foundation.events import CAN_RX, PIN_EDGE, SSP_SEGMENT, UART_BYTE
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness import bus_schedule, profile, wiring
+from ranger_sim.harness.outside import bus_schedule, profile
+from ranger_sim.harness.wiring import ranger as wiring
 
 RATED_SPEED_RPM = 6300  # of a motor without load at 12 V (robot.md B2)
 MOTOR_GEAR = {"MCH": 66.0, "MCFO": 34.0, "MCFI": 34.0}  # robot.md B2: from motor to joint

@@ -40,7 +40,7 @@ from ranger_sim.foundation.events import (
     TX_SENT,
 )
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness import bus_schedule, profile
+from ranger_sim.harness.outside import bus_schedule, profile
 from ranger_sim.harness.step_watch import StepWatch
 from ranger_sim.harness.xcp.slave import ANSWER, ERR_CMD_UNKNOWN, ERR_OUT_OF_RANGE, ERROR, SHORT, Slave
 from ranger_sim.harness.xcp.table_memory import TableMemory

@@ -2,10 +2,10 @@
 
 from collections.abc import MutableSequence
 from ranger_sim.firmware_sim.board import Board
-from ranger_sim.harness.board_wires import BoardWires
-from ranger_sim.harness.sampler import Sampler
+from ranger_sim.harness.records.sampler import Sampler
 from ranger_sim.harness.step_watch import SerialDevice
 from ranger_sim.harness.step_watch import StepEnd
+from ranger_sim.harness.wiring.board_wires import BoardWires
 from ranger_sim.plant.plant import Plant
 from typing import Any
 from typing import final

@@ -11,7 +11,7 @@ from ranger_sim.foundation import events
 from ranger_sim.foundation.events import EventQueue
 from ranger_sim.foundation.row_stream import RowStream
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.board_wires import BoardWires, SspWire
+from ranger_sim.harness.wiring.board_wires import BoardWires, SspWire
 from ranger_sim.plant.bridge import Bridge
 
 WINDOW = 10_000

@@ -15,8 +15,8 @@ from ranger_sim.firmware_sim.clock import Crystal
 from ranger_sim.firmware_sim.scheduler import Occasional, Task
 from ranger_sim.foundation.events import CAN_REQUEST, CAN_TX_DONE, STAGE_BUS, TX_SENT
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness import bus_schedule, profile
-from ranger_sim.harness.bus_schedule import BusSchedule
+from ranger_sim.harness.outside import bus_schedule, profile
+from ranger_sim.harness.outside.bus_schedule import BusSchedule
 from ranger_sim.harness.ranger import Ranger
 from ranger_sim.harness.scenario import Scenario
 

@@ -6,7 +6,7 @@ import dataclasses
 import pytest
 
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness import image_boards
+from ranger_sim.harness.firmware import image_boards
 from ranger_sim.harness.ranger import Ranger
 from ranger_sim.harness.scenario import Scenario
 from ranger_sim.harness.timeline.timeline import Timeline

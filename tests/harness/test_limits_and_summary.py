@@ -6,8 +6,8 @@ from types import SimpleNamespace as Made
 import pytest
 
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness import summary
 from ranger_sim.harness.campaigns import plan
+from ranger_sim.harness.records import summary
 from ranger_sim.harness.scenario import Scenario
 
 RANGE = {"slope": {"low": 0.0, "high": 0.1}}

@@ -7,9 +7,11 @@ import pytest
 from ranger_sim.firmware_sim.board import Board
 from ranger_sim.foundation.events import NEVER
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness import lockstep, profile, wiring
+from ranger_sim.harness import lockstep
+from ranger_sim.harness.outside import profile
 from ranger_sim.harness.ranger import Ranger
 from ranger_sim.harness.scenario import Scenario, StopRule
+from ranger_sim.harness.wiring import ranger as wiring
 
 RUN_S = 0.06
 

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.logbook import Logbook, decoded
-from ranger_sim.harness.recorder import Recorder
+from ranger_sim.harness.records.logbook import Logbook, decoded
+from ranger_sim.harness.records.recorder import Recorder
 
 MS = 1_000_000
 FRAMES = [  # time in ms, bus from 0, identifier, flags, words
@@ -140,7 +140,7 @@ def test_who_listens_gets_every_row_and_takes_none_away(mode, recorded):
 
 
 def test_the_digest_is_that_of_the_bytes_of_buses_and_body_in_order(recorded):
-    """harness/recorder.py: BLAKE2b-256 over a line and the digests of each bus's rows and of the samples."""
+    """harness/records/recorder.py: BLAKE2b-256 over a line and the digests of each bus's rows and of the samples."""
     _, recorder = recorded("none")
     parts = []
     for number in range(3):

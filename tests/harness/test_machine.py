@@ -13,7 +13,7 @@ from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.faults.fault import Fault, Parameter, Place
 from ranger_sim.harness.machine import Machine
 from ranger_sim.harness.waiting import ConditionNotMetError
-from ranger_sim.harness.wires import AnalogInput, BridgeWire, CanWire, EncoderWire, Wiring
+from ranger_sim.harness.wiring.wires import AnalogInput, BridgeWire, CanWire, EncoderWire, Wiring
 from ranger_sim.plant.bridge import Bridge
 from ranger_sim.plant.incremental_encoder import IncrementalEncoder
 from ranger_sim.plant.plant import Plant

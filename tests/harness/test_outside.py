@@ -9,8 +9,8 @@ import pytest
 
 from ranger_sim.datatable.loader import load_table
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness import profile
-from ranger_sim.harness.outside import put_outside
+from ranger_sim.harness.outside import profile
+from ranger_sim.harness.outside.machine import put_outside
 from tests.firmware_sim.native.support import COMPILER
 
 SERVO = pathlib.Path(__file__).resolve().parents[2] / "examples" / "servo"

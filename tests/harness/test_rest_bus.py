@@ -9,8 +9,8 @@ import pytest
 from ranger_sim import datatable
 from ranger_sim.datatable.packing import value_of_word, word_of_value
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness import profile
-from ranger_sim.harness.rest_bus import RestBus
+from ranger_sim.harness.outside import profile
+from ranger_sim.harness.outside.rest_bus import RestBus
 
 TABLE = datatable.load()
 MS = 1_000_000

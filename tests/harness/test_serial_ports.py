@@ -15,10 +15,10 @@ from ranger_sim.firmware_sim.clock import Crystal
 from ranger_sim.foundation import descriptors
 from ranger_sim.foundation.events import NEVER, PIN_EDGE, UART_BYTE
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness import serial_ports
+from ranger_sim.harness.outside import serial_ports
+from ranger_sim.harness.outside.serial_ports import Dropouts, PtyPort, RealPort, SerialLine
 from ranger_sim.harness.ranger import Ranger
 from ranger_sim.harness.scenario import Scenario
-from ranger_sim.harness.serial_ports import Dropouts, PtyPort, RealPort, SerialLine
 from ranger_sim.plant.imu import Imu
 from tests.examples import examples
 

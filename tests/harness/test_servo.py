@@ -17,7 +17,7 @@ RANGERS = (
     "ranger_sim.datatable.generated",
     "ranger_sim.harness.conditions",
     "ranger_sim.harness.ranger",
-    "ranger_sim.harness.wiring",
+    "ranger_sim.harness.wiring.ranger",
     "ranger_sim.plant.body",
     "ranger_sim.plant.ranger",
     "ranger_sim.sysid",

@@ -11,11 +11,11 @@ import pytest
 from ranger_sim import loading
 from ranger_sim.can_bus.bus import Bus
 from ranger_sim.firmware_sim.board import Board
-from ranger_sim.harness import profile
+from ranger_sim.harness.outside import profile
 from ranger_sim.harness.ranger import Ranger
+from ranger_sim.harness.records.strike_watch import StrikeWatch
+from ranger_sim.harness.records.summary import energy, motor_powers, oddities
 from ranger_sim.harness.scenario import Scenario, StopRule
-from ranger_sim.harness.strike_watch import StrikeWatch
-from ranger_sim.harness.summary import energy, motor_powers, oddities
 from ranger_sim.plant.ranger import RangerPlant
 from ranger_sim.plant.walk_record import WalkRecord
 

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from ranger_sim.harness.summary import oddities
+from ranger_sim.harness.records.summary import oddities
 from ranger_sim.plant import walk_record
 from ranger_sim.plant.body import DOUBLE, FALLEN, SINGLE, Body
 from ranger_sim.plant.parameters import BodyParameters

@@ -9,7 +9,7 @@ import json
 import sys
 
 from ranger_sim.boards.quirks import Quirks
-from ranger_sim.harness import profile
+from ranger_sim.harness.outside import profile
 from ranger_sim.harness.ranger import Ranger
 from ranger_sim.harness.scenario import Scenario
 

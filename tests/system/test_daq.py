@@ -19,7 +19,7 @@ import pytest
 from ranger_sim.boards.quirks import Quirks
 from ranger_sim.datatable.generated import all_variables
 from ranger_sim.foundation.numbers import float_of_word
-from ranger_sim.harness import serial_ports
+from ranger_sim.harness.outside import serial_ports
 from ranger_sim.harness.ranger import Ranger
 from ranger_sim.harness.scenario import Scenario
 from ranger_sim.tools import cli

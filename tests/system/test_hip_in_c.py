@@ -7,7 +7,7 @@ import shutil
 import pytest
 
 from ranger_sim.boards.quirks import Quirks
-from ranger_sim.harness import native_boards
+from ranger_sim.harness.firmware import native_boards
 from ranger_sim.harness.ranger import Ranger
 from ranger_sim.harness.scenario import Scenario
 from tests.firmware_sim.native.support import COMPILER

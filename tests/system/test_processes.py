@@ -15,9 +15,9 @@ import pytest
 from ranger_sim.foundation import wallclock
 from ranger_sim.foundation.peers import connected
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness import wiring
 from ranger_sim.harness.processes import control
 from ranger_sim.harness.timeline import perfetto_reader
+from ranger_sim.harness.wiring import ranger as wiring
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 TWO_SECONDS = 2.0  # the promise for naming what died or hangs

@@ -2,7 +2,7 @@
 
 import contextlib
 
-from ranger_sim.harness import profile
+from ranger_sim.harness.outside import profile
 from ranger_sim.harness.ranger import Ranger
 from ranger_sim.harness.scenario import Scenario, StopRule
 

@@ -8,7 +8,7 @@ import pytest
 
 from ranger_sim import loading
 from ranger_sim.harness.ranger import BOARD_CLASSES, BoardName
-from ranger_sim.harness.wiring import BOARDS
+from ranger_sim.harness.wiring.ranger import BOARDS
 from ranger_sim.tools import stubs
 
 DECLARATION = """\

@@ -14,7 +14,7 @@ from rich.table import Table
 
 from ranger_sim.can_bus.bounds import Bound, response_times, utilisation
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness import bus_schedule, profile
+from ranger_sim.harness.outside import bus_schedule, profile
 from ranger_sim.tools.command_line import terminal
 from ranger_sim.tools.command_line.files import json_target, replace_file
 from ranger_sim.tools.command_line.units import whole_number

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 
-from ranger_sim.harness import bus_schedule, profile
+from ranger_sim.harness.outside import bus_schedule, profile
 from ranger_sim.tools.command_line import terminal
 from ranger_sim.tools.command_line.files import json_target, replace_file
 from ranger_sim.tools.command_line.units import TIMES, quantity

@@ -62,7 +62,10 @@ def debuggers(
             raise UserError("--allow-network: nothing would listen there; give --gdb BOARD=HOST:PORT with it")
         yield []
         return
-    from ranger_sim.harness.debuggers import close_doors, open_doors  # sockets and all: only where they are wanted
+    from ranger_sim.harness.firmware.debuggers import (  # sockets and all: only where they are wanted
+        close_doors,
+        open_doors,
+    )
 
     doors = open_doors(robot.boards, options.gdb, options.allow_network, ends)
     try:

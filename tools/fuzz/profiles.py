@@ -6,7 +6,7 @@ import pathlib
 import tempfile
 
 from ranger_sim.foundation.random_stream import RandomStream
-from ranger_sim.harness import profile
+from ranger_sim.harness.outside import profile
 from ranger_sim.tools.fuzz import Finding
 
 INTERFACES = ("ranger_sim", "slcan", "socketcan", "virtual")

@@ -14,8 +14,8 @@ from ranger_sim.datatable.generated import all_variables
 from ranger_sim.datatable.packing import value_of_word
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness import normal_errors
+from ranger_sim.harness.outside.serial_ports import DAQ_BAUD, RealPort, reason_of
 from ranger_sim.harness.ranger_names import RANGER
-from ranger_sim.harness.serial_ports import DAQ_BAUD, RealPort, reason_of
 from ranger_sim.tools.panel.channels import EMPTY, Times, Trace, Values, between, thinned
 from ranger_sim.tools.panel.source import ANKLES, KNOWN_POSE, LEGS, Source, known_pose, table_channels
 from ranger_sim.tools.robodaq.codec import Point

@@ -15,12 +15,13 @@ from ranger_sim.datatable.generated import all_variables
 from ranger_sim.datatable.packing import parts_of_error_word, value_of_word
 from ranger_sim.foundation import peers
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness import logbook, normal_errors
+from ranger_sim.harness import normal_errors
 from ranger_sim.harness.feed import records
 from ranger_sim.harness.processes import control
 from ranger_sim.harness.ranger_names import RANGER
-from ranger_sim.harness.sampler import PERIOD_NS
-from ranger_sim.harness.summary import JOULES_PER_WH
+from ranger_sim.harness.records import logbook
+from ranger_sim.harness.records.sampler import PERIOD_NS
+from ranger_sim.harness.records.summary import JOULES_PER_WH
 from ranger_sim.tools.panel.channels import Channel, Memory, Times, Trace, Values, between
 from ranger_sim.tools.panel.source import TRUE_POSE, Source, error_rows, table_channels
 

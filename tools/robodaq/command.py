@@ -23,7 +23,7 @@ from ranger_sim.datatable import parameters
 from ranger_sim.datatable.generated import all_variables
 from ranger_sim.foundation import wallclock
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.serial_ports import BLUETOOTH_BAUD, DAQ_BAUD, RealPort, reason_of
+from ranger_sim.harness.outside.serial_ports import BLUETOOTH_BAUD, DAQ_BAUD, RealPort, reason_of
 from ranger_sim.tools.command_line import terminal
 from ranger_sim.tools.command_line.files import json_target, replace_file
 from ranger_sim.tools.command_line.units import TIMES, quantity, whole_number

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.logbook import decoded
+from ranger_sim.harness.records.logbook import decoded
 from ranger_sim.tools.run.folder import BUS_LOGS, FAILURES, VARIABLES, RunFolder
 
 Takers = dict[str, Callable[[Any], None]]  # of rows, by the stream that they come from

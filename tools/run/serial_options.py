@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from ranger_sim.boards.quirks import Quirks
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness import serial_ports
+from ranger_sim.harness.outside import serial_ports
 from ranger_sim.tools.command_line.options import Option, add_all
 from ranger_sim.tools.command_line.units import word
 

@@ -17,9 +17,10 @@ from ranger_sim.datatable.addresses import XCP_BUS, XCP_MASTER_ID, XCP_SLAVE_ID
 from ranger_sim.foundation import wallclock
 from ranger_sim.foundation.peers import told
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness import wiring
 from ranger_sim.harness.faults.ranger_catalogue import CATALOGUE
 from ranger_sim.harness.feed.server import FeedServer
+from ranger_sim.harness.outside.profile import Profile
+from ranger_sim.harness.outside.profile import load as load_profile
 from ranger_sim.harness.processes import control, places
 from ranger_sim.harness.processes.hardware import HardwareInTheLoop
 from ranger_sim.harness.processes.lateness import figures
@@ -28,9 +29,8 @@ from ranger_sim.harness.processes.plant_process import sent_away
 from ranger_sim.harness.processes.requests import admitted, can_be_armed
 from ranger_sim.harness.processes.settings import FASTEST, NEVER, ON_FAILURE, SLOWEST, Settings, one_processor
 from ranger_sim.harness.processes.supervisor import ELSEWHERE, RUNNING, Supervisor, View, check_platform
-from ranger_sim.harness.profile import Profile
-from ranger_sim.harness.profile import load as load_profile
 from ranger_sim.harness.stop_rule import MOST_STEPS, StopRule
+from ranger_sim.harness.wiring import ranger as wiring
 from ranger_sim.tools import faults
 from ranger_sim.tools.buses import server_options
 from ranger_sim.tools.command_line import terminal

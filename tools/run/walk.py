@@ -16,11 +16,12 @@ from ranger_sim import loading
 from ranger_sim.firmware_sim.native import coverage
 from ranger_sim.foundation import wallclock
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness import native_boards, normal_errors
+from ranger_sim.harness import normal_errors
 from ranger_sim.harness.faults.ranger_catalogue import CATALOGUE
-from ranger_sim.harness.native_firmware import Firmware
-from ranger_sim.harness.profile import Profile
-from ranger_sim.harness.profile import load as load_profile
+from ranger_sim.harness.firmware import native_boards
+from ranger_sim.harness.firmware.native_firmware import Firmware
+from ranger_sim.harness.outside.profile import Profile
+from ranger_sim.harness.outside.profile import load as load_profile
 from ranger_sim.harness.ranger_names import RANGER
 from ranger_sim.harness.scenario import Scenario, StopRule
 from ranger_sim.plant import terms

@@ -11,7 +11,6 @@ from ranger_sim.firmware_sim.peripherals.ssp import SspSegment
 from ranger_sim.foundation import events
 from ranger_sim.foundation.events import NEVER, EventQueue
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness import wiring
 from ranger_sim.harness.processes import kinds, places, plain
 from ranger_sim.harness.processes.block import Block, new_stage
 from ranger_sim.harness.processes.channel import SLOT_WORDS, Bell, Mailbox
@@ -20,6 +19,7 @@ from ranger_sim.harness.processes.places import SLOTS
 from ranger_sim.harness.processes.remote_board import RemoteBoard
 from ranger_sim.harness.processes.stage import Stage
 from ranger_sim.harness.ranger import Ranger
+from ranger_sim.harness.wiring import ranger as wiring
 from tests.examples import examples
 from tests.harness.processes.child import Child
 

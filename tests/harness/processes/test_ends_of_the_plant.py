@@ -13,7 +13,7 @@ from ranger_sim.firmware_sim.activity import ACTIVITY_COLUMNS
 from ranger_sim.foundation import wallclock
 from ranger_sim.foundation.events import CAN_REQUEST, CAN_RX, CAN_TX_DONE, TX_SENT, EventQueue
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness import profile
+from ranger_sim.harness.outside import profile
 from ranger_sim.harness.processes import activity, hardware, places
 from ranger_sim.harness.processes.hardware import HardwareInTheLoop, RestNode
 from ranger_sim.harness.processes.pace import Pace

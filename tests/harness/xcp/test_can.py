@@ -21,10 +21,11 @@ from ranger_sim.datatable import parameters
 from ranger_sim.datatable.addresses import XCP_MASTER_ID, XCP_SLAVE_ID, address_of
 from ranger_sim.datatable.generated import errors, routes
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness import bus_schedule, profile, wiring
+from ranger_sim.harness.outside import bus_schedule, profile
 from ranger_sim.harness.processes.outside import move_bus
 from ranger_sim.harness.ranger import Ranger
 from ranger_sim.harness.scenario import Scenario
+from ranger_sim.harness.wiring import ranger as wiring
 from ranger_sim.harness.xcp.can import XcpCanProbe
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]

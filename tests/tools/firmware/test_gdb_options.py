@@ -12,7 +12,7 @@ import sys
 import pytest
 
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.debuggers import open_doors
+from ranger_sim.harness.firmware.debuggers import open_doors
 from tests.firmware_sim.gdb.client import Client
 from tests.firmware_sim.gdb.machine import Machine
 from tests.firmware_sim.lpc2194.programs import content, words_of

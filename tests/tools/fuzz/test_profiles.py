@@ -2,7 +2,7 @@
 
 import pytest
 
-from ranger_sim.harness import profile
+from ranger_sim.harness.outside import profile
 from ranger_sim.tools.fuzz import profiles as fuzz_profiles
 
 

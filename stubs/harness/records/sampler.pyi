@@ -1,4 +1,4 @@
-# Generated from harness/sampler.py and harness/sampler.pxd (python -m ranger_sim.tools.stubs); do not edit.
+# Generated from harness/records/sampler.py and harness/records/sampler.pxd (python -m ranger_sim.tools.stubs); do not edit.
 
 from collections.abc import MutableSequence
 from ranger_sim.firmware_sim.board import Board

@@ -25,8 +25,8 @@ from typing import Any
 from ranger_sim.datatable.model import Board, Table, Variable
 from ranger_sim.datatable.packing import value_of_word
 from ranger_sim.foundation.events import FLAG_ERROR, FLAG_EXTENDED, FLAG_REMOTE
-from ranger_sim.harness.bus_schedule import BusSchedule, robots_table, schedule_of_board
-from ranger_sim.harness.profile import Profile
+from ranger_sim.harness.outside.bus_schedule import BusSchedule, robots_table, schedule_of_board
+from ranger_sim.harness.outside.profile import Profile
 
 SYNC = "TIMESTAMP"
 # Chosen by us. A gap: a period, two slots of jitter, and what a busy bus and an adapter's driver may add. Missing:

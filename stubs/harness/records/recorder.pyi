@@ -1,4 +1,4 @@
-# Generated from harness/recorder.py and harness/recorder.pxd (python -m ranger_sim.tools.stubs); do not edit.
+# Generated from harness/records/recorder.py and harness/records/recorder.pxd (python -m ranger_sim.tools.stubs); do not edit.
 
 from ranger_sim.foundation.row_stream import RowStream
 from typing import Any

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.recorder import Recorder
+from ranger_sim.harness.records.recorder import Recorder
 
 WINDOW_S = 10.0  # default window of the logs: some 16 steps
 READ_ROWS = 4096  # of a spooled stream at a time

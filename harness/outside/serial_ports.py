@@ -20,7 +20,7 @@ from ranger_sim.foundation.events import NEVER, PIN_EDGE, STAGE_PINS, UART_BYTE
 from ranger_sim.foundation.peers import LIMITS, Terminal, read_ready, write_ready
 from ranger_sim.foundation.random_stream import RandomStream
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness import wiring
+from ranger_sim.harness.wiring import ranger as wiring
 
 if TYPE_CHECKING:
     from ranger_sim.harness.ranger import Ranger

@@ -2,7 +2,8 @@
 
 from typing import Any
 
-from ranger_sim.harness import bus_schedule, wiring
+from ranger_sim.harness.outside import bus_schedule
+from ranger_sim.harness.wiring import ranger as wiring
 
 Message = tuple[Any, ...]
 

@@ -1,6 +1,6 @@
 """The wires of a machine, as tables: which sensor hangs on which pin of which board, which board on which bus.
 
-Read a line from left to right in the direction in which the signal goes. Ranger's tables are harness/wiring.py.
+Read a line from left to right in the direction in which the signal goes. Ranger's tables are harness/wiring/ranger.py.
 """
 
 import dataclasses

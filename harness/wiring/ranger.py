@@ -5,7 +5,7 @@ Read a line from left to right in the direction in which the signal goes.
 """
 
 from ranger_sim.boards import can_router, motor_board, user_interface
-from ranger_sim.harness.wires import AnalogInput, BridgeWire, CanWire, EncoderWire, EncoderWord, Wiring
+from ranger_sim.harness.wiring.wires import AnalogInput, BridgeWire, CanWire, EncoderWire, EncoderWord, Wiring
 from ranger_sim.plant import wiring_points as point
 
 # The order in which boards are advanced and their messages sorted within an instant.

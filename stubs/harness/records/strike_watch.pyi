@@ -1,4 +1,4 @@
-# Generated from harness/strike_watch.py and harness/strike_watch.pxd (python -m ranger_sim.tools.stubs); do not edit.
+# Generated from harness/records/strike_watch.py and harness/records/strike_watch.pxd (python -m ranger_sim.tools.stubs); do not edit.
 
 from ranger_sim.firmware_sim.board import Board
 from ranger_sim.harness.step_watch import StepEnd

@@ -5,7 +5,7 @@ from typing import Any
 from ranger_sim.firmware_sim.native.hardware import Hardware
 from ranger_sim.firmware_sim.native.native_board import NativeBoard
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.native_firmware import Firmware, table_version
+from ranger_sim.harness.firmware.native_firmware import Firmware, table_version
 
 
 class TableBoard(NativeBoard):

@@ -15,9 +15,9 @@ from ranger_sim.datatable.model import Table, Variable
 from ranger_sim.datatable.packing import word_of_value
 from ranger_sim.foundation.events import NEVER
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.bus_schedule import command_variables, robots_table, schedule_of_board
-from ranger_sim.harness.profile import Profile
-from ranger_sim.harness.supervision import SYNC, expected_periods
+from ranger_sim.harness.outside.bus_schedule import command_variables, robots_table, schedule_of_board
+from ranger_sim.harness.outside.profile import Profile
+from ranger_sim.harness.outside.supervision import SYNC, expected_periods
 
 DATA_8 = 8  # flags of a data frame of eight bytes
 SPREAD_NS = 137_000  # between first sendings, so that not everything comes at once; chosen by us: longer than a frame
@@ -48,7 +48,7 @@ class RestBus:
             sync = self.table.variable(SYNC)
             for bus in profile.buses:
                 self._add(sync, bus, int((sync.period_ms or Fraction(1)) * 1_000_000))
-            # alone the main brain reaches nobody (see harness/profile.py), so both are absent
+            # alone the main brain reaches nobody (see harness/outside/profile.py), so both are absent
             slot_ns = brain.slot_us * 1000
             for variable in command_variables(self.table):
                 for bus, schedule in schedules.items():

@@ -24,8 +24,7 @@ from typing import Any
 
 from ranger_sim.datatable.model import ROUTER, Table
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness import wiring
-from ranger_sim.harness.bus_schedule import (
+from ranger_sim.harness.outside.bus_schedule import (
     MOST_ROWS,
     MOST_TURNS,
     BusSchedule,
@@ -33,8 +32,9 @@ from ranger_sim.harness.bus_schedule import (
     passes_of,
     robots_table,
 )
+from ranger_sim.harness.wiring import ranger as wiring
 
-FOLDER = pathlib.Path(__file__).resolve().parent.parent / "profiles"
+FOLDER = pathlib.Path(__file__).resolve().parents[2] / "profiles"
 SCHEDULES = "schedules"
 FULL = "full"
 EMULATED, EXTERNAL, ABSENT = "emulated", "external", "absent"

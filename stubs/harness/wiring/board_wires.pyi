@@ -1,4 +1,4 @@
-# Generated from harness/board_wires.py and harness/board_wires.pxd (python -m ranger_sim.tools.stubs); do not edit.
+# Generated from harness/wiring/board_wires.py and harness/wiring/board_wires.pxd (python -m ranger_sim.tools.stubs); do not edit.
 
 from collections.abc import MutableSequence
 from ranger_sim.firmware_sim.board import Board

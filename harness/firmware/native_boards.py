@@ -14,8 +14,8 @@ from ranger_sim.firmware_sim.native import image_build
 from ranger_sim.firmware_sim.native.hardware import ExternalConverter, Hardware, InternalConverter
 from ranger_sim.firmware_sim.peripherals.adc_external import CONVERSION_NS as FASTEST_CONVERSION_NS
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness import native_firmware
-from ranger_sim.harness.native_firmware import Firmware
+from ranger_sim.harness.firmware import native_firmware
+from ranger_sim.harness.firmware.native_firmware import Firmware
 
 BATTERY_VOLTAGE_CHANNEL = 1  # AIN1, P0.28
 

@@ -7,7 +7,7 @@ from typing import Any
 from ranger_sim import loading
 from ranger_sim.boards.counters import RangerCounters
 from ranger_sim.datatable.generated import errors as error_table
-from ranger_sim.harness.vital_signs import alive, can
+from ranger_sim.harness.records.vital_signs import alive, can
 
 JOULES_PER_WH = 3600.0
 COVERAGE = ("lines", "covered", "branches", "taken")

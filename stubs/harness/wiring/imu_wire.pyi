@@ -1,4 +1,4 @@
-# Generated from harness/imu_wire.py and harness/imu_wire.pxd (python -m ranger_sim.tools.stubs); do not edit.
+# Generated from harness/wiring/imu_wire.py and harness/wiring/imu_wire.pxd (python -m ranger_sim.tools.stubs); do not edit.
 
 from ranger_sim.foundation.events import EventQueue
 from ranger_sim.harness.step_watch import SerialDevice
