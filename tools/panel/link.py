@@ -16,36 +16,95 @@ from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness import normal_errors
 from ranger_sim.harness.outside.serial_ports import DAQ_BAUD, RealPort, reason_of
 from ranger_sim.harness.ranger_names import RANGER
-from ranger_sim.tools.panel.channels import EMPTY, Times, Trace, Values, between, thinned
+from ranger_sim.tools.panel.channels import EMPTY, Times, Trace, Values, between
 from ranger_sim.tools.panel.source import ANKLES, KNOWN_POSE, LEGS, Source, known_pose, table_channels
 from ranger_sim.tools.robodaq.codec import Point
+from ranger_sim.tools.robodaq.rates import GAP_PERIODS, Rates, published_hz
 from ranger_sim.tools.robodaq.session import OWN, Session
 
 LOOK_S = 0.01
 MOST_CHOSEN = CHANNELS - len(OWN)
 MOST_POINTS = 60_000  # kept of each variable: two minutes of a fast one
-USUAL_OF = 50  # points whose median distance is the usual one
-SLOWEST_S = 0.5  # the slow list comes round in a third of a second (robot.md N4.15): what is later is a gap
+USUAL_OF = 50  # points whose median distance is the usual one, until the robot has told its lists
+SLOWEST_S = 0.5  # the slow list comes round in a third of a second (robot.md N4.15)
+STEP_S = 1e-3  # the clock of the robot's stamps
+NOTHING_S = 1e-4  # a point of nothing stands so long after the last one before a gap
+NOTHING = np.full(1, np.nan, np.float32)
 
 
 class Kept:
-    """The newest points of one variable."""
+    """The newest points of one variable. after_gap: 1 where nothing came for too long before the point.
 
-    def __init__(self) -> None:
+    stands: it is told when it is written, and stands until then; else it is sampled.
+    """
+
+    def __init__(self, stands: bool) -> None:
+        self.stands = stands
         self.times = array.array("d")
         self.values = array.array("f")
+        self.after_gap = array.array("b")
 
-    def add(self, time_s: float, value: float) -> None:
+    def add(self, time_s: float, value: float, after_gap: bool) -> None:
+        """A point at a time that is later than all before."""
+        if self.stands and not after_gap and self.times and time_s - self.times[-1] > STEP_S:
+            self._append(time_s - STEP_S, self.values[-1], False)
+        self._append(time_s, value, after_gap)
+        if len(self.times) > 2 * MOST_POINTS:
+            for row in (self.times, self.values, self.after_gap):
+                del row[:MOST_POINTS]
+
+    def _append(self, time_s: float, value: float, after_gap: bool) -> None:
         self.times.append(time_s)
         self.values.append(value)
-        if len(self.times) > 2 * MOST_POINTS:
-            del self.times[:MOST_POINTS]
-            del self.values[:MOST_POINTS]
+        self.after_gap.append(after_gap)
 
-    def period_s(self) -> float:
-        """Usual distance of two points, s."""
+    def is_late(self, time_s: float) -> bool:
+        """So long after the last point that it is a gap, by the usual distance of the last ones."""
         near = np.diff(np.asarray(self.times[-USUAL_OF:]))
-        return float(np.median(near)) if len(near) else SLOWEST_S
+        usual_s = min(float(np.median(near)), SLOWEST_S) if len(near) else SLOWEST_S
+        return bool(self.times) and time_s - self.times[-1] > GAP_PERIODS * usual_s
+
+    def trace(self, begin: float, end: float, points: int) -> Trace:
+        """What a plot shows of a window: lines from gap to gap."""
+        times, values = np.array(self.times), np.array(self.values, np.float32)
+        starts = [0, *np.flatnonzero(np.array(self.after_gap)).tolist()]
+        found: list[Trace] = []
+        for first, last in zip(starts, [*starts[1:], len(times)], strict=True):
+            if first < last and times[last - 1] >= begin and times[first] <= end:
+                found.append(unbroken(times[first:last], values[first:last], begin, end, points))
+        return joined(found)
+
+
+def unbroken(times: Times, values: Values, begin: float, end: float, points: int) -> Trace:
+    """A window of points that come now often, now rarely, without a gap, in at most `points` buckets."""
+    first, last = np.searchsorted(times, (begin, end))
+    first, last = max(0, int(first) - 1), min(len(times), int(last) + 1)  # lines go on beyond the edge
+    times, values = times[first:last], values[first:last]
+    if len(times) <= 2 * points or end <= begin:
+        return Trace(times, values, None)
+    width = (end - begin) / points
+    bucket = np.floor(times / width).astype(np.int64)
+    starts = np.flatnonzero(np.diff(bucket, prepend=bucket[0] - 1))
+    x = np.arange(bucket[0], bucket[-1] + 1) * width
+    low, high = (
+        np.interp(x, x[bucket[starts] - bucket[0]], extreme.reduceat(values, starts)).astype(np.float32)
+        for extreme in (np.minimum, np.maximum)
+    )
+    return Trace(x, low, high)
+
+
+def joined(pieces: list[Trace]) -> Trace:
+    """Pieces one after another, with nothing between them."""
+    pieces = [piece for piece in pieces if len(piece.x)]
+    if not pieces:
+        return EMPTY
+    thick = any(piece.high is not None for piece in pieces)
+    x, low, high = [], [], []
+    for piece in pieces:
+        x += [piece.x, piece.x[-1:] + NOTHING_S]
+        low += [piece.low, NOTHING]
+        high += [piece.low if piece.high is None else piece.high, NOTHING]
+    return Trace(np.concatenate(x[:-1]), np.concatenate(low[:-1]), np.concatenate(high[:-1]) if thick else None)
 
 
 class LinkSource(Source):
@@ -58,13 +117,21 @@ class LinkSource(Source):
         self.title = f"data link on {port}"
         self.port = RealPort(port, DAQ_BAUD)
         self.session = Session(self._hear)
+        self.rates = Rates(self.session)
         table = table_channels()
         self.channels = list(table.values())
         self.place = {number: place for place, number in enumerate(table)}
         self.number = {channel.name: place for place, channel in enumerate(self.channels)}
-        self.kept = [Kept() for _ in self.channels]
         self.pose_names = KNOWN_POSE
         self.wanted: tuple[int, ...] = ()
+        self.restarts = 0
+        self._begin()
+
+    def _begin(self) -> None:
+        """Nothing is known yet of this robot, or of the time since it got its power anew."""
+        regular = published_hz()
+        self.kept = [Kept(number not in regular) for number in self.place]
+        self.stamps: dict[int, int] = {}
         self.first_ms: int | None = None
         self.first_errors: dict[tuple[int, int], float] = {}
 
@@ -75,12 +142,24 @@ class LinkSource(Source):
 
     def _hear(self, point: Point) -> None:
         number, word, stamp = point
-        if number in self.place:
-            kept, time_s = self.kept[self.place[number]], self._seconds(stamp)
-            if kept.times and time_s <= kept.times[-1]:
+        if self.session.restarts != self.restarts:
+            self.restarts = self.session.restarts
+            self._begin()
+        after_gap = self.rates.take(point)
+        if number not in self.place:
+            return
+        kept, time_s = self.kept[self.place[number]], self._seconds(stamp)
+        if self.stamps.get(number) == stamp and self.session.clock_ms is not None:
+            if not kept.stands:
                 return  # the slow list brings a point again that has come by another
-            value = value_of_word(all_variables.TYPES[number], word)
-            kept.add(time_s, value if np.isfinite(value) else np.nan)
+            time_s = self._seconds(self.session.clock_ms) - STEP_S  # written long ago, and so it is still
+        self.stamps[number] = stamp
+        if kept.times and time_s <= kept.times[-1]:
+            return
+        if not self.rates.know:
+            after_gap = kept.is_late(time_s)
+        value = value_of_word(all_variables.TYPES[number], word)
+        kept.add(time_s, value if np.isfinite(value) else np.nan, after_gap)
 
     async def run(self) -> None:
         """Carry bytes until the port is lost."""
@@ -112,16 +191,12 @@ class LinkSource(Source):
         wanted = tuple(sorted(set(channels)))
         if wanted != self.wanted:
             self.wanted = wanted
-            rows = [parameters.find(self.channels[channel].name) for channel in wanted]
+            rows = [parameters.find(self.channels[channel].name) for channel in wanted[:MOST_CHOSEN]]
             pose = [parameters.find(name) for name in (*LEGS[0], *LEGS[1], *ANKLES)]
             self.session.select(rows, pose[: MOST_CHOSEN - len(rows)])
 
     def trace(self, channel: int, begin: float, end: float, points: int) -> Trace:
-        kept = self.kept[channel]
-        if not kept.times:
-            return EMPTY
-        times, values = np.array(kept.times), np.array(kept.values, np.float32)
-        return thinned(times, values, begin, end, points, min(kept.period_s(), SLOWEST_S))
+        return self.kept[channel].trace(begin, end, points)
 
     def samples(self, channel: int, begin: float, end: float) -> tuple[Times, Values]:
         kept = self.kept[channel]
@@ -156,9 +231,19 @@ class LinkSource(Source):
         loop_s = asyncio.get_running_loop().time()
         return {
             "time_s": now_s,
-            "link": {"state": self.session.state(loop_s), **self.session.counters()},
+            "link": {
+                "state": self.session.state(loop_s),
+                **self.session.counters(),
+                "lists": [self._with_seconds(row) for row in self.rates.lists()],
+                "chosen": [self._with_seconds(row) for row in self.rates.rows(self.rates.chosen())],
+                "asked": "channels" in self.session.pending(),
+            },
             "errors": sorted(rows, key=lambda row: -row["last_s"]),
         }
+
+    def _with_seconds(self, row: dict[str, Any]) -> dict[str, Any]:
+        """A row of the link's rates, its last gap in the page's time."""
+        return {**row, "last_s": None if row["last_ms"] is None else self._seconds(row["last_ms"])}
 
     async def request(self, wish: dict[str, Any]) -> dict[str, Any]:
         if wish.get("do") != "set":

@@ -154,8 +154,7 @@ class PanelServer:
 
     def want(self) -> None:
         """Tell the source what all pages show."""
-        plots = (plot for session in self.sessions for plot in session.plots.values())
-        self.source.want(sorted({channel for plot in plots for channel in plot.channels}))
+        self.source.want(sorted({channel for session in self.sessions for channel in session.wanted}))
 
     async def socket(self, socket: WebSocket) -> None:
         """One page, until it leaves or is sent away with a reason."""
@@ -191,6 +190,7 @@ class Session:
         self.wants = wants  # called when its plots are others
         self.socket = socket
         self.plots: dict[int, Plot] = {}
+        self.wanted: set[int] = set()  # channels of its plots, also of those that another view hides
         self.at: float | None = None  # the page's cursor; None: the newest
         self.shown = asyncio.Event()  # the page has shown what it was sent
         self.shown.set()
@@ -282,10 +282,12 @@ class Session:
                 seconds(plot.get("span"), "span") or 10.0,
                 points_of(plot.get("points")),
             )
-        if sum(len(plot.channels) for plot in found.values()) > MOST_CHANNELS:
+        hidden = channels_of(wish.get("hidden", []), self.source)
+        if sum(len(plot.channels) for plot in found.values()) + len(hidden) > MOST_CHANNELS:
             raise UserError(f"look: {MOST_CHANNELS} channels at a time are possible")
-        before, self.plots = self.plots, found
-        if [plot.channels for plot in before.values()] != [plot.channels for plot in found.values()]:
+        self.plots = found
+        before, self.wanted = self.wanted, {*hidden, *(each for plot in found.values() for each in plot.channels)}
+        if before != self.wanted:
             self.wants()
         self.at = seconds(wish.get("at"), "at")
         self.changed.set()

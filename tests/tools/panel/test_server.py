@@ -34,6 +34,7 @@ class Ramp(Source):
         self.channels = [Channel("RAMP", "s", "a ramp", "test")]
         self.pose_names = ("EST_STATE_TH0",)
         self.asked = []
+        self.wants = []
 
     def span(self):
         return (0.0, 10.0)
@@ -48,6 +49,9 @@ class Ramp(Source):
 
     def values(self, wanted, at):
         return [at for _ in wanted]
+
+    def want(self, channels):
+        self.wants.append(channels)
 
     def pose(self, at):
         return (10.0 if at is None else at, [0.25])
@@ -190,6 +194,8 @@ def test_requests_reach_the_robot_and_what_it_refuses_is_answered(panel):
         ({"do": "look", "plots": [{"channels": [0], "points": 5, "begin": "x"}]}, "begin: x is no time"),
         ({"do": "look", "plots": [{"channels": [0], "points": 5, "end": 1e300}]}, "is no time"),
         ({"do": "look", "plots": [{"channels": [0] * (MOST_CHANNELS + 1), "points": 5}]}, "channels at a time"),
+        ({"do": "look", "plots": [], "hidden": [0] * (MOST_CHANNELS + 1)}, "channels at a time"),
+        ({"do": "look", "plots": [], "hidden": [1]}, "1 is not 0 to 0"),
         ({"do": "values", "channels": "RAMP"}, "a list of numbers"),
         ({"do": None}, "is no request"),
     ],
@@ -253,6 +259,15 @@ def test_a_page_that_shows_nothing_gets_no_second_picture(panel):
 
 def exported(address, query, kind="csv"):
     return get(address, f"/export/{kind}?{query}", Cookie=f"{COOKIE}={TOKEN}")
+
+
+def test_what_the_plots_show_stays_wanted_while_another_view_hides_them(panel):
+    """A data link would send it rarely otherwise."""
+    it, address, _ = panel
+    with page(address) as socket:
+        for wish in ({"plots": [{"channels": [0], "points": 5}]}, {"plots": [], "hidden": [0]}, {"plots": []}):
+            assert "error" not in answer(socket, do="look", **wish)
+        assert it.source.wants == [[0], []]
 
 
 def test_a_selection_is_saved_as_it_came(panel, tmp_path):

@@ -14,7 +14,9 @@ from ranger_sim.harness.feed.server import FeedServer
 from ranger_sim.tools.panel.link import LinkSource
 from ranger_sim.tools.panel.recording import Event, RecordingSource
 from ranger_sim.tools.panel.robot import ErrorList, RobotSource
-from ranger_sim.tools.panel.source import KNOWN_POSE, TRUE_POSE, known_pose
+from ranger_sim.tools.panel.source import ANKLES, KNOWN_POSE, TRUE_POSE, known_pose
+from ranger_sim.tools.robodaq.codec import Point
+from tests.tools.robodaq.on_a_line import OnALine
 
 SECONDS = 0.6
 
@@ -184,17 +186,90 @@ def test_a_port_that_is_not_there_is_told():
         LinkSource("/dev/no-such-port")
 
 
-def test_the_links_silences_are_gaps_and_never_lines():
+def test_the_links_silences_are_gaps_and_never_lines_before_its_lists_are_known():
     """Points every 2 ms, then 0.3 s of nothing."""
     source = LinkSource("loop://")
     number = all_variables.ID_OF["MCH_ANGLE"]
     for ms in [*range(0, 400, 2), *range(700, 1000, 2)]:
-        source._hear((number, 0x3F800000, 5000 + ms))
+        source._hear(Point(number, 0x3F800000, 5000 + ms))
     channel = number_of(source, "MCH_ANGLE")
     trace = source.trace(channel, 0.0, 1.0, 2000)
-    in_gap = (trace.x > 0.399) & (trace.x < 0.699)
-    assert np.isnan(trace.low[in_gap]).all() and in_gap.any()
+    (place,) = np.flatnonzero(np.isnan(trace.low))
+    assert trace.x[[place - 1, place + 1]].tolist() == pytest.approx([0.398, 0.7])
     assert source.values([channel], None) == [1.0]
+    source.close()
+
+
+@pytest.fixture(scope="module")
+def linked():
+    """(source, begin, end of the bytes that were lost on the line, s): a robot on its link, three channels fast."""
+    line = OnALine()
+    source = LinkSource("loop://")
+    names = ("MCH_ANGLE", "FSM_HIP", "MCFO_RIGHT_LS")
+    source.want([number_of(source, name) for name in names])
+    line.pass_on(source.session, 2.0)
+    begin = source.span()[1]
+    line.pass_on(source.session, 0.4, loses=True)
+    end = source._seconds(source.session.clock_ms) + 0.4
+    line.pass_on(source.session, 1.5)
+    yield source, begin, end
+    source.close()
+    line.robot.close()
+
+
+@pytest.mark.parametrize("points", [4000, 300])  # as they came; the extremes of a pixel's time
+def test_bytes_that_are_lost_on_the_line_are_a_gap_in_the_plot(linked, points):
+    source, begin, end = linked
+    trace = source.trace(number_of(source, "MCH_ANGLE"), begin - 1.0, end + 1.0, points)
+    nothing = np.isnan(trace.low)
+    inside = (trace.x > begin + 0.01) & (trace.x < end - 0.02)
+    assert nothing.any() and nothing[inside].all()
+    there = trace.x[~nothing]
+    assert np.diff(there).max() == pytest.approx(0.4, abs=0.03)  # that one, and no other
+    assert np.sum(np.diff(there) > 0.05) == 1
+
+
+def test_what_is_written_now_and_then_stands_in_between_on_the_link(linked):
+    """The hip's state: whole numbers, never a slope from one to the next."""
+    source, begin, _ = linked
+    trace = source.trace(number_of(source, "FSM_HIP"), 0.5, begin, 4000)
+    values = trace.low[~np.isnan(trace.low)]
+    steps = np.flatnonzero(np.diff(values))
+    assert len(steps) >= 2
+    assert (np.diff(trace.x[~np.isnan(trace.low)])[steps] < 2e-3).all()
+
+
+def test_a_parameter_of_the_link_has_a_line_although_nobody_writes_it(linked):
+    source, begin, _ = linked
+    trace = source.trace(number_of(source, "P_H_PM_TIME"), 0.0, begin, 4000)
+    assert set(trace.low.tolist()) == {300.0} and trace.x[-1] - trace.x[0] > 1.0
+
+
+def test_the_page_is_told_the_lists_of_the_link(linked):
+    source, begin, end = linked
+
+    async def state():
+        return source.state(None)
+
+    link = asyncio.run(state())["link"]
+    assert [row["list"] for row in link["lists"]] == ["fast", "medium", "slow"]
+    angle = next(row for row in link["chosen"] if row["name"] == "MCH_ANGLE")
+    assert (angle["list"], angle["gaps"]) == ("fast", 1) and angle["last_s"] == pytest.approx(end, abs=0.03)
+    assert {row["list"] for row in link["chosen"] if row["name"] in ANKLES} == {"medium"}
+    assert link["asked"] is False and link["gaps"] == 1
+
+
+def test_a_robot_that_gets_its_power_anew_is_shown_anew():
+    source = LinkSource("loop://")
+    time, angle = (all_variables.ID_OF[name] for name in ("TIMESTAMP", "MCH_ANGLE"))
+    for stamp in (50_000, 50_002, 50_004):
+        source.session._take(Point(time, stamp, stamp))
+        source.session._take(Point(angle, 0x3F800000, stamp))
+    source.session._take(Point(time, 10, 10))
+    source.session._take(Point(angle, 0x40000000, 12))
+    channel = number_of(source, "MCH_ANGLE")
+    assert source.values([channel], None) == [2.0] and len(source.kept[channel].times) == 1
+    assert source.span()[1] == pytest.approx(0.002)
     source.close()
 
 

@@ -65,7 +65,7 @@ function greet(found) {
   by("freeze").hidden = !live;
   by("pace").hidden = !can.has("pace");
   by("face").hidden = !can.has("panel");
-  for (const [name, needs] of [["parameters", "parameters"], ["errors", "errors"], ["inside", "boards"], ["faults", "faults"]])
+  for (const [name, needs] of [["parameters", "parameters"], ["errors", "errors"], ["inside", "boards"], ["link", "link"], ["faults", "faults"]])
     document.querySelector(`[data-view=${name}]`).hidden = !can.has(needs);
   by("pose-note").textContent = hello.pose.includes("hip_y_m") ? "as its body is; contact forces green" : hello.pose.length ? "as it estimates itself; the lower foot stands" : "no leg angles in this source";
   by("names").replaceChildren(...hello.channels.map((channel) => Object.assign(document.createElement("option"), { value: channel.name })));
@@ -103,7 +103,8 @@ async function atMark() {
 function look() {
   if (!hello) return;
   const wanted = plots.wanted().map((plot) => ({ channels: plot.numbers, begin: held ? held[0] : null, end: held ? held[1] : null, span: window_s, points: plots.points() }));
-  link.send({ do: "look", plots: view === "plots" ? wanted : [], at: instant() });
+  const seen = view === "plots";
+  link.send({ do: "look", plots: seen ? wanted : [], hidden: seen ? [] : wanted.flatMap((plot) => plot.channels), at: instant() });
 }
 
 function hold(window) {
@@ -254,8 +255,13 @@ function tell_state() {
     by("bus").value = chosen;
     by("frames").replaceChildren(tables.frames((state.frames ?? [])[+chosen] ?? [], by("frame-search").value));
   }
+  if (view === "link" && state.link) {
+    by("link-state").textContent = tables.linkState(state.link);
+    by("link-lists").replaceChildren(tables.linkLists(state.link.lists));
+    by("link-chosen").replaceChildren(tables.linkRows(state.link.chosen));
+  }
   if (view === "faults") by("fault-list").replaceChildren(tables.faults(state.faults ?? [], tell));
-  if (state.link) by("readout").textContent = `${state.link.state}; ${state.link.points.toLocaleString("en")} points, ${state.link.gaps} gaps (longest ${state.link.longest_gap_ms} ms), ${state.link.bad_checksums} bad checksums`;
+  if (state.link) by("readout").textContent = tables.linkState(state.link);
   else if (state.left_out && Object.keys(state.left_out).length) by("readout").textContent = `left out because this program was too slow: ${Object.entries(state.left_out).map(([name, rows]) => `${rows} rows of ${name}`).join(", ")}`;
 }
 

@@ -27,9 +27,10 @@ export function table(headings, rows) {
 
 export const note = (text) => Object.assign(document.createElement("p"), { className: "note", textContent: text });
 
-export function meter(share, text) {
+// alarms: near its end it is red, as a slot that is nearly full
+export function meter(share, text, alarms = true) {
   const box = document.createElement("div");
-  box.className = "meter" + (share > 0.9 ? " high" : "");
+  box.className = "meter" + (alarms && share > 0.9 ? " high" : "");
   box.setAttribute("role", "meter");
   box.setAttribute("aria-valuenow", Math.round(100 * share));
   box.setAttribute("aria-label", text);
@@ -74,6 +75,30 @@ export function frames(rows, filter) {
   if (!shown.length) return note("no frames");
   return table(["#time", "#id", "name", "#value", "data", "#so far"], shown.map((row) =>
     [seconds(row.time_s), row.id, row.name, figure(row.value), Object.assign(document.createElement("code"), { textContent: row.data }), row.count.toLocaleString("en")]));
+}
+
+// ---- the data link
+
+export const linkState = (link) => `${link.state}${link.asked ? ", lists asked for" : ""}; ${link.points.toLocaleString("en")} points, silent ${link.gaps} times (longest ${link.longest_gap_ms} ms), ${link.bad_checksums} bad checksums, ${link.restarts} restarts of the robot`;
+
+const rate = (hz) => hz === null || hz === undefined ? "–" : hz >= 100 ? hz.toFixed(0) : hz.toFixed(1);
+
+function achieved({ rate_hz, promised_hz }, name) {
+  const share = promised_hz ? rate_hz / promised_hz : 0;
+  return meter(share, `${name}: ${Math.round(100 * share)} % of its rate`, false);
+}
+
+const gaps = (row) => [row.gaps, row.gaps ? `${row.longest_ms} ms` : "–", seconds(row.last_s)];
+
+export function linkLists(rows) {
+  return table(["list", "#variables", "#came, 1/s", "of the promise", "#promised, 1/s", "#gaps", "#longest", "#last"],
+    rows.map((row) => [row.list, row.variables, rate(row.rate_hz), achieved(row, row.list), rate(row.promised_hz), ...gaps(row)]));
+}
+
+export function linkRows(rows) {
+  if (!rows.length) return note("nothing yet: the robot has not told its lists");
+  return table(["variable", "list", "#came, 1/s", "of the promise", "#promised, 1/s", "#gaps", "#longest", "#last"],
+    rows.map((row) => [row.name, row.list, rate(row.rate_hz), achieved(row, row.name), `${row.regular ? "" : "≥ "}${rate(row.promised_hz)}`, ...gaps(row)]));
 }
 
 export function faults(rows, ask) {
