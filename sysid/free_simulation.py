@@ -555,6 +555,7 @@ class _Fit:
         new.size_p = np.concatenate((self.size_p[:count], np.where(added != 0.0, np.abs(added), 1.0)))
         new.moves = np.concatenate((np.ones(count), np.full(len(added), 0.0 if fixed else 1.0)))
         new.came_from = (new.x, new.u, new.p)
+        new.at_ports = np.zeros((*self.at_ports.shape[:2], len(added)))  # found by the first round, if anything acts
         return new
 
     def _acting_now(self) -> Array:
