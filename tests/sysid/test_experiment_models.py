@@ -308,7 +308,135 @@ def positioning():
     }
 
 
-SECOND_BOOK = {"motor-bench": motor_bench, "leg-swing": leg_swing, "ankle": ankle, "positioning": positioning}
+def walk():
+    b = Book(12.0)
+    hip_K, ankle_K, f = 66.0 * K, 0.612, 1.0 / 1.2  # a stride is two steps of 0.6 s
+    swing = b.sine((1.0, f, 0.0))
+    stance, other = 1.0 / (1.0 + np.exp(-16.0 * swing)), 1.0 / (1.0 + np.exp(16.0 * swing))
+    double = np.exp(-(swing**2) / 0.0144)
+    hip = b.sine((0.35, f, 0.3), (0.06, 3.0 * f, 1.0), (0.01, 0.31, 0.0))
+    leg = b.sine((0.22, f, 0.9), (0.04, 2.0 * f, 0.4), (0.01, 0.23, 0.5))
+    wh, wl = b.rate(hip), b.rate(leg)
+    torque = 0.55 * b.rate(wh) + 7.6 * hip + 3.0 * np.sin(leg)
+    current = (torque + 0.1 * np.tanh(20.0 * wh)) / hip_K
+    supply = 24.0 - 0.2 * abs(current)
+    duty = (R * current + hip_K * wh) / supply
+    total = (hip_K * current * wh + 12.0) / supply
+    warm = b.lag(current**2, 60.0)
+    ankles = {}
+    for name, phase, on, sound in (("outer", 0.2, stance, False), ("inner", 0.2 + math.pi, other, True)):
+        angle = 1.2 + b.sine((0.5, f, phase), (0.2, 2.0 * f, phase))
+        w = b.rate(angle)
+        tau = 3.0 * on * (1.0 + b.sine((0.5, f, phase + 1.0))) + 0.134 * (angle - 1.66)
+        fault = {} if sound else {"lost_counts": 1.0 * (abs(w) > 2.0)}
+        cable = b.cable(f"{name} ", tau, 14.0)
+        if sound:
+            cable = {f"{name} cable": (cable[f"{name} cable"][0], {}, {}, 2e-4)}
+        ankles |= {
+            f"{name} motor": (
+                [(f"{name} wm", -0.00185, 1), (f"{name} I", ankle_K, 0), (f"{name} wm", -0.01, 0),
+                 (f"{name} tau", -1.0, 0)],
+                {"K": tau + 0.1 * np.tanh(20.0 * w), "C_0": np.tanh(20.0 * w), "C_1": w},
+                {} if sound else {"return_spring": angle * angle},
+                None,
+            ),
+            **cable,
+            **b.turning(f"{name} motor turning", f"{name} m", f"{name} wm", **fault),
+            **b.turning(f"{name} joint turning", f"{name} q", f"{name} w"),
+            **b.sensor(f"{name}_ankle_angle_rad", f"{name} q", 2e-4, **({} if sound else {"bit_flip": b.flips()})),
+            **b.sensor(f"{name}_ankle_rate_rad_per_s", f"{name} w", 0.02),
+            **b.sensor(f"{name}_motor_angle_rad", f"{name} m", 2e-4),
+            **b.sensor(f"{name}_ankle_current_A", f"{name} I", 0.02),
+        }  # fmt: skip
+    return b, {
+        **b.winding("hip ", current, wh, hip_K, supply, torque_constant_temperature=hip_K * wh * warm),
+        "hip": (
+            [("hip w", -0.55, 1), ("hip", -7.6, 0), ("leg", -3.0, 0), ("hip I", hip_K, 0)],
+            {"J": b.rate(wh), "m g c": np.sin(leg), "k_h": hip, "C_0": np.tanh(wh / 0.03), "C_1": wh,
+             "K": hip_K * current},
+            {
+                **b.friction(wh, torque, 0.01, 0.3),
+                "torque_constant_temperature": hip_K * current * warm,
+                "cogging": np.sin(264.0 * hip),
+                "commutation_ripple": torque * np.sin(462.0 * hip),
+                "once_per_turn": np.sin(3.0 * hip + 0.3),
+                "hip_spring_bend": hip * hip * hip,
+                "spring_value": hip,
+                "leg_asymmetry": (stance - other) * np.cos(leg),
+            },
+            None,
+        ),
+        **b.turning("hip turning", "hip", "hip w"),
+        **b.turning("leg turning", "leg", "leg w"),
+        "stance": (
+            [("leg w", -10.0, 1), ("leg", 60.0 * stance, 0), ("hip", 20.0 * other, 0), ("outer tau", stance, 0),
+             ("inner tau", other, 0)],
+            {"m": b.rate(wl)},
+            {
+                "inertia": np.sin(leg) + b.rate(wl) / 5.0,
+                "floor": 1.0,
+                "contact_loss": double * b.sine((1.0, f, math.pi / 2.0)) + 0.3 * np.sign(wl) * stance,
+                "leg_asymmetry": stance - other,
+                "geometry": np.sign(leg) * np.sin(leg) ** 2,
+            },
+            0.5,
+        ),
+        "closure": (
+            [("leg", double, 0), ("hip", -double / 2.0, 0)],
+            {},
+            {"geometry": double * np.sign(hip), "floor": double / 2.0},
+            2e-3,
+        ),
+        **ankles,
+        "power": (
+            [("battery V", total, 0), ("battery I", supply, 0), ("hip I", -2.0 * R * current - hip_K * wh, 0),
+             ("hip w", -hip_K * current, 0)],
+            {"fixed": 1.0},
+            {"pwm_ripple": (2.0 * abs(current) + 1.0) / 20.0},
+            0.2,
+        ),
+        "battery": (
+            [("battery V", 1.0, 0), ("battery I", 0.1, 0)],
+            {"empty voltage": 1.0},
+            {"battery_sag": total, "charge_drift": b.total(total)},
+            0.02,
+        ),
+        **b.sensor(
+            "hip_angle_rad", "hip", 2e-4, **{"sensor_offset@angle": 1.0, "eccentricity": np.sin(2.0 * hip + 0.4)}
+        ),
+        **b.sensor("hip_rate_rad_per_s", "hip w", 0.02, sensor_lag=b.rate(wh)),
+        **b.sensor(
+            "outer_leg_rate_rad_per_s",
+            "leg w",
+            0.01,
+            **{
+                "sensor_scale@gyro": wl,
+                "sensor_offset@gyro": 1.0,
+                "gyro_misalignment": b.sine((0.2, f, 2.0), (0.1, 2.0 * f, 0.1)),
+                "clock_drift": b.rate(wl) * b.t,
+            },
+        ),
+        **b.sensor("outer_leg_angle_rad", "leg", 5e-3),
+        **b.current_sensor("hip_current_A", "hip I", current, duty),
+        **b.sensor("hip_voltage_V", "hip V", 0.05, voltage_clip=duty * (abs(duty) > 0.3)),
+        **b.sensor("battery_voltage_V", "battery V", 0.02),
+        **b.sensor("battery_current_A", "battery I", 0.02),
+        "hip law": (
+            [("hip I", 1.0, 0), ("hip", 5.0, 0), ("hip w", 0.5, 0)],
+            {"target": np.sign(hip)},
+            {"firmware_parameter": hip},
+            0.05,
+        ),
+    }  # fmt: skip
+
+
+SECOND_BOOK = {
+    "motor-bench": motor_bench,
+    "leg-swing": leg_swing,
+    "ankle": ankle,
+    "positioning": positioning,
+    "walk": walk,
+}
 
 
 def close(found, expected, what):
