@@ -29,8 +29,15 @@ def smooth(table: Table, column: Array, width: float) -> Array:
 
 
 def derivative(table: Table, column: Array, width: float) -> Array:
-    """Rate per second of the smoothed column."""
+    """Rate per second of the smoothed column.
+
+    The derivative of a Gaussian narrower than a sample, taken at samples, makes a rate too small, in the end 0: then by
+    differences of the smoothed column over two samples.
+    """
     step_s = table.step_s
+    if width < 1.0:
+        smoothed = smooth(table, column, width)
+        return per_run(table, lambda part: np.gradient(part, step_s) if len(part) > 1 else np.zeros(1), smoothed)
     return per_run(table, lambda part: ndimage.gaussian_filter1d(part, width, order=1, mode="nearest") / step_s, column)
 
 

@@ -34,6 +34,24 @@ def test_the_derivative_of_a_ramp_is_its_slope_away_from_the_ends():
         assert rate[inside] == pytest.approx(np.full(140, 3.0), rel=1e-3)
 
 
+@pytest.mark.parametrize("width", [0.05, 0.3, 0.6, 0.99, 1.0, 1.5])
+def test_a_ramp_has_its_slope_under_a_gaussian_narrower_than_a_sample_too(width):
+    """It had a twelfth of it under 0.3 samples: a current's lag, logged every 10 ms, came out twelve times as long."""
+    one = table()
+    rate = signals.derivative(one, 3.0 * one.time_s, width)
+    for inside in (slice(10, 190), slice(210, 390)):
+        assert rate[inside] == pytest.approx(np.full(180, 3.0), rel=1e-3)
+    single = Table(np.array([0.0, 0.1, 0.2, 5.0]), {}, (slice(0, 3), slice(3, 4)))
+    assert signals.derivative(single, np.array([0.0, 1.0, 2.0, 7.0]), width)[3] == 0.0
+
+
+def test_a_jump_under_a_narrow_gaussian_is_a_difference_over_two_samples():
+    one = table()
+    jump = (np.arange(400) >= 100).astype(float)
+    rate = signals.derivative(one, jump, 0.05)
+    assert rate[[98, 99, 100, 101]] == pytest.approx([0.0, 50.0, 50.0, 0.0])
+
+
 def test_a_gaussian_of_so_many_samples_weakens_a_sine_by_its_known_factor():
     one = table()
     omega = 2.0 * math.pi / 40.0  # per sample
