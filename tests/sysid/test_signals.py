@@ -45,6 +45,16 @@ def test_a_ramp_has_its_slope_under_a_gaussian_narrower_than_a_sample_too(width)
     assert signals.derivative(single, np.array([0.0, 1.0, 2.0, 7.0]), width)[3] == 0.0
 
 
+@pytest.mark.parametrize("width", [1.0, 1.5])
+def test_from_a_sample_s_width_on_the_rate_of_a_sine_is_the_gaussian_s(width):
+    """Differences over two samples would make it smaller by 4.5 %."""
+    one = table()
+    omega = 2.0 * math.pi / 12.0  # per sample
+    rate = signals.derivative(one, np.sin(omega * np.arange(400)), width)
+    expected = omega / STEP_S * math.exp(-0.5 * (width * omega) ** 2) * np.cos(omega * np.arange(400))
+    assert rate[40:160] == pytest.approx(expected[40:160], abs=0.003 * omega / STEP_S)
+
+
 def test_a_jump_under_a_narrow_gaussian_is_a_difference_over_two_samples():
     one = table()
     jump = (np.arange(400) >= 100).astype(float)
