@@ -96,6 +96,9 @@ def sensors():
     fast = [{"speed_rad_s": part * top("w") / 10.0} for part in range(2, 10)]
     offset = -(K - MU_K * s["sgn_w"] * s["sgn_I"])
 
+    def fast_by_voltage(p):
+        return beyond(s["w_by_voltage"], p["speed_rad_s"])
+
     def twice(angle):
         return np.hstack((waves(angle), waves(2.0 * angle)))
 
@@ -110,7 +113,8 @@ def sensors():
         Row("sensor_offset", "speed_rad_per_s", S, ("offset_rad_s",),
             lambda p: {"electric": -K * ones, "mechanical": C_1 * ones, T: -ones}),
         Row("current_step_at_zero_duty", "current_A", S, ("offset_A",),
-            lambda p: {"electric": -R * np.tanh(s["V_by_torque"] / near), "mechanical": offset * np.tanh(s["V"] / near)}),
+            lambda p: {"electric": -R * np.tanh(s["V_by_torque"] / near),
+                       "mechanical": offset * np.tanh(s["V"] / near)}),
         Row("sensor_lag", "voltage_V", S, ("time_constant_s",), electric(lambda p: -s["dV"])),
         Row("sensor_lag", "current_A", S, ("time_constant_s",),
             lambda p: {"electric": R * s["dI"], "mechanical": K * s["dI"]}),
@@ -123,9 +127,9 @@ def sensors():
         Row("eccentricity", "motor_angle_rad", S, ("cosine_rad", "sine_rad", "cosine_twice_rad", "sine_twice_rad"),
             lambda p: {T: turning(twice(s["angle"]))}, phase_is_free=True),
         Row("lost_counts", "speed_rad_per_s", S, ("share",),
-            lambda p: {"electric": K * beyond(s["w"], p["speed_rad_s"]), T: beyond(s["w_by_voltage"], p["speed_rad_s"])},
+            lambda p: {"electric": K * beyond(s["w"], p["speed_rad_s"]), T: fast_by_voltage(p)},
             fast, scale="speed_rad_s"),
-        Row("lost_counts", "motor_angle_rad", S, ("share",), lambda p: {T: -beyond(s["w_by_voltage"], p["speed_rad_s"])},
+        Row("lost_counts", "motor_angle_rad", S, ("share",), lambda p: {T: -fast_by_voltage(p)},
             fast, scale="speed_rad_s"),
         Row("clock_drift", "torque_Nm", S, ("share",), mechanical(lambda p: s["t"] * s["dT"])),
     ]  # fmt: skip
@@ -137,7 +141,8 @@ def friction():
     limit = C_0 + MU_K * abs(current)
     drives = np.array([1.0 if a * b > 0.0 else 0.0 for a, b in zip(current, w, strict=True)])
     return [
-        Row("stribeck", MOTOR, M, ("excess_Nm",), mechanical(lambda p: -sign * np.exp(-np.square(w / p["speed_rad_s"]))),
+        Row("stribeck", MOTOR, M, ("excess_Nm",),
+            mechanical(lambda p: -sign * np.exp(-np.square(w / p["speed_rad_s"]))),
             [{"speed_rad_s": part * top("w") / 100.0} for part in (1, 2, 4, 8, 16, 30, 50)], scale="speed_rad_s",
             **positive("excess_Nm")),
         Row("presliding", MOTOR, M, ("share_of_friction",),
@@ -268,7 +273,7 @@ def test_signals_of_a_noiseless_bench_are_the_motion_s_own(measured):
     assert s["angle"] - offset == pytest.approx(true["angle"], abs=1e-3)
     assert s["t"] == pytest.approx(run.time_s - 2.0, abs=1e-12)
     assert s["warmth"][200:-200] == pytest.approx(run["temperature_C"][200:-200] - 25.0, abs=1e-3)
-    assert s["V_by_torque"][calm] == pytest.approx(true["V"][calm], abs=0.1)
+    assert s["V_by_torque"][calm] == pytest.approx(true["V"][calm], abs=0.02 * np.ptp(true["V"]))
     assert s["sgn_I"][calm].tolist() == np.sign(true["I"][calm]).tolist()
     assert s["sgn_w"][calm].tolist() == np.sign(true["w"][calm]).tolist()
     for name, of in (("dI", "current_A"), ("dT", "torque_Nm"), ("dV", "voltage_V")):
@@ -283,7 +288,8 @@ def test_balances_of_a_noiseless_bench_are_closed_by_its_own_numbers(measured):
     run, true = driven(measured)
     made = MotorBench().prepare(run)
     numbers = {
-        "electric": {"resistance_ohm": 1.5, "contact_drop_V": 0.6, "torque_constant_Nm_per_A": 0.25, "inductance_H": 0.0},
+        "electric": {"resistance_ohm": 1.5, "contact_drop_V": 0.6, "torque_constant_Nm_per_A": 0.25,
+                     "inductance_H": 0.0},
         "mechanical": {"torque_constant_Nm_per_A": 0.25, "constant_friction_Nm": 0.04, "viscous_friction_Nms": 0.01,
                        "load_friction_Nm_per_A": 0.03, "inertia_kg_m2": 0.002},
     }  # fmt: skip
@@ -306,7 +312,7 @@ def test_balances_of_a_noiseless_bench_are_closed_by_its_own_numbers(measured):
 
 
 def test_rows_near_jumps_turns_and_ends_do_not_count():
-    """Of rows in the middle of a run those count that are some samples off: jumps of V, turns of the sign of I and w."""
+    """Jumps of V, turns of the sign of I and w: what is some samples off counts."""
     run, true = driven()
     volts = run["voltage_V"] + 3.0 * (np.arange(len(run)) == 3000)
     jumped = Table(run.time_s, run.columns | {"voltage_V": volts}, run.runs, "bench")
@@ -317,10 +323,6 @@ def test_rows_near_jumps_turns_and_ends_do_not_count():
     for name, signal in (("electric", "I"), ("mechanical", "w")):
         turns = np.flatnonzero(np.diff(np.sign(true[signal])) != 0.0)
         off = ~sound[name].valid
-        steps = {
-            "electric": np.abs(np.diff(run["voltage_V"], prepend=run["voltage_V"][0])) > 0.06 * np.ptp(run["voltage_V"])
-        }
-        assert not steps["electric"].all()
         assert all(off[turn - 1 : turn + 3].all() for turn in turns if 20 < turn < len(run) - 20)
 
 
