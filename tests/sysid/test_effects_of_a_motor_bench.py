@@ -4,8 +4,10 @@ import math
 
 import numpy as np
 import pytest
+from scipy import ndimage
 
 from ranger_sim.foundation.random_arrays import generator
+from ranger_sim.foundation.user_error import UserError
 from ranger_sim.sysid.dataset import Table
 from ranger_sim.sysid.machine import Recording
 from ranger_sim.sysid.machines.motor_bench import MotorBench, stand_ins
@@ -279,6 +281,9 @@ def test_signals_of_a_noiseless_bench_are_the_motion_s_own(measured):
     for name, of in (("dI", "current_A"), ("dT", "torque_Nm"), ("dV", "voltage_V")):
         slope = np.gradient(run[of], 0.001)
         assert np.max(np.abs(s[name] - slope)[calm]) < 0.02 * np.max(np.abs(slope[calm])), name
+    # by two ways that have no noise in common with what they stand for
+    dw = np.gradient(ndimage.gaussian_filter1d(s["w"], 5.0, mode="nearest") if measured else s["w_by_voltage"], 0.001)
+    assert np.allclose(s["dw"], dw, rtol=1e-9, atol=1e-9 * np.ptp(dw))
     assert made.lags == ((0, 10, 30, 100) if measured else (0, 100, 250))
     assert set(made.equations) == {"electric", "mechanical", *(["transmission"] if measured else [])}
 
@@ -309,6 +314,28 @@ def test_balances_of_a_noiseless_bench_are_closed_by_its_own_numbers(measured):
         assert turning.columns == {} and not turning.lines
         assert np.max(np.abs(turning.response[turning.valid])) < 1e-4 * np.ptp(true["w"])
         assert np.flatnonzero(~turning.valid).tolist() == [0, 1, 2, 3, *range(len(run) - 4, len(run))]
+
+
+def test_a_bench_whose_signals_are_of_different_motions_is_told():
+    run, true = driven()
+    columns = run.columns
+
+    def refused(**changed):
+        return Table(run.time_s, columns | changed, run.runs, "bench")
+
+    for changed, line in (
+        ({"voltage_V": -0.6 * true["w"] + 1.5 * true["I"]}, "voltage_V and speed_rad_per_s have opposite signs"),
+        ({"motor_angle_rad": -true["angle"]}, "turns the other way round as speed_rad_per_s"),
+        ({"motor_angle_rad": 2.1 * true["angle"]}, "turns 2.09 times as fast as speed_rad_per_s"),
+        ({"motor_angle_rad": true["angle"] / 2.1}, r"turns 0.47\d times as fast as speed_rad_per_s"),
+        ({"motor_angle_rad": np.cumsum(true["I"])}, "are not the same motion"),
+    ):
+        with pytest.raises(UserError, match=line):
+            MotorBench().prepare(refused(**changed))
+    for share in (1.9, 1.0 / 1.9):
+        MotorBench().prepare(refused(motor_angle_rad=share * true["angle"]))
+    # a drop of the winding as large as the voltage leaves little: it does not go against the speed yet
+    MotorBench().prepare(refused(voltage_V=1.5 * true["I"] + 0.6 * np.sign(true["I"]) + 0.002 * true["w"]))
 
 
 def test_rows_near_jumps_turns_and_ends_do_not_count():
