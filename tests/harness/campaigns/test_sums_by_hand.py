@@ -106,7 +106,8 @@ def test_how_shares_are_to_be_read_is_told_by_the_design():
 )
 def test_a_tolerance_is_held_against_the_times(times, sample, expected):
     rows = [
-        run(str(n), "masked", detected=[error("A", "X", each)] if each < math.inf else []) for n, each in enumerate(times)
+        run(str(n), "masked", detected=[error("A", "X", each)] if each < math.inf else [])
+        for n, each in enumerate(times)
     ]
     wanted = Tolerance("detection", 30.0, 0.75, sample or 0.95)
     told = summary.tolerance(plan(sample=Sample(9) if sample else None), wanted, rows)
@@ -239,7 +240,10 @@ def test_a_replay_is_the_walk_itself_or_the_campaigns_where_more_was_set():
 
 def test_everything_of_a_small_campaign_adds_up():
     made = plan(
-        axes={"fault": [STUCK], "x": [1, 2]}, tolerances=(Tolerance("detection", 50.0, 0.5),), search=None, machine="m:x"
+        axes={"fault": [STUCK], "x": [1, 2]},
+        tolerances=(Tolerance("detection", 50.0, 0.5),),
+        search=None,
+        machine="m:x",
     )
     made = Made(
         **{name: getattr(made, name) for name in (*made.__dataclass_fields__, "design")},
@@ -284,7 +288,11 @@ def test_everything_of_a_small_campaign_adds_up():
     assert [each["key"] for each in told["worst"]] == ["e", "a"] and [each["key"] for each in told["unsure"]] == ["d"]
     assert told["worst"][1]["detected"] == error("MCH", "X", 5.0) and told["worst"][0]["detected"] is None
     first, second = told["rows"][:2]
-    assert (first["first_firmware"], first["first_firmware_ms"], first["detected_by"]) == ("V on can1", 2.0, "X from MCH")
+    assert (first["first_firmware"], first["first_firmware_ms"], first["detected_by"]) == (
+        "V on can1",
+        2.0,
+        "X from MCH",
+    )
     assert (second["first_firmware"], second["first_firmware_ms"], second["detected_by"]) == ("", None, "")
     whole.foreseen = 6
     assert summary.of(whole)["tolerances"] == [] and not summary.of(whole)["finished"]
