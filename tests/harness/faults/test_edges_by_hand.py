@@ -44,7 +44,7 @@ class Line:
         self.fault.begin(START)
 
     def step(self, *edges_us, clear=None):
-        """Send edges, in us after the first step's start, upwards; a negative one goes down. [(us, A, B)] that arrive."""
+        """[(us, A, B)] that arrive of edges at these us after the first step began; a negative one goes down."""
         for each in edges_us:
             way = -1 if each < 0 else 1
             self.encoder.cell += way
