@@ -9,6 +9,8 @@ import pathlib
 from ranger_sim.plant import terms
 from ranger_sim.sysid import causes, machines
 from ranger_sim.sysid.fit import Parameter
+from ranger_sim.sysid.machines import ankle
+from ranger_sim.sysid.machines.walk import base
 from ranger_sim.tools.command_line.files import replace_file
 
 PAGE = pathlib.Path(__file__).parent / "reference/causes.md"
@@ -43,6 +45,16 @@ def page() -> str:
         for known in machine.parameters:
             limits = f"{known.low:g} to {known.high:g}"
             lines.append(f"| {known.name} | {known.unit} | {known.value:.6g} | {limits} | {known.meaning} |")
+    lines += ["", "## What sound ankles differ in", ""]
+    lines.append("As a standard deviation from what the machine knows. The second column is for a recording of the")
+    lines.append("joint alone, of which the model misses far more than noise; empty: anything.")
+    lines += ["", "| | deviation | by the joint alone |", "|---|---|---|"]
+    for name, deviation in ankle.SPREAD.items():
+        loose = f"{ankle.LOOSE[name]:.6g}" if name in ankle.LOOSE else ""
+        lines.append(f"| {name} | {deviation:.6g} | {loose} |")
+    lines += ["", "## What sound walking robots differ in", "", "| | value | deviation |", "|---|---|---|"]
+    for name, (value, deviation) in base.PRIORS.items():
+        lines.append(f"| {name} | {value:.6g} | {deviation:.6g} |")
     for name in ("motor", "springs", "ankle"):
         module = importlib.import_module(f"ranger_sim.sysid.identify.{name}")
         lines += ["", f"## Unknowns of identify/{name}.py", "", "| | unit | start | limits | known to | source |"]
