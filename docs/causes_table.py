@@ -4,10 +4,11 @@ python docs/causes_table.py
 """
 
 import importlib
+import math
 import pathlib
 
 from ranger_sim.plant import terms
-from ranger_sim.sysid import causes, machines
+from ranger_sim.sysid import causes, instruments, machines
 from ranger_sim.sysid.fit import Parameter
 from ranger_sim.sysid.machines import ankle
 from ranger_sim.sysid.machines.walk import base
@@ -64,6 +65,15 @@ def page() -> str:
             known_to = f"{unknown.uncertainty:g}" if unknown.uncertainty else ""
             cells = (unknown.name, unknown.unit, f"{unknown.value:.6g}", limits, known_to, unknown.source)
             lines.append(f"| {' | '.join(cells)} |")
+    lines += ["", "## Instruments of the virtual benches", ""]
+    lines.append("Noise, offset and gain as standard deviations; offset and gain are drawn once for a recording.")
+    lines += ["", "| | unit | noise | a count | offset | gain | range | source |", "|---|---|---|---|---|---|---|---|"]
+    for one in (each for each in vars(instruments).values() if isinstance(each, instruments.Instrument)):
+        ends = f"{one.low:g} to {one.high:g}" if one.high < math.inf else ""
+        sizes = " | ".join(f"{size:.6g}" for size in (one.noise, one.resolution, one.offset, one.gain))
+        lines.append(f"| {one.name} | {one.unit} | {sizes} | {ends} | {one.source} |")
+    lines.append(f"| tape measure | m | {instruments.TAPE_M:g} | | | | | 1 mm as its limit |")
+    lines.append(f"| calliper | m | {instruments.CALLIPER_M:g} | | | | | 0.1 mm as its limit |")
     lines += [
         "",
         "## Forms of a model file",

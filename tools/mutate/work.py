@@ -32,6 +32,8 @@ START_S = 60.0
 LOOP_S = 5.0  # a test that takes so much more processor time than it did is in a loop
 BUILD_S = 600.0  # nor one module to be built, on a machine that has other work
 NOTHING: dict[str, Any] = {"imported": [], "shared": [], "tests": {}, "late": {}, "failed": []}  # a map without tests
+# They hold tables of modules that run nothing but their import: the map of functions cannot tell so.
+TABLES = ("tests/sysid/test_causes_are_documented.py",)
 NO_SUCH_TEST = 4  # pytest's exit code
 LIMIT_TEST_S = 20.0  # of processor time: a test that takes longer takes no part; chosen by us
 
@@ -247,6 +249,7 @@ class TestsOf:
     def __init__(self, found: dict[str, dict[str, Any]]) -> None:
         self.tests: dict[str, dict] = {name: test for each in found.values() for name, test in each["tests"].items()}
         self.known = set(self.tests) | {name for each in found.values() for name in each["late"]}
+        self.tables = {name for name in self.tests if name.partition("::")[0] in TABLES}
         self.starting = {name for name, test in self.tests.items() if test["starts"]}
         self.late: dict[str, set[str]] = {}
         for each in found.values():
@@ -280,7 +283,7 @@ class TestsOf:
         """
         place = f"{mutant.path}:{mutant.first_line}"
         late = not self.at_import(mutant)
-        reach = self.by_function.get(place, set()) if late else self.by_module.get(mutant.path, set())
+        reach = self.by_function.get(place, set()) if late else self.by_module.get(mutant.path, set()) | self.tables
         chosen: list[str] = []
         left = len(self.late.get(place, ()))
         for names in (reach, self.starting - reach):
@@ -324,7 +327,7 @@ class TestsOf:
     def leave_out(self, name: str) -> None:
         """Never choose this test again."""
         del self.tests[name]
-        for names in (*self.by_function.values(), *self.by_module.values(), self.starting):
+        for names in (*self.by_function.values(), *self.by_module.values(), self.starting, self.tables):
             names.discard(name)
 
     def seconds(self, names: list[str]) -> float:
