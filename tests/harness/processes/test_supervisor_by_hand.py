@@ -1,0 +1,349 @@
+"""What the supervisor says and does, piece by piece, with clocks, kernels and children made by hand."""
+
+import contextlib
+import json
+import os
+import signal
+from types import SimpleNamespace as Made
+
+import pytest
+
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.harness.processes import places, supervisor
+from ranger_sim.harness.processes.requests import Request
+from ranger_sim.harness.processes.settings import Settings
+from ranger_sim.harness.processes.supervisor import GONE, HANG_S, PLANT, RESTARTING, RUNNING, STOPPED, Child, Supervisor
+from ranger_sim.harness.ranger import Ranger
+from ranger_sim.harness.stop_rule import StopRule
+
+
+class Said(supervisor.View):
+    """Everything that was said and shown."""
+
+    def __init__(self):
+        self.lines, self.shown = [], []
+
+    def say(self, text):
+        self.lines.append(text)
+
+    def show(self, state):
+        self.shown.append(state)
+
+    def heard(self):
+        """What was said since the last call."""
+        lines, self.lines = self.lines, []
+        return lines
+
+
+@pytest.fixture(scope="module")
+def robot():
+    with contextlib.closing(Ranger()) as made:
+        yield made
+
+
+@pytest.fixture
+def alone(robot, monkeypatch):
+    """A supervisor that has started nothing. `clock`, `kernel`: what it is told of time and processes; `killed`."""
+    settings = Settings(None, name=f"by-hand-{os.getpid()}", real_time=False)
+    with contextlib.closing(Supervisor(robot, settings, StopRule(time_s=1.0), lambda *_: 0, Said())) as made:
+        made.clock = Made(now=100.0)
+        made.states, made.used, made.killed, made.answers = {}, {}, [], []
+        monkeypatch.setattr(supervisor, "wallclock", Made(monotonic_s=lambda: made.clock.now))
+        monkeypatch.setattr(
+            supervisor,
+            "kernel",
+            Made(
+                state_of=lambda process: made.states.get(process, "S"),
+                processor_time_s=lambda process: made.used.get(process, 0.0),
+            ),
+        )
+        monkeypatch.setattr(supervisor.os, "kill", lambda *what: made.killed.append(what))
+        monkeypatch.setattr(made.control, "answer", lambda *what: made.answers.append(what))
+        yield made
+
+
+def plants(alone):
+    """Orders that the plant's process has been given."""
+    found = []
+    with contextlib.suppress(BlockingIOError):
+        while True:
+            found.append(json.loads(alone.plant_link.recv(1 << 16, 0x40)))
+    return found
+
+
+def tells(alone, **news):
+    alone.plant_link.send(json.dumps(news).encode())
+    alone.hear_plant()
+
+
+# ---- boards that hang
+
+
+def test_a_board_that_keeps_its_turn_too_long_is_killed_and_told(alone):
+    alone.children["MCH"] = Child("MCH", 41)
+    words = alone.blocks["MCH"].words
+    words[places.ASKED], words[places.ANSWERED] = 7, 6
+    alone.used[41] = 3.0
+    alone.look()
+    alone.clock.now += HANG_S - 0.001
+    alone.look()
+    assert alone.killed == [] and alone.view.heard() == []
+    alone.clock.now += 0.001
+    alone.used[41] = 4.25
+    alone.look()
+    assert alone.killed == [(41, signal.SIGKILL)]
+    assert alone.view.heard() == [
+        f"MCH (process 41) hangs: no answer for {HANG_S:.1f} s, 1.2 s of them computing; it is killed"
+    ]
+    alone.clock.now += HANG_S / 2
+    alone.look()
+    assert len(alone.killed) == 1  # it is given its time anew
+    assert alone.children["MCH"].was_asked
+
+
+@pytest.mark.parametrize(
+    ("change", "killed"),
+    [
+        ({}, True),
+        ({"answered": 7}, False),
+        ({"asked": 8}, False),
+        ({"state": STOPPED}, False),
+        ({"kernel": "T"}, False),
+        ({"kernel": "t"}, False),
+        ({"kernel": "Z"}, False),
+        ({"kernel": ""}, False),
+        ({"kernel": "R"}, False),  # it would like to run, and has not had the processor
+        ({"kernel": "R", "used": HANG_S / 2}, True),
+        ({"kernel": "R", "used": HANG_S / 2 - 0.01}, False),
+        ({"held": 1}, False),
+    ],
+)
+def test_a_board_hangs_only_when_it_has_its_turn_and_could_run(alone, change, killed):
+    child = alone.children["MCH"] = Child("MCH", 41)
+    words = alone.blocks["MCH"].words
+    words[places.ASKED], words[places.ANSWERED] = 7, 6
+    alone.look()
+    words[places.ASKED] = change.get("asked", 7)
+    words[places.ANSWERED] = change.get("answered", 6)
+    words[places.HELD] = change.get("held", 0)
+    child.state = change.get("state", RUNNING)
+    alone.states[41], alone.used[41] = change.get("kernel", "S"), change.get("used", 0.0)
+    alone.clock.now += HANG_S
+    alone.look()
+    assert bool(alone.killed) is killed
+
+
+def test_a_board_that_a_debugger_has_is_told_once_each_time(alone):
+    words = alone.blocks["MCH"].words
+    words[places.HELD] = 1
+    assert alone.is_held("MCH", words) and alone.is_held("MCH", words)
+    assert alone.view.heard() == ["MCH is held by its debugger, or waits for it: all wait"]
+    words[places.HELD] = 0
+    assert not alone.is_held("MCH", words)
+    words[places.HELD] = 1
+    assert alone.is_held("MCH", words) and len(alone.view.heard()) == 1
+
+
+def test_a_plant_without_progress_is_named_once_until_it_goes_on(alone):
+    plant = alone.children[PLANT] = Child(PLANT, 50, turn=0)
+    alone.stage[0][places.HEARTBEAT_NS] = 5
+    alone.look()
+    alone.clock.now += HANG_S
+    alone.look()
+    assert alone.view.heard() == []
+    alone.clock.now += 0.5
+    alone.states[50] = "T"
+    alone.look()
+    assert alone.view.heard() == []
+    alone.states[50] = "S"
+    alone.look()
+    alone.clock.now += 5
+    alone.look()
+    assert alone.view.heard() == [f"{PLANT} (process 50) hangs: no progress for {HANG_S + 0.5:.1f} s"]
+    alone.stage[0][places.HEARTBEAT_NS] = 6
+    alone.look()
+    assert plant.turn == 0
+    alone.clock.now += HANG_S + 0.1
+    alone.blocks["MCH"].words[places.ASKED] = 1  # a board keeps it waiting
+    alone.look()
+    assert alone.view.heard() == []
+    alone.blocks["MCH"].words[places.ANSWERED] = 1
+    alone.clock.now += HANG_S + 0.1
+    alone.look()
+    assert len(alone.view.heard()) == 1
+    alone.ending = True
+    shown = len(alone.view.shown)
+    alone.clock.now += 99
+    alone.look()
+    assert alone.view.heard() == [] and len(alone.view.shown) == shown
+
+
+# ---- children that end
+
+
+@pytest.mark.parametrize(
+    ("code", "told"),
+    [(-9, "MCH (process 41) was killed by signal 9"), (3, "MCH (process 41) ended with code 3: broken")],
+)
+def test_a_board_that_ended_is_told_with_its_reason_and_waited_for_no_longer(alone, code, told):
+    child = alone.children["MCH"] = Child("MCH", 41)
+    if code > 0:
+        alone.blocks["MCH"].leave_fault("broken")
+    alone.ended(child, code)
+    assert alone.view.heard() == [told] and child.state == GONE
+    assert alone.blocks["MCH"].words[places.FATE] == 1 and plants(alone) == []
+    assert os.eventfd_read(alone.blocks["MCH"].answer_descriptor) == 1
+
+
+def test_a_board_that_was_to_be_restarted_gets_its_room_and_then_its_process(alone, monkeypatch):
+    child = alone.children["MCH"] = Child("MCH", 41, state=RESTARTING)
+    alone.ended(child, -9)
+    assert child.state == RESTARTING and alone.view.heard() == []
+    assert plants(alone) == [{"do": "make_room", "board": "MCH", "number": "restart MCH"}]
+    started = []
+    monkeypatch.setattr(alone, "start_board", lambda name, fresh: started.append((name, fresh)))
+    tells(alone, answer="restart MCH", time_s=1.25)
+    assert started == [("MCH", True)] and plants(alone) == [{"do": "revive", "board": "MCH"}]
+    assert alone.view.heard() == ["MCH restarted at 1.250 s of the robot's time"]
+
+
+def test_a_board_that_ends_while_the_run_does_is_not_restarted(alone):
+    for change in ({"ending": True}, {"interrupts": 1}):
+        for name, value in {"ending": False, "interrupts": 0, **change}.items():
+            setattr(alone, name, value)
+        alone.ended(Child("MCH", 41, state=RESTARTING), 1)
+        assert plants(alone) == []
+    alone.ending = True
+    alone.view.heard()
+    alone.ended(Child("MCH", 41), 0)
+    assert alone.view.heard() == []
+    alone.ended(Child("MCH", 41), 2)
+    assert alone.view.heard() == ["MCH (process 41) ended with code 2"]
+
+
+@pytest.mark.parametrize(
+    ("ending", "code", "exit_code", "told"),
+    [
+        (True, 0, 0, ""),
+        (True, 3, 3, ""),
+        (True, -9, 1, "was killed by signal 9"),
+        (False, 0, 1, "ended with code 0"),
+        (False, 2, 1, "ended with code 2"),
+    ],
+)
+def test_the_end_of_the_plant_is_that_of_the_run(alone, ending, code, exit_code, told):
+    alone.ending = ending
+    alone.ended(Child(PLANT, 50), code)
+    assert alone.exit_code == exit_code
+    lines = [f"{PLANT} (process 50) {told}: the run is lost, no files are finished"] if told else []
+    assert alone.view.heard() == lines
+
+
+# ---- news, orders and requests
+
+
+def test_news_of_the_plant_are_kept_said_and_answered(alone):
+    tells(alone, status={"time_s": 3.0, "damaged": {"MCH": 2}})
+    assert alone.status == {"time_s": 3.0, "damaged": {"MCH": 2}}
+    tells(alone, gone="MCH", time_s=2.5)
+    assert alone.view.heard() == ["MCH is off its bus since 2.500 s of the robot's time"]
+    tells(alone, answer=7, time_s=2.0)
+    tells(alone, answer=0, time_s=2.5)
+    tells(alone, answer=8, error="no")
+    assert alone.answers == [(7, {"time_s": 2.0}), (0, {"time_s": 2.5}), (8, {"error": "no"})]
+    assert not alone.ending
+    tells(alone, collecting=True)
+    assert alone.ending and alone.failure == ""
+    alone.ending = False
+    tells(alone, failed="the port")
+    assert alone.ending and alone.failure == "the port"
+    alone.ending = False
+    tells(alone, over=True)
+    assert plants(alone) == [{"do": "finish"}]
+
+
+def test_one_interrupt_stops_and_lets_go_and_two_break_off(alone):
+    alone.children = {"MCH": Child("MCH", 41), "MB": Child("MB", 42, state=STOPPED)}
+    alone.interrupt()
+    assert plants(alone) == [{"do": "stop"}] and alone.exit_code is None
+    assert all(block.words[places.LET_GO] == 1 for block in alone.blocks.values())
+    assert alone.killed == [(42, signal.SIGCONT)]
+    alone.interrupt()
+    assert alone.exit_code == 130 and alone.view.heard() == ["broken off: no files are finished"]
+    assert plants(alone) == []
+
+
+def test_a_request_is_answered_or_passed_on(alone):
+    alone.obey(1, Request("status"))
+    assert alone.answers.pop() == (1, alone.state())
+    alone.obey(2, Request("pause"))
+    [order] = plants(alone)
+    assert (order["do"], order["number"]) == ("pause", 2) and alone.answers == []
+    alone.children = {"MCH": Child("MCH", 41, state=STOPPED), "MB": Child("MB", 42, state=STOPPED)}
+    alone.obey(3, Request("pause"))
+    assert alone.answers.pop() == (3, {"error": "MCH, MB is stopped: all wait for it"}) and plants(alone) == []
+    alone.children = {}
+    alone.plant_link.close()
+    alone.obey(4, Request("pause"))
+    assert alone.answers.pop() == (4, {"error": "pause: the body's process takes no orders now"})
+
+
+def test_a_restart_ends_what_runs_and_is_refused_where_nothing_is(alone):
+    alone.restart(1, "MCH")
+    assert alone.answers.pop() == (1, {"error": "restart: MCH has no process here"})
+    child = alone.children["MCH"] = Child("MCH", 41)
+    alone.obey(2, Request("restart", board="MCH"))
+    assert alone.killed == [(41, signal.SIGKILL)] and child.state == RESTARTING
+    assert alone.answers.pop() == (2, {"restarting": "MCH"})
+    alone.restart(3, "MCH")
+    assert alone.answers.pop() == (3, {"error": "restart: MCH is being restarted already"}) and len(alone.killed) == 1
+    child.state = GONE
+    alone.restart(4, "MCH")
+    assert plants(alone)[0]["do"] == "make_room" and len(alone.killed) == 1 and child.state == RESTARTING
+
+
+def test_a_client_that_is_sent_away_is_told_once_for_each_door_and_reason(alone):
+    reason, other = list(supervisor.REASONS)[:2]
+    alone.status = {"sent_away": {"feed": {reason: 1}}}
+    alone.say_who_was_sent_away()
+    alone.status = {"sent_away": {"feed": {reason: 5, other: 1}}}
+    alone.control.sent_away[reason] += 1
+    alone.say_who_was_sent_away()
+    alone.say_who_was_sent_away()
+    assert alone.view.heard() == [
+        f"{door}: a client {supervisor.REASONS[why]}, and was sent away; others of this kind are counted"
+        for door, why in (("feed", reason), ("feed", other), ("control", reason))
+    ]
+
+
+def test_the_state_has_every_board_with_its_counts(alone):
+    words = alone.blocks["MCH"].words
+    words[places.SLOT_COUNT], words[places.OVERRUNS], words[places.ERRORS], words[places.DAMAGED] = 10, 2, 3, 4
+    words[places.MAX_SLOT_CYCLES] = 30_000
+    alone.status = {"damaged": {"MCH": 5}, "time_s": 1.5}
+    alone.children = {"MCH": Child("MCH", 41, state=STOPPED), PLANT: Child(PLANT, 50)}
+    state = alone.state()
+    found = dict(state["boards"]["MCH"])
+    found.pop("lateness")
+    assert found == {
+        "state": STOPPED,
+        "process": 41,
+        "slots": 10,
+        "overruns": 2,
+        "max_slot_us": 30_000 * 1e6 / alone.robot.boards["MCH"].hz,
+        "errors": 3,
+        "damaged": 9,
+    }
+    assert (state["boards"]["MB"]["state"], state["boards"]["MB"]["process"]) == (supervisor.ELSEWHERE, 0)
+    assert (state["plant"], state["time_s"], state["speed"]) == (50, 1.5, None)
+    alone.children.clear()
+    assert alone.state()["plant"] == 0
+    assert alone.describe() == "as fast as it goes; ordinary scheduling, memory not locked (as asked for)"
+
+
+def test_words_are_shown_as_many_as_a_board_has_and_elsewhere_than_linux_nothing_runs(monkeypatch):
+    assert supervisor.words_shown(Made(memory=None)) == 0 and supervisor.words_shown(Made(memory=[1, 2])) == 2
+    supervisor.check_platform()
+    monkeypatch.setattr(supervisor.sys, "platform", "darwin")
+    with pytest.raises(UserError, match="need Linux"):
+        supervisor.check_platform()
