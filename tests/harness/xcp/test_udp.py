@@ -9,7 +9,7 @@ import pytest
 
 from ranger_sim.datatable import parameters
 from ranger_sim.datatable.addresses import address_of
-from ranger_sim.foundation.peers import FULL
+from ranger_sim.foundation.peers import ARRIVALS_PER_S, FULL, MALFORMED
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.ranger import Ranger
 from ranger_sim.harness.scenario import Scenario
@@ -115,22 +115,75 @@ def test_beyond_this_machine_it_listens_only_when_that_is_asked_for(robot):
         XcpUdpServer(robot, 0, "0.0.0.0")
 
 
-def test_a_look_carries_out_so_many_commands_however_packed_and_asks_once_whose_a_stranger_is(robot, monkeypatch):
-    asked = []
-    monkeypatch.setattr(udp, "owner_of", lambda sender: asked.append(sender) or os.getuid())
+GET_STATUS, CONNECT = struct.pack("<HH", 1, 0) + b"\xfd", struct.pack("<HH", 2, 0) + b"\xff\x00"
+
+
+def test_a_look_carries_out_so_many_commands_however_packed(robot):
     with contextlib.closing(XcpUdpServer(robot, 0)) as server, contextlib.closing(Client(robot, server)) as client:
-        get_status = struct.pack("<HH", 1, 0) + b"\xfd"
-        client.socket.send(struct.pack("<HH", 2, 0) + b"\xff\x00" + get_status * 99)
+        client.socket.send(CONNECT + GET_STATUS * 99)
         counts = []
         for look in range(9):
             server.poll(robot.loop.time + look)
             counts.append(server.totals["commands"])
         assert counts == [16, 32, 48, 64, 80, 96, 100, 100, 100]
         assert len(client.heard()) == 100
-        asked.clear()
-        with contextlib.closing(Client(robot, server)) as stranger:
-            for _ in range(10):
-                stranger.socket.send(get_status)
+
+
+def test_strangers_are_not_asked_about_but_for_connecting_and_then_so_often_in_a_second(robot, monkeypatch):
+    asked, now_s = [], 1000.0
+    monkeypatch.setattr(udp, "owner_of", lambda sender: asked.append(sender) or os.getuid())
+    with contextlib.closing(XcpUdpServer(robot, 0)) as server, contextlib.closing(Client(robot, server)) as stranger:
+        server.clock, server.asked_s = lambda: now_s, now_s
+
+        def looks(count, datagram):
+            for _ in range(count):
+                stranger.socket.send(datagram)
+            for _ in range(count):
+                server.poll(robot.loop.time)
+            return len(asked)
+
+        assert looks(10, GET_STATUS) == 0
+        assert server.sent_away == {MALFORMED: 10}  # nobody may say that who is not connected
+        with contextlib.closing(Client(robot, server)) as client:
+            client.socket.send(CONNECT)
             server.poll(robot.loop.time)
-            assert len(asked) == 1  # whether the master is still there
-            assert server.sent_away == {FULL: 10}
+            assert len(asked) == 1 and len(client.heard()) == 1
+            assert looks(10, GET_STATUS) == 1
+            assert looks(20, CONNECT) == udp.QUESTIONS  # each time whether the master is still there
+            now_s += 0.75 / ARRIVALS_PER_S
+            assert looks(20, CONNECT) == udp.QUESTIONS
+            now_s += 0.75 / ARRIVALS_PER_S
+            assert looks(20, CONNECT) == udp.QUESTIONS + 1
+        assert server.sent_away == {MALFORMED: 10, FULL: 70}
+        assert stranger.heard() == []
+
+
+def test_what_strangers_pour_does_not_reach_the_masters_queue(robot):
+    """More than the kernel keeps for a socket: of the master's commands none is lost, each look has its share."""
+    with contextlib.closing(XcpUdpServer(robot, 0)) as server, contextlib.closing(Client(robot, server)) as client:
+        client.socket.send(CONNECT)
+        server.poll(robot.loop.time)
+        with contextlib.closing(Client(robot, server)) as stranger:
+            for _ in range(4000):
+                stranger.socket.send(GET_STATUS)
+        for _ in range(20):
+            client.socket.send(GET_STATUS)
+        before = server.sent_away[FULL]
+        for _ in range(3):
+            server.poll(robot.loop.time)
+        assert len(client.heard()) == 21
+        assert server.sent_away[FULL] - before == 3 * udp.STRANGERS_A_LOOK
+        assert server.left_over
+        client.socket.send(struct.pack("<HH", 1, 0) + b"\xfe")
+        server.poll(robot.loop.time)
+        assert server.private is None and server.master is None
+
+
+def test_a_port_that_an_xcp_slave_has_is_not_had_by_another_also_while_a_master_is_there(robot):
+    with contextlib.closing(XcpUdpServer(robot, 0)) as server, contextlib.closing(Client(robot, server)) as client:
+        for _ in range(2):
+            with pytest.raises(UserError, match=f"127.0.0.1:{server.port}: Address already in use"):
+                XcpUdpServer(robot, server.port)
+            client.socket.send(CONNECT)
+            server.poll(robot.loop.time)
+            assert server.private is not None
