@@ -59,8 +59,9 @@ class Limits:
 # and in the boards (both measured on 23 November 2026, AMD EPYC); a real adapter of 1 Mbit/s sends 8 in a millisecond,
 # a serial one of 1 Mbaud, and a daemon before one, 4. burst: attach, a window of its protocol. longest: attach, a
 # reason; slcan, an extended frame has 26; socketcand, a send has 45; control, a request has below 100;
-# gdb, the packet size that its stub tells, with what is around it; a look of it is one of a board that stands, or one
-# in a millisecond. trace, the head of a browser's request, cookies of other servers of this machine included.
+# gdb, the packet size that its stub tells, with what is around it; of a board that runs a debugger asks little, and of
+# one that stands as much as it likes. trace, the head of a browser's request, cookies of other servers of this machine
+# included.
 # xcp-udp, a datagram in a frame of Ethernet, of which a look takes 16 and no more than `burst` commands.
 # backlog: 8,000 frames, 0.3 s of a full bus of 3 Mbit/s; feed, 3 s of all that a robot records (2.6 MB a second).
 KB = 1024
@@ -72,7 +73,7 @@ LIMITS = {
     "control":    Limits(   32,        4,     8,    4096,    4 * KB,     64 * KB,  64 * KB,   64 * KB),
     "xcp-udp":    Limits(    1,       32,    16,    1500,   24 * KB,     64 * KB,        0,         0),
     "serial":     Limits(    1,        0,     0,       0,    2 * KB,      4 * KB,        0,         0),
-    "gdb":        Limits(    1,        0,    64, 17 * KB,   16 * KB,     64 * KB,  64 * KB,         0),
+    "gdb":        Limits(    1,        4,    64, 17 * KB,   16 * KB,     64 * KB,  64 * KB,         0),
     "feed":       Limits(    4,        0,     8,      64,    4 * KB,   1024 * KB,  64 * KB, 8192 * KB),
     "trace":      Limits(    8,        0,     8, 16 * KB,    4 * KB,    256 * KB,  64 * KB,         0),
 }  # fmt: skip

@@ -16,6 +16,7 @@ from ranger_sim.firmware_sim.gdb.target import Debuggable, Target
 from ranger_sim.foundation import descriptors
 from ranger_sim.foundation.peers import (
     MALFORMED,
+    MS,
     REASONS,
     Door,
     Peer,
@@ -82,6 +83,7 @@ class GdbServer(Door[_Client]):
         self.held = False
         self.seen = 0  # debuggers so far
         self.halts = 0
+        self.looks = 0  # while it ran
         self.doors: list[GdbServer] = [self]
         self.leads_to(board)
 
@@ -126,8 +128,9 @@ class GdbServer(Door[_Client]):
     # ---- what the processor calls, between two instructions
 
     def poll(self) -> None:
-        """Somebody may have come, or wants the board halted."""
-        self._attend()
+        """Somebody may have come, or wants the board halted. Once in a millisecond of the board (Core.LOOK_CYCLES)."""
+        self.looks += 1
+        self._attend(self.looks * MS)
         self._stand()
 
     def halted(self, error: UserError | None) -> None:
@@ -170,9 +173,9 @@ class GdbServer(Door[_Client]):
 
     # ---- a look at the door
 
-    def _attend(self) -> None:
-        """What has come is carried out, as far as there is room, and answers go out."""
-        self.look(0)
+    def _attend(self, now_ns: int = 0) -> None:
+        """What has come is carried out, as far as there is room, and answers go out; 0: the board stands."""
+        self.look(now_ns)
         self.write()
 
     def _wait(self) -> None:
