@@ -130,6 +130,7 @@ class Fault(StepWatch):
         self.acted_count = 0
         self.largest_difference = 0.0
         self.stop_wanted = False
+        self.gives_way = False  # where another fault still works it never begins; else that ends the run
         self.twin: Any = None  # harness.faults.twin.Twin: of a fault that is to be proven
 
     @classmethod
@@ -200,6 +201,8 @@ class Fault(StepWatch):
         self.robot = robot
         self.random = RandomStream(robot.seed, f"fault {len(robot.faults)} {self.place.name} {self.mode}")
         self.connect()
+        if self.gives_way and self.start is None and (taken := self._in_its_way()):
+            raise UserError(taken)
         for each in (self.start, self.end):
             if each is not None:
                 each.begin(robot)
@@ -226,7 +229,12 @@ class Fault(StepWatch):
                 self.robot.loop.watchers.remove(self)
                 return
             if self.start is None or self.start.met():
-                self._take_its_claims()
+                if taken := self._in_its_way():
+                    if not self.gives_way:
+                        raise UserError(taken)
+                    self.stop()
+                    self.robot.loop.watchers.remove(self)
+                    return
                 self.activated_ns = now_ns
                 if isinstance(self.end, Lasting):
                     self.end.since_ns = now_ns
@@ -240,8 +248,8 @@ class Fault(StepWatch):
         else:
             self.before(now_ns)
 
-    def _take_its_claims(self) -> None:
-        """UserError when another fault that is not clear yet has one of them: neither could be proved, nor undone."""
+    def _in_its_way(self) -> str:
+        """Which other fault is not clear yet and has one of its claims, or nothing: neither could be proved, nor undone."""
         for other in self.robot.faults:
             if other is self or other.activated_ns < 0 or other.cleared_ns >= 0:
                 continue
@@ -251,7 +259,8 @@ class Fault(StepWatch):
             if self.restarts and self.restarts == other.inside and other.active:  # what has ended, a restart may cure
                 common.append(f"{other.inside}, which would be taken away under it")
             if common:
-                raise UserError(f"fault {self.text()}: {other.text()} still works at {common[0]}; one fault at a time")
+                return f"fault {self.text()}: {other.text()} still works at {common[0]}; one fault at a time"
+        return ""
 
     def after_step(self, start_ns: int, end_ns: int) -> None:
         if self.activated_ns < 0:

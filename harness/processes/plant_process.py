@@ -186,7 +186,9 @@ class PlantRun:
         """Arm a fault that the supervisor's door has admitted. UserError where it cannot act on this robot."""
         if len(self.robot.faults) > MOST_FAULTS:
             raise UserError(f"fault: {MOST_FAULTS + 1} faults of one run are enough")
-        self.robot.arm(CATALOGUE.typed(text))
+        fault = CATALOGUE.typed(text)
+        fault.gives_way = True
+        self.robot.arm(fault)
 
     def clear(self, which: int) -> None:
         """End a fault with the next step of the body."""

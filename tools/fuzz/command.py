@@ -20,7 +20,9 @@ TARGETS = {
     "channel": "damaged messages in the channel between a board's process and the body's",
     "doors": "hostile programs at every door: requests, connections, floods, answers never read; no robot behind",
     "gdb": "hostile debuggers at the door of a board that runs machine code",
+    "panel": "hostile programs at the panel's HTTP and WebSocket",
     "profiles": "profiles and bus schedules with pieces cut out, doubled and replaced",
+    "requests": "requests of `ctl` that reach a walking robot, faults of every kind among them; viewers of the feed",
     "serial": "wrong bytes on the line between main brain and computer, both ways",
     "xcp": "hostile masters at the XCP slave's door on UDP, a robot behind",
 }

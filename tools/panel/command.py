@@ -26,6 +26,7 @@ HERE = "127.0.0.1"
 START_S = 60.0  # an interpreted robot takes so long to be there
 LOOK_S = 0.05
 END_S = 10.0
+GIVES_WAY = 5  # steps of nice(2) behind the robot's processes; chosen by us: a third of their weight
 
 
 def register(commands: Any) -> None:
@@ -101,10 +102,12 @@ def source_of(options: argparse.Namespace, say: Any) -> Iterator[Any]:
             yield link
     elif options.walk:
         with own_robot(say) as source:
+            os.nice(GIVES_WAY)
             yield source
     else:
         from ranger_sim.tools.panel.robot import RobotSource
 
+        os.nice(GIVES_WAY)
         yield RobotSource(options.name)
 
 
@@ -167,9 +170,7 @@ def listening(address: str, port: int) -> Iterator[socket.socket]:
 
 def serve(source: Any, listener: socket.socket, host: str, say: Any) -> int:
     """Until Ctrl-C, or the robot has ended and everybody has left."""
-    import uvicorn
-
-    from ranger_sim.tools.panel.server import LONGEST_WISH, PanelServer, new_token
+    from ranger_sim.tools.panel.server import PanelServer, new_token
 
     address, port = listener.getsockname()[:2]
     token = new_token()
@@ -181,8 +182,23 @@ def serve(source: Any, listener: socket.socket, host: str, say: Any) -> int:
     panel = PanelServer(source, token, names, say)
     shown = HERE if address in ("0.0.0.0", "::") else address
     say(f"{source.title}: http://{shown}:{port}/?token={token}   (Ctrl-C ends it)")
+    server = http_server(panel)
+    with contextlib.suppress(KeyboardInterrupt):
+        asyncio.run(server.serve(sockets=[listener]))
+    if panel.refused:
+        say("panel: refused: " + ", ".join(f"{count} {why}" for why, count in panel.refused.items()))
+    return 0
+
+
+def http_server(panel: Any) -> Any:
+    """What serves it (uvicorn.Server)."""
+    import uvicorn
+
+    from ranger_sim.tools.panel.server import LONGEST_WISH
+
     config = uvicorn.Config(
         panel.app,
+        http=panel.connections.protocol,
         log_level="critical",
         access_log=False,
         ws="websockets-sansio",
@@ -192,7 +208,4 @@ def serve(source: Any, listener: socket.socket, host: str, say: Any) -> int:
         timeout_graceful_shutdown=1,
         h11_max_incomplete_event_size=16384,
     )
-    server = uvicorn.Server(config)
-    with contextlib.suppress(KeyboardInterrupt):
-        asyncio.run(server.serve(sockets=[listener]))
-    return 0
+    return uvicorn.Server(config)

@@ -221,8 +221,8 @@ class RobotSource(Source):
         return total_Wh * JOULES_PER_WH / (self.weight_N * distance_m)
 
     async def request(self, wish: dict[str, Any]) -> dict[str, Any]:
-        if wish.get("do") not in REQUESTS:
-            raise UserError(f"{wish.get('do')!r} is no request to a robot")
+        if not isinstance(wish.get("do"), str) or wish["do"] not in REQUESTS:
+            raise UserError(f"{str(wish.get('do'))[:40]!r} is no request to a robot")
         answer: dict[str, Any] = await asyncio.to_thread(control.ask, self.name, wish)
         return answer
 

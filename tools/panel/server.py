@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import hmac
 import json
 import math
 import os
@@ -26,6 +27,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.tools.panel import export, messages
+from ranger_sim.tools.panel.connections import Connections
 from ranger_sim.tools.panel.source import Source
 
 PAGE = pathlib.Path(__file__).parent / "page"
@@ -61,6 +63,7 @@ class PanelServer:
         self.log = log
         self.sessions: set[Session] = set()
         self.refused: Counter[str] = Counter()
+        self.connections = Connections(lambda: {session.socket.client for session in self.sessions}, self.refuse)
         self.feeding: asyncio.Task[None] | None = None
         self.app = Starlette(
             routes=[
@@ -91,8 +94,8 @@ class PanelServer:
         origin = asked.headers.get("origin")
         if origin is not None and urlsplit(origin).netloc != host:
             return "a page of another site"
-        token = asked.query_params.get("token") or asked.cookies.get(COOKIE)
-        return None if token == self.token else "a wrong token"
+        token = asked.query_params.get("token") or asked.cookies.get(COOKIE) or ""
+        return None if hmac.compare_digest(token.encode(), self.token.encode()) else "a wrong token"
 
     async def page(self, request: Request) -> Response:
         """The page; its first visit leaves the token in a cookie."""
@@ -163,20 +166,23 @@ class PanelServer:
             fault = f"no place free ({PLACES} pages)"
         if fault is not None:
             self.refuse(fault)
-            await socket.accept()
-            await socket.close(CLOSE_FULL if "place" in fault else CLOSE_POLICY, fault)
+            self.connections.ends(socket.client)
+            with contextlib.suppress(WebSocketDisconnect):
+                await socket.accept()
+                await socket.close(CLOSE_FULL if "place" in fault else CLOSE_POLICY, fault)
             return
         await socket.accept()
         session = Session(self.source, socket, self.want)
         self.sessions.add(session)
         try:
             reason = await session.serve()
-            if reason:
-                self.refuse(reason)
-                with contextlib.suppress(Exception):
-                    await socket.close(CLOSE_POLICY, reason)
         finally:
             self.sessions.discard(session)
+            self.connections.ends(socket.client)  # also where what it has not taken stands before the reason
+        if reason:
+            self.refuse(reason)
+            with contextlib.suppress(Exception):
+                await socket.close(CLOSE_POLICY, reason)
 
 
 FILES = frozenset(path.name for path in PAGE.iterdir() if path.suffix in TYPES) if PAGE.is_dir() else frozenset()
@@ -202,28 +208,33 @@ class Session:
 
     async def serve(self) -> str:
         """Until it leaves; returns why it had to, or nothing."""
-        await self.send(messages.text({"hello": self.source.hello(), "version": messages.VERSION}))
-        showing = asyncio.create_task(self.show())
+        showing: asyncio.Task[None] | None = None
         try:
+            await self.send(messages.text({"hello": self.source.hello(), "version": messages.VERSION}))
+            showing = asyncio.create_task(self.show())
             while True:
                 try:
                     async with asyncio.timeout(PATIENCE_S):
                         text = await self.socket.receive_text()
-                except TimeoutError:
-                    return "silence"
-                except (WebSocketDisconnect, RuntimeError, KeyError):  # gone, or it sent bytes
+                except (RuntimeError, KeyError):  # it has left, or it sent bytes
                     return ""
                 if showing.done():
-                    return ""
+                    showing.result()
                 reason = await self.hear(text)
                 if reason:
                     return reason
+        except TimeoutError:
+            return "silence"
+        except WebSocketDisconnect:
+            return ""
         finally:
-            showing.cancel()
+            if showing is not None:
+                showing.cancel()
+                await asyncio.gather(showing, return_exceptions=True)
 
     async def send(self, message: bytes) -> None:
-        """One message at a time."""
-        async with self.sending:
+        """One message at a time. TimeoutError: the page takes nothing any more."""
+        async with asyncio.timeout(PATIENCE_S), self.sending:
             await self.socket.send_bytes(message)
 
     # --- what the page says ---------------------------------------------------------------------------------
@@ -255,7 +266,8 @@ class Session:
         """What the page wishes. UserError for what cannot be."""
         what = wish.get("do")
         if what == "shown":
-            self.wishes += 1.0  # it keeps the pace, and is no request
+            if not self.shown.is_set():
+                self.wishes += 1.0  # it keeps the pace, and is no request
             self.shown.set()
             return {}
         if what == "look":

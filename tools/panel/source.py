@@ -38,6 +38,7 @@ class Source:
         self.channels: list[Channel] = []
         self.geometry: dict[str, Any] = {}
         self.lost = ""  # why nothing more will come
+        self.listed: list[dict[str, Any]] = []  # the channels as a page gets them, once one has come
 
     async def run(self) -> None:
         """Take in what comes, until nothing more does."""
@@ -75,15 +76,16 @@ class Source:
 
     def hello(self) -> dict[str, Any]:
         """What the page must know at its beginning."""
+        self.listed = self.listed or [channel.content() for channel in self.channels]
         return {
             "title": self.title,
             "can": sorted(self.can),
-            "channels": [channel.content() for channel in self.channels],
+            "channels": self.listed,
             "pose": list(self.pose_names),
             "geometry": self.geometry,
             "parameters": parameter_rows() if "parameters" in self.can else [],
             "faults": fault_rows() if "faults" in self.can else {},
-            "slots_us": {board.name: board.slot_us for board in datatable.load().boards if board.slot_us},
+            "slots_us": slots_us(),
             "span": self.span(),
         }
 
@@ -136,6 +138,12 @@ def fault_rows() -> dict[str, Any]:
     for (kind, name), mode in MODES.items():
         modes.setdefault(kind, []).append({"mode": name, "meaning": mode.meaning})
     return {"places": places, "modes": modes}
+
+
+@functools.cache
+def slots_us() -> dict[str, float]:
+    """{board: its slot, us} of those that have slots."""
+    return {board.name: board.slot_us for board in datatable.load().boards if board.slot_us}
 
 
 @functools.cache

@@ -1,6 +1,8 @@
 """The remote serial protocol by known answers, spoken by a client that shares no code with the stub."""
 
+import contextlib
 import re
+import socket
 import xml.etree.ElementTree
 
 import pytest
@@ -485,3 +487,25 @@ def test_a_port_beyond_this_machine_must_be_asked_for_and_a_taken_one_is_told():
             GdbServer(tiny(), 70000)
     finally:
         first.close()
+
+
+def test_of_a_board_that_runs_a_debugger_asks_four_things_in_a_millisecond_and_of_one_that_stands_as_much_as_it_likes():
+    machine = tiny()
+    with contextlib.closing(GdbServer(machine, 0)) as server:
+        server.begin()
+        with socket.create_connection(("127.0.0.1", server.port)) as client:
+            while not server.held:
+                server._attend()
+            client.sendall(b"$m0,4#fd" * 40)
+            server._attend()
+            assert server.worked == 40
+            client.sendall(b"$c#63")
+            server._attend()
+            assert not server.held
+            for _ in range(16):  # what the last burst left is used up
+                client.sendall(b"$m0,4#fd" * 40)
+                server.poll()
+            before = server.worked
+            for look in range(1, 6):
+                server.poll()
+                assert server.worked - before == 4 * look

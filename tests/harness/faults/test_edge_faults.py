@@ -5,6 +5,7 @@ import math
 import pytest
 
 from ranger_sim.foundation.user_error import UserError
+from ranger_sim.harness.faults.ranger_catalogue import CATALOGUE
 from tests.harness.faults.bench import EdgeBench
 
 RAD_PER_EDGE = math.pi / 2048.0
@@ -369,6 +370,24 @@ def test_a_second_fault_at_a_place_that_is_taken_is_refused_when_it_begins():
     bench.inject(bench.place, "stuck", at="5 ms")
     with pytest.raises(UserError, match=r"stuck.*offset.* still works at MCH.joint_encoder; one fault at a time"):
         run(bench, 10)
+
+
+def test_one_that_gives_way_never_begins_where_another_works_and_the_run_goes_on():
+    """Those that are asked for while the robot runs: `ctl` must not end it."""
+    bench = EdgeBench(forward)
+    first = bench.inject(bench.place, "offset", until="20 ms")
+    late = CATALOGUE.fault(bench.place, "stuck", "5 ms", None, {})
+    late.gives_way = True
+    late.arm(bench)
+    bench.faults.append(late)
+    run(bench, 10)
+    assert first.active and late.activated_ns < 0 and late.over and not late.acted
+    now = CATALOGUE.fault(bench.place, "stuck", None, None, {})
+    now.gives_way = True
+    with pytest.raises(UserError, match="offset.* still works at MCH.joint_encoder; one fault at a time"):
+        now.arm(bench)  # said at once, where it would have to begin at once
+    run(bench, 100)
+    assert first.ended_ns == 20_000_000
 
 
 def test_a_second_fault_at_a_place_may_begin_when_the_first_one_is_clear():

@@ -142,6 +142,24 @@ def test_a_viewer_that_takes_nothing_misses_rows_and_is_told_how_many(shown):
     assert sum(sum(each.values()) for each in told) == feed.totals["rows_left_out"] >= missed
 
 
+def test_of_viewers_that_have_all_places_one_that_has_missed_something_makes_room(shown):
+    robot, feed, look = shown
+    for _ in range(LIMITS["feed"].peers):
+        look()
+    robot.run_for(0.04)
+    late = look()
+    robot.run_for(0.04)
+    assert feed.sent_away == {"full": 1}  # all of them take what they are shown
+    assert [kind for kind, _ in late.heard()] == [records.HELLO]
+    slow = feed.peers[1]
+    slow.outgoing += bytes(LIMITS["feed"].backlog)
+    robot.run_for(0.02)
+    later = look()
+    robot.run_for(0.04)
+    assert feed.sent_away == {"full": 1, "idle": 1} and slow not in feed.peers
+    assert later.heard()[0][0] == records.HELLO
+
+
 def test_a_viewer_that_speaks_is_sent_away(shown):
     robot, feed, look = shown
     viewer, other = look(), look()
