@@ -249,7 +249,7 @@ class Fault(StepWatch):
             self.before(now_ns)
 
     def _in_its_way(self) -> str:
-        """Which other fault is not clear yet and has one of its claims, or nothing: neither could be proved, nor undone."""
+        """Which fault that is not clear yet has one of its claims, or nothing: neither could be proved, nor undone."""
         for other in self.robot.faults:
             if other is self or other.activated_ns < 0 or other.cleared_ns >= 0:
                 continue

@@ -405,15 +405,21 @@ def _close(end: socket.socket | int) -> None:
         end.close()
 
 
-def programs(name: str, doors: Doors) -> list[tuple[Callable[..., None], tuple]]:
-    """Who disturbs the robot by that name: what each program runs, and on what."""
-    alone = {BUSY: (burn, ()), FRAMES_IN_WINDOW: (send_in_window, (doors,)), READ: (read, (doors,))}
+Run = tuple[Callable[..., None], tuple]  # what a program runs, and on what
+
+
+def programs(name: str, doors: Doors) -> list[Run]:
+    """Who disturbs the robot by that name."""
+    alone: dict[str, Run] = {
+        BUSY: (burn, ()),
+        FRAMES_IN_WINDOW: (send_in_window, (doors,)),
+        READ: (read, (doors,)),
+        DRAWN: (draw, (doors,)),
+    }
     if name in PEACE_OF.values():
         return []
     if name == ALL:
         return [program for each in TOGETHER for program in programs(each, doors)]
-    if name == DRAWN:
-        return [(draw, (doors,))]
     if name in alone:
         return [alone[name]]
     return [(stay if FLOODS[name].stays else pour, (FLOODS[name], doors))]

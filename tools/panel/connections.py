@@ -24,7 +24,7 @@ Client = tuple[str, int]
 class Connections:
     """`protocol` is what the server makes for each. pages: clients that keep their place. refuse: hears a reason."""
 
-    def __init__(self, pages: Callable[[], Collection[Client]], refuse: Callable[[str], None]) -> None:
+    def __init__(self, pages: Callable[[], Collection[object]], refuse: Callable[[str], None]) -> None:
         self.pages = pages
         self.refuse = refuse
         self.transports: dict[Client, asyncio.Transport] = {}  # the oldest first
