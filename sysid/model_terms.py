@@ -41,7 +41,7 @@ Made = Callable[[Numbers, Context], dict[str, float]]
 
 def _wave(numbers: Numbers) -> tuple[float, float]:
     """(amplitude, phase) of A sin(x + phase) = c cos x + s sin x."""
-    cosine, sine = (next(v for k, v in numbers.items() if k.startswith(name)) for name in ("cosine", "sine"))
+    cosine, sine = [next(v for k, v in numbers.items() if k.startswith(name)) for name in ("cosine", "sine")]
     return math.hypot(cosine, sine), math.atan2(cosine, sine)
 
 
