@@ -11,7 +11,7 @@ from ranger_sim.foundation.random_arrays import generator
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.plant import terms as plant_terms
 from ranger_sim.plant.motor_parameters import ANKLE_MOTOR, HIP_MOTOR
-from ranger_sim.sysid import answer, intervals, isolability, misfit, model_terms, residual_term
+from ranger_sim.sysid import answer, intervals, isolability, misfit, model_terms, plausibility, residual_term
 from ranger_sim.sysid.dataset import Channel, Dataset, Table
 from ranger_sim.sysid.diagnosis import Diagnosis, KnownEffect
 from ranger_sim.sysid.experiment_models import SAMPLES, Equation
@@ -458,3 +458,25 @@ def test_a_time_base_is_the_finest_carrier_s_between_2_and_8_ms():
     with pytest.raises(UserError, match="d: hip_angle_rad have no time in common"):
         one = Dataset("d", {"hip_angle_rad": Channel("hip_angle_rad", "rad", 0.004 * np.arange(20), np.arange(20.0))})
         timebase.even_table(one, ["hip_angle_rad"], ("hip_angle_rad",))
+
+
+def test_a_recording_of_which_all_but_moments_are_lost_is_told():
+    t = np.concatenate((0.5 * np.arange(5), 2.0 + 0.004 * np.arange(1, 11)))
+    value = np.concatenate((10.0 * np.arange(5), 40.0 + 0.1 * np.arange(1, 11)))
+    one = Dataset("d", {"hip_angle_rad": Channel("hip_angle_rad", "rad", t, value)})
+    with pytest.raises(UserError, match="d: hardly any time in which all of hip_angle_rad came"):
+        timebase.even_table(one, ["hip_angle_rad"], ("hip_angle_rad",))
+
+
+@pytest.mark.parametrize(("rest", "told"), [(0.045, False), (0.055, True)])
+def test_a_parameter_is_told_alone_where_the_others_leave_a_twentieth_of_its_column(rest, told):
+    one, two = RNG.normal(size=(2, N))
+    one[8:] /= np.linalg.norm(one[8:])
+    two[8:] -= one[8:] * (one[8:] @ two[8:])
+    two[8:] /= np.linalg.norm(two[8:])
+    column = math.sqrt(1.0 - rest**2) * one + rest * two
+    regression = Regression([plain(5.0 * one + 3.0 * column + 1e-5 * RNG.normal(size=N), {"p": one, "q": column})])
+    found = plausibility._alone(regression, "one", "q")
+    assert (found is not None) is told
+    if told:
+        assert found.value == pytest.approx(3.0, rel=0.02) and found.equation == "one"

@@ -478,6 +478,36 @@ def test_a_place_is_told_for_causes_that_could_stand_at_several():
                 assert any(cause in each.causes for each in model.equations if each.channel == place)
 
 
+PLACES = {
+    "motor-bench": {
+        "sensor_lag": "speed_rad_per_s",
+        "clock_drift": "speed_rad_per_s",
+        "eccentricity": "motor_angle_rad",
+    },
+    "leg-swing": {"sensor_lag": "hip_angle_rad", "eccentricity": "hip_angle_rad", "clock_drift": "voltage_V"},
+    "ankle": {"sensor_lag": "joint_rate_rad_per_s", "eccentricity": "joint_angle_rad", "clock_drift": "current_A"},
+    "positioning": {
+        "sensor_lag": "the controller's loop",
+        "sensor_offset@angle": "position_m",
+        "clock_drift": "voltage_V",
+    },
+    "walk": {
+        "sensor_lag": "hip_rate_rad_per_s",
+        "eccentricity": "hip_angle_rad",
+        "clock_drift": "outer_leg_rate_rad_per_s",
+        "sensor_offset@angle": "hip_angle_rad",
+        "sensor_scale@current": "hip_current_A",
+        "sensor_offset@current": "hip_current_A",
+        "cable_backlash": "outer ankle",
+        "bit_flip": "outer ankle",
+    },
+}
+
+
+def test_causes_stand_at_their_most_usual_places():
+    assert {name: dict(make().places) for name, make in experiment_models.MODELS.items()} == PLACES
+
+
 def test_the_builder_s_grid_has_twenty_steps_between_samples_and_ends_with_the_duration():
     b = Builder(10.0)
     assert len(b.t) == 2400 and b.t[-1] == 10.0 and b.step_s == pytest.approx(10.0 / 2399.0)

@@ -295,6 +295,19 @@ def test_noise_that_hangs_together_counts_as_so_much_louder_white_noise():
     assert floor.deviation == pytest.approx(math.hypot(found.deviation, 3.0))
 
 
+@pytest.mark.parametrize("memory", [0.0, 0.4, 0.9])
+def test_samples_with_a_memory_that_are_thinned_to_one_in_three_have_its_third_power(memory):
+    """The spectrum of every third sample of such a noise is that of a memory m^3, but for a factor."""
+    f = np.linspace(0.01, 0.5, 30)
+    found = regression._spectrum(f, memory, 0.0, 3)
+    wanted = 1.0 / (1.0 + memory**6 - 2.0 * memory**3 * np.cos(2.0 * math.pi * f))
+    assert found / found[0] == pytest.approx(wanted / wanted[0])
+    # a Gaussian of two samples takes its square off, sample by sample
+    one = regression._spectrum(f, memory, 2.0, 1)
+    bare = 1.0 / (1.0 + memory**2 - 2.0 * memory * np.cos(2.0 * math.pi * f))
+    assert one == pytest.approx(bare * np.exp(-((4.0 * math.pi * f) ** 2)))
+
+
 def test_noise_from_repeats_is_taken_at_the_upper_limit_of_its_interval():
     noise = np.concatenate((np.zeros(8), RNG.normal(size=60)))
     repeats = np.concatenate((np.full(8, -1), np.arange(60) // 2))

@@ -322,3 +322,15 @@ def test_a_time_is_cut_out_of_all_channels_both_ends_with_it():
     assert len(rest["a"].value) == 2
     with pytest.raises(UserError, match="a has 1 samples outside"):
         repairs.cut(recording(), T[1], 1.0 + T[-3])
+
+
+@pytest.mark.parametrize(("period", "moves"), [(6.0, False), (8.0, True), (20.0, True)])
+def test_a_sine_of_more_than_six_samples_a_period_moves_and_a_faster_one_is_taken_for_noise(period, moves):
+    """Its variance over half the mean square of differences is 1 / (1 - cos(360 / period)): 2 and 3.4, against 2.25."""
+    n = np.arange(2400)
+    other = channel("b", np.sin(2.0 * math.pi * n / period), "V", 0.004 * n)
+    assert sanity._moves(other, 1.0, 9.0) == moves
+    # and of a fifth of its range there must be more
+    for part, there in ((0.19, False), (0.21, moves)):
+        small = np.where((n > 260) & (n < 2200), part, 1.0) * other.value
+        assert sanity._moves(channel("b", small, "V", 0.004 * n), 1.1, 8.7) == there
