@@ -11,8 +11,9 @@ from ranger_sim.foundation.random_arrays import generator
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.sysid import fit
 from ranger_sim.sysid.figures import hypotheses
+from ranger_sim.sysid.figures.diagnose import Simulated
 from ranger_sim.sysid.figures.hypotheses import Evidence, Judge
-from ranger_sim.sysid.figures.question import Candidate, Figure
+from ranger_sim.sysid.figures.question import Candidate, Figure, Outcome
 from ranger_sim.sysid.figures.surface import Surface
 from ranger_sim.sysid.fit import Parameter, _Objective
 
@@ -343,3 +344,23 @@ def test_a_value_stands_on_a_limit_within_a_thousandth_of_its_error():
     assert fit._limits_met(asked, np.array([6e-6, 5.0]), np.zeros(2)) == ""
     both = fit._limits_met(asked, np.array([0.0, 10.0]), np.ones(2))
     assert both == "a stands on its lower limit 0 V; b stands on its upper limit 10 A"
+
+
+# --- what was simulated -----------------------------------------------------------------------------------------------
+
+
+def test_outcomes_are_gathered_by_place_and_a_figure_of_no_run_is_told():
+    runs = [
+        [Outcome({"f": 1.0}, 10.0), Outcome({"f": 3.0, "g": 5.0}, 4.0, failed=True)],
+        [Outcome({"f": 2.0}, 7.0, failed=True), Outcome({}, 1.0, failed=True)],
+    ]
+    made = Simulated(CANDIDATES, [np.array([0.0, 0.0, 0.0]), np.array([1.0, 0.0, 2.0])], runs)
+    found = made.evidence(["f"], 3)
+    assert found.survived.tolist() == [14.0, 8.0] and found.failures.tolist() == [1.0, 2.0]
+    # as if at every place as many runs as there are seeds had come as far as the farthest
+    assert found.unseen == 30.0 and found.places.tolist() == [[0.0, 0.0, 0.0], [1.0, 0.0, 2.0]]
+    assert found.surfaces["f"].means.tolist() == [2.0, 2.0]
+    assert made.evidence(["g"], 3).surfaces["g"].places.tolist() == [[0.0, 0.0, 0.0]]
+    with pytest.raises(UserError, match="figure h: none of 4 simulated runs came to it"):
+        made.evidence(["h"], 3)
+    assert made.nearest(np.array([1.0, 3.0, -2.0])) == pytest.approx(math.sqrt(1.0 + 9.0 + 4.0))

@@ -1,0 +1,99 @@
+"""Frames of a recording become channels by their messages' own numbers; what was left out is counted."""
+
+import pathlib
+
+import pytest
+
+from ranger_sim.foundation.events import FLAG_ERROR, FLAG_EXTENDED, FLAG_REMOTE
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.sysid.readers import frames
+
+DBC = """VERSION ""
+
+NS_ :
+
+BS_:
+
+BU_: A
+
+BO_ 291 ANGLE: 4 A
+ SG_ value : 0|16@1- (0.001,0) [0|0] "rad" A
+
+BO_ 292 DRIVE: 8 A
+ SG_ current : 0|16@1- (0.01,0) [0|0] "A" A
+ SG_ level : 32|8@1+ (1,0) [0|0] "" A
+
+BO_ 2147483939 OTHER: 2 A
+ SG_ value : 0|8@1+ (1,0) [0|0] "V" A
+"""
+
+
+@pytest.fixture
+def dbc(tmp_path) -> pathlib.Path:
+    path = tmp_path / "robot.dbc"
+    path.write_text(DBC, encoding="utf-8")
+    return path
+
+
+def angle(time_ns, value, length=4, identifier=291, flags=0):
+    return ("can1", time_ns, identifier, flags | length, value & 0xFFFF, 0)
+
+
+def test_signals_have_their_message_s_scale_and_length_and_the_recording_s_stamps(dbc):
+    rows = [
+        angle(1_000_000_000, 1500),
+        ("can1", 1_500_000_000, 292, 8, 250, 7),
+        angle(2_000_000_000, -250),
+        angle(2_250_000_000, 9, 2, flags=FLAG_EXTENDED),  # 291 as an extended identifier is another message
+        angle(2_500_000_000, 1, flags=FLAG_REMOTE),
+        angle(2_600_000_000, 1, flags=FLAG_ERROR),
+    ]
+    found = frames.decode("log", rows, [dbc])
+    assert set(found.channels) == {"ANGLE", "DRIVE.current", "DRIVE.level", "OTHER"}
+    assert found["ANGLE"].value.tolist() == [1.5, -0.25] and found["ANGLE"].time_s.tolist() == [1.0, 2.0]
+    assert found["DRIVE.current"].value.tolist() == [2.5] and found["DRIVE.level"].value.tolist() == [7.0]
+    assert [found[name].unit for name in ("ANGLE", "DRIVE.current", "DRIVE.level", "OTHER")] == ["rad", "A", "", "V"]
+    assert found["OTHER"].value.tolist() == [9.0] and found["OTHER"].time_s.tolist() == [2.25]
+    assert not [each for each in found.findings if each.kind in ("unknown_frames", "broken_frames")]
+
+
+def test_frames_that_nobody_knows_and_those_that_do_not_fit_are_counted(dbc):
+    rows = [
+        angle(1_000, 5),
+        angle(2_000, 5, 1),
+        angle(3_000, 5, 1),
+        *(angle(4_000 + k, 0, identifier=7 + k % 2) for k in range(5)),
+    ]
+    found = frames.decode("log", rows, [dbc])
+    told = {each.kind: each for each in found.findings}
+    assert (told["unknown_frames"].size, told["unknown_frames"].severity) == (5.0, "note")
+    assert told["unknown_frames"].text.startswith(
+        "5 frames have identifiers that the DBC file does not know (0x7, 0x8)"
+    )
+    assert (told["broken_frames"].channel, told["broken_frames"].size) == ("ANGLE", 2.0)
+    assert told["broken_frames"].unit == "frames" and told["broken_frames"].severity == "warning"
+    assert len(found["ANGLE"].value) == 1
+
+
+def test_stamps_of_the_epoch_begin_at_the_first_frame_that_was_one(dbc):
+    begin = 1_700_000_000_000_000_000
+    rows = [angle(begin, 0, identifier=9), angle(begin + 250_000_000, 1), angle(begin + 1_250_000_001, 2)]
+    found = frames.decode("log", rows, [dbc])
+    assert found["ANGLE"].time_s.tolist() == [0.25, 1.250000001]
+    late = frames.decode("log", [angle(5_000_000_000, 1)], [dbc])
+    assert late["ANGLE"].time_s.tolist() == [5.0]
+
+
+def test_recordings_and_files_that_say_nothing_are_told(dbc, tmp_path):
+    with pytest.raises(UserError, match=r"log: none of its frames is a message of the DBC file \(1 others\)"):
+        frames.decode("log", [angle(1, 1, identifier=9), angle(2, 1, flags=FLAG_ERROR)], [dbc])
+    with pytest.raises(UserError, match="none.dbc: cannot be read"):
+        frames.decode("log", [], [tmp_path / "none.dbc"])
+    empty = tmp_path / "empty.dbc"
+    empty.write_text('VERSION ""\n', encoding="utf-8")
+    with pytest.raises(UserError, match="a recording of CAN frames needs a DBC file with messages"):
+        frames.decode("log", [], [empty])
+    wrong = tmp_path / "wrong.dbc"
+    wrong.write_text("BO_ nothing", encoding="utf-8")
+    with pytest.raises(UserError, match="wrong.dbc: not a DBC file that cantools can read"):
+        frames.decode("log", [], [wrong])
