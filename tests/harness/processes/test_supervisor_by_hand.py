@@ -171,6 +171,7 @@ def test_a_plant_without_progress_is_named_once_until_it_goes_on(alone):
     alone.clock.now += HANG_S + 0.1
     alone.look()
     assert len(alone.view.heard()) == 1
+    assert alone.view.shown[-1]["plant"] == 50
     alone.ending = True
     shown = len(alone.view.shown)
     alone.clock.now += 99
