@@ -1,6 +1,8 @@
 """Conditions, ends of a walk and noticed strikes, on machines made by hand."""
 
+import contextlib
 import math
+import pathlib
 from types import SimpleNamespace as Made
 
 import pytest
@@ -9,6 +11,8 @@ from ranger_sim.firmware_sim.board import Board
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness import waiting
 from ranger_sim.harness.names import Names
+from ranger_sim.harness.processes import kernel
+from ranger_sim.harness.ranger import Ranger
 from ranger_sim.harness.records.strike_watch import StrikeWatch
 from ranger_sim.harness.stop_rule import StopRule
 from ranger_sim.plant.ranger import RangerPlant
@@ -188,3 +192,24 @@ def test_a_strike_is_noticed_with_the_flip_of_the_swing_leg():
     assert (two["mean"], two["std"]) == (12.0, pytest.approx(2.0))
     missed = strikes((3, 10, 1, 24), (5, 99, 0, 99))
     assert (missed["missed"], missed["count"]) == (3, 2)
+
+
+def test_a_run_says_whether_it_is_over():
+    with contextlib.closing(Ranger()) as robot:
+        assert robot.run(StopRule(time_s=0.004), 0.001) is False and robot.time_s == pytest.approx(0.001)
+        assert robot.run(StopRule(time_s=0.004), 1.0) is True and robot.time_s == pytest.approx(0.004)
+        assert robot.run(StopRule(time_s=0.004), 1.0) is True and robot.time_s == pytest.approx(0.004)
+        assert robot.run(StopRule(time_s=0.005, steps=9), 0.0005) is False
+        robot.ended = "forward"
+        assert robot.run(StopRule(time_s=1.0), 0.001) is True and robot.time_s == pytest.approx(0.0045)
+
+
+def test_a_process_is_shown_by_its_name_of_at_most_fifteen_bytes():
+    comm = pathlib.Path("/proc/self/comm")
+    before = comm.read_text(encoding="ascii").strip()
+    try:
+        for name in ("ranger MCH", "a name that is too long"):
+            kernel.name_process(name)
+            assert comm.read_text(encoding="ascii").strip() == name[:15]
+    finally:
+        kernel.name_process(before)
