@@ -208,7 +208,7 @@ def test_a_process_is_shown_by_its_name_of_at_most_fifteen_bytes():
     comm = pathlib.Path("/proc/self/comm")
     before = comm.read_text(encoding="ascii").strip()
     try:
-        for name in ("ranger MCH", "a name that is too long"):
+        for name in ("ranger MCH", "a-name-that-is-too-long"):
             kernel.name_process(name)
             assert comm.read_text(encoding="ascii").strip() == name[:15]
     finally:
