@@ -35,6 +35,12 @@ class Line:
             raise OSError
         self.sent.append((data, address))
 
+    def setsockopt(self, *_):
+        raise OSError  # a kernel that lets nobody share a port: the master has no socket of its own
+
+    def fileno(self):
+        return 5
+
     def close(self):
         pass
 
@@ -46,7 +52,8 @@ def server(monkeypatch):
     with contextlib.closing(udp.XcpUdpServer(robot, 0)) as made:
         made.socket.close()
         made.socket = Line()
-        made.owners = {ME: 7, OTHER: 7}
+        made.owners, made.now_s = {ME: 7, OTHER: 7}, 50.0
+        made.clock, made.asked_s = (lambda: made.now_s), 50.0
         monkeypatch.setattr(udp, "owner_of", lambda sender: made.owners.get(sender))
         monkeypatch.setattr(udp, "trusted", lambda user: user == 7)
         yield made
@@ -99,19 +106,39 @@ def test_who_is_unknown_or_of_another_user_is_not_answered(server):
     assert len(asks(server, CONNECT)) == 1
 
 
-def test_one_stranger_is_looked_up_in_a_look_and_the_rest_go_away(server):
-    server.socket.coming += [(datagram(STATUS), OTHER)] * 3
+def test_who_does_not_connect_is_not_heard_whoever_has_the_place(server):
+    for datagrams in (datagram(STATUS), datagram(STATUS, CONNECT), b"", b"\x02\x00\x00\x00"):
+        server.socket.coming.append((datagrams, OTHER))
+        server.poll(0)
+    assert server.counters()[f"sent_away_{MALFORMED}"] == 4 and server.counters()["commands"] == 0
+    assert len(asks(server, CONNECT)) == 1
+    assert asks(server, STATUS, sender=OTHER) == [] and server.counters()[f"sent_away_{FULL}"] == 1
+
+
+def test_the_kernel_is_asked_about_strangers_as_often_as_others_are_taken_in(server):
+    server.owners = {}
+    strangers = udp.QUESTIONS + 2
+    for _ in range(strangers):
+        asks(server, CONNECT)
+    assert (server.sent_away[UNKNOWN], server.sent_away[FULL]) == (udp.QUESTIONS, 2)
+    server.now_s += 0.999 / udp.ARRIVALS_PER_S
+    asks(server, CONNECT)
+    assert server.sent_away[FULL] == 3
+    server.now_s += 0.002 / udp.ARRIVALS_PER_S
+    asks(server, CONNECT)
+    assert server.sent_away[UNKNOWN] == udp.QUESTIONS + 1
+    server.now_s += 1e6  # never more than there is room for
+    for _ in range(strangers):
+        asks(server, CONNECT)
+    assert server.sent_away[UNKNOWN] == 2 * udp.QUESTIONS + 1
+
+
+def test_a_look_takes_so_many_strangers_and_the_next_the_rest(server):
+    server.socket.coming += [(datagram(STATUS), OTHER)] * (udp.STRANGERS_A_LOOK + 1)
     server.poll(0)
-    assert server.counters() == {
-        "commands": 1,  # of one who is not connected there is no answer, and no place taken
-        "packets_out": 0,
-        "packets_dropped": 0,
-        "writes_refused": 0,
-        f"sent_away_{FULL}": 2,
-    }
-    server.socket.coming += [(datagram(STATUS), OTHER)]
+    assert server.left_over and len(server.socket.coming) == 1
     server.poll(0)
-    assert server.counters()["commands"] == 2
+    assert not server.left_over and server.sent_away[MALFORMED] == udp.STRANGERS_A_LOOK + 1
 
 
 def test_a_look_carries_out_as_many_commands_as_its_burst_and_the_next_goes_on(server):
