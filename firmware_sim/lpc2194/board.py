@@ -268,9 +268,13 @@ class ImageBoard(Microcontroller):
             if self.edge_time < first:
                 first = self.edge_time
             own = NEVER
+            stop = first if first < self.horizon else self.horizon
+            if self.idle and core.debugger is not None:  # who waits for ever is to be found by a debugger, too
+                own = self.time_of(core.next_look)
+                if own < stop:
+                    self._catch_up(own)
             if not self.idle and not self.asleep:
                 own = self.time_of(core.cycles)
-                stop = first if first < self.horizon else self.horizon
                 if own < stop:
                     self._run(stop)
                     continue
@@ -335,7 +339,8 @@ class ImageBoard(Microcontroller):
                 self.pass_cycles = core.cycles - cycles
                 self.pass_instructions = core.instructions - instructions
                 self.pass_looks = self.map.looks != looks
-                if not self.waits[self._flash_place(pc)]:
+                # not beyond `target`: what comes then is seen by the pass that is under way
+                if not self.waits[self._flash_place(pc)] and core.cycles + self.pass_cycles <= target:
                     self._learn(self.pass_instructions)
                 return True
         return False

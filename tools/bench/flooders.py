@@ -24,6 +24,7 @@ from ranger_sim.harness.processes import control
 from ranger_sim.tools.robodaq.codec import write_packet
 
 CHUNK = 1 << 16  # bytes offered at once: what a socket takes
+LET_IN_S = 5.0  # a page waits so long for its place
 LOOK_S = 0.1  # between two looks of programs that only stay
 
 # The robot that is flooded: with every door of a robot of Python boards; with a board that runs machine code and a
@@ -113,8 +114,17 @@ def visiting(doors: Doors) -> socket.socket:
 
 
 def page(doors: Doors) -> socket.socket:
-    """A page of the panel."""
-    return _distant(doors.panel, handshake(doors, doors.token))
+    """A page of the panel, which has been let in."""
+    client = _distant(doors.panel, handshake(doors, doors.token))
+    client.settimeout(LET_IN_S)
+    heard = b""
+    while b"\r\n\r\n" not in heard:
+        if not (data := client.recv(1)):
+            client.close()
+            raise ConnectionResetError
+        heard += data
+    client.settimeout(None)
+    return client
 
 
 def page_of_another_site(doors: Doors) -> socket.socket:

@@ -51,6 +51,7 @@ MOST_CHANNELS = 48  # of all plots of a page, as RoboDAQ
 MOST_POINTS = 4000
 PATIENCE_S = 30.0  # without a sign of the page
 CLOSE_POLICY, CLOSE_FULL = 1008, 1013  # RFC 6455 and its registry
+BROKEN = {1002, 1003, 1007, 1009}  # the same: who is told so did not speak WebSocket, or too much at once
 
 
 class PanelServer:
@@ -225,8 +226,8 @@ class Session:
                     return reason
         except TimeoutError:
             return "silence"
-        except WebSocketDisconnect:
-            return ""
+        except WebSocketDisconnect as left:
+            return "a broken message" if left.code in BROKEN else ""
         finally:
             if showing is not None:
                 showing.cancel()

@@ -1,7 +1,11 @@
 """A debugger at a board that runs an image: it looks and nothing changes, also at devices and at loops that wait."""
 
+import contextlib
+import socket
+
 import pytest
 
+from ranger_sim.firmware_sim.gdb.server import GdbServer
 from tests.firmware_sim.gdb.client import session
 from tests.firmware_sim.lpc2194.programs import Run, board_with, words_of
 
@@ -97,3 +101,19 @@ def test_looking_at_a_board_of_the_chip_leaves_its_run_as_it_is():
     assert everything(board) == everything(alone.board)
     assert board.skips_idle
     assert board.counters().processor.idle_instructions > 0
+
+
+def test_a_program_that_waits_for_ever_without_an_interrupt_is_found_by_a_debugger_and_goes_on_as_without():
+    """`b .` is skipped at once; the door is looked at all the same, and nothing but that."""
+    alone, board = board_with([0xEAFFFFFE]), board_with([0xEAFFFFFE])
+    with contextlib.closing(GdbServer(board, 0, ends=lambda: True)) as server:  # held, it is let go
+        server.begin()
+        run = Run(board).to(20_000_000)
+        assert board.next_time < 40_000_000  # it is due for the door's sake
+        with socket.create_connection(("127.0.0.1", server.port)):
+            run.to(40_000_000)
+            assert server.seen == 1
+    Run(board).to(60_000_000)
+    Run(alone).to(60_000_000)
+    assert everything(board) == everything(alone)
+    assert board.counters().processor.idle_cycles > 0.9 * board.core.cycles

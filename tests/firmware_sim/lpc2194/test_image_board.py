@@ -1,7 +1,7 @@
 """A board that runs an image: boot, interrupts, frames, stamps; slicing changes nothing, nor does skipping loops."""
 
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from ranger_sim.firmware_sim.clock import Crystal
@@ -95,6 +95,7 @@ def test_loops_that_wait_are_skipped_and_nothing_but_the_time_it_takes_shows_it(
     assert counts.idle_cycles > 0.8 * counts.cycles  # a service and a frame take some 130 of 6,000 cycles
 
 
+@example([1501, 36301, 71601, 106101, 141401], [1, 1, 2799], "poller")  # the pass that is learned from passed the end
 @given(
     st.lists(st.integers(1_000, 400_000), min_size=1, max_size=12, unique=True),
     st.lists(st.integers(1, 60_000), min_size=1, max_size=6),
