@@ -334,3 +334,44 @@ def test_a_sine_of_more_than_six_samples_a_period_moves_and_a_faster_one_is_take
     for part, there in ((0.19, False), (0.21, moves)):
         small = np.where((n > 260) & (n < 2200), part, 1.0) * other.value
         assert sanity._moves(channel("b", small, "V", 0.004 * n), 1.1, 8.7) == there
+
+
+# ---- clocks
+
+
+@pytest.mark.parametrize(
+    ("ppm", "told"), [(99.0, False), (101.0, True), (-99.0, False), (-101.0, True), (9000.0, True)]
+)
+def test_a_clock_that_runs_off_by_more_than_a_hundred_parts_in_a_million_is_told(ppm, told):
+    found = of("clock_drift", channel("board_s", 3.0 + (1.0 + 1e-6 * ppm) * (T + 1.0), "s", T + 1.0))
+    assert bool(found) == told
+    if told:
+        assert found[0].size == pytest.approx(ppm, abs=0.1) and found[0].unit == "ppm"
+        assert (found[0].start_s, found[0].end_s) == (1.0, pytest.approx(1.0 + T[-1]))
+        assert found[0].text == f"its clock runs {abs(ppm):.0f} ppm {'fast' if ppm > 0 else 'slow'} against the stamps"
+
+
+@pytest.mark.parametrize("scatter_s", [4e-4, 8e-3])
+def test_a_clock_s_drift_must_be_five_times_what_its_scatter_leaves_open(scatter_s):
+    """A line through n stamps is known to its scatter times sqrt(12 / n) over the span."""
+    ours = T[::40]
+    noise = scatter_s * generator(6, "clock").normal(size=len(ours))
+    shown = 1.002 * ours + noise
+    assert np.all(np.diff(shown) >= 0.0)
+    slope, offset = np.polyfit(ours, shown, 1)
+    spread = float(np.std(shown - slope * ours - offset)) * math.sqrt(12.0 / len(ours)) / ours[-1]
+    assert ((slope - 1.0) > 5.0 * spread) == (scatter_s == 4e-4)
+    found = of("clock_drift", channel("board_s", shown, "s", ours))
+    assert bool(found) == (scatter_s == 4e-4)
+
+
+def test_what_is_no_clock_has_no_drift():
+    assert not of("clock_drift", channel("time_s", 1.02 * T, "s"))  # another rate altogether
+    assert not of("clock_drift", channel("time_s", -T, "s")) and not of(
+        "clock_drift", channel("x_rad", 1.001 * T, "rad")
+    )
+
+
+def test_of_a_constant_channel_nothing_else_is_told():
+    data = Dataset("data", {"current_A": channel("current_A", np.full(2000, 500.0), "A")})
+    assert [each.kind for each in sanity.inspect(data)] == ["constant"]
