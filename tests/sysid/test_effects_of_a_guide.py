@@ -57,7 +57,7 @@ def swung(step_s=0.002, seconds=8.0):
 
 
 def test_the_balance_of_a_guide_is_force_against_mass_and_friction():
-    """A sine of 1.5 rad/s under a Gaussian of 1.5 ms is itself, to some millionths."""
+    """A sine of 1.5 rad/s under a Gaussian of 1.5 ms is itself; its slope at steps of 2 ms to a part in a thousand."""
     run = swung()
     t = run.time_s
     made = Positioning().prepare(run)
@@ -66,7 +66,7 @@ def test_the_balance_of_a_guide_is_force_against_mass_and_friction():
     v, a = 0.3 * np.cos(1.5 * t), -0.45 * np.sin(1.5 * t)
     assert list(force.columns) == [each.name for each in Positioning.parameters]
     mass, viscous, coulomb, offset = force.columns.values()
-    assert np.allclose(mass[inside], a[inside], atol=1e-4) and np.allclose(viscous[inside], v[inside], atol=1e-4)
+    assert np.allclose(mass[inside], a[inside], atol=5e-4) and np.allclose(viscous[inside], v[inside], atol=5e-4)
     top = np.quantile(np.abs(viscous), 0.98)
     # a hundredth of the fastest speed is near standstill, a quarter of that turns the sign
     assert np.allclose(coulomb, np.tanh(viscous / (0.0025 * top)))
