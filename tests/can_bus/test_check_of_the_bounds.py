@@ -21,7 +21,7 @@ from ranger_sim.can_bus.bound_check import (
     random_set,
     random_sets,
 )
-from ranger_sim.can_bus.bounds import Bound, Message, message, utilisation
+from ranger_sim.can_bus.bounds import Bound, message, response_times, utilisation
 from ranger_sim.foundation.events import FLAG_EXTENDED
 from ranger_sim.foundation.random_stream import RandomStream
 from tests.examples import examples
@@ -408,5 +408,7 @@ def test_many_sets_are_those_of_their_numbers_and_their_load_is_the_mean():
     assert found["unbounded"] == 0 and random_sets(6, seed=4) == found != random_sets(6, seed=5)
 
 
-def test_messages_of_the_check_are_messages_of_the_bounds():
-    assert isinstance(sender("a", 1).message, Message)
+def test_where_there_is_no_bound_there_is_no_instance_that_answers_last():
+    one = message("a", 1, 100_000, 8)  # 135 us of every 100
+    [bound] = response_times([one], RATE)
+    assert bound == Bound(one, None, 0, 0, 0, None)

@@ -372,6 +372,13 @@ def test_a_link_that_is_shut_says_so_and_is_shut_once(attached):
     assert link.present_state() == 0
 
 
+def test_figures_of_an_attached_bus_are_those_of_what_has_come_by_now(attached):
+    link, end, _ = attached()
+    end.send(frame_record(6, 1) + record(8, "qHHH", 5, 0, 3, 4))
+    told = python_can.RangerSimBus.statistics(SimpleNamespace(_link=link))
+    assert (told["sent"], told["transmit_errors"], told["receive_errors"]) == (1, 3, 4)
+
+
 # ---- private links
 
 
@@ -400,6 +407,15 @@ def test_private_links_hear_each_other_with_stamps_since_the_epoch(clock):
     two.close()
     one.close()
     assert one.bus.links == []
+
+
+def test_who_sends_wakes_the_others_who_sleep_until_an_instant_that_has_come_nearer(clock):
+    links_of_bus = private(3)
+    woken = []
+    for number, link in enumerate(links_of_bus):
+        link.changed = SimpleNamespace(notify_all=lambda number=number: woken.append(number))
+    links_of_bus[1]._wake_sleepers()
+    assert woken == [0, 2]
 
 
 def test_a_private_queue_that_stays_full_and_a_controller_that_is_off_are_told(clock):
@@ -818,7 +834,7 @@ class Air:
     """An interface of the test: every other bus hears each message but for each `lose`-th, and every `swap`-th late."""
 
     def __init__(self, lose=0):
-        self.buses, self.lose, self.count = [], lose, 0
+        self.buses, self.lose, self.count, self.sent = [], lose, 0, []
 
     def opened(self, _interface, _channel):
         self.buses.append(_OnAir(self))
@@ -836,6 +852,8 @@ class _OnAir:
         self.queue = None
 
     def send(self, message):
+        running = int.from_bytes(message.data, "little")
+        self.air.sent.append((self.air.buses.index(self), message.arbitration_id, running))
         for other in self.air.buses:
             if other is not self:
                 self.air.count += 1
@@ -851,7 +869,8 @@ class _OnAir:
 )
 def test_what_is_sent_through_an_interface_is_counted_at_every_other_node(monkeypatch, frames, nodes, lose, lost):
     cpu, wall = iter((1.0, 3.0)), iter((10.0, 15.0))
-    monkeypatch.setattr(benchmark, "opened", Air(lose).opened)
+    air = Air(lose)
+    monkeypatch.setattr(benchmark, "opened", air.opened)
     monkeypatch.setattr(benchmark.wallclock, "process_cpu_s", lambda: next(cpu))
     monkeypatch.setattr(benchmark.wallclock, "monotonic_s", lambda: next(wall))
     assert benchmark.interface_frames("any", frames, nodes) == {
@@ -863,6 +882,8 @@ def test_what_is_sent_through_an_interface_is_counted_at_every_other_node(monkey
         "wall_s": 5.0,
         "frames_per_s": frames / 2.0,
     }
+    # in turn, each with a running number of its own: 16 identifiers of each node, 64 between two nodes' first ones
+    assert air.sent == [(n % nodes, n % nodes * 64 + n // nodes % 16, n // nodes // 16) for n in range(frames)]
 
 
 def test_frames_of_a_sender_take_its_sixteen_identifiers_in_turn():
