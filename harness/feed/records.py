@@ -16,6 +16,7 @@ HELLO = 1  # JSON: who it is, and what the streams hold
 ROWS = 2  # number of the stream (one byte), then its rows
 GAP = 3  # JSON: {stream: rows that were left out here}, because too much was waiting
 STATE = 4  # JSON: what is in no stream
+SLOTS = 5  # number of the board (one byte), then its slots: three 64-bit whole numbers each
 
 HEAD = struct.Struct("<IB")
 

@@ -19,6 +19,7 @@ from ranger_sim.harness.records.summary import energy
 
 LOOK_NS = 20_000_000  # virtual time between two looks: 50 pictures a second at real time
 STATE_NS = 100_000_000
+SLOT_BYTES = 24
 
 
 class FeedServer(Door[Peer]):
@@ -43,6 +44,8 @@ class FeedServer(Door[Peer]):
         self.left_out: dict[int, Counter[str]] = {}  # by peer, since it was told
         self.greeting = b""  # the first record, once somebody has asked for it
         self.next_state_ns = 0
+        self.boards: dict[str, Any] = {}  # those that tell their slots
+        self.slots_shown: dict[str, int] = {}
         self.totals = {"viewers_seen": 0, "rows_left_out": 0}
         for number, stream in enumerate(self.streams):
             robot.logbook.listen(stream, self._taker(number, stream))
@@ -77,6 +80,7 @@ class FeedServer(Door[Peer]):
         self.look(now_ns)
         if self.peers:
             self.robot.logbook.flush()
+            self._show_slots()
             if now_ns >= self.next_state_ns or self.robot.ended:
                 self.next_state_ns = now_ns + STATE_NS
                 record = records.text_record(records.STATE, self.state(now_ns))
@@ -84,6 +88,17 @@ class FeedServer(Door[Peer]):
                     self._offer(peer, record, "state", 1)
             self.write()
         return now_ns + LOOK_NS
+
+    def _show_slots(self) -> None:
+        """What the boards' processes have kept of their slots since the last look."""
+        for number, (name, board) in enumerate(self.boards.items()):
+            rows, self.slots_shown[name], missed = board.slots_since(self.slots_shown[name])
+            record = records.record(records.SLOTS, bytes([number]) + rows)
+            for peer in self.peers:
+                if missed:
+                    self.left_out[id(peer)][f"slots of {name}"] += missed
+                if rows:
+                    self._offer(peer, record, f"slots of {name}", len(rows) // SLOT_BYTES)
 
     def state(self, now_ns: int) -> dict[str, Any]:
         """What is in no stream: the panel of the user interface board, faults, how far it walked."""
@@ -120,6 +135,7 @@ class FeedServer(Door[Peer]):
                 }
                 for stream in self.streams
             ],
+            "boards": [{"name": name, "hz": robot.boards[name].hz} for name in self.boards],
             "samples": dict(robot.plant.sample_names),
             "states": state_names(robot),
             "geometry": robot.plant.geometry(),
@@ -128,6 +144,10 @@ class FeedServer(Door[Peer]):
 
     def _welcome(self, connection: socket.socket) -> Peer:
         peer = Peer(SocketStream(connection))
+        if not self.peers:  # they have got processes of their own by now; what nobody looked at is nobody's
+            there = {name: self.robot.loop.board(name) for name in self.robot.boards}
+            self.boards = {name: board for name, board in there.items() if hasattr(board, "slots_since")}
+            self.slots_shown = {name: board.slots_since(0)[1] for name, board in self.boards.items()}
         self.left_out[id(peer)] = Counter()
         self.robot.loop.sampler.words = self.robot.recorder.words  # also of a robot that keeps no log
         self.totals["viewers_seen"] += 1

@@ -15,6 +15,8 @@ from ranger_sim.harness.processes.places import (
     FAULT_WORDS,
     MAGIC_WORD,
     PLACE_WORD,
+    RING,
+    RING_ROW,
     ROW_SIZE,
     SLOTS,
     SLOTS_WORD,
@@ -35,7 +37,8 @@ class Block:
         self.name = name
         self.to_board_first = TABLE + table_words
         self.from_board_first = self.to_board_first + SLOTS * SLOT_WORDS
-        self.size = self.from_board_first + SLOTS * SLOT_WORDS
+        self.ring_first = self.from_board_first + SLOTS * SLOT_WORDS
+        self.size = self.ring_first + RING * RING_ROW
         self.memory = mmap.mmap(-1, 8 * self.size)
         self.words = memoryview(self.memory).cast("q")
         self.table_words = table_words

@@ -1,4 +1,5 @@
 from ranger_sim.firmware_sim.microcontroller cimport Microcontroller
+from ranger_sim.firmware_sim.scheduler cimport SlotScheduler
 from ranger_sim.foundation.events cimport EventQueue
 from ranger_sim.harness.processes.channel cimport LONGEST, Bell, Mailbox
 from ranger_sim.harness.processes.places cimport (
@@ -30,6 +31,12 @@ from ranger_sim.harness.processes.places cimport (
     RESULT,
     RESULT_DONE,
     RESULT_MORE,
+    RING,
+    RING_CYCLES,
+    RING_LATE,
+    RING_ROW,
+    RING_ROWS,
+    RING_START,
     ROWS,
     SLOTS,
     SLOT_COUNT,
@@ -52,10 +59,11 @@ cdef class Endpoint:
     cdef public Mailbox to_board, from_board
     cdef public Audience audience
     cdef public EventQueue pending, out
-    cdef public long long slots_seen, turns, reached, can_wait, promised
+    cdef public long long slots_seen, cycles_seen, ring_first, turns, reached, can_wait, promised
     cpdef void serve(self)
     cdef void _advance(self)
     cdef int _run_to(self, long long until) except -1
-    cdef void _late(self)
+    cdef long long _late(self) except? -2
+    cdef void _keep_slots(self)
     cdef bint _put_out(self)
     cdef int _show(self) except -1

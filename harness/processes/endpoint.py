@@ -9,6 +9,7 @@ import cython
 
 from ranger_sim.boards.counters import as_dict
 from ranger_sim.firmware_sim.microcontroller import Microcontroller
+from ranger_sim.firmware_sim.scheduler import SlotScheduler
 from ranger_sim.foundation import wallclock
 from ranger_sim.foundation.events import CAN_RX, CAN_TX_DONE, PIN_EDGE, UART_BYTE, EventQueue
 from ranger_sim.harness.processes.activity import ActivityStore
@@ -57,6 +58,12 @@ if not cython.compiled:
         RESULT,
         RESULT_DONE,
         RESULT_MORE,
+        RING,
+        RING_CYCLES,
+        RING_LATE,
+        RING_ROW,
+        RING_ROWS,
+        RING_START,
         ROWS,
         SLOT_COUNT,
         SLOT_TIME,
@@ -103,7 +110,9 @@ class Endpoint:
         self.promised = 0
         self.clock: object = wallclock.monotonic_ns
         self.pending = EventQueue(64)
-        self.slots_seen = 0
+        self.slots_seen = board.scheduler.slot_count
+        self.cycles_seen = board.scheduler.total_slot_cycles
+        self.ring_first = shared.ring_first
         self.reached = 0
 
     def serve(self) -> cython.void:
@@ -161,17 +170,40 @@ class Endpoint:
         board: Microcontroller = self.board
         if board.next_time < until or board.inbox.head_time < until:
             board.advance(until)
-            if board.scheduler.slot_count != self.slots_seen:
-                self._late()
+            self._keep_slots()
 
-    def _late(self) -> cython.void:
-        """A slot has begun: hold its instant against the wall clock."""
+    def _keep_slots(self) -> cython.void:
+        """The latest slots into the ring: of most calls none, or one that has begun and ended."""
+        scheduler: SlotScheduler = self.board.scheduler
+        begun: cython.bint = scheduler.slot_count != self.slots_seen
+        closed: cython.longlong = scheduler.total_slot_cycles - self.cycles_seen
+        before: cython.longlong = closed
+        row: cython.longlong
+        self.cycles_seen += closed
+        if scheduler.done:
+            before = closed - scheduler.last_slot_cycles if begun else 0
+        if before > 0:  # of the slot before the latest
+            row = self.block[RING_ROWS] - (1 if begun else 2)
+            if row >= 0:
+                self.block[self.ring_first + RING_ROW * (row % RING) + RING_CYCLES] = before
+        if begun:
+            self.slots_seen = scheduler.slot_count
+            row = self.ring_first + RING_ROW * (self.block[RING_ROWS] % RING)
+            self.block[row + RING_START] = scheduler.slot_time
+            self.block[row + RING_CYCLES] = 0
+            self.block[row + RING_LATE] = self._late()
+            self.block[RING_ROWS] += 1
+        if scheduler.done and closed > 0 and self.block[RING_ROWS] > 0:
+            row = self.ring_first + RING_ROW * ((self.block[RING_ROWS] - 1) % RING)
+            self.block[row + RING_CYCLES] = scheduler.last_slot_cycles
+
+    def _late(self) -> cython.longlong:
+        """A slot has begun: hold its instant against the wall clock; ns, -1 where no pace is kept."""
         due: cython.longlong
         late: cython.longlong
         place: cython.longlong
-        self.slots_seen = self.board.scheduler.slot_count
         if self.stage[PACED] == 0:
-            return
+            return -1
         due = self.stage[PACE_WALL_NS] + int(
             (self.board.scheduler.slot_time - self.stage[PACE_TIME_NS]) * self.stage_doubles[PACE_WALL_PER_TIME]
         )
@@ -184,6 +216,7 @@ class Endpoint:
         self.block[LATE_COUNT] += 1
         place = bin_of(late // 1000)
         self.block[LATENESS + place] += 1
+        return late
 
     def _put_out(self) -> cython.bint:
         """What the board put out goes into the mailbox; True when more is left than fits."""

@@ -32,6 +32,7 @@ cpdef enum:
     TURNS = 48
     URGENT = 49
     HELD = 50
+    RING_ROWS = 51
     LET_GO = 55
     FATE = 56
     ALIVE = 0
@@ -43,6 +44,11 @@ cpdef enum:
     LATENESS = 128
     LATENESS_WORDS = 1344
     TABLE = 1472
+    RING = 512
+    RING_ROW = 3
+    RING_START = 0
+    RING_CYCLES = 1
+    RING_LATE = 2
     COMMAND_ADVANCE = 1
     COMMAND_MORE = 2
     COMMAND_COUNTERS = 3

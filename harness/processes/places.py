@@ -44,6 +44,7 @@ if not cython.compiled:
     TURNS = 48
     URGENT = 49  # message kinds (bits) that the board may answer at once
     HELD = 50  # 1 while a debugger has the board, or is waited for: it keeps its turn and does not hang
+    RING_ROWS = 51  # slots that were written into the ring so far; the latest may not have ended yet
     # the supervisor's words
     LET_GO = 55  # 1: the run is to end, debuggers have to let the board go
     FATE = 56  # ALIVE or GONE: nobody will answer
@@ -58,6 +59,13 @@ if not cython.compiled:
     LATENESS = 128  # see lateness.py
     LATENESS_WORDS = 1344
     TABLE = 1472  # LATENESS + LATENESS_WORDS: the main brain's data table, then the two mailboxes
+
+    # behind both mailboxes: a ring of the latest slots, a row each
+    RING = 512  # a quarter of a second of the fastest board; who looks comes 50 times a second of the robot
+    RING_ROW = 3
+    RING_START = 0  # ns: when its tick was due
+    RING_CYCLES = 1  # to the end of its last task; 0 as long as it has not ended
+    RING_LATE = 2  # ns: how late it was computed by the wall clock; -1 where no pace is kept
 
     COMMAND_ADVANCE = 1
     COMMAND_MORE = 2

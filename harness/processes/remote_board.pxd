@@ -21,6 +21,9 @@ from ranger_sim.harness.processes.places cimport (
     PLANT_SLEEPS,
     RESULT,
     RESULT_MORE,
+    RING,
+    RING_ROW,
+    RING_ROWS,
     ROWS,
     SLOTS,
     SLOT_TIME,
@@ -41,7 +44,7 @@ cdef class RemoteBoard(Board):
     cdef public list lines
     cdef public object counted, uncounted, log
     cdef public bint posted, gone, follows_steps
-    cdef public long long place, silent_until, urgent, turns, reached, watched_number, slot_time
+    cdef public long long ring_first, place, silent_until, urgent, turns, reached, watched_number, slot_time
     cdef bint _urgent(self, long long until) noexcept
     cdef void _post(self, long long command, long long until)
     cdef int _ring(self, long long command, long long until) except -1

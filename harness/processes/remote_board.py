@@ -45,6 +45,9 @@ if not cython.compiled:
         PLANT_SLEEPS,
         RESULT,
         RESULT_MORE,
+        RING,
+        RING_ROW,
+        RING_ROWS,
         ROWS,
         SLOT_TIME,
         SLOTS,
@@ -81,6 +84,7 @@ class RemoteBoard(Board):
         self.log = RemoteActivity(self, shared.words, built.scheduler.log)
         self.uncounted = built.counters()
         self.block = shared.words
+        self.ring_first = shared.ring_first
         self.ask = Bell(shared.words, ASKED, BOARD_SLEEPS, shared.ask_descriptor)
         self.answer = Bell(shared.words, ANSWERED, PLANT_SLEEPS, shared.answer_descriptor)
         self.to_board = Mailbox(shared.words, f"to {self.name}", shared.to_board_first, SLOTS, ASK_USED, TO_BOARD)
@@ -209,6 +213,21 @@ class RemoteBoard(Board):
     def activity(self) -> object:
         """Its activity log, kept in its own process: rows come when it is flushed."""
         return self.log
+
+    def slots_since(self, row) -> tuple:
+        """Slots that have ended, from number `row` on: (bytes of RING_ROW words each, number of the next, missed ones).
+
+        They are as the board's process has written them; nothing is asked of it.
+        """
+        end = max(self.block[RING_ROWS] - 1, row)  # the latest may not have ended
+        first = max(row, end - RING + 2)  # of a full ring the oldest may be written over at any moment
+        words = memoryview(self.block)[self.ring_first : self.ring_first + RING * RING_ROW]
+        head, tail = RING_ROW * (first % RING), RING_ROW * (end % RING)
+        if first == end:
+            return b"", end, first - row
+        if head < tail:
+            return words[head:tail].tobytes(), end, first - row
+        return words[head:].tobytes() + words[:tail].tobytes(), end, first - row
 
     def counters(self) -> object:
         """What the board counted, as it was fetched last; only its last slot where it was gone by then."""

@@ -129,10 +129,11 @@ class Memory:
     newest: time (s) of the last row, None before the first.
     """
 
-    def __init__(self, columns: int, period_s: float) -> None:
+    def __init__(self, columns: int, period_s: float, fine_s: float | None = None) -> None:
         self.columns = columns
         self.period_s = period_s
-        self.fine = _Rows(columns, round(FINE_S / period_s))
+        self.fine_s = FINE_S if fine_s is None else fine_s
+        self.fine = _Rows(columns, round(self.fine_s / period_s))
         self.low = _Rows(columns, round(COARSE_S / COARSE_WIDTH_S))
         self.high = _Rows(columns, round(COARSE_S / COARSE_WIDTH_S))
         self.bucket: int | None = None  # the one that is being filled
@@ -145,7 +146,7 @@ class Memory:
         if len(times) == 0:
             return
         if self.newest is not None and times[0] <= self.newest:  # another robot, or it was started anew
-            self.__init__(self.columns, self.period_s)  # type: ignore[misc]
+            self.__init__(self.columns, self.period_s, self.fine_s)  # type: ignore[misc]
         self.fine.append(times, values)
         self.newest = float(times[-1])
         buckets = np.floor(times / COARSE_WIDTH_S + 1e-9).astype(np.int64)

@@ -23,6 +23,7 @@ from ranger_sim.harness.records import logbook
 from ranger_sim.harness.records.sampler import PERIOD_NS
 from ranger_sim.harness.records.summary import JOULES_PER_WH
 from ranger_sim.tools.panel.channels import Channel, Memory, Times, Trace, Values, between
+from ranger_sim.tools.panel.slots import BoardSlots
 from ranger_sim.tools.panel.source import TRUE_POSE, Source, error_rows, table_channels
 
 CONNECT_S = 5.0
@@ -65,7 +66,9 @@ class RobotSource(Source):
         ]
         states = {name: {int(n): text for n, text in each.items()} for name, each in hello["states"].items()}
         table = table_channels(states)
-        self.channels = [*self.body, *table.values()]
+        self.slots = [BoardSlots(board["name"], board["hz"]) for board in hello["boards"]]
+        self.channels = [*self.body, *table.values(), *(each for board in self.slots for each in board.channels())]
+        self.first_slot = len(self.body) + len(table)  # among the channels
         self.identifiers = np.array(list(table))
         self.pose_names = TRUE_POSE
         self.pose_columns = [list(hello["samples"]).index(column) for column in TRUE_POSE]
@@ -131,6 +134,8 @@ class RobotSource(Source):
             self.shown = json.loads(body)
         elif kind == records.GAP:
             self.gaps.update(json.loads(body))
+        elif kind == records.SLOTS:
+            self.slots[body[0]].take(body[1:], self.start_ns)
         elif kind == records.ROWS:
             stream = self.streams[body[0]]
             rows: Any = np.frombuffer(body[1:], np.float64 if stream["reals"] else np.int64)
@@ -169,6 +174,9 @@ class RobotSource(Source):
 
     def _place(self, channel: int) -> tuple[Memory, int]:
         body = len(self.body)
+        if channel >= self.first_slot:
+            board, column = divmod(channel - self.first_slot, 2)
+            return self.slots[board].memory, column
         return (self.body_rows, channel) if channel < body else (self.word_rows, channel - body)
 
     def trace(self, channel: int, begin: float, end: float, points: int) -> Trace:
@@ -205,6 +213,7 @@ class RobotSource(Source):
             "ended": self.shown.get("ended", ""),
             "faults": self.shown.get("faults", []),
             "boards": self.status.get("boards", {}),
+            "slots": {board.name: board.content(at) for board in self.slots},
             "buses": self.status.get("buses", {}),
             "pace": {key: self.status.get(key) for key in ("speed", "behind_s", "paused", "scheduling")},
             "errors": self.errors.content(self.span()[1]),

@@ -31,6 +31,8 @@ class Endpoint:
     pending: EventQueue
     out: EventQueue
     slots_seen: int
+    cycles_seen: int
+    ring_first: int
     turns: int
     reached: int
     can_wait: int

@@ -33,6 +33,7 @@ LATE_COUNT: int
 TURNS: int
 URGENT: int
 HELD: int
+RING_ROWS: int
 LET_GO: int
 FATE: int
 ALIVE: int
@@ -44,6 +45,11 @@ FAULT_WORDS: int
 LATENESS: int
 LATENESS_WORDS: int
 TABLE: int
+RING: int
+RING_ROW: int
+RING_START: int
+RING_CYCLES: int
+RING_LATE: int
 COMMAND_ADVANCE: int
 COMMAND_MORE: int
 COMMAND_COUNTERS: int

@@ -1,5 +1,6 @@
 """The feed: who looks sees what the log would keep, changes nothing, and waits for nobody."""
 
+import contextlib
 import json
 import socket
 
@@ -8,10 +9,12 @@ import pytest
 
 from ranger_sim import Ranger, Scenario
 from ranger_sim.datatable.generated import all_variables
+from ranger_sim.firmware_sim.activity import ACTIVITY_COLUMNS, COLUMN_CYCLES, COLUMN_KIND, COLUMN_START, SLOT_ENDED
 from ranger_sim.foundation.peers import LIMITS
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.feed import records
 from ranger_sim.harness.feed.server import FeedServer
+from ranger_sim.harness.processes.apart import Apart
 
 SECONDS = 0.1
 
@@ -204,3 +207,36 @@ def test_half_a_record_waits_for_the_rest():
     buffer += whole[-1:]
     assert list(records.taken(buffer)) == [(records.STATE, b'{"a":1}')]
     assert not buffer
+
+
+def test_a_viewer_sees_the_slots_of_boards_with_a_process_of_their_own():
+    """Held against the log that a board in this process keeps of itself."""
+    names = ("MCH", "UI")
+    ended = {}
+    with contextlib.closing(Ranger(Scenario(seed=3))) as robot:
+        logs = {name: [] for name in names}
+        for name in names:
+            robot.board(name).activity().add_sink(lambda _, rows, own=logs[name]: own.append(rows))
+        robot.run_for(0.3)
+        for name in names:
+            robot.board(name).activity().flush()
+            rows = np.frombuffer(b"".join(logs[name]), np.int64).reshape(-1, ACTIVITY_COLUMNS)
+            ended[name] = rows[rows[:, COLUMN_KIND] == SLOT_ENDED][:, [COLUMN_START, COLUMN_CYCLES]]
+    with contextlib.closing(Ranger(Scenario(seed=3))) as robot:
+        feed = FeedServer(robot, "feed-of-slots")
+        robot.attach(feed)
+        apart = Apart(robot, names)
+        try:
+            viewer = Viewer("feed-of-slots")
+            found = watched(robot, viewer, 0.3)
+        finally:
+            apart.close()
+        viewer.socket.close()
+    hello = json.loads(found[0][1])
+    assert [board["name"] for board in hello["boards"]] == list(names) and hello["boards"][0]["hz"] == 60_000_000
+    for number, name in enumerate(names):
+        data = b"".join(body[1:] for kind, body in found if kind == records.SLOTS and body[0] == number)
+        slots = np.frombuffer(data, np.int64).reshape(-1, 3)
+        assert len(slots) > 0.8 * len(ended[name]) and (slots[:, 2] == -1).all()  # nobody keeps a pace here
+        first = int(np.searchsorted(ended[name][:, 0], slots[0, 0]))  # who looks sees what is from then on
+        np.testing.assert_array_equal(slots[:, :2], ended[name][first : first + len(slots)])

@@ -27,7 +27,7 @@ const plots = makePlots(by("plots"), {
   cursor: (time) => { at = time; look(); },
   zoom: (begin, end) => { zooms.push(range()); hold([begin, end]); },
   widen: () => { const before = zooms.pop(); hold(before && !before.follows ? [before.begin, before.end] : null); },
-  marked: () => { atMark(); remember(); },
+  marked: () => { atMark(); look(); remember(); },
 }, colour);
 const face = makeFace(by("face"), (key) => tell({ do: "key", key }, `key ${key} pressed`),
   (stick) => tell({ do: "radio", stick }, `radio stick at ${stick}`));
@@ -88,8 +88,9 @@ function greet(found) {
 
 const range = () => held ? { begin: held[0], end: held[1], follows: false } : { begin: span[1] - window_s, end: span[1], follows: true };
 
-// Where robot, values and frames stand: at the cursor, of a recording where it is played; null: at the newest.
-const instant = () => at ?? (can.has("live") ? null : played);
+// Where robot, values, slots and frames stand: at the cursor; of a recording where it is played; at the mark, when the
+// plots are held or another view hides them; null: at the newest.
+const instant = () => at ?? (can.has("live") ? (held || view !== "plots" ? plots.mark() : null) : played);
 
 async function atMark() {
   const time = plots.mark(), channels = [...new Set(plots.all().flatMap((plot) => plot.numbers))];
@@ -248,7 +249,9 @@ function tell_state() {
     by("errors-normal").replaceChildren(tables.errors(errors.filter((row) => row.normal), "none"));
   }
   if (view === "inside") {
-    if (!by("view-inside").contains(document.activeElement) || document.activeElement.tagName !== "BUTTON") by("boards").replaceChildren(tables.boards(state.boards ?? {}, hello.slots_us, tell));
+    if (!by("view-inside").contains(document.activeElement) || document.activeElement.tagName !== "BUTTON") by("boards").replaceChildren(tables.boards(state.boards ?? {}, state.slots ?? {}, hello.slots_us, tell));
+    by("inside-at").textContent = insideAt();
+    by("slots-note").textContent = SLOTS_NOTE + (state.slots_note ? ` ${state.slots_note}` : "");
     by("buses").replaceChildren(tables.buses(state.buses ?? {}));
     const chosen = by("bus").value || "0";
     if (by("bus").length !== (state.frames ?? []).length) by("bus").replaceChildren(...(state.frames ?? []).map((_, k) => new Option(`can${k + 1}`, k)));
@@ -263,6 +266,14 @@ function tell_state() {
   if (view === "faults") by("fault-list").replaceChildren(tables.faults(state.faults ?? [], tell));
   if (state.link) by("readout").textContent = tables.linkState(state.link);
   else if (state.left_out && Object.keys(state.left_out).length) by("readout").textContent = `left out because this program was too slow: ${Object.entries(state.left_out).map(([name, rows]) => `${rows} rows of ${name}`).join(", ")}`;
+}
+
+const SLOTS_NOTE = "Bar: what the slot took of its time; line: the longest of the second before. Late: by the wall clock, of the slots of the second before, from 1 µs to 1 s by the logarithm.";
+
+// Of which instant slots and frames are.
+function insideAt() {
+  const seen = instant();
+  return seen === null ? "now; click a plot, or move its cursor by the arrow keys, and robot, slots and frames stand at that instant" : `at ${seen.toFixed(3)} s${can.has("live") ? "; Escape leads back to now" : ""}`;
 }
 
 function bars() {

@@ -48,17 +48,56 @@ export function errors(rows, nothing) {
     rows.map((row) => [row.board, row.name, row.text, row.count.toLocaleString("en"), seconds(row.first_s), seconds(row.last_s)]));
 }
 
-const late = (us) => us === undefined || us === null ? "–" : us < 1e3 ? `${Math.round(us)} µs` : us < 1e6 ? `${(us / 1e3).toFixed(1)} ms` : `${(us / 1e6).toFixed(1)} s`;
+const time = (us) => us === undefined || us === null ? "–" : us < 100 ? `${us.toFixed(1)} µs` : us < 1e3 ? `${Math.round(us)} µs` : us < 1e6 ? `${(us / 1e3).toFixed(1)} ms` : `${(us / 1e6).toFixed(1)} s`;
 
-export function boards(found, slots_us, ask) {
-  const names = Object.keys(found);
+// Of a slot: what it took (the bar), what the worst of the second before it took (the mark).
+function slotBar(name, slot, slot_us) {
+  const share = slot.used_us / slot_us, worst = slot.used ? slot.used.worst / slot_us : share;
+  const box = meter(share, `${name}: ${Math.round(100 * share)} % of its slot, at worst ${Math.round(100 * worst)} % in the second before`);
+  const mark = document.createElement("b");
+  mark.style.left = `${Math.min(100, 100 * worst)}%`;
+  box.append(mark);
+  return box;
+}
+
+const LATEST_US = 1e6;   // the bar of lateness goes from 1 µs to 1 s, by the logarithm
+const lateShare = (us) => us === null || us === undefined ? 0 : Math.max(0, Math.min(1, Math.log10(Math.max(us, 1)) / Math.log10(LATEST_US)));
+
+function lateBars(name, late) {
+  if (!late) return document.createTextNode("no pace is kept");
+  const box = document.createElement("div");
+  box.className = "late";
+  box.setAttribute("role", "img");
+  box.setAttribute("aria-label", `${name}: half of the slots of the second before were at most ${time(late.median)} late, 99 of 100 ${time(late.most)}, the latest ${time(late.worst)}`);
+  for (const which of ["median", "most", "worst"]) {
+    const bar = document.createElement("i");
+    bar.style.width = `${100 * lateShare(late[which])}%`;
+    box.append(bar);
+  }
+  box.append(Object.assign(document.createElement("small"), { textContent: `${time(late.median)}, ${time(late.most)}, ${time(late.worst)}` }));
+  return box;
+}
+
+// found: the supervisor's view; slots: of each board at the instant that is shown, where it tells them
+export function boards(found, slots, slots_us, ask) {
+  const names = [...new Set([...Object.keys(found), ...Object.keys(slots).filter((name) => slots[name])])];
   if (!names.length) return note("nothing is known of the boards yet");
-  return table(["board", "state", "#slots", "longest slot", "#µs", "#margin", "#overruns", "#errors", "#late, 99 of 100", ""], names.map((name) => {
-    const board = found[name], share = board.max_slot_us / slots_us[name];
-    const restart = Object.assign(document.createElement("button"), { type: "button", textContent: "Restart" });
-    restart.onclick = () => ask({ do: "restart", board: name });
-    return [name, board.state, board.slots.toLocaleString("en"), meter(share, `${name}: ${Math.round(100 * share)} % of its slot`), board.max_slot_us.toFixed(0),
-      `${(100 * (1 - share)).toFixed(0)} %`, board.overruns, board.errors, late(board.lateness?.p99_us), restart];
+  const supervised = Object.keys(found).length > 0, paced = names.some((name) => slots[name]?.late);
+  const headings = ["board", ...(supervised ? ["state"] : []), "slot", "#took", "#margin", ...(paced ? ["late: half, 99 %, worst"] : []),
+    ...(supervised ? ["#longest", "#overruns", "#errors", ""] : [])];
+  return table(headings, names.map((name) => {
+    const board = found[name], slot = slots[name], slot_us = slots_us[name], known = slot && slot.used_us !== null;
+    const row = [name];
+    if (supervised) row.push(board?.state);
+    row.push(known ? slotBar(name, slot, slot_us) : "not told", known ? time(slot.used_us) : "–", known ? `${(100 * (1 - slot.used_us / slot_us)).toFixed(0)} %` : "–");
+    if (paced) row.push(slot ? lateBars(name, slot.late) : "–");
+    if (supervised) {
+      const restart = Object.assign(document.createElement("button"), { type: "button", textContent: "Restart" });
+      restart.setAttribute("aria-label", `restart ${name}`);
+      restart.onclick = () => ask({ do: "restart", board: name });
+      row.push(time(board?.max_slot_us), board?.overruns, board?.errors, restart);
+    }
+    return row;
   }));
 }
 
@@ -73,7 +112,7 @@ export function frames(rows, filter) {
   const wanted = filter.trim().toUpperCase();
   const shown = rows.filter((row) => !wanted || row.name.includes(wanted) || String(row.id) === wanted);
   if (!shown.length) return note("no frames");
-  return table(["#time", "#id", "name", "#value", "data", "#so far"], shown.map((row) =>
+  return table(["#time", "#id", "name", "#value", "data", "#until now"], shown.map((row) =>
     [seconds(row.time_s), row.id, row.name, figure(row.value), Object.assign(document.createElement("code"), { textContent: row.data }), row.count.toLocaleString("en")]));
 }
 
