@@ -99,9 +99,11 @@ def test_of_too_many_connections_the_oldest_that_is_no_page_makes_room():
         page = await panel.page()
         await panel.turns()
         idle = [panel.program() for _ in range(connections.MOST + 20)]
-        for _ in range(20):
-            await panel.turns()
         held = panel.panel.connections.transports
+        for _ in range(1000):  # the kernel hands connections over when it likes
+            await panel.turns()
+            if panel.panel.refused[connections.MADE_ROOM] == 22 + len(panel.hostile):
+                break
         assert len(held) == connections.MOST
         assert page.socket.getsockname() in held and panel.good.socket.getsockname() in held
         assert panel.panel.refused == {connections.MADE_ROOM: 22 + len(panel.hostile)}
