@@ -217,7 +217,7 @@ def understood(code: int, content: bytes) -> dict[str, Any]:
     if code != BINARY or len(content) < 16:
         raise ValueError(f"a message of code {code} and {len(content)} bytes")
     version, kind, _, channels, _, points, _ = struct.unpack_from("<BBHHHII", content)
-    if version != 1:
+    if version != 2:
         raise ValueError(f"version {version}")
     if kind == 1:
         if points != len(content) - 16:
@@ -225,7 +225,7 @@ def understood(code: int, content: bytes) -> dict[str, Any]:
         found: dict[str, Any] = json.loads(content[16:], parse_constant=_no_number)
         return found
     if kind == 2:
-        at = 16
+        at = 32
         for _ in range(channels):
             _, flags, count, _ = struct.unpack_from("<IIII", content, at)
             body = 4 * count * (2 if flags & 1 else 1)

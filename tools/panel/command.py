@@ -117,7 +117,7 @@ def own_robot(say: Any) -> Iterator[Any]:
     from ranger_sim.tools.panel.robot import RobotSource
 
     name, parent = f"panel-{os.getpid()}", os.getpid()
-    command = [sys.executable, "-m", "ranger_sim", "up", "--name", name, "--no-real-time", "--processor", "all"]
+    command = [sys.executable, "-m", "ranger_sim", "up", "--name", name]
     with tempfile.TemporaryFile("w+", prefix="ranger-sim-") as said:
         robot = subprocess.Popen(
             command,

@@ -110,6 +110,7 @@ def joined(pieces: list[Trace]) -> Trace:
 class LinkSource(Source):
     """What comes over `port`. UserError when it cannot be opened."""
 
+    late_s = 2.0  # the slow list comes round in a third of a second, and whether it is late is known later
     can = frozenset({"live", "parameters", "errors", "link"})
 
     def __init__(self, port: str) -> None:

@@ -1,16 +1,19 @@
-"""What server and page say to each other over the one WebSocket, version 1 (README.md has the page's side).
+"""What server and page say to each other over the one WebSocket, version 2 (README.md has the page's side).
 
 From the page: text, JSON objects with `do`. To the page: binary, a head of 16 bytes and a body, little-endian.
 
     head    version (u8), kind (u8), plot (u16), channels (u16), flags (u16), points (u32), 0 (u32)
     TEXT    the body is JSON
-    TRACES  of one plot: per channel its number (u32), flags (u32), points (u32), 0 (u32); then x (f64), low (f32),
-            high (f32, only with ENVELOPE), padded to 8 bytes; NaN is a gap
+    TRACES  of one plot: its end (f64) and span (f64), s, and in the head what it wants as points; flags FOLLOWS (it
+            goes on with time; else it is a held window) and ANEW (all of it; else what is new since the last such
+            message, and some of what was sent already). Then per channel its number (u32), flags (u32), points (u32),
+            0 (u32); then x (f64), low (f32), high (f32, only with ENVELOPE), padded to 8 bytes; NaN is a gap
     POSE    time (f64), then angles and lengths of the robot (f32), as the channels of `pose` in HELLO say
 """
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import struct
 from collections.abc import Sequence
@@ -20,11 +23,23 @@ import numpy as np
 
 from ranger_sim.tools.panel.channels import Trace
 
-VERSION = 1
+VERSION = 2
 TEXT, TRACES, POSE = 1, 2, 3
 ENVELOPE = 1
+FOLLOWS, ANEW = 1, 2
 HEAD = struct.Struct("<BBHHHII")
+WINDOW = struct.Struct("<dd")
 TRACE_HEAD = struct.Struct("<IIII")
+
+
+@dataclasses.dataclass(frozen=True)
+class Window:
+    """What a plot shows: the `span` seconds before `end`, in `points` points. flags: FOLLOWS, ANEW."""
+
+    end: float
+    span: float
+    points: int
+    flags: int
 
 
 def text(content: Any) -> bytes:
@@ -33,9 +48,12 @@ def text(content: Any) -> bytes:
     return HEAD.pack(VERSION, TEXT, 0, 0, 0, len(body), 0) + body
 
 
-def traces(plot: int, channels: Sequence[int], found: Sequence[Trace]) -> bytes:
+def traces(plot: int, window: Window, channels: Sequence[int], found: Sequence[Trace]) -> bytes:
     """All traces of one plot."""
-    parts = [HEAD.pack(VERSION, TRACES, plot, len(channels), 0, 0, 0)]
+    parts = [
+        HEAD.pack(VERSION, TRACES, plot, len(channels), window.flags, window.points, 0),
+        WINDOW.pack(window.end, window.span),
+    ]
     for channel, trace in zip(channels, found, strict=True):
         count = len(trace.x)
         flags = 0 if trace.high is None else ENVELOPE

@@ -295,6 +295,10 @@ class Session:
                 seconds(plot.get("span"), "span") or 10.0,
                 points_of(plot.get("points")),
             )
+        for number, plot in found.items():
+            before_it = self.plots.get(number)
+            if before_it is not None and before_it.wish() == plot.wish():
+                plot.told = before_it.told
         hidden = channels_of(wish.get("hidden", []), self.source)
         if sum(len(plot.channels) for plot in found.values()) + len(hidden) > MOST_CHANNELS:
             raise UserError(f"look: {MOST_CHANNELS} channels at a time are possible")
@@ -331,9 +335,9 @@ class Session:
         begin, end = self.source.span()
         found = []
         for number, plot in self.plots.items():
-            first, last = plot.window(end)
-            traces = [self.source.trace(channel, first, last, plot.points) for channel in plot.channels]
-            found.append(messages.traces(number, plot.channels, traces))
+            first, points, window = plot.next(end, self.source.late_s)
+            traces = [self.source.trace(channel, first, window.end, points) for channel in plot.channels]
+            found.append(messages.traces(number, window, plot.channels, traces))
         pose = self.source.pose(self.at)
         if pose is not None:
             found.append(messages.pose(*pose))
@@ -348,17 +352,35 @@ class Session:
 
 
 class Plot:
-    """A plot of the page: `begin` to `end`, or the last `span` seconds while both are None."""
+    """A plot of the page: `begin` to `end`, or the last `span` seconds while both are None.
+
+    told: the newest instant when the page last got it, s; None before the first time.
+    """
 
     def __init__(self, channels: list[int], begin: float | None, end: float | None, span: float, points: int) -> None:
         self.channels, self.begin, self.end, self.points = channels, begin, end, points
         self.span = min(max(span, 1e-3), 36_000.0)
+        self.told: float | None = None
 
-    def window(self, newest: float) -> tuple[float, float]:
-        """(begin, end), s."""
+    def wish(self) -> tuple[Any, ...]:
+        """What the page wants to see; another wish is shown anew."""
+        return self.channels, self.begin, self.end, self.span, self.points
+
+    def next(self, newest: float, late_s: float) -> tuple[float, int, messages.Window]:
+        """What the page does not have: where it begins (s), in how many points, and the window it belongs to.
+
+        What may have come late, up to `late_s` before the last message, is sent again, and the point that was not full.
+        """
         if self.begin is not None and self.end is not None:
-            return self.begin, self.end
-        return newest - self.span, newest
+            return self.begin, self.points, messages.Window(self.end, self.end - self.begin, self.points, 0)
+        told, self.told = self.told, newest
+        begin, width = newest - self.span, self.span / self.points
+        if told is not None and told <= newest:
+            points = math.ceil((newest - told + late_s) / width - 1e-6) + 1
+            if points < self.points:
+                window = messages.Window(newest, self.span, self.points, messages.FOLLOWS)
+                return newest - points * width, points, window
+        return begin, self.points, messages.Window(newest, self.span, self.points, messages.FOLLOWS | messages.ANEW)
 
 
 def channels_of(wanted: Any, source: Source) -> list[int]:

@@ -31,6 +31,7 @@ class Source:
     """
 
     title = ""
+    late_s = 0.25  # how much later than the newest something else may come; also what a trigger looks back
     can: frozenset[str] = frozenset()
     pose_names: tuple[str, ...] = ()
 

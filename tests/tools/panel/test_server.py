@@ -165,13 +165,46 @@ def test_a_page_sees_its_plots_the_robot_and_the_state(panel):
         assert hello["channels"][0]["name"] == "RAMP" and hello["title"] == "a ramp"
         socket.send('{"do": "look", "plots": [{"channels": [0], "span": 2, "points": 5}]}')
         data = heard(socket, lambda kind, body: kind == messages.TRACES)
-        assert messages.HEAD.unpack_from(data)[:4] == (1, messages.TRACES, 0, 1)
-        assert messages.TRACE_HEAD.unpack_from(data, 16) == (0, 0, 5, 0)
-        assert np.frombuffer(data, "<f8", 5, 32).tolist() == [8.0, 8.5, 9.0, 9.5, 10.0]
-        assert np.frombuffer(data, "<f4", 5, 72).tolist() == [8.0, 8.5, 9.0, 9.5, 10.0]
+        assert messages.HEAD.unpack_from(data) == (2, messages.TRACES, 0, 1, messages.FOLLOWS | messages.ANEW, 5, 0)
+        assert messages.WINDOW.unpack_from(data, 16) == (10.0, 2.0)
+        assert messages.TRACE_HEAD.unpack_from(data, 32) == (0, 0, 5, 0)
+        assert np.frombuffer(data, "<f8", 5, 48).tolist() == [8.0, 8.5, 9.0, 9.5, 10.0]
+        assert np.frombuffer(data, "<f4", 5, 88).tolist() == [8.0, 8.5, 9.0, 9.5, 10.0]
         pose = heard(socket, lambda kind, body: kind == messages.POSE)
         assert np.frombuffer(pose, "<f8", 1, 16)[0] == 10.0 and np.frombuffer(pose, "<f4", 1, 24)[0] == 0.25
         assert heard(socket, lambda kind, body: kind == messages.TEXT and "state" in body)["state"]["time_s"] == 10.0
+
+
+def test_of_what_goes_on_a_page_gets_what_is_new_and_a_little_of_what_it_has():
+    whole, new = messages.FOLLOWS | messages.ANEW, messages.FOLLOWS
+    plot = server.Plot([0], None, None, 10.0, 1000)  # points 10 ms wide
+    assert plot.next(20.0, 0.25) == (10.0, 1000, messages.Window(20.0, 10.0, 1000, whole))
+    begin, points, window = plot.next(20.04, 0.25)  # 0.29 s: 29 points and the one that was not full
+    assert (points, window) == (30, messages.Window(20.04, 10.0, 1000, new)) and begin == pytest.approx(19.74)
+    assert plot.next(20.04, 0.25)[1:] == (26, messages.Window(20.04, 10.0, 1000, new))  # it is paused
+    assert plot.next(29.7, 0.25)[1] == 992
+    assert plot.next(39.5, 0.25) == (29.5, 1000, messages.Window(39.5, 10.0, 1000, whole))  # too much of it is new
+    assert plot.next(3.0, 0.25)[2].flags == whole  # it was started anew
+    held = server.Plot([0], 2.0, 5.0, 10.0, 100)
+    assert held.next(20.0, 0.25) == held.next(20.0, 0.25) == (2.0, 100, messages.Window(5.0, 3.0, 100, 0))
+
+
+def test_a_page_that_looks_at_the_same_again_has_what_it_has(panel):
+    _, address, _ = panel
+    looks = '{"do": "look", "plots": [{"channels": [0], "span": %s, "points": 5}], "at": %s}'
+    with page(address) as socket:
+        flags = []
+        for span, at in ((2, "null"), (2, 9.5), (2, 9.0), (3, 9.0), (2, 9.0)):
+            socket.send(looks % (span, at))
+            data = heard(
+                socket,
+                lambda kind, body, span=span: (
+                    kind == messages.TRACES and messages.WINDOW.unpack_from(body, 16)[1] == span
+                ),
+            )
+            flags.append(messages.HEAD.unpack_from(data)[4])
+        assert flags[0] == flags[3] == flags[4] == messages.FOLLOWS | messages.ANEW
+        assert flags[1] == flags[2]
 
 
 def test_requests_reach_the_robot_and_what_it_refuses_is_answered(panel):

@@ -1,5 +1,5 @@
 // The one WebSocket: JSON out, binary messages in (messages.py has their form). Comes back by itself when it is lost.
-const VERSION = 1, TEXT = 1, TRACES = 2, POSE = 3, ENVELOPE = 1;
+const VERSION = 2, TEXT = 1, TRACES = 2, POSE = 3, ENVELOPE = 1, FOLLOWS = 1, ANEW = 2;
 const AGAIN_MS = [300, 1000, 3000];
 
 export function connect(heard) {
@@ -26,7 +26,7 @@ export function connect(heard) {
     if (view.getUint8(0) !== VERSION) { heard.closed("the server speaks another version: load the page again", true); return; }
     const kind = view.getUint8(1);
     if (kind === TEXT) takeText(JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 16))));
-    else if (kind === TRACES) heard.traces(view.getUint16(2, true), traces(buffer, view, view.getUint16(4, true)));
+    else if (kind === TRACES) heard.traces(plot(buffer, view));
     else if (kind === POSE) heard.pose(view.getFloat64(16, true), new Float32Array(buffer, 24, view.getUint32(8, true)));
   }
 
@@ -42,9 +42,15 @@ export function connect(heard) {
     }
   }
 
+  function plot(buffer, view) {
+    const flags = view.getUint16(6, true);
+    return { place: view.getUint16(2, true), points: view.getUint32(8, true), follows: !!(flags & FOLLOWS), anew: !!(flags & ANEW),
+      end: view.getFloat64(16, true), span: view.getFloat64(24, true), found: traces(buffer, view, view.getUint16(4, true)) };
+  }
+
   function traces(buffer, view, channels) {
     const found = [];
-    let at = 16;
+    let at = 32;
     for (let k = 0; k < channels; k++) {
       const channel = view.getUint32(at, true), flags = view.getUint32(at + 4, true), count = view.getUint32(at + 8, true);
       at += 16;

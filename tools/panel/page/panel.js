@@ -38,8 +38,8 @@ const parameters = makeParameters(by("parameter-groups"), {
 
 const link = connect({
   hello: greet,
-  picture: (found, lost) => { span = found; shown++; light(lost); if (lost) by("light-text").textContent = lost; scrubber(); if (!held) triggered(); },
-  traces: (place, found) => { const r = range(); plots.show(place, found, [r.begin, r.end]); plots.values(); },
+  picture: (found, lost) => { span = found; shown++; light(lost); if (lost) by("light-text").textContent = lost; scrubber(); if (!held) triggered(); plots.values(performance.now()); },
+  traces: (found) => plots.show(found),
   pose: (time, values) => { pose = values; by("clock").textContent = `${time.toFixed(3)} s`; stage.draw(values); bars(); },
   values: (found, time) => { if (time === instant()) plots.stands(found, plots.cursor()); },
   state: (found) => { state = found; tell_state(); },
@@ -103,7 +103,7 @@ async function atMark() {
 
 function look() {
   if (!hello) return;
-  const wanted = plots.wanted().map((plot) => ({ channels: plot.numbers, begin: held ? held[0] : null, end: held ? held[1] : null, span: window_s, points: plots.points() }));
+  const wanted = plots.wanted().map((plot) => ({ channels: plot.numbers, begin: held ? held[0] : null, end: held ? held[1] : null, span: window_s, points: plots.points(plot, !held) }));
   const seen = view === "plots";
   link.send({ do: "look", plots: seen ? wanted : [], hidden: seen ? [] : wanted.flatMap((plot) => plot.channels), at: instant() });
 }

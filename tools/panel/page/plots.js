@@ -1,18 +1,23 @@
-// The plots: uPlot shows what the server has thinned; an axis for each unit; one cursor for all.
+// The plots: an axis for each unit, one cursor for all. uPlot shows a held window; while a plot goes on with time, uPlot
+// has its axes and cursor, and strip.js its lines.
+import { makeStrip } from "./strip.js";
+
 const COLOURS = ["#1f6fb2", "#d9731a", "#2c9a5b", "#a8499a", "#b3261e", "#0f8b8d", "#8a6d00", "#6a5acd", "#7a4a1e", "#4a7fb0", "#c2577a", "#5c7d1e"];
 const DASHES = [[], [7, 4], [2, 3]];   // beside colours: also for who cannot tell them apart
-const HEIGHT = 230, MOST_AXES = 4;
+const HEIGHT = 230, MOST_AXES = 4, MOST_POINTS = 4000;
+const TIGHTER = 0.5;    // an axis stays as it is until what is seen leaves it, or needs less than this share of it
+const READABLE_MS = 150;   // between two figures at one place
 
 export function makePlots(box, on, colour) {
   let plots = [], channels = [], shared = null;   // shared: {begin, end} while held
   let mark = null, at = null;
-  let exact = { at: null, values: {} }, marked = {}, notes = [];   // what the server says stands at the cursor, and at the mark
+  let exact = { at: null, values: {} }, marked = {}, notes = [], told_ms = 0;   // what the server says stands at the cursor, and at the mark
 
   function add(numbers = []) {
     const element = document.createElement("div");
     element.className = "plot";
     element.innerHTML = '<div class="head"></div><div class="chart"></div>';
-    const plot = { element, numbers: [...numbers], chart: null, signature: "", data: null, drawn: 0 };
+    const plot = { element, numbers: [...numbers], chart: null, signature: "", found: null, strip: null, ranges: {}, drawn: 0 };
     element.addEventListener("dragover", (event) => { event.preventDefault(); element.classList.add("over"); });
     element.addEventListener("dragleave", () => element.classList.remove("over"));
     element.addEventListener("drop", (event) => {
@@ -79,6 +84,14 @@ export function makePlots(box, on, colour) {
     closer.onclick = () => close(plot);
     row.append(closer);
     if (!plot.numbers.length && plot.chart) { plot.chart.destroy(); plot.chart = null; plot.signature = ""; }
+    if (plot.numbers.length) chartOf(plot);
+  }
+
+  // The chart for these channels, built where it is missing or another.
+  function chartOf(plot) {
+    const signature = plot.numbers.join();
+    if (!plot.chart || plot.signature !== signature) { plot.found = plot.strip = null; build(plot); plot.signature = signature; }
+    return plot.chart;
   }
 
   // Two points of each bucket, low and high; NaN becomes null, where uPlot leaves a gap.
@@ -107,8 +120,10 @@ export function makePlots(box, on, colour) {
   }
 
   function units(plot) {
-    return [...new Set(plot.numbers.map((number) => channels[number].unit || "1"))];
+    return [...new Set(plot.numbers.map(unitOf))];
   }
+
+  const unitOf = (number) => channels[number].unit || "1";
 
   function build(plot) {
     plot.chart?.destroy();
@@ -116,12 +131,12 @@ export function makePlots(box, on, colour) {
     const ink = colour("soft"), line = colour("line");
     const axes = [{ stroke: ink, grid: { stroke: line, width: 1 }, ticks: { stroke: line }, values: (_, ticks) => ticks.map((each) => `${+each.toFixed(6)} s`) }];
     units(plot).forEach((unit, k) => {
-      scales[unit] = { auto: true };
+      scales[unit] = { auto: true, range: (_, least, most) => plot.strip ? rangeOf(plot, unit) : uPlot.rangeNum(least ?? 0, most ?? 1, 0.1, true) };
       if (k < MOST_AXES) axes.push({ scale: unit, side: k % 2 ? 1 : 3, stroke: ink, size: 62, label: unit === "1" ? "" : unit, labelSize: 16, labelGap: 0,
         grid: { show: k === 0, stroke: line, width: 1 }, ticks: { stroke: line } });
     });
     const series = [{}, ...plot.numbers.map((number, k) => ({
-      label: channels[number].name, scale: channels[number].unit || "1", stroke: shade(plot, number), width: 1,
+      label: channels[number].name, scale: unitOf(number), stroke: shade(plot, number), width: 1,
       dash: DASHES[Math.floor(k / COLOURS.length) % DASHES.length], points: { show: false }, spanGaps: false }))];
     plot.chart = new uPlot({
       width: width(plot), height: HEIGHT, scales, axes, series, legend: { show: false },
@@ -137,9 +152,11 @@ export function makePlots(box, on, colour) {
             on.zoom(begin, end);
           }
         }],
+        drawAxes: [(chart) => { if (plot.strip) lines(plot, chart); }],
         draw: [(chart) => marks(chart)],
       },
-    }, [[0, 1], ...plot.numbers.map(() => [null, null])], plot.element.querySelector(".chart"));
+    }, nothing(plot), plot.element.querySelector(".chart"));
+    plot.chart.batch(() => {});   // at once, so that its size is known
     plot.chart.over.addEventListener("dblclick", () => on.widen());
     plot.chart.over.addEventListener("click", (event) => { if (event.detail === 1 && at !== null) { mark = at; on.marked(mark); redraw(); } });
     plot.chart.over.addEventListener("mouseleave", () => { at = null; on.cursor(null); values(); });
@@ -167,21 +184,81 @@ export function makePlots(box, on, colour) {
 
   const width = (plot) => Math.max(200, plot.element.clientWidth - 10);
 
-  function show(place, found, window) {
+  const nothing = (plot) => [[], ...plot.numbers.map(() => [])];
+
+  // What the server says of a plot (messages.py): a held window whole, of one that goes on all or what is new.
+  function show({ place, end, span, points, anew, follows, found }) {
     const plot = wanted()[place];
-    if (!plot || !plot.numbers.length || found.length !== plot.numbers.length || found.some((each, k) => each.channel !== plot.numbers[k])) return;
-    const signature = plot.numbers.join();
-    if (!plot.chart || plot.signature !== signature) { build(plot); plot.signature = signature; }
+    if (!plot || found.length !== plot.numbers.length || found.some((each, k) => each.channel !== plot.numbers[k])) return;
+    const chart = chartOf(plot);
+    if (follows && !anew && !plot.strip) return;   // it belongs to one before
     plot.found = found;
-    plot.chart.batch(() => {
-      plot.chart.setData(joined(found.map(drawable)), true);
-      plot.chart.setScale("x", { min: window[0], max: window[1] });
-    });
+    if (!follows) {
+      plot.strip = null;
+      chart.batch(() => {
+        chart.setData(joined(found.map(drawable)), true);
+        chart.setScale("x", { min: end - span, max: end });
+      });
+    } else {
+      if (anew) {
+        if (!plot.strip) chart.setData(nothing(plot), false);
+        plot.strip = makeStrip(found.length, points, span / points, wide(), Math.round(chart.bbox.height));
+      }
+      plot.strip.take(found, end);
+      ranges(plot);
+      chart.setScale("x", shownBy(plot));
+      chart.batch(() => {});
+    }
     plot.drawn++;
   }
 
+  // A column of a strip is as wide as a line, in pixels of the screen.
+  const wide = () => Math.max(1, Math.round(window.devicePixelRatio || 1));
+
+  function shownBy(plot) {
+    const max = plot.strip.end();
+    return { min: max - plot.chart.bbox.width / plot.strip.wide * plot.strip.column_s, max };
+  }
+
+  // Of each unit, what its axis shows; where that is another, all is painted anew.
+  function ranges(plot) {
+    for (const unit of units(plot)) {
+      let least = Infinity, most = -Infinity;
+      plot.numbers.forEach((number, k) => {
+        if (unitOf(number) !== unit) return;
+        const [low, high] = plot.strip.extremes(k);
+        least = Math.min(least, low);
+        most = Math.max(most, high);
+      });
+      if (!(least <= most)) continue;
+      const before = plot.ranges[unit], [min, max] = uPlot.rangeNum(least, most, 0.1, true);
+      if (before && least >= before[0] && most <= before[1] && max - min >= TIGHTER * (before[1] - before[0])) continue;
+      plot.ranges[unit] = [min, max];
+      plot.strip.spoil();
+    }
+  }
+
+  const rangeOf = (plot, unit) => plot.ranges[unit] ?? [0, 1];
+
+  function lines(plot, chart) {
+    plot.strip.stretch(Math.max(1, Math.round(chart.bbox.height)));   // it is known for good when the axes have their figures
+    plot.strip.paint(plot.numbers.map((number, k) => {
+      const [least, most] = rangeOf(plot, unitOf(number)), shade_of = shade(plot, number);
+      return { colour: shade_of, faint: k < COLOURS.length ? null : shade_of + "60", least, most };
+    }));
+    const { left, top, width } = chart.bbox, { strip } = plot;
+    chart.ctx.save();
+    chart.ctx.beginPath();
+    chart.ctx.rect(left, top, width, strip.canvas.height);
+    chart.ctx.clip();
+    strip.show(chart.ctx, Math.round(left + width) - strip.canvas.width, Math.round(top));
+    chart.ctx.restore();
+  }
+
   // Beside each name: the value at the cursor as the server has it, without a cursor the newest that is drawn.
-  function values() {
+  function values(now = 0) {
+    if (now && now - told_ms < READABLE_MS) return;
+    told_ms = now;
     for (const plot of plots) {
       for (const chip of plot.element.querySelectorAll(".chip")) {
         const number = +chip.dataset.channel, trace = plot.found?.find((each) => each.channel === number);
@@ -190,16 +267,30 @@ export function makePlots(box, on, colour) {
         const before = at !== null && mark !== null ? marked[number] ?? null : null, states = channels[number].states;
         let text = value === null ? "" : states[Math.round(value)] ?? figure(value);
         if (value !== null && before !== null && !(Math.round(value) in states)) text += ` (Δ ${figure(value - before)})`;
-        chip.children[2].textContent = text;
+        if (chip.children[2].textContent !== text) chip.children[2].textContent = text;
       }
     }
   }
 
   function redraw() { for (const plot of plots) plot.chart?.redraw(false); }
-  function resize() { for (const plot of plots) plot.chart?.setSize({ width: width(plot), height: HEIGHT }); }
-  function restyle() { for (const plot of plots) plot.signature = ""; }
+  function resize() { for (const plot of plots) plot.chart?.batch(() => plot.chart.setSize({ width: width(plot), height: HEIGHT })); }
   const wanted = () => plots.filter((plot) => plot.numbers.length);
-  const points = () => Math.max(100, Math.min(2000, Math.round(box.clientWidth / 2)));   // two points of each: a pixel
+
+  // Other colours: all is drawn anew as it stands.
+  function restyle() {
+    for (const plot of wanted()) {
+      const { strip, chart } = plot, [x, ...data] = chart.data, { min, max } = chart.scales.x;
+      build(plot);
+      strip?.spoil();
+      plot.chart.batch(() => { plot.chart.setData([x, ...data], true); plot.chart.setScale("x", { min, max }); });
+    }
+  }
+
+  // How many points a plot wants: one for each column that goes on, and of a held window, where each is two, for every other pixel.
+  function points(plot, follows) {
+    const pixels = follows ? chartOf(plot).bbox.width / wide() : Math.min(MOST_POINTS, box.clientWidth) / 2;
+    return Math.max(100, Math.min(MOST_POINTS, Math.floor(pixels)));
+  }
 
   return {
     add, put, close, show, values, redraw, resize, restyle, wanted, points,
