@@ -36,8 +36,8 @@ def test_a_target_that_there_is_not_gets_one_line(capsys):
         cli.main(["fuzz", "walls"])
     assert left.value.code == 2
     assert capsys.readouterr().err == (
-        "ranger-sim fuzz: 'walls' is no target; there are can, channel, doors, gdb, profiles, serial, xcp "
-        "(see ranger-sim fuzz --help)\n"
+        "ranger-sim fuzz: 'walls' is no target; there are can, channel, doors, gdb, panel, profiles, requests, "
+        "serial, xcp (see ranger-sim fuzz --help)\n"
     )
 
 
