@@ -50,7 +50,7 @@ MOST_PLOTS = 24
 MOST_CHANNELS = 48  # of all plots of a page, as RoboDAQ
 MOST_POINTS = 4000
 PATIENCE_S = 30.0  # without a sign of the page
-CLOSE_POLICY, CLOSE_FULL = 1008, 1013  # RFC 6455 and its registry
+CLOSE_POLICY, CLOSE_FULL, LEFT = 1008, 1013, 1006  # RFC 6455 and its registry
 BROKEN = {1002, 1003, 1007, 1009}  # the same: who is told so did not speak WebSocket, or too much at once
 
 
@@ -234,9 +234,12 @@ class Session:
                 await asyncio.gather(showing, return_exceptions=True)
 
     async def send(self, message: bytes) -> None:
-        """One message at a time. TimeoutError: the page takes nothing any more."""
+        """One message at a time. TimeoutError: the page takes nothing any more. WebSocketDisconnect: it has left."""
         async with asyncio.timeout(PATIENCE_S), self.sending:
-            await self.socket.send_bytes(message)
+            try:
+                await self.socket.send_bytes(message)
+            except RuntimeError as gone:  # the server has closed it meanwhile, for a frame that is none
+                raise WebSocketDisconnect(LEFT) from gone
 
     # --- what the page says ---------------------------------------------------------------------------------
 
