@@ -364,13 +364,15 @@ def test_a_walk_is_set_up_without_what_fits_tests_or_reads_dbc_files():
     assert {name_of(each) for each in dependencies + more} <= set(names_in(part_of_lock(lock, None)))
 
 
-def test_a_library_that_comes_later_is_named_in_one_line():
-    hidden = "import sys; sys.modules['cantools'] = None\n"  # what an environment without it looks like
-    done = run(
-        ["-c", hidden + "from ranger_sim.tools.cli import main; sys.exit(main(['can-bounds', '--dbc', 'x.dbc']))"], ROOT
-    )
+@pytest.mark.parametrize(
+    "library, command",
+    [("cantools", ["can-bounds", "--dbc", "x.dbc"]), ("uvicorn", ["panel"]), ("starlette", ["panel", "--walk"])],
+)
+def test_a_library_that_comes_later_is_named_in_one_line(library, command):
+    hidden = f"import sys; sys.modules[{library!r}] = None\n"  # what an environment without it looks like
+    done = run(["-c", hidden + f"from ranger_sim.tools.cli import main; sys.exit(main({command!r}))"], ROOT)
     assert done.returncode == 2 and "Traceback" not in done.stderr
-    assert "this needs cantools, which is missing: in a checkout `make setup`" in " ".join(done.stderr.split())
+    assert f"this needs {library}, which is missing: in a checkout `make setup`" in " ".join(done.stderr.split())
 
 
 def test_modules_that_are_optimised_most_exist():
