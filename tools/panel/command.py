@@ -160,7 +160,8 @@ def own_robot(say: Any) -> Iterator[Any]:
 def listening(address: str, port: int) -> Iterator[socket.socket]:
     """A socket for the browser's requests. UserError when it cannot be had."""
     family = socket.AF_INET6 if ":" in address else socket.AF_INET
-    listener = socket.socket(family, socket.SOCK_STREAM)
+    # TCP is named because asyncio sends small messages at once (TCP_NODELAY) only then; else each picture waits 40 ms.
+    listener = socket.socket(family, socket.SOCK_STREAM, socket.IPPROTO_TCP)
     with contextlib.closing(listener):
         listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:

@@ -3,6 +3,7 @@
 import asyncio
 import contextlib
 import json
+import socket
 import threading
 
 import numpy as np
@@ -121,6 +122,26 @@ def get(address, path, **headers):
     found = response.status, dict(response.getheaders()), response.read()
     link.close()
     return found
+
+
+def test_a_small_message_does_not_wait_for_the_one_before_to_be_acknowledged():
+    async def delays():
+        found = asyncio.get_running_loop().create_future()
+
+        def came(_, writer):
+            accepted = writer.get_extra_info("socket")
+            found.set_result(accepted.getsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY))
+            writer.close()
+
+        with listening("127.0.0.1", 0) as listener:
+            async with await asyncio.start_server(came, sock=listener):
+                _, writer = await asyncio.open_connection(*listener.getsockname())
+                told = await asyncio.wait_for(found, PATIENCE_S)
+                writer.close()
+                await writer.wait_closed()
+        return told
+
+    assert asyncio.run(delays()) != 0
 
 
 def test_the_page_is_served_to_who_has_the_token_and_leaves_it_in_a_cookie(panel):
