@@ -6,17 +6,19 @@ from types import ModuleType
 from ranger_sim.foundation.user_error import UserError
 
 # where a library is not called as the package that brings it
-PACKAGES = {"vcd": "pyvcd"}
+PACKAGES = {"elftools": "pyelftools", "vcd": "pyvcd"}
 
 
 def imported(module: str) -> ModuleType:
     """The library `module`. UserError that says how to get it, when it is not installed."""
+    top = module.partition(".")[0]
     try:
-        return importlib.import_module(module)
+        importlib.import_module(top)
     except ModuleNotFoundError as error:
-        if error.name != module.partition(".")[0]:
+        if error.name != top:
             raise
-        package = PACKAGES.get(error.name, error.name)
+        package = PACKAGES.get(top, top)
         raise UserError(
             f"this needs {package}, which is missing: in a checkout `make setup`, else pip install {package}"
         ) from None
+    return importlib.import_module(module)

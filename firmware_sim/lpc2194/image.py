@@ -8,11 +8,9 @@ import dataclasses
 import io
 import os
 import pathlib
+from typing import Any
 
-from elftools.common.exceptions import ELFError
-from elftools.elf.elffile import ELFFile
-from elftools.elf.sections import SymbolTableSection
-
+from ranger_sim.foundation.libraries import imported
 from ranger_sim.foundation.user_error import UserError
 
 # LPC2194 user manual, memory map
@@ -104,8 +102,10 @@ def _checked(path: pathlib.Path, pieces: list[tuple[int, bytes]]) -> tuple[tuple
 
 def _from_elf(path: pathlib.Path, content: bytes) -> Image:
     """Segments are loaded where their physical address says: initialised data lie in flash behind the code."""
+    elffile = imported("elftools.elf.elffile")
+    broken = imported("elftools.common.exceptions").ELFError
     try:
-        elf = ELFFile(io.BytesIO(content))
+        elf = elffile.ELFFile(io.BytesIO(content))
         machine = elf["e_machine"]
         if elf.elfclass != 32 or not elf.little_endian or machine != "EM_ARM":
             order = "little" if elf.little_endian else "big"
@@ -128,17 +128,18 @@ def _from_elf(path: pathlib.Path, content: bytes) -> Image:
         if elf["e_shoff"] + elf["e_shnum"] * elf["e_shentsize"] > len(content):
             raise UserError(f"{path}: truncated: the file has {len(content)} bytes, its section table ends behind them")
         symbols = _symbols(elf)
-    except (ELFError, ValueError, KeyError, AssertionError, UnicodeDecodeError) as error:
+    except (broken, ValueError, KeyError, AssertionError, UnicodeDecodeError) as error:
         reason = str(error) or type(error).__name__
         raise UserError(f"{path}: a damaged or truncated ELF file: {reason}") from None
     return Image(path, _checked(path, pieces), symbols)
 
 
-def _symbols(elf: ELFFile) -> tuple[Symbol, ...]:
-    """Functions and variables, without the mapping symbols ($a, $t, $d) and sections' own."""
+def _symbols(elf: Any) -> tuple[Symbol, ...]:
+    """Functions and variables of an ELFFile, without the mapping symbols ($a, $t, $d) and sections' own."""
+    tables = imported("elftools.elf.sections").SymbolTableSection
     found = []
     for section in elf.iter_sections():
-        if not isinstance(section, SymbolTableSection):
+        if not isinstance(section, tables):
             continue
         for symbol in section.iter_symbols():
             kind = symbol["st_info"]["type"]
