@@ -25,6 +25,7 @@ LOG = HERE / "build" / "setup.log"
 LATER = {
     "cantools",
     "cffi",
+    "h11",
     "perfetto",
     "pyelftools",
     "pyvcd",

@@ -8,24 +8,11 @@ import runpy
 
 import pytest
 
+from ranger_sim.rooms import ROOMS
+
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 ROBOT = ROOT / "docs" / "robot.md"
-ROOMS = (
-    "foundation",
-    "datatable",
-    "can_bus",
-    "plant",
-    "firmware_sim",
-    "boards",
-    "harness",
-    "sysid",
-    "tools",
-    "ranger_sim",
-    "profiles",
-    "benchmarks",
-    "tests",
-    "docs",
-)
+FOLDERS = (*ROOMS, "ranger_sim", "profiles", "benchmarks", "tests", "docs")
 READ = {".py", ".pxd", ".md", ".toml", ".csv", ".h", ".dbc", ".js", ".css", ".html", ".sh"}
 
 PARAGRAPH = r"[BNCPWT]\d+(?:\.\d+)?"
@@ -47,7 +34,7 @@ FORMER = re.compile(
 def texts():
     """(path, text) of every file of the repository that a person writes, and of what is generated from it."""
     paths = [path for path in ROOT.iterdir() if path.is_file() and path.suffix in READ]
-    for room in ROOMS:
+    for room in FOLDERS:
         paths += [path for path in (ROOT / room).rglob("*") if path.suffix in READ and "__pycache__" not in path.parts]
     paths.remove(pathlib.Path(__file__).resolve())
     return [(path, path.read_text(encoding="utf-8")) for path in sorted(paths)]

@@ -42,7 +42,7 @@ class FeedServer(Door[Peer]):
         self.name = name
         self.streams = list(robot.recorder.streams())
         self.left_out: dict[int, Counter[str]] = {}  # by peer, since it was told
-        self.greeting = b""  # the first record, once somebody has asked for it
+        self.greeting = b""  # the first record, while somebody looks
         self.next_state_ns = 0
         self.boards: dict[str, Any] = {}  # those that tell their slots
         self.slots_shown: dict[str, int] = {}
@@ -148,6 +148,7 @@ class FeedServer(Door[Peer]):
             there = {name: self.robot.loop.board(name) for name in self.robot.boards}
             self.boards = {name: board for name, board in there.items() if hasattr(board, "slots_since")}
             self.slots_shown = {name: board.slots_since(0)[1] for name, board in self.boards.items()}
+            self.greeting = b""
         self.left_out[id(peer)] = Counter()
         self.robot.loop.sampler.words = self.robot.recorder.words  # also of a robot that keeps no log
         self.totals["viewers_seen"] += 1

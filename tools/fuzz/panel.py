@@ -30,7 +30,7 @@ from ranger_sim.harness.feed import records
 from ranger_sim.harness.feed.server import FeedServer
 from ranger_sim.harness.processes.requests import admitted
 from ranger_sim.harness.ranger import Ranger
-from ranger_sim.tools.fuzz import Finding
+from ranger_sim.tools.fuzz import Connection, Finding
 from ranger_sim.tools.panel.command import http_server
 from ranger_sim.tools.panel.connections import MOST
 from ranger_sim.tools.panel.robot import RobotSource
@@ -133,38 +133,12 @@ class Faults(logging.Handler):
         self.found.append(f"{record.getMessage().strip()}: {trouble!r}")
 
 
-class Program:
-    """A connection of one program, and what it has heard. is_page: it has begun a WebSocket."""
+class Program(Connection):
+    """A connection of one program. is_page: it has begun a WebSocket."""
 
     def __init__(self, port: int) -> None:
-        self.socket = socket.create_connection(("127.0.0.1", port))
-        self.socket.setblocking(False)
-        self.heard = bytearray()
-        self.is_page = self.reads = True
-        self.gone = False
-
-    def say(self, data: bytes) -> None:
-        """As much as goes."""
-        try:
-            self.socket.send(data)
-        except BlockingIOError:
-            pass
-        except OSError:
-            self.gone = True
-
-    def hear(self) -> None:
-        """What has come."""
-        try:
-            while data := self.socket.recv(1 << 18):
-                self.heard += data
-            self.gone = True
-        except BlockingIOError:
-            pass
-        except OSError:
-            self.gone = True
-
-    def close(self) -> None:
-        self.socket.close()
+        super().__init__(socket.create_connection(("127.0.0.1", port)))
+        self.is_page = True
 
 
 def handshake(port: int, token: str = TOKEN) -> bytes:

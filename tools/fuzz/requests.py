@@ -26,7 +26,7 @@ from ranger_sim.harness.processes import requests
 from ranger_sim.harness.processes.plant_process import PlantRun
 from ranger_sim.harness.ranger import Ranger
 from ranger_sim.harness.scenario import Scenario
-from ranger_sim.tools.fuzz import Finding
+from ranger_sim.tools.fuzz import Connection, Finding
 
 SLICE_S = 0.002
 CASES_PER_SLICE = 8
@@ -53,28 +53,13 @@ class Body(PlantRun):
         self.answers.append(content)
 
 
-class Viewer:
+class Viewer(Connection):
     """A program that looks, reads or not, and perhaps says something."""
 
     def __init__(self, name: str) -> None:
-        self.heard = bytearray()
-        self.reads = True
-        self.gone = False
-        self.socket = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
-        self.socket.setblocking(False)
+        super().__init__(socket.socket(socket.AF_UNIX, socket.SOCK_STREAM))
         try:
             self.socket.connect(records.address(name))
-        except OSError:
-            self.gone = True
-
-    def hear(self) -> None:
-        """What has come."""
-        try:
-            while data := self.socket.recv(1 << 18):
-                self.heard += data
-            self.gone = True
-        except BlockingIOError:
-            pass
         except OSError:
             self.gone = True
 

@@ -298,10 +298,9 @@ class Session:
                 seconds(plot.get("span"), "span") or 10.0,
                 points_of(plot.get("points")),
             )
-        for number, plot in found.items():
-            before_it = self.plots.get(number)
-            if before_it is not None and before_it.wish() == plot.wish():
-                plot.told = before_it.told
+        for number, shown in self.plots.items():
+            if number in found and found[number].wish() == shown.wish():
+                found[number].told = shown.told
         hidden = channels_of(wish.get("hidden", []), self.source)
         if sum(len(plot.channels) for plot in found.values()) + len(hidden) > MOST_CHANNELS:
             raise UserError(f"look: {MOST_CHANNELS} channels at a time are possible")

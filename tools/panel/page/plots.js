@@ -4,7 +4,7 @@ import { makeStrip } from "./strip.js";
 
 const COLOURS = ["#1f6fb2", "#d9731a", "#2c9a5b", "#a8499a", "#b3261e", "#0f8b8d", "#8a6d00", "#6a5acd", "#7a4a1e", "#4a7fb0", "#c2577a", "#5c7d1e"];
 const DASHES = [[], [7, 4], [2, 3]];   // beside colours: also for who cannot tell them apart
-const HEIGHT = 230, MOST_AXES = 4, MOST_POINTS = 4000;
+const HEIGHT = 230, MOST_AXES = 4, AXIS_PX = 62, MOST_POINTS = 4000;
 const TIGHTER = 0.5;    // an axis stays as it is until what is seen leaves it, or needs less than this share of it
 const READABLE_MS = 150;   // between two figures at one place
 
@@ -89,7 +89,7 @@ export function makePlots(box, on, colour) {
 
   // The chart for these channels, built where it is missing or another.
   function chartOf(plot) {
-    const signature = plot.numbers.join();
+    const signature = `${plot.numbers.join()} ${axesOf(plot)}`;
     if (!plot.chart || plot.signature !== signature) { plot.found = plot.strip = null; build(plot); plot.signature = signature; }
     return plot.chart;
   }
@@ -123,6 +123,9 @@ export function makePlots(box, on, colour) {
     return [...new Set(plot.numbers.map(unitOf))];
   }
 
+  // So many axes that half of the width is left for the lines.
+  const axesOf = (plot) => Math.max(1, Math.min(MOST_AXES, units(plot).length, Math.floor(width(plot) / 2 / AXIS_PX)));
+
   const unitOf = (number) => channels[number].unit || "1";
 
   function build(plot) {
@@ -132,7 +135,7 @@ export function makePlots(box, on, colour) {
     const axes = [{ stroke: ink, grid: { stroke: line, width: 1 }, ticks: { stroke: line }, values: (_, ticks) => ticks.map((each) => `${+each.toFixed(6)} s`) }];
     units(plot).forEach((unit, k) => {
       scales[unit] = { auto: true, range: (_, least, most) => plot.strip ? rangeOf(plot, unit) : uPlot.rangeNum(least ?? 0, most ?? 1, 0.1, true) };
-      if (k < MOST_AXES) axes.push({ scale: unit, side: k % 2 ? 1 : 3, stroke: ink, size: 62, label: unit === "1" ? "" : unit, labelSize: 16, labelGap: 0,
+      if (k < axesOf(plot)) axes.push({ scale: unit, side: k % 2 ? 1 : 3, stroke: ink, size: AXIS_PX, label: unit === "1" ? "" : unit, labelSize: 16, labelGap: 0,
         grid: { show: k === 0, stroke: line, width: 1 }, ticks: { stroke: line } });
     });
     const series = [{}, ...plot.numbers.map((number, k) => ({
@@ -289,7 +292,7 @@ export function makePlots(box, on, colour) {
   // How many points a plot wants: one for each column that goes on, and of a held window, where each is two, for every other pixel.
   function points(plot, follows) {
     const pixels = follows ? chartOf(plot).bbox.width / wide() : Math.min(MOST_POINTS, box.clientWidth) / 2;
-    return Math.max(100, Math.min(MOST_POINTS, Math.floor(pixels)));
+    return Math.max(10, Math.min(MOST_POINTS, Math.floor(pixels)));
   }
 
   return {
