@@ -1,9 +1,11 @@
-"""The pictures of the panel's page: python docs/panel_pictures.py (needs Chromium; a minute).
+"""The pictures of the panel's page, one of each view: python docs/panel_pictures.py (needs Chromium; a minute).
 
-A robot walks in real time beside it, so two runs of this give two pictures of the same.
+A robot walks in real time beside it, so two runs of this give two pictures of the same. The view Link is of its data
+link, with drop-outs.
 """
 
 import base64
+import contextlib
 import pathlib
 import re
 import signal
@@ -18,10 +20,22 @@ from tests import browser
 HERE = pathlib.Path(__file__).parent
 WIDTH, HEIGHT = 1400, 940
 SECONDS = 12.0
-VIEWS = {"plots": "panel.png", "inside": "panel-inside.png", "faults": "panel-faults.png"}
+OF_A_ROBOT = {
+    "plots": "panel.png",
+    "parameters": "panel-parameters.png",
+    "errors": "panel-errors.png",
+    "inside": "panel-inside.png",
+    "faults": "panel-faults.png",
+}
+OF_A_LINK = {"link": "panel-link.png"}
+OPENED = (
+    "for (const group of document.querySelectorAll('#parameter-groups details'))"
+    " group.open = group.innerText.startsWith('P_H ')"
+)
 ARMED = (
     "{ const f = document.getElementById('fault-place'); f.value = 'MCH.joint_encoder'; f.onchange();"
-    " document.getElementById('fault-mode').value = 'stuck'; document.getElementById('fault-end').value = '+4 ms';"
+    " const m = document.getElementById('fault-mode'); m.value = 'stuck'; m.onchange();"
+    " document.getElementById('fault-end').value = '+4 ms';"
     " document.getElementById('fault-form').requestSubmit(); 0 }"
 )
 
@@ -36,28 +50,50 @@ class Address:
         return self.text
 
 
-def main():
-    command = [sys.executable, "-m", "ranger_sim", "panel", "--walk", "--http-port", "0"]
-    panel = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
-    address = next(found[0] for line in panel.stderr if (found := re.search(r"http://\S+", line)))
+@contextlib.contextmanager
+def started(*arguments):
+    """A command of ours, until it is no longer needed."""
+    process = subprocess.Popen([sys.executable, "-m", "ranger_sim", *arguments], stderr=subprocess.PIPE, text=True)
     try:
-        with tempfile.TemporaryDirectory() as folder, browser.opened(folder) as page:
-            page.open(Address(address), WIDTH, HEIGHT, 1)
-            page.until("document.body?.dataset.connected === 'yes'")
-            page.until(f"window.rangerPanel?.span()[1] > {SECONDS}")
-            for view, name in VIEWS.items():
-                page.value(f"document.querySelector('[data-view={view}]').click()")
-                if view == "faults":
-                    page.value(ARMED)
-                    page.until("window.rangerPanel.state().faults?.[0]?.cleared_s")
-                pictures = page.value("window.rangerPanel.shown()")
-                page.until(f"window.rangerPanel.shown() > {pictures} + 8")
-                picture = page.call("Page.captureScreenshot", format="png")["data"]
-                (HERE / name).write_bytes(base64.b64decode(picture))
-                print(HERE / name)
+        yield process
     finally:
-        panel.send_signal(signal.SIGINT)
-        panel.communicate()
+        process.send_signal(signal.SIGINT)
+        process.communicate()
+
+
+def said(process, pattern):
+    """The first of what it says that is like this."""
+    return next(found[0] for line in process.stderr if (found := re.search(pattern, line)))
+
+
+def picture_views(views, *arguments):
+    """Of each view of a panel a picture, once it has shown SECONDS of the robot."""
+    with (
+        started("panel", *arguments, "--http-port", "0") as panel,
+        tempfile.TemporaryDirectory() as folder,
+        browser.opened(folder) as page,
+    ):
+        page.open(Address(said(panel, r"http://\S+")), WIDTH, HEIGHT, 1)
+        page.until("document.body?.dataset.connected === 'yes'")
+        page.until(f"window.rangerPanel?.span()[1] > {SECONDS}")
+        for view, name in views.items():
+            page.value(f"document.querySelector('[data-view={view}]').click()")
+            if view == "parameters":
+                page.value(OPENED)
+            if view == "faults":
+                page.value(ARMED)
+                page.until("window.rangerPanel.state().faults?.[0]?.cleared_s")
+            pictures = page.value("window.rangerPanel.shown()")
+            page.until(f"window.rangerPanel.shown() > {pictures} + 8")
+            picture = page.call("Page.captureScreenshot", format="png")["data"]
+            (HERE / name).write_bytes(base64.b64decode(picture))
+            print(HERE / name)
+
+
+def main():
+    picture_views(OF_A_ROBOT, "--walk")
+    with started("up", "--daq-port", "pty", "--daq-dropouts") as robot:
+        picture_views(OF_A_LINK, "--port", said(robot, r"/dev/pts/\d+"))
 
 
 if __name__ == "__main__":
