@@ -11,7 +11,8 @@ length, and `RATE_MORE` on top (`Healthy`). How often that alone would cry wolf 
 """
 
 import dataclasses
-from collections.abc import Iterable, Sequence
+import itertools
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -284,7 +285,10 @@ class Healthy:
         return cls(spans, changes, per_s)
 
     def most(self, key: Key, duration_ns: int) -> int:
-        """The most errors of this kind that any healthy walk had within this time, rounded up to the next count."""
+        """The most errors of this kind that any healthy walk had within this time.
+
+        Below the next count that is looked at; beyond the last one that any of them reached it is that one.
+        """
         spans = self.spans.get(key)
         normal = int(self.per_s.get(key, 0.0) * duration_ns * 1e-9)
         if not spans:
@@ -353,24 +357,22 @@ class Healthy:
         return Healthy(spans, changes)
 
 
-def looked_at(places: int) -> list[int]:
-    """The first `places` counts at which rates are looked at."""
-    counts: list[int] = []
+def all_looked_at() -> Iterator[int]:
+    """The counts at which rates are looked at: each of the first, then ever fewer."""
     count = 0
-    while len(counts) < places:
-        count = count + 1 if count < EACH_COUNT_TO else max(count + 1, int(count * COUNT_GROWTH))
-        counts.append(count)
-    return counts
+    while True:
+        count = count + 1 if count < EACH_COUNT_TO else int(count * COUNT_GROWTH)
+        yield count
+
+
+def looked_at(places: int) -> list[int]:
+    """The first `places` of them."""
+    return list(itertools.islice(all_looked_at(), places))
 
 
 def looked_at_below(total: int) -> Iterable[int]:
     """Those of them up to `total`."""
-    count = 0
-    while True:
-        count = count + 1 if count < EACH_COUNT_TO else max(count + 1, int(count * COUNT_GROWTH))
-        if count > total:
-            return
-        yield count
+    return itertools.takewhile(lambda count: count <= total, all_looked_at())
 
 
 def event_times(record: Record) -> dict[Key, np.ndarray]:
