@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 Times = NDArray[np.float64]
 Values = NDArray[np.float32]
 
-# Of a running robot. Chosen by us: twice 436 channels of Ranger are 105 MB fine and 251 MB coarse, once they are full.
+# Of a running robot: every sample of the last minute, and extremes of so long (s) for so long (s). Chosen by us: a
+# window of an hour has fewer columns of pixels. The 436 channels of Ranger are 105 MB fine and 67 MB in extremes.
 FINE_S = 60.0
-COARSE_S = 3600.0
-COARSE_WIDTH_S = 0.1
+COARSE_S = ((0.1, 600.0), (1.0, 3600.0))
 GAP_PERIODS = 2.5  # so many usual periods without a sample are a gap
 
 
@@ -134,11 +134,7 @@ class Memory:
         self.period_s = period_s
         self.fine_s = FINE_S if fine_s is None else fine_s
         self.fine = _Rows(columns, round(self.fine_s / period_s))
-        self.low = _Rows(columns, round(COARSE_S / COARSE_WIDTH_S))
-        self.high = _Rows(columns, round(COARSE_S / COARSE_WIDTH_S))
-        self.bucket: int | None = None  # the one that is being filled
-        self.bucket_low: Any = None
-        self.bucket_high: Any = None
+        self.coarse = [_Extremes(columns, width_s, kept_s) for width_s, kept_s in COARSE_S]
         self.newest: float | None = None
 
     def append(self, times: Times, values: Values) -> None:
@@ -149,41 +145,65 @@ class Memory:
             self.__init__(self.columns, self.period_s, self.fine_s)  # type: ignore[misc]
         self.fine.append(times, values)
         self.newest = float(times[-1])
-        buckets = np.floor(times / COARSE_WIDTH_S + 1e-9).astype(np.int64)
-        starts = np.flatnonzero(np.diff(buckets, prepend=buckets[0] - 1))
-        lows, highs = np.minimum.reduceat(values, starts, axis=0), np.maximum.reduceat(values, starts, axis=0)
-        for place, start in enumerate(starts):
-            self._extend(int(buckets[start]), lows[place], highs[place])
-
-    def _extend(self, bucket: int, low: Any, high: Any) -> None:
-        if bucket == self.bucket:
-            self.bucket_low, self.bucket_high = np.minimum(self.bucket_low, low), np.maximum(self.bucket_high, high)
-            return
-        if self.bucket is not None:
-            at = np.array([self.bucket * COARSE_WIDTH_S])
-            self.low.append(at, self.bucket_low[np.newaxis])
-            self.high.append(at, self.bucket_high[np.newaxis])
-        self.bucket, self.bucket_low, self.bucket_high = bucket, low, high
+        for extremes in self.coarse:
+            extremes.append(times, values)
 
     def trace(self, column: int, begin: float, end: float, points: int) -> Trace:
-        """One column of a window: from the samples where they reach back so far, else from the extremes."""
+        """One column of a window: from the samples where they reach back so far, else from the narrowest extremes."""
         times, values = self.fine.rows()
         if len(times) == 0:
             return EMPTY
-        older, _ = self.low.rows()
-        if begin >= times[0] or len(older) == 0 or older[0] >= times[0] - COARSE_WIDTH_S:
+        first = [times[0], *(extremes.first() for extremes in self.coarse)]
+        reaches = [0.0, *(extremes.width_s for extremes in self.coarse)]  # what begins so much earlier is no older
+        for level, oldest in enumerate(first):
+            older = (first[k] < oldest - reaches[k] for k in range(level + 1, len(first)))
+            if begin >= oldest or not any(older):
+                break
+        if level == 0:
             return thinned(times, values[:, column], begin, end, points, self.period_s)
-        times, lows = self.low.rows()
-        _, highs = self.high.rows()
-        low = thinned(times, lows[:, column], begin, end, points, COARSE_WIDTH_S)
-        high = thinned(times, highs[:, column], begin, end, points, COARSE_WIDTH_S)
-        return Trace(low.x, low.low, high.low if high.high is None else high.high)
+        return self.coarse[level - 1].trace(column, begin, end, points)
 
     def row(self, at: float) -> tuple[float, Values] | None:
         """(time, values) of the last sample not later than `at`."""
         times, values = self.fine.rows()
         place = int(np.searchsorted(times, at, side="right")) - 1
         return (float(times[place]), values[place]) if place >= 0 else None
+
+
+class _Extremes:
+    """Lowest and highest value of every `width_s`, for the last `kept_s`; the newest is still growing."""
+
+    def __init__(self, columns: int, width_s: float, kept_s: float) -> None:
+        self.width_s = width_s
+        self.low = _Rows(columns, round(kept_s / width_s))
+        self.high = _Rows(columns, round(kept_s / width_s))
+        self.bucket = -1  # the newest
+
+    def append(self, times: Times, values: Values) -> None:
+        buckets = np.floor(times / self.width_s + 1e-9).astype(np.int64)
+        starts = np.flatnonzero(np.diff(buckets, prepend=buckets[0] - 1))
+        lows, highs = np.minimum.reduceat(values, starts, axis=0), np.maximum.reduceat(values, starts, axis=0)
+        numbers = buckets[starts]
+        known = int(numbers[0] == self.bucket)
+        if known:
+            for rows, found, wider in ((self.low, lows, np.minimum), (self.high, highs, np.maximum)):
+                newest = rows.rows()[1][-1]
+                wider(newest, found[0], out=newest)
+        if len(numbers) > known:
+            begin = (numbers[known:] * self.width_s).astype(np.float64)
+            self.low.append(begin, lows[known:])
+            self.high.append(begin, highs[known:])
+            self.bucket = int(numbers[-1])
+
+    def first(self) -> float:
+        """Where the oldest one begins, s; there is one."""
+        return float(self.low.rows()[0][0])
+
+    def trace(self, column: int, begin: float, end: float, points: int) -> Trace:
+        times, lows = self.low.rows()
+        low = thinned(times, lows[:, column], begin, end, points, self.width_s)
+        high = thinned(times, self.high.rows()[1][:, column], begin, end, points, self.width_s)
+        return Trace(low.x, low.low, high.low if high.high is None else high.high)
 
 
 class _Rows:

@@ -314,19 +314,20 @@ class Session:
     # --- what the page sees ---------------------------------------------------------------------------------
 
     async def show(self) -> None:
-        """Pictures, as fast as the page takes them, 30 in a second at most."""
+        """Pictures, as fast as the page takes them, on the average 30 in a second at most."""
         loop = asyncio.get_running_loop()
         live = "live" in self.source.can
+        due_s = loop.time()
         while True:
-            begun_s = loop.time()
             self.changed.clear()
             self.shown.clear()
-            for message in self.picture(begun_s):
+            for message in self.picture(loop.time()):
                 await self.send(message)
             await self.send(messages.text({"picture": self.source.span(), "lost": self.source.lost}))
             await self.shown.wait()
+            due_s = max(due_s + PICTURE_S, loop.time() - PICTURE_S)  # one that was late may be made up for, not more
             if live and self.at is None and not self.source.lost:
-                await asyncio.sleep(max(0.0, begun_s + PICTURE_S - loop.time()))
+                await asyncio.sleep(max(0.0, due_s - loop.time()))
             else:
                 with contextlib.suppress(TimeoutError):
                     async with asyncio.timeout(STATE_S if live else None):

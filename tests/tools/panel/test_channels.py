@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ranger_sim.tools.panel import channels
-from ranger_sim.tools.panel.channels import COARSE_WIDTH_S, FINE_S, Memory, thinned
+from ranger_sim.tools.panel.channels import FINE_S, Memory, thinned
 
 PERIOD = 0.002
 
@@ -93,14 +93,21 @@ def filled(seconds, rows=10):
     return memory
 
 
-def test_a_spike_is_seen_an_hour_later(monkeypatch):
+@pytest.mark.parametrize(
+    ("coarse", "width_s"), [(((0.1, 600.0), (1.0, 3600.0)), 0.1), (((0.1, 5.0), (1.0, 50.0)), 1.0)]
+)
+def test_a_spike_is_seen_when_its_samples_are_gone(monkeypatch, coarse, width_s):
     monkeypatch.setattr(channels, "FINE_S", 2.0)
-    memory = filled(20.0)
+    monkeypatch.setattr(channels, "COARSE_S", coarse)
+    memory = filled(20.5)
     fine, _ = memory.fine.rows()
-    assert fine[0] > 17.9  # the samples of the spike are gone
-    trace = memory.trace(0, 0.0, 20.0, 400)
+    assert fine[0] > 18.4  # the samples of the spike are gone
+    trace = memory.trace(0, 0.0, 20.5, 400)
     assert trace.high.max() == 1e6
-    assert abs(trace.x[int(np.argmax(trace.high))] - 1.0) <= COARSE_WIDTH_S
+    assert abs(trace.x[int(np.argmax(trace.high))] - 1.0) < width_s + 1e-9
+    # what is shown reaches to the newest sample: also the extremes that are still growing
+    assert trace.x[-1] == pytest.approx(20.5 - (20.5 % width_s or width_s), abs=1e-6)
+    assert trace.low[-1] == pytest.approx(trace.x[-1], abs=1e-6) and trace.high[-1] == pytest.approx(20.498)
 
 
 def test_at_the_beginning_a_window_that_reaches_before_it_is_still_shown_sample_by_sample():
@@ -111,12 +118,14 @@ def test_at_the_beginning_a_window_that_reaches_before_it_is_still_shown_sample_
 
 def test_the_memory_of_a_running_robot_does_not_grow():
     memory = Memory(1, PERIOD)
-    room = memory.fine.times.nbytes + memory.low.times.nbytes
-    for minute in range(3):
+    parts = [memory.fine, *(rows for extremes in memory.coarse for rows in (extremes.low, extremes.high))]
+    room = [rows.times.nbytes + rows.values.nbytes for rows in parts]
+    for minute in range(150):  # two hours and a half: every part was full twice
         memory.append(60.0 * minute + grid(30_000), np.zeros((30_000, 1), np.float32))
     times, _ = memory.fine.rows()
-    assert memory.fine.times.nbytes + memory.low.times.nbytes == room
-    assert times[-1] - times[0] <= FINE_S and memory.newest == pytest.approx(179.998)
+    assert [rows.times.nbytes + rows.values.nbytes for rows in parts] == room
+    assert times[-1] - times[0] <= FINE_S and memory.newest == pytest.approx(8999.998)
+    assert [each.first() for each in memory.coarse] == pytest.approx([9000.0 - 600.0, 9000.0 - 3600.0])
 
 
 def test_another_robot_begins_a_new_memory():
