@@ -1,14 +1,37 @@
 // The front panel as the user interface board drives it: display, lights, tone, sync light; keys are the robot's.
+import { put } from "./renew.js";
+
 const KEYS = ["", "walk", "stop", "", "sync light", ""];   // of the record walk's program; others give them other meanings
 const LIGHTS = 16, TONE = 22, SYNC = 23, PRESSED = 24;
+
+const COLOURS = ["off", "red", "green", "yellow", "blue", "purple", "turquoise", "white"];   // by which of red, green, blue shine
+
+function lamp(name, text) {
+  const box = Object.assign(document.createElement("div"), { innerHTML: `<i></i>${text}` });
+  box.setAttribute("role", "img");
+  box.dataset.name = name;
+  return box;
+}
+
+function shine(box, background, words) {
+  box.firstChild.style.background = background;
+  box.title = words;
+  box.setAttribute("aria-label", `${box.dataset.name}: ${words}`);
+}
+
+// In words: what shines at least half as bright as the brightest.
+function colourWords(rgb) {
+  const most = Math.max(...rgb);
+  return most ? `${COLOURS[rgb.reduce((sum, each, k) => sum + (2 * each >= most) * (1 << k), 0)]} (red ${rgb[0]}, green ${rgb[1]}, blue ${rgb[2]})` : "off";
+}
 
 export function makeFace(box, press, steer) {
   box.innerHTML = '<div class="top"><div class="lcd" role="img" aria-label="display"></div><div><label><input type="checkbox" id="hear"> hear the buzzer</label><p class="note" id="tone"></p></div></div>' +
     '<div class="lights"></div><div class="keys"></div>' +
     '<label class="stick">radio <input type="range" min="-1" max="1" step="0.05" value="0" aria-label="radio stick, left to right"> <output>0</output></label>';
   const lights = box.querySelector(".lights"), keys = box.querySelector(".keys"), lcd = box.querySelector(".lcd"), stick = box.querySelector(".stick input");
-  for (let k = 0; k < 6; k++) lights.append(Object.assign(document.createElement("div"), { innerHTML: `<i></i>${k + 1}` }));
-  lights.append(Object.assign(document.createElement("div"), { innerHTML: "<i></i>sync" }));
+  for (let k = 0; k < 6; k++) lights.append(lamp(`light ${k + 1}`, k + 1));
+  lights.append(lamp("sync light", "sync"));
   KEYS.forEach((name, k) => {
     const button = Object.assign(document.createElement("button"), { type: "button", innerHTML: `key ${k}<small></small>` });
     button.querySelector("small").textContent = name;
@@ -33,19 +56,17 @@ export function makeFace(box, press, steer) {
   };
 
   function show(words) {
-    if (!words) { lcd.textContent = "not shown"; return; }
+    if (!words) { put(lcd, "not shown"); return; }
     const text = words.slice(0, 16).map((code) => code >= 32 && code < 127 ? String.fromCharCode(code) : " ").join("");
-    lcd.textContent = `${text.slice(0, 8)}\n${text.slice(8)}`;
-    lcd.setAttribute("aria-label", `display: ${text.trim() || "empty"}`);
+    put(lcd, `${text.slice(0, 8)}\n${text.slice(8)}`);
+    lcd.setAttribute("aria-label", `display: ${text.trim().replace(/ +/g, " ") || "empty"}`);
     for (let k = 0; k < 6; k++) {
       const word = words[LIGHTS + k], rgb = [word & 255, word >> 8 & 255, word >> 16 & 255];
-      const lamp = lights.children[k].firstChild;
-      lamp.style.background = word ? `rgb(${rgb.join()})` : "transparent";
-      lights.children[k].title = word ? `red ${rgb[0]}, green ${rgb[1]}, blue ${rgb[2]}` : "off";
+      shine(lights.children[k], word ? `rgb(${rgb.join()})` : "transparent", colourWords(rgb));
     }
-    lights.children[6].firstChild.style.background = words[SYNC] ? "#fff3a0" : "transparent";
+    shine(lights.children[6], words[SYNC] ? "#fff3a0" : "transparent", words[SYNC] ? "on" : "off");
     for (let k = 0; k < 6; k++) keys.children[k].classList.toggle("down", (words[PRESSED] >> k & 1) === 1);
-    box.querySelector("#tone").textContent = words[TONE] ? `buzzer: ${words[TONE]} Hz` : "buzzer: silent";
+    put(box.querySelector("#tone"), words[TONE] ? `buzzer: ${words[TONE]} Hz` : "buzzer: silent");
     if (gain) {
       tone.frequency.value = words[TONE] || 1;
       gain.gain.value = words[TONE] && box.querySelector("#hear").checked ? 0.05 : 0;

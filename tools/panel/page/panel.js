@@ -1,13 +1,22 @@
 // The page: what it shows is in the address, what comes from the server is handed to the parts.
+import { makeChannelList } from "./channel_list.js";
 import { connect } from "./connection.js";
 import { makeFace } from "./face.js";
+import * as keys from "./keys.js";
+import { makeNotes } from "./notes.js";
 import { download, makeParameters } from "./parameters.js";
-import { figure, makePlots } from "./plots.js";
+import { makePlots } from "./plots.js";
+import { put, reachable, renew } from "./renew.js";
 import { makeStage } from "./stage.js";
 import * as tables from "./tables.js";
+import { figure } from "./words.js";
 
 const by = (id) => document.getElementById(id);
 const VALUES_MS = 500;
+const MESSAGE_MS = 4000;
+const QUIET_MS = 600;      // after the cursor's last step it is said what stands there
+const DESCRIBED_MS = 1000; // between two descriptions of the robot
+const SHORTEST_S = 1e-3, LONGEST_S = 36_000;   // a plot's window
 const FIRST = [["hip_rad", "ankle_outer_rad", "ankle_inner_rad"], ["hip_A", "outer_A", "inner_A"], ["FSM_HIP", "FSM_FO", "FSM_FI"]];
 const FIRST_OF_A_LOG = [["MCH_ANGLE", "MCFO_RIGHT_ANKLE_ANGLE", "MCFI_MID_ANKLE_ANGLE"], ["MCH_MOTOR_CURRENT"], ["FSM_HIP"]];
 const CURRENTS = [["hip", "hip_A", "hip"], ["outer ankle", "outer_A", "outer"], ["inner ankle", "inner_A", "inner"], ["steering", "steering_A", "steering"]];
@@ -16,19 +25,31 @@ const FULL_BAR_A = 10;
 let colours = {};
 const colour = (name) => colours[name] ??= getComputedStyle(document.documentElement).getPropertyValue("--" + name).trim();
 
-let hello = null, can = new Set(), number = new Map(), listed = [];   // listed: channels, group by group
+let hello = null, can = new Set(), number = new Map();
 let span = [0, 0], held = null, window_s = 10, zooms = [], view = "plots", state = {}, pose = null;
 let playing = false, played = 0, at = null, trigger = null, shown = 0;
-const notes = [];   // {time, text}
 
 const stage = makeStage(by("stage"), colour);
 const plots = makePlots(by("plots"), {
-  changed: () => { look(); remember(); channelList(); atMark(); },
+  changed: () => { look(); remember(); listDrawn(); atMark(); },
+  chosen: () => listDrawn(),
+  full: (most) => say(`${most} channels at a time are possible: take one out first`),
+  resized: () => look(),
   cursor: (time) => { at = time; look(); },
   zoom: (begin, end) => { zooms.push(range()); hold([begin, end]); },
-  widen: () => { const before = zooms.pop(); hold(before && !before.follows ? [before.begin, before.end] : null); },
+  widen: () => widen(),
   marked: () => { atMark(); look(); remember(); },
 }, colour);
+const channelList = makeChannelList(by("channels"), by("search"), (channel) => {
+  const plot = plots.chosen();
+  if (plot.numbers.includes(channel)) plots.take(plot, channel);
+  else plots.put(plot, channel);
+});
+const listDrawn = () => channelList.drawn(plots.all().flatMap((plot) => plot.numbers), plots.chosen()?.numbers ?? []);
+const notes = makeNotes(by("notes"), by("note"), {
+  changed: (found) => { plots.setNotes(found); remember(); },
+  go: (time) => { const half = (range().end - range().begin) / 2; plots.setMark(time); hold([time - half, time + half]); atMark(); },
+});
 const face = makeFace(by("face"), (key) => tell({ do: "key", key }, `key ${key} pressed`),
   (stick) => tell({ do: "radio", stick }, `radio stick at ${stick}`));
 const parameters = makeParameters(by("parameter-groups"), {
@@ -38,12 +59,12 @@ const parameters = makeParameters(by("parameter-groups"), {
 
 const link = connect({
   hello: greet,
-  picture: (found, lost) => { span = found; shown++; light(lost); if (lost) by("light-text").textContent = lost; scrubber(); if (!held) triggered(); plots.values(performance.now()); },
+  picture: (found, lost) => { span = found; shown++; light(lost); scrubber(); if (!held) triggered(); plots.values(performance.now()); },
   traces: (found) => plots.show(found),
-  pose: (time, values) => { pose = values; by("clock").textContent = `${time.toFixed(3)} s`; stage.draw(values); bars(); },
-  values: (found, time) => { if (time === instant()) plots.stands(found, plots.cursor()); },
+  pose: (time, values) => { pose = values; by("clock").textContent = `${time.toFixed(3)} s`; stage.draw(values); bars(); describe(); },
+  values: (found, time) => { if (time === instant()) { plots.stands(found, plots.cursor()); sayCursor(); } },
   state: (found) => { state = found; tell_state(); },
-  closed: (reason, refused) => { light("x"); by("light-text").textContent = refused ? `refused: ${reason}` : `${reason}: trying again`; document.body.dataset.connected = "no"; },
+  closed: (reason, refused) => { light(refused ? `refused: ${reason}` : `${reason}: trying again`); document.body.dataset.connected = "no"; },
 });
 
 // ---- the beginning
@@ -53,8 +74,6 @@ function greet(found) {
   can = new Set(hello.can);
   span = hello.span;
   number = new Map(hello.channels.map((channel, k) => [channel.name, k]));
-  const groups = [...new Set(hello.channels.map((channel) => channel.group))];
-  listed = [...hello.channels.keys()].sort((a, b) => groups.indexOf(hello.channels[a].group) - groups.indexOf(hello.channels[b].group) || a - b);
   by("title").textContent = hello.title;
   document.title = `${hello.title} – panel`;
   plots.know(hello.channels);
@@ -79,7 +98,8 @@ function greet(found) {
   faultForm();
   if (!plots.all().length) recall();
   if (!live) hold(held ?? [span[0], Math.min(span[1], span[0] + window_s)]);
-  channelList();
+  channelList.know(hello.channels);
+  listDrawn();
   document.body.dataset.connected = "yes";
   look();
 }
@@ -99,6 +119,30 @@ async function atMark() {
     const { values } = await link.ask({ do: "values", channels, at: time });
     plots.stoodAtMark(Object.fromEntries(channels.map((channel, k) => [channel, values[k]])));
   } catch { /* told by the light */ }
+}
+
+// Out of the last closer look; without one, twice as wide.
+function widen() {
+  const before = zooms.pop();
+  if (!before) zoomBy(2);
+  else hold(before.follows ? null : [before.begin, before.end]);
+}
+
+// The window by this factor, with the cursor where it is in it.
+function zoomBy(factor) {
+  const { begin, end } = range(), around = Math.min(end, Math.max(begin, instant() ?? (held ? (begin + end) / 2 : end)));
+  const width = Math.min(LONGEST_S, Math.max(SHORTEST_S, (end - begin) * factor)), before = (around - begin) / (end - begin) * width;
+  if (factor < 1) zooms.push(range());
+  hold([around - before, around - before + width]);
+}
+
+// The plots' cursor, and the window with it where it would leave that.
+function cursorTo(time) {
+  const { begin, end } = range(), there = Math.min(span[1], Math.max(span[0], time)), by_s = Math.min(0, there - begin) + Math.max(0, there - end);
+  if (!held || by_s) hold([begin + by_s, end + by_s]);
+  at = there;
+  plots.setCursor(at);
+  look();
 }
 
 function look() {
@@ -150,7 +194,7 @@ by("trigger").onchange = () => {
   const named = parts && Object.keys(states).find((each) => states[each] === parts[3]);
   const value = parts ? Number(named ?? parts[3]) : NaN;
   if (channel === undefined || !Number.isFinite(value)) { by("trigger-note").textContent = "a name, then =, < or >, then a number or a state"; return; }
-  if (!plots.all().some((plot) => plot.numbers.includes(channel))) plots.put(plots.last(), channel);
+  if (!plots.all().some((plot) => plot.numbers.includes(channel))) plots.put(plots.chosen(), channel);
   trigger = { channel, sign: parts[2] === "becomes" ? "=" : parts[2], value, since: span[1] };
   by("trigger-note").textContent = "waiting";
 };
@@ -162,7 +206,7 @@ function remember() {
   const parts = new URLSearchParams({ view, span: window_s, plots: names.join(";") });
   if (held) parts.set("from", held[0].toFixed(6)), parts.set("to", held[1].toFixed(6));
   if (plots.mark() !== null) parts.set("mark", plots.mark().toFixed(6));
-  if (notes.length) parts.set("notes", JSON.stringify(notes.map((each) => [each.time, each.text])));
+  if (notes.all().length) parts.set("notes", JSON.stringify(notes.all().map((each) => [each.time, each.text])));
   history.replaceState(null, "", `${location.search}#${parts}`);
 }
 
@@ -177,9 +221,8 @@ function recall() {
   if (parts.get("from") !== null) hold([Number(parts.get("from")), Number(parts.get("to"))]);
   if (parts.get("mark") !== null) plots.setMark(Number(parts.get("mark")));
   try {
-    for (const [time, text] of JSON.parse(parts.get("notes") ?? "[]")) notes.push({ time: Number(time), text: String(text).slice(0, 80) });
+    for (const [time, text] of JSON.parse(parts.get("notes") ?? "[]")) notes.add(Number(time), String(text).slice(0, 80));
   } catch { say("the notes in the address cannot be read"); }
-  noteList();
   choose(parts.get("view") ?? "plots");
 }
 
@@ -193,79 +236,51 @@ function choose(name) {
     by(`view-${each.dataset.view}`).hidden = !on;
   }
   if (view === "plots") plots.resize();
-  if (hello) { look(); remember(); tell_state(); }
-}
-
-// ---- the list of channels
-
-function channelList() {
-  if (!hello) return;
-  const wanted = by("search").value.trim().toLowerCase().split(/\s+/).filter(Boolean);
-  const drawn = new Set(plots.all().flatMap((plot) => plot.numbers));
-  const rows = [];
-  let group = null, count = 0;
-  for (const k of listed) {
-    const channel = hello.channels[k];
-    const words = `${channel.name} ${channel.unit} ${channel.description} ${channel.group}`.toLowerCase();
-    if (!wanted.every((each) => words.includes(each))) continue;
-    count++;
-    if (channel.group !== group) { group = channel.group; rows.push(Object.assign(document.createElement("li"), { className: "group", textContent: group })); }
-    const item = document.createElement("li"), button = Object.assign(document.createElement("button"), { type: "button", draggable: true });
-    button.className = drawn.has(k) ? "on" : "";
-    button.setAttribute("aria-pressed", String(drawn.has(k)));
-    button.title = channel.description;
-    button.append(channel.name, Object.assign(document.createElement("small"), { textContent: channel.unit ? ` ${channel.unit}` : "" }));
-    button.ondragstart = (event) => event.dataTransfer.setData("text/plain", String(k));
-    button.onclick = () => plots.put(plots.last(), k);
-    item.append(button);
-    rows.push(item);
-  }
-  const top = by("channels").scrollTop;
-  by("channels").replaceChildren(...(count ? rows : [tables.note("no channel has these words")]));
-  by("channels").scrollTop = top;
+  if (hello) { look(); remember(); tell_state(); reachable(by(`view-${view}`)); }
 }
 
 // ---- what is in no channel
 
+// lost: why nothing more comes
 function light(lost) {
-  const unexpected = (state.errors ?? []).filter((row) => !row.normal).length, box = by("light");
-  box.className = `light ${lost ? "off" : unexpected || state.ended ? "bad" : "good"}`;
-  if (!lost) by("light-text").textContent = state.ended ? `ended: ${state.ended}` : unexpected ? `${unexpected} unexpected error${unexpected > 1 ? "s" : ""}` : can.has("live") ? "no unexpected error" : "recording";
+  const unexpected = (state.errors ?? []).filter((row) => !row.normal).length;
+  by("light").className = `light ${lost ? "off" : unexpected || state.ended ? "bad" : "good"}`;
+  put(by("light-text"), lost || (state.ended ? `ended: ${state.ended}` : unexpected ? `${unexpected} unexpected error${unexpected > 1 ? "s" : ""}` : can.has("live") ? "no unexpected error" : "recording"));
 }
 
 function tell_state() {
   if (!hello) return;
-  by("walked").textContent = state.steps === undefined ? "" : `${state.steps} steps, ${figure(state.distance_m)} m, ${(state.speed_m_per_s ?? 0).toFixed(2)} m/s`;
+  put(by("walked"), state.steps === undefined ? "" : `${state.steps} steps, ${figure(state.distance_m)} m, ${(state.speed_m_per_s ?? 0).toFixed(2)} m/s`);
   const spent = Object.entries(state.energy_Wh ?? {});
-  by("energy").textContent = spent.length ? `from the battery: ${spent.map(([name, value]) => `${name.replaceAll("_", " ")} ${(1e3 * value).toFixed(1)} mWh`).join(", ")}` + (state.tcot ? `; cost of transport ${state.tcot.toFixed(3)}` : "") : "";
+  put(by("energy"), spent.length ? `from the battery: ${spent.map(([name, value]) => `${name.replaceAll("_", " ")} ${(1e3 * value).toFixed(1)} mWh`).join(", ")}` + (state.tcot ? `; cost of transport ${state.tcot.toFixed(3)}` : "") : "");
   const pace = state.pace ?? {};
-  by("pause").textContent = pace.paused ? "Let the robot go on" : "Pause robot";
-  by("pace-text").textContent = pace.behind_s > 0.05 ? ` ${pace.behind_s.toFixed(2)} s late` : "";
+  put(by("pause"), pace.paused ? "Let the robot go on" : "Pause robot");
+  put(by("pace-text"), pace.behind_s > 0.05 ? ` ${pace.behind_s.toFixed(2)} s late` : "");
   const errors = state.errors ?? [], unexpected = errors.filter((row) => !row.normal);
-  by("error-count").textContent = unexpected.length || "";
+  put(by("error-count"), unexpected.length ? String(unexpected.length) : "");
   if (can.has("panel")) face.show(state.panel);
   if (view === "errors") {
-    by("errors-unexpected").replaceChildren(tables.errors(unexpected, "none"));
-    by("errors-normal").replaceChildren(tables.errors(errors.filter((row) => row.normal), "none"));
+    renew(by("errors-unexpected"), tables.errors(unexpected, "unexpected errors"));
+    renew(by("errors-normal"), tables.errors(errors.filter((row) => row.normal), "errors as in every healthy walk"));
   }
   if (view === "inside") {
-    if (!by("view-inside").contains(document.activeElement) || document.activeElement.tagName !== "BUTTON") by("boards").replaceChildren(tables.boards(state.boards ?? {}, state.slots ?? {}, hello.slots_us, tell));
-    by("inside-at").textContent = insideAt();
-    by("slots-note").textContent = SLOTS_NOTE + (state.slots_note ? ` ${state.slots_note}` : "");
-    by("buses").replaceChildren(tables.buses(state.buses ?? {}));
+    renew(by("boards"), tables.boards(state.boards ?? {}, state.slots ?? {}, hello.slots_us, tell));
+    put(by("inside-at"), insideAt());
+    put(by("slots-note"), SLOTS_NOTE + (state.slots_note ? ` ${state.slots_note}` : ""));
+    renew(by("buses"), tables.buses(state.buses ?? {}));
     const chosen = by("bus").value || "0";
     if (by("bus").length !== (state.frames ?? []).length) by("bus").replaceChildren(...(state.frames ?? []).map((_, k) => new Option(`can${k + 1}`, k)));
     by("bus").value = chosen;
-    by("frames").replaceChildren(tables.frames((state.frames ?? [])[+chosen] ?? [], by("frame-search").value));
+    renew(by("frames"), tables.frames((state.frames ?? [])[+chosen] ?? [], by("frame-search").value));
   }
   if (view === "link" && state.link) {
-    by("link-state").textContent = tables.linkState(state.link);
-    by("link-lists").replaceChildren(tables.linkLists(state.link.lists));
-    by("link-chosen").replaceChildren(tables.linkRows(state.link.chosen));
+    put(by("link-state"), tables.linkState(state.link));
+    renew(by("link-lists"), tables.linkLists(state.link.lists));
+    renew(by("link-chosen"), tables.linkRows(state.link.chosen));
   }
-  if (view === "faults") by("fault-list").replaceChildren(tables.faults(state.faults ?? [], tell));
-  if (state.link) by("readout").textContent = tables.linkState(state.link);
-  else if (state.left_out && Object.keys(state.left_out).length) by("readout").textContent = `left out because this program was too slow: ${Object.entries(state.left_out).map(([name, rows]) => `${rows} rows of ${name}`).join(", ")}`;
+  if (view === "faults") renew(by("fault-list"), tables.faults(state.faults ?? [], tell));
+  if (state.link) put(by("readout"), tables.linkState(state.link));
+  else if (state.left_out && Object.keys(state.left_out).length) put(by("readout"), `left out because this program was too slow: ${Object.entries(state.left_out).map(([name, rows]) => `${rows} rows of ${name}`).join(", ")}`);
 }
 
 const SLOTS_NOTE = "Bar: what the slot took of its time; line: the longest of the second before. Late: by the wall clock, of the slots of the second before, from 1 µs to 1 s by the logarithm.";
@@ -285,8 +300,25 @@ function bars() {
     const value = pose[place], share = Math.min(50, 50 * Math.abs(value) / FULL_BAR_A), bar = row.querySelector("i");
     bar.style.width = `${share}%`;
     bar.style.left = `${value < 0 ? 50 - share : 50}%`;
-    row.lastChild.textContent = `${value.toFixed(2)} A`;
+    put(row.lastChild, `${value.toFixed(2)} A`);
   });
+}
+
+// The picture of the robot in words, for who does not see it.
+let described_ms = 0;
+function describe() {
+  const now = performance.now();
+  if (now - described_ms < DESCRIBED_MS) return;
+  described_ms = now;
+  by("stage").setAttribute("aria-label", `The robot, seen from its side: ${stage.words(pose)}`);
+}
+
+// What stands at the cursor is said once it rests, where it was moved by keys.
+let resting = null, byKeys = false;
+function sayCursor() {
+  if (!byKeys) return;
+  clearTimeout(resting);
+  resting = setTimeout(() => { byKeys = false; put(by("said"), plots.atCursor()); }, QUIET_MS);
 }
 
 async function tell(wish, done) {
@@ -299,9 +331,8 @@ async function tell(wish, done) {
 let hiding = 0;
 function say(text) {
   by("message").textContent = text;
-  by("message").hidden = false;
   clearTimeout(hiding);
-  hiding = setTimeout(() => { by("message").hidden = true; }, 4000);
+  hiding = setTimeout(() => { by("message").textContent = ""; }, MESSAGE_MS);
 }
 
 // ---- parameters: their values now, some times a second while they are looked at
@@ -385,12 +416,16 @@ function play(on) {
 // ---- controls
 
 for (const tab of document.querySelectorAll("nav [role=tab]")) tab.onclick = () => choose(tab.dataset.view);
-document.querySelector("nav").onkeydown = (event) => {
-  const tabs = [...document.querySelectorAll("nav [role=tab]:not([hidden])")], here = tabs.indexOf(document.activeElement);
-  const next = tabs[(here + ({ ArrowRight: 1, ArrowLeft: -1 }[event.key] ?? 0) + tabs.length) % tabs.length];
-  if (event.key.startsWith("Arrow") && here >= 0) { event.preventDefault(); event.stopPropagation(); next.focus(); choose(next.dataset.view); }
-};
-by("search").oninput = channelList;
+function goTab(find) {
+  const tabs = [...document.querySelectorAll("nav [role=tab]:not([hidden])")], next = tabs.at(find(tabs.indexOf(document.activeElement), tabs.length));
+  next.focus();
+  choose(next.dataset.view);
+}
+
+keys.bind("tabs", document.querySelector("nav"), {
+  ArrowRight: () => goTab((here, count) => (here + 1) % count), ArrowLeft: () => goTab((here) => here - 1), Home: () => goTab(() => 0), End: () => goTab(() => -1),
+});
+by("skip").onclick = () => by(`view-${view}`).focus();
 by("add-plot").onclick = () => { plots.add(); remember(); };
 by("freeze").onclick = () => hold(held ? null : [span[1] - window_s, span[1]]);
 by("span").onchange = () => { window_s = Number(by("span").value); if (held) hold([held[1] - window_s, held[1]]); look(); remember(); };
@@ -405,27 +440,12 @@ for (const kind of ["csv", "mf4"]) by(`save-${kind}`).onclick = () => {
   by(`save-${kind}`).href = `export/${kind}?${new URLSearchParams({ channels: channels.join(","), begin, end })}`;
 };
 
-// Notes: marks that are kept with a word, in the address and on the plots; a click goes there.
-function noteList() {
-  by("notes").replaceChildren(...notes.map((each, k) => {
-    const chip = Object.assign(document.createElement("button"), { type: "button", className: "chip", textContent: `${each.time.toFixed(3)} s: ${each.text}` });
-    chip.title = "go there; Delete takes it away";
-    chip.onclick = () => { const half = (range().end - range().begin) / 2; plots.setMark(each.time); hold([each.time - half, each.time + half]); atMark(); };
-    chip.onkeydown = (event) => { if (event.key === "Delete" || event.key === "Backspace") { notes.splice(k, 1); noteList(); remember(); } };
-    return chip;
-  }));
-  plots.setNotes(notes);
-}
-
 by("note-form").onsubmit = (event) => {
   event.preventDefault();
   const text = by("note").value.trim(), time = plots.mark();
   if (!text || time === null) { say(time === null ? "click a plot first: the note stands at the mark" : "a note has a word or more"); return; }
-  notes.push({ time, text });
-  notes.sort((one, other) => one.time - other.time);
+  notes.add(time, text);
   by("note").value = "";
-  noteList();
-  remember();
 };
 
 by("picture").onclick = () => {
@@ -448,25 +468,49 @@ by("picture").onclick = () => {
   all.toBlob((blob) => download("plots.png", blob));
 };
 
-document.addEventListener("keydown", (event) => {
-  const typing = event.target.matches("input, select, textarea");
-  if (event.altKey && /^[0-5]$/.test(event.key) && can.has("keys")) { event.preventDefault(); tell({ do: "key", key: Number(event.key) }, `key ${event.key} pressed`); return; }
-  if (event.key === "Escape") { plots.setMark(null); plots.setCursor(null); at = null; look(); remember(); return; }
-  if (typing || event.ctrlKey || event.metaKey || event.altKey) return;
-  if (event.key === "/") { event.preventDefault(); choose("plots"); by("search").focus(); }
-  if (event.key === "h" && can.has("live")) by("freeze").click();
-  if (event.key === " " && !can.has("live") && !event.target.matches("button")) { event.preventDefault(); play(!playing); }
-  const step = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
-  if (step && !event.target.closest("nav")) {
-    event.preventDefault();
-    const by_s = step * (event.shiftKey ? 0.1 : 0.01);
-    if (can.has("live")) { if (!held) hold([span[1] - window_s, span[1]]); at = (at ?? plots.cursor() ?? held[1]) + by_s; plots.setCursor(at); look(); }
-    else { play(false); goTo((played || span[0]) + by_s); }
-  }
-});
+// ---- keys
 
-let width = 0;
-new ResizeObserver(() => { if (width !== by("plots").clientWidth) { width = by("plots").clientWidth; plots.resize(); look(); } if (pose) stage.draw(pose); }).observe(by("plots"));
+function step(by_s) {
+  byKeys = true;
+  if (can.has("live")) cursorTo((at ?? plots.cursor() ?? range().end) + by_s);
+  else { play(false); goTo((played || span[0]) + by_s); }
+}
+
+function mark(time = instant() ?? span[1]) {
+  plots.setMark(time);
+  atMark();
+  look();
+  remember();
+  say(`mark at ${time.toFixed(3)} s`);
+}
+
+function search() {
+  const field = { parameters: "parameter-search", inside: "frame-search" }[view] ?? "search";
+  if (field === "search") choose("plots");
+  by(field).focus();
+}
+
+const digits = (count, act) => Array.from({ length: count }, (_, k) => act(k));
+keys.bind("page", document, {
+  h: () => can.has("live") ? by("freeze").click() : false,
+  "/": search,
+  ArrowLeft: () => step(-0.01), ArrowRight: () => step(0.01), "Shift+ArrowLeft": () => step(-0.1), "Shift+ArrowRight": () => step(0.1),
+  "+": () => zoomBy(0.5), "-": widen,
+  m: () => mark(),
+  n: () => { choose("plots"); if (plots.mark() === null) mark(); by("note").focus(); },
+  ...Object.fromEntries(digits(9, (k) => [String(k + 1), () => {
+    const plot = plots.all()[k];
+    if (!plot) return false;
+    plots.choose(plot);
+    say(`channels go into plot ${k + 1}`);
+  }])),
+  Space: () => can.has("live") ? false : play(!playing),
+  Escape: () => { plots.setMark(null); plots.setCursor(null); at = null; look(); remember(); },
+  ...Object.fromEntries(digits(6, (key) => [`Alt+${key}`, () => can.has("keys") ? void tell({ do: "key", key }, `key ${key} pressed`) : false])),
+});
+keys.help(by("keys"), by("signs"));
+
+new ResizeObserver(() => { if (pose) stage.draw(pose); }).observe(by("stage"));
 window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { colours = {}; plots.restyle(); if (pose) stage.draw(pose); });
-window.rangerPanel = { plots, shown: () => shown, state: () => state, span: () => span, held: () => held, channel: (name) => number.get(name), pose: () => pose };
+window.rangerPanel = { plots, keys: keys.bindings, shown: () => shown, state: () => state, span: () => span, held: () => held, channel: (name) => number.get(name), pose: () => pose };
 choose("plots");

@@ -1,5 +1,6 @@
 // Parameters in groups: value now, limits, default, what was changed here; undo; sets as files; two sets compared.
-import { figure } from "./plots.js";
+import { bind } from "./keys.js";
+import { figure } from "./words.js";
 
 export function makeParameters(box, tools, ask) {
   let rows = [], current = {}, first = null, compared = null;
@@ -15,7 +16,9 @@ export function makeParameters(box, tools, ask) {
       part.dataset.group = group;
       part.append(Object.assign(document.createElement("summary"), { textContent: `${group} (${members.length})` }));
       const scroll = Object.assign(document.createElement("div"), { className: "scroll" }), element = document.createElement("table");
-      element.createTHead().insertRow().innerHTML = '<th>parameter</th><th class="number">value</th><th>unit</th><th class="number">least</th><th class="number">most</th><th class="number">default</th><th class="number compare">other set</th><th>meaning</th>';
+      element.createTHead().insertRow().innerHTML = ["parameter", "#value", "unit", "#least", "#most", "#default", "#other set", "meaning"]
+        .map((each) => `<th scope="col"${each.startsWith("#") ? ' class="number"' : ""}>${each.replace("#", "")}</th>`).join("");
+      element.createCaption().textContent = `parameters of the group ${group}`;
       const body = element.createTBody();
       for (const row of members) body.append(line(row));
       scroll.append(element);
@@ -29,13 +32,13 @@ export function makeParameters(box, tools, ask) {
     const element = document.createElement("tr");
     const input = Object.assign(document.createElement("input"), { inputMode: "decimal", autocomplete: "off" });
     input.setAttribute("aria-label", row.name);
-    input.onkeydown = (event) => { if (event.key === "Enter") input.blur(); if (event.key === "Escape") { input.value = figure(current[row.name]); input.blur(); } };
     input.onchange = () => set(row.name, Number(input.value));
     const cell = (text, kind = "") => Object.assign(document.createElement("td"), { textContent: text ?? "", className: kind });
     const value = document.createElement("td");
     value.className = "number";
     value.append(input);
-    element.append(cell(row.name), value, cell(row.unit), cell(row.least === null ? "" : figure(row.least), "number"), cell(row.most === null ? "" : figure(row.most), "number"),
+    const name = Object.assign(document.createElement("th"), { scope: "row", textContent: row.name });
+    element.append(name, value, cell(row.unit), cell(row.least === null ? "" : figure(row.least), "number"), cell(row.most === null ? "" : figure(row.most), "number"),
       cell(figure(row.default), "number"), cell("", "number compare"), cell(row.description));
     element.dataset.words = `${row.name} ${row.description} ${row.unit}`.toLowerCase();
     inputs.set(row.name, { input, element, row });
@@ -123,6 +126,10 @@ export function makeParameters(box, tools, ask) {
     } catch (fault) { tools.note(String(fault), true); }
   }
 
+  bind("parameter", box, { Escape: ({ target }) => {
+    if (!target.matches("input")) return false;
+    target.value = figure(current[target.getAttribute("aria-label")]);
+  } });
   tools.search.oninput = filter;
   tools.changed.onchange = filter;
   tools.undo.onclick = undo;

@@ -1,39 +1,52 @@
 // The plots: an axis for each unit, one cursor for all. uPlot shows a held window; while a plot goes on with time, uPlot
 // has its axes and cursor, and strip.js its lines.
+import { bind } from "./keys.js";
+import { put as say } from "./renew.js";
 import { makeStrip } from "./strip.js";
+import { extremes, plotWords, title, valueWords } from "./words.js";
 
 const COLOURS = ["#1f6fb2", "#d9731a", "#2c9a5b", "#a8499a", "#b3261e", "#0f8b8d", "#8a6d00", "#6a5acd", "#7a4a1e", "#4a7fb0", "#c2577a", "#5c7d1e"];
 const DASHES = [[], [7, 4], [2, 3]];   // beside colours: also for who cannot tell them apart
 const HEIGHT = 230, MOST_AXES = 4, AXIS_PX = 62, MOST_POINTS = 4000;
 const TIGHTER = 0.5;    // an axis stays as it is until what is seen leaves it, or needs less than this share of it
 const READABLE_MS = 150;   // between two figures at one place
+const TOLD_MS = 1000;      // between two of a plot's descriptions in words
+const MOST_CHANNELS = 48;  // of all plots (server.py)
 
 export function makePlots(box, on, colour) {
-  let plots = [], channels = [], shared = null;   // shared: {begin, end} while held
-  let mark = null, at = null;
-  let exact = { at: null, values: {} }, marked = {}, notes = [], told_ms = 0;   // what the server says stands at the cursor, and at the mark
+  let plots = [], channels = [], chosen = null;   // chosen: where channels go
+  let mark = null, at = null, dragged = null;   // dragged: the plot that a channel is drawn out of
+  let exact = { at: null, values: {} }, marked = {}, notes = [], told_ms = 0, described_ms = 0;   // what the server says stands at the cursor, and at the mark
 
   function add(numbers = []) {
     const element = document.createElement("div");
     element.className = "plot";
-    element.innerHTML = '<div class="head"></div><div class="chart"></div>';
+    element.setAttribute("role", "group");
+    element.innerHTML = '<div class="head"></div><div class="chart" role="img"></div>';
     const plot = { element, numbers: [...numbers], chart: null, signature: "", found: null, strip: null, ranges: {}, drawn: 0 };
     element.addEventListener("dragover", (event) => { event.preventDefault(); element.classList.add("over"); });
     element.addEventListener("dragleave", () => element.classList.remove("over"));
     element.addEventListener("drop", (event) => {
       event.preventDefault();
       element.classList.remove("over");
-      const number = parseInt(event.dataTransfer.getData("text/plain"), 10);
-      if (Number.isInteger(number)) put(plot, number);
+      const number = parseInt(event.dataTransfer.getData("text/plain"), 10), from = dragged;
+      dragged = null;
+      if (from) move(from, number, plot);
+      else if (Number.isInteger(number)) put(plot, number);
     });
+    element.addEventListener("pointerdown", () => choose(plot));
+    bindHead(plot);
     box.append(element);
     plots.push(plot);
     head(plot);
+    choose(plot);
+    sizes.observe(element);
     return plot;
   }
 
   function put(plot, number) {
     if (!channels[number] || plot.numbers.includes(number)) return;
+    if (wanted().reduce((sum, each) => sum + each.numbers.length, 0) >= MOST_CHANNELS) { on.full(MOST_CHANNELS); return; }
     plot.numbers.push(number);
     head(plot);
     on.changed();
@@ -45,46 +58,96 @@ export function makePlots(box, on, colour) {
     on.changed();
   }
 
-  function close(plot) {
-    plot.chart?.destroy();
-    plot.element.remove();
-    plots = plots.filter((each) => each !== plot);
-    if (!plots.length) add();
+  function move(plot, number, to) {
+    if (to === plot || to.numbers.includes(number)) return;
+    plot.numbers = plot.numbers.filter((each) => each !== number);
+    to.numbers.push(number);
+    head(plot);
+    head(to);
     on.changed();
   }
 
+  function close(plot) {
+    const place = plots.indexOf(plot);
+    sizes.unobserve(plot.element);
+    plot.chart?.destroy();
+    plot.element.remove();
+    plots.splice(place, 1);
+    if (!plots.length) add();
+    plots.forEach(head);
+    choose(chosen === plot ? plots[Math.min(place, plots.length - 1)] : chosen);
+    chosen.element.querySelector(".which").focus();
+    on.changed();
+  }
+
+  // Channels go into this plot from now on. What stands above is not made anew: a click on it is under way.
+  function choose(plot) {
+    chosen = plot;
+    for (const each of plots) {
+      each.element.classList.toggle("chosen", each === chosen);
+      each.element.querySelector(".which").setAttribute("aria-pressed", String(each === chosen));
+    }
+    on.chosen();
+  }
+
+  // Up and down lead a channel from plot to plot.
+  function bindHead(plot) {
+    const row = plot.element.querySelector(".head");
+    const onChip = (act) => (event) => { const chip = event.target.closest(".chip"); return chip ? act(+chip.dataset.channel) : false; };
+    const shift = (by) => onChip((number) => {
+      const place = plots.indexOf(plot) + by;
+      if (place < 0) return;
+      const to = plots[place] ?? add();
+      move(plot, number, to);
+      choose(to);
+      to.element.querySelector(`[data-channel="${number}"]`)?.focus();
+    });
+    const out = onChip((number) => take(plot, number));
+    bind("chip", row, { ArrowUp: shift(-1), ArrowDown: shift(1), Delete: out, Backspace: out });
+  }
+
+  const nameOf = (plot) => `plot ${plots.indexOf(plot) + 1}`;
   const place = (plot, number) => plot.numbers.indexOf(number);
   const shade = (plot, number) => COLOURS[place(plot, number) % COLOURS.length];
 
+  // What stands above a plot. The focus stays at its place in the row.
   function head(plot) {
-    const row = plot.element.querySelector(".head");
-    row.replaceChildren(...plot.numbers.map((number) => {
-      const chip = document.createElement("button");
-      chip.type = "button";
-      chip.className = "chip";
-      chip.style.setProperty("--swatch", shade(plot, number));
-      chip.title = `${channels[number].description}; click to take it out`;
-      chip.innerHTML = "<i></i><span></span><b></b>";
-      chip.children[1].textContent = channels[number].name + (channels[number].unit ? `, ${channels[number].unit}` : "");
-      chip.dataset.channel = number;
-      chip.onclick = () => take(plot, number);
-      return chip;
-    }));
-    if (!plot.numbers.length) {
-      const hint = document.createElement("span");
-      hint.className = "note";
-      hint.textContent = "click a channel, or drag it here";
-      row.append(hint);
-    }
-    const closer = document.createElement("button");
-    closer.type = "button";
-    closer.className = "close";
-    closer.textContent = "×";
-    closer.setAttribute("aria-label", "close this plot");
-    closer.onclick = () => close(plot);
+    const row = plot.element.querySelector(".head"), name = nameOf(plot);
+    const focus = row.contains(document.activeElement) ? [...row.children].indexOf(document.activeElement) : -1;
+    plot.element.setAttribute("aria-label", name);
+    const which = button("which", String(plots.indexOf(plot) + 1), () => choose(plot));
+    which.title = "channels go into this plot";
+    which.setAttribute("aria-label", `${name}: channels go here`);
+    which.setAttribute("aria-pressed", String(plot === chosen));
+    row.replaceChildren(which, ...plot.numbers.map((number) => chipOf(plot, number, name)));
+    if (!plot.numbers.length) row.append(Object.assign(document.createElement("span"), { className: "note", textContent: "click a channel, or drag it here" }));
+    const closer = button("close", "×", () => close(plot));
+    closer.setAttribute("aria-label", `close ${name}`);
     row.append(closer);
+    if (focus >= 0) row.querySelectorAll("button")[Math.min(focus, plot.numbers.length)].focus();
     if (!plot.numbers.length && plot.chart) { plot.chart.destroy(); plot.chart = null; plot.signature = ""; }
     if (plot.numbers.length) chartOf(plot);
+    values();
+  }
+
+  function button(kind, text, act) {
+    const made = Object.assign(document.createElement("button"), { type: "button", className: kind, textContent: text });
+    made.onclick = act;
+    return made;
+  }
+
+  function chipOf(plot, number, name) {
+    const chip = button("chip", "", () => take(plot, number)), channel = channels[number];
+    chip.style.setProperty("--swatch", shade(plot, number));
+    chip.title = `${channel.description}; click to take it out`;
+    chip.setAttribute("aria-label", `${title(channel)}: take it out of ${name}`);
+    chip.innerHTML = "<i></i><span></span><b></b>";
+    chip.children[1].textContent = title(channel);
+    chip.dataset.channel = number;
+    chip.draggable = true;
+    chip.ondragstart = (event) => { dragged = plot; event.dataTransfer.setData("text/plain", String(number)); };
+    chip.ondragend = () => { dragged = null; };
+    return chip;
   }
 
   // The chart for these channels, built where it is missing or another.
@@ -258,25 +321,56 @@ export function makePlots(box, on, colour) {
     chart.ctx.restore();
   }
 
-  // Beside each name: the value at the cursor as the server has it, without a cursor the newest that is drawn.
+  // Of a channel of a plot: the value at the cursor as the server has it, without a cursor the newest that is drawn;
+  // undefined: it is on its way.
+  function valueOf(plot, number) {
+    if (at !== null) return exact.at === at ? exact.values[number] ?? null : undefined;
+    const trace = plot.found?.find((each) => each.channel === number);
+    return trace && trace.low.length ? trace.low[trace.low.length - 1] : null;
+  }
+
+  const inWords = (number, value) => valueWords(channels[number], value, at !== null && mark !== null ? marked[number] ?? null : null);
+
   function values(now = 0) {
     if (now && now - told_ms < READABLE_MS) return;
     told_ms = now;
     for (const plot of plots) {
       for (const chip of plot.element.querySelectorAll(".chip")) {
-        const number = +chip.dataset.channel, trace = plot.found?.find((each) => each.channel === number);
-        const value = at !== null ? (exact.at === at ? exact.values[number] ?? null : undefined) : trace && trace.low.length ? trace.low[trace.low.length - 1] : null;
-        if (value === undefined) continue;   // it is on its way
-        const before = at !== null && mark !== null ? marked[number] ?? null : null, states = channels[number].states;
-        let text = value === null ? "" : states[Math.round(value)] ?? figure(value);
-        if (value !== null && before !== null && !(Math.round(value) in states)) text += ` (Δ ${figure(value - before)})`;
-        if (chip.children[2].textContent !== text) chip.children[2].textContent = text;
+        const value = valueOf(plot, +chip.dataset.channel);
+        if (value !== undefined) say(chip.children[2], inWords(+chip.dataset.channel, value));
       }
     }
+    if (!now || now - described_ms >= TOLD_MS) { described_ms = now; plots.forEach(describe); }
+  }
+
+  // The picture for who does not see it.
+  function describe(plot) {
+    const { min, max } = plot.chart?.scales.x ?? {};
+    const lines = plot.numbers.map((number, k) => {
+      const trace = plot.found?.find((each) => each.channel === number);
+      const [least, most] = plot.strip ? plot.strip.extremes(k) : trace ? extremes(trace) : [Infinity, -Infinity];
+      return { channel: channels[number], text: inWords(number, valueOf(plot, number)), least, most };
+    });
+    plot.element.querySelector(".chart").setAttribute("aria-label", plotWords(nameOf(plot), [min, max], at, lines));
+  }
+
+  // What stands at the cursor; nothing while it is on its way.
+  function atCursor() {
+    if (at === null || exact.at !== at) return "";
+    const numbers = [...new Set(plots.flatMap((plot) => plot.numbers))];
+    return `${at.toFixed(3)} s. ${numbers.map((number) => `${title(channels[number])}: ${inWords(number, exact.values[number]) || "no value"}`).join("; ")}`;
   }
 
   function redraw() { for (const plot of plots) plot.chart?.redraw(false); }
-  function resize() { for (const plot of plots) plot.chart?.batch(() => plot.chart.setSize({ width: width(plot), height: HEIGHT })); }
+
+  // True: one has another width now. One that another view hides keeps its own.
+  function resize() {
+    const others = plots.filter((plot) => plot.chart && plot.element.clientWidth && plot.chart.width !== width(plot));
+    for (const { chart, element } of others) chart.batch(() => chart.setSize({ width: width({ element }), height: HEIGHT }));
+    return others.length > 0;
+  }
+
+  const sizes = new ResizeObserver(() => { if (resize()) on.resized(); });
   const wanted = () => plots.filter((plot) => plot.numbers.length);
 
   // Other colours: all is drawn anew as it stands.
@@ -291,15 +385,15 @@ export function makePlots(box, on, colour) {
 
   // How many points a plot wants: one for each column that goes on, and of a held window, where each is two, for every other pixel.
   function points(plot, follows) {
-    const pixels = follows ? chartOf(plot).bbox.width / wide() : Math.min(MOST_POINTS, box.clientWidth) / 2;
+    const pixels = follows ? chartOf(plot).bbox.width / wide() : Math.min(MOST_POINTS, width(plot)) / 2;
     return Math.max(10, Math.min(MOST_POINTS, Math.floor(pixels)));
   }
 
   return {
-    add, put, close, show, values, redraw, resize, restyle, wanted, points,
+    add, put, take, close, choose, show, values, redraw, resize, restyle, wanted, points, atCursor,
     know: (found) => { channels = found; },
     all: () => plots,
-    last: () => plots[plots.length - 1] ?? add(),
+    chosen: () => chosen,
     cursor: () => at,
     setCursor: (time) => { at = time; values(); for (const plot of plots) if (plot.chart) plot.chart.setCursor(time === null ? { left: -10, top: -10 } : { left: plot.chart.valToPos(time, "x"), top: 10 }, false); },
     mark: () => mark,
@@ -309,10 +403,3 @@ export function makePlots(box, on, colour) {
     stoodAtMark: (values_there) => { marked = values_there; values(); },
   };
 }
-
-export const figure = (value) => {
-  if (value === null || value === undefined || !Number.isFinite(value)) return "–";
-  const size = Math.abs(value);
-  if (value === Math.round(value) && size < 1e7) return String(value);
-  return size >= 1e5 || size < 1e-3 ? value.toExponential(3) : value.toPrecision(5);
-};

@@ -84,5 +84,13 @@ export function makeStage(canvas, colour) {
     context.stroke();
   }
 
-  return { draw, know: (hello) => { names = hello.pose; if (hello.geometry.leg) geometry = hello.geometry; } };
+  // What the picture shows.
+  function words(values) {
+    const { legs } = posed(values), lean = (angle) => `${Math.abs(angle).toFixed(2)} rad ${angle < 0 ? "back" : "forward"}`;
+    if (!Number.isFinite(legs.outer.leg) || !Number.isFinite(legs.inner.leg)) return "its legs are not known";
+    const on = ["outer", "inner"].filter((side) => legs[side].force && Math.hypot(...legs[side].force) > 1);
+    return `outer legs lean ${lean(legs.outer.leg)}, inner legs ${lean(legs.inner.leg)}` + (on.length ? `, it stands on the ${on.join(" and ")} feet` : "");
+  }
+
+  return { draw, words, know: (hello) => { names = hello.pose; if (hello.geometry.leg) geometry = hello.geometry; } };
 }

@@ -1,29 +1,35 @@
 // Tables of the page: errors, boards, buses, frames, parameters, faults. Text only ever enters as text.
-import { figure } from "./plots.js";
+import { figure } from "./words.js";
 
-export function table(headings, rows) {
+// headings: "#" before one of numbers, "-" (after that) before one that is only read aloud. The first column names its row.
+export function table(caption, headings, rows) {
   const box = document.createElement("div");
   box.className = "scroll";
+  box.setAttribute("role", "group");
+  box.setAttribute("aria-label", caption);
   const element = document.createElement("table");
+  element.createCaption().textContent = caption;
   const head = element.createTHead().insertRow();
   for (const heading of headings) {
-    const cell = document.createElement("th");
-    cell.textContent = heading.replace(/^#/, "");
-    if (heading.startsWith("#")) cell.className = "number";
+    const cell = Object.assign(document.createElement("th"), { scope: "col", className: kind(heading) }), text = heading.replace(/^#?-?/, "");
+    cell.append(/^#?-/.test(heading) ? Object.assign(document.createElement("span"), { className: "unseen", textContent: text }) : text);
     head.append(cell);
   }
   const body = element.createTBody();
   for (const row of rows) {
     const line = body.insertRow();
     row.forEach((content, k) => {
-      const cell = line.insertCell();
-      if (headings[k].startsWith("#")) cell.className = "number";
-      content instanceof Node ? cell.append(content) : cell.textContent = content ?? "–";
+      const cell = Object.assign(document.createElement(k ? "td" : "th"), { className: kind(headings[k]) });
+      if (!k) cell.scope = "row";
+      cell.append(content ?? "–");
+      line.append(cell);
     });
   }
   box.append(element);
   return box;
 }
+
+const kind = (heading) => heading.startsWith("#") ? "number" : "";
 
 export const note = (text) => Object.assign(document.createElement("p"), { className: "note", textContent: text });
 
@@ -33,6 +39,7 @@ export function meter(share, text, alarms = true) {
   box.className = "meter" + (alarms && share > 0.9 ? " high" : "");
   box.setAttribute("role", "meter");
   box.setAttribute("aria-valuenow", Math.round(100 * share));
+  box.setAttribute("aria-valuetext", text);
   box.setAttribute("aria-label", text);
   const bar = document.createElement("i");
   bar.style.width = `${Math.max(0, Math.min(100, 100 * share))}%`;
@@ -42,9 +49,9 @@ export function meter(share, text, alarms = true) {
 
 const seconds = (value) => value === null || value === undefined ? "–" : `${value.toFixed(3)} s`;
 
-export function errors(rows, nothing) {
-  if (!rows.length) return note(nothing);
-  return table(["board", "error", "meaning", "#count", "#first", "#last"],
+export function errors(rows, caption) {
+  if (!rows.length) return note("none");
+  return table(caption, ["board", "error", "meaning", "#count", "#first", "#last"],
     rows.map((row) => [row.board, row.name, row.text, row.count.toLocaleString("en"), seconds(row.first_s), seconds(row.last_s)]));
 }
 
@@ -84,8 +91,8 @@ export function boards(found, slots, slots_us, ask) {
   if (!names.length) return note("nothing is known of the boards yet");
   const supervised = Object.keys(found).length > 0, paced = names.some((name) => slots[name]?.late);
   const headings = ["board", ...(supervised ? ["state"] : []), "slot", "#took", "#margin", ...(paced ? ["late: half, 99 %, worst"] : []),
-    ...(supervised ? ["#longest", "#overruns", "#errors", ""] : [])];
-  return table(headings, names.map((name) => {
+    ...(supervised ? ["#longest", "#overruns", "#errors", "-restart"] : [])];
+  return table("slots of the boards", headings, names.map((name) => {
     const board = found[name], slot = slots[name], slot_us = slots_us[name], known = slot && slot.used_us !== null;
     const row = [name];
     if (supervised) row.push(board?.state);
@@ -104,7 +111,7 @@ export function boards(found, slots, slots_us, ask) {
 export function buses(found) {
   const names = Object.keys(found);
   if (!names.length) return note("nothing is known of the buses yet");
-  return table(["bus", "load in 10 ms", "#", "#error frames"], names.map((name) =>
+  return table("loads of the buses", ["bus", "load in 10 ms", "#-share", "#error frames"], names.map((name) =>
     [name, meter(found[name].load, `${name}: ${Math.round(100 * found[name].load)} %`), `${(100 * found[name].load).toFixed(1)} %`, found[name].errors]));
 }
 
@@ -112,7 +119,7 @@ export function frames(rows, filter) {
   const wanted = filter.trim().toUpperCase();
   const shown = rows.filter((row) => !wanted || row.name.includes(wanted) || String(row.id) === wanted);
   if (!shown.length) return note("no frames");
-  return table(["#time", "#id", "name", "#value", "data", "#until now"], shown.map((row) =>
+  return table("newest frames", ["#time", "#id", "name", "#value", "data", "#until now"], shown.map((row) =>
     [seconds(row.time_s), row.id, row.name, figure(row.value), Object.assign(document.createElement("code"), { textContent: row.data }), row.count.toLocaleString("en")]));
 }
 
@@ -130,20 +137,21 @@ function achieved({ rate_hz, promised_hz }, name) {
 const gaps = (row) => [row.gaps, row.gaps ? `${row.longest_ms} ms` : "–", seconds(row.last_s)];
 
 export function linkLists(rows) {
-  return table(["list", "#variables", "#came, 1/s", "of the promise", "#promised, 1/s", "#gaps", "#longest", "#last"],
+  return table("lists of the data link", ["list", "#variables", "#came, 1/s", "of the promise", "#promised, 1/s", "#gaps", "#longest", "#last"],
     rows.map((row) => [row.list, row.variables, rate(row.rate_hz), achieved(row, row.list), rate(row.promised_hz), ...gaps(row)]));
 }
 
 export function linkRows(rows) {
   if (!rows.length) return note("nothing yet: the robot has not told its lists");
-  return table(["variable", "list", "#came, 1/s", "of the promise", "#promised, 1/s", "#gaps", "#longest", "#last"],
+  return table("variables on the fast and the medium list", ["variable", "list", "#came, 1/s", "of the promise", "#promised, 1/s", "#gaps", "#longest", "#last"],
     rows.map((row) => [row.name, row.list, rate(row.rate_hz), achieved(row, row.name), `${row.regular ? "" : "≥ "}${rate(row.promised_hz)}`, ...gaps(row)]));
 }
 
 export function faults(rows, ask) {
   if (!rows.length) return note("none was armed");
-  return table(["#", "fault", "#armed", "#active since", "acted", "largest difference", "#ended", "#clear", ""], rows.map((row, k) => {
+  return table("faults", ["#-number", "fault", "#armed", "#active since", "acted", "largest difference", "#ended", "#clear", "-take away"], rows.map((row, k) => {
     const clear = Object.assign(document.createElement("button"), { type: "button", textContent: "Clear", disabled: row.ended_s !== null });
+    clear.setAttribute("aria-label", `clear ${row.fault}`);
     clear.onclick = () => ask({ do: "clear", which: k });
     return [k, row.fault, seconds(row.armed_s), seconds(row.activated_s), row.acted ? `yes, ${row.acted_count}×, first at ${seconds(row.acted_s)}` : "not yet",
       row.acted ? `${figure(row.largest_difference)} ${row.unit}` : "–", seconds(row.ended_s), row.cleared_s === null && row.permanent ? `after ${row.permanent}` : seconds(row.cleared_s), clear];
