@@ -1,7 +1,6 @@
 from ranger_sim.boards.firmware_board cimport SatelliteBoard
 from ranger_sim.boards.modules.buzzer cimport Buzzer
 from ranger_sim.boards.modules.colour_leds cimport ColourLeds
-from ranger_sim.boards.modules.front_panel cimport FrontPanel
 from ranger_sim.boards.modules.imu_parser cimport ImuParser
 from ranger_sim.boards.modules.keypad cimport Keypad
 from ranger_sim.boards.modules.lcd cimport Lcd
@@ -20,7 +19,6 @@ cdef class UserInterfaceBoard(SatelliteBoard):
     cdef public Lcd lcd
     cdef public SyncLight sync_light
     cdef public Buzzer buzzer
-    cdef public FrontPanel panel
     cdef public long long slots, imu_start_slots
     # the rest
     cdef public TimerCapture timer0

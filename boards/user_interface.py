@@ -1,31 +1,33 @@
 """The user interface board (UI, B8A): IMU, keys, radio control, display, colour lights, buzzer.
 
-Source: robot.md N3.6, N4.10-N4.12, N4.16; appendix 3.7, 3.8. What a person sees and hears is public state:
-`board.lcd.text()`, `board.leds.colour(i)`, `board.buzzer.hertz`, `board.sync_light.lit`; `board.memory` has all of it
-as words, also where the board runs in a process of its own (modules/front_panel.py).
+Source: robot.md N3.6, N4.10-N4.12, N4.16; appendix 3.7, 3.8. What a person sees and hears hangs on its pins:
+`board.panel.text()`, `board.panel.colour(i)`, `board.panel.hertz`; `board.memory` has all of it as words, also where
+the board runs in a process of its own, and whatever program it runs (modules/front_panel.py).
 """
 
 import cython
 
 from ranger_sim.boards.firmware_board import TICK_CYCLES, SatelliteBoard
-from ranger_sim.boards.modules.buzzer import Buzzer, BuzzerFrequency, ErrorSound, TuneStart
+from ranger_sim.boards.modules.buzzer import PERIOD_AT_START, Buzzer, BuzzerFrequency, ErrorSound, TuneStart
 from ranger_sim.boards.modules.can_link import TRANSMIT_CYCLES
 from ranger_sim.boards.modules.colour_leds import CYCLES_PER_WRITE, ColourLeds, LedReceiver
-from ranger_sim.boards.modules.front_panel import FrontPanel
+from ranger_sim.boards.modules.front_panel import KEY_PINS, SYNC_PIN, FrontPanel
 from ranger_sim.boards.modules.imu_parser import (
     HEADER_ANGLES_AND_RATES,
     HEADER_RATES_ONLY,
     ImuParser,
     start_command,
 )
-from ranger_sim.boards.modules.keypad import KEY_PINS, Keypad
+from ranger_sim.boards.modules.keypad import Keypad
 from ranger_sim.boards.modules.lcd import Lcd, LcdQuarter
 from ranger_sim.boards.modules.mcu_led import PINS as LED_PINS
 from ranger_sim.boards.modules.publishing import Send, laid_out
 from ranger_sim.boards.modules.rc_receiver import RcReceiver
-from ranger_sim.boards.modules.sync_light import SYNC_PIN, SyncLight
+from ranger_sim.boards.modules.sync_light import SyncLight
 from ranger_sim.datatable.generated import ui as table
 from ranger_sim.firmware_sim.peripherals.gpio import p0
+from ranger_sim.firmware_sim.peripherals.pwm import Pwm
+from ranger_sim.firmware_sim.peripherals.ssp import SspMaster
 from ranger_sim.firmware_sim.peripherals.timer_capture import TimerCapture
 from ranger_sim.firmware_sim.peripherals.uart import Uart
 from ranger_sim.firmware_sim.scheduler import Schedule, Task
@@ -87,13 +89,14 @@ class UserInterfaceBoard(SatelliteBoard):
             self.timer0.use_channel(channel, RC_PINS[channel], source=captures)
         self.vic.attach(TIMER_MATCH, 0, self.on_rc_edge, RC_CYCLES, slot=RC_SLOT, name="timer0 capture")
         # what a person touches, sees and hears
+        panel = FrontPanel(self)
+        self.carry(panel)
         self.keypad = Keypad(self.gpio, board.report)
-        self.lcd = Lcd(board.report)
-        self.leds = ColourLeds()
-        self.buzzer = Buzzer(quirks.buzzer_beeps, quirks.song_repeats_for_ever)
+        self.lcd = Lcd(self.gpio, board.report)
+        self.leds = ColourLeds(SspMaster(self, panel.ssp), self.gpio)
+        pwm = Pwm(self, period=PERIOD_AT_START, phase_ns=phase_ns)
+        self.buzzer = Buzzer(pwm, quirks.buzzer_beeps, quirks.song_repeats_for_ever)
         self.sync_light = SyncLight(self.gpio, self.keypad, self.leds)
-        self.panel = FrontPanel(self.lcd, self.leds, self.buzzer, self.sync_light, self.keypad)
-        self.memory = self.panel.words
         self.listen()
         self.on_timer_tick = self.lcd_tick
         self.start(self.schedule(), phase_ns)
@@ -192,12 +195,6 @@ class UserInterfaceBoard(SatelliteBoard):
             self.extra_cycles += LCD_BYTE_CYCLES
         else:
             self.extra_cycles += LCD_IDLE_CYCLES
-        self.panel.show()
-
-    def move_memory(self, words) -> None:
-        """What the panel shows stands in `words` from now on."""
-        self.panel.move(words)
-        self.memory = words
 
     # --- tasks of every slot ----------------------------------------------------------------------------
 

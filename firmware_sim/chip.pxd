@@ -26,4 +26,5 @@ cdef class Chip(Board):
     cdef public long long hz
     cdef public Crystal crystal
     cdef public long long unclaimed
-    cdef public list peripherals
+    cdef public list peripherals, followers
+    cdef public object pwm_follower, panel

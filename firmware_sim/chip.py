@@ -22,6 +22,7 @@ class Chip(Board):
 
     `now`: the instant (ns) at which the present input, handler or task takes effect. `pins`: levels 0/1. `unclaimed`:
     messages that nobody listened to. The slot timer matched at `match_time` and will match at `tick_time`.
+    `panel`: what a person sees of the board, or None (`carry`).
     """
 
     def __init__(self, name, hz, crystal=None) -> None:
@@ -35,6 +36,11 @@ class Chip(Board):
         self.vic = InterruptController(self.ns_per_cycle)
         self.peripherals = []
         self.pins = integers(PINS)
+        # per pin the Peripheral on the board that sees each change of its level (`on_level`), or None; and who sees
+        # what drives the PWM unit's pins (`on_pwm`)
+        self.followers = [None] * 64  # PINS
+        self.pwm_follower = None
+        self.panel = None
         self.now = 0
         self.instant = 0  # up to which inputs have been taken in
         self.code_time = 0  # when the processor goes on with its code
@@ -52,3 +58,15 @@ class Chip(Board):
         self.tick_time = NEVER
         self.match_time = 0
         self.unclaimed = 0
+
+    def carry(self, panel) -> None:
+        """The board carries `panel`, what a person sees: its `words` are the board's memory, for others to read."""
+        self.panel = panel
+        self.memory = panel.words
+
+    def move_memory(self, words) -> None:
+        """What the panel shows stands in `words` from now on."""
+        if self.panel is None:
+            Board.move_memory(self, words)
+        self.panel.move(words)
+        self.memory = words

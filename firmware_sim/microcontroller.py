@@ -462,6 +462,8 @@ class Microcontroller(Chip):
         self.pins[pin] = queue.b
         if queue.c >= 0:
             self.pins[queue.c] = queue.d
+        if self.followers[pin] is not None:
+            cython.cast(Peripheral, self.followers[pin]).on_level(pin, queue.b)
         if channel < 0:
             return self.others.on_message(queue)
         if cython.cast(Peripheral, self.pin_owners[pin]).on_pin(channel, queue.b, queue.time):

@@ -30,6 +30,14 @@ class Peripheral:
         """The pin of `channel` changed to `level` at `time`; returns 1 to ask for the pin's interrupt, else 0."""
         return 0
 
+    def on_level(self, pin: cython.longlong, level: cython.longlong) -> cython.int:
+        """The level of a pin that this follows (`Chip.followers`) is `level` from now on, driven by whomever."""
+        return 0
+
+    def on_pwm(self, pwm: object) -> cython.int:
+        """What the PWM unit drives is what `pwm` has latched from now on (`Chip.pwm_follower`)."""
+        return 0
+
     def on_alarm(self, alarm: cython.longlong, time: cython.longlong) -> InterruptSource | None:
         """The alarm that this peripheral numbered `alarm` is due; returns what `on_message` does."""
         return None

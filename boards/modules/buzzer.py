@@ -11,6 +11,10 @@ import array
 import cython
 
 from ranger_sim.boards.modules.receiver import Receiver
+from ranger_sim.firmware_sim.peripherals.pwm import Pwm
+
+if not cython.compiled:
+    from ranger_sim.firmware_sim.peripherals.pwm import LER_MR0, LER_MR5
 
 # Our own tune, a rising and falling fifth: the robot played a song that belongs to others. (Hz, ms)
 TUNE = ((523, 200), (784, 200), (659, 200), (988, 200), (784, 400), (587, 200), (523, 400), (0, 200))
@@ -22,18 +26,18 @@ MOST_WAITING = 8
 # an error's code modulo 4 chooses its pitch, so different errors sound different
 PITCHES_HZ = (1047, 1319, 1568, 2093)
 PWM_CLOCK_HZ = 60_000_000
+PERIOD_AT_START = 100_000  # counts of MR0, as the firmware sets it up
 LOWEST_HZ, HIGHEST_HZ = 1, 30_000
 
 
 class Buzzer:
-    """`update` runs once per slot of 1 ms; `hertz` is what is heard now, 0 for silence."""
+    """`update` runs once per slot of 1 ms; `hertz` is the tone that the PWM unit was last told, 0 for silence."""
 
-    def __init__(self, beeps=True, repeats=False) -> None:
+    def __init__(self, pwm: Pwm, beeps=True, repeats=False) -> None:
+        self.pwm = pwm
         self.beeps = beeps
         self.repeats = repeats
         self.hertz = 0
-        self.mr0 = 0
-        self.mr5 = 0
         self.frequency_hertz = 0  # as last commanded
         self.playing = False
         self.note = 0
@@ -50,18 +54,21 @@ class Buzzer:
         self.tunes_started = 0
         self.beeps_made = 0
 
-    def tone(self, hertz: cython.longlong) -> cython.void:
+    def tone(self, hertz: cython.longlong) -> cython.int:
         """Sound `hertz` (1-30 000; anything else is silence) by writing MR0 and MR5."""
         if hertz < LOWEST_HZ or hertz > HIGHEST_HZ:
             hertz = 0
         if hertz == self.hertz:
-            return
+            return 0
         self.hertz = hertz
         if hertz == 0:
-            self.mr5 = 0
-            return
-        self.mr0 = PWM_CLOCK_HZ // hertz
-        self.mr5 = self.mr0 // 2
+            self.pwm.MR5 = 0
+            self.pwm.latch(LER_MR5)
+        else:
+            self.pwm.MR0 = PWM_CLOCK_HZ // hertz
+            self.pwm.MR5 = self.pwm.MR0 // 2
+            self.pwm.latch(LER_MR0 | LER_MR5)
+        return 0
 
     def start_tune(self) -> cython.void:
         """From the first note; a tune that plays goes on."""

@@ -1,49 +1,59 @@
-"""Six lights of three colours on two MAX6966 drivers in a chain, written over SPI.
+"""Six lights of three colours on two MAX6966 drivers in a chain, written over the SSP.
 
 Light l has port (3 l + c) mod 9 of device l / 3, c = 0 blue, 1 green, 2 red. A command word has red in byte
 0, green in byte 1, blue in byte 2. Port value 1 is off, 0 is fully on, 3-254 are duty steps; levels below 3
-become off and above 254 fully on. Source: robot.md N4.11; MAX6966 data sheet.
+become off and above 254 fully on. Source: robot.md N4.11; the devices are
+firmware_sim/peripherals/led_drivers.py.
 """
-
-import array
 
 import cython
 
+from ranger_sim.boards.modules.front_panel import BLUE, GREEN, LIGHTS_SELECT, RED
 from ranger_sim.boards.modules.receiver import Receiver
+from ranger_sim.firmware_sim.peripherals.gpio import Gpio
+from ranger_sim.firmware_sim.peripherals.led_drivers import CONFIGURATION, RUN
+from ranger_sim.firmware_sim.peripherals.ssp import SspMaster
 
-BLUE = 0
-GREEN = 1
-RED = 2
+if not cython.compiled:
+    from ranger_sim.boards.modules.front_panel import LIGHTS_PER_DRIVER, PORTS_USED
+
 TRANSFERS_PER_LED = 3
 DARK, WHITE = 0, 0xFFFFFF  # command words
-DEVICES, PORTS = 2, 9
 OFF, FULLY_ON = 1, 0  # values of a port
 DIMMEST, BRIGHTEST = 3, 254  # levels that are duty steps
-OUTPUT_CONFIGURATION = 0x10
-SHUTDOWN_CONFIGURATION = 0x0A
+ALL_PORTS, NO_OPERATION = 0x0A, 0x2000  # a register, and a whole word
 # 32 bits at 15 Mbit/s are 128 cycles of 60 MHz, which the program waits for, and about 70 more to build the
 # words and move the select pin (chosen by us, because no listing says)
 CYCLES_PER_WRITE = 200
 
 
 class ColourLeds:
-    """Both devices' registers as the SPI writes leave them."""
+    """The firmware's side: `ssp` is the port as a master, `gpio` has the drivers' select pin."""
 
-    def __init__(self) -> None:
-        self.ports = array.array("q", [OFF]) * (DEVICES * PORTS)
-        self.configuration = array.array("q", [0]) * DEVICES
-        self.writes = 0
-        for register in (OUTPUT_CONFIGURATION, SHUTDOWN_CONFIGURATION):
-            for device in range(DEVICES):
-                self.write(device, register, 1)
+    def __init__(self, ssp: SspMaster, gpio: Gpio) -> None:
+        self.ssp = ssp
+        self.gpio = gpio
+        self.select_pin = LIGHTS_SELECT
+        gpio.write(LIGHTS_SELECT, 1)
+        self._send(CONFIGURATION << 8 | RUN, CONFIGURATION << 8 | RUN)
+        self._send(ALL_PORTS << 8 | OFF, ALL_PORTS << 8 | OFF)
 
-    def write(self, device: cython.longlong, register: cython.longlong, value: cython.longlong) -> cython.void:
-        """One transfer: `register` of one device gets `value`, the other device a no-operation."""
-        self.writes += 1
-        if 0 <= register < PORTS:
-            self.ports[device * PORTS + register] = value & 0xFF
-        elif register == OUTPUT_CONFIGURATION:
-            self.configuration[device] = value & 0xFF
+    def _send(self, far: cython.longlong, near: cython.longlong) -> cython.int:
+        """One transfer: 16 bits for each driver."""
+        self.gpio.write(self.select_pin, 0)
+        self.ssp.word(far)
+        self.ssp.word(near)
+        self.gpio.write(self.select_pin, 1)
+        return 0
+
+    def write(self, device: cython.longlong, register: cython.longlong, value: cython.longlong) -> cython.int:
+        """`register` of one device gets `value`, the other device a no-operation."""
+        word: cython.longlong = register << 8 | value & 0xFF
+        if device == 0:
+            self._send(NO_OPERATION, word)
+        else:
+            self._send(word, NO_OPERATION)
+        return 0
 
     def set_colour(self, led: cython.longlong, colour: cython.longlong, level: cython.longlong) -> cython.longlong:
         """Brightness 0-255 of one colour of light 0-5; returns the number of transfers, 1."""
@@ -52,7 +62,7 @@ class ColourLeds:
             value = OFF
         elif level > BRIGHTEST:
             value = FULLY_ON
-        self.write(led // 3, (3 * led + colour) % PORTS, value)
+        self.write(led // LIGHTS_PER_DRIVER, (3 * led + colour) % PORTS_USED, value)
         return 1
 
     def set_led(self, led: cython.longlong, word: cython.longlong) -> cython.longlong:
@@ -61,19 +71,6 @@ class ColourLeds:
         self.set_colour(led, GREEN, (word >> 8) & 0xFF)
         self.set_colour(led, BLUE, (word >> 16) & 0xFF)
         return TRANSFERS_PER_LED
-
-    def level(self, led: cython.longlong, colour: cython.longlong) -> cython.longlong:
-        """Brightness that an eye sees of one colour of light 0-5: 0 (off) ... 255 (fully on)."""
-        value: cython.longlong = self.ports[PORTS * (led // 3) + (3 * led + colour) % PORTS]
-        if value == OFF:
-            return 0
-        if value == FULLY_ON:
-            return 255
-        return value
-
-    def colour(self, led: cython.longlong) -> cython.longlong:
-        """What light 0-5 shows, as a command word: 8 bits each of red (lowest), green and blue."""
-        return self.level(led, RED) | (self.level(led, GREEN) << 8) | (self.level(led, BLUE) << 16)
 
 
 class LedReceiver(Receiver):

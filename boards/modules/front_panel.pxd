@@ -1,10 +1,9 @@
-cimport cython
+from ranger_sim.firmware_sim.peripheral cimport Peripheral
+from ranger_sim.firmware_sim.peripherals.character_display cimport CharacterDisplay
+from ranger_sim.firmware_sim.peripherals.led_drivers cimport LedDrivers
+from ranger_sim.firmware_sim.peripherals.pwm cimport Pwm
 
-from ranger_sim.boards.modules.buzzer cimport Buzzer
-from ranger_sim.boards.modules.colour_leds cimport ColourLeds
-from ranger_sim.boards.modules.keypad cimport Keypad
-from ranger_sim.boards.modules.lcd cimport CharacterDisplay, Lcd
-from ranger_sim.boards.modules.sync_light cimport SyncLight
+cimport cython
 
 cpdef enum:
     CHARACTERS = 0
@@ -12,20 +11,22 @@ cpdef enum:
     TONE_HZ = 22
     SYNC = 23
     KEYS = 24
-    WORDS = 25
+    LEDS = 25
+    WORDS = 26
     CHARACTERS_PER_LINE = 8
-    SECOND_LINE_AT = 0x40
     LIGHT_COUNT = 6
+    LIGHTS_PER_DRIVER = 3
+    PORTS_USED = 9
 
 @cython.final
-cdef class FrontPanel:
-    cdef public Lcd lcd
-    cdef public ColourLeds leds
-    cdef public Buzzer buzzer
-    cdef public SyncLight sync_light
-    cdef public Keypad keypad
+cdef class FrontPanel(Peripheral):
+    cdef public CharacterDisplay display
+    cdef public LedDrivers ssp
     cdef public long long[::1] words
-    cdef public long long seen_commands, seen_characters, seen_writes
-    @cython.locals(display=CharacterDisplay)
-    cpdef int show(self) except -1
-    cpdef int move(self, words) except -1
+    cdef public long long[64] bit_of
+    cdef public long long enable_pin, select_pin, sync_pin, first_led, last_led
+    cdef int _set_bit(self, long long word, long long bit, long long level) except -1
+    cdef int _show_characters(self) except -1
+    cdef int _show_lights(self) except -1
+    cdef long long _level(self, long long light, long long colour) except? <long long>-1
+    cpdef long long colour(self, long long light) except? <long long>-1

@@ -1,18 +1,21 @@
-"""What a person sees, hears and presses on the user interface board, as words that others may read at any instant.
+"""The user interface board's front panel: what hangs on the pins of its processor for a person, and its state as words.
 
-`WORDS` of them: the display's sixteen characters (0 while it is off), the six lights as command words (red in the
-lowest byte), the tone in Hz (0: silence), the sync light, and the keys that are down, a bit each.
+It knows levels of pins, words on the SSP and the PWM unit's registers, of whatever program: robot.md N4.11. `WORDS` of
+them, which others may read at any instant: the display's sixteen characters (0 while it is off), the six colour lights
+as command words (red in the lowest byte), the tone in Hz (0: silence), the sync light, the keys that are down and the
+lights beside the processor that are lit (a bit each: green, red, blue).
 """
 
 import array
 
 import cython
 
-from ranger_sim.boards.modules.buzzer import Buzzer
-from ranger_sim.boards.modules.colour_leds import ColourLeds
-from ranger_sim.boards.modules.keypad import Keypad
-from ranger_sim.boards.modules.lcd import Lcd
-from ranger_sim.boards.modules.sync_light import SyncLight
+from ranger_sim.boards.modules.mcu_led import PINS as PINS_OF_LEDS
+from ranger_sim.firmware_sim.peripheral import Peripheral
+from ranger_sim.firmware_sim.peripherals.character_display import CharacterDisplay
+from ranger_sim.firmware_sim.peripherals.gpio import p0, p1
+from ranger_sim.firmware_sim.peripherals.led_drivers import LedDrivers
+from ranger_sim.firmware_sim.peripherals.pwm import Pwm
 
 if not cython.compiled:
     CHARACTERS = 0
@@ -20,47 +23,115 @@ if not cython.compiled:
     TONE_HZ = 22
     SYNC = 23
     KEYS = 24
-    WORDS = 25
+    LEDS = 25
+    WORDS = 26
     CHARACTERS_PER_LINE = 8
-    SECOND_LINE_AT = 0x40
     LIGHT_COUNT = 6
+    LIGHTS_PER_DRIVER = 3
+    PORTS_USED = 9  # of each driver
+
+# The display: DB0 ... DB7 and its three lines of control
+DISPLAY_DATA = tuple(p0(bit) for bit in range(8))
+DISPLAY_RS, DISPLAY_RW, DISPLAY_ENABLE = p0(15), p0(10), p0(11)
+# Two MAX6966 on the SSP; light l has port (3 l + c) mod 9 of driver l / 3, c = 0 blue, 1 green, 2 red
+LIGHTS_SELECT = p0(20)
+DRIVERS = 2
+BLUE, GREEN, RED = 0, 1, 2
+KEY_PINS = (p1(18), p0(12), p0(13), p0(28), p1(16), p0(30))  # active high
+SYNC_PIN = p0(16)  # low lights it
+LED_PINS = tuple(PINS_OF_LEDS[colour] for colour in ("green", "red", "blue"))  # side by side; low lights them
+# The buzzer is a piezo on PWM5, P0.21
+BUZZER_CHANNEL = 5
 
 
-class FrontPanel:
-    """`show` brings `words` up to date; it costs the robot nothing, as a look at it does."""
+class FrontPanel(Peripheral):
+    """What a person sees, hears and presses, at the pins of `chip`. `ssp`: what hangs on its SSP, the lights."""
 
-    def __init__(self, lcd: Lcd, leds: ColourLeds, buzzer: Buzzer, sync_light: SyncLight, keypad: Keypad) -> None:
-        self.lcd = lcd
-        self.leds = leds
-        self.buzzer = buzzer
-        self.sync_light = sync_light
-        self.keypad = keypad
+    def __init__(self, chip) -> None:
+        Peripheral.__init__(self, chip)
+        self.display = CharacterDisplay(chip, DISPLAY_DATA, DISPLAY_RS, DISPLAY_RW, DISPLAY_ENABLE)
+        self.ssp = LedDrivers(chip, LIGHTS_SELECT, DRIVERS)
         self.words = array.array("q", [0]) * WORDS
-        self.seen_commands = -1  # what was shown last: characters and lights change rarely
-        self.seen_characters = -1
-        self.seen_writes = -1
+        self.bit_of = [0] * 64
+        for pins in (KEY_PINS, LED_PINS):
+            for number, pin in enumerate(pins):
+                self.bit_of[pin] = 1 << number
+        self.enable_pin = DISPLAY_ENABLE
+        self.select_pin = LIGHTS_SELECT
+        self.sync_pin = SYNC_PIN
+        self.first_led, self.last_led = LED_PINS[0], LED_PINS[-1]
+        for pin in (DISPLAY_ENABLE, LIGHTS_SELECT, SYNC_PIN, *KEY_PINS, *LED_PINS):
+            chip.followers[pin] = self
+        chip.pwm_follower = self
 
-    def show(self) -> None:
-        """Once per slot."""
+    def on_level(self, pin: cython.longlong, level: cython.longlong) -> cython.int:
+        """A pin has changed."""
+        if pin == self.select_pin:
+            if self.ssp.on_select(level):
+                self._show_lights()
+        elif pin == self.enable_pin:
+            if self.display.on_enable(level):
+                self._show_characters()
+        elif pin == self.sync_pin:
+            self.words[SYNC] = 1 - level
+        elif self.first_led <= pin <= self.last_led:
+            self._set_bit(LEDS, self.bit_of[pin], 1 - level)
+        else:
+            self._set_bit(KEYS, self.bit_of[pin], level)
+        return 0
+
+    def on_pwm(self, pwm: object) -> cython.int:
+        """The tone is that of PWM5, if it has pulses: pins that stand still are not heard."""
+        unit: Pwm = pwm
+        hertz: cython.longlong = 0
+        if unit.driven >> BUZZER_CHANNEL & 1 and 0 < unit.latched_MR5 < unit.latched_MR0:
+            hertz = (2 * unit.hz + unit.latched_MR0) // (2 * unit.latched_MR0)
+        self.words[TONE_HZ] = hertz
+        return 0
+
+    def _set_bit(self, word: cython.longlong, bit: cython.longlong, level: cython.longlong) -> cython.int:
+        self.words[word] = self.words[word] | bit if level else self.words[word] & ~bit
+        return 0
+
+    def _show_characters(self) -> cython.int:
+        """The display has taken a byte."""
         i: cython.longlong
-        display = self.lcd.display
-        if display.commands != self.seen_commands or display.characters != self.seen_characters:
-            self.seen_commands = display.commands
-            self.seen_characters = display.characters
-            for i in range(CHARACTERS_PER_LINE):
-                self.words[CHARACTERS + i] = display.memory[i] if display.on else 0
-                self.words[CHARACTERS + CHARACTERS_PER_LINE + i] = (
-                    display.memory[SECOND_LINE_AT + i] if display.on else 0
-                )
-        if self.leds.writes != self.seen_writes:
-            self.seen_writes = self.leds.writes
-            for i in range(LIGHT_COUNT):
-                self.words[LIGHTS + i] = self.leds.colour(i)
-        self.words[TONE_HZ] = self.buzzer.hertz
-        self.words[SYNC] = 1 if self.sync_light.lit else 0
-        self.words[KEYS] = self.keypad.buttons()
+        for i in range(CHARACTERS_PER_LINE):
+            self.words[CHARACTERS + i] = self.display.shown(0, i)
+            self.words[CHARACTERS + CHARACTERS_PER_LINE + i] = self.display.shown(1, i)
+        return 0
+
+    def _show_lights(self) -> cython.int:
+        """The drivers have taken what was sent."""
+        light: cython.longlong
+        for light in range(LIGHT_COUNT):
+            self.words[LIGHTS + light] = (
+                self._level(light, RED) | self._level(light, GREEN) << 8 | self._level(light, BLUE) << 16
+            )
+        return 0
+
+    def _level(self, light: cython.longlong, colour: cython.longlong) -> cython.longlong:
+        """Brightness of one colour of a light, 0 ... 255."""
+        return self.ssp.level(light // LIGHTS_PER_DRIVER, (3 * light + colour) % PORTS_USED)
 
     def move(self, words) -> None:
         """The words stand in `words` from now on, as they are: memory that processes share."""
         words[:] = memoryview(self.words)
         self.words = words
+
+    # --- for who looks from within the process ------------------------------------------------------------
+
+    def text(self) -> str:
+        """Both lines as a person reads them, joined by a line feed; what is no printable ASCII shows as a space."""
+        codes = [self.words[CHARACTERS + place] for place in range(2 * CHARACTERS_PER_LINE)]
+        shown = "".join(chr(code) if 0x20 <= code < 0x7F else " " for code in codes)
+        return f"{shown[:CHARACTERS_PER_LINE]}\n{shown[CHARACTERS_PER_LINE:]}"
+
+    def colour(self, light: cython.longlong) -> cython.longlong:
+        """What light 0-5 shows, as a command word: 8 bits each of red (lowest), green and blue."""
+        return self.words[LIGHTS + light]
+
+    @property
+    def hertz(self) -> int:
+        """The tone that is heard; 0: silence."""
+        return self.words[TONE_HZ]

@@ -2,11 +2,9 @@
 
 import cython
 
+from ranger_sim.boards.modules.front_panel import KEY_PINS
 from ranger_sim.datatable.generated import errors
 from ranger_sim.firmware_sim.peripherals.gpio import Gpio
-
-# pin number = 32 x port + bit: P1.18, P0.12, P0.13, P0.28, P1.16, P0.30
-KEY_PINS = (50, 12, 13, 28, 48, 30)
 
 
 class Keypad:

@@ -9,11 +9,11 @@ flashes in the first n + 1, so the run of flashes tells where in the cycle a vid
 import cython
 
 from ranger_sim.boards.modules.colour_leds import DARK, TRANSFERS_PER_LED, WHITE, ColourLeds
+from ranger_sim.boards.modules.front_panel import SYNC_PIN
 from ranger_sim.boards.modules.keypad import Keypad
 from ranger_sim.firmware_sim.peripherals.gpio import Gpio
 
 SYNC_KEY = 4
-SYNC_PIN = 16  # P0.16
 SYNC_LED = 1  # light 2
 TOGGLE_SLOTS = 100
 CELL_MS = 125

@@ -8,12 +8,12 @@ from ranger_sim.firmware_sim.lpc2194.block cimport Block, Clocks
 from ranger_sim.firmware_sim.lpc2194.can cimport AFMR_BYPASS, CanFilterBlock
 from ranger_sim.firmware_sim.lpc2194.converter cimport ConverterBlock
 from ranger_sim.firmware_sim.lpc2194.pins cimport PinSelectBlock
-from ranger_sim.firmware_sim.lpc2194.ssp cimport SspDevice
 from ranger_sim.firmware_sim.lpc2194.system cimport SystemBlock
 from ranger_sim.firmware_sim.lpc2194.timer cimport ProgrammedTimer
 from ranger_sim.firmware_sim.lpc2194.vic cimport VicBlock
 from ranger_sim.firmware_sim.microcontroller cimport INDICES_PER_KIND, MESSAGE_KINDS, Microcontroller
 from ranger_sim.firmware_sim.peripheral cimport Peripheral
+from ranger_sim.firmware_sim.peripherals.ssp cimport SspDevice
 from ranger_sim.foundation.events cimport CAN_RX, NEVER, PIN_EDGE, EventQueue
 
 cpdef enum:

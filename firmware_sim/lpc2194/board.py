@@ -34,7 +34,7 @@ from ranger_sim.firmware_sim.lpc2194.image import Image
 from ranger_sim.firmware_sim.lpc2194.pins import FastGpioBlock, OldGpioBlock, PinSelectBlock, Ports
 from ranger_sim.firmware_sim.lpc2194.pwm import PwmBlock
 from ranger_sim.firmware_sim.lpc2194.spi import SpiBlock
-from ranger_sim.firmware_sim.lpc2194.ssp import SegmentLink, SerialConverter, SspBlock, SspDevice
+from ranger_sim.firmware_sim.lpc2194.ssp import SegmentLink, SerialConverter, SspBlock
 from ranger_sim.firmware_sim.lpc2194.system import SystemBlock
 from ranger_sim.firmware_sim.lpc2194.timer import TimerBlock
 from ranger_sim.firmware_sim.lpc2194.uart import UartBlock
@@ -42,6 +42,7 @@ from ranger_sim.firmware_sim.lpc2194.vic import VicBlock
 from ranger_sim.firmware_sim.microcontroller import Microcontroller
 from ranger_sim.firmware_sim.peripheral import Peripheral
 from ranger_sim.firmware_sim.peripherals.adc_external import Ads7871
+from ranger_sim.firmware_sim.peripherals.ssp import SspDevice
 from ranger_sim.foundation.events import EventQueue
 
 if not cython.compiled:
@@ -130,6 +131,10 @@ class ImageBoard(Microcontroller):
             device = SerialConverter(self, converter)
         elif hardware.segment_interval_ns:
             device = SegmentLink(self, hardware.segment_interval_ns)
+        elif hardware.panel is not None:
+            panel = hardware.panel(self)
+            self.carry(panel)
+            device = panel.ssp
         else:
             device = SspDevice(self)
         self.system = SystemBlock(self, clocks, converter)
@@ -465,6 +470,8 @@ class ImageBoard(Microcontroller):
             self.pins[queue.a] = queue.b
             if queue.c >= 0:
                 self.pins[queue.c] = queue.d
+            if self.followers[queue.a] is not None:
+                cython.cast(Peripheral, self.followers[queue.a]).on_level(queue.a, queue.b)
             self.pin_select.on_pin(queue.a, queue.b, queue.time)
         elif 0 <= queue.kind < MESSAGE_KINDS and 0 <= queue.a < INDICES_PER_KIND:
             if queue.kind != CAN_RX or self.acceptance.mode & AFMR_BYPASS:

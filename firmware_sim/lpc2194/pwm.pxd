@@ -14,4 +14,5 @@ cdef class PwmBlock(Block):
     cdef public long long TCR, MCR, PCR
     cdef public bint begun
     cpdef object _look(self)
+    cpdef object _drive(self)
     cdef long long _match(self, long long number) noexcept

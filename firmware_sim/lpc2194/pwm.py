@@ -37,6 +37,7 @@ class PwmBlock(Block):
         Block.__init__(self, chip, clocks, "PWM", 0xE0014000)
         self.pwm = Pwm(chip, period=600, hz=60_000_000)  # until the program sets it up
         self.pwm.MR0 = 0
+        self.pwm.driven = 0
         self.TCR = 0
         self.MCR = 0
         self.PCR = 0
@@ -50,16 +51,22 @@ class PwmBlock(Block):
         """Periods begin now, or stop, as the registers are."""
         pwm: Pwm = self.pwm
         runs: cython.bint = self.TCR & 0xB == TCR_COUNTS | TCR_PWM and self.MCR & MCR_RESET_MR0 and pwm.MR0 > 0
-        if self.begun or not runs:
-            self.begun = runs
+        was: cython.bint = self.begun
+        self.begun = runs
+        self._drive()
+        if was or not runs:
             return
-        self.begun = True
         pwm.hz = self.clocks.pclk
         pwm.phase_ns = self.chip.now
         pwm.rate = 1_000_000_000 + self.chip.crystal.ppb
         pwm.period_start = self.chip.now
         pwm.latch(0x7F)
         pwm.LER = 0
+
+    def _drive(self) -> None:
+        """The pins of channels that PWMPCR enables show pulses while periods pass."""
+        self.pwm.driven = self.PCR >> 8 & 0x7E if self.begun else 0
+        self.pwm.tell()
 
     def _match(self, number: cython.longlong) -> cython.longlong:
         pwm: Pwm = self.pwm
@@ -141,6 +148,7 @@ class PwmBlock(Block):
             if value & 0x7E:
                 self.not_modelled("PWM with double edges (PWMPCR)")
             self.PCR = value
+            self._drive()
         elif offset == 0x0C:
             if value:
                 self.not_modelled("the PWM's prescaler (PWMPR)")

@@ -3,9 +3,8 @@ cimport cython
 from ranger_sim.firmware_sim.alarm cimport Alarm
 from ranger_sim.firmware_sim.lpc2194.block cimport Block
 from ranger_sim.firmware_sim.lpc2194.vic cimport SSP_INPUT
-from ranger_sim.firmware_sim.peripheral cimport Peripheral
 from ranger_sim.firmware_sim.peripherals.adc_external cimport START, Ads7871
-from ranger_sim.firmware_sim.peripherals.ssp cimport SspSegment
+from ranger_sim.firmware_sim.peripherals.ssp cimport SspDevice, SspSegment
 from ranger_sim.firmware_sim.vic cimport InterruptSource
 from ranger_sim.foundation.events cimport SSP_START
 
@@ -26,10 +25,6 @@ cpdef enum:
     CR1_LOOPBACK = 1
     CR1_ENABLE = 2
     CR1_SLAVE = 4
-
-cdef class SspDevice(Peripheral):
-    cpdef int begin(self, long long time) except -1
-    cpdef long long exchange(self, long long word, long long time) except? <long long>-1
 
 @cython.final
 cdef class SerialConverter(SspDevice):

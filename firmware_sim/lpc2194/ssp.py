@@ -9,9 +9,8 @@ transmit FIFO has some. What hangs there is an `SspDevice`: the external convert
 import cython
 
 from ranger_sim.firmware_sim.lpc2194.block import Block
-from ranger_sim.firmware_sim.peripheral import Peripheral
 from ranger_sim.firmware_sim.peripherals.adc_external import Ads7871
-from ranger_sim.firmware_sim.peripherals.ssp import SspSegment
+from ranger_sim.firmware_sim.peripherals.ssp import SspDevice, SspSegment
 from ranger_sim.firmware_sim.vic import InterruptSource
 from ranger_sim.foundation.events import NEVER, SSP_SEGMENT
 
@@ -41,18 +40,6 @@ if not cython.compiled:
     CR1_SLAVE = 4
 
 SEGMENT_WORDS = 31
-
-
-class SspDevice(Peripheral):
-    """What hangs on the SSP: nothing. It reads as zeros."""
-
-    def begin(self, time: cython.longlong) -> cython.int:
-        """The first bit of a word goes over the wires at `time` (ns)."""
-        return 0
-
-    def exchange(self, word: cython.longlong, time: cython.longlong) -> cython.longlong:
-        """The last bit of `word` is through at `time`; returns the word that came the other way."""
-        return 0
 
 
 class SerialConverter(SspDevice):
@@ -218,6 +205,7 @@ class SspBlock(Block):
         for i in range(self.going_count):
             self.going[i] = self.going[i + 1]
         self.busy = True
+        cython.cast(SspDevice, self.device).bits = (self.CR0 & 15) + 1
         cython.cast(SspDevice, self.device).begin(time)
         self.word_alarm.set(time + self.word_ns)
         return 0

@@ -1,6 +1,8 @@
 """What is in the chip of a board and hangs on it: given by who builds the board, not by its program."""
 
 import dataclasses
+from collections.abc import Callable
+from typing import Any
 
 from ranger_sim.firmware_sim.peripherals import adc_external
 
@@ -39,9 +41,14 @@ class SpiDevice:
 
 @dataclasses.dataclass(frozen=True)
 class Hardware:
-    """Core clock (Hz), converters (None: there is none), and what hangs on each SPI."""
+    """Core clock (Hz), converters (None: there is none), and what hangs on each SPI.
+
+    panel: makes, of the chip, what a person sees of the board, as boards/modules/front_panel.py: it has `words`, `move`
+    and, as `ssp`, what hangs on the SSP. None: there is nothing to be seen, and no SspDevice.
+    """
 
     hz: int = 60_000_000
     external: ExternalConverter | None = dataclasses.field(default_factory=ExternalConverter)
     internal: InternalConverter = dataclasses.field(default_factory=InternalConverter)
     spi: dict[int, SpiDevice] = dataclasses.field(default_factory=lambda: {0: SpiDevice()})
+    panel: Callable[[Any], Any] | None = None

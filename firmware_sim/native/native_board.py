@@ -20,7 +20,14 @@ from ranger_sim.firmware_sim.peripherals.can_controller import CanController
 from ranger_sim.firmware_sim.peripherals.gpio import Gpio
 from ranger_sim.firmware_sim.peripherals.pwm import Pwm
 from ranger_sim.firmware_sim.peripherals.spi_encoder import SpiEncoder
-from ranger_sim.firmware_sim.peripherals.ssp import SEGMENT_WORDS, SspPort, SspSegment
+from ranger_sim.firmware_sim.peripherals.ssp import (
+    LONGEST_WORD,
+    SEGMENT_WORDS,
+    SspDevice,
+    SspMaster,
+    SspPort,
+    SspSegment,
+)
 from ranger_sim.firmware_sim.peripherals.timer_capture import TimerCapture
 from ranger_sim.firmware_sim.peripherals.uart import Uart
 from ranger_sim.firmware_sim.scheduler import Occasional, Schedule, Task, Wait
@@ -88,6 +95,7 @@ class Calls:
         self.adcxs = Started("external converter")
         self.spis = Started("SPI")
         self.ssps = Started("SSP")
+        self.masters = Started("SSP as a master of words")
         self.uarts = Started("UART")
         self.cans = Started("CAN controller")
 
@@ -251,6 +259,8 @@ class Calls:
         it = self.hardware.external
         if it is None:
             raise UserError("no external converter hangs on this board")
+        if 0 in self.masters:
+            raise UserError("the SSP is a master of words already, so the external converter cannot have it")
         adc = Ads7871(self.chip, it.eint, it.reference_V, it.conversion_ns, it.scale, it.offset_counts)
         adc.inputs = [it.inputs.get(code, code) for code in range(16)]
         self.adcxs[0] = adc
@@ -304,6 +314,20 @@ class Calls:
             return 0
         self.mail[0:SEGMENT_WORDS] = segment.words
         return 1
+
+    def ssp_start_words(self, bits: int, divider: int) -> None:
+        self.new(self.masters, 0)
+        if 0 in self.adcxs:
+            raise UserError("the external converter has the SSP")
+        if not 4 <= bits <= LONGEST_WORD:
+            raise UserError(f"SSP: words of {bits} bits: 4 to {LONGEST_WORD} are possible")
+        if divider % 2 or not 2 <= divider <= 512:
+            raise UserError(f"SSP: divider {divider}: even, 2 to 512 is possible")
+        device = self.chip.panel.ssp if self.chip.panel is not None else SspDevice(self.chip)
+        self.masters[0] = SspMaster(self.chip, device, bits)
+
+    def ssp_word(self, word: int) -> int:
+        return self.masters[0].word(word)
 
     def uart_start(self, number: int, divisor: int, divaddval: int, mulval: int, trigger: int) -> None:
         self.new(self.uarts, number)
@@ -400,6 +424,8 @@ class NativeBoard(Microcontroller):
         self.failure: UserError | None = None
         self.phase_ns = phase_ns
         self.now = phase_ns
+        if hardware.panel is not None:
+            self.carry(hardware.panel(self))
         self.devices = Calls(self, self.library, hardware, phase_ns)
         levels = array.array("q", bytes(8 * len(self.pins)))  # where the program reads them without a call
         self.pins = levels

@@ -2,7 +2,8 @@
 # (pins are those of the boards' tables, 0 ... 63)
 """General-purpose pins: P0.0 ... P0.31 are pins 0 ... 31, P1.0 ... P1.31 are pins 32 ... 63.
 
-Inputs follow PIN_EDGE messages (the chip keeps their levels); a change of an output sends PIN_OUTPUT.
+Inputs follow PIN_EDGE messages (the chip keeps their levels); a change of an output sends PIN_OUTPUT. What else is on
+the board and hangs on a pin sees both (`Chip.followers`).
 A pin's level at a stamp is that of its last message: a partner pin without messages of its own is as old as
 the last edge that reported it.
 """
@@ -39,16 +40,19 @@ class Gpio(Peripheral):
     def write(self, pin: cython.longlong, level: cython.longlong) -> None:
         """Drive an output; a change is told outside as PIN_OUTPUT at `now`."""
         if self.chip.pins[pin] != level or self.outputs[pin] == 0:
-            self.outputs[pin] = 1
-            self.chip.pins[pin] = level
-            self.chip.outbox.push(self.chip.now, 0, PIN_OUTPUT, pin, level)
+            self._drive(pin, level)
 
     def toggle(self, pin: cython.longlong) -> None:
         """Invert an output."""
-        level: cython.longlong = 1 - self.chip.pins[pin]
+        self._drive(pin, 1 - self.chip.pins[pin])
+
+    def _drive(self, pin: cython.longlong, level: cython.longlong) -> cython.int:
         self.outputs[pin] = 1
         self.chip.pins[pin] = level
         self.chip.outbox.push(self.chip.now, 0, PIN_OUTPUT, pin, level)
+        if self.chip.followers[pin] is not None:
+            cython.cast(Peripheral, self.chip.followers[pin]).on_level(pin, level)
+        return 0
 
     def IOSET(self, port: cython.longlong, mask: cython.longlong) -> None:
         """Set the pins of `mask` (bit 0 = Px.0) of port 0 or 1."""

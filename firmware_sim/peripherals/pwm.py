@@ -30,7 +30,8 @@ LONGEST_PERIOD_S = 2  # so that products of times and rates stay within 64 bits
 class Pwm(Peripheral):
     """Seven match registers; `latched_MRn` are the values that drive the pins. `period`: MR0 in counts.
 
-    `period_start`: instant (ns) of the period that has what was latched last.
+    `period_start`: instant (ns) of the period that has what was latched last. `driven`: the channels whose pins it
+    drives, bit n for channel n.
     """
 
     def __init__(self, chip, period=600, hz=0, phase_ns=0) -> None:
@@ -44,6 +45,7 @@ class Pwm(Peripheral):
         self.MR5 = 0
         self.MR6 = 0
         self.LER = 0
+        self.driven = 0x7E
         self.latched_MR0 = period
         self.latched_MR1 = 0
         self.latched_MR2 = 0
@@ -97,6 +99,15 @@ class Pwm(Peripheral):
             )
         if mask & LER_MR0:
             self._count_periods()
+        self.tell()
+
+    def tell(self) -> None:
+        """Whoever follows the unit's pins on the board (`Chip.pwm_follower`) sees what was latched.
+
+        ROBOT PARITY: at once, where the pins have it from the next period on; and not what `write` does to a bridge.
+        """
+        if self.chip.pwm_follower is not None:
+            cython.cast(Peripheral, self.chip.pwm_follower).on_pwm(self)
 
     def _count_periods(self) -> None:
         """Count periods of MR0 from `phase_ns` on."""

@@ -4,6 +4,17 @@ from ranger_sim.foundation.events cimport SSP_LOAD, SSP_START, EventQueue
 
 cimport cython
 
+cdef class SspDevice(Peripheral):
+    cdef public long long bits
+    cpdef int begin(self, long long time) except -1
+    cpdef long long exchange(self, long long word, long long time) except? <long long>-1
+
+@cython.final
+cdef class SspMaster(Peripheral):
+    cdef public SspDevice device
+    cdef public long long bits
+    cpdef long long word(self, long long word) except? <long long>-1
+
 @cython.final
 cdef class SspSegment:
     cdef public long long used

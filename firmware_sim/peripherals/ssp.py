@@ -1,4 +1,7 @@
-"""The synchronous serial port as a link of whole segments between two chips.
+"""The synchronous serial port: words to what hangs on its wires, or a link of whole segments between two chips.
+
+As a master of words (`SspMaster`) it exchanges each with an `SspDevice` at once: the time that it takes is a cost of
+the program's.
 
 A segment is 31 half-words; at 16 bits and 3 Mbit/s it lasts 165.3 us. The master starts an exchange
 (SSP_START at `now`), the slave has loaded what it will send (SSP_LOAD), which goes out in every exchange until
@@ -19,6 +22,7 @@ if not cython.compiled:
     from ranger_sim.foundation.events import SSP_LOAD, SSP_START
 
 SEGMENT_WORDS = 31
+LONGEST_WORD = 16  # bits
 BIT_RATE = 3_000_000  # 60 MHz / 20
 WORD_BITS = 16
 
@@ -26,6 +30,38 @@ WORD_BITS = 16
 def segment_time_ns(words: cython.longlong, word_bits: cython.longlong, bit_rate: cython.longlong) -> cython.longlong:
     """Duration of `words` words of `word_bits` bits (ns, rounded down): 31, 16, 3 Mbit/s give 165,333."""
     return words * word_bits * 1000000000 // bit_rate
+
+
+class SspDevice(Peripheral):
+    """What hangs on the SSP: nothing. It reads as zeros. `bits`: of a word, as the master sends it."""
+
+    def __init__(self, chip) -> None:
+        Peripheral.__init__(self, chip)
+        self.bits = LONGEST_WORD
+
+    def begin(self, time: cython.longlong) -> cython.int:
+        """The first bit of a word goes over the wires at `time` (ns)."""
+        return 0
+
+    def exchange(self, word: cython.longlong, time: cython.longlong) -> cython.longlong:
+        """The last bit of `word` is through at `time`; returns the word that came the other way."""
+        return 0
+
+
+class SspMaster(Peripheral):
+    """The port as a master of words of `bits` bits to `device`."""
+
+    def __init__(self, chip, device, bits=LONGEST_WORD) -> None:
+        Peripheral.__init__(self, chip)
+        self.device = device
+        self.bits = bits
+
+    def word(self, word: cython.longlong) -> cython.longlong:
+        """Send a word; returns the one that came the other way."""
+        device: SspDevice = self.device
+        device.bits = self.bits
+        device.begin(self.chip.now)
+        return device.exchange(word & ((1 << self.bits) - 1), self.chip.now)
 
 
 class SspSegment:

@@ -5,6 +5,7 @@ import pathlib
 from collections.abc import Mapping
 
 from ranger_sim.boards import ankle_board, can_router, hip, motor_board, steering
+from ranger_sim.boards.modules.front_panel import FrontPanel
 from ranger_sim.firmware_sim.lpc2194.hardware import BoardHardware
 from ranger_sim.firmware_sim.lpc2194.image import Image, read
 from ranger_sim.firmware_sim.native.hardware import ExternalConverter, InternalConverter, SpiDevice
@@ -48,7 +49,7 @@ def hardware_of(board: str) -> BoardHardware:
             segment_interval_ns=LEAST_INTERVAL_NS,
             slot_timer=0,
         )
-    return BoardHardware(external=None, spi={})
+    return BoardHardware(external=None, spi={}, panel=FrontPanel)
 
 
 def known(board: str) -> str:

@@ -7,8 +7,9 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from ranger_sim.boards import ankle_board, hip, motor_board, steering
+from ranger_sim.boards.modules.front_panel import FrontPanel
 from ranger_sim.datatable import generated
-from ranger_sim.datatable.generated import mcfi, mcfo, mch, mcsi
+from ranger_sim.datatable.generated import mcfi, mcfo, mch, mcsi, ui
 from ranger_sim.firmware_sim.native import build as compiling
 from ranger_sim.firmware_sim.native import image_build
 from ranger_sim.firmware_sim.native.hardware import ExternalConverter, Hardware, InternalConverter
@@ -21,11 +22,11 @@ BATTERY_VOLTAGE_CHANNEL = 1  # AIN1, P0.28
 
 
 class Place(NamedTuple):
-    """A board that firmware in C can take, one with a motor: its generated table, and its external converter."""
+    """A board that firmware in C can take: its generated table and, of one with a motor, its external converter."""
 
     table: Any
-    sequence: tuple[tuple[str, int, int], ...]  # (analog input, multiplexer code, gain code)
-    conversion_ns: int
+    sequence: tuple[tuple[str, int, int], ...] = ()  # (analog input, multiplexer code, gain code)
+    conversion_ns: int = 0
 
 
 PLACES = {
@@ -33,12 +34,15 @@ PLACES = {
     "MCFO": Place(mcfo, ankle_board.SEQUENCE, motor_board.CONVERSION_NS),
     "MCFI": Place(mcfi, ankle_board.SEQUENCE, motor_board.CONVERSION_NS),
     "MCSI": Place(mcsi, steering.SEQUENCE, motor_board.CONVERSION_NS),
+    "UI": Place(ui),
 }
 
 
 def hardware_of(board: str) -> Hardware:
     """What hangs on the chip of a board of the robot, as on the emulated one."""
     place = PLACES[board]
+    if not place.sequence:
+        return Hardware(hz=place.table.CLOCK_HZ, external=None, spi={}, panel=FrontPanel)
     return Hardware(
         hz=place.table.CLOCK_HZ,
         external=ExternalConverter(

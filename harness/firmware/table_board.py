@@ -1,5 +1,6 @@
 """A board with firmware in C and variables of a master table. Apart from native_firmware.py: it loads cffi."""
 
+import dataclasses
 from typing import Any
 
 from ranger_sim.firmware_sim.native.hardware import Hardware
@@ -27,9 +28,11 @@ class TableBoard(NativeBoard):
         record: Any = None,
     ) -> None:
         given = firmware.manifest.hardware
-        NativeBoard.__init__(
-            self, name, firmware.library, crystal, power_up_ns, given if given is not None else hardware, record
-        )
+        if given is None:
+            given = hardware
+        elif hardware is not None:  # a manifest cannot say what a person sees of the board
+            given = dataclasses.replace(given, panel=hardware.panel)
+        NativeBoard.__init__(self, name, firmware.library, crystal, power_up_ns, given, record)
         wanted = table_version(firmware.table) if version is None else version
         compiled = self.library.table_version()
         if compiled is not None and compiled != wanted:

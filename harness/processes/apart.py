@@ -20,7 +20,7 @@ from ranger_sim.firmware_sim.native import crash
 from ranger_sim.foundation import descriptors
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.processes import board_process, kernel, places
-from ranger_sim.harness.processes.block import Block, new_stage
+from ranger_sim.harness.processes.block import Block, new_stage, words_shown
 from ranger_sim.harness.processes.remote_board import RemoteBoard
 from ranger_sim.harness.processes.settings import Settings
 from ranger_sim.harness.processes.stage import Stage
@@ -51,8 +51,7 @@ class Apart:
         self.settings = Settings(speed=None, real_time=False, processor=self.used)
         words, doubles = stage = new_stage()
         place = {name: number for number, name in enumerate(wiring.BOARDS)}
-        table_words = len(robot.boards["MB"].store.words)
-        self.blocks = {name: Block(name, place[name], table_words if name == "MB" else 0) for name in names}
+        self.blocks = {name: Block(name, place[name], words_shown(robot.boards[name])) for name in names}
         self.ended = False
         self.deaths: list[dict[str, Any]] = []
         self.children = {name: fork(self._board(name, stage)) for name in names}

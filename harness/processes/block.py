@@ -92,6 +92,11 @@ class Block:
         self.words[FAULT_TEXT] = len(data)
 
 
+def words_shown(board: Any) -> int:
+    """How many words of its memory a board shows."""
+    return 0 if board.memory is None else len(board.memory)
+
+
 def new_stage() -> Any:
     """The stage as (words, doubles), two views of one anonymous shared memory."""
     memory = mmap.mmap(-1, 8 * (STAGE_FIRST + STAGE_RING * ROW_SIZE))

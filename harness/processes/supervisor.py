@@ -23,7 +23,7 @@ from ranger_sim.foundation import descriptors, wallclock
 from ranger_sim.foundation.peers import REASONS
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.processes import board_process, kernel, places, plant_process
-from ranger_sim.harness.processes.block import Block, new_stage
+from ranger_sim.harness.processes.block import Block, new_stage, words_shown
 from ranger_sim.harness.processes.control import ControlServer
 from ranger_sim.harness.processes.lateness import figures
 from ranger_sim.harness.processes.requests import Request
@@ -555,11 +555,6 @@ class Supervisor:
             if child.state != GONE:
                 with contextlib.suppress(ChildProcessError):
                     os.waitpid(child.process, 0)
-
-
-def words_shown(board: Any) -> int:
-    """How many words of its memory a board shows."""
-    return 0 if board.memory is None else len(board.memory)
 
 
 def check_platform() -> None:

@@ -3,7 +3,6 @@
 from ranger_sim.boards.firmware_board import SatelliteBoard
 from ranger_sim.boards.modules.buzzer import Buzzer
 from ranger_sim.boards.modules.colour_leds import ColourLeds
-from ranger_sim.boards.modules.front_panel import FrontPanel
 from ranger_sim.boards.modules.imu_parser import ImuParser
 from ranger_sim.boards.modules.keypad import Keypad
 from ranger_sim.boards.modules.lcd import Lcd
@@ -38,7 +37,6 @@ class UserInterfaceBoard(SatelliteBoard):
     lcd: Lcd
     sync_light: SyncLight
     buzzer: Buzzer
-    panel: FrontPanel
     slots: int
     imu_start_slots: int
     timer0: TimerCapture
@@ -52,7 +50,6 @@ class UserInterfaceBoard(SatelliteBoard):
     def on_uart(self, queue: Any) -> Any: ...
     def on_rc_edge(self, queue: Any) -> None: ...
     def lcd_tick(self) -> None: ...
-    def move_memory(self, words: Any) -> None: ...
     def update_imu(self) -> Any: ...
     def update_errors(self) -> Any: ...
     def watch_sync_key(self) -> None: ...

@@ -35,4 +35,9 @@ class Chip(Board):
     crystal: Crystal
     unclaimed: int
     peripherals: list[Any]
+    followers: list[Any]
+    pwm_follower: Any
+    panel: Any
     def __init__(self, name: Any, hz: int, crystal: Any = None) -> None: ...
+    def carry(self, panel: Any) -> None: ...
+    def move_memory(self, words: Any) -> None: ...

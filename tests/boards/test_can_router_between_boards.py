@@ -85,10 +85,10 @@ def test_what_the_user_interface_publishes_is_in_the_data_table(robot):
 
 
 def test_the_main_brain_colours_the_lights(robot):
-    assert [robot.ui.leds.colour(i) for i in range(6)] == [
+    assert [robot.ui.panel.colour(i) for i in range(6)] == [
         robot.brain.store.get_int(number) for number in range(table.UI_SET_LED_1, table.UI_SET_LED_6 + 1)
     ]
-    assert robot.ui.leds.colour(0) != 0  # stand-by has its colour
+    assert robot.ui.panel.colour(0) != 0  # stand-by has its colour
 
 
 def test_a_key_reaches_the_data_table_within_sixty_milliseconds(robot):

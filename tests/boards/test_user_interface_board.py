@@ -8,7 +8,7 @@ import sys
 import pytest
 
 from ranger_sim.boards.modules.buzzer import TUNE
-from ranger_sim.boards.modules.keypad import KEY_PINS
+from ranger_sim.boards.modules.front_panel import KEY_PINS
 from ranger_sim.boards.quirks import Quirks
 from ranger_sim.boards.user_interface import IMU_UART, PINS, UserInterfaceBoard
 from ranger_sim.datatable.generated import errors
@@ -232,7 +232,7 @@ def test_words_from_the_main_brain_appear_on_the_display():
     for quarter, text in enumerate(("stan", "dby ", "25.1", " V  ")):
         command(wires, 130 + quarter, letters(text))
     wires.run(900 * MS)
-    assert wires.board.lcd.text() == "standby \n25.1 V  "
+    assert wires.board.panel.text() == "standby \n25.1 V  "
 
 
 def test_six_light_commands_per_slot_colour_six_lights():
@@ -241,16 +241,16 @@ def test_six_light_commands_per_slot_colour_six_lights():
     for led, colour in enumerate(colours):
         wires.frame(1000 + led * 37_000, 2, 134 + led, colour, 0)
     wires.run(3 * MS)
-    assert [wires.board.leds.colour(led) for led in range(6)] == colours
+    assert [wires.board.panel.colour(led) for led in range(6)] == colours
 
 
 def test_a_song_command_plays_the_tune_once():
     wires = build().run(5 * MS)
     command(wires, table.UI_EMPTY_TX2, 1)
     wires.run(100 * MS)
-    assert wires.board.buzzer.hertz == TUNE[0][0]
+    assert wires.board.panel.hertz == TUNE[0][0]
     wires.run(3000 * MS)
-    assert wires.board.buzzer.hertz == 0
+    assert wires.board.panel.hertz == 0
     assert wires.board.buzzer.tunes_started == 1
 
 
@@ -259,7 +259,7 @@ def test_an_error_of_another_board_beeps_and_with_the_quirk_it_does_not():
     for beeps in (True, False):
         wires = build(buzzer_beeps=beeps).run(5 * MS)
         command(wires, table.ERROR_LCD, errors.AE_SPIKE | 3 << 16 | 1 << 22)
-        heard[beeps] = wires.board.buzzer.hertz
+        heard[beeps] = wires.board.panel.hertz
     assert heard == {True: 1319, False: 0}
 
 
@@ -269,7 +269,7 @@ def test_its_own_errors_beep_too_and_go_out_with_board_and_time():
     wires.run(5 * MS)
     wires.board.lcd.put(16, 65)
     wires.run(10 * MS)
-    assert wires.board.buzzer.hertz > 0
+    assert wires.board.panel.hertz > 0
     wires.run(100 * MS)
     word = errors.LCD_POS_OOB | table.BOARD_NUMBER << 16 | 1 << 22
     assert [(w0, w1) for _, w0, w1 in wires.of(table.ERROR_VARIABLE)] == [(word, 77)]
@@ -282,7 +282,7 @@ def test_key_four_held_for_a_hundred_slots_starts_the_sync_light():
     assert not wires.board.sync_light.running
     wires.run(113 * MS)
     assert wires.board.sync_light.lit
-    assert wires.board.leds.colour(1) == 0xFFFFFF
+    assert wires.board.panel.colour(1) == 0xFFFFFF
     assert wires.board.pins[PINS["sync_light"]] == 0
     wires.pin(113 * MS + 10, KEY_PINS[4], 0)
     wires.run(170 * MS)

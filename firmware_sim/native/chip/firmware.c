@@ -1,7 +1,7 @@
 /* The header for the chip: every call reads and writes the registers that it is named after.
  *
  * What a program needs of pins is chosen by us where the chip offers several: those of the robot's boards. What is not
- * here: the SSP as a link of segments (fw_ssp_*); the external converter hangs on it. */
+ * here: the SSP as a link of segments (fw_ssp_start, fw_ssp_exchange, fw_ssp_load, fw_ssp_take). */
 #include "chip.h"
 #include "registers.h"
 
@@ -531,6 +531,25 @@ int32_t fw_adcx_result(void)
     high = SSPDR & 0xFFu;
     low = SSPDR & 0xFFu;
     return (int32_t)(int16_t)(high << 8 | low) >> 2;
+}
+
+/* --- the SSP as a master of words --- */
+
+void fw_ssp_start_words(uint32_t bits, uint32_t divider)
+{
+    uint32_t pin;
+    for (pin = 17; pin <= 19; pin++) /* SCK1, MISO1, MOSI1 */
+        select_function(pin, 2);
+    SSPCR1 = 0;
+    SSPCPSR = 2;
+    SSPCR0 = (divider / 2u - 1u) << 8 | (bits - 1u); /* CPOL 0, CPHA 0 */
+    SSPCR1 = 2;
+}
+
+uint32_t fw_ssp_word(uint32_t word)
+{
+    SSPDR = word;
+    return ssp_wait();
 }
 
 /* --- SPI 0 with an absolute encoder --- */

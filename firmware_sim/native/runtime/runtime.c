@@ -34,7 +34,8 @@
     CALL(uart_start) CALL(uart_RBR) CALL(uart_THR) CALL(uart_LSR) CALL(uart_IIR) \
     CALL(can_start) CALL(can_transmit) CALL(can_buffer_free) CALL(can_abort) CALL(can_read) CALL(can_release) \
     CALL(can_clear_overrun) CALL(can_GSR) CALL(can_SR) CALL(can_ICR) CALL(can_MOD) CALL(can_write_MOD) \
-    CALL(can_write_IER)
+    CALL(can_write_IER) \
+    CALL(ssp_start_words) CALL(ssp_word)
 
 /* One of the two a program leaves out. */
 void firmware_main(void) __attribute__((weak));
@@ -227,6 +228,9 @@ uint32_t fw_ssp_take(uint32_t number, uint16_t words[FW_SEGMENT_WORDS])
             words[i] = (uint16_t)fw_mail[i];
     return came;
 }
+
+void fw_ssp_start_words(uint32_t bits, uint32_t divider) { HOST2(ssp_start_words, bits, divider); }
+uint32_t fw_ssp_word(uint32_t word) { return (uint32_t)HOST1(ssp_word, word); }
 
 void fw_uart_start(uint32_t number, uint32_t divisor, uint32_t divaddval, uint32_t mulval, uint32_t trigger)
 {

@@ -2,6 +2,7 @@
 
 from collections.abc import MutableSequence
 from ranger_sim.boards.modules.receiver import Receiver
+from ranger_sim.firmware_sim.peripherals.pwm import Pwm
 
 TUNE: tuple[tuple[int, ...], ...]
 BEEP_MS: int
@@ -9,10 +10,12 @@ PAUSE_MS: int
 MOST_WAITING: int
 PITCHES_HZ: tuple[int, ...]
 PWM_CLOCK_HZ: int
+PERIOD_AT_START: int
 LOWEST_HZ: int
 HIGHEST_HZ: int
 
 class Buzzer:
+    pwm: Pwm
     beeps: bool
     repeats: bool
     playing: bool
@@ -20,8 +23,6 @@ class Buzzer:
     beep_left_ms: int
     beeps_waiting: int
     hertz: int
-    mr0: int
-    mr5: int
     frequency_hertz: int
     note: int
     note_left_ms: int
@@ -33,8 +34,8 @@ class Buzzer:
     beep_queue: MutableSequence[int]
     tunes_started: int
     beeps_made: int
-    def __init__(self, beeps: bool = True, repeats: bool = False) -> None: ...
-    def tone(self, hertz: int) -> None: ...
+    def __init__(self, pwm: Pwm, beeps: bool = True, repeats: bool = False) -> None: ...
+    def tone(self, hertz: int) -> int: ...
     def start_tune(self) -> None: ...
     def error_sound(self, code: int) -> None: ...
     def update(self) -> int: ...

@@ -1,11 +1,9 @@
 # Generated from boards/modules/front_panel.py and boards/modules/front_panel.pxd (python -m ranger_sim.tools.stubs); do not edit.
 
 from collections.abc import MutableSequence
-from ranger_sim.boards.modules.buzzer import Buzzer
-from ranger_sim.boards.modules.colour_leds import ColourLeds
-from ranger_sim.boards.modules.keypad import Keypad
-from ranger_sim.boards.modules.lcd import Lcd
-from ranger_sim.boards.modules.sync_light import SyncLight
+from ranger_sim.firmware_sim.peripheral import Peripheral
+from ranger_sim.firmware_sim.peripherals.character_display import CharacterDisplay
+from ranger_sim.firmware_sim.peripherals.led_drivers import LedDrivers
 from typing import Any
 from typing import final
 
@@ -14,22 +12,42 @@ LIGHTS: int
 TONE_HZ: int
 SYNC: int
 KEYS: int
+LEDS: int
 WORDS: int
 CHARACTERS_PER_LINE: int
-SECOND_LINE_AT: int
 LIGHT_COUNT: int
+LIGHTS_PER_DRIVER: int
+PORTS_USED: int
+DISPLAY_DATA: Any
+DISPLAY_RS: Any
+DISPLAY_RW: Any
+DISPLAY_ENABLE: Any
+LIGHTS_SELECT: Any
+DRIVERS: int
+BLUE: int
+GREEN: int
+RED: int
+KEY_PINS: tuple[Any, ...]
+SYNC_PIN: Any
+LED_PINS: Any
+BUZZER_CHANNEL: int
 
 @final
-class FrontPanel:
-    lcd: Lcd
-    leds: ColourLeds
-    buzzer: Buzzer
-    sync_light: SyncLight
-    keypad: Keypad
+class FrontPanel(Peripheral):
+    display: CharacterDisplay
+    ssp: LedDrivers
     words: MutableSequence[int]
-    seen_commands: int
-    seen_characters: int
-    seen_writes: int
-    def __init__(self, lcd: Lcd, leds: ColourLeds, buzzer: Buzzer, sync_light: SyncLight, keypad: Keypad) -> None: ...
-    def show(self) -> None: ...
+    bit_of: MutableSequence[int]
+    enable_pin: int
+    select_pin: int
+    sync_pin: int
+    first_led: int
+    last_led: int
+    def __init__(self, chip: Any) -> None: ...
+    def on_level(self, pin: int, level: int) -> int: ...
+    def on_pwm(self, pwm: Any) -> int: ...
     def move(self, words: Any) -> None: ...
+    def text(self) -> str: ...
+    def colour(self, light: int) -> int: ...
+    @property
+    def hertz(self) -> int: ...

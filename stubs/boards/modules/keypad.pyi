@@ -4,8 +4,6 @@ from collections.abc import MutableSequence
 from ranger_sim.firmware_sim.peripherals.gpio import Gpio
 from typing import Any
 
-KEY_PINS: tuple[int, ...]
-
 class Keypad:
     gpio: Gpio
     pins: MutableSequence[int]

@@ -2,6 +2,7 @@
 
 from collections.abc import MutableSequence
 from ranger_sim.boards.modules.receiver import Receiver
+from ranger_sim.firmware_sim.peripherals.gpio import Gpio
 from typing import Any
 
 START_COMMANDS: tuple[int, ...]
@@ -15,28 +16,8 @@ PLACES_PER_QUARTER: int
 IDLE: int
 CURSOR_SET: int
 CHARACTER_WRITTEN: int
-SPACE: int
 SET_ADDRESS: int
-ENTRY_MODE: int
-DISPLAY_ON: int
-FUNCTION_SET: int
-HOME: int
-CLEAR: int
 SECOND_LINE: int
-
-class CharacterDisplay:
-    memory: MutableSequence[int]
-    address: int
-    commands: int
-    characters: int
-    on: bool
-    two_lines: bool
-    wide_bus: bool
-    increment: int
-    def __init__(self) -> None: ...
-    def command(self, byte: int) -> None: ...
-    def data(self, byte: int) -> None: ...
-    def lines(self) -> Any: ...
 
 class Lcd:
     countdown: int
@@ -44,7 +25,11 @@ class Lcd:
     waiting: int
     position: int
     character: int
-    display: CharacterDisplay
+    gpio: Gpio
+    data_pins: MutableSequence[int]
+    rs_pin: int
+    rw_pin: int
+    enable_pin: int
     report: Any
     positions: MutableSequence[int]
     characters: MutableSequence[int]
@@ -54,8 +39,7 @@ class Lcd:
     code_position: int
     written: int
     lost: int
-    def __init__(self, report: Any) -> None: ...
-    def text(self) -> str: ...
+    def __init__(self, gpio: Gpio, report: Any) -> None: ...
     def put(self, position: int, character: int) -> bool: ...
     def set_quarter(self, quarter: int, word: int) -> int: ...
     def tick(self) -> int: ...

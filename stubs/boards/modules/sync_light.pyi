@@ -5,7 +5,6 @@ from ranger_sim.boards.modules.keypad import Keypad
 from ranger_sim.firmware_sim.peripherals.gpio import Gpio
 
 SYNC_KEY: int
-SYNC_PIN: int
 SYNC_LED: int
 TOGGLE_SLOTS: int
 CELL_MS: int

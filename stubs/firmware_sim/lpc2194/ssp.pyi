@@ -3,8 +3,8 @@
 from collections.abc import MutableSequence
 from ranger_sim.firmware_sim.alarm import Alarm
 from ranger_sim.firmware_sim.lpc2194.block import Block
-from ranger_sim.firmware_sim.peripheral import Peripheral
 from ranger_sim.firmware_sim.peripherals.adc_external import Ads7871
+from ranger_sim.firmware_sim.peripherals.ssp import SspDevice
 from ranger_sim.firmware_sim.peripherals.ssp import SspSegment
 from ranger_sim.firmware_sim.vic import InterruptSource
 from typing import Any
@@ -27,10 +27,6 @@ CR1_LOOPBACK: int
 CR1_ENABLE: int
 CR1_SLAVE: int
 SEGMENT_WORDS: int
-
-class SspDevice(Peripheral):
-    def begin(self, time: int) -> int: ...
-    def exchange(self, word: int, time: int) -> int: ...
 
 @final
 class SerialConverter(SspDevice):

@@ -7,10 +7,24 @@ from typing import Any
 from typing import final
 
 SEGMENT_WORDS: int
+LONGEST_WORD: int
 BIT_RATE: int
 WORD_BITS: int
 
 def segment_time_ns(words: int, word_bits: int, bit_rate: int) -> int: ...
+
+class SspDevice(Peripheral):
+    bits: int
+    def __init__(self, chip: Any) -> None: ...
+    def begin(self, time: int) -> int: ...
+    def exchange(self, word: int, time: int) -> int: ...
+
+@final
+class SspMaster(Peripheral):
+    device: SspDevice
+    bits: int
+    def __init__(self, chip: Any, device: SspDevice, bits: int = ...) -> None: ...
+    def word(self, word: int) -> int: ...
 
 @final
 class SspSegment:

@@ -106,8 +106,8 @@ def test_the_panel_shows_what_the_user_interface_board_drives(shown):
     robot.run_for(0.001)  # all boards are at one instant
     panel = feed.state(robot.loop.time)["panel"]
     text = "".join(map(chr, panel[:16]))
-    assert (text[:8], text[8:]) == tuple(board.lcd.display.lines())
-    assert panel[16:22] == [board.leds.colour(light) for light in range(6)]
+    assert f"{text[:8]}\n{text[8:]}" == board.panel.text()
+    assert panel[16:22] == [board.panel.colour(light) for light in range(6)]
     assert panel[22] == board.buzzer.hertz and panel[23] == board.sync_light.lit
 
 

@@ -3,6 +3,7 @@
 import pytest
 
 from ranger_sim.boards.hip import HipBoard
+from ranger_sim.boards.modules.front_panel import DISPLAY_ENABLE
 from ranger_sim.can_bus.frame import frame_bits
 from ranger_sim.foundation.numbers import word_of_float
 from ranger_sim.foundation.user_error import UserError
@@ -72,8 +73,10 @@ def test_a_key_is_in_the_frame_that_tells_of_keys():
 
 
 def test_what_a_board_puts_out_while_it_starts_is_seen():
-    """The user interface board sets the pin of its sync light before any time has passed; motor boards set none."""
-    assert list(BoardAlone("UI").pin_log.values()) == [[(0.0, 1)]]
+    """The user interface board puts out its sync light and starts its display before any time has passed."""
+    board = BoardAlone("UI")
+    assert board.pin("sync_light").log == [(0.0, 1)]
+    assert board.pin_log[DISPLAY_ENABLE] == [(0.0, 1), (0.0, 0)] * 5  # its five start commands
     assert BoardAlone("MCH").pin_log == {}
 
 

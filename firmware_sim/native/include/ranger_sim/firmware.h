@@ -277,6 +277,15 @@ void fw_ssp_load(uint32_t number, const uint16_t words[FW_SEGMENT_WORDS]);
 /* What came in last; 0 when it has been taken already. */
 uint32_t fw_ssp_take(uint32_t number, uint16_t words[FW_SEGMENT_WORDS]);
 
+/* --- SSP as a master of words (SSPCR0, SSPCPSR, SSPDR), for what hangs on it and has a select pin ------------------
+ */
+/* Words of 4 ... 16 bits, the first bit read at the first edge of a clock that is low between words; its rate is the
+ * core clock / divider, which is even, 2 ... 512. Nothing else can be started on the SSP then. */
+void fw_ssp_start_words(uint32_t bits, uint32_t divider);
+/* Send a word, and wait for its end; returns the one that came the other way. The program moves the select pin. (Here
+ * it is through at once: bits * divider cycles belong to the cost of the task or handler.) */
+uint32_t fw_ssp_word(uint32_t word);
+
 /* --- UARTs, 8N1 (UnRBR, UnTHR, UnLSR, UnIIR, UnDLL and UnDLM as one divisor, UnFDR, UnFCR) ---------------------------
  */
 /* baud = core clock / (16 * divisor * (1 + divaddval / mulval)); trigger of the receive FIFO: 1, 4, 8 or 14. */
