@@ -154,6 +154,28 @@ def test_the_page_comes_back_when_the_connection_was_lost_and_the_robot_ends_wit
         page.errors.clear()  # the browser tells of the refused connections
 
 
+def test_on_a_telephone_no_view_is_wider_than_the_window_and_no_row_is_torn_into_many_lines(tmp_path):
+    with served("--walk") as (address, _), page_of(address, tmp_path, 390) as page:
+        hand = Hand(page)
+        hand.view("faults")
+        hand.give("#fault-place", "MCH.joint_encoder")
+        hand.give("#fault-mode", "stuck")
+        hand.give("#fault-end", "+4 ms")
+        hand.click("#fault-form button", "Arm")
+        hand.sees("state.faults?.[0]?.cleared_s")
+        for view in page.value(
+            "[...document.querySelectorAll('nav [data-view]:not([hidden])')].map((e) => e.dataset.view)"
+        ):
+            hand.view(view)
+            page.value("for (const each of document.querySelectorAll('details')) each.open = true")
+            pictures = page.value("window.rangerPanel.shown()")
+            page.until(f"window.rangerPanel.shown() > {pictures} + 3")
+            assert page.value("document.documentElement.scrollWidth <= innerWidth"), view
+            # three lines of a table's 13 px at the browser's line height, with its borders
+            rows = "[...document.querySelectorAll('tr')].filter((e) => e.offsetHeight > 75).map((e) => e.textContent)"
+            assert page.value(rows) == [], view
+
+
 @pytest.mark.parametrize("width", [390, 768, 1400])
 def test_a_recording_is_scrubbed_and_nothing_is_wider_than_the_window(tmp_path, width):
     from ranger_sim.tools import cli

@@ -51,8 +51,8 @@ const seconds = (value) => value === null || value === undefined ? "–" : `${va
 
 export function errors(rows, caption) {
   if (!rows.length) return note("none");
-  return table(caption, ["board", "error", "meaning", "#count", "#first", "#last"],
-    rows.map((row) => [row.board, row.name, row.text, row.count.toLocaleString("en"), seconds(row.first_s), seconds(row.last_s)]));
+  return table(caption, ["board", "error", "#count", "#first", "#last", "meaning"],
+    rows.map((row) => [row.board, row.name, row.count.toLocaleString("en"), seconds(row.first_s), seconds(row.last_s), row.text]));
 }
 
 const time = (us) => us === undefined || us === null ? "–" : us < 100 ? `${us.toFixed(1)} µs` : us < 1e3 ? `${Math.round(us)} µs` : us < 1e6 ? `${(us / 1e3).toFixed(1)} ms` : `${(us / 1e6).toFixed(1)} s`;
