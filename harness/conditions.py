@@ -35,7 +35,7 @@ from ranger_sim.harness.waiting import (
 from ranger_sim.harness.wiring import ranger as wiring
 from ranger_sim.plant.ranger import SAMPLES
 
-__all__ = ["STATE_VARIABLES", "Condition", "ConditionNotMetError", "ErrorNoted", "Waiting", "condition"]
+__all__ = ["STATE_VARIABLES", "Condition", "ConditionNotMetError", "ErrorNoted", "Waiting", "condition", "state_names"]
 
 # machine: variable of its state in the main brain's table
 STATE_VARIABLES = {
@@ -45,6 +45,12 @@ STATE_VARIABLES = {
     "outer_foot": "FSM_FO",
     "steering": "FSM_STEER",
 }
+
+
+def state_names(robot: Any, machine: str) -> dict[int, str]:
+    """{number: state} of a machine of the main brain's program; empty where that program has none of this name."""
+    states = getattr(robot.boards["MB"].modes, machine, None)
+    return {} if states is None else {state.number: state.name for state in states.machine.states}
 
 
 class Step(Condition):

@@ -13,7 +13,7 @@ from typing import Any
 from ranger_sim import datatable
 from ranger_sim.foundation.peers import LIMITS, MALFORMED, REASONS, Door, Peer, SocketStream
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.conditions import STATE_VARIABLES
+from ranger_sim.harness.conditions import STATE_VARIABLES, state_names
 from ranger_sim.harness.feed import records
 from ranger_sim.harness.records.summary import energy
 
@@ -137,7 +137,11 @@ class FeedServer(Door[Peer]):
             ],
             "boards": [{"name": name, "hz": robot.boards[name].hz} for name in self.boards],
             "samples": dict(robot.plant.sample_names),
-            "states": state_names(robot),
+            "states": {
+                variable: names
+                for machine, variable in STATE_VARIABLES.items()
+                if (names := state_names(robot, machine))
+            },
             "geometry": robot.plant.geometry(),
             "weight_N": robot.plant.parameters.total_mass_kg * robot.plant.parameters.gravity_m_per_s2,
         }
@@ -176,13 +180,3 @@ class FeedServer(Door[Peer]):
         """Whole numbers by name: viewers now and seen, rows left out, and who was sent away, by reason."""
         away = {f"sent_away_{reason}": self.sent_away[reason] for reason in REASONS}
         return {"viewers": len(self.peers), **self.totals, **away}
-
-
-def state_names(robot: Any) -> dict[str, dict[int, str]]:
-    """{variable: {number: state}} of the machines of the main brain's program."""
-    modes = robot.boards["MB"].modes
-    return {
-        variable: {state.number: state.name for state in getattr(modes, machine).machine.states}
-        for machine, variable in STATE_VARIABLES.items()
-        if hasattr(modes, machine)
-    }

@@ -9,7 +9,7 @@ import numpy as np
 from ranger_sim import datatable
 from ranger_sim.boards.counters import RangerCounters
 from ranger_sim.datatable.generated import all_variables
-from ranger_sim.harness.conditions import STATE_VARIABLES
+from ranger_sim.harness.conditions import STATE_VARIABLES, state_names
 
 
 @dataclasses.dataclass
@@ -56,8 +56,8 @@ class Recorded:
     def machine_states(self, machine: str) -> Any:
         """(time_s, state numbers, {number: name}) of one of the main brain's machines."""
         number = all_variables.ID_OF[STATE_VARIABLES[machine]]
-        names = {state.number: state.name for state in getattr(self.robot.boards["MB"].modes, machine).machine.states}
-        return self._seconds(self.word_times_ns), self.words[:, number].astype(int), names
+        states = self.words[:, number].astype(int)
+        return self._seconds(self.word_times_ns), states, state_names(self.robot, machine)
 
     def state_text(self, times_s: Any) -> list[list[str]]:
         """The states of hip and feet at the given times, three lines each."""

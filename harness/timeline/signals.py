@@ -7,7 +7,7 @@ import numpy as np
 from ranger_sim.boards.modules.motor_output import PERIOD_COUNTS
 from ranger_sim.datatable.generated import all_variables
 from ranger_sim.foundation.events import PIN_OUTPUT, PWM_UPDATE
-from ranger_sim.harness.conditions import STATE_VARIABLES
+from ranger_sim.harness.conditions import STATE_VARIABLES, state_names
 from ranger_sim.harness.timeline.frames import NUMPY_TYPES
 from ranger_sim.harness.timeline.model import Counter, Slices, changes, runs
 from ranger_sim.harness.wiring import ranger as wiring
@@ -42,8 +42,7 @@ def machine_states(robot: Any, rows: np.ndarray, zero_ns: int, end_ns: int) -> l
     time = rows[:, 0] - zero_ns
     found = []
     for machine, variable in STATE_VARIABLES.items():
-        states = getattr(robot.boards["MB"].modes, machine).machine.states
-        names = {state.number: state.name for state in states}
+        names = state_names(robot, machine)
         start, end, state = runs(time, rows[:, 1 + all_variables.ID_OF[variable]], end_ns)
         numbers = sorted(set(state.tolist()))
         found.append(

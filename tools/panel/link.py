@@ -17,7 +17,7 @@ from ranger_sim.harness import normal_errors
 from ranger_sim.harness.outside.serial_ports import DAQ_BAUD, RealPort, reason_of
 from ranger_sim.harness.ranger_names import RANGER
 from ranger_sim.tools.panel.channels import EMPTY, Times, Trace, Values, between
-from ranger_sim.tools.panel.source import ANKLES, KNOWN_POSE, LEGS, Source, known_pose, table_channels
+from ranger_sim.tools.panel.source import ANKLES, KNOWN_POSE, LEGS, Source, known_pose, known_states, table_channels
 from ranger_sim.tools.robodaq.codec import Point
 from ranger_sim.tools.robodaq.rates import GAP_PERIODS, Rates, published_hz
 from ranger_sim.tools.robodaq.session import OWN, Session
@@ -119,7 +119,7 @@ class LinkSource(Source):
         self.port = RealPort(port, DAQ_BAUD)
         self.session = Session(self._hear)
         self.rates = Rates(self.session)
-        table = table_channels()
+        table = table_channels(known_states())
         self.channels = list(table.values())
         self.place = {number: place for place, number in enumerate(table)}
         self.number = {channel.name: place for place, channel in enumerate(self.channels)}

@@ -15,7 +15,7 @@ from ranger_sim.foundation.user_error import UserError
 from ranger_sim.sysid.dataset import Dataset
 from ranger_sim.sysid.readers import run_folder
 from ranger_sim.tools.panel.channels import EMPTY, Channel, Times, Trace, Values, between, thinned
-from ranger_sim.tools.panel.source import ANKLES, KNOWN_POSE, LEGS, TRUE_POSE, Source, known_pose
+from ranger_sim.tools.panel.source import ANKLES, KNOWN_POSE, LEGS, TRUE_POSE, Source, known_pose, known_states
 from ranger_sim.tools.recordings import datasets
 
 TRUTH = "plant."  # begins the names of what only a simulation knows of the body
@@ -79,9 +79,9 @@ class RecordingSource(Source):
                 row = known.get(name)
                 whose = "body" if name.startswith(TRUTH) else row.publisher if row is not None else "recording"
                 description = row.description if row is not None else ""
-                self.channels.append(
-                    Channel(name.removeprefix(TRUTH) + group, channel.unit, description, whose + group)
-                )
+                shown = name.removeprefix(TRUTH) + group
+                states = known_states().get(name, {})
+                self.channels.append(Channel(shown, channel.unit, description, whose + group, states))
                 times = channel.time_s + (shift_s if number else 0.0)
                 period = None if steps or len(times) < 3 else float(np.median(np.diff(times))) or None
                 self.data.append((times, channel.value.astype(np.float32), period))

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import functools
 from typing import Any
 
-from ranger_sim import datatable
+from ranger_sim import Ranger, datatable
 from ranger_sim.datatable import parameters
 from ranger_sim.foundation.user_error import UserError
+from ranger_sim.harness.conditions import STATE_VARIABLES, state_names
 from ranger_sim.tools.panel.channels import EMPTY, Channel, Times, Trace, Values
 
 # Where the robot's parts are, from what it knows itself: legs as its program of 2011 or those of 2015 and 2016 estimate
@@ -151,6 +153,15 @@ def slots_us() -> dict[str, float]:
 def error_rows() -> dict[int, tuple[str, str]]:
     """{code: (name, meaning)} of the master table."""
     return {row.id: (row.name, row.description) for row in datatable.load().errors}
+
+
+@functools.cache
+def known_states() -> dict[str, dict[int, str]]:
+    """{variable: {number: state}} of our main brain's program, which has the record walk's numbers: for a source that
+    does not tell them itself.
+    """
+    with contextlib.closing(Ranger()) as robot:
+        return {variable: state_names(robot, machine) for machine, variable in STATE_VARIABLES.items()}
 
 
 def table_channels(states: dict[str, dict[int, str]] | None = None) -> dict[int, Channel]:

@@ -167,6 +167,15 @@ def test_a_runs_folder_is_shown_with_its_body_and_its_variables(folder):
     assert angle == pytest.approx(body, abs=0.02)
 
 
+def test_states_have_their_names_also_where_the_source_tells_numbers_only(folder):
+    link = LinkSource("loop://")
+    for source in (RecordingSource([str(folder)]), link):
+        hip = source.channels[number_of(source, "FSM_HIP")].states
+        assert hip[5] == "HI_premid" and hip[2] == "HO_premid" and len(hip) == 10
+        assert source.channels[number_of(source, "MCH_ANGLE")].states == {}
+    link.close()
+
+
 def test_a_second_recording_lies_over_the_first_moved_in_time(folder):
     source = RecordingSource([str(folder), str(folder)], shift_s=0.5)
     first, second = (number_of(source, name) for name in ("hip_rad", "hip_rad (run)"))
