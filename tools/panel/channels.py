@@ -99,7 +99,10 @@ def _with_gaps(times: Times, values: Values, period: float) -> Trace:
 def _standing(times: Times, values: Values, begin: float, end: float, points: int) -> Trace:
     """A quantity that is told when it changes: steps, from the samples around and in the window."""
     if len(times) <= points:
+        final = np.append(np.diff(times) > 0, True)  # of several at one instant
+        times, values = times[final], values[final]
         x = np.repeat(times, 2)[1:]
+        x[1::2] = np.nextafter(x[1::2], -np.inf)  # the value before: a plot has one point at an instant
         low = np.repeat(values, 2)[:-1]
         if times[-1] < end:
             x, low = np.append(x, end), np.append(low, values[-1])

@@ -57,7 +57,14 @@ def test_a_quantity_that_is_told_when_it_changes_stands_until_then():
     trace = thinned(times, values, 1.0, 6.0, 100, None)
     shown = dict(zip(trace.x.tolist(), trace.low.tolist(), strict=True))
     assert shown[6.0] == 2.0 and shown[5.0] == 2.0
-    assert [value for x, value in zip(trace.x, trace.low, strict=True) if x == 2.0] == [1.0, 4.0]
+    assert np.interp([1.999999, 2.0, 4.999999], trace.x, trace.low).tolist() == [1.0, 4.0, 4.0]
+    assert (np.diff(trace.x) > 0).all()  # a plot has one point at an instant
+
+
+def test_of_several_values_at_one_instant_the_last_one_stands():
+    trace = thinned(np.array([0.0, 2.0, 2.0]), np.array([1.0, 9.0, 4.0], np.float32), 0.0, 3.0, 100, None)
+    assert np.interp([1.0, 2.0, 3.0], trace.x, trace.low).tolist() == [1.0, 4.0, 4.0]
+    assert (np.diff(trace.x) > 0).all()
 
 
 def test_of_many_changes_in_a_bucket_the_extremes_are_shown():

@@ -203,3 +203,24 @@ def test_a_recording_is_scrubbed_and_nothing_is_wider_than_the_window(tmp_path, 
         page.value("document.getElementById('save-csv').onclick()")
         saved = page.value("fetch(document.getElementById('save-csv').href).then((answer) => answer.text())")
         assert saved.startswith("time_s,channel,unit,value") and saved.count("hip_rad") > 1000
+
+
+def test_two_runs_lie_over_each_other_and_are_shown_from_their_beginning(tmp_path):
+    from ranger_sim.tools import cli
+
+    runs = [tmp_path / "before", tmp_path / "after"]
+    for seed, run in enumerate(runs, start=1):
+        assert cli.main(["walk", "--time", "2s", "--seed", str(seed), "--log", "full", "--out", str(run)]) == 0
+    with served(*map(str, runs)) as (address, _), page_of(address, tmp_path) as page:
+        names = "[...p.element.querySelectorAll('.chip span')].map((e) => e.textContent.split(',')[0])"
+        plots = page.value(f"window.rangerPanel.plots.all().map((p) => {names})")
+        assert plots[0] == ["hip_rad", "hip_rad (after)"] and all(len(plot) == 2 for plot in plots)
+        page.until("document.getElementById('clock').textContent === '0.000 s'")
+        held = "[...document.querySelectorAll('.chip b')].slice(0, 2).map((e) => e.textContent)"
+        page.until(f'JSON.stringify({held}) === \'["0.35000","0.35000"]\'')  # rad: the pose in which it is let go
+        box = page.value("JSON.stringify(document.querySelector('.u-over').getBoundingClientRect())")
+        left, top = (json.loads(box)[key] for key in ("left", "top"))
+        page.point(left + 300, top + 30)
+        page.until("window.rangerPanel.plots.cursor() > 0.5")
+        page.point(5, 5)  # away from the plots: what stands where it is played is shown again
+        page.until(f'JSON.stringify({held}) === \'["0.35000","0.35000"]\'')

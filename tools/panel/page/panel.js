@@ -27,7 +27,7 @@ const colour = (name) => colours[name] ??= getComputedStyle(document.documentEle
 
 let hello = null, can = new Set(), number = new Map();
 let span = [0, 0], held = null, window_s = 10, zooms = [], view = "plots", state = {}, pose = null;
-let playing = false, played = 0, at = null, trigger = null, shown = 0;
+let playing = false, played = null, at = null, trigger = null, shown = 0;
 
 const stage = makeStage(by("stage"), colour);
 const plots = makePlots(by("plots"), {
@@ -35,7 +35,7 @@ const plots = makePlots(by("plots"), {
   chosen: () => listDrawn(),
   full: (most) => say(`${most} channels at a time are possible: take one out first`),
   resized: () => look(),
-  cursor: (time) => { at = time; look(); },
+  cursor: (time) => { at = time; if (time === null && !can.has("live")) plots.setCursor(played); look(); },
   zoom: (begin, end) => { zooms.push(range()); hold([begin, end]); },
   widen: () => widen(),
   marked: () => { atMark(); look(); remember(); },
@@ -97,7 +97,10 @@ function greet(found) {
   }));
   faultForm();
   if (!plots.all().length) recall();
-  if (!live) hold(held ?? [span[0], Math.min(span[1], span[0] + window_s)]);
+  if (!live) {
+    hold(held ?? [span[0], Math.min(span[1], span[0] + window_s)]);
+    goTo(played ?? held[0]);
+  }
   channelList.know(hello.channels);
   listDrawn();
   document.body.dataset.connected = "yes";
@@ -210,11 +213,17 @@ function remember() {
   history.replaceState(null, "", `${location.search}#${parts}`);
 }
 
+// Plots where the address names none. Of two runs over each other one channel in each plot, of both.
+function usual() {
+  const sets = number.has("hip_rad") ? FIRST : FIRST_OF_A_LOG;
+  const pairs = sets.flat().map((name) => [...number.keys()].filter((each) => each === name || each.startsWith(`${name} (`)));
+  return pairs.some((pair) => pair.length > 1) ? pairs : sets;
+}
+
 function recall() {
   const parts = new URLSearchParams(location.hash.slice(1));
   const wanted = parts.get("plots");
-  const usual = number.has("hip_rad") ? FIRST : FIRST_OF_A_LOG;
-  const sets = wanted !== null ? wanted.split(";").map((each) => each.split(",").filter(Boolean)) : usual;
+  const sets = wanted !== null ? wanted.split(";").map((each) => each.split(",").filter(Boolean)) : usual();
   for (const names of sets) plots.add(names.map((name) => number.get(name)).filter((each) => each !== undefined));
   window_s = Number(parts.get("span")) || window_s;
   by("span").value = String(window_s);
@@ -383,7 +392,7 @@ function scrubber() {
   const bar = by("position");
   bar.min = span[0];
   bar.max = span[1];
-  if (document.activeElement !== bar) bar.value = played || span[0];
+  if (document.activeElement !== bar) bar.value = played ?? span[0];
 }
 
 function goTo(time) {   // of a recording
@@ -404,7 +413,7 @@ function play(on) {
   if (played >= span[1] && on) played = span[0];
   const step = (now) => {
     if (!playing) return;
-    const next = (played || span[0]) + (now - before) / 1000 * Number(by("speed").value);
+    const next = played + (now - before) / 1000 * Number(by("speed").value);
     before = now;
     if (next >= span[1] && !by("loop").checked) { goTo(span[1]); play(false); return; }
     goTo(next >= span[1] ? span[0] : next);
@@ -473,7 +482,7 @@ by("picture").onclick = () => {
 function step(by_s) {
   byKeys = true;
   if (can.has("live")) cursorTo((at ?? plots.cursor() ?? range().end) + by_s);
-  else { play(false); goTo((played || span[0]) + by_s); }
+  else { play(false); goTo(played + by_s); }
 }
 
 function mark(time = instant() ?? span[1]) {

@@ -265,6 +265,7 @@ export function makePlots(box, on, colour) {
         chart.setData(joined(found.map(drawable)), true);
         chart.setScale("x", { min: end - span, max: end });
       });
+      stand(chart);
     } else {
       if (anew) {
         if (!plot.strip) chart.setData(nothing(plot), false);
@@ -276,6 +277,12 @@ export function makePlots(box, on, colour) {
       chart.batch(() => {});
     }
     plot.drawn++;
+  }
+
+  // The chart's cursor where `at` is in its window.
+  function stand(chart) {
+    const left = at === null ? -10 : chart.valToPos(at, "x");
+    chart.setCursor(left >= 0 ? { left, top: 10 } : { left: -10, top: -10 }, false);
   }
 
   // A column of a strip is as wide as a line, in pixels of the screen.
@@ -395,7 +402,7 @@ export function makePlots(box, on, colour) {
     all: () => plots,
     chosen: () => chosen,
     cursor: () => at,
-    setCursor: (time) => { at = time; values(); for (const plot of plots) if (plot.chart) plot.chart.setCursor(time === null ? { left: -10, top: -10 } : { left: plot.chart.valToPos(time, "x"), top: 10 }, false); },
+    setCursor: (time) => { at = time; values(); for (const plot of plots) if (plot.chart) stand(plot.chart); },
     mark: () => mark,
     setMark: (time) => { mark = time; redraw(); values(); },
     stands: (values_there, time) => { exact = { at: time, values: values_there }; values(); },
