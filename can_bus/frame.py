@@ -289,6 +289,20 @@ def frame_bits(
     return measure(identifier, flags, lo, hi) & MEASURED_BITS
 
 
+@cython.boundscheck(False)  # all five are of one length
+@cython.wraparound(False)
+def fill_frame_bits(identifiers, flags, lows, highs, bits) -> None:
+    """`frame_bits` of many frames into `bits`: five buffers of 64-bit integers, of one length."""
+    ids: cython.longlong[::1] = identifiers
+    flag: cython.longlong[::1] = flags
+    low: cython.longlong[::1] = lows
+    high: cython.longlong[::1] = highs
+    found: cython.longlong[::1] = bits
+    place: cython.longlong
+    for place in range(len(found)):
+        found[place] = measure(ids[place], flag[place], low[place], high[place]) & MEASURED_BITS
+
+
 def arbitration_key(identifier: cython.longlong, flags: cython.longlong) -> cython.longlong:
     """The arbitration field as a 32-bit number in the order of its bits: the lower key wins the bus.
 

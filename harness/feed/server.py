@@ -102,7 +102,7 @@ class FeedServer(Door[Peer]):
 
     def state(self, now_ns: int) -> dict[str, Any]:
         """What is in no stream: the panel of the user interface board, faults, how far it walked."""
-        robot = self.robot
+        robot, outside = self.robot, self._outside()
         panel = robot.loop.board("UI").memory
         return {
             "time_ns": now_ns,
@@ -113,11 +113,16 @@ class FeedServer(Door[Peer]):
             "energy_Wh": energy(robot),
             "ended": robot.ended,
             "faults": [fault.summary() for fault in robot.faults if fault.twin is None],
+            "bus_errors": {bus.name: outside.get(bus.name, bus.counters).errors for bus in robot.buses},
         }
+
+    def _outside(self) -> dict[str, Any]:
+        """{bus: its end at a real one} of those that are not emulated (can_bus/edge/external_bus.py)."""
+        return {end.name: end for end in self.robot.polled if hasattr(end, "bit_rate")}
 
     def hello(self) -> dict[str, Any]:
         """Who it is, and what the streams hold."""
-        robot = self.robot
+        robot, outside = self.robot, self._outside()
         return {
             "version": records.VERSION,
             "name": self.name,
@@ -134,6 +139,10 @@ class FeedServer(Door[Peer]):
                     "reals": robot.recorder.streams()[stream].is_real,
                 }
                 for stream in self.streams
+            ],
+            "buses": [
+                {"name": bus.name, "bit_per_s": outside[bus.name].bit_rate if bus.name in outside else bus.bitrate}
+                for bus in robot.buses
             ],
             "boards": [{"name": name, "hz": robot.boards[name].hz} for name in self.boards],
             "samples": dict(robot.plant.sample_names),

@@ -1,5 +1,7 @@
 """The length of a frame, its CRC and its stuff bits, against arithmetic done another way."""
 
+import array
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -162,3 +164,11 @@ def test_the_worst_case_is_reached_by_some_stuffed_region(flags):
     worst = "00000" + ("1111" + "0000") * region
     assert len(stuffed(worst[:region])) - region == (region - 1) // 4
     assert frame.worst_case_bits(flags) == frame.unstuffed_bits(flags) + (region - 1) // 4
+
+
+@given(st.lists(st.tuples(st.integers(0, 0x7FF), st.sampled_from((0, 3, 8, 15, FLAG_REMOTE | 8)), WORD, WORD)))
+def test_many_frames_at_once_are_as_long_as_one_by_one(frames):
+    columns = [array.array("q", column) for column in zip(*frames, strict=True)] or [array.array("q")] * 4
+    bits = array.array("q", [0]) * len(frames)
+    frame.fill_frame_bits(*columns, bits)
+    assert bits.tolist() == [whole_length(*each) for each in frames]

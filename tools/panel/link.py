@@ -239,7 +239,7 @@ class LinkSource(Source):
                 "chosen": [self._with_seconds(row) for row in self.rates.rows(self.rates.chosen())],
                 "asked": "channels" in self.session.pending(),
             },
-            "errors": sorted(rows, key=lambda row: -row["last_s"]),
+            "errors": sorted(rows, key=lambda row: row["first_s"]),
         }
 
     def _with_seconds(self, row: dict[str, Any]) -> dict[str, Any]:

@@ -4,39 +4,30 @@ from __future__ import annotations
 
 import asyncio
 import json
-from collections import Counter, deque
-from collections.abc import Iterator
+from collections import Counter
 from typing import Any
 
 import numpy as np
 
 from ranger_sim import datatable
 from ranger_sim.datatable.generated import all_variables
-from ranger_sim.datatable.packing import parts_of_error_word, value_of_word
 from ranger_sim.foundation import peers
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness import normal_errors
 from ranger_sim.harness.feed import records
 from ranger_sim.harness.processes import control
-from ranger_sim.harness.ranger_names import RANGER
-from ranger_sim.harness.records import logbook
 from ranger_sim.harness.records.sampler import PERIOD_NS
 from ranger_sim.harness.records.summary import JOULES_PER_WH
 from ranger_sim.tools.panel.channels import Channel, Memory, Times, Trace, Values, between
-from ranger_sim.tools.panel.slots import BoardSlots
-from ranger_sim.tools.panel.source import TRUE_POSE, Source, error_rows, table_channels
+from ranger_sim.tools.panel.inside.buses import Bus
+from ranger_sim.tools.panel.inside.errors import ERRORS, ON_NO_BUS, ErrorList, changes
+from ranger_sim.tools.panel.inside.frames import ERROR, RecentFrames, of_the_robot
+from ranger_sim.tools.panel.inside.slots import BoardSlots
+from ranger_sim.tools.panel.source import TRUE_POSE, Source, table_channels
 
 CONNECT_S = 5.0
 READ_BYTES = 1 << 18
 STATUS_S = 0.5
-IDENTIFIERS = 2048
-FRAMES_KEPT = 1 << 20  # of all buses: 50 s of a walking robot
-FRAMES_SHOWN = 40
-ERRORS = {
-    all_variables.ID_OF[name]: name.removeprefix("ERROR_")
-    for name in all_variables.ID_OF
-    if name.startswith("ERROR_") and name.removeprefix("ERROR_") in all_variables.BOARD_NAMES.values()
-}
+FRAMES_KEPT = 1 << 18  # of each bus; chosen by us: 12 MB, 60 s of a walking robot
 REQUESTS = frozenset({"key", "set", "pause", "resume", "restart", "fault", "clear", "radio"})
 
 
@@ -67,8 +58,19 @@ class RobotSource(Source):
         states = {name: {int(n): text for n, text in each.items()} for name, each in hello["states"].items()}
         table = table_channels(states)
         self.slots = [BoardSlots(board["name"], board["hz"]) for board in hello["boards"]]
-        self.channels = [*self.body, *table.values(), *(each for board in self.slots for each in board.channels())]
+        self.frames = {bus["name"]: RecentFrames(FRAMES_KEPT) for bus in hello["buses"]}
+        self.buses = [
+            Bus(bus["name"], self.start_ns, bus["bit_per_s"], self.frames[bus["name"]], of_the_robot)
+            for bus in hello["buses"]
+        ]
+        self.channels = [
+            *self.body,
+            *table.values(),
+            *(each for board in self.slots for each in board.channels()),
+            *(each for bus in self.buses for each in bus.channels()),
+        ]
         self.first_slot = len(self.body) + len(table)  # among the channels
+        self.first_load = self.first_slot + 2 * len(self.slots)
         self.identifiers = np.array(list(table))
         self.pose_names = TRUE_POSE
         self.pose_columns = [list(hello["samples"]).index(column) for column in TRUE_POSE]
@@ -80,7 +82,6 @@ class RobotSource(Source):
         self.signed = np.array([kind == "i32" for kind in kinds])
         self.shown: dict[str, Any] = {}  # the newest STATE
         self.status: dict[str, Any] = {}  # the supervisor's
-        self.buses = [Traffic() for stream in self.streams if stream["name"].startswith("can")]
         self.errors = ErrorList()
         self.gaps: Counter[str] = Counter()
         self.table_errors = {number: 0 for number in ERRORS if number in table}
@@ -132,8 +133,15 @@ class RobotSource(Source):
     def _take(self, kind: int, body: bytes) -> None:
         if kind == records.STATE:
             self.shown = json.loads(body)
+            for bus in self.buses:  # all that had begun by then has been told
+                bus.passed(self.shown["time_ns"])
+                bus.more_errors = self.shown["bus_errors"][bus.name] - self.frames[bus.name].total.get(ERROR, 0)
         elif kind == records.GAP:
-            self.gaps.update(json.loads(body))
+            missed = json.loads(body)
+            self.gaps.update(missed)
+            for bus in self.buses:
+                if bus.name in missed:
+                    bus.gap()
         elif kind == records.SLOTS:
             self.slots[body[0]].take(body[1:], self.start_ns)
         elif kind == records.ROWS:
@@ -145,7 +153,7 @@ class RobotSource(Source):
             elif stream["name"] == "words":
                 self._take_words(rows)
             else:
-                self._take_frames(int(stream["name"].removeprefix("can")) - 1, rows)
+                self._take_frames(next(bus for bus in self.buses if bus.name == stream["name"]), rows)
 
     def _take_words(self, rows: Any) -> None:
         words = rows[:, 1:][:, self.identifiers]
@@ -154,17 +162,16 @@ class RobotSource(Source):
         values[:, self.floats] = raw[:, self.floats].view(np.float32)
         values[:, self.signed] = raw[:, self.signed].view(np.int32)
         self.word_rows.append((rows[:, 0] - self.start_ns) * 1e-9, values)
-        for number in self.table_errors:  # the router's and the main brain's own errors are on no bus
-            if ERRORS[number] in ("CSR", "MB"):
-                for word, time_ns in _changes(rows[:, 1 + number], rows[:, 0], self.table_errors[number]):
+        for number in self.table_errors:  # what reaches the table without a bus
+            if ERRORS[number] in ON_NO_BUS:
+                for word, time_ns in changes(rows[:, 1 + number], rows[:, 0], self.table_errors[number]):
                     self.errors.note(word, (time_ns - self.start_ns) * 1e-9)
                 self.table_errors[number] = int(rows[-1, 1 + number])
 
-    def _take_frames(self, bus: int, rows: Any) -> None:
-        self.buses[bus].take(rows)
-        identifiers = rows[:, 2] & 0x1FFFFFFF
-        for row in rows[np.isin(identifiers, list(ERRORS))]:
-            self.errors.note(int(row[1]) >> 12, (int(row[0]) - self.start_ns) * 1e-9)
+    def _take_frames(self, bus: Bus, rows: Any) -> None:
+        self.frames[bus.name].append(rows)
+        bus.take(rows)
+        self.errors.note_frames(rows, self.start_ns)
 
     # --- what is shown --------------------------------------------------------------------------------------
 
@@ -174,6 +181,8 @@ class RobotSource(Source):
 
     def _place(self, channel: int) -> tuple[Memory, int]:
         body = len(self.body)
+        if channel >= self.first_load:
+            return self.buses[channel - self.first_load].memory, 0
         if channel >= self.first_slot:
             board, column = divmod(channel - self.first_slot, 2)
             return self.slots[board].memory, column
@@ -202,8 +211,9 @@ class RobotSource(Source):
         return None if row is None else (row[0], [float(row[1][column]) for column in self.pose_columns])
 
     def state(self, at: float | None) -> dict[str, Any]:
+        now_s = self.span()[1]
         return {
-            "time_s": self.span()[1],
+            "time_s": now_s,
             "panel": self.shown.get("panel"),
             "steps": self.shown.get("steps", 0),
             "distance_m": self.shown.get("distance_m", 0.0),
@@ -214,10 +224,10 @@ class RobotSource(Source):
             "faults": self.shown.get("faults", []),
             "boards": self.status.get("boards", {}),
             "slots": {board.name: board.content(at) for board in self.slots},
-            "buses": self.status.get("buses", {}),
+            "buses": {bus.name: bus.content(at, now_s) for bus in self.buses},
             "pace": {key: self.status.get(key) for key in ("speed", "behind_s", "paused", "scheduling")},
-            "errors": self.errors.content(self.span()[1]),
-            "frames": [traffic.newest(self.start_ns, at) for traffic in self.buses],
+            "errors": self.errors.content(now_s, at),
+            "frames": {bus.name: bus.listed(at) for bus in self.buses},
             "left_out": dict(self.gaps),
         }
 
@@ -234,90 +244,3 @@ class RobotSource(Source):
             raise UserError(f"{str(wish.get('do'))[:40]!r} is no request to a robot")
         answer: dict[str, Any] = await asyncio.to_thread(control.ask, self.name, wish)
         return answer
-
-
-def _changes(words: Any, times_ns: Any, before: int) -> Iterator[tuple[int, int]]:
-    """(word, time) of every change to another word than none."""
-    for place in np.flatnonzero(np.diff(words, prepend=before)):
-        if words[place]:
-            yield int(words[place]), int(times_ns[place])
-
-
-class ErrorList:
-    """Errors by board and code: how often, first and last time; those of a healthy walk apart."""
-
-    def __init__(self) -> None:
-        self.rows: dict[tuple[int, int], dict[str, Any]] = {}
-
-    def note(self, word: int, time_s: float) -> None:
-        """An error word came at this time of the robot."""
-        code, board, count = parts_of_error_word(word)
-        if code == 0:
-            return
-        row = self.rows.setdefault((board, code), {"first_s": time_s, "count": 0})
-        row["count"] += max(1, count)
-        row["last_s"] = time_s
-
-    def content(self, now_s: float) -> list[dict[str, Any]]:
-        """As the page gets it, the newest first."""
-        found = []
-        for (board, code), row in self.rows.items():
-            name, text = error_rows().get(code, (f"error {code}", "not in the table"))
-            whose = all_variables.BOARD_NAMES.get(board, f"board {board}")
-            normal = row["count"] <= normal_errors.most_normal(RANGER, whose, code, now_s, True)
-            found.append({"board": whose, "name": name, "text": text, "normal": normal, **row})
-        return sorted(found, key=lambda row: -row["last_s"])
-
-
-class Traffic:
-    """The frames of one bus: the newest of all, and how many of each identifier."""
-
-    def __init__(self) -> None:
-        self.blocks: deque[Any] = deque()
-        self.kept = 0
-        self.counts = np.zeros(IDENTIFIERS, np.int64)
-
-    def take(self, rows: Any) -> None:
-        """Rows of a frame stream (foundation/row_stream.py)."""
-        self.blocks.append(rows)
-        self.kept += len(rows)
-        while self.kept > FRAMES_KEPT // 4:
-            self.kept -= len(self.blocks.popleft())
-        identifiers = rows[:, 2] & 0x1FFFFFFF
-        self.counts += np.bincount(identifiers[identifiers < IDENTIFIERS], minlength=IDENTIFIERS)
-
-    def newest(self, start_ns: int, at: float | None) -> list[dict[str, Any]]:
-        """The last frames until an instant, the newest first, with what they carry."""
-        until = None if at is None else start_ns + round(at * 1e9)
-        found: list[Any] = []
-        for rows in reversed(self.blocks):
-            if until is not None and rows[0, 0] > until:
-                continue
-            part = rows if until is None else rows[rows[:, 0] <= until]
-            found.extend(part[::-1][: FRAMES_SHOWN - len(found)])
-            if len(found) >= FRAMES_SHOWN:
-                break
-        if not found:
-            return []
-        frames = logbook.decoded(np.array(found))
-        return [
-            {
-                "time_s": (int(time_ns) - start_ns) * 1e-9,
-                "id": int(number),
-                "name": all_variables.NAMES.get(int(number), ""),
-                "data": (int(low) | int(high) << 32).to_bytes(8, "little").hex(" "),
-                "value": value_of(int(number), int(low)),
-                "count": int(self.counts[number]) if number < IDENTIFIERS else 0,
-            }
-            for time_ns, number, low, high in zip(
-                frames["time_ns"], frames["identifier"], frames["word0"], frames["word1"], strict=True
-            )
-        ]
-
-
-def value_of(number: int, word: int) -> float | int | None:
-    """What a frame of the robot carries; None for one that is not of its table, or no number."""
-    if number not in all_variables.TYPES:
-        return None
-    value = value_of_word(all_variables.TYPES[number], word & 0xFFFFFFFF)
-    return value if np.isfinite(value) else None

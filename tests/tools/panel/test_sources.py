@@ -11,9 +11,10 @@ from ranger_sim.datatable.generated import all_variables
 from ranger_sim.datatable.packing import error_word
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.feed.server import FeedServer
+from ranger_sim.tools.panel.inside.errors import ErrorList
 from ranger_sim.tools.panel.link import LinkSource
 from ranger_sim.tools.panel.recording import Event, RecordingSource
-from ranger_sim.tools.panel.robot import ErrorList, RobotSource
+from ranger_sim.tools.panel.robot import RobotSource
 from ranger_sim.tools.panel.source import ANKLES, KNOWN_POSE, TRUE_POSE, known_pose
 from ranger_sim.tools.robodaq.codec import Point
 from tests.tools.robodaq.on_a_line import OnALine
@@ -46,7 +47,8 @@ def walked():
     asyncio.run(source.run())
     thread.join()
     log = robot.logbook
-    yield {"samples": log.samples(), "words": log.words(), "frames": log.frames()}, source
+    loads = {bus.name: bus.load.windows() for bus in robot.buses}
+    yield {"samples": log.samples(), "words": log.words(), "frames": log.frames(), "loads": loads}, source
     robot.close()
 
 
@@ -88,7 +90,7 @@ def test_the_newest_frames_are_those_of_the_bus(walked):
     kept, source = walked
     frames = kept["frames"]
     on_bus = frames["bus"] == 0
-    shown = source.state(None)["frames"][0]
+    shown = source.state(None)["frames"]["can1"]
     assert [row["id"] for row in shown] == frames["identifier"][on_bus][::-1][: len(shown)].tolist()
     first = shown[0]
     data = bytes.fromhex(first["data"])
@@ -96,8 +98,40 @@ def test_the_newest_frames_are_those_of_the_bus(walked):
     assert int.from_bytes(data[4:], "little") == frames["word1"][on_bus][-1] & 0xFFFFFFFF
     identifiers = frames["identifier"][on_bus]
     assert first["count"] == np.sum(identifiers == first["id"])
-    earlier = source.state(0.3)["frames"][0]
-    assert all(row["time_s"] <= 0.3 for row in earlier) and earlier[0]["time_s"] > 0.29
+
+
+@pytest.mark.parametrize("bus", ["can1", "can2", "can3", "can4"])
+def test_frames_and_how_often_each_came_are_those_until_the_cursor(walked, bus):
+    kept, source = walked
+    frames = kept["frames"]
+    until = (frames["bus"] == int(bus[3]) - 1) & (frames["time_ns"] <= 300_000_000)
+    shown = source.state(0.3)["frames"][bus]
+    assert [row["id"] for row in shown] == frames["identifier"][until][::-1][:40].tolist()
+    for row in shown:
+        assert row["count"] == np.sum(frames["identifier"][until] == row["id"])
+
+
+@pytest.mark.parametrize("bus", ["can1", "can2", "can3", "can4"])
+def test_the_load_at_the_cursor_is_that_of_the_buss_own_meter(walked, bus):
+    """In single precision, per cent: a bit of a window of 30,000 is 3e-3."""
+    kept, source = walked
+    meter = kept["loads"][bus]
+    at = source.state(0.3011)["buses"][bus]  # the window that ended last is the one until 0.3 s
+    assert at["load"] == pytest.approx(100 * meter[29], abs=1e-4)
+    channel = number_of(source, f"load_{bus}")
+    assert source.values([channel], 0.3011) == [pytest.approx(at["load"])]
+    assert at["of_second"]["worst"] == pytest.approx(100 * max(meter[1:30]), abs=1e-4)  # all since the robot was there
+    assert at["errors"] == 0
+    trace = source.trace(channel, 0.0, SECONDS, 4000)
+    assert trace.low.max() == pytest.approx(100 * max(meter[1:]), abs=1e-4)
+
+
+def test_so_many_frames_came_in_the_second_before(walked):
+    kept, source = walked
+    times = kept["frames"]["time_ns"][kept["frames"]["bus"] == 3]
+    bus = next(bus for bus in source.buses if bus.name == "can4")
+    assert bus.frames.within(100_000_000, 300_000_000) == np.sum((times > 100_000_000) & (times <= 300_000_000))
+    assert bus.content(0.3, SECONDS)["frames_per_s"] is None  # it is not there for a second yet
 
 
 def test_the_robot_stands_at_an_instant_as_its_body_did(walked):
@@ -132,9 +166,11 @@ def test_errors_are_counted_by_board_and_code_and_those_of_a_healthy_walk_stand_
     errors.note(0, 4.0)
     rows = errors.content(10.0)
     assert [(row["board"], row["count"], row["first_s"], row["last_s"], row["normal"]) for row in rows] == [
+        ("MCH", 4, 1.0, 2.5, True),  # a row keeps its place while others come
         ("MCH", 900, 3.0, 3.0, False),
-        ("MCH", 4, 1.0, 2.5, True),
     ]
+    assert [row["until"] for row in errors.content(10.0, 2.4)] == [1, 0]
+    assert [row["until"] for row in errors.content(10.0, 2.5)] == [4, 0]
 
 
 def all_normal():

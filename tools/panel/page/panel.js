@@ -277,10 +277,9 @@ function tell_state() {
     put(by("inside-at"), insideAt());
     put(by("slots-note"), SLOTS_NOTE + (state.slots_note ? ` ${state.slots_note}` : ""));
     renew(by("buses"), tables.buses(state.buses ?? {}));
-    const chosen = by("bus").value || "0";
-    if (by("bus").length !== (state.frames ?? []).length) by("bus").replaceChildren(...(state.frames ?? []).map((_, k) => new Option(`can${k + 1}`, k)));
-    by("bus").value = chosen;
-    renew(by("frames"), tables.frames((state.frames ?? [])[+chosen] ?? [], by("frame-search").value));
+    const frames = state.frames ?? {}, names = Object.keys(frames);
+    if (by("bus").length !== names.length) by("bus").replaceChildren(...names.map((name) => new Option(name, name)));
+    renew(by("frames"), tables.frames(frames[by("bus").value] ?? [], by("frame-search").value));
   }
   if (view === "link" && state.link) {
     put(by("link-state"), tables.linkState(state.link));

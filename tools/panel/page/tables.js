@@ -47,12 +47,21 @@ export function meter(share, text, alarms = true) {
   return box;
 }
 
+// a meter with a line at another share
+function marked(box, share) {
+  const mark = document.createElement("b");
+  mark.style.left = `${Math.max(0, Math.min(100, 100 * share))}%`;
+  box.append(mark);
+  return box;
+}
+
 const seconds = (value) => value === null || value === undefined ? "–" : `${value.toFixed(3)} s`;
 
 export function errors(rows, caption) {
   if (!rows.length) return note("none");
-  return table(caption, ["board", "error", "#count", "#first", "#last", "meaning"],
-    rows.map((row) => [row.board, row.name, row.count.toLocaleString("en"), seconds(row.first_s), seconds(row.last_s), row.text]));
+  const then = rows.some((row) => (row.until ?? null) !== null);   // at the cursor
+  return table(caption, ["board", "error", "#count", ...(then ? ["#until the cursor"] : []), "#first", "#last", "meaning"],
+    rows.map((row) => [row.board, row.name, whole(row.count), ...(then ? [whole(row.until)] : []), seconds(row.first_s), seconds(row.last_s), row.text]));
 }
 
 const time = (us) => us === undefined || us === null ? "–" : us < 100 ? `${us.toFixed(1)} µs` : us < 1e3 ? `${Math.round(us)} µs` : us < 1e6 ? `${(us / 1e3).toFixed(1)} ms` : `${(us / 1e6).toFixed(1)} s`;
@@ -60,11 +69,7 @@ const time = (us) => us === undefined || us === null ? "–" : us < 100 ? `${us.
 // Of a slot: what it took (the bar), what the worst of the second before it took (the mark).
 function slotBar(name, slot, slot_us) {
   const share = slot.used_us / slot_us, worst = slot.used ? slot.used.worst / slot_us : share;
-  const box = meter(share, `${name}: ${Math.round(100 * share)} % of its slot, at worst ${Math.round(100 * worst)} % in the second before`);
-  const mark = document.createElement("b");
-  mark.style.left = `${Math.min(100, 100 * worst)}%`;
-  box.append(mark);
-  return box;
+  return marked(meter(share, `${name}: ${Math.round(100 * share)} % of its slot, at worst ${Math.round(100 * worst)} % in the second before`), worst);
 }
 
 const LATEST_US = 1e6;   // the bar of lateness goes from 1 µs to 1 s, by the logarithm
@@ -108,19 +113,26 @@ export function boards(found, slots, slots_us, ask) {
   }));
 }
 
+const whole = (count) => count === null || count === undefined ? "–" : count.toLocaleString("en");
+const percent = (value) => value === null || value === undefined ? "–" : `${value.toFixed(1)} %`;
+
+// Of a bus: the load of the last 10 ms (the bar), the fullest 10 ms of the second before (the mark).
 export function buses(found) {
   const names = Object.keys(found);
-  if (!names.length) return note("nothing is known of the buses yet");
-  return table("loads of the buses", ["bus", "load in 10 ms", "#-share", "#error frames"], names.map((name) =>
-    [name, meter(found[name].load, `${name}: ${Math.round(100 * found[name].load)} %`), `${(100 * found[name].load).toFixed(1)} %`, found[name].errors]));
+  return table("loads of the buses", ["bus", "load in 10 ms", "#-share", "#fullest of 1 s", "#frames in 1 s", "#error frames"], names.map((name) => {
+    const bus = found[name], worst = bus.of_second?.worst ?? bus.load;
+    const bar = bus.load === null ? "not known"
+      : marked(meter(bus.load / 100, `${name}: ${percent(bus.load)} of it taken, at most ${percent(worst)} in the second before`), worst / 100);
+    return [name, bar, percent(bus.load), percent(bus.of_second?.worst), whole(bus.frames_per_s), whole(bus.errors)];
+  }));
 }
 
 export function frames(rows, filter) {
   const wanted = filter.trim().toUpperCase();
-  const shown = rows.filter((row) => !wanted || row.name.includes(wanted) || String(row.id) === wanted);
+  const shown = rows.filter((row) => !wanted || row.name.toUpperCase().includes(wanted) || String(row.id) === wanted);
   if (!shown.length) return note("no frames");
-  return table("newest frames", ["#time", "#id", "name", "#value", "data", "#until now"], shown.map((row) =>
-    [seconds(row.time_s), row.id, row.name, figure(row.value), Object.assign(document.createElement("code"), { textContent: row.data }), row.count.toLocaleString("en")]));
+  return table("newest frames", ["#time", "#id", "name", "#value", "data", "#until then"], shown.map((row) =>
+    [seconds(row.time_s), row.id, row.name, typeof row.value === "string" ? row.value : figure(row.value), Object.assign(document.createElement("code"), { textContent: row.data }), whole(row.count)]));
 }
 
 // ---- the data link

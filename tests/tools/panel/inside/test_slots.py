@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from ranger_sim.tools.panel.slots import KEPT_S, BoardSlots
+from ranger_sim.tools.panel.inside.slots import KEPT_S, BoardSlots
 
 HZ = 60_000_000
 START_NS = 5_000_000  # the robot's power-up

@@ -1,0 +1,83 @@
+"""Frames of a bus as the page lists them, from rows by hand."""
+
+import numpy as np
+import pytest
+
+from ranger_sim.can_bus.frame import FIELD_DATA
+from ranger_sim.datatable.generated import all_variables
+from ranger_sim.foundation.events import FLAG_ERROR, FLAG_EXTENDED, FLAG_REMOTE
+from ranger_sim.tools.panel.inside.frames import ERROR, RecentFrames, listed, of_nobody, of_the_robot
+
+ANGLE = all_variables.ID_OF["MCH_ANGLE"]
+ONE = 0x3F800000  # 1.0 in single precision
+
+
+def row(time_ns, identifier, flags=8, low=0, high=0):
+    return (time_ns, low << 12 | flags << 4, high << 29 | identifier)
+
+
+def rows(*each):
+    return np.array([row(*frame) for frame in each], np.int64)
+
+
+def shown(frames, until_ns=None, read=of_the_robot):
+    return listed(frames.until(until_ns, 40), lambda keys: frames.counts(until_ns, keys), 1_000_000_000, read)
+
+
+@pytest.fixture
+def frames():
+    found = RecentFrames(100)
+    found.append(rows((1_500_000_000, ANGLE, 8, ONE, 7), (2_500_000_000, 5, 3, 0xAABBCC, 0)))
+    found.append(rows((3_500_000_000, ANGLE, 8, ONE, 8)))
+    return found
+
+
+def test_a_variable_is_told_by_its_name_and_value_the_newest_first(frames):
+    first, second, third = shown(frames)
+    assert first == {
+        "time_s": pytest.approx(2.5),
+        "count": 2,
+        "id": ANGLE,
+        "name": "MCH_ANGLE",
+        "value": 1.0,
+        "data": "00 00 80 3f 08 00 00 00",
+    }
+    assert (second["data"], second["count"], third["count"]) == ("cc bb aa", 1, 2)
+    assert shown(frames, read=of_nobody)[0]["name"] == ""
+
+
+def test_at_an_earlier_instant_there_were_fewer(frames):
+    assert [each["count"] for each in shown(frames, 2_500_000_000)] == [1, 1]
+    assert shown(frames, 1_499_999_999) == []
+
+
+def test_error_remote_and_long_frames_are_not_taken_for_variables():
+    found = RecentFrames(100)
+    found.append(
+        rows(
+            (1, ANGLE, FLAG_ERROR | 8, FIELD_DATA, 30), (2, ANGLE, FLAG_REMOTE | 8), (3, ANGLE, FLAG_EXTENDED | 8, ONE)
+        )
+    )
+    long, remote, error = shown(found)
+    assert (long["id"], long["name"], long["value"], long["count"]) == (ANGLE, "", None, 1)
+    assert (remote["data"], remote["value"]) == ("remote", None)
+    assert (error["id"], error["name"], error["data"]) == (None, "error frame, data", "")
+    assert found.counts(None, [ERROR, ANGLE]) == [1, 1]
+
+
+def test_the_last_frames_are_kept_and_all_are_counted():
+    found = RecentFrames(100)
+    for first in range(0, 1000, 30):
+        found.append(rows(*((time_ns, 5) for time_ns in range(first, first + 30))))
+    assert found.until(None, 5)[:, 0].tolist() == [1015, 1016, 1017, 1018, 1019]
+    assert found.until(950, 3)[:, 0].tolist() == [948, 949, 950]
+    assert found.counts(None, [5]) == [1020] and found.counts(950, [5]) == [951]
+    assert found.within(940, 950) == 10 and found.within(2, 950) is None
+    assert len(found.kept) == 200
+
+
+def test_another_robot_of_the_same_name_begins_anew():
+    found = RecentFrames(100)
+    found.append(rows((1000, 5), (2000, 5)))
+    found.append(rows((10, 6)))
+    assert found.counts(None, [5, 6]) == [0, 1] and len(found.until(None, 9)) == 1

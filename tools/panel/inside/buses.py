@@ -1,0 +1,102 @@
+"""Buses of a source: their frames and load at an instant, and the load as a channel beside what it was for."""
+
+from __future__ import annotations
+
+from typing import Any, Protocol
+
+import numpy as np
+
+from ranger_sim.harness.records import logbook
+from ranger_sim.tools.panel.channels import Channel, Memory, Times, Values
+from ranger_sim.tools.panel.inside.frames import ERROR, Reading, listed
+from ranger_sim.tools.panel.inside.load import WINDOW_NS, Load
+from ranger_sim.tools.panel.inside.slots import STATISTICS_S, statistics
+
+GROUP = "buses"
+FRAMES_SHOWN = 40
+KEPT_S = 3600.0  # of the load of a running robot; chosen by us: 9 MB for a bus, once it is full
+SECOND_NS = 10**9
+WINDOW_S = WINDOW_NS * 1e-9
+
+
+class Frames(Protocol):
+    """Frames of a bus, in memory or in a file."""
+
+    def until(self, until_ns: int | None, most: int) -> Any:
+        """The last rows not later than an instant."""
+
+    def within(self, first_ns: int, until_ns: int) -> int | None:
+        """How many came between two instants."""
+
+    def counts(self, until_ns: int | None, keys: list[int]) -> list[int | None]:
+        """How many there were of each kind until an instant; None: not known yet."""
+
+
+class Bus:
+    """One bus. start_ns: the stamp of its frames at the source's time 0; bit_per_s: None where nobody knows it.
+
+    more_errors: error frames that are known otherwise than by rows, beyond those of the rows.
+    """
+
+    def __init__(
+        self, name: str, start_ns: int, bit_per_s: int | None, frames: Frames, read: Reading, kept_s: float = KEPT_S
+    ) -> None:
+        self.name = name
+        self.start_ns = start_ns
+        self.frames = frames
+        self.read = read
+        self.load = None if bit_per_s is None else Load(bit_per_s, start_ns)
+        self.memory = Memory(1, WINDOW_S, kept_s)
+        self.more_errors = 0
+
+    def channels(self) -> list[Channel]:
+        """What a plot may show of it."""
+        if self.load is None:
+            return []
+        return [Channel(f"load_{self.name}", "%", f"{self.name}: share of the 10 ms before that was taken", GROUP)]
+
+    def take(self, rows: Any) -> None:
+        """These have passed."""
+        if self.load is not None:
+            self._note(*self.load.take(logbook.decoded(rows)))
+
+    def passed(self, until_ns: int) -> None:
+        """Nothing else has passed until then."""
+        if self.load is not None:
+            self._note(*self.load.passed(until_ns))
+
+    def gap(self) -> None:
+        """Frames were missed here."""
+        if self.load is not None:
+            self.load.gap()
+
+    def _note(self, times: Times, shares: Values) -> None:
+        self.memory.append(times, 100.0 * shares[:, np.newaxis])
+
+    def value(self, at: float | None) -> float | None:
+        """Of the window that had ended last, %; None: that is not known."""
+        row = self.memory.row(np.inf if at is None else at)
+        return None if row is None or (at is not None and at - row[0] > 2 * WINDOW_S) else float(row[1][0])
+
+    def content(self, at: float | None, now_s: float) -> dict[str, Any]:
+        """Of the 10 ms and of the second before an instant (None: now): load in %, frames, and error frames until then.
+
+        "load" and "of_second" are None where nothing is known.
+        """
+        end_s = now_s if at is None else at
+        end_ns = self.start_ns + round(end_s * 1e9)
+        times, values = self.memory.fine.rows()
+        first, last = np.searchsorted(times, (end_s - STATISTICS_S, end_s), side="right")
+        errors = self.frames.counts(None if at is None else end_ns, [ERROR])[0]
+        return {
+            "load": self.value(at),
+            "of_second": statistics(values[first:last, 0]) if self.value(at) is not None else None,
+            "frames_per_s": self.frames.within(end_ns - SECOND_NS, end_ns),
+            "errors": None if errors is None else errors + self.more_errors,
+        }
+
+    def listed(self, at: float | None) -> list[dict[str, Any]]:
+        """The last frames until an instant, the newest first, with what they carry."""
+        until_ns = None if at is None else self.start_ns + round(at * 1e9)
+        rows = self.frames.until(until_ns, FRAMES_SHOWN)
+        return listed(rows, lambda keys: self.frames.counts(until_ns, keys), self.start_ns, self.read)
