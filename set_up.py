@@ -153,8 +153,10 @@ class Steps:
             elif text.startswith("Installing"):
                 self.line.show("packages", f"installing {of} packages")
 
+        # the lock has everything that is wanted: pyproject.toml leaves out what a package has no need of here
         # bytecode is written when a module is first imported: most of them never are
         options = ["--disable-pip-version-check", "--progress-bar", "off", "--no-compile", "--require-hashes"]
+        options += ["--no-deps"]
         self.run([self.python, "-m", "pip", "install", *options, "-r", wanted], seen)
         self.line.show("packages", f"{of} packages ({what})", end=True)
         wanted.replace(kept)

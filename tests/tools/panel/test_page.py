@@ -103,9 +103,6 @@ def test_a_person_at_the_panel_of_a_walking_robot(tmp_path):
         # the lines have the height that the axis has
         high = "((p) => [p.strip.canvas.height, Math.round(p.chart.bbox.height)])(window.rangerPanel.plots.all()[0])"
         assert len(set(page.value(high))) == 1
-        # the lines have the height that the axis has
-        high = "((p) => [p.strip.canvas.height, Math.round(p.chart.bbox.height)])(window.rangerPanel.plots.all()[0])"
-        assert len(set(page.value(high))) == 1
         drawn = page.value("window.rangerPanel.plots.all().at(-1).found[0].low.at(-1)")
         assert -0.6 < drawn < 0.6  # rad between the legs of a walking robot
         assert "MCH_ANGLE" in page.value("location.hash")

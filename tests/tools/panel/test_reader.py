@@ -1,0 +1,101 @@
+"""The page for who has it read aloud: axe-core finds nothing in any view, and what has a picture has words."""
+
+import importlib.resources
+import re
+import signal
+import subprocess
+import sys
+
+import pytest
+
+from tests import browser
+from tests.tools.panel.test_page import PATIENCE_S, Hand, page_of, served
+
+pytestmark = pytest.mark.skipif(browser.BROWSER is None, reason="no browser here")
+AXE = importlib.resources.files("axe_playwright_python").joinpath("axe.min.js")
+# What axe finds, of whatever weight: the rule, and where.
+FOUND = """axe.run(document, { resultTypes: ["violations"] }).then((all) => all.violations.map(
+    (each) => `${each.impact}: ${each.id}: ${each.nodes.map((node) => node.html.slice(0, 120)).join(" ")}`))"""
+# Roles that say nothing without a name.
+NAMED = {"button", "checkbox", "combobox", "img", "link", "meter", "searchbox", "slider", "tab", "table", "textbox"}
+
+
+def looked_through(page, views):
+    """Every view, light and dark, at a telephone's width and at a screen's."""
+    hand = Hand(page)
+    page.value(AXE.read_text(encoding="utf-8") + ";0")
+    for dark in (False, True):
+        page.colours(dark)
+        for width in (390, 1400):
+            page.resize(width, 1000, 1)
+            for view in views:
+                hand.view(view)
+                pictures = page.value("window.rangerPanel.shown()")
+                page.until(f"window.rangerPanel.shown() > {pictures} + 2")
+                assert page.value(FOUND) == [], (view, width, "dark" if dark else "light")
+
+
+def named(page):
+    """{role: names} of what the browser tells a screen reader."""
+    found = {}
+    for node in page.call("Accessibility.getFullAXTree")["nodes"]:
+        if not node.get("ignored"):
+            name = node.get("name", {}).get("value", "")
+            found.setdefault(node["role"]["value"], []).append(name)
+    return found
+
+
+def test_axe_finds_nothing_in_any_view_of_a_robot_and_everything_has_a_name(tmp_path):
+    with served("--walk") as (address, _), page_of(address, tmp_path) as page:
+        page.until("window.rangerPanel.span()[1] > 2")
+        page.value("document.getElementById('pause').click()")  # it need not keep its pace beside this
+        Hand(page).sees("state.pace.paused === true")
+        looked_through(page, ["plots", "parameters", "errors", "inside", "faults", "help"])
+        for view in ("plots", "inside"):
+            Hand(page).view(view)
+            told = named(page)
+            for role in NAMED & told.keys():
+                assert all(name.strip() for name in told[role]), (view, role, told[role])
+            assert any(re.match(r"light 1: \w+", name) for name in told["image"] if "light" in name), told["image"]
+            assert any(name.startswith("display: ") for name in told["image"])
+            if view == "plots":
+                plot = r"plot 1, -?\d+\.\d to \d+\.\d s\. hip_rad, rad: -?0\.\d+, between -?\d.* and \d"
+                assert any(re.match(plot, name) for name in told["image"])
+            else:
+                assert {"slots of the boards", "loads of the buses", "newest frames"} <= {*told["table"]}
+
+
+def test_what_is_live_speaks_only_when_it_has_something_new(tmp_path):
+    with served("--walk") as (address, _), page_of(address, tmp_path) as page:
+        page.until("window.rangerPanel.span()[1] > 2")
+        page.value("""{
+            window.spoken = [];
+            const heard = new MutationObserver((all) => spoken.push(...all.map((each) => each.target.textContent)));
+            for (const each of document.querySelectorAll("[role=status], [role=alert], [aria-live]"))
+                heard.observe(each, { childList: true, characterData: true, subtree: true });
+            0 }""")
+        pictures = page.value("window.rangerPanel.shown()")
+        page.until(f"window.rangerPanel.shown() > {pictures} + 40")
+        assert page.value("window.spoken") == []
+
+
+def test_axe_finds_nothing_in_the_view_of_a_data_link_and_gaps_are_told(tmp_path):
+    command = [sys.executable, "-m", "ranger_sim", "up", "--daq-port", "pty", "--daq-dropouts"]
+    robot = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+    try:
+        port = next(found[0] for line in robot.stderr if (found := re.search(r"/dev/pts/\d+", line)))
+        with served("--port", port) as (address, _), page_of(address, tmp_path) as page:
+            hand = Hand(page)
+            hand.view("link")
+            hand.sees("state.link?.lists?.some((row) => row.list === 'fast' && row.variables > 3 && row.rate_hz > 10)")
+            hand.sees("state.link.chosen.some((row) => row.gaps > 0)")
+            name = "document.querySelector('#link-chosen tbody th').textContent"
+            assert page.value(name) in page.value("[...document.querySelectorAll('#names option')].map((e) => e.value)")
+            looked_through(page, ["link"])
+            # where nothing came there is no line: a point of nothing in what the plot was given
+            hand.view("plots")
+            empty = "(t) => t.low.some((v, k) => v !== v && k > 0 && k < t.low.length - 1)"
+            page.until(f"window.rangerPanel.plots.all().some((p) => p.found?.some({empty}))")
+    finally:
+        robot.send_signal(signal.SIGINT)
+        robot.communicate(timeout=PATIENCE_S)
