@@ -93,6 +93,7 @@ def test_slots_and_their_lateness_stand_at_the_mark_as_the_plots_have_them(walki
         hand.give("#search", name)
         hand.click("#channels button", name)
     press(walking, "h")
+    press(walking, "ArrowLeft")  # a cursor, around which is zoomed
     while np.diff(walking.value("window.rangerPanel.held()")) > FINE_S:
         press(walking, "+")
     walking.until(
@@ -104,6 +105,7 @@ def test_slots_and_their_lateness_stand_at_the_mark_as_the_plots_have_them(walki
     inside = np.flatnonzero((late[0] > begin) & (late[0] < end))
     k = inside[np.argmax(late[1, inside])]  # the latest of them
     assert late[0, k] == used[0, k]
+    press(walking, "Escape")  # the cursor's instant would go before the mark's
     walking.value(f"window.rangerPanel.plots.setMark({late[0, k]})")
     hand.view("inside")
     hand.sees(f"text('inside-at').startsWith('at {late[0, k]:.3f} s')")
