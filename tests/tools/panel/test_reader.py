@@ -1,6 +1,7 @@
 """The page for who has it read aloud: axe-core finds nothing in any view, and what has a picture has words."""
 
 import importlib.resources
+import os
 import re
 import signal
 import subprocess
@@ -79,8 +80,9 @@ def test_what_is_live_speaks_only_when_it_has_something_new(tmp_path):
         assert page.value("window.spoken") == []
 
 
-def test_axe_finds_nothing_in_the_view_of_a_data_link_and_gaps_are_told(tmp_path):
+def test_axe_finds_nothing_in_the_view_of_a_data_link_and_plots_have_no_line_in_the_gaps_that_it_tells(tmp_path):
     command = [sys.executable, "-m", "ranger_sim", "up", "--daq-port", "pty", "--daq-dropouts"]
+    command += ["--name", f"linked-{os.getpid()}"]
     robot = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
     try:
         port = next(found[0] for line in robot.stderr if (found := re.search(r"/dev/pts/\d+", line)))
@@ -88,14 +90,25 @@ def test_axe_finds_nothing_in_the_view_of_a_data_link_and_gaps_are_told(tmp_path
             hand = Hand(page)
             hand.view("link")
             hand.sees("state.link?.lists?.some((row) => row.list === 'fast' && row.variables > 3 && row.rate_hz > 10)")
-            hand.sees("state.link.chosen.some((row) => row.gaps > 0)")
-            name = "document.querySelector('#link-chosen tbody th').textContent"
-            assert page.value(name) in page.value("[...document.querySelectorAll('#names option')].map((e) => e.value)")
             looked_through(page, ["link"])
-            # where nothing came there is no line: a point of nothing in what the plot was given
+            hand.sees("state.link.chosen.some((row) => row.name === 'MCH_ANGLE' && row.gaps > 0)")
+            rows = "[...document.querySelectorAll('#link-chosen tbody tr')].map((row) => row.innerText.split(/[\\s]+/))"
+            told = next(row for row in page.value(rows) if row[0] == "MCH_ANGLE")
+            last_s = float(told[-2])  # when it came again, and "s"
             hand.view("plots")
-            empty = "(t) => t.low.some((v, k) => v !== v && k > 0 && k < t.low.length - 1)"
-            page.until(f"window.rangerPanel.plots.all().some((p) => p.found?.some({empty}))")
+            hand.click("#freeze", "Hold")
+            plot = "window.rangerPanel.plots.all()[0]"
+            page.until(f"{plot}.strip === null && {plot}.found?.length > 0")
+            assert page.value("document.querySelector('.chip span').textContent").startswith("MCH_ANGLE")
+            times, low = page.value(f"[{plot}.found[0].x, {plot}.found[0].low].map((each) => Array.from(each))")
+            begin, end = page.value("window.rangerPanel.held()")
+            column_s = (end - begin) / page.value(f"window.rangerPanel.plots.points({plot}, false)")
+            nothing = [k for k, value in enumerate(low) if value is None and 0 < k < len(low) - 1]
+            assert nothing
+            # a point has the time when it was measured, the list tells when it came: some cycles of 2 ms later
+            assert min(abs(times[k + 1] - last_s) for k in nothing) <= column_s + 0.01
+            # silences of the radio last 50 to 180 ms, and columns reach into them from both ends
+            assert all(times[k + 1] - times[k - 1] > 0.05 - 2 * column_s for k in nothing)
     finally:
         robot.send_signal(signal.SIGINT)
         robot.communicate(timeout=PATIENCE_S)
