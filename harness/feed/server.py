@@ -14,6 +14,7 @@ from ranger_sim import datatable
 from ranger_sim.foundation.peers import LIMITS, MALFORMED, REASONS, Door, Peer, SocketStream
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.conditions import STATE_VARIABLES, state_names
+from ranger_sim.harness.faults.power import PowerlessBoard
 from ranger_sim.harness.feed import records
 from ranger_sim.harness.records.summary import energy
 
@@ -102,11 +103,11 @@ class FeedServer(Door[Peer]):
 
     def state(self, now_ns: int) -> dict[str, Any]:
         """What is in no stream: the panel of the user interface board, faults, how far it walked."""
-        robot, outside = self.robot, self._outside()
-        panel = robot.loop.board("UI").memory
+        robot, outside, unseen = self.robot, self._outside(), why_unseen(self.robot)
         return {
             "time_ns": now_ns,
-            "panel": None if panel is None else list(panel),
+            "panel": None if unseen else list(robot.loop.board("UI").memory),
+            "panel_unseen": unseen,
             "steps": robot.steps,
             "distance_m": robot.distance_m,
             "speed_m_per_s": robot.mean_speed_m_per_s(),
@@ -189,3 +190,17 @@ class FeedServer(Door[Peer]):
         """Whole numbers by name: viewers now and seen, rows left out, and who was sent away, by reason."""
         away = {f"sent_away_{reason}": self.sent_away[reason] for reason in REASONS}
         return {"viewers": len(self.peers), **self.totals, **away}
+
+
+def why_unseen(robot: Any) -> str:
+    """Why nobody here can know what the front panel shows, in a sentence; empty where it is known."""
+    board, profile = robot.loop.board("UI"), robot.profile
+    if profile is not None and "UI" in profile.external():
+        return "The user interface board is outside: its own display, lights and buzzer show what it drives."
+    if profile is not None and "UI" in profile.absent():
+        return "There is no user interface board in this run."
+    if isinstance(board, PowerlessBoard):
+        return "The user interface board is without power or held in reset."
+    if getattr(board, "gone", False):
+        return "The user interface board is lost: its process has ended."
+    return ""

@@ -215,6 +215,7 @@ class RobotSource(Source):
         return {
             "time_s": now_s,
             "panel": self.shown.get("panel"),
+            "panel_unseen": self.shown.get("panel_unseen", ""),
             "steps": self.shown.get("steps", 0),
             "distance_m": self.shown.get("distance_m", 0.0),
             "speed_m_per_s": self.shown.get("speed_m_per_s", 0.0),

@@ -13,6 +13,7 @@ from ranger_sim.foundation.events import PIN_OUTPUT
 from ranger_sim.foundation.row_stream import RowStream
 from ranger_sim.harness.feed.server import FeedServer
 from ranger_sim.harness.firmware import native_boards
+from ranger_sim.harness.outside.profile import Profile
 from tests.firmware_sim.native.support import COMPILER
 
 FACE = pathlib.Path(__file__).parent / "face"
@@ -110,3 +111,34 @@ def test_the_board_in_python_shows_what_its_pins_say():
                 address = byte & 0x7F
     text = [seen.get(address, 0x20) for address in (*range(8), *range(0x40, 0x48))]
     assert text == shown[:16] and len(seen) == 16 and bytes(text).strip()
+
+
+def test_a_board_without_power_shows_nothing_and_the_feed_says_why():
+    with contextlib.closing(Ranger(Scenario(seed=3))) as robot:
+        robot.inject("UI.supply", "brown_out", at="100 ms", off_ms=100)
+        feed = FeedServer(robot, "feed-of-a-dark-face")
+        robot.attach(feed)
+        robot.run_for(0.09)
+        assert any(feed.state(0)["panel"][16:22]) and feed.state(0)["panel_unseen"] == ""  # a light is on already
+        robot.run_for(0.06)
+        state = feed.state(0)
+        assert state["panel"] is None
+        assert state["panel_unseen"] == "The user interface board is without power or held in reset."
+        robot.run_for(0.056)  # the power is back since 201 ms, and nobody has written to the display yet
+        state = feed.state(0)
+        assert state["panel"][:16] == [ord(" ")] * 16 and state["panel_unseen"] == ""
+
+
+@pytest.mark.parametrize(
+    ("state", "sentence"),
+    [
+        ("external", "The user interface board is outside: its own display, lights and buzzer show what it drives."),
+        ("absent", "There is no user interface board in this run."),
+    ],
+)
+def test_of_a_board_that_does_not_run_here_nothing_is_made_up(state, sentence):
+    with contextlib.closing(Ranger(Scenario(seed=3))) as robot:
+        feed = FeedServer(robot, "feed-of-no-face")
+        robot.attach(feed)
+        robot.profile = Profile("test", "test.toml", "", "", {"UI": state}, {})
+        assert feed.state(0)["panel"] is None and feed.state(0)["panel_unseen"] == sentence

@@ -267,7 +267,7 @@ function tell_state() {
   put(by("pace-text"), pace.behind_s > 0.05 ? ` ${pace.behind_s.toFixed(2)} s late` : "");
   const errors = state.errors ?? [], unexpected = errors.filter((row) => !row.normal);
   put(by("error-count"), unexpected.length ? String(unexpected.length) : "");
-  if (can.has("panel")) face.show(state.panel);
+  if (can.has("panel")) face.show(state.panel, state.panel_unseen);
   if (view === "errors") {
     renew(by("errors-unexpected"), tables.errors(unexpected, "unexpected errors"));
     renew(by("errors-normal"), tables.errors(errors.filter((row) => row.normal), "errors as in every healthy walk"));
