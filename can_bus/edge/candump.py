@@ -91,12 +91,12 @@ def read_candump(path: str | pathlib.Path) -> Iterator[tuple[str, int, int, int,
     for number, line in enumerate(text.splitlines(), 1):
         if line.strip():
             try:
-                yield _frame_of_line(line)
+                yield frame_of_line(line)
             except ValueError as error:
                 raise UserError(f"{source}:{number}: {error}") from None
 
 
-def _frame_of_line(line: str) -> tuple[str, int, int, int, int, int]:
+def frame_of_line(line: str) -> tuple[str, int, int, int, int, int]:
     """One line of a log; ValueError says what is wrong with it."""
     parts = line.split()
     if len(parts) == 4 and parts[3] in ("R", "T"):

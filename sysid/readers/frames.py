@@ -32,7 +32,7 @@ def decode(
     """The signals of all frames that the DBC files know. UserError when there is none, or a file cannot be read."""
     dataset = Dataset(name, {})
     mapping = dict(mapping or {})
-    messages = _messages(databases)
+    messages = messages_of(databases)
     samples: dict[tuple[str, str], tuple[list[int], list[float], str]] = {}
     unknown: dict[int, int] = {}
     broken: dict[str, int] = {}
@@ -73,7 +73,7 @@ def decode(
     return dataset
 
 
-def _messages(databases: Iterable[str | pathlib.Path]) -> dict:
+def messages_of(databases: Iterable[str | pathlib.Path]) -> dict:
     """Messages by identifier, of all files together."""
     cantools = imported("cantools")
     found: dict = {}

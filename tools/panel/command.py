@@ -97,7 +97,8 @@ def source_of(options: argparse.Namespace, say: Any) -> Iterator[Any]:
         from ranger_sim.tools.panel.recording import Event, RecordingSource
 
         align = Event.typed(options.align) if options.align else None
-        yield RecordingSource(options.recordings, options.dbc, options.shift, align)
+        with contextlib.closing(RecordingSource(options.recordings, options.dbc, options.shift, align)) as recording:
+            yield recording
     elif options.port:
         from ranger_sim.tools.panel.link import LinkSource
 

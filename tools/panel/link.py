@@ -29,6 +29,11 @@ USUAL_OF = 50  # points whose median distance is the usual one, until the robot 
 SLOWEST_S = 0.5  # the slow list comes round in a third of a second (robot.md N4.15)
 STEP_S = 1e-3  # the clock of the robot's stamps
 NOTHING_S = 1e-4  # a point of nothing stands so long after the last one before a gap
+NO_SLOTS = (
+    "The data link brings no slots one by one. What the boards tell of them themselves are the channels "
+    "…_EXECUTION_TIME and …_MAX_EXECUTION_TIME."
+)
+NO_FRAMES = "The data link brings no frames: a program at the bus shows them (docs/how-to/can-tools.md)."
 NOTHING = np.full(1, np.nan, np.float32)
 
 
@@ -240,6 +245,7 @@ class LinkSource(Source):
                 "asked": "channels" in self.session.pending(),
             },
             "errors": sorted(rows, key=lambda row: row["first_s"]),
+            "missing": {"slots": NO_SLOTS, "buses": NO_FRAMES},
         }
 
     def _with_seconds(self, row: dict[str, Any]) -> dict[str, Any]:

@@ -7,6 +7,7 @@ import math
 import pathlib
 import re
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -15,6 +16,8 @@ from ranger_sim.foundation.user_error import UserError
 from ranger_sim.sysid.dataset import Dataset
 from ranger_sim.sysid.readers import run_folder
 from ranger_sim.tools.panel.channels import EMPTY, Channel, Times, Trace, Values, between, thinned
+from ranger_sim.tools.panel.inside.buses import Bus
+from ranger_sim.tools.panel.inside.recorded import NO_SLOTS, TOLD_SLOTS, Decoded, RunLogs
 from ranger_sim.tools.panel.source import ANKLES, KNOWN_POSE, LEGS, TRUE_POSE, Source, known_pose, known_states
 from ranger_sim.tools.recordings import datasets
 
@@ -59,13 +62,12 @@ class RecordingSource(Source):
     UserError for what cannot be read, or an event that is in one of them never.
     """
 
-    can = frozenset({"play"})
-
     def __init__(
         self, paths: Sequence[str], databases: Sequence[str] = (), shift_s: float = 0.0, align: Event | None = None
     ) -> None:
         super().__init__()
-        read_in = [read(path, databases) for path in paths]
+        decoded = [Decoded(pathlib.Path(path), databases) if databases else None for path in paths]
+        read_in = [read(path, databases, frames) for path, frames in zip(paths, decoded, strict=True)]
         if align is not None:
             first, second = (align.first(dataset) for dataset in read_in)
             shift_s += first - second
@@ -87,6 +89,14 @@ class RecordingSource(Source):
                 self.data.append((times, channel.value.astype(np.float32), period))
         if not self.data:
             raise UserError(f"{paths[0]}: there is no channel in it")
+        self.inside = [
+            inside_of(pathlib.Path(path), dataset, frames, shift_s if number else 0.0, self.span()[1], bool(number))
+            for number, (path, dataset, frames) in enumerate(zip(paths, read_in, decoded, strict=True))
+        ]
+        self.loads = [bus for part in self.inside for bus in part.buses if bus.load is not None]
+        self.channels += [channel for bus in self.loads for channel in bus.channels()]
+        errors = any(name in known and name.startswith("ERROR_") for dataset in read_in for name in dataset.channels)
+        self.can = frozenset({"play", "errors"} if errors else {"play"})
         self.number = {channel.name: place for place, channel in reversed(list(enumerate(self.channels)))}
         legs_known = any(all(name in self.number for name in pair) for pair in LEGS)
         if all(name in self.number for name in TRUE_POSE):
@@ -94,21 +104,44 @@ class RecordingSource(Source):
         elif legs_known and all(name in self.number for name in ANKLES):
             self.pose_names = KNOWN_POSE
 
+    async def run(self) -> None:
+        """Go through the logs of frames, which may take a minute for an hour of them."""
+        self.is_coming = True
+        for part in self.inside:
+            await part.run()
+        self.is_coming = False
+
+    def close(self) -> None:
+        """Give the logs back."""
+        for part in self.inside:
+            part.close()
+
+    def _load(self, channel: int) -> Bus | None:
+        return self.loads[channel - len(self.data)] if channel >= len(self.data) else None
+
     def span(self) -> tuple[float, float]:
         times = [times for times, _, _ in self.data if len(times)]
         return (min(float(each[0]) for each in times), max(float(each[-1]) for each in times)) if times else (0.0, 0.0)
 
     def trace(self, channel: int, begin: float, end: float, points: int) -> Trace:
+        if (bus := self._load(channel)) is not None:
+            return bus.memory.trace(0, begin, end, points)
         times, values, period = self.data[channel]
         return thinned(times, values, begin, end, points, period) if len(times) else EMPTY
 
     def samples(self, channel: int, begin: float, end: float) -> tuple[Times, Values]:
+        if (bus := self._load(channel)) is not None:
+            times, shares = bus.memory.fine.rows()
+            return between(times, shares[:, 0], begin, end)
         times, values, _ = self.data[channel]
         return between(times, values, begin, end)
 
     def values(self, wanted: list[int], at: float | None) -> list[float | None]:
         found: list[float | None] = []
         for channel in wanted:
+            if (bus := self._load(channel)) is not None:
+                found.append(bus.value(at))
+                continue
             times, values, _ = self.data[channel]
             place = len(times) - 1 if at is None else int(np.searchsorted(times, at, side="right")) - 1
             value = float(values[place]) if place >= 0 else None
@@ -128,9 +161,33 @@ class RecordingSource(Source):
             found = known_pose(values)
         return None if found is None else (self.span()[1] if at is None else at, found)
 
+    def state(self, at: float | None) -> dict[str, Any]:
+        end_s = self.span()[1]
+        no_slots = f"{NO_SLOTS} {TOLD_SLOTS}" if "MCH_EXECUTION_TIME" in self.number else NO_SLOTS
+        buses = [bus for part in self.inside for bus in part.buses]
+        return {
+            "time_s": end_s,
+            "buses": {bus.name: bus.content(at, end_s) for bus in buses},
+            "frames": {bus.name: bus.listed(at) for bus in buses},
+            "errors": [row for part in self.inside for row in part.errors.content(end_s, at)],
+            "missing": {"slots": no_slots, "buses": " ".join(dict.fromkeys(part.note() for part in self.inside))},
+        }
 
-def read(path: str, databases: Sequence[str]) -> Dataset:
-    """The channels of one recording, those of a simulated body among them."""
+
+def read(path: str, databases: Sequence[str], frames: Decoded | None) -> Dataset:
+    """The channels of one recording, those of a simulated body among them. frames: keeps them where it has some."""
     if (pathlib.Path(path) / run_folder.VARIABLES).is_file():
         return run_folder.read(path, truth=True)
-    return datasets.open_recording(path, databases=databases)
+    reader = None if frames is None else frames.passing
+    return datasets.open_recording(path, databases=databases, read_frames=reader)
+
+
+def inside_of(
+    path: pathlib.Path, dataset: Dataset, frames: Decoded | None, shift_s: float, end_s: float, is_second: bool
+) -> Decoded | RunLogs:
+    """What one recording keeps beside its channels."""
+    group = f" ({path.name})" if is_second else ""
+    if frames is None or not frames.words:
+        return RunLogs(path, dataset, group, shift_s, end_s)
+    frames.done(group, shift_s)
+    return frames

@@ -321,6 +321,7 @@ class Session:
         while True:
             self.changed.clear()
             self.shown.clear()
+            renews = live or self.source.is_coming
             for message in self.picture(loop.time()):
                 await self.send(message)
             await self.send(messages.text({"picture": self.source.span(), "lost": self.source.lost}))
@@ -330,7 +331,7 @@ class Session:
                 await asyncio.sleep(max(0.0, due_s - loop.time()))
             else:
                 with contextlib.suppress(TimeoutError):
-                    async with asyncio.timeout(STATE_S if live else None):
+                    async with asyncio.timeout(STATE_S if renews else None):
                         await self.changed.wait()
 
     def picture(self, now_s: float) -> list[bytes]:

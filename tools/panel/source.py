@@ -41,6 +41,7 @@ class Source:
         self.channels: list[Channel] = []
         self.geometry: dict[str, Any] = {}
         self.lost = ""  # why nothing more will come
+        self.is_coming = False  # what was recorded is still being read
         self.listed: list[dict[str, Any]] = []  # the channels as a page gets them, once one has come
 
     async def run(self) -> None:
@@ -70,7 +71,7 @@ class Source:
         return None
 
     def state(self, at: float | None) -> dict[str, Any]:
-        """What is in no channel: boards, buses, panel, errors, frames, faults."""
+        """What is in no channel: boards, buses, panel, errors, frames, faults; missing: why slots or buses are not."""
         return {}
 
     async def request(self, wish: dict[str, Any]) -> dict[str, Any]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import pathlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 from ranger_sim.foundation.user_error import UserError
@@ -43,9 +43,11 @@ def open_recording(
     mapping: Mapping[str, str] | None = None,
     databases: Sequence[str | pathlib.Path] = (),
     time_unit: str | None = None,
+    read_frames: Callable[[pathlib.Path], Iterable[frames.Frame]] | None = None,
 ) -> Dataset:
     """The channels of a file or folder. `databases`: DBC files, for frames (candump, BLF, ASC, TRC).
 
+    read_frames: reads them otherwise than can_bus.edge.logs.read_log does, to keep them.
     An MDF file is read as frames when DBC files are given, and as channels otherwise. UserError for all that is wrong.
     """
     path = pathlib.Path(path)
@@ -55,7 +57,7 @@ def open_recording(
 
         if not databases:
             raise UserError(f"{path}: a recording of CAN frames needs a DBC file (--dbc FILE)")
-        return frames.decode(path.name, read_log(path), databases, mapping)
+        return frames.decode(path.name, (read_frames or read_log)(path), databases, mapping)
     return readers.read(path, mapping, time_unit=time_unit, variable_units=robot_units())
 
 

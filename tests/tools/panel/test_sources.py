@@ -1,8 +1,12 @@
 """What the page is shown: a robot that runs, a recording, a data link; each against what is known of it otherwise."""
 
 import asyncio
+import contextlib
+import json
+import pathlib
 import threading
 
+import can
 import numpy as np
 import pytest
 
@@ -17,9 +21,11 @@ from ranger_sim.tools.panel.recording import Event, RecordingSource
 from ranger_sim.tools.panel.robot import RobotSource
 from ranger_sim.tools.panel.source import ANKLES, KNOWN_POSE, TRUE_POSE, known_pose
 from ranger_sim.tools.robodaq.codec import Point
+from ranger_sim.tools.run.logs import variables_part, write_frames
 from tests.tools.robodaq.on_a_line import OnALine
 
 SECONDS = 0.6
+GENERATED = pathlib.Path(all_variables.__file__).parent
 
 
 @pytest.fixture(scope="module")
@@ -48,7 +54,8 @@ def walked():
     thread.join()
     log = robot.logbook
     loads = {bus.name: bus.load.windows() for bus in robot.buses}
-    yield {"samples": log.samples(), "words": log.words(), "frames": log.frames(), "loads": loads}, source
+    kept = {"samples": log.samples(), "words": log.words(), "frames": log.frames(), "loads": loads, "robot": robot}
+    yield kept, source
     robot.close()
 
 
@@ -201,15 +208,106 @@ def test_a_runs_folder_is_shown_with_its_body_and_its_variables(folder):
     assert trace.x[-1] == 2.0 and np.isfinite(trace.low).all()
     angle, body = (source.values([number_of(source, name)], 1.9)[0] for name in ("MCH_ANGLE", "hip_rad"))
     assert angle == pytest.approx(body, abs=0.02)
+    source.close()
 
 
 def test_states_have_their_names_also_where_the_source_tells_numbers_only(folder):
     link = LinkSource("loop://")
-    for source in (RecordingSource([str(folder)]), link):
+    recording = RecordingSource([str(folder)])
+    for source in (recording, link):
         hip = source.channels[number_of(source, "FSM_HIP")].states
         assert hip[5] == "HI_premid" and hip[2] == "HO_premid" and len(hip) == 10
         assert source.channels[number_of(source, "MCH_ANGLE")].states == {}
+    recording.close()
     link.close()
+
+
+@pytest.fixture(scope="module")
+def recorded(walked, tmp_path_factory):
+    """The same walk, of which a folder was kept."""
+    robot, place = walked[0]["robot"], tmp_path_factory.mktemp("recorded")
+    write_frames(robot, place)
+    takers, close = variables_part(robot, place / "variables.mf4")
+    for stream, take in takers.items():
+        for rows in robot.logbook.kept(stream):
+            take(rows)
+    close()
+    with contextlib.closing(RecordingSource([str(place)])) as source:
+        asyncio.run(source.run())
+        yield source
+
+
+@pytest.mark.parametrize("at", [0.0213, 0.3011, 0.5555])
+def test_inside_of_a_robot_that_ran_and_of_its_recording_are_one(walked, recorded, at):
+    running, kept = walked[1].state(at), recorded.state(at)
+    for bus, rows in running["frames"].items():
+        for row, found in zip(rows, kept["frames"][bus], strict=True):
+            stamps = row.pop("time_s"), found.pop("time_s")
+            assert 0.0 <= stamps[0] - stamps[1] < 1e-6 and row == found  # a log has microseconds
+    assert len(kept["errors"]) > 2
+    for row, found in zip(running["errors"], kept["errors"], strict=True):
+        times = [(each.pop("first_s"), each.pop("last_s")) for each in (row, found)]
+        assert times[0] == pytest.approx(times[1], abs=1e-6) and row == found
+
+
+@pytest.mark.parametrize("bus", ["can1", "can2", "can3", "can4"])
+def test_the_load_of_a_recorded_bus_is_that_of_its_own_meter(walked, recorded, bus):
+    """In every window; a stamp in microseconds moves up to 3 bits of 30,000 over an edge, 0.01 %."""
+    meter = walked[0]["loads"][bus]
+    times, shares = recorded.samples(number_of(recorded, f"load_{bus}"), 0.0, SECONDS)
+    numbers = np.rint(times / 0.01).astype(int) - 1
+    assert len(numbers) >= 56 and shares.max() > 5.0
+    np.testing.assert_allclose(shares, 100 * np.array(meter)[numbers], atol=0.0101)
+    assert recorded.values([number_of(recorded, f"load_{bus}")], 0.3011) == [pytest.approx(100 * meter[29], abs=0.0101)]
+
+
+def test_the_frames_of_a_walks_folder_are_those_that_python_can_reads(folder):
+    with contextlib.closing(RecordingSource([str(folder)])) as source:
+        assert "being read" in source.state(1.0)["missing"]["buses"]
+        asyncio.run(source.run())
+        shown = source.state(1.2345)
+    with can.LogReader(folder / "can3.log") as reader:
+        messages = [message for message in reader if message.timestamp <= 1.2345]
+    rows = shown["frames"]["can3"]
+    assert [row["id"] for row in rows] == [message.arbitration_id for message in messages[::-1][:40]]
+    assert [row["data"] for row in rows] == [message.data.hex(" ") for message in messages[::-1][:40]]
+    identifiers = [message.arbitration_id for message in messages]
+    assert [row["count"] for row in rows] == [identifiers.count(row["id"]) for row in rows]
+    second = [message for message in messages if message.timestamp > 0.2345]
+    assert shown["buses"]["can3"]["frames_per_s"] == len(second)
+    assert shown["missing"]["buses"] == "" and "keeps no slots" in shown["missing"]["slots"]
+
+
+def test_the_errors_of_a_walks_folder_are_those_of_its_summary_as_far_as_they_were_sent(folder):
+    summary = json.loads((folder / "summary.json").read_text())["errors"]
+    with contextlib.closing(RecordingSource([str(folder)])) as source:
+        asyncio.run(source.run())
+        rows = source.state(None)["errors"]
+    assert "errors" in source.can and {row["board"] for row in rows} == set(summary)
+    for row in rows:
+        assert 0 < row["count"] <= summary[row["board"]][row["name"]]
+
+
+def test_frames_with_their_dbc_file_are_shown_by_it_and_their_load_is_not_known(folder):
+    path, database = str(folder / "can1.log"), GENERATED / "can1.dbc"
+    with contextlib.closing(RecordingSource([path], [str(database)])) as source:
+        shown = source.state(1.2345)
+    with contextlib.closing(RecordingSource([str(folder)])) as known:
+        asyncio.run(known.run())
+        expected = known.state(1.2345)["frames"]["can1"]
+    for row, by_dbc in zip(expected, shown["frames"]["can1"], strict=True):
+        assert [row[name] for name in ("id", "data", "count")] == [by_dbc[name] for name in ("id", "data", "count")]
+        assert by_dbc["name"].startswith(row["name"])
+    assert shown["buses"]["can1"]["errors"] is None
+    assert shown["buses"]["can1"]["load"] is None and "do not tell the bit rate" in shown["missing"]["buses"]
+    assert source.can == {"play"}
+
+
+def test_what_a_recording_of_variables_or_a_link_does_not_keep_is_said(folder):
+    with contextlib.closing(RecordingSource([str(folder / "variables.mf4")])) as source:
+        state = source.state(1.0)
+    assert state["buses"] == {} and "keeps no frames" in state["missing"]["buses"]
+    assert {"MB", "MCSI"} <= {row["board"] for row in state["errors"]}
 
 
 def test_a_second_recording_lies_over_the_first_moved_in_time(folder):
@@ -217,6 +315,13 @@ def test_a_second_recording_lies_over_the_first_moved_in_time(folder):
     first, second = (number_of(source, name) for name in ("hip_rad", "hip_rad (run)"))
     assert source.values([first], 1.0) == source.values([second], 1.5)
     assert source.span()[1] == pytest.approx(2.5, abs=0.01)
+    asyncio.run(source.run())
+    first, second = source.state(1.0003)["frames"]["can1"], source.state(1.5003)["frames"]["can1 (run)"]
+    assert len(first) == 40 and [row.pop("time_s") for row in first] == pytest.approx(
+        [row.pop("time_s") - 0.5 for row in second]
+    )
+    assert first == second
+    source.close()
 
 
 @pytest.mark.parametrize(("path", "words"), [("nowhere.mf4", "there is no such file"), (".", "no folder of a walk")])
@@ -347,6 +452,7 @@ def test_a_recording_without_a_body_shows_the_pose_that_the_robot_knows_itself(f
     source.pose_names = KNOWN_POSE
     known = dict(zip(KNOWN_POSE, source.pose(1.9)[1], strict=True))
     assert all(known[name] == pytest.approx(true[name], abs=0.06) for name in KNOWN_POSE)
+    source.close()
 
 
 def test_the_estimates_of_the_program_that_runs_are_taken():

@@ -35,7 +35,7 @@ class Frames(Protocol):
 class Bus:
     """One bus. start_ns: the stamp of its frames at the source's time 0; bit_per_s: None where nobody knows it.
 
-    more_errors: error frames that are known otherwise than by rows, beyond those of the rows.
+    more_errors: error frames that are known otherwise than by rows, beyond those of the rows; None: nobody knows.
     """
 
     def __init__(
@@ -47,7 +47,7 @@ class Bus:
         self.read = read
         self.load = None if bit_per_s is None else Load(bit_per_s, start_ns)
         self.memory = Memory(1, WINDOW_S, kept_s)
-        self.more_errors = 0
+        self.more_errors: int | None = 0
 
     def channels(self) -> list[Channel]:
         """What a plot may show of it."""
@@ -92,7 +92,7 @@ class Bus:
             "load": self.value(at),
             "of_second": statistics(values[first:last, 0]) if self.value(at) is not None else None,
             "frames_per_s": self.frames.within(end_ns - SECOND_NS, end_ns),
-            "errors": None if errors is None else errors + self.more_errors,
+            "errors": None if errors is None or self.more_errors is None else errors + self.more_errors,
         }
 
     def listed(self, at: float | None) -> list[dict[str, Any]]:

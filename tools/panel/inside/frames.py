@@ -41,6 +41,12 @@ def keys_of(rows: Any) -> Any:
     return np.where(flags & FLAG_ERROR, ERROR, identifiers)
 
 
+def counted(rows: Any) -> list[tuple[int, int]]:
+    """(key, how many) of each kind among frames."""
+    keys, counts = np.unique(keys_of(rows), return_counts=True)
+    return list(zip(keys.tolist(), counts.tolist(), strict=True))
+
+
 class RecentFrames:
     """The last `most` frames of one bus, and how many of each kind there were in all.
 
@@ -60,8 +66,8 @@ class RecentFrames:
         if self.used and rows[0, 0] < self.kept[self.used - 1, 0]:
             self.used = 0
             self.total.clear()
-        for key, count in zip(*np.unique(keys_of(rows), return_counts=True), strict=True):
-            self.total[int(key)] = self.total.get(int(key), 0) + int(count)
+        for key, count in counted(rows):
+            self.total[key] = self.total.get(key, 0) + count
         rows = rows[-self.most :]
         if self.used + len(rows) > len(self.kept):
             stay = min(self.most, self.used)

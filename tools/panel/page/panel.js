@@ -84,7 +84,7 @@ function greet(found) {
   by("freeze").hidden = !live;
   by("pace").hidden = !can.has("pace");
   by("face").hidden = !can.has("panel");
-  for (const [name, needs] of [["parameters", "parameters"], ["errors", "errors"], ["inside", "boards"], ["link", "link"], ["faults", "faults"]])
+  for (const [name, needs] of [["parameters", "parameters"], ["errors", "errors"], ["link", "link"], ["faults", "faults"]])
     document.querySelector(`[data-view=${name}]`).hidden = !can.has(needs);
   by("pose-note").textContent = hello.pose.includes("hip_y_m") ? "as its body is; contact forces green" : hello.pose.length ? "as it estimates itself; the lower foot stands" : "no leg angles in this source";
   by("names").replaceChildren(...hello.channels.map((channel) => Object.assign(document.createElement("option"), { value: channel.name })));
@@ -273,11 +273,12 @@ function tell_state() {
     renew(by("errors-normal"), tables.errors(errors.filter((row) => row.normal), "errors as in every healthy walk"));
   }
   if (view === "inside") {
-    renew(by("boards"), tables.boards(state.boards ?? {}, state.slots ?? {}, hello.slots_us, tell));
-    put(by("inside-at"), insideAt());
-    put(by("slots-note"), SLOTS_NOTE + (state.slots_note ? ` ${state.slots_note}` : ""));
-    renew(by("buses"), tables.buses(state.buses ?? {}));
-    const frames = state.frames ?? {}, names = Object.keys(frames);
+    const missing = state.missing ?? {}, frames = state.frames ?? {}, names = Object.keys(frames);   // what a source has not, in its words
+    renew(by("boards"), missing.slots ? tables.note(missing.slots) : tables.boards(state.boards ?? {}, state.slots ?? {}, hello.slots_us, tell));
+    put(by("inside-at"), missing.slots && !names.length ? "" : insideAt());
+    put(by("slots-note"), missing.slots ? "" : SLOTS_NOTE);
+    renew(by("buses"), ...(names.length ? [tables.buses(state.buses ?? {})] : []), ...(missing.buses ? [tables.note(missing.buses)] : []));
+    by("frames-part").hidden = !names.length;
     if (by("bus").length !== names.length) by("bus").replaceChildren(...names.map((name) => new Option(name, name)));
     renew(by("frames"), tables.frames(frames[by("bus").value] ?? [], by("frame-search").value));
   }

@@ -1,0 +1,135 @@
+"""Frames of a bus in a log on disk: known piece by piece, of which two are in memory."""
+
+from __future__ import annotations
+
+import bisect
+import os
+import pathlib
+from typing import Any
+
+import numpy as np
+
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.tools.panel.inside.candump_rows import rows_of
+from ranger_sim.tools.panel.inside.frames import counted, nothing
+
+PIECE_BYTES = 1 << 20  # chosen by us: some seconds of a bus, read in some ten milliseconds
+PIECES_KEPT = 2
+Piece = tuple[int, int, Any]  # offset of its first and behind its last byte, rows
+
+
+class LogFrames:
+    """A log of candump with one bus, in order of time. UserError for one that cannot be read.
+
+    `read` and `add` in turn go through it; what is asked for is answered of what was added so far. A frame stands at
+    its microsecond, the log's own resolution: up to 1 us before the instant at which the bus had it.
+    """
+
+    def __init__(self, path: pathlib.Path) -> None:
+        self.path = path
+        try:
+            self.file = path.open("rb")
+        except OSError as error:
+            raise UserError(f"{path}: the frame log cannot be read ({error.strerror})") from None
+        self.size = os.fstat(self.file.fileno()).st_size
+        self.offset = 0  # what is before it was added
+        self.newest_ns: int | None = None
+        self.total: dict[int, int] = {}
+        self.starts: list[tuple[int, int]] = []  # of each piece: bytes
+        self.first_ns: list[int] = []
+        self.before: list[int] = []  # frames before it
+        self.before_by_key: list[dict[int, int]] = []
+        self.frames = 0
+        self.cached: dict[int, Any] = {}
+
+    def read(self) -> Piece | None:
+        """The next piece; None behind the last one. Changes nothing, so that another thread may do it."""
+        while self.offset < self.size:
+            text = os.pread(self.file.fileno(), PIECE_BYTES, self.offset)
+            end = self.offset + len(text)
+            if end < self.size:
+                text = text[: text.rfind(b"\n") + 1]
+            if not text:
+                raise UserError(f"{self.path}: a line of more than {PIECE_BYTES} bytes is none of a frame log")
+            return self.offset, self.offset + len(text), self._rows_of(text)
+        return None
+
+    def _rows_of(self, text: bytes) -> Any:
+        try:
+            return rows_of(text)
+        except UserError as error:
+            raise UserError(f"{self.path}: {error}") from None
+
+    def add(self, piece: Piece) -> None:
+        """This piece has been read."""
+        begin, self.offset, rows = piece
+        if not len(rows):
+            return
+        self.starts.append((begin, self.offset))
+        self.first_ns.append(int(rows[0, 0]))
+        self.newest_ns = int(rows[-1, 0])
+        self.before.append(self.frames)
+        self.before_by_key.append(dict(self.total))
+        self.frames += len(rows)
+        for key, count in counted(rows):
+            self.total[key] = self.total.get(key, 0) + count
+        self._keep(len(self.starts) - 1, rows)
+
+    def _keep(self, number: int, rows: Any) -> None:
+        self.cached[number] = rows
+        while len(self.cached) > PIECES_KEPT:
+            del self.cached[next(iter(self.cached))]
+
+    def _piece(self, number: int) -> Any:
+        rows = self.cached.pop(number, None)
+        if rows is None:
+            begin, end = self.starts[number]
+            rows = self._rows_of(os.pread(self.file.fileno(), end - begin, begin))
+        self._keep(number, rows)
+        return rows
+
+    def _place(self, until_ns: int | None) -> tuple[int, int]:
+        """(number of the piece, rows of it that are not later); -1: all are later."""
+        number = len(self.starts) - 1 if until_ns is None else bisect.bisect_right(self.first_ns, until_ns) - 1
+        if number < 0:
+            return -1, 0
+        rows = self._piece(number)
+        return number, len(rows) if until_ns is None else int(np.searchsorted(rows[:, 0], until_ns, "right"))
+
+    def _is_open(self, until_ns: int | None) -> bool:
+        """More may come until this instant from what was not read yet."""
+        is_over = self.newest_ns is not None and until_ns is not None and until_ns < self.newest_ns
+        return self.offset < self.size and not is_over
+
+    def until(self, until_ns: int | None, most: int) -> Any:
+        """The last frames not later than an instant (None: of all), up to `most` rows."""
+        number, end = self._place(until_ns)
+        if number < 0:
+            return nothing()
+        found = [self._piece(number)[max(0, end - most) : end]]
+        while sum(map(len, found)) < most and number > 0:
+            number -= 1
+            found.append(self._piece(number)[-(most - sum(map(len, found))) :])
+        return np.concatenate(found[::-1])
+
+    def within(self, first_ns: int, until_ns: int) -> int | None:
+        """How many came later than the one and not later than the other instant; None: that is not in the log."""
+        if not self.starts or first_ns < self.first_ns[0] or self._is_open(until_ns):
+            return None
+        (early, early_rows), (late, late_rows) = self._place(first_ns), self._place(until_ns)
+        return self.before[late] + late_rows - self.before[early] - early_rows
+
+    def counts(self, until_ns: int | None, keys: list[int]) -> list[int | None]:
+        """How many there were of each kind until an instant, since the log's beginning; None: it is not read so far."""
+        if self._is_open(until_ns):
+            return [None] * len(keys)
+        number, end = self._place(until_ns)
+        if number < 0:
+            return [0] * len(keys)
+        there = dict(counted(self._piece(number)[:end]))
+        before = self.before_by_key[number]
+        return [before.get(key, 0) + there.get(key, 0) for key in keys]
+
+    def close(self) -> None:
+        """Give the file back."""
+        self.file.close()

@@ -1,0 +1,167 @@
+"""What recordings keep of the inside: the logs of a run's folder, and the frames of a recording with DBC files."""
+
+from __future__ import annotations
+
+import array
+import asyncio
+import json
+import pathlib
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from ranger_sim.can_bus.edge.logs import read_log
+from ranger_sim.foundation.events import FLAG_ERROR, FLAG_EXTENDED, FLAG_REMOTE
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.harness.ranger import BUS_BIT_RATE
+from ranger_sim.sysid.dataset import Dataset
+from ranger_sim.sysid.readers import columns, frames
+from ranger_sim.sysid.readers.run_folder import SUMMARY
+from ranger_sim.tools.panel.inside.buses import Bus
+from ranger_sim.tools.panel.inside.errors import ERRORS, ON_NO_BUS, ErrorList, changes
+from ranger_sim.tools.panel.inside.frames import ROW_WORDS, RecentFrames, of_the_robot
+from ranger_sim.tools.panel.inside.logs import LogFrames
+from ranger_sim.tools.run.folder import BUS_LOGS
+
+NO_SLOTS = "A recording keeps no slots one by one."
+TOLD_SLOTS = (
+    "What the boards tell of them themselves are the channels …_EXECUTION_TIME and …_MAX_EXECUTION_TIME; "
+    "a running robot shows every one (ranger-sim panel --name)."
+)
+NO_FRAMES = (
+    "This recording keeps no frames; a walk's folder does (ranger-sim walk --log full --out), or frames with --dbc."
+)
+NO_RATE = "Frames alone do not tell the bit rate, so the load is not known; error frames are left out."
+NO_RATE_OF_PROFILE = "The walk had a profile, whose bit rates its log does not tell: loads are not known."
+
+
+class RunLogs:
+    """Frames and errors of a walk's folder, or errors alone of a recording of variables.
+
+    group: behind the names of buses; shift_s: so much later; end_s: until then it is looked at.
+    They come while `run` does, so that an hour of them opens at once.
+    """
+
+    def __init__(self, folder: pathlib.Path, dataset: Dataset, group: str, shift_s: float, end_s: float) -> None:
+        self.group = group
+        self.start_ns = -round(shift_s * 1e9)
+        self.end_s = end_s
+        self.errors = ErrorList()
+        rate = BUS_BIT_RATE if profile_of(folder) is None else None
+        self.logs = [LogFrames(folder / name) for name in BUS_LOGS if (folder / name).is_file()]
+        self.buses = [
+            Bus(log.path.stem + group, self.start_ns, rate, log, of_the_robot, kept_s=end_s + 1.0) for log in self.logs
+        ]
+        self.missing = NO_FRAMES if not self.logs else NO_RATE_OF_PROFILE if rate is None else ""
+        self.trouble = ""
+        self.is_read = not self.logs
+        for board in ERRORS.values():  # without logs of the buses, all of them as far as the table has them
+            channel = dataset.channels.get(f"ERROR_{board}")
+            if channel is not None and (board in ON_NO_BUS or not self.logs):
+                for word, time_s in changes(channel.value.astype(np.int64), channel.time_s, 0):
+                    self.errors.note(word, float(time_s) + shift_s)
+
+    async def run(self) -> None:
+        """Go through the logs, all of them at one pace."""
+        try:
+            waiting = list(zip(self.logs, self.buses, strict=True))
+            while waiting:
+                log, bus = min(waiting, key=lambda each: each[0].newest_ns or 0)
+                piece = await asyncio.to_thread(log.read)
+                if piece is None:
+                    waiting.remove((log, bus))
+                    bus.passed(self.start_ns + round(self.end_s * 1e9))
+                    continue
+                log.add(piece)
+                bus.take(piece[2])
+                self.errors.note_frames(piece[2], self.start_ns)
+        except UserError as error:
+            self.trouble = str(error)
+        self.is_read = True
+
+    def close(self) -> None:
+        """Give the logs back."""
+        for log in self.logs:
+            log.close()
+
+    def note(self) -> str:
+        """What of it is not there (yet)."""
+        if self.trouble:
+            return self.trouble
+        if not self.is_read:
+            newest = min(log.newest_ns or self.start_ns for log in self.logs)
+            return f"The logs are being read: up to {(newest - self.start_ns) * 1e-9:.0f} s so far."
+        return self.missing
+
+
+class Decoded:
+    """The frames of a recording that is read with DBC files, in memory with 24 bytes each.
+
+    `passing` is what they are read from; after it `done`.
+    """
+
+    missing = NO_RATE
+
+    def __init__(self, path: pathlib.Path, databases: Sequence[str]) -> None:
+        self.path = path
+        self.messages = frames.messages_of(databases)
+        self.words: dict[str, array.array[int]] = {}
+        self.first_ns: int | None = None  # of the frames that may be messages
+        self.buses: list[Bus] = []
+        self.errors = ErrorList()
+
+    def passing(self, path: pathlib.Path) -> Iterator[frames.Frame]:
+        """Every frame of the recording."""
+        for frame in read_log(path):
+            bus, time_ns, identifier, flags, low, high = frame
+            if self.first_ns is None and not flags & (FLAG_ERROR | FLAG_REMOTE):
+                self.first_ns = time_ns
+            words = self.words.setdefault(bus or path.stem, array.array("q"))
+            words.extend((time_ns, low << 12 | flags << 4, high << 29 | identifier))
+            yield frame
+
+    def done(self, group: str, shift_s: float) -> None:
+        """All have passed. Their time 0 is that of the channels."""
+        first_ns = self.first_ns or 0
+        start_ns = (first_ns if first_ns * 1e-9 > columns.EPOCH_S else 0) - round(shift_s * 1e9)
+        for name, words in self.words.items():
+            rows = np.frombuffer(words, np.int64).reshape(-1, ROW_WORDS)
+            rows = rows[np.argsort(rows[:, 0], kind="stable")]
+            kept = RecentFrames(len(rows))
+            kept.append(rows)
+            self.buses.append(Bus(name + group, start_ns, None, kept, self.read))
+            self.buses[-1].more_errors = None
+        self.words.clear()
+
+    def read(self, number: int, flags: int, data: bytes) -> tuple[str, float | str | None]:
+        """A frame by the DBC files."""
+        message = self.messages.get(number | (frames.EXTENDED_BIT if flags & FLAG_EXTENDED else 0))
+        if message is None:
+            return "", None
+        try:
+            signals = message.decode(data, decode_choices=False)
+        except Exception:  # too short, or a multiplexer's value that has no signals: of many kinds
+            return message.name, None
+        if len(signals) == 1:
+            return message.name, float(next(iter(signals.values())))
+        return message.name, ", ".join(f"{name} {float(value):g}" for name, value in signals.items())
+
+    async def run(self) -> None:
+        """All of them are there from the beginning."""
+
+    def close(self) -> None:
+        """Nothing is open."""
+
+    def note(self) -> str:
+        """What of it is not there."""
+        return self.missing
+
+
+def profile_of(folder: pathlib.Path) -> str | None:
+    """The profile of buses and boards with which a walk was made, as its summary has it; None: the usual ones."""
+    try:
+        summary = json.loads((folder / SUMMARY).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+    found = summary.get("profile") if isinstance(summary, dict) else None
+    return None if found is None else str(found)
