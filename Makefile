@@ -30,7 +30,7 @@ test: $(VENV)/.all
 PLAIN = $(addprefix tests/,foundation datatable can_bus firmware_sim boards plant harness/test_counters.py \
 	harness/test_imu_wire.py harness/test_profile.py harness/test_requests.py harness/test_supervision.py)
 NOT_PLAIN = $(addprefix tests/,can_bus/test_can_programs.py boards/test_head_2015.py boards/test_original_images.py \
-	boards/test_main_brain_runs_alike_compiled_and_interpreted.py plant/test_walking.py)
+	boards/test_main_brain_runs_alike_compiled_and_interpreted.py plant/walking/test_walking.py)
 
 test-interpreted: $(VENV)/.all
 	RANGER_SIM_INTERPRETED=1 $(RUN) -m pytest -q -rs -n 2 --dist loadfile $(addprefix --ignore=,$(NOT_PLAIN)) $(PLAIN)

@@ -6,9 +6,9 @@ import os
 
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.stop_rule import StopRule
-from ranger_sim.plant.battery import BatteryParameters
-from ranger_sim.plant.electrics import ElectricsParameters
-from ranger_sim.plant.electronics import SWITCHES
+from ranger_sim.plant.electrics.battery import BatteryParameters
+from ranger_sim.plant.electrics.electrics import ElectricsParameters
+from ranger_sim.plant.electrics.electronics import SWITCHES
 
 __all__ = ["LIMITS", "Scenario", "StopRule"]
 
@@ -32,7 +32,7 @@ class Scenario:
     slope_rad: positive downhill. floor_roughness_m: standard deviation of the height per foothold.
     start_uptime_ms: network time at power-up, so that wraps and long runs can be tested.
     battery_charge: of the packs at power-up, 1 is full. battery_capacity_Wh: of all of them together.
-    electronics_off: names of `plant.electronics.SWITCHES`, parts that draw no power in this walk.
+    electronics_off: names of `plant.electrics.electronics.SWITCHES`, parts that draw no power in this walk.
     """
 
     controller: str = "record-2011"

@@ -17,9 +17,9 @@ from collections.abc import Iterator
 from typing import Any
 
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.plant.electrics import ElectricsParameters
-from ranger_sim.plant.motor_parameters import MotorParameters
-from ranger_sim.plant.parameters import BodyParameters, fault_of
+from ranger_sim.plant.electrics.electrics import ElectricsParameters
+from ranger_sim.plant.electrics.motor_parameters import MotorParameters
+from ranger_sim.plant.mechanics.parameters import BodyParameters, fault_of
 
 FOLDER = pathlib.Path(__file__).parent / "bodies"
 MOTORS = ("hip", "outer_ankle", "inner_ankle")

@@ -4,7 +4,7 @@ import cython
 
 
 class Bridge:
-    """Takes what a board writes, with the instant. Ranger's H-bridge is `plant.drive.Drive`."""
+    """Takes what a board writes, with the instant. Ranger's H-bridge is `plant.electrics.drive.Drive`."""
 
     def write_pwm(
         self, time: cython.longlong, mr2: cython.longlong, mr6: cython.longlong, mr0: cython.longlong

@@ -1,16 +1,16 @@
 cimport cython
 
-from ranger_sim.plant.absolute_encoder cimport AbsoluteEncoder
-from ranger_sim.plant.body cimport FALLEN, Body
-from ranger_sim.plant.electrics cimport Electrics
-from ranger_sim.plant.imu cimport Imu
-from ranger_sim.plant.incremental_encoder cimport IncrementalEncoder
-from ranger_sim.plant.leg cimport INNER, OUTER, Leg
-from ranger_sim.plant.motion cimport advance
-from ranger_sim.plant.motor_unit cimport MotorUnit
+from ranger_sim.plant.sensors.absolute_encoder cimport AbsoluteEncoder
+from ranger_sim.plant.mechanics.body cimport FALLEN, Body
+from ranger_sim.plant.electrics.electrics cimport Electrics
+from ranger_sim.plant.sensors.imu cimport Imu
+from ranger_sim.plant.sensors.incremental_encoder cimport IncrementalEncoder
+from ranger_sim.plant.mechanics.leg cimport INNER, OUTER, Leg
+from ranger_sim.plant.walking.motion cimport advance
+from ranger_sim.plant.electrics.motor_unit cimport MotorUnit
 from ranger_sim.plant.plant cimport Plant
-from ranger_sim.plant.steering cimport Steering
-from ranger_sim.plant.watch cimport fall
+from ranger_sim.plant.mechanics.steering cimport Steering
+from ranger_sim.plant.walking.watch cimport fall
 from ranger_sim.plant.wiring_points cimport HIP_WORD, INNER_ANKLE_WORD, OUTER_ANKLE_WORD
 
 @cython.final

@@ -11,25 +11,25 @@ Seen from the boards: `motors` with their drives, `encoders` with their edges, `
 import cython
 import numpy as np
 
-from ranger_sim.plant import handling
-from ranger_sim.plant.absolute_encoder import AbsoluteEncoder
-from ranger_sim.plant.body import Body
-from ranger_sim.plant.electrics import Electrics
-from ranger_sim.plant.floor import Floor
-from ranger_sim.plant.imu import Imu
-from ranger_sim.plant.incremental_encoder import IncrementalEncoder
-from ranger_sim.plant.leg import Leg
-from ranger_sim.plant.motor_unit import MotorUnit
-from ranger_sim.plant.parameters import BodyParameters
+from ranger_sim.plant.electrics.electrics import Electrics
+from ranger_sim.plant.electrics.motor_unit import MotorUnit
+from ranger_sim.plant.mechanics.body import Body
+from ranger_sim.plant.mechanics.floor import Floor
+from ranger_sim.plant.mechanics.leg import Leg
+from ranger_sim.plant.mechanics.parameters import BodyParameters
+from ranger_sim.plant.mechanics.steering import Steering
+from ranger_sim.plant.mechanics.walk_record import RING
 from ranger_sim.plant.plant import Plant
-from ranger_sim.plant.steering import Steering
-from ranger_sim.plant.walk_record import RING
+from ranger_sim.plant.sensors.absolute_encoder import AbsoluteEncoder
+from ranger_sim.plant.sensors.imu import Imu
+from ranger_sim.plant.sensors.incremental_encoder import IncrementalEncoder
+from ranger_sim.plant.walking import handling
 
 if not cython.compiled:
-    from ranger_sim.plant.body import FALLEN
-    from ranger_sim.plant.leg import INNER, OUTER
-    from ranger_sim.plant.motion import advance
-    from ranger_sim.plant.watch import fall
+    from ranger_sim.plant.mechanics.body import FALLEN
+    from ranger_sim.plant.mechanics.leg import INNER, OUTER
+    from ranger_sim.plant.walking.motion import advance
+    from ranger_sim.plant.walking.watch import fall
     from ranger_sim.plant.wiring_points import HIP_WORD, INNER_ANKLE_WORD, OUTER_ANKLE_WORD
 
 STEP_NS = 250_000  # the plant's step; its error is measured in EQUATIONS 15

@@ -23,15 +23,15 @@ from typing import Any
 
 from ranger_sim.foundation.numbers import reals
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.plant import term_torques as torques
-from ranger_sim.plant.leg import INNER, OUTER
+from ranger_sim.plant.mechanics import term_torques as torques
+from ranger_sim.plant.mechanics.leg import INNER, OUTER
 from ranger_sim.plant.wiring_points import ANALOG_NAMES, ENCODER_NAMES, WORD_NAMES
 
 MOTORS = ("hip_motor", "outer_motor", "inner_motor", "steering_motor")
 TORQUE_PLACES = ("hip_joint", "hip_motor", "outer_ankle", "outer_motor", "inner_ankle", "inner_motor")
 ROTORS = ("hip_motor", "outer_motor", "inner_motor")
 CABLES = ("outer_cable", "inner_cable")
-# place and leg of a row of plant/term_torques.py (the hip's places belong to no leg)
+# place and leg of a row of plant/mechanics/term_torques.py (the hip's places belong to no leg)
 ROW_PLACES = {
     "hip_joint": (torques.HIP_JOINT, -1),
     "hip_motor": (torques.HIP_MOTOR, -1),
@@ -63,7 +63,7 @@ class Form:
     places: tuple[str, ...]
     parameters: tuple[Parameter, ...]
     meaning: str
-    torque: int = -1  # row code of plant/term_torques.py, -1 when it acts elsewhere
+    torque: int = -1  # row code of plant/mechanics/term_torques.py, -1 when it acts elsewhere
 
 
 def _phase(name: str = "phase_rad") -> Parameter:

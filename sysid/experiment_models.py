@@ -5,7 +5,7 @@ over time. A channel that is measured adds an equation: what the sensor shows is
 adjusts, and causes, enter an equation by what they add to it: their regressor. A cause stands where it is most usual;
 `places` says so where there is a choice.
 
-The numbers are those of the robot's hip motor (plant/motor_parameters.py) and of the bench of the blind tests
+The numbers are those of the robot's hip motor (plant/electrics/motor_parameters.py) and of the bench of the blind tests
 (tests/blind/README.md). Only their order matters here: it decides how alike two signatures look.
 """
 
@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ranger_sim.plant.motor_parameters import MotorParameters
+from ranger_sim.plant.electrics.motor_parameters import MotorParameters
 from ranger_sim.sysid.dataset import Array
 
 SAMPLES = 120  # of the reference motion, from which signatures are compared
@@ -262,7 +262,7 @@ def motor_bench() -> Model:
 
 
 def leg_swing() -> Model:
-    """A leg swings about the held hip; inertial numbers of plant/parameters.py."""
+    """A leg swings about the held hip; inertial numbers of plant/mechanics/parameters.py."""
     p = MotorParameters()
     gear_K, R, J, gravity, spring = p.gear * p.torque_constant_Nm_per_A, p.resistance_ohm, 0.55, 7.06, 7.6
     b = Builder(24.0)

@@ -12,8 +12,8 @@ from typing import Any
 
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.plant import terms
-from ranger_sim.plant.battery import BatteryParameters
-from ranger_sim.plant.motor_parameters import ANKLE_MOTOR, HIP_MOTOR, MotorParameters
+from ranger_sim.plant.electrics.battery import BatteryParameters
+from ranger_sim.plant.electrics.motor_parameters import ANKLE_MOTOR, HIP_MOTOR, MotorParameters
 from ranger_sim.sysid.causes import CAUSES
 from ranger_sim.sysid.machine import Machine
 
@@ -76,7 +76,7 @@ def _torque_constant(numbers: Numbers, context: Context) -> dict[str, float]:
 
 def _dead_time(numbers: Numbers, _: Context) -> dict[str, float]:
     pack = BatteryParameters()
-    nominal_V = 3.7 * pack.cells_in_series  # of a lithium cell, as at plant/battery.py
+    nominal_V = 3.7 * pack.cells_in_series  # of a lithium cell, as at plant/electrics/battery.py
     return {"fraction": numbers["drop_V"] / nominal_V}
 
 

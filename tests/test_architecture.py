@@ -28,6 +28,13 @@ MAY_IMPORT = {
     "sysid": {"foundation", "plant"},
     "tools": {"foundation", "datatable", "can_bus", "plant", "firmware_sim", "boards", "harness", "sysid"},
 }
+# The same inside a room, for those of its rooms that stand above one another.
+INSIDE = {
+    "plant/sensors": set(),
+    "plant/mechanics": set(),
+    "plant/electrics": {"sensors", "mechanics"},
+    "plant/walking": {"mechanics"},
+}
 # Libraries that belong to one place of the house.
 ONLY_IN = {
     "can": ("can_bus/edge/",),
@@ -83,6 +90,18 @@ def test_a_package_imports_only_what_the_table_allows(package):
     for path in [*(ROOT / package).rglob("*.py"), *(ROOT / package).rglob("*.pxd")]:
         for name, line in imported_packages(path):
             if (name in MAY_IMPORT or name == "tests") and name != package and name not in MAY_IMPORT[package]:
+                faults.append(f"{path.relative_to(ROOT)}:{line} imports {name}")
+    assert not faults, "\n".join(faults)
+
+
+@pytest.mark.parametrize("inside", INSIDE)
+def test_arrows_between_rooms_of_a_room_run_one_way(inside):
+    room, _, own = inside.partition("/")
+    others = {name.partition("/")[2] for name in INSIDE if name.startswith(f"{room}/")} - {own}
+    faults = []
+    for path in [*(ROOT / inside).rglob("*.py"), *(ROOT / inside).rglob("*.pxd")]:
+        for name, line in imported_modules(path):
+            if name.startswith(f"ranger_sim.{room}.") and name.split(".")[2] in others - INSIDE[inside]:
                 faults.append(f"{path.relative_to(ROOT)}:{line} imports {name}")
     assert not faults, "\n".join(faults)
 
@@ -324,9 +343,10 @@ ONLY_RANGERS = (
     "ranger_sim.harness.ranger",
     "ranger_sim.harness.scenario",
     "ranger_sim.harness.wiring.ranger",
-    "ranger_sim.plant.body",
     "ranger_sim.plant.electrics",
+    "ranger_sim.plant.mechanics",
     "ranger_sim.plant.ranger",
+    "ranger_sim.plant.walking",
 )
 
 

@@ -23,7 +23,7 @@ CITATION = re.compile(
 # "[N 4.3]" and "[A 8.3.1; P 3: robot]" in the parameter files of the plant: A is a section of the appendix.
 BRACKETS = re.compile(r"\[([A-Z] \d[^\]]*)\]")
 BRACKETED = re.compile(r"\b([A-Z]) (\d+(?:\.\d+)*)")
-BRACKET_FILES = [ROOT / "plant" / "parameters.py", ROOT / "plant" / "motor_parameters.py"]
+BRACKET_FILES = [ROOT / "plant/mechanics/parameters.py", ROOT / "plant/electrics/motor_parameters.py"]
 # How such a document was named before this one stood beside the code.
 FORMER = re.compile(
     r"\bfacts:?,? (?:network|control|record|on |about |section |\d)|of[ _]the[ _]facts|[a-z]-and-[a-z]+,? \d", re.I

@@ -73,7 +73,12 @@ def test_every_declared_module_is_compiled_where_a_compiler_is():
 
 
 def test_modules_with_the_same_last_name_are_not_confused():
-    for inside in ("boards.steering", "plant.steering", "boards.modules.absolute_encoder", "plant.absolute_encoder"):
+    for inside in (
+        "boards.steering",
+        "plant.mechanics.steering",
+        "boards.modules.absolute_encoder",
+        "plant.sensors.absolute_encoder",
+    ):
         name = f"ranger_sim.{inside}"
         module = importlib.import_module(name)
         assert module.__name__ == module.__spec__.name == name

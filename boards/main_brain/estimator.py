@@ -30,7 +30,7 @@ if not cython.compiled:
 _MASK = 0xFFFFFFFF
 _NEWEST = 0x7FFFFFFF  # a stamp further ahead than this is behind
 # Counts of a pair's two sensors that mean contact. The robot's of 2016 is 850, where both together have 700 in swing
-# (robot.md C3.2); the emulated sensors have 700 each (plant/foot_sensor.py), so it is twice as much here.
+# (robot.md C3.2); the emulated sensors have 700 each (plant/sensors/foot_sensor.py), so it is twice as much here.
 CONTACT_SUM = 1700.0
 
 READS = (

@@ -20,8 +20,8 @@ import math
 
 from ranger_sim.foundation.random_stream import RandomStream
 from ranger_sim.plant.bridge import Bridge
-from ranger_sim.plant.incremental_encoder import IncrementalEncoder
 from ranger_sim.plant.plant import Plant
+from ranger_sim.plant.sensors.incremental_encoder import IncrementalEncoder
 
 STEP_NS = 125_000  # half a slot of the motor board
 LINES = 500  # of the encoder

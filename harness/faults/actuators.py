@@ -1,7 +1,7 @@
 """Faults between the bridges and the joints: bridge, winding, magnets, cable, joint.
 
-Windings and joints get other numbers, or torques on top of those that are there (plant/term_torques.py); what the
-firmware has written stays.
+Windings and joints get other numbers, or torques on top of those that are there (plant/mechanics/term_torques.py);
+what the firmware has written stays.
 """
 
 import math
@@ -12,9 +12,9 @@ from ranger_sim.harness.faults.catalogue import mode
 from ranger_sim.harness.faults.fault import Fault, Parameter, WholeNumber
 from ranger_sim.harness.faults.kinds import BRIDGE, CABLE, JOINT, MOTOR
 from ranger_sim.plant import wiring_points as point
-from ranger_sim.plant.drive import DRIVEN, HELD_HIGH, HELD_LOW, HELD_OPEN
-from ranger_sim.plant.leg import INNER, OUTER
-from ranger_sim.plant.term_torques import ANKLE_CABLE, ANKLE_JOINT, HIP_JOINT, SPRING, VISCOUS, TermTorques
+from ranger_sim.plant.electrics.drive import DRIVEN, HELD_HIGH, HELD_LOW, HELD_OPEN
+from ranger_sim.plant.mechanics.leg import INNER, OUTER
+from ranger_sim.plant.mechanics.term_torques import ANKLE_CABLE, ANKLE_JOINT, HIP_JOINT, SPRING, VISCOUS, TermTorques
 
 SIDES = {point.OUTER_ANKLE: OUTER, point.INNER_ANKLE: INNER}
 
@@ -215,7 +215,7 @@ class TorqueFault(Fault):
         self.rows: list[tuple[int, int, int, tuple[float, ...]]] = []
 
     def add(self, *rows: tuple[int, int, int, tuple[float, ...]]) -> None:
-        """Torques (form, place, side, parameters) of plant/term_torques.py."""
+        """Torques (form, place, side, parameters) of plant/mechanics/term_torques.py."""
         self.rows.extend(rows)
         self._build(rows_of(self.body.terms) + [row_with_zeros(row) for row in rows])
 
@@ -274,8 +274,9 @@ def row_with_zeros(row: tuple[int, int, int, tuple[float, ...]]) -> tuple[int, i
 class JammedJoint(TorqueFault):
     """Something is caught in the joint: it is held at the angle at which it was.
 
-    Held as by the ankles' stops (plant/parameters.py): a spring of 400 N m/rad with half of critical damping for a
-    foot; at the hip, where a leg of 0.5 kg m^2 swings, five times as stiff. The steering's is a damper: it creeps.
+    Held as by the ankles' stops (plant/mechanics/parameters.py): a spring of 400 N m/rad with half of critical damping
+    for a foot; at the hip, where a leg of 0.5 kg m^2 swings, five times as stiff. The steering's is a damper:
+    it creeps.
     """
 
     mode = "jammed"

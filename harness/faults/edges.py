@@ -1,9 +1,9 @@
 """Faults of incremental encoders: the edges between sensor and board are rewritten before the board sees them.
 
 The wire shows a count of its own beside the sensor's, `true`, both in edges of channel A as
-plant/incremental_encoder.py counts them. Channel A is high at even counts; going up, B is its opposite at an edge,
-going down its equal, and the board counts by that alone. So whatever a fault makes of the count, edges come out that a
-sensor could have sent.
+plant/sensors/incremental_encoder.py counts them. Channel A is high at even counts; going up, B is its opposite at an
+edge, going down its equal, and the board counts by that alone. So whatever a fault makes of the count, edges come out
+that a sensor could have sent.
 
 Two families. Faults of the value (offset, drift, noise ...) let the wire run after a wrong count: extra edges come
 SPACING_NS apart, and after the end the wire runs back, so that the board's count is right again. Faults of the line
@@ -24,7 +24,7 @@ from ranger_sim.harness.faults.catalogue import mode
 from ranger_sim.harness.faults.fault import Fault, Parameter, WholeNumber
 from ranger_sim.harness.faults.kinds import EDGES
 from ranger_sim.harness.faults.sensor import Quantity, SignalFault, lasting, mode_classes
-from ranger_sim.plant.incremental_encoder import BOUNCE_NS
+from ranger_sim.plant.sensors.incremental_encoder import BOUNCE_NS
 
 # From one extra edge to the next. Chosen by us: 50 per slot of a board, so that its ring of 63 takes them all, and as
 # fast as the ankles' motor encoders at 18 rad/s of the joint.
@@ -136,7 +136,7 @@ class EdgeFault(Fault):
     def sensor_as_its_model(self) -> bool:
         """Whether the sensor's count is that of the joint's present angle, and followed here edge by edge.
 
-        An edge of the disc lies at most 0.4 edges beside its place (plant/incremental_encoder.py).
+        An edge of the disc lies at most 0.4 edges beside its place (plant/sensors/incremental_encoder.py).
         """
         position = self.encoder.position(self.joint_rad())
         return bool(self.true == self.encoder.cell and -0.5 <= position - self.true <= 1.5)
@@ -402,7 +402,7 @@ class LostEdges(OnTheLine):
 
 @mode
 class ContactBounce(OnTheLine):
-    """An edge goes back and over again, as plant/incremental_encoder.py lets some of the hip's."""
+    """An edge goes back and over again, as plant/sensors/incremental_encoder.py lets some of the hip's."""
 
     mode = "contact_bounce"
     kinds = (EDGES,)

@@ -12,7 +12,7 @@ from ranger_sim.harness.faults.catalogue import REASONS, mode
 from ranger_sim.harness.faults.fault import Fault, Parameter
 from ranger_sim.harness.faults.kinds import IMU
 from ranger_sim.harness.faults.sensor import Quantity, SignalFault, lasting, mode_classes
-from ranger_sim.plant.imu import PACKET_BYTES, SET_MODE
+from ranger_sim.plant.sensors.imu import PACKET_BYTES, SET_MODE
 
 ACKNOWLEDGEMENT_BYTES = 8
 RATE_X = 13  # place of the rate about x in a packet

@@ -73,7 +73,7 @@ class Sag(BatteryFault):
     parameters = (
         Parameter(
             "ohm", "ohm", 0.1, 0.0, 5.0, "more resistance",
-            "chosen by us: seven packs have 0.07 ohm, one has 0.5 (plant/battery.py)",
+            "chosen by us: seven packs have 0.07 ohm, one has 0.5 (plant/electrics/battery.py)",
         ),
         Parameter("drop", "V", 0.0, 0.0, 15.0, "less voltage without load", "chosen by us: none; 15 V leave a third"),
     )  # fmt: skip

@@ -9,8 +9,8 @@ from ranger_sim.harness.faults.catalogue import mode
 from ranger_sim.harness.faults.fault import Parameter, WholeNumber
 from ranger_sim.harness.faults.sensor import Quantity, lasting, mode_classes
 from ranger_sim.harness.faults.voltages import VoltageFault
-from ranger_sim.plant.electrics import STEERING_CENTRE_V, STEERING_V_PER_RAD
-from ranger_sim.plant.foot_sensor import STANCE_COUNTS, SWING_COUNTS, VOLTS_PER_COUNT
+from ranger_sim.plant.electrics.electrics import STEERING_CENTRE_V, STEERING_V_PER_RAD
+from ranger_sim.plant.sensors.foot_sensor import STANCE_COUNTS, SWING_COUNTS, VOLTS_PER_COUNT
 
 # fmt: off
 QUANTITIES: Mapping[str, Quantity] = {

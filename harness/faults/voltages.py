@@ -6,7 +6,8 @@ sensor's line to the pin, as the plant has it (`Plant.analog_line`).
 
 from ranger_sim.harness.faults.sensor import SignalFault
 
-MOST_DEVIATIONS = 3.7  # of NoiseSource's normal numbers (plant/noise.py); a plant with wider noise says a wider one
+# of NoiseSource's normal numbers (plant/sensors/noise.py); a plant with wider noise says a wider one
+MOST_DEVIATIONS = 3.7
 
 
 class VoltageFault(SignalFault):

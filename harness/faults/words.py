@@ -12,7 +12,7 @@ from ranger_sim.harness.faults.catalogue import mode
 from ranger_sim.harness.faults.fault import Fault, Parameter, WholeNumber
 from ranger_sim.harness.faults.kinds import WORD
 from ranger_sim.harness.faults.sensor import Quantity, SignalFault, lasting, mode_classes
-from ranger_sim.plant.absolute_encoder import COUNTS_PER_TURN, WORD_BITS
+from ranger_sim.plant.sensors.absolute_encoder import COUNTS_PER_TURN, WORD_BITS
 
 COUNTS = Quantity(
     unit="counts",
@@ -23,7 +23,7 @@ COUNTS = Quantity(
     open_value=0.0,
     source="chosen by us: 100 counts are 0.077 rad, a quarter of a step's half angle; the limit is half a turn",
 )
-MOST_DEVIATIONS = 3.7  # of NoiseSource's normal numbers (plant/noise.py)
+MOST_DEVIATIONS = 3.7  # of NoiseSource's normal numbers (plant/sensors/noise.py)
 
 
 def signed(counts: int) -> int:

@@ -7,7 +7,7 @@ from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.faults.catalogue import mode
 from ranger_sim.harness.faults.fault import Fault, Parameter
 from ranger_sim.harness.faults.kinds import FLOOR, ROBOT
-from ranger_sim.plant.leg import RIGID
+from ranger_sim.plant.mechanics.leg import RIGID
 
 
 class WorldFault(Fault):

@@ -3,7 +3,7 @@ cimport cython
 from ranger_sim.foundation.edge_buffer cimport ByteBuffer
 from ranger_sim.foundation.events cimport ORDER_PINS, UART_BYTE, EventQueue
 from ranger_sim.harness.step_watch cimport SerialDevice
-from ranger_sim.plant.imu cimport Imu
+from ranger_sim.plant.sensors.imu cimport Imu
 
 cpdef enum:
     MESSAGE_BYTES = 8

@@ -1,14 +1,14 @@
 # Generated from plant/ranger.py and plant/ranger.pxd (python -m ranger_sim.tools.stubs); do not edit.
 
 from collections.abc import MutableSequence
-from ranger_sim.plant.absolute_encoder import AbsoluteEncoder
-from ranger_sim.plant.body import Body
-from ranger_sim.plant.electrics import Electrics
-from ranger_sim.plant.imu import Imu
-from ranger_sim.plant.incremental_encoder import IncrementalEncoder
-from ranger_sim.plant.motor_unit import MotorUnit
+from ranger_sim.plant.electrics.electrics import Electrics
+from ranger_sim.plant.electrics.motor_unit import MotorUnit
+from ranger_sim.plant.mechanics.body import Body
+from ranger_sim.plant.mechanics.steering import Steering
 from ranger_sim.plant.plant import Plant
-from ranger_sim.plant.steering import Steering
+from ranger_sim.plant.sensors.absolute_encoder import AbsoluteEncoder
+from ranger_sim.plant.sensors.imu import Imu
+from ranger_sim.plant.sensors.incremental_encoder import IncrementalEncoder
 from typing import Any
 from typing import final
 

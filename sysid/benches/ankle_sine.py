@@ -16,8 +16,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from ranger_sim.plant.motor_parameters import ANKLE_MOTOR, MotorParameters
-from ranger_sim.plant.parameters import BodyParameters
+from ranger_sim.plant.electrics.motor_parameters import ANKLE_MOTOR, MotorParameters
+from ranger_sim.plant.mechanics.parameters import BodyParameters
 from ranger_sim.sysid.benches.bench_terms import NOTHING, BenchTerms
 from ranger_sim.sysid.dataset import Channel, Dataset
 from ranger_sim.sysid.instruments import BOARD_CURRENT, JOINT_ENCODER, Instrument

@@ -8,10 +8,10 @@ import dataclasses
 from collections.abc import Mapping, Sequence
 
 from ranger_sim.plant import terms
-from ranger_sim.plant.motor_parameters import MotorParameters
-from ranger_sim.plant.motor_unit import MotorUnit
-from ranger_sim.plant.parameters import BodyParameters
-from ranger_sim.plant.term_torques import TermTorques
+from ranger_sim.plant.electrics.motor_parameters import MotorParameters
+from ranger_sim.plant.electrics.motor_unit import MotorUnit
+from ranger_sim.plant.mechanics.parameters import BodyParameters
+from ranger_sim.plant.mechanics.term_torques import TermTorques
 
 BODY = BodyParameters()
 GEARS = {"hip_motor": BODY.hip_gear, "outer_motor": BODY.ankle_gear, "inner_motor": BODY.ankle_gear}

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from ranger_sim.foundation.random_arrays import generator
-from ranger_sim.plant.parameters import BodyParameters
+from ranger_sim.plant.mechanics.parameters import BodyParameters
 from ranger_sim.sysid.benches.motor import readings
 from ranger_sim.sysid.dataset import Channel, Dataset
 from ranger_sim.sysid.instruments import FISH_SCALE, INCLINOMETER, JOINT_ENCODER, TAPE_M

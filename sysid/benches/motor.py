@@ -1,7 +1,7 @@
 """The motor alone: stalled, and turning a shaft against a brake (appendix 8.2, figures 26, 28, 29, 31).
 
-Both measure the plant's own motor (`plant/motor_unit.py`), fed by a DC supply: a bridge that stands still. A reading is
-taken when speed and current have settled.
+Both measure the plant's own motor (`plant/electrics/motor_unit.py`), fed by a DC supply: a bridge that stands still. A
+reading is taken when speed and current have settled.
 
     stall        voltage_V, current_A at a shaft that is held
     cantilever   voltage_V, current_A, speed_rad_per_s, torque_Nm at the output of the 14:1 gearbox, for -6 ... 6 V,
@@ -13,8 +13,8 @@ import dataclasses
 import numpy as np
 from numpy.typing import NDArray
 
-from ranger_sim.plant.motor_parameters import MotorParameters
-from ranger_sim.plant.motor_unit import MotorUnit
+from ranger_sim.plant.electrics.motor_parameters import MotorParameters
+from ranger_sim.plant.electrics.motor_unit import MotorUnit
 from ranger_sim.sysid.benches.bench_terms import NOTHING, BenchTerms
 from ranger_sim.sysid.dataset import Channel, Dataset
 from ranger_sim.sysid.instruments import CURRENT_SENSOR, SHAFT_SPEED, TORQUE_CELL, VOLTMETER, Instrument

@@ -3,8 +3,8 @@
     J_all w' = T(I, w) + terms - T_brake        T of EQUATIONS 2.1, J_all: rotor through the gearbox, and the load
     T_cell   = J_load w' + T_brake              what the load cell between gearbox and load shows
 
-Channels are those of the experiment `motor-bench`. Electrics are the plant's own (`plant/motor_unit.py`), mechanics
-are integrated by the midpoint of STEP_S; the brake is a torque that goes with the motion.
+Channels are those of the experiment `motor-bench`. Electrics are the plant's own (`plant/electrics/motor_unit.py`),
+mechanics are integrated by the midpoint of STEP_S; the brake is a torque that goes with the motion.
 """
 
 import dataclasses
@@ -13,8 +13,8 @@ import math
 import numpy as np
 
 from ranger_sim.foundation.random_arrays import generator
-from ranger_sim.plant.friction import smoothed_sign
-from ranger_sim.plant.motor_parameters import MotorParameters
+from ranger_sim.plant.electrics.motor_parameters import MotorParameters
+from ranger_sim.plant.mechanics.friction import smoothed_sign
 from ranger_sim.sysid.benches.bench_terms import NOTHING, BenchTerms
 from ranger_sim.sysid.benches.motor import BENCH_MOTOR, Array
 from ranger_sim.sysid.dataset import Channel, Dataset

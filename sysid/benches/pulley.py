@@ -16,7 +16,7 @@ import dataclasses
 import numpy as np
 
 from ranger_sim.foundation.random_arrays import generator
-from ranger_sim.plant.motor_parameters import MotorParameters
+from ranger_sim.plant.electrics.motor_parameters import MotorParameters
 from ranger_sim.sysid.benches.bench_terms import NOTHING, BenchTerms
 from ranger_sim.sysid.benches.motor import BENCH_MOTOR, readings
 from ranger_sim.sysid.dataset import Dataset

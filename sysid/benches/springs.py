@@ -13,8 +13,8 @@ import dataclasses
 import numpy as np
 
 from ranger_sim.foundation.random_arrays import generator
-from ranger_sim.plant.motor_parameters import HIP_MOTOR, MotorParameters
-from ranger_sim.plant.parameters import BodyParameters, hip_spring_torque_Nm
+from ranger_sim.plant.electrics.motor_parameters import HIP_MOTOR, MotorParameters
+from ranger_sim.plant.mechanics.parameters import BodyParameters, hip_spring_torque_Nm
 from ranger_sim.sysid.benches.bench_terms import NOTHING, BenchTerms
 from ranger_sim.sysid.benches.motor import readings
 from ranger_sim.sysid.dataset import Dataset

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.plant.motor_parameters import ANKLE_MOTOR
+from ranger_sim.plant.electrics.motor_parameters import ANKLE_MOTOR
 from ranger_sim.sysid.benches.ankle_sine import ENCODER, DAMPING_As_per_rad, STIFFNESS_A_per_rad
 from ranger_sim.sysid.dataset import Dataset
 from ranger_sim.sysid.fit import Fit, Parameter

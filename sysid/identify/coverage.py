@@ -12,8 +12,8 @@ from typing import Any
 from scipy import stats
 
 from ranger_sim.foundation.random_arrays import generator
-from ranger_sim.plant.motor_parameters import MotorParameters
-from ranger_sim.plant.parameters import BodyParameters
+from ranger_sim.plant.electrics.motor_parameters import MotorParameters
+from ranger_sim.plant.mechanics.parameters import BodyParameters
 from ranger_sim.sysid.benches import ankle_sine, leg, motor, pulley, springs
 from ranger_sim.sysid.benches.bench_terms import NOTHING, BenchTerms
 from ranger_sim.sysid.fit import Fit

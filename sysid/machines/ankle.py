@@ -27,7 +27,7 @@ import numpy as np
 from scipy.signal import lfilter
 
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.plant.motor_parameters import ANKLE_MOTOR
+from ranger_sim.plant.electrics.motor_parameters import ANKLE_MOTOR
 from ranger_sim.sysid import plausibility, signals
 from ranger_sim.sysid.dataset import Array, Finding, Table
 from ranger_sim.sysid.machine import Columns, Effect, Equation, Known, Quantity, Recording, Values

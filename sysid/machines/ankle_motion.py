@@ -22,7 +22,7 @@ from scipy.linalg import lapack
 
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.plant import body_files
-from ranger_sim.plant.motor_parameters import ANKLE_MOTOR
+from ranger_sim.plant.electrics.motor_parameters import ANKLE_MOTOR
 from ranger_sim.sysid.dataset import Array
 
 STEP_S = 0.002  # longest step: the cable's mode with the foot, 100 1/s, is within 0.4 % of its frequency

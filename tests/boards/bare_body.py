@@ -14,9 +14,9 @@ from ranger_sim.boards.quirks import Quirks
 from ranger_sim.datatable.generated import mb as table
 from ranger_sim.datatable.generated.all_variables import TABLE_SIZE
 from ranger_sim.datatable.store import DataStore
-from ranger_sim.plant import handling
-from ranger_sim.plant.body import DOUBLE, FALLEN, HELD, SINGLE, Body
-from ranger_sim.plant.motion import advance
+from ranger_sim.plant.mechanics.body import DOUBLE, FALLEN, HELD, SINGLE, Body
+from ranger_sim.plant.walking import handling
+from ranger_sim.plant.walking.motion import advance
 
 STEP_S = 0.0005
 BATTERY_V = 25.9

@@ -1,7 +1,7 @@
 """The program "reflex": its currents against the gait that the plant's tests walk with, and its states by hand.
 
-`tests/plant/walking.py` has the same gait on the body's own angles, in the appendix's signs; no code is shared. What
-both make of one scripted walk, in the joints' sense and in ampere, has to agree.
+`tests/plant/walking/small_controllers.py` has the same gait on the body's own angles, in the appendix's signs; no code
+is shared. What both make of one scripted walk, in the joints' sense and in ampere, has to agree.
 """
 
 import dataclasses
@@ -13,7 +13,7 @@ import pytest
 from ranger_sim.foundation.random_stream import RandomStream
 from tests.boards.bare_body import BareRobot
 from tests.boards.main_brain_bench import Bench
-from tests.plant.walking import PaperGait
+from tests.plant.walking.small_controllers import PaperGait
 
 ZERO = 1.68
 STEP_TICKS = 300  # 0.6 s

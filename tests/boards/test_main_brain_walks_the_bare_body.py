@@ -11,9 +11,9 @@ import pytest
 from ranger_sim.boards.quirks import Quirks
 from ranger_sim.datatable.generated import mb as table
 from ranger_sim.plant import body_files
-from ranger_sim.plant.body import FALLEN
-from ranger_sim.plant.floor import Floor
-from ranger_sim.plant.parameters import BodyParameters
+from ranger_sim.plant.mechanics.body import FALLEN
+from ranger_sim.plant.mechanics.floor import Floor
+from ranger_sim.plant.mechanics.parameters import BodyParameters
 from tests.boards.bare_body import BareRobot
 
 

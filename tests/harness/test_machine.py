@@ -15,8 +15,8 @@ from ranger_sim.harness.machine import Machine
 from ranger_sim.harness.waiting import ConditionNotMetError
 from ranger_sim.harness.wiring.wires import AnalogInput, BridgeWire, CanWire, EncoderWire, Wiring
 from ranger_sim.plant.bridge import Bridge
-from ranger_sim.plant.incremental_encoder import IncrementalEncoder
 from ranger_sim.plant.plant import Plant
+from ranger_sim.plant.sensors.incremental_encoder import IncrementalEncoder
 from tests.firmware_sim.native.support import COMPILER, EXAMPLE
 
 needs_a_compiler = pytest.mark.skipif(not COMPILER, reason="no C compiler is installed here")

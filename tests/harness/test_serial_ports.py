@@ -19,7 +19,7 @@ from ranger_sim.harness.outside import serial_ports
 from ranger_sim.harness.outside.serial_ports import Dropouts, PtyPort, RealPort, SerialLine
 from ranger_sim.harness.ranger import Ranger
 from ranger_sim.harness.scenario import Scenario
-from ranger_sim.plant.imu import Imu
+from ranger_sim.plant.sensors.imu import Imu
 from tests.examples import examples
 
 BYTE_NS = 10_000

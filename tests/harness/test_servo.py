@@ -18,7 +18,7 @@ RANGERS = (
     "ranger_sim.harness.conditions",
     "ranger_sim.harness.ranger",
     "ranger_sim.harness.wiring.ranger",
-    "ranger_sim.plant.body",
+    "ranger_sim.plant.mechanics.body",
     "ranger_sim.plant.ranger",
     "ranger_sim.sysid",
     "ranger_sim.tools",

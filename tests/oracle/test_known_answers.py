@@ -16,8 +16,8 @@ from ranger_sim.harness.ranger import Ranger
 from ranger_sim.harness.records.strike_watch import StrikeWatch
 from ranger_sim.harness.records.summary import energy, motor_powers, oddities
 from ranger_sim.harness.scenario import Scenario, StopRule
+from ranger_sim.plant.mechanics.walk_record import WalkRecord
 from ranger_sim.plant.ranger import RangerPlant
-from ranger_sim.plant.walk_record import WalkRecord
 
 
 @pytest.fixture

@@ -25,7 +25,7 @@ from tests.oracle.test_summary_schema import violations
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 MASTER = ROOT / "datatable" / "master"
 LEG_M = 0.96  # appendix table 2
-NOMINAL_V = 7 * 3.72  # seven cells, at the mean of plant/battery.py's curve: the charge of a full pack
+NOMINAL_V = 7 * 3.72  # seven cells, at the mean of plant/electrics/battery.py's curve: the charge of a full pack
 BUSES = ("can1", "can2", "can3", "can4")
 
 # What the files of a run cannot tell: (why not, figures, who tells it: a test of this folder or another of the suite).
@@ -33,7 +33,7 @@ NONE_IN_A_WALK = "a healthy walk has none, and files tell nothing of what did no
 OF_THE_MODEL = "counts and extremes that may lie between two samples, 2 ms apart"
 SCENARIO = "tests/oracle/test_every_counter.py"
 KNOWN = "tests/oracle/test_known_answers.py"
-ODD = "tests/plant/test_odd_figures.py"
+ODD = "tests/plant/walking/test_odd_figures.py"
 OTHER_ORACLES = (
     (NONE_IN_A_WALK, "fell fall_cause", f"{SCENARIO}::test_a_fall_is_told_with_its_cause"),
     (NONE_IN_A_WALK, "failed_boards", f"{SCENARIO}::test_each_board_that_hangs_is_named_and_no_other"),

@@ -9,9 +9,9 @@ import pytest
 
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.plant import body_files
-from ranger_sim.plant.body import Body
-from ranger_sim.plant.electrics import Electrics
-from ranger_sim.plant.parameters import BodyParameters
+from ranger_sim.plant.electrics.electrics import Electrics
+from ranger_sim.plant.mechanics.body import Body
+from ranger_sim.plant.mechanics.parameters import BodyParameters
 from ranger_sim.plant.ranger import RangerPlant
 from ranger_sim.tools import cli
 

@@ -10,11 +10,11 @@ import sys
 import pytest
 
 from ranger_sim.plant import wiring_points as point
-from ranger_sim.plant.parameters import BodyParameters
+from ranger_sim.plant.mechanics.parameters import BodyParameters
+from ranger_sim.plant.mechanics.steering import Steering
+from ranger_sim.plant.mechanics.walk_record import RING, WalkRecord
 from ranger_sim.plant.ranger import SAMPLES, STEP_NS, RangerPlant
-from ranger_sim.plant.steering import Steering
-from ranger_sim.plant.walk_record import RING, WalkRecord
-from tests.plant.walking import ElectricWalker, RecordGait, electric_start
+from tests.plant.walking.small_controllers import ElectricWalker, RecordGait, electric_start
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
 

@@ -6,10 +6,10 @@ import pytest
 
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.plant import terms
-from ranger_sim.plant.leg import INNER, OUTER, Leg
-from ranger_sim.plant.parameters import BodyParameters
+from ranger_sim.plant.mechanics.leg import INNER, OUTER, Leg
+from ranger_sim.plant.mechanics.parameters import BodyParameters
+from ranger_sim.plant.mechanics.term_torques import TermTorques
 from ranger_sim.plant.ranger import RangerPlant
-from ranger_sim.plant.term_torques import TermTorques
 
 STEP = 125_000
 

@@ -26,7 +26,7 @@ cdef class Second(First):
     cdef public bint on
 """
 LOOK = """\
-from ranger_sim.plant.drive import Drive
+from ranger_sim.plant.electrics.drive import Drive
 
 class OfAUser:
     pass

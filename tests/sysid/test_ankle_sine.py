@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.plant.motor_parameters import ANKLE_MOTOR
+from ranger_sim.plant.electrics.motor_parameters import ANKLE_MOTOR
 from ranger_sim.sysid import readers
 from ranger_sim.sysid.benches import ankle_sine as bench
 from ranger_sim.sysid.dataset import Dataset

@@ -10,7 +10,7 @@ import pytest
 from ranger_sim.foundation.random_arrays import generator
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.plant import terms as plant_terms
-from ranger_sim.plant.motor_parameters import ANKLE_MOTOR, HIP_MOTOR
+from ranger_sim.plant.electrics.motor_parameters import ANKLE_MOTOR, HIP_MOTOR
 from ranger_sim.sysid import answer, intervals, isolability, misfit, model_terms, plausibility, residual_term
 from ranger_sim.sysid.dataset import Channel, Dataset, Table
 from ranger_sim.sysid.diagnosis import Diagnosis, KnownEffect

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.special import ellipk
 
-from ranger_sim.plant.parameters import BodyParameters
+from ranger_sim.plant.mechanics.parameters import BodyParameters
 from ranger_sim.sysid import instruments
 from ranger_sim.sysid.benches import leg, motor, pulley, springs
 

@@ -9,8 +9,8 @@ from scipy.integrate import solve_ivp
 
 from ranger_sim.foundation.random_arrays import generator
 from ranger_sim.plant import terms as plant_terms
-from ranger_sim.plant.motor_parameters import ANKLE_MOTOR, HIP_MOTOR
-from ranger_sim.plant.parameters import BodyParameters
+from ranger_sim.plant.electrics.motor_parameters import ANKLE_MOTOR, HIP_MOTOR
+from ranger_sim.plant.mechanics.parameters import BodyParameters
 from ranger_sim.sysid.benches import ankle_sine, leg, motor, motor_run, pulley, springs
 from ranger_sim.sysid.benches.bench_terms import NOTHING, BenchTerms
 

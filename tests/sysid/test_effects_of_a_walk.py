@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from ranger_sim.foundation.random_arrays import generator
-from ranger_sim.plant.parameters import BodyParameters
+from ranger_sim.plant.mechanics.parameters import BodyParameters
 from ranger_sim.sysid.dataset import Table
 from ranger_sim.sysid.machines.walk import Walk, causes, machine, strikes
 from ranger_sim.sysid.machines.walk.machine import Rows, WalkRecording

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from ranger_sim.plant.motor_parameters import MotorParameters
+from ranger_sim.plant.electrics.motor_parameters import MotorParameters
 from ranger_sim.sysid import experiment_models
 from ranger_sim.sysid.experiment_models import FINE, SAMPLES, Builder
 

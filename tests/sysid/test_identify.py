@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.plant.parameters import BodyParameters
+from ranger_sim.plant.mechanics.parameters import BodyParameters
 from ranger_sim.sysid.benches import leg, motor, pulley
 from ranger_sim.sysid.dataset import Channel, Dataset
 from ranger_sim.sysid.fit import Parameter

@@ -9,8 +9,8 @@ import pytest
 
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.plant import terms
-from ranger_sim.plant.electrics import Electrics
-from ranger_sim.plant.parameters import BodyParameters
+from ranger_sim.plant.electrics.electrics import Electrics
+from ranger_sim.plant.mechanics.parameters import BodyParameters
 from ranger_sim.sysid import model_file
 from ranger_sim.sysid.benches.bench_terms import BenchTerms
 from ranger_sim.sysid.benches.motor import BENCH_MOTOR, SuppliedMotor

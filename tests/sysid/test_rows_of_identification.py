@@ -9,7 +9,7 @@ from scipy.interpolate import CubicHermiteSpline
 
 from ranger_sim.foundation.random_arrays import generator
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.plant.motor_parameters import ANKLE_MOTOR
+from ranger_sim.plant.electrics.motor_parameters import ANKLE_MOTOR
 from ranger_sim.sysid import plausibility
 from ranger_sim.sysid.dataset import Channel, Dataset
 from ranger_sim.sysid.fit import Fit, Parameter

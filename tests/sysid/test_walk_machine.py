@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.plant.parameters import BodyParameters
+from ranger_sim.plant.mechanics.parameters import BodyParameters
 from ranger_sim.sysid.channels import named_for
 from ranger_sim.sysid.dataset import Channel, Dataset, Table
 from ranger_sim.sysid.diagnose import diagnose

@@ -1,7 +1,7 @@
 """The walk's balances on motions of the plant's body: what they leave over is what moves it, and else nothing.
 
-The body's accelerations come from Lagrange's equations in closed form (plant/stance.py), which other tests hold
-against two further derivations; the balances here are sums of moments.
+The body's accelerations come from Lagrange's equations in closed form (plant/mechanics/stance.py), which other tests
+hold against two further derivations; the balances here are sums of moments.
 """
 
 import dataclasses
@@ -10,13 +10,20 @@ import numpy as np
 import pytest
 
 from ranger_sim.foundation.random_stream import RandomStream
-from ranger_sim.plant.body import SINGLE, Body
-from ranger_sim.plant.floor import Floor
-from ranger_sim.plant.leg import INNER, OUTER
-from ranger_sim.plant.stance import on_feet
+from ranger_sim.plant.mechanics.body import SINGLE, Body
+from ranger_sim.plant.mechanics.floor import Floor
+from ranger_sim.plant.mechanics.leg import INNER, OUTER
+from ranger_sim.plant.mechanics.stance import on_feet
 from ranger_sim.sysid.machines.walk import mechanics
 from ranger_sim.sysid.machines.walk.mechanics import Motion, Numbers
-from tests.plant.test_body_equations import INERTIAL, closed_posture, random_posture, set_motors, set_state, torque
+from tests.plant.mechanics.test_body_equations import (
+    INERTIAL,
+    closed_posture,
+    random_posture,
+    set_motors,
+    set_state,
+    torque,
+)
 
 ROWS = 40
 NUMBERS = dataclasses.replace(Numbers.of(INERTIAL), slope_rad=INERTIAL.slope_rad)

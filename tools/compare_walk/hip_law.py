@@ -21,7 +21,7 @@ import numpy as np
 from scipy.signal import savgol_filter
 from scipy.stats import t as t_distribution
 
-from ranger_sim.plant.parameters import BodyParameters
+from ranger_sim.plant.mechanics.parameters import BodyParameters
 from ranger_sim.sysid.dataset import Array
 from ranger_sim.tools.compare_walk.gait import INNER_PUSH, OUTER_PUSH, Walk
 

@@ -14,7 +14,7 @@ from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.campaigns.cases import Case, Settings, version
 from ranger_sim.harness.scenario import Scenario, StopRule
 from ranger_sim.plant import body_files
-from ranger_sim.plant.parameters import BodyParameters
+from ranger_sim.plant.mechanics.parameters import BodyParameters
 from ranger_sim.sysid.figures.question import Candidate, Outcome, Point
 from ranger_sim.tools.command_line.files import replace_file
 

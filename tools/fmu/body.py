@@ -16,7 +16,9 @@ from ranger_sim.boards.main_brain import controllers
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.scenario import Scenario
 from ranger_sim.plant import body_files
-from ranger_sim.plant.imu import (
+from ranger_sim.plant.mechanics.parameters import BodyParameters, fault_of
+from ranger_sim.plant.ranger import SAMPLES, STEP_NS, RangerPlant
+from ranger_sim.plant.sensors.imu import (
     HEADER_ANGLES_AND_RATES,
     HEADER_RATES,
     SET_MODE,
@@ -24,8 +26,6 @@ from ranger_sim.plant.imu import (
     SET_MODE_THIRD,
     SILENT,
 )
-from ranger_sim.plant.parameters import BodyParameters, fault_of
-from ranger_sim.plant.ranger import SAMPLES, STEP_NS, RangerPlant
 from ranger_sim.plant.wiring_points import ANALOG_NAMES, ENCODER_NAMES, MOTOR_NAMES, WORD_NAMES
 
 STEP_S = STEP_NS * 1e-9

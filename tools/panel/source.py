@@ -16,7 +16,8 @@ from ranger_sim.tools.panel.channels import EMPTY, Channel, Times, Trace, Values
 # them, feet by the ankles' encoders. Angles against gravity, rad; robot.md N4.17, C1.
 LEGS = (("E_LO_ANGLE", "E_LI_ANGLE"), ("EST_STATE_TH0", "EST_STATE_TH1"))
 ANKLES = ("MCFO_RIGHT_ANKLE_ANGLE", "MCFI_MID_ANKLE_ANGLE")
-ANKLE_ZERO_RAD = 1.68  # between leg and foot, of the body `ranger` (plant/parameters.py); 1.60, 1.63: robot.md N5
+# between leg and foot, of the body `ranger` (plant/mechanics/parameters.py); 1.60, 1.63: robot.md N5
+ANKLE_ZERO_RAD = 1.68
 KNOWN_POSE = ("leg_outer_rad", "leg_inner_rad", "foot_outer_rad", "foot_inner_rad")
 # As the body has them, where a body is simulated; rad, m, N, A.
 TRUE_POSE = (

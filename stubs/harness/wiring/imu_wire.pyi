@@ -2,7 +2,7 @@
 
 from ranger_sim.foundation.events import EventQueue
 from ranger_sim.harness.step_watch import SerialDevice
-from ranger_sim.plant.imu import Imu
+from ranger_sim.plant.sensors.imu import Imu
 from typing import Any
 from typing import final
 

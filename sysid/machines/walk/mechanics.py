@@ -9,7 +9,7 @@ import dataclasses
 
 import numpy as np
 
-from ranger_sim.plant.parameters import BodyParameters
+from ranger_sim.plant.mechanics.parameters import BodyParameters
 from ranger_sim.sysid.dataset import Array
 
 LEGS = ("outer", "inner")

@@ -9,9 +9,9 @@ import types
 
 from ranger_sim.harness.conditions import condition
 from ranger_sim.harness.faults.ranger_catalogue import CATALOGUE
-from ranger_sim.plant.imu import HEADER_RATES, SET_MODE, SET_MODE_SECOND, SET_MODE_THIRD
-from ranger_sim.plant.incremental_encoder import IncrementalEncoder
 from ranger_sim.plant.ranger import RangerPlant
+from ranger_sim.plant.sensors.imu import HEADER_RATES, SET_MODE, SET_MODE_SECOND, SET_MODE_THIRD
+from ranger_sim.plant.sensors.incremental_encoder import IncrementalEncoder
 
 STEP_NS = 250_000
 

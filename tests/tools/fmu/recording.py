@@ -8,7 +8,7 @@ import contextlib
 from ranger_sim.harness.ranger import Ranger
 from ranger_sim.harness.scenario import Scenario
 from ranger_sim.harness.step_watch import StepWatch
-from ranger_sim.plant.drive import PWM_WRITE, ROW
+from ranger_sim.plant.electrics.drive import PWM_WRITE, ROW
 from ranger_sim.plant.wiring_points import ANALOG_NAMES, ENCODER_NAMES, MOTOR_NAMES, WORD_NAMES
 
 

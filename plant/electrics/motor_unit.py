@@ -1,0 +1,460 @@
+# cython: cdivision=True
+# (only doubles are divided, by durations and resistances above zero)
+"""A brushed motor with its drive: winding current in closed form, friction at the joint, heat, power balance.
+
+Everything seen from outside is in the joint's sense: a positive current turns the joint positively. `mounting`
+(+1 or -1) says how the motor sits: with -1 a positive bridge voltage turns the joint negatively (the outer
+ankle is mirrored, robot.md N4.1, N4.2).
+
+Electrical (appendix eq. 32 with the inductance added; EQUATIONS 10.1-10.7):
+
+    V = L dI/dt + R I + V_c sgn(I) + K G w
+
+K may ripple with the rotor's angle: then it does on both sides, in V as in T, or the shaft would take another power
+than the winding gives (EQUATIONS 10.10). `turn` sets its mean over the coming step.
+
+On one side of zero this is linear, so the current is an exponential towards (V - K G w -/+ V_c) / R and is
+integrated exactly, together with its square, until it reaches zero; there it stays while |V - K G w| < V_c.
+The speed w is constant over a call. An open bridge is the same equation with V = 0 and the drop
+V_c + V_battery + 2 V_diode: the winding pushes its current back into the battery through two diodes.
+
+Mechanical (appendix eq. 33, 35, 36): T = G K I - (mu G K |I| + C_0) tanh(w / epsilon) - C_1 w, without the
+rotor's inertia, which the body carries. tanh instead of sgn lets a stuck joint creep: below friction F a load T
+moves it with epsilon atanh(T / F), that is 0.027 rad/s at half of the friction with epsilon = 0.05 rad/s.
+
+Losses of the PWM: a triangular ripple of V_b d (1 - d) / (L f) from peak to peak heats the loop by
+R (V_b d (1 - d) / (L f))^2 / 12, with the inductance at the PWM frequency. The gate drive takes 0.3 W at 30 V
+and 100 kHz for each lead that switches. The electronics' 5.15 W are measured at the router board, which feeds
+everything "except for the motors and motor drivers" (appendix 3.8), so gate and ripple losses come on top and
+are drawn from the battery here.
+"""
+
+import cython
+
+from ranger_sim.foundation.numbers import reals
+from ranger_sim.plant.electrics.drive import Drive
+from ranger_sim.plant.electrics.motor_parameters import MotorParameters
+
+if not cython.compiled:
+    from math import exp, log, sin
+
+    from ranger_sim.plant.mechanics.friction import smoothed_sign
+
+
+class MotorUnit:
+    """One motor with its bridge. `parameters`: MotorParameters; `mounting`: +1 or -1.
+
+    After `step_electrical`: `mean_current_A` and `current_A` (end of the step) in the joint's sense;
+    `battery_current_A`, mean drawn from the battery, negative when the motor feeds it; `drive_Nm`,
+    `coulomb_Nm`, `viscous_Nms` for the body: torque = drive - coulomb tanh(rate / epsilon) - viscous rate.
+    Sums since power-up in J: battery_J = drawn_J - returned_J = mechanical + winding + series + contact + ripple
+    + gate + diode + change of magnetic energy.
+
+    More than 40 fields, because the lines of a step use the winding's numbers and its books alike: in an object of
+    their own the books would be looked up in every line.
+    """
+
+    def __init__(self, name, parameters=None, mounting=1) -> None:
+        p = parameters if parameters is not None else MotorParameters()
+        self.name = name
+        self.parameters = p
+        self.mounting = mounting
+        self.drive = Drive(p.watchdog_ns)
+        self.gear = p.gear
+        self.contact_drop_V = p.contact_drop_V
+        self.winding_ohm = p.resistance_ohm  # at the present temperature
+        self.series_ohm = p.series_resistance_ohm + p.bridge_resistance_ohm
+        self.K = p.torque_constant_Nm_per_A  # at the present temperature, its mean over a turn of the rotor
+        self.angle_factor = 1.0  # of K: where the rotor stands, 1 for a motor without ripple
+        self.inductance_H = p.inductance_H(p.settling_frequency_hz)
+        # of EQUATIONS 10.6, without voltage, resistance and duty
+        self.ripple_per_ohm2 = 1.0 / (12.0 * (p.inductance_H(p.pwm_frequency_hz) * p.pwm_frequency_hz) ** 2)
+        self.gate_W_per_V = p.gate_power_W / 30.0 * (p.pwm_frequency_hz / 100e3)
+        self.diode_drop_V = p.diode_drop_V
+        self.dead_time_fraction = p.dead_time_fraction
+        self.mu = p.load_friction
+        self.C0 = p.constant_friction_Nm
+        self.C1 = p.viscous_friction_Nms
+        self.inverse_smoothing = 1.0 / p.friction_smoothing_rad_s
+        self.resistance_per_K = p.resistance_per_K
+        self.torque_constant_per_K = p.torque_constant_per_K
+        self.ripples = reals([])  # of each: part of K, periods per turn of the rotor, phase (rad)
+        self.heat_matters = p.resistance_per_K != 0.0 or p.torque_constant_per_K != 0.0
+        self.G_wh = 1.0 / p.winding_to_housing_K_per_W
+        self.G_ha = 1.0 / p.housing_to_air_K_per_W
+        self.inverse_C_w = 1.0 / p.winding_capacity_J_per_K
+        self.inverse_C_h = 1.0 / p.housing_capacity_J_per_K
+        self.air_C = p.air_C
+        self.rotor_temperature_C = p.air_C
+        self.housing_temperature_C = p.air_C
+
+        self.bridge_current_A = 0.0  # in the bridge's sense
+        self.current_A = 0.0
+        self.battery_current_A = 0.0
+        self.heat_W = 0.0  # in the rotor, mean over the last 8 ms
+        self.drive_Nm = 0.0
+        self.coulomb_Nm = p.constant_friction_Nm
+        self.viscous_Nms = p.viscous_friction_Nms
+
+        self.drawn_J = 0.0
+        self.drawn_before_J = 0.0  # until the robot was let go; kept by plant/ranger.py
+        self.returned_J = 0.0
+        self.mechanical_J = 0.0  # K G w I, before friction
+        self.ripple_J = 0.0
+        self.gate_J = 0.0
+        self.diode_J = 0.0
+        # since its temperature was last computed: time, and integrals of the current's size and of its square
+        self.heat_s = 0.0
+        self.size_As = 0.0
+        self.square_A2s = 0.0
+        # of all the time before: these integrals, heat of the winding and the ripple
+        self.warmed_As = 0.0
+        self.warmed_A2s = 0.0
+        self.warmed_J = 0.0
+        self.warmed_ripple_J = 0.0
+        # of a step in pieces: charge through the winding in the joint's sense, charge from the battery
+        self.total_As = 0.0
+        self.from_battery_As = 0.0
+        # of a whole step of `known_s` at `known_ohm`: time constant, e^(-t/tau) and two integrals of it
+        self.known_s = 0.0
+        self.known_ohm = 0.0
+        self.per_s = 0.0  # one over each
+        self.per_ohm = 0.0
+        self.tau_s = 0.0
+        self.decay = 0.0
+        self.decay_s = 0.0
+        self.decay_squared_s = 0.0
+
+    def magnetic_J(self) -> cython.double:
+        """Energy in winding and inductor now."""
+        return 0.5 * self.inductance_H * self.bridge_current_A * self.bridge_current_A
+
+    def battery_J(self) -> cython.double:
+        """Energy taken from the battery since power-up, less what was given back."""
+        return self.drawn_J - self.returned_J
+
+    def add_ripple(self, fraction, periods_per_turn, phase_rad) -> None:
+        """K is so much more and less of itself, with this phase where the rotor's angle is 0."""
+        self.ripples = reals(list(self.ripples) + [fraction, periods_per_turn, phase_rad])
+
+    def turn(self, angle_rad: cython.double, rate_rad_s: cython.double, seconds: cython.double) -> cython.void:
+        """Set K for a step that begins at this angle of the joint: its mean over what the rotor goes through."""
+        half: cython.double = 0.5 * self.gear * rate_rad_s * seconds
+        middle: cython.double = self.gear * angle_rad + half
+        factor: cython.double = 1.0
+        part: cython.double
+        x: cython.double
+        i: cython.Py_ssize_t
+        for i in range(0, len(self.ripples), 3):
+            part = self.ripples[i]
+            x = self.ripples[i + 1] * half
+            if x > 1e-4 or x < -1e-4:  # below, the mean of a sine about its middle is the middle, to 1e-9
+                part *= sin(x) / x
+            factor += part * sin(self.ripples[i + 1] * middle + self.ripples[i + 2])
+        self.angle_factor = factor
+
+    def torque_Nm(self, current_A: cython.double, rate_rad_s: cython.double) -> cython.double:
+        """Torque at the joint for a current and a joint rate, without the rotor's inertia."""
+        GKI: cython.double = self.gear * self.K * self.angle_factor * current_A
+        load: cython.double = GKI if GKI > 0.0 else -GKI
+        return (
+            GKI - (self.mu * load + self.C0) * smoothed_sign(rate_rad_s * self.inverse_smoothing) - self.C1 * rate_rad_s
+        )
+
+    def load(self, current_A: cython.double) -> cython.void:
+        """Set the three torque numbers for the body from a current in the joint's sense."""
+        GKI: cython.double = self.gear * self.K * self.angle_factor * current_A
+        self.drive_Nm = GKI
+        self.coulomb_Nm = self.mu * (GKI if GKI > 0.0 else -GKI) + self.C0
+        self.viscous_Nms = self.C1
+
+    def step_electrical(
+        self,
+        t0: cython.longlong,
+        t1: cython.longlong,
+        rate_rad_s: cython.double,
+        battery_V: cython.double,
+    ) -> cython.void:
+        """Winding, bridge and heat from `t0` to `t1` (ns) at a constant joint rate and battery voltage.
+
+        Here where the bridge does not change and the current stays on its side of zero, which is nearly always;
+        in pieces otherwise (EQUATIONS 10.2-10.7).
+        """
+        drive: Drive = self.drive
+        if t1 <= t0:
+            return
+        if drive.next_change_ns <= t0:  # before anything else: it is a call
+            drive.apply(t0)
+        h: cython.double = (t1 - t0) * 1e-9
+        R: cython.double = self.winding_ohm + self.series_ohm
+        GK: cython.double = self.mounting * self.gear * self.K * self.angle_factor
+        contact_V: cython.double = self.contact_drop_V
+        back_emf_V: cython.double = GK * rate_rad_s
+        amps: cython.double = self.bridge_current_A
+        d: cython.double = drive.duty
+        x: cython.double
+        drop: cython.double
+        sign: cython.double
+        final: cython.double
+        above: cython.double
+        part: cython.double = -1.0
+        total_As: cython.double
+        from_battery_As: cython.double = 0.0
+        if amps == 0.0 and drive.switching_leads == 0 and drive.next_change_ns > t1:
+            x = d * battery_V - back_emf_V
+            if -contact_V <= x <= contact_V:
+                # nothing drives a current through the contacts and no lead switches: only time passes
+                if self.current_A != 0.0 or self.battery_current_A != 0.0 or self.drive_Nm != 0.0:
+                    self.current_A = 0.0
+                    self.battery_current_A = 0.0
+                    self.load(0.0)
+                self.heat_s += h
+                if self.heat_s >= 0.008:
+                    self._heat()
+                return
+        if h != self.known_s or R != self.known_ohm:
+            self._know_step(h, R)
+        if drive.next_change_ns > t1:
+            if drive.is_open:
+                x = -back_emf_V
+                drop = contact_V + battery_V + 2.0 * self.diode_drop_V
+            else:
+                x = d * battery_V - back_emf_V
+                drop = contact_V + self.dead_time_fraction * battery_V
+            # `sign`: side of zero the current is on or goes to; `final` and `above` are measured on that side
+            if amps > 0.0 or amps == 0.0 and x > drop:
+                sign = 1.0
+            elif amps < 0.0 or x < -drop:
+                sign = -1.0
+            else:
+                sign = 0.0
+            if sign != 0.0:
+                final = (sign * x - drop) * self.per_ohm
+                above = sign * amps - final
+                part = final + above * self.decay
+        if part >= 0.0:
+            amps = sign * part
+            part = h * final
+            x = above * self.decay_s
+            self.square_A2s += final * (part + 2.0 * x) + above * above * self.decay_squared_s
+            part += x
+            self.size_As += part
+            total_As = sign * part
+            if drive.is_open:
+                from_battery_As -= part
+                self.diode_J += 2.0 * self.diode_drop_V * part
+            else:
+                # the dead time's drop is the battery's own voltage, switched against the current: it goes back
+                from_battery_As += d * total_As - self.dead_time_fraction * part
+                if drive.switching_leads > 0:
+                    part = battery_V * R * self.ripple_per_ohm2 * drive.ripple * h
+                    x = drive.switching_leads * self.gate_W_per_V * h
+                    self.ripple_J += part * battery_V
+                    self.gate_J += x * battery_V
+                    from_battery_As += part + x
+        else:
+            self._step_in_pieces(t0, t1, back_emf_V, battery_V)
+            amps = self.bridge_current_A
+            total_As = self.total_As
+            from_battery_As = self.from_battery_As
+        self.bridge_current_A = amps
+        self.current_A = self.mounting * amps
+        self.battery_current_A = from_battery_As * self.per_s
+        self.mechanical_J += back_emf_V * total_As
+        x = from_battery_As * battery_V
+        if x >= 0.0:
+            self.drawn_J += x
+        else:
+            self.returned_J -= x
+        self.heat_s += h
+        if self.heat_s >= 0.008:
+            self._heat()
+        # the torque numbers for the body: `load` of the mean current
+        x = GK * total_As * self.per_s
+        self.drive_Nm = x
+        self.coulomb_Nm = self.mu * (x if x > 0.0 else -x) + self.C0
+
+    def _step_in_pieces(
+        self,
+        t0: cython.longlong,
+        t1: cython.longlong,
+        back_emf_V: cython.double,
+        battery_V: cython.double,
+    ) -> cython.void:
+        """`step_electrical` over changes of the bridge and zeros of the current: leaves the current, `total_As` and
+        `from_battery_As`, and counts the heat's integrals and the energies of ripple, gates and diodes.
+
+        Pieces between changes of the bridge; in each the current runs to its final value, or to zero and on from
+        there, and its integral, that of its size and that of its square are summed (EQUATIONS 10.2-10.7).
+        """
+        drive: Drive = self.drive
+        now: cython.longlong = t0
+        following: cython.longlong
+        h: cython.double = self.known_s
+        R: cython.double = self.known_ohm
+        tau: cython.double = self.tau_s
+        contact_V: cython.double = self.contact_drop_V
+        amps: cython.double = self.bridge_current_A
+        seconds: cython.double
+        left: cython.double
+        x: cython.double
+        drop: cython.double
+        d: cython.double
+        sign: cython.double
+        final: cython.double
+        above: cython.double
+        e: cython.double
+        e_s: cython.double
+        ee_s: cython.double
+        part: cython.double
+        charge: cython.double
+        absolute: cython.double
+        from_battery_As: cython.double = 0.0
+        total_As: cython.double = 0.0
+        size_As: cython.double = 0.0
+        square_A2s: cython.double = 0.0
+        while now < t1:
+            following = drive.next_change_ns
+            if following > t1:
+                following = t1
+            seconds = (following - now) * 1e-9
+            d = drive.duty
+            if drive.is_open:
+                x = -back_emf_V
+                drop = contact_V + battery_V + 2.0 * self.diode_drop_V
+            else:
+                x = d * battery_V - back_emf_V
+                drop = contact_V + self.dead_time_fraction * battery_V
+            charge = 0.0
+            absolute = 0.0
+            left = seconds
+            while left > 0.0:
+                # `sign`: side of zero the current is on or goes to; `final` and `above` are measured on that side
+                if amps > 0.0:
+                    sign = 1.0
+                elif amps < 0.0:
+                    sign = -1.0
+                elif x > drop:
+                    sign = 1.0
+                elif x < -drop:
+                    sign = -1.0
+                else:
+                    break  # the contact drop holds the current at zero
+                final = (sign * x - drop) * self.per_ohm
+                above = sign * amps - final
+                if left == h:
+                    e = self.decay
+                    e_s = self.decay_s
+                    ee_s = self.decay_squared_s
+                else:
+                    e = exp(-left / tau)
+                    e_s = tau * (1.0 - e)
+                    ee_s = 0.5 * tau * (1.0 - e * e)
+                part = final + above * e
+                if part >= 0.0:
+                    amps = sign * part
+                    part = left
+                    left = 0.0
+                else:
+                    # the current reaches zero inside: there e = -final / above
+                    e = -final / above
+                    e_s = tau * (1.0 - e)
+                    ee_s = 0.5 * tau * (1.0 - e * e)
+                    part = tau * log(above / -final)
+                    if part > left:
+                        part = left
+                    left -= part
+                    amps = 0.0
+                part *= final
+                square_A2s += final * (part + 2.0 * above * e_s) + above * above * ee_s
+                part += above * e_s
+                charge += sign * part
+                absolute += part
+            total_As += charge
+            size_As += absolute
+            if drive.is_open:
+                from_battery_As -= absolute
+                self.diode_J += 2.0 * self.diode_drop_V * absolute
+            else:
+                # the dead time's drop is the battery's own voltage, switched against the current: it goes back
+                from_battery_As += d * charge - self.dead_time_fraction * absolute
+                if drive.switching_leads > 0:
+                    part = battery_V * R * self.ripple_per_ohm2 * drive.ripple * seconds
+                    x = drive.switching_leads * self.gate_W_per_V * seconds
+                    self.ripple_J += part * battery_V
+                    self.gate_J += x * battery_V
+                    from_battery_As += part + x
+            now = following
+            if now == drive.next_change_ns:
+                drive.apply(now)
+        self.bridge_current_A = amps
+        self.total_As = total_As
+        self.from_battery_As = from_battery_As
+        self.size_As += size_As
+        self.square_A2s += square_A2s
+
+    @property
+    def mean_current_A(self):
+        """Mean of the last step, in the joint's sense."""
+        return self.drive_Nm / (self.gear * self.K * self.angle_factor)
+
+    @property
+    def contact_J(self):
+        """Heat at the brushes."""
+        return self.contact_drop_V * (self.warmed_As + self.size_As)
+
+    @property
+    def series_J(self):
+        """Heat in the inductor, the bridge and other series resistance."""
+        return self.series_ohm * (self.warmed_A2s + self.square_A2s)
+
+    @property
+    def winding_J(self):
+        """Heat in the winding without its share of the ripple's."""
+        return self.warmed_J + self.winding_ohm * self.square_A2s
+
+    def _heat(self) -> cython.void:
+        """Warm the motor with the mean power since it was last warmed: winding, brushes, its share of the ripple.
+
+        The ripple heats the winding and the series parts in proportion to their resistance.
+        """
+        winding_J: cython.double = self.winding_ohm * self.square_A2s
+        ripple_J: cython.double = (self.ripple_J - self.warmed_ripple_J) * self.winding_ohm
+        ripple_J /= self.winding_ohm + self.series_ohm
+        self.heat_W = (winding_J + self.contact_drop_V * self.size_As + ripple_J) / self.heat_s
+        self.warmed_J += winding_J
+        self.warmed_A2s += self.square_A2s
+        self.warmed_As += self.size_As
+        self.warmed_ripple_J = self.ripple_J
+        self.square_A2s = 0.0
+        self.size_As = 0.0
+        self._warm(self.heat_s)
+        self.heat_s = 0.0
+
+    def _know_step(self, h: cython.double, R: cython.double) -> cython.void:
+        """Keep what a step of `h` seconds at a loop resistance of `R` ohm needs of the exponential."""
+        self.known_s = h
+        self.known_ohm = R
+        self.per_s = 1.0 / h
+        self.per_ohm = 1.0 / R
+        self.tau_s = self.inductance_H / R
+        self.decay = exp(-h / self.tau_s)
+        self.decay_s = self.tau_s * (1.0 - self.decay)
+        self.decay_squared_s = 0.5 * self.tau_s * (1.0 - self.decay * self.decay)
+
+    def _warm(self, h: cython.double) -> cython.void:
+        """Winding and housing after `h` seconds of `heat_W`; R and K follow when their coefficients are set.
+
+        Asked every 8 ms, less than a 600th of any winding's time constant: chosen by us.
+        """
+        inward: cython.double = (self.rotor_temperature_C - self.housing_temperature_C) * self.G_wh
+        outward: cython.double = (self.housing_temperature_C - self.air_C) * self.G_ha
+        self.rotor_temperature_C += (self.heat_W - inward) * h * self.inverse_C_w
+        self.housing_temperature_C += (inward - outward) * h * self.inverse_C_h
+        if self.heat_matters:
+            self.winding_ohm = self.parameters.resistance_ohm * (
+                1.0 + self.resistance_per_K * (self.rotor_temperature_C - 25.0)
+            )
+            self.K = self.parameters.torque_constant_Nm_per_A * (
+                1.0 + self.torque_constant_per_K * (self.housing_temperature_C - 25.0)
+            )

@@ -1,9 +1,0 @@
-# Generated from plant/sliding.py and plant/sliding.pxd (python -m ranger_sim.tools.stubs); do not edit.
-
-from ranger_sim.plant.body import Body
-
-MOTOR: int
-FREEDOMS: int
-
-def slide(body: Body, h: float, stages: int) -> None: ...
-def write_forces(body: Body) -> None: ...

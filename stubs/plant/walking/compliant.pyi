@@ -1,0 +1,3 @@
+# Generated from plant/walking/compliant.py and plant/walking/compliant.pxd (python -m ranger_sim.tools.stubs); do not edit.
+
+PARTS: int
