@@ -12,7 +12,7 @@ from plotly.io import to_json
 from plotly.offline import get_plotlyjs
 
 HERE = pathlib.Path(__file__).parent
-OUTER, INNER, HIP, INK = "#1f6fb2", "#d9731a", "#2c7a4b", "#1d2733"
+OUTER, INNER, HIP, INK = "#115599", "#bb5500", "#009475", "#1d2733"  # the report's and the panel's
 
 
 @dataclasses.dataclass

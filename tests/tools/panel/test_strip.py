@@ -34,8 +34,8 @@ PROGRAM = """
     return { x, low, high: null };
   };
   const of = (first, last) => [extremes(first, last), samples(first * WIDTH, last * WIDTH)];
-  const pen = (colour, faint, most) => ({ colour, faint, least: -2, most });
-  const pens = (most) => [pen("#1f6fb2", null, most), pen("#d9731a", "#d9731a60", most)];
+  const pen = (colour, dash, most) => ({ colour, dash, least: -2, most });
+  const pens = (most) => [pen("#1f6fb2", "-", most), pen("#d9731a", "------      ", most)];
   const seen = (strip) => {
     const canvas = Object.assign(document.createElement("canvas"), { width: COLUMNS, height: 40 });
     const onto = canvas.getContext("2d");
@@ -90,3 +90,48 @@ def test_what_is_painted_piece_by_piece_is_what_would_be_painted_at_once(tmp_pat
     assert told["gap"] == [0, 0, 0] and min(told["before"]) > 0
     assert told["extremes"] == [-5, 9]
     assert told["later"] == [[1, 3], 9]  # what is no longer seen does not stretch the axis
+
+
+# Level lines, each in a row of its own, of every pen of a plot: held they are uPlot's, while they go on the strip's. Of
+# each the columns of a row are told that are drawn, not faint; a line between two rows has half of its colour in each.
+DASHES = """
+(() => {
+  const { plots } = window.rangerPanel, [plot] = plots.wanted(), END = 2;
+  const rows = () => {
+    const { chart } = plot, { left, width } = chart.bbox;
+    chart.axes.forEach((axis) => { axis.grid.show = false; });
+    chart.redraw(false);
+    chart.batch(() => {});
+    return plot.numbers.map((number, k) => {
+      const y = Math.round(chart.valToPos(k, "1", true));
+      const { data } = chart.ctx.getImageData(left, y - 1, width, 3);
+      let row = "";
+      const opaque = (c) => Math.max(...[0, 1, 2].map((r) => data[4 * (r * width + c) + 3]));
+      for (let c = 4; c < width - 4; c++) row += opaque(c) > 100 ? "-" : " ";
+      return row;
+    });
+  };
+  const points = plots.points(plot, true), x = [0, 1, END];
+  const found = plot.numbers.map((channel, k) => ({ channel, x, low: [k, k, k], high: null }));
+  const shown = (follows) => {
+    plots.show({ place: 0, end: END, span: 1.5, points, anew: true, follows, found });
+    return rows();
+  };
+  const strip = shown(true), { min, max } = plot.chart.scales.x;
+  plots.show({ place: 0, end: max, span: max - min, points, anew: true, follows: false, found });
+  return JSON.stringify({ strip, uplot: rows() });
+})()
+"""
+
+
+def test_a_dash_is_the_same_while_a_plot_goes_on_and_while_it_is_held(tmp_path):
+    names = [f"level_{k}" for k in range(48)]
+    log = tmp_path / "log.csv"
+    rows = (f"{t / 100}," + ",".join(map(str, range(48))) for t in range(300))
+    log.write_text("\n".join([",".join(["time_s", *names]), *rows]) + "\n", encoding="utf-8")
+    with served(str(log)) as (address, _), page_of(f"{address}#plots={','.join(names)}", tmp_path) as page:
+        page.until("window.rangerPanel.plots.wanted()[0]?.drawn > 0")
+        told = json.loads(page.value(DASHES))
+    assert told["strip"] == told["uplot"]
+    assert len(set(told["strip"])) == 6 and set(told["strip"][0]) == {"-"}
+    assert all(len(set(told["strip"][k : k + 8])) == 1 for k in range(0, 48, 8))  # eight colours, one dash

@@ -86,7 +86,7 @@ function greet(found) {
   by("face").hidden = !can.has("panel");
   for (const [name, needs] of [["parameters", "parameters"], ["errors", "errors"], ["link", "link"], ["faults", "faults"]])
     document.querySelector(`[data-view=${name}]`).hidden = !can.has(needs);
-  by("pose-note").textContent = hello.pose.includes("hip_y_m") ? "as its body is; contact forces green" : hello.pose.length ? "as it estimates itself; the lower foot stands" : "no leg angles in this source";
+  by("pose-note").textContent = hello.pose.includes("hip_y_m") ? "as its body is; inner legs hollow, contact forces thin" : hello.pose.length ? "as it estimates itself; inner legs hollow, the lower foot stands" : "no leg angles in this source";
   by("names").replaceChildren(...hello.channels.map((channel) => Object.assign(document.createElement("option"), { value: channel.name })));
   by("bars").replaceChildren(...CURRENTS.map(([name, , swatch]) => {
     const row = document.createElement("div");

@@ -1,12 +1,11 @@
 // The plots: an axis for each unit, one cursor for all. uPlot shows a held window; while a plot goes on with time, uPlot
 // has its axes and cursor, and strip.js its lines.
 import { bind } from "./keys.js";
+import { colourOf, dashOf, inkOf, swatch } from "./pens.js";
 import { put as say } from "./renew.js";
 import { makeStrip } from "./strip.js";
 import { extremes, plotWords, title, valueWords } from "./words.js";
 
-const COLOURS = ["#1f6fb2", "#d9731a", "#2c9a5b", "#a8499a", "#b3261e", "#0f8b8d", "#8a6d00", "#6a5acd", "#7a4a1e", "#4a7fb0", "#c2577a", "#5c7d1e"];
-const DASHES = [[], [7, 4], [2, 3]];   // beside colours: also for who cannot tell them apart
 const HEIGHT = 230, MOST_AXES = 4, AXIS_PX = 62, MOST_POINTS = 4000;
 const TIGHTER = 0.5;    // an axis stays as it is until what is seen leaves it, or needs less than this share of it
 const READABLE_MS = 150;   // between two figures at one place
@@ -23,7 +22,7 @@ export function makePlots(box, on, colour) {
     element.className = "plot";
     element.setAttribute("role", "group");
     element.innerHTML = '<div class="head"></div><div class="chart" role="img"></div>';
-    const plot = { element, numbers: [...numbers], chart: null, signature: "", found: null, strip: null, ranges: {}, drawn: 0 };
+    const plot = { element, numbers: [...numbers], pens: new Map(), chart: null, signature: "", found: null, strip: null, ranges: {}, drawn: 0 };
     element.addEventListener("dragover", (event) => { event.preventDefault(); element.classList.add("over"); });
     element.addEventListener("dragleave", () => element.classList.remove("over"));
     element.addEventListener("drop", (event) => {
@@ -107,8 +106,20 @@ export function makePlots(box, on, colour) {
   }
 
   const nameOf = (plot) => `plot ${plots.indexOf(plot) + 1}`;
-  const place = (plot, number) => plot.numbers.indexOf(number);
-  const shade = (plot, number) => COLOURS[place(plot, number) % COLOURS.length];
+
+  // The first that no other channel of the plot has; a channel keeps its own while it is there.
+  function pen(plot, number) {
+    const { pens, numbers } = plot;
+    if (pens.has(number)) return pens.get(number);
+    for (const each of pens.keys()) if (!numbers.includes(each)) pens.delete(each);
+    const taken = new Set(pens.values());
+    let free = 0;
+    while (taken.has(free)) free++;
+    pens.set(number, free);
+    return free;
+  }
+
+  const shade = (plot, number) => colour(colourOf(pen(plot, number)));
 
   // What stands above a plot. The focus stays at its place in the row.
   function head(plot) {
@@ -138,7 +149,7 @@ export function makePlots(box, on, colour) {
 
   function chipOf(plot, number, name) {
     const chip = button("chip", "", () => take(plot, number)), channel = channels[number];
-    chip.style.setProperty("--swatch", shade(plot, number));
+    chip.style.setProperty("--swatch", swatch(pen(plot, number)));
     chip.title = `${channel.description}; click to take it out`;
     chip.setAttribute("aria-label", `${title(channel)}: take it out of ${name}`);
     chip.innerHTML = "<i></i><span></span><b></b>";
@@ -201,12 +212,12 @@ export function makePlots(box, on, colour) {
       if (k < axesOf(plot)) axes.push({ scale: unit, side: k % 2 ? 1 : 3, stroke: ink, size: AXIS_PX, label: unit === "1" ? "" : unit, labelSize: 16, labelGap: 0,
         grid: { show: k === 0, stroke: line, width: 1 }, ticks: { stroke: line } });
     });
-    const series = [{}, ...plot.numbers.map((number, k) => ({
-      label: channels[number].name, scale: unitOf(number), stroke: shade(plot, number), width: 1,
-      dash: DASHES[Math.floor(k / COLOURS.length) % DASHES.length], points: { show: false }, spanGaps: false }))];
+    const series = [{}, ...plot.numbers.map((number) => ({
+      label: channels[number].name, scale: unitOf(number), stroke: (chart) => striped(plot, number, chart), width: 1, points: { show: false }, spanGaps: false }))];
+    const dot = (_, k) => shade(plot, plot.numbers[k - 1]);
     plot.chart = new uPlot({
       width: width(plot), height: HEIGHT, scales, axes, series, legend: { show: false },
-      cursor: { drag: { x: true, y: false, setScale: false }, sync: { key: "time" }, y: false, points: { size: 6 } },
+      cursor: { drag: { x: true, y: false, setScale: false }, sync: { key: "time" }, y: false, points: { size: 6, stroke: dot, fill: dot } },
       hooks: {
         setCursor: [(chart) => {
           if (chart.cursor.event && chart.cursor.left >= 0) { at = chart.posToVal(chart.cursor.left, "x"); on.cursor(at); values(); }
@@ -226,6 +237,12 @@ export function makePlots(box, on, colour) {
     plot.chart.over.addEventListener("dblclick", () => on.widen());
     plot.chart.over.addEventListener("click", (event) => { if (event.detail === 1 && at !== null) { mark = at; on.marked(mark); redraw(); } });
     plot.chart.over.addEventListener("mouseleave", () => { at = null; on.cursor(null); values(); });
+  }
+
+  // Of a held window, with its dashes where they are while it goes on.
+  function striped(plot, number, chart) {
+    const { min, max } = chart.scales.x, { left, width } = chart.bbox, middle = wide() % 2 / 2;   // uPlot moves such a line by half a pixel
+    return inkOf(shade(plot, number), dashOf(pen(plot, number)), wide(), left - middle - min / (max - min) * width);
   }
 
   function marks(chart) {
@@ -315,9 +332,9 @@ export function makePlots(box, on, colour) {
 
   function lines(plot, chart) {
     plot.strip.stretch(Math.max(1, Math.round(chart.bbox.height)));   // it is known for good when the axes have their figures
-    plot.strip.paint(plot.numbers.map((number, k) => {
-      const [least, most] = rangeOf(plot, unitOf(number)), shade_of = shade(plot, number);
-      return { colour: shade_of, faint: k < COLOURS.length ? null : shade_of + "60", least, most };
+    plot.strip.paint(plot.numbers.map((number) => {
+      const [least, most] = rangeOf(plot, unitOf(number));
+      return { colour: shade(plot, number), dash: dashOf(pen(plot, number)), least, most };
     }));
     const { left, top, width } = chart.bbox, { strip } = plot;
     chart.ctx.save();

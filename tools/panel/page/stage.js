@@ -64,6 +64,11 @@ export function makeStage(canvas, colour) {
     context.strokeStyle = colour(side);
     context.lineCap = "round";
     stroke([at(...hip), at(ax, ay)], 6);
+    if (side === "inner") {   // hollow: told from the outer ones by more than their colour
+      context.strokeStyle = colour("sky");
+      stroke([at(...hip), at(ax, ay)], 2.5);
+      context.strokeStyle = colour(side);
+    }
     const sole = [];
     for (let k = 0; k <= 20; k++) {
       const direction = foot - (geometry.heel + (geometry.toe - geometry.heel) * k / 20);

@@ -1,7 +1,8 @@
 // What a plot that goes on with time shows: of every channel and column of pixels the lowest and the highest value.
 // Column c is the time from c to c + 1 columns; it stays where it is, so only what is new is worked out and painted.
+import { fainter, isDrawn } from "./pens.js";
+
 const ROUNDING = 1e-6;   // of a column: a time that should be its beginning may be a hair before it
-const DASH = 12;         // columns
 
 // The numbers: `columns` newest columns of each of `channels`, in rings. NaN: nothing came.
 export function makeColumns(channels, columns, column_s) {
@@ -89,8 +90,8 @@ export function makeStrip(channels, columns, column_s, wide, tall) {
   const context = canvas.getContext("2d");
   let stale = 0;   // the first column that is not painted as it is now
 
-  // Each column reaches the one before it, so that a line has no holes. `pens`: of each channel {colour, faint, least, most},
-  // its colours and what stands at the bottom and the top. One with a faint colour is dashed with it.
+  // Each column reaches the one before it, so that a line has no holes. `pens`: of each channel {colour, dash, least, most},
+  // what it is drawn with (pens.js) and what stands at the bottom and the top.
   function paint(pens) {
     const head = numbers.head();
     for (let c = Math.max(stale, seen()); c <= head;) {   // in pieces that do not cross the ring's end
@@ -107,6 +108,7 @@ export function makeStrip(channels, columns, column_s, wide, tall) {
     pens.forEach((pen, k) => {
       const scale = canvas.height / (pen.most - pen.least), there = begin > numbers.first();
       let least_before = there ? numbers.low(k, begin - 1) : NaN, most_before = there ? numbers.high(k, begin - 1) : NaN;
+      const faint = fainter(pen.colour);
       let from = begin, top = NaN, bottom = NaN, colour = pen.colour;   // columns that look alike are one rectangle
       const fill = (until) => {
         if (top === top) {
@@ -118,7 +120,7 @@ export function makeStrip(channels, columns, column_s, wide, tall) {
       for (let c = begin; c < end; c++) {
         const least = numbers.low(k, c), most = numbers.high(k, c);
         const y = (pen.most - (least_before > most ? least_before : most)) * scale, y2 = (pen.most - (most_before < least ? most_before : least)) * scale;
-        const shade = pen.faint && c % DASH >= DASH / 2 ? pen.faint : pen.colour;
+        const shade = isDrawn(pen.dash, c) ? pen.colour : faint;
         if (y !== top || y2 !== bottom || shade !== colour) { fill(c); top = y; bottom = y2; colour = shade; }
         least_before = least;
         most_before = most;
