@@ -94,7 +94,11 @@ class RobotSource(Source):
                 if kind != records.HELLO or hello.get("version") != records.VERSION:
                     raise UserError(f"the robot named {self.name} speaks another version of the feed")
                 return hello
-            data = self.connection.recv(READ_BYTES)
+            try:
+                data = self.connection.recv(READ_BYTES)
+            except TimeoutError:
+                self.connection.close()
+                raise UserError(f"the robot named {self.name} has said nothing for {CONNECT_S:g} s") from None
             if not data:
                 raise UserError(f"the robot named {self.name} shows itself to {peers.LIMITS['feed'].peers} already")
             self.incoming += data

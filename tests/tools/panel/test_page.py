@@ -202,6 +202,34 @@ def test_a_recording_is_scrubbed_and_nothing_is_wider_than_the_window(tmp_path, 
         assert saved.startswith("time_s,channel,unit,value") and saved.count("hip_rad") > 1000
 
 
+def test_inside_of_a_recording_stands_at_the_instant_to_which_it_is_scrubbed(tmp_path):
+    """Frames and loads on the page against those that the robot of the same walk had until then."""
+    from ranger_sim.tools import cli
+
+    assert cli.main(["walk", "--time", "2s", "--log", "full", "--out", str(tmp_path / "run")]) == 0
+    robot = Ranger(log="full")
+    robot.run_for(1.6)
+    frames = robot.logbook.frames()
+    meters = {bus.name: bus.load.windows() for bus in robot.buses}
+    robot.close()
+    column = "[...document.querySelectorAll('#frames tbody tr')].map((row) => row.cells[1].textContent)"
+    load = "document.querySelector('#buses tbody tr:nth-child(2) .number').textContent"
+    with served(str(tmp_path / "run")) as (address, _), page_of(address, tmp_path) as page:
+        hand = Hand(page)
+        hand.view("inside")
+        page.until("document.querySelectorAll('#buses tbody tr').length === 4")
+        hand.give("#bus", "can2")
+        for at in (1.505, 0.705):  # back as well
+            hand.give("#position", at)
+            until = (frames["bus"] == 1) & (frames["time_ns"] <= round(at * 1e9))
+            identifiers = [str(each) for each in frames["identifier"][until][::-1][:40]]
+            page.until(f"JSON.stringify({column}) === {json.dumps(json.dumps(identifiers, separators=(',', ':')))}")
+            assert page.value("document.getElementById('inside-at').textContent") == f"at {at:.3f} s"
+            ended = round(100 * at - 0.5)  # windows of 10 ms
+            assert float(page.value(load).split()[0]) == pytest.approx(100 * meters["can2"][ended - 1], abs=0.07)
+        assert "keeps no slots" in page.value("document.getElementById('boards').textContent")
+
+
 def test_two_runs_lie_over_each_other_and_are_shown_from_their_beginning(tmp_path):
     from ranger_sim.tools import cli
 

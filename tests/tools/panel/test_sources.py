@@ -164,6 +164,17 @@ def test_a_name_that_nobody_has_is_told():
         RobotSource("nobody-here")
 
 
+def test_a_robot_that_says_nothing_is_told(monkeypatch):
+    """It listens, but never looks at who has come. A panel that starts a robot then asks again."""
+    monkeypatch.setattr("ranger_sim.tools.panel.robot.CONNECT_S", 0.1)
+    robot = Ranger()
+    feed = FeedServer(robot, "silent-robot-of-a-test")
+    with pytest.raises(UserError, match=r"silent-robot-of-a-test has said nothing for 0\.1 s"):
+        RobotSource("silent-robot-of-a-test")
+    feed.close()
+    robot.close()
+
+
 def test_errors_are_counted_by_board_and_code_and_those_of_a_healthy_walk_stand_apart():
     errors = ErrorList()
     code = next(code for code, boards in all_normal().items() if "MCH" in boards)
