@@ -168,6 +168,10 @@ def mode_json(name: str, kind: type[Fault]) -> dict[str, Any]:
 def fault_text(fault: dict) -> str:
     """What became of a fault, in a line; of one that did not act, why the run shows nothing about it."""
     name = f"fault {fault['fault']}"
+    if fault["gave_way_s"] is not None:
+        return (
+            f"{name}: INVALID, it gave way at {fault['gave_way_s']:.6g} s: {fault['gave_way_to']}; one fault at a time"
+        )
     if fault["activated_s"] is None:
         return f"{name}: INVALID, it did not begin: its start condition never came true"
     begun = f"{name}: began at {fault['activated_s']:.6g} s"

@@ -131,6 +131,8 @@ class Fault(StepWatch):
         self.largest_difference = 0.0
         self.stop_wanted = False
         self.gives_way = False  # where another fault still works it never begins; else that ends the run
+        self.gave_way_ns = -1
+        self.gave_way_to = ""  # which fault had its place when it was to begin
         self.twin: Any = None  # harness.faults.twin.Twin: of a fault that is to be proven
 
     @classmethod
@@ -202,7 +204,7 @@ class Fault(StepWatch):
         self.random = RandomStream(robot.seed, f"fault {len(robot.faults)} {self.place.name} {self.mode}")
         self.connect()
         if self.gives_way and self.start is None and (taken := self._in_its_way()):
-            raise UserError(taken)
+            raise UserError(f"fault {self.text()}: {taken}; one fault at a time")
         for each in (self.start, self.end):
             if each is not None:
                 each.begin(robot)
@@ -231,7 +233,8 @@ class Fault(StepWatch):
             if self.start is None or self.start.met():
                 if taken := self._in_its_way():
                     if not self.gives_way:
-                        raise UserError(taken)
+                        raise UserError(f"fault {self.text()}: {taken}; one fault at a time")
+                    self.gave_way_ns, self.gave_way_to = now_ns, taken
                     self.stop()
                     self.robot.loop.watchers.remove(self)
                     return
@@ -259,7 +262,7 @@ class Fault(StepWatch):
             if self.restarts and self.restarts == other.inside and other.active:  # what has ended, a restart may cure
                 common.append(f"{other.inside}, which would be taken away under it")
             if common:
-                return f"fault {self.text()}: {other.text()} still works at {common[0]}; one fault at a time"
+                return f"{other.text()} still works at {common[0]}"
         return ""
 
     def after_step(self, start_ns: int, end_ns: int) -> None:
@@ -344,6 +347,8 @@ class Fault(StepWatch):
             "largest_difference": self.largest_difference,
             "unit": self.unit,
             "permanent": self.permanent or None,
+            "gave_way_s": seconds(self.gave_way_ns),
+            "gave_way_to": self.gave_way_to or None,
             "proof": {**self.proof().summary(), "of_faults": len(self._together())}
             if self.twin is not None and self.activated_ns >= 0
             else None,

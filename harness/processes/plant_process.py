@@ -28,6 +28,7 @@ ORDERS_LIMIT = 64  # keys and parameters at one instant of the robot's time: a p
 KEY_HOLD_NS = 200_000_000  # a firm press
 MISUSE = 2  # exit code when something outside cannot be opened
 RESET, OPERATING = 1, 0  # modes of a bus node
+MOST_TOLD = 10  # faults that gave way, in one status; chosen by us: a status stays short
 POWER_UP_NS = 1_000_000  # from a restarted process being there to its board's power
 
 
@@ -46,6 +47,7 @@ class PlantRun:
         self.stopping = False
         self.mourned: set[str] = set()
         self.deaths: list[dict] = []
+        self.gave_way: dict[int, str] = {}  # by the fault's number
         robot.deaths = self.deaths
         self.next_status_s = 0.0
         self.orders = 0  # that changed the robot at `orders_ns` of its time
@@ -79,7 +81,9 @@ class PlantRun:
             self.wait(min(ahead_s, LONGEST_WAIT_S))
             if self.paused or ahead_s > LONGEST_WAIT_S or self.stopping:
                 continue
-            if robot.run(stop, slice_s):
+            done = robot.run(stop, slice_s)
+            self.look_at_faults()
+            if done:
                 return
             self.bury()
 
@@ -197,6 +201,14 @@ class PlantRun:
             raise UserError(f"clear: there is no fault {which}; {len(faults)} were armed, counted from 0")
         faults[which].stop()
 
+    def look_at_faults(self) -> None:
+        """Tell of a fault that was asked for and gave way to another since the last look: it never begins."""
+        for number, fault in enumerate(self.robot.faults):
+            if fault.gave_way_ns >= 0 and number not in self.gave_way:
+                at_s = (fault.gave_way_ns - self.robot.start_ns) * 1e-9
+                self.gave_way[number] = f"fault {number}, {fault.text()}, gave way at {at_s:.3f} s: {fault.gave_way_to}"
+                self.tell(said=self.gave_way[number])
+
     def status(self) -> dict:
         """What the live view shows."""
         robot = self.robot
@@ -209,6 +221,7 @@ class PlantRun:
             "speed_m_per_s": robot.mean_speed_m_per_s(),
             "behind_s": max(0.0, -self.pace.ahead_s(robot.loop.time)),
             "paused": self.paused,
+            "gave_way": list(self.gave_way.values())[-MOST_TOLD:],
             "buses": self.loads(),
             "ends": [end.counters() for end in robot.polled],
             "sent_away": sent_away(robot.polled),

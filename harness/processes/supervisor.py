@@ -329,6 +329,8 @@ class Supervisor:
                 self.answered(news)
             if "gone" in news:
                 self.view.say(f"{news['gone']} is off its bus since {news['time_s']:.3f} s of the robot's time")
+            if "said" in news:
+                self.view.say(news["said"])
             if "failed" in news:
                 self.failure, self.ending = news["failed"], True
             if "collecting" in news:  # from here on boards end because they are told to

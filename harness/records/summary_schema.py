@@ -213,6 +213,10 @@ FIGURES = (
     Figure("faults[].unit", TEXT, "", "of that difference"),
     Figure("faults[].permanent", TEXT, "", "what ends its consequences", "they end with it"),
     Figure(
+        "faults[].gave_way_s", REAL, "s", "when it was to begin and its place was taken: it never begins", "it was not"
+    ),
+    Figure("faults[].gave_way_to", TEXT, "", "which fault still worked there", "it did not give way"),
+    Figure(
         "faults[].proof",
         OBJECT,
         "",

@@ -457,6 +457,20 @@ def test_a_timeline_that_cannot_be_is_refused_before_any_process_begins(command,
     assert done.returncode == 2 and "is no format" in done.stderr and done.stderr.count("\n") == 1
 
 
+def test_a_fault_whose_place_is_taken_when_it_is_to_begin_is_told_by_status_and_by_the_robot(up):
+    robot = up(speed="0.05")
+    robot.running()
+    first = control.ask(robot.name, {"do": "fault", "fault": "MCH.absolute_encoder:offset"})
+    start = f"{first['time_s'] + 0.05:.3f}"  # later than the next request can come: a second by the wall clock
+    late = f"MCH.absolute_encoder:stuck@{start} s"
+    assert control.ask(robot.name, {"do": "fault", "fault": late})["time_s"] < float(start)
+    [told] = robot.until(lambda status: status["gave_way"], "told")["gave_way"]
+    assert told == (
+        f"fault 1, {late}, gave way at {start} s: MCH.absolute_encoder:offset still works at MCH.absolute_encoder"
+    )
+    robot.wait_for(re.escape(told))
+
+
 def test_a_fault_at_a_sensor_acts_beside_processes_and_one_inside_a_board_is_refused(command):
     run = ("up", "--time", "0.06s", "--speed", "max", "--json", "-", "--name", f"test-{uuid.uuid4().hex[:12]}")
     done = command(*run, "--fault", "MCH.absolute_encoder:offset@0.03 s")

@@ -6,6 +6,7 @@ import pytest
 
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.faults.ranger_catalogue import CATALOGUE
+from ranger_sim.tools.faults import fault_text
 from tests.harness.faults.bench import EdgeBench
 
 RAD_PER_EDGE = math.pi / 2048.0
@@ -382,6 +383,14 @@ def test_one_that_gives_way_never_begins_where_another_works_and_the_run_goes_on
     bench.faults.append(late)
     run(bench, 10)
     assert first.active and late.activated_ns < 0 and late.over and not late.acted
+    told = late.summary()
+    assert told["gave_way_s"] == pytest.approx(0.005)  # its start
+    assert told["gave_way_to"] == "MCH.joint_encoder:offset@0 s..20 ms still works at MCH.joint_encoder"
+    assert fault_text(told) == (
+        "fault MCH.joint_encoder:stuck@5 ms: INVALID, it gave way at 0.005 s: "
+        "MCH.joint_encoder:offset@0 s..20 ms still works at MCH.joint_encoder; one fault at a time"
+    )
+    assert first.summary()["gave_way_s"] is first.summary()["gave_way_to"] is None
     now = CATALOGUE.fault(bench.place, "stuck", None, None, {})
     now.gives_way = True
     with pytest.raises(UserError, match="offset.* still works at MCH.joint_encoder; one fault at a time"):

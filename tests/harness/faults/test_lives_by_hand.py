@@ -255,6 +255,8 @@ def test_a_summary_has_seconds_since_power_up():
         "largest_difference": -0.5,
         "unit": "V",
         "permanent": None,
+        "gave_way_s": None,
+        "gave_way_to": None,
         "proof": None,
     }
     fault.permanent = "a reset"

@@ -162,10 +162,10 @@ export function linkRows(rows) {
 export function faults(rows, ask) {
   if (!rows.length) return note("none was armed");
   return table("faults", ["#-number", "fault", "#armed", "#active since", "acted", "largest difference", "#ended", "#clear", "-take away"], rows.map((row, k) => {
-    const clear = Object.assign(document.createElement("button"), { type: "button", textContent: "Clear", disabled: row.ended_s !== null });
+    const clear = Object.assign(document.createElement("button"), { type: "button", textContent: "Clear", disabled: row.ended_s !== null || row.gave_way_to !== null });
     clear.setAttribute("aria-label", `clear ${row.fault}`);
     clear.onclick = () => ask({ do: "clear", which: k });
-    return [k, row.fault, seconds(row.armed_s), seconds(row.activated_s), row.acted ? `yes, ${row.acted_count}×, first at ${seconds(row.acted_s)}` : "not yet",
+    return [k, row.fault, seconds(row.armed_s), seconds(row.activated_s), row.acted ? `yes, ${row.acted_count}×, first at ${seconds(row.acted_s)}` : row.gave_way_to ? `never: gave way at ${seconds(row.gave_way_s)}, ${row.gave_way_to}` : "not yet",
       row.acted ? `${figure(row.largest_difference)} ${row.unit}` : "–", seconds(row.ended_s), row.cleared_s === null && row.permanent ? `after ${row.permanent}` : seconds(row.cleared_s), clear];
   }));
 }
