@@ -293,6 +293,8 @@ def frame_bits(
 @cython.wraparound(False)
 def fill_frame_bits(identifiers, flags, lows, highs, bits) -> None:
     """`frame_bits` of many frames into `bits`: five buffers of 64-bit integers, of one length."""
+    if not cython.compiled:  # numpy's own integers are no Python's
+        identifiers, flags, lows, highs = (memoryview(each).tolist() for each in (identifiers, flags, lows, highs))
     ids: cython.longlong[::1] = identifiers
     flag: cython.longlong[::1] = flags
     low: cython.longlong[::1] = lows

@@ -2,6 +2,7 @@
 
 import array
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -172,3 +173,6 @@ def test_many_frames_at_once_are_as_long_as_one_by_one(frames):
     bits = array.array("q", [0]) * len(frames)
     frame.fill_frame_bits(*columns, bits)
     assert bits.tolist() == [whole_length(*each) for each in frames]
+    of_numpy = np.zeros(len(frames), np.int64)
+    frame.fill_frame_bits(*(np.array(column, np.int64) for column in columns), of_numpy)
+    assert of_numpy.tolist() == bits.tolist()
