@@ -22,7 +22,8 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 BUILT = (".so", ".pyd")
 DATA_FOLDERS = ("profiles",)  # shipped beside the packages, no Python in them
-COMPILER = (os.environ.get("CC") or sysconfig.get_config_var("CC") or "cc").split()[0]
+CC = os.environ.get("CC") or sysconfig.get_config_var("CC") or "cc"  # with its options, or a cache before it
+COMPILER = CC.split()[0]
 needs_compiler = pytest.mark.skipif(shutil.which(COMPILER) is None, reason="no C compiler here")
 WHERE_FROM = (
     "import importlib, json, sys\n"
@@ -272,7 +273,7 @@ def test_a_tool_chain_that_knows_no_layout_builds_as_well_and_what_older_builds_
     assert all(file.endswith(".py") for file in files) and reason == "nothing was built here"
 
     compiler = small_house / "cc"
-    compiler.write_text(f'#!/bin/sh\ncase "$*" in *-fno-plt*) exit 1;; esac\nexec {COMPILER} "$@"\n', encoding="ascii")
+    compiler.write_text(f'#!/bin/sh\ncase "$*" in *-fno-plt*) exit 1;; esac\nexec {CC} "$@"\n', encoding="ascii")
     compiler.chmod(0o755)
     build_in(small_house, CC=str(compiler))
     files, reason = how_it_runs(small_house)

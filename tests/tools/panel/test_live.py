@@ -123,3 +123,23 @@ def test_slots_and_their_lateness_stand_at_the_mark_as_the_plots_have_them(walki
     assert (f"{used_us:.1f} µs" if used_us < 100 else f"{int(used_us + 0.5)} µs") in walking.value(row)
     press(walking, "Escape")  # and now it is now again
     hand.sees(f"state.slots.MCH.begun_s > {now_s}")
+
+
+def test_nothing_jumps_when_what_is_shown_changes(walking):
+    """By the browser's own measure of layout shifts: the share of the window that moved times the share of the window
+    by which it did. A page that is read may have 0.1 in all (web.dev/articles/cls); each view here has a tenth in 2 s.
+    """
+    hand = Hand(walking)
+    walking.value("""{
+        window.moved = [];
+        const watcher = new PerformanceObserver((list) => moved.push(...list.getEntries().map((each) => each.value)));
+        watcher.observe({ type: "layout-shift" });
+        0 }""")
+    for view in ("plots", "inside", "errors"):
+        hand.view(view)
+        pictures = walking.value("window.rangerPanel.shown()")
+        walking.until(f"window.rangerPanel.shown() > {pictures} + 10")  # the view is whole
+        walking.value("window.moved.length = 0")
+        now_s = walking.value("window.rangerPanel.span()[1]")
+        walking.until(f"window.rangerPanel.span()[1] > {now_s} + 2")
+        assert sum(walking.value("window.moved")) < 0.01, view
