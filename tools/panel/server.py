@@ -1,6 +1,7 @@
 """The page and its WebSocket, on this machine unless the user says otherwise. A page never slows the robot.
 
-A page gets the next picture when it has shown the one before, so a slow one gets fewer, and one that is dead gets none.
+A page gets a picture while it paints the one before, and no more until it has shown that: a slow page gets fewer, and
+one that is dead gets two.
 Whoever asks must have the token, in the address or in the cookie that the first visit leaves; a page of another site
 is refused by its Origin, also when its name was made to lead here.
 """
@@ -41,6 +42,7 @@ COOKIE = "ranger-sim-panel"
 
 # Chosen by us: what a page may take.
 PLACES = 16  # pages at a time: each costs a picture 30 times a second
+AHEAD = 2  # pictures that a page was sent and has not shown: one is painted while the next is made
 PICTURE_S = 1 / 31  # so that 30 in a second remain where some are late
 STATE_S = 0.2
 LONGEST_WISH = 1 << 16  # bytes: a parameter set by name has below 20,000
@@ -199,8 +201,8 @@ class Session:
         self.plots: dict[int, Plot] = {}
         self.wanted: set[int] = set()  # channels of its plots, also of those that another view hides
         self.at: float | None = None  # the page's cursor; None: the newest
-        self.shown = asyncio.Event()  # the page has shown what it was sent
-        self.shown.set()
+        self.unshown = 0  # pictures that it was sent and has not shown
+        self.shown = asyncio.Event()  # it has shown one
         self.changed = asyncio.Event()  # it wants to see something else
         self.wishes = BURST
         self.wished_s = 0.0
@@ -270,8 +272,9 @@ class Session:
         """What the page wishes. UserError for what cannot be."""
         what = wish.get("do")
         if what == "shown":
-            if not self.shown.is_set():
+            if self.unshown > 0:
                 self.wishes += 1.0  # it keeps the pace, and is no request
+                self.unshown -= 1
             self.shown.set()
             return {}
         if what == "look":
@@ -320,12 +323,14 @@ class Session:
         due_s = loop.time()
         while True:
             self.changed.clear()
-            self.shown.clear()
             renews = live or self.source.is_coming
             for message in self.picture(loop.time()):
                 await self.send(message)
             await self.send(messages.text({"picture": self.source.span(), "lost": self.source.lost}))
-            await self.shown.wait()
+            self.unshown += 1
+            while self.unshown >= AHEAD:
+                self.shown.clear()
+                await self.shown.wait()
             due_s = max(due_s + PICTURE_S, loop.time() - PICTURE_S)  # one that was late may be made up for, not more
             if live and self.at is None and not self.source.lost:
                 await asyncio.sleep(max(0.0, due_s - loop.time()))

@@ -16,7 +16,7 @@ from ranger_sim.foundation.user_error import UserError
 from ranger_sim.tools.panel import messages, server
 from ranger_sim.tools.panel.channels import Channel, Trace, between
 from ranger_sim.tools.panel.command import listening
-from ranger_sim.tools.panel.server import BURST, COOKIE, MOST_CHANNELS, PLACES, PanelServer
+from ranger_sim.tools.panel.server import AHEAD, BURST, COOKIE, MOST_CHANNELS, PLACES, PanelServer
 from ranger_sim.tools.panel.source import Source
 from ranger_sim.tools.recordings.datasets import open_recording
 
@@ -296,19 +296,30 @@ def test_when_all_places_are_taken_one_more_is_told_and_pages_that_never_read_ke
         assert len(it.sessions) == PLACES
 
 
-def test_a_page_that_shows_nothing_gets_no_second_picture(panel):
-    """The bound of what a dead page costs: one picture."""
+def test_a_page_gets_two_pictures_ahead_of_what_it_has_shown_and_no_third(panel):
+    """The bound of what a dead page costs: two pictures. A page beside it shows how many there are meanwhile."""
     _, address, _ = panel
-    with page(address) as socket:
-        pictures = 0
-        for number in range(20):
-            socket.send(json.dumps({"do": "look", "plots": [], "number": number}))
-            answered = False
-            while not answered:
-                data = socket.recv(PATIENCE_S)
-                pictures += b'"picture"' in data[:40]
-                answered = b'"answer"' in data[:40]
-        assert pictures == 1
+
+    def seen_beside():
+        """The dead page's pictures, while the other one is shown ten."""
+        for _ in range(10):
+            heard(lively, lambda kind, body: kind == messages.TEXT and "picture" in body)
+        dead.send('{"do": "look", "plots": [], "number": 7}')
+        pictures, answered = 0, False
+        while not answered:
+            data = dead.recv(PATIENCE_S)
+            pictures += b'"picture"' in data[:40]
+            answered = b'"answer"' in data[:40]
+        return pictures
+
+    with page(address) as lively, page(address) as dead:
+        assert seen_beside() == AHEAD == 2
+        assert seen_beside() == 0
+        dead.send('{"do": "shown"}')
+        assert seen_beside() == 1
+        for _ in range(AHEAD):
+            dead.send('{"do": "shown"}')
+        assert seen_beside() == AHEAD
 
 
 def exported(address, query, kind="csv"):
