@@ -40,16 +40,6 @@ ARMED = (
 )
 
 
-class Address:
-    """Where a page is, as tests.browser takes it."""
-
-    def __init__(self, text):
-        self.text = text
-
-    def as_uri(self):
-        return self.text
-
-
 @contextlib.contextmanager
 def started(*arguments):
     """A command of ours, until it is no longer needed."""
@@ -73,7 +63,7 @@ def picture_views(views, *arguments):
         tempfile.TemporaryDirectory() as folder,
         browser.opened(folder) as page,
     ):
-        page.open(Address(said(panel, r"http://\S+")), WIDTH, HEIGHT, 1)
+        page.open(said(panel, r"http://\S+"), WIDTH, HEIGHT, 1)
         page.until("document.body?.dataset.connected === 'yes'")
         page.until(f"window.rangerPanel?.span()[1] > {SECONDS}")
         for view, name in views.items():

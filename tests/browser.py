@@ -47,14 +47,14 @@ class Page:
             text += byte
         return json.loads(text)
 
-    def open(self, path, width, height=900, ratio=2, dark=False):
-        """Show a file at this width in CSS pixels."""
+    def open(self, where, width, height=900, ratio=2, dark=False):
+        """Show a file (its path), or what is at an address (text), at this width in CSS pixels."""
         target = self.call("Target.createTarget", url="about:blank")["targetId"]
         self._session = self.call("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
         self.call("Runtime.enable")
         self.resize(width, height, ratio)
         self.colours(dark)
-        self.call("Page.navigate", url=path.as_uri())
+        self.call("Page.navigate", url=where if isinstance(where, str) else where.as_uri())
 
     def resize(self, width, height=900, ratio=2):
         """Another width, as when a telephone is turned."""

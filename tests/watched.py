@@ -53,16 +53,6 @@ KB = os.sysconf("SC_PAGE_SIZE") // 1024
 TICKS_PER_S = os.sysconf("SC_CLK_TCK")
 
 
-class Address:
-    """Where a page is, as tests.browser takes it."""
-
-    def __init__(self, text):
-        self.text = text
-
-    def as_uri(self):
-        return self.text
-
-
 def family(root: int) -> list[int]:
     """A process and all that it started."""
     parents = {}
@@ -127,7 +117,7 @@ def watched(seconds: float, seed: int, width: int):
         page = stack.enter_context(browser.opened(stack.enter_context(tempfile.TemporaryDirectory())))
         plots = ";".join(",".join(plot.split()) for plot in PLOTS)
         where = urllib.parse.urlencode({"view": "plots", "span": "10", "plots": plots})
-        page.open(Address(f"{address}#{where}"), width, 1000, 1)
+        page.open(f"{address}#{where}", width, 1000, 1)
         page.until("document.body?.dataset.connected === 'yes' && window.rangerPanel.shown() > 0")
         yield name, robot, panel, page
 

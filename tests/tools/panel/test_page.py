@@ -18,16 +18,6 @@ pytestmark = pytest.mark.skipif(browser.BROWSER is None, reason="no browser here
 PATIENCE_S = 120
 
 
-class Address:
-    """Where a page is, as tests.browser takes it."""
-
-    def __init__(self, text):
-        self.text = text
-
-    def as_uri(self):
-        return self.text
-
-
 @contextlib.contextmanager
 def served(*arguments):
     """(address of a panel, its process)."""
@@ -48,7 +38,7 @@ def served(*arguments):
 @contextlib.contextmanager
 def page_of(address, folder, width=1400):
     with browser.opened(folder / "browser") as page:
-        page.open(Address(address), width, 1000, 1)
+        page.open(address, width, 1000, 1)
         page.until("document.body?.dataset.connected === 'yes' && window.rangerPanel?.shown() > 0")
         yield page
         assert not page.errors

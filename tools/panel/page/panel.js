@@ -317,7 +317,7 @@ function bars() {
     const value = pose[place], share = Math.min(50, 50 * Math.abs(value) / FULL_BAR_A), bar = row.querySelector("i");
     bar.style.width = `${share}%`;
     bar.style.left = `${value < 0 ? 50 - share : 50}%`;
-    put(row.lastChild, `${value.toFixed(2)} A`);
+    put(row.lastChild, `${(Math.abs(value) < 0.005 ? 0 : value).toFixed(2)} A`);
   });
 }
 
