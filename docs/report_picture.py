@@ -1,4 +1,4 @@
-"""The picture of a walk's report, as README.md shows it: python docs/report_picture.py (needs Chromium; half a minute)."""
+"""The picture of a walk's report, as README.md shows it: python docs/report_picture.py (needs Chromium)."""
 
 import base64
 import pathlib
