@@ -1,15 +1,19 @@
 // The one WebSocket: JSON out, binary messages in (messages.py has their form). Comes back by itself when it is lost.
+// A frame of the screen paints one picture: painted as its messages come, one picture would cost two frames.
 const VERSION = 2, TEXT = 1, TRACES = 2, POSE = 3, ENVELOPE = 1, FOLLOWS = 1, ANEW = 2;
 const AGAIN_MS = [300, 1000, 3000];
 
 export function connect(heard) {
   let socket = null, tries = 0, number = 0, refused = false;
+  let coming = [], pictures = [];   // what to do for the picture of which messages come, and for each that is there whole
   const waiting = new Map();
 
   function open() {
     const token = new URLSearchParams(location.search).get("token");
     socket = new WebSocket(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/socket` + (token ? `?token=${token}` : ""));
     socket.binaryType = "arraybuffer";
+    coming = [];
+    pictures = [];
     socket.onopen = () => { tries = 0; };
     socket.onmessage = (event) => take(event.data);
     socket.onclose = (event) => {
@@ -26,15 +30,28 @@ export function connect(heard) {
     if (view.getUint8(0) !== VERSION) { heard.closed("the server speaks another version: load the page again", true); return; }
     const kind = view.getUint8(1);
     if (kind === TEXT) takeText(JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 16))));
-    else if (kind === TRACES) heard.traces(plot(buffer, view));
-    else if (kind === POSE) heard.pose(view.getFloat64(16, true), new Float32Array(buffer, 24, view.getUint32(8, true)));
+    else if (kind === TRACES) coming.push(() => heard.traces(plot(buffer, view)));
+    else if (kind === POSE) coming.push(() => heard.pose(view.getFloat64(16, true), new Float32Array(buffer, 24, view.getUint32(8, true))));
+  }
+
+  function whole(picture) {
+    pictures.push([...coming, picture]);
+    coming = [];
+    if (pictures.length === 1) requestAnimationFrame(paint);
+  }
+
+  function paint() {
+    if (!pictures.length) return;   // it belonged to a connection that was lost
+    for (const act of pictures.shift()) act();
+    send({ do: "shown" });
+    if (pictures.length) requestAnimationFrame(paint);
   }
 
   function takeText(content) {
     if ("hello" in content) heard.hello(content.hello);
     else if ("values" in content && "at" in content) heard.values(content.values, content.at);
     else if ("state" in content) heard.state(content.state);
-    else if ("picture" in content) { heard.picture(content.picture, content.lost); requestAnimationFrame(() => send({ do: "shown" })); }
+    else if ("picture" in content) whole(() => heard.picture(content.picture, content.lost));
     else if ("answer" in content) {
       const asked = waiting.get(content.answer);
       waiting.delete(content.answer);

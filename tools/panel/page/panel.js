@@ -59,21 +59,13 @@ const parameters = makeParameters(by("parameter-groups"), {
 
 const link = connect({
   hello: greet,
-  picture: (found, lost) => { span = found; counted(); light(lost); scrubber(); if (!held) triggered(); plots.values(performance.now()); },
+  picture: (found, lost) => { span = found; shown++; light(lost); scrubber(); if (!held) triggered(); plots.values(performance.now()); },
   traces: (found) => plots.show(found),
   pose: (time, values) => { pose = values; by("clock").textContent = `${time.toFixed(3)} s`; stage.draw(values); bars(); describe(); },
   values: (found, time) => { if (time === instant()) { plots.stands(found, plots.cursor()); sayCursor(); } },
   state: (found) => { state = found; tell_state(); },
   closed: (reason, refused) => { light(refused ? `refused: ${reason}` : `${reason}: trying again`); document.body.dataset.connected = "no"; },
 });
-
-// Pictures that could be seen: two between one frame of the screen and the next are one.
-let fresh = false;
-function counted() {
-  if (fresh) return;
-  fresh = true;
-  requestAnimationFrame(() => { shown++; fresh = false; });
-}
 
 // ---- the beginning
 
