@@ -208,6 +208,7 @@ def http_server(panel: Any) -> Any:
         access_log=False,
         ws="websockets-sansio",
         ws_max_size=LONGEST_WISH,
+        ws_per_message_deflate=False,  # it would cost both sides more than the kilobytes of a picture do
         ws_ping_interval=10.0,
         ws_ping_timeout=20.0,
         timeout_graceful_shutdown=1,
