@@ -191,7 +191,7 @@ def understood(code: int, content: bytes) -> dict[str, Any]:
     if code != BINARY or len(content) < 16:
         raise ValueError(f"a message of code {code} and {len(content)} bytes")
     version, kind, _, channels, _, points, _ = struct.unpack_from("<BBHHHII", content)
-    if version != 2:
+    if version != 3:
         raise ValueError(f"version {version}")
     if kind == 1:
         if points != len(content) - 16:
@@ -209,7 +209,21 @@ def understood(code: int, content: bytes) -> dict[str, Any]:
         return {}
     if kind == 3 and 16 + 8 + 4 * points == len(content):
         return {}
+    if kind == 4:
+        return _picture(content, points)
     raise ValueError(f"kind {kind} with {len(content)} bytes")
+
+
+def _picture(content: bytes, count: int) -> dict[str, Any]:
+    found: dict[str, Any] = {}
+    at = 16
+    for _ in range(count):
+        length, _ = struct.unpack_from("<II", content, at)
+        found |= understood(BINARY, content[at + 8 : at + 8 + length])
+        at += 8 + length + -length % 8
+    if at != len(content):
+        raise ValueError(f"a picture of {len(content)} bytes says {at}")
+    return found
 
 
 def _no_number(text: str) -> None:

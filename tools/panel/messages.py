@@ -1,4 +1,4 @@
-"""What server and page say to each other over the one WebSocket, version 2 (README.md has the page's side).
+"""What server and page say to each other over the one WebSocket, version 3 (README.md has the page's side).
 
 From the page: text, JSON objects with `do`. To the page: binary, a head of 16 bytes and a body, little-endian.
 
@@ -9,6 +9,8 @@ From the page: text, JSON objects with `do`. To the page: binary, a head of 16 b
             message, and some of what was sent already). Then per channel its number (u32), flags (u32), points (u32),
             0 (u32); then x (f64), low (f32), high (f32, only with ENVELOPE), padded to 8 bytes; NaN is a gap
     POSE    time (f64), then angles and lengths of the robot (f32), as the channels of `pose` in HELLO say
+    PICTURE all that one picture has: messages as above, so many as the head says as points, each behind its length
+            (u32) and 0 (u32), and padded to 8
 """
 
 from __future__ import annotations
@@ -23,13 +25,14 @@ import numpy as np
 
 from ranger_sim.tools.panel.channels import Trace
 
-VERSION = 2
-TEXT, TRACES, POSE = 1, 2, 3
+VERSION = 3
+TEXT, TRACES, POSE, PICTURE = 1, 2, 3, 4
 ENVELOPE = 1
 FOLLOWS, ANEW = 1, 2
 HEAD = struct.Struct("<BBHHHII")
 WINDOW = struct.Struct("<dd")
 TRACE_HEAD = struct.Struct("<IIII")
+PART_HEAD = struct.Struct("<II")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -73,3 +76,11 @@ def pose(time_s: float, values: Sequence[float]) -> bytes:
         + struct.pack("<d", time_s)
         + np.array(values, "<f4").tobytes()
     )
+
+
+def picture(parts: Sequence[bytes]) -> bytes:
+    """What belongs together, as one message: many small ones cost server and page a wake each."""
+    whole = [HEAD.pack(VERSION, PICTURE, 0, 0, 0, len(parts), 0)]
+    for part in parts:
+        whole += [PART_HEAD.pack(len(part), 0), part, bytes(-len(part) % 8)]
+    return b"".join(whole)

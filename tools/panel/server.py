@@ -324,9 +324,7 @@ class Session:
         while True:
             self.changed.clear()
             renews = live or self.source.is_coming
-            for message in self.picture(loop.time()):
-                await self.send(message)
-            await self.send(messages.text({"picture": self.source.span(), "lost": self.source.lost}))
+            await self.send(messages.picture(self.picture(loop.time())))
             self.unshown += 1
             while self.unshown >= AHEAD:
                 self.shown.clear()
@@ -340,7 +338,7 @@ class Session:
                         await self.changed.wait()
 
     def picture(self, now_s: float) -> list[bytes]:
-        """The messages of one picture."""
+        """What one picture has, as messages."""
         begin, end = self.source.span()
         found = []
         for number, plot in self.plots.items():
@@ -357,6 +355,7 @@ class Session:
         if now_s >= self.next_state_s or self.at is not None:
             self.next_state_s = now_s + STATE_S
             found.append(messages.text({"state": self.source.state(self.at)}))
+        found.append(messages.text({"picture": self.source.span(), "lost": self.source.lost}))
         return found
 
 

@@ -93,16 +93,30 @@ def page(address, token=TOKEN, **settings):
         yield socket
 
 
+def parts(message):
+    """The messages in a picture, read by hand; of another message, itself."""
+    if message[1] != 4:
+        return [message]
+    found, at = [], 16
+    for _ in range(int.from_bytes(message[8:12], "little")):
+        length = int.from_bytes(message[at : at + 4], "little")
+        found.append(message[at + 8 : at + 8 + length])
+        at = (at + 8 + length + 7) // 8 * 8
+    assert at == len(message)
+    return found
+
+
 def heard(socket, wanted):
-    """The first message for which wanted(kind, body) is true; pictures are taken."""
+    """The first message for which wanted(kind, body) is true, also of those in a picture; pictures are taken."""
     while True:
-        data = socket.recv(PATIENCE_S)
-        kind = data[1]
-        body = json.loads(data[16:]) if kind == messages.TEXT else data
-        if kind == messages.TEXT and "picture" in body:
+        message = socket.recv(PATIENCE_S)
+        if message[1] == messages.PICTURE:
             socket.send('{"do": "shown"}')
-        if wanted(kind, body):
-            return body
+        for data in parts(message):
+            kind = data[1]
+            body = json.loads(data[16:]) if kind == messages.TEXT else data
+            if wanted(kind, body):
+                return body
 
 
 def answer(socket, **wish):
@@ -186,7 +200,7 @@ def test_a_page_sees_its_plots_the_robot_and_the_state(panel):
         assert hello["channels"][0]["name"] == "RAMP" and hello["title"] == "a ramp"
         socket.send('{"do": "look", "plots": [{"channels": [0], "span": 2, "points": 5}]}')
         data = heard(socket, lambda kind, body: kind == messages.TRACES)
-        assert messages.HEAD.unpack_from(data) == (2, messages.TRACES, 0, 1, messages.FOLLOWS | messages.ANEW, 5, 0)
+        assert messages.HEAD.unpack_from(data) == (3, messages.TRACES, 0, 1, messages.FOLLOWS | messages.ANEW, 5, 0)
         assert messages.WINDOW.unpack_from(data, 16) == (10.0, 2.0)
         assert messages.TRACE_HEAD.unpack_from(data, 32) == (0, 0, 5, 0)
         assert np.frombuffer(data, "<f8", 5, 48).tolist() == [8.0, 8.5, 9.0, 9.5, 10.0]
@@ -194,6 +208,13 @@ def test_a_page_sees_its_plots_the_robot_and_the_state(panel):
         pose = heard(socket, lambda kind, body: kind == messages.POSE)
         assert np.frombuffer(pose, "<f8", 1, 16)[0] == 10.0 and np.frombuffer(pose, "<f4", 1, 24)[0] == 0.25
         assert heard(socket, lambda kind, body: kind == messages.TEXT and "state" in body)["state"]["time_s"] == 10.0
+
+
+def test_a_picture_is_one_message_of_parts_that_begin_at_multiples_of_8():
+    assert messages.picture([b"12345678", b"abc"]).hex(" ", 8) == (
+        "0304000000000000 0200000000000000"  # version 3, kind 4; two parts
+        " 0800000000000000 3132333435363738 0300000000000000 6162630000000000"
+    )
 
 
 def test_of_what_goes_on_a_page_gets_what_is_new_and_a_little_of_what_it_has():
@@ -308,7 +329,7 @@ def test_a_page_gets_two_pictures_ahead_of_what_it_has_shown_and_no_third(panel)
         pictures, answered = 0, False
         while not answered:
             data = dead.recv(PATIENCE_S)
-            pictures += b'"picture"' in data[:40]
+            pictures += data[1] == messages.PICTURE
             answered = b'"answer"' in data[:40]
         return pictures
 

@@ -1,18 +1,17 @@
 // The one WebSocket: JSON out, binary messages in (messages.py has their form). Comes back by itself when it is lost.
-// A frame of the screen paints one picture: painted as its messages come, one picture would cost two frames.
-const VERSION = 2, TEXT = 1, TRACES = 2, POSE = 3, ENVELOPE = 1, FOLLOWS = 1, ANEW = 2;
+// A frame of the screen paints one picture, when it is due: painted as it comes, one picture would cost two frames.
+const VERSION = 3, TEXT = 1, TRACES = 2, POSE = 3, PICTURE = 4, ENVELOPE = 1, FOLLOWS = 1, ANEW = 2;
 const AGAIN_MS = [300, 1000, 3000];
 
 export function connect(heard) {
   let socket = null, tries = 0, number = 0, refused = false;
-  let coming = [], pictures = [];   // what to do for the picture of which messages come, and for each that is there whole
+  let pictures = [];   // that came and are not painted
   const waiting = new Map();
 
   function open() {
     const token = new URLSearchParams(location.search).get("token");
     socket = new WebSocket(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/socket` + (token ? `?token=${token}` : ""));
     socket.binaryType = "arraybuffer";
-    coming = [];
     pictures = [];
     socket.onopen = () => { tries = 0; };
     socket.onmessage = (event) => take(event.data);
@@ -26,32 +25,37 @@ export function connect(heard) {
   }
 
   function take(buffer) {
-    const view = new DataView(buffer);
-    if (view.getUint8(0) !== VERSION) { heard.closed("the server speaks another version: load the page again", true); return; }
-    const kind = view.getUint8(1);
-    if (kind === TEXT) takeText(JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 16))));
-    else if (kind === TRACES) coming.push(() => heard.traces(plot(buffer, view)));
-    else if (kind === POSE) coming.push(() => heard.pose(view.getFloat64(16, true), new Float32Array(buffer, 24, view.getUint32(8, true))));
-  }
-
-  function whole(picture) {
-    pictures.push([...coming, picture]);
-    coming = [];
-    if (pictures.length === 1) requestAnimationFrame(paint);
+    const head = new DataView(buffer);
+    if (head.getUint8(0) !== VERSION) heard.closed("the server speaks another version: load the page again", true);
+    else if (head.getUint8(1) !== PICTURE) part(buffer, 0, buffer.byteLength);
+    else if (pictures.push(buffer) === 1) requestAnimationFrame(paint);
   }
 
   function paint() {
-    if (!pictures.length) return;   // it belonged to a connection that was lost
-    for (const act of pictures.shift()) act();
+    if (!pictures.length) return;   // they belonged to a connection that was lost
+    const buffer = pictures.shift(), view = new DataView(buffer);
+    for (let k = view.getUint32(8, true), at = 16; k > 0; k--) {
+      const length = view.getUint32(at, true);
+      part(buffer, at + 8, length);
+      at += 8 + length + (8 - length % 8) % 8;
+    }
     send({ do: "shown" });
     if (pictures.length) requestAnimationFrame(paint);
+  }
+
+  // A message, or one of those in a picture.
+  function part(buffer, at, length) {
+    const view = new DataView(buffer, at, length), kind = view.getUint8(1);
+    if (kind === TEXT) takeText(JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, at + 16, length - 16))));
+    else if (kind === TRACES) heard.traces(plot(buffer, at, view));
+    else if (kind === POSE) heard.pose(view.getFloat64(16, true), new Float32Array(buffer, at + 24, view.getUint32(8, true)));
   }
 
   function takeText(content) {
     if ("hello" in content) heard.hello(content.hello);
     else if ("values" in content && "at" in content) heard.values(content.values, content.at);
     else if ("state" in content) heard.state(content.state);
-    else if ("picture" in content) whole(() => heard.picture(content.picture, content.lost));
+    else if ("picture" in content) heard.picture(content.picture, content.lost);
     else if ("answer" in content) {
       const asked = waiting.get(content.answer);
       waiting.delete(content.answer);
@@ -59,15 +63,14 @@ export function connect(heard) {
     }
   }
 
-  function plot(buffer, view) {
+  function plot(buffer, at, view) {
     const flags = view.getUint16(6, true);
     return { place: view.getUint16(2, true), points: view.getUint32(8, true), follows: !!(flags & FOLLOWS), anew: !!(flags & ANEW),
-      end: view.getFloat64(16, true), span: view.getFloat64(24, true), found: traces(buffer, view, view.getUint16(4, true)) };
+      end: view.getFloat64(16, true), span: view.getFloat64(24, true), found: traces(buffer, at + 32, view.getUint16(4, true)) };
   }
 
-  function traces(buffer, view, channels) {
-    const found = [];
-    let at = 32;
+  function traces(buffer, at, channels) {
+    const found = [], view = new DataView(buffer);
     for (let k = 0; k < channels; k++) {
       const channel = view.getUint32(at, true), flags = view.getUint32(at + 4, true), count = view.getUint32(at + 8, true);
       at += 16;
