@@ -43,7 +43,7 @@ COOKIE = "ranger-sim-panel"
 # Chosen by us: what a page may take.
 PLACES = 16  # pages at a time: each costs a picture 30 times a second
 AHEAD = 2  # pictures that a page was sent and has not shown: one is painted while the next is made
-PICTURE_S = 1 / 31  # so that 30 in a second remain where some are late
+PICTURE_S = 1 / 33  # so that 30 in a second remain where some are late
 STATE_S = 0.2
 LONGEST_WISH = 1 << 16  # bytes: a parameter set by name has below 20,000
 WISHES_PER_S = 50.0
@@ -317,7 +317,7 @@ class Session:
     # --- what the page sees ---------------------------------------------------------------------------------
 
     async def show(self) -> None:
-        """Pictures, as fast as the page takes them, on the average 31 in a second at most."""
+        """Pictures, as fast as the page takes them, on the average 33 in a second at most."""
         loop = asyncio.get_running_loop()
         live = "live" in self.source.can
         due_s = loop.time()
