@@ -106,12 +106,13 @@ def started(*arguments, **how):
 
 @contextlib.contextmanager
 def watched(seconds: float, seed: int, width: int):
-    """(robot, panel, page, browser's process id): a robot in real time, looked at."""
+    """(name, robot, panel, page): a robot in real time, looked at; its time stands until the page is there."""
     name = f"watched-{os.getpid()}"
     with contextlib.ExitStack() as stack:
         words = ["up", "--name", name, "--time", f"{seconds}s", "--seed", str(seed), "--log", "none", "--json", "-"]
         robot = stack.enter_context(started(*words, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL))
         until_there(name, robot)
+        control.ask(name, {"do": "pause"})
         panel = stack.enter_context(started("panel", "--name", name, "--http-port", "0", stderr=subprocess.PIPE))
         address = next(found[0] for line in panel.stderr if (found := re.search(r"http://\S+", line)))
         page = stack.enter_context(browser.opened(stack.enter_context(tempfile.TemporaryDirectory())))
@@ -119,6 +120,7 @@ def watched(seconds: float, seed: int, width: int):
         where = urllib.parse.urlencode({"view": "plots", "span": "10", "plots": plots})
         page.open(f"{address}#{where}", width, 1000, 1)
         page.until("document.body?.dataset.connected === 'yes' && window.rangerPanel.shown() > 0")
+        control.ask(name, {"do": "resume"})
         yield name, robot, panel, page
 
 
@@ -241,8 +243,11 @@ def main(words: list[str] | None = None) -> int:
     options.add_argument("--seed", type=int, default=1)
     options.add_argument("--keep", type=pathlib.Path, help="everything as JSON")
     chosen = options.parse_args(words)
+    seconds = float(chosen.time.removesuffix("s"))
+    if seconds < 2 * chosen.every:
+        options.error(f"--time {seconds:g}s: a row each {chosen.every:g} s (--every) needs {2 * chosen.every:g} s at least")
     result = watch(
-        float(chosen.time.removesuffix("s")),
+        seconds,
         chosen.every,
         chosen.seed,
         chosen.width,
