@@ -22,6 +22,7 @@ import urllib.parse
 import numpy as np
 
 from ranger_sim.foundation import wallclock
+from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.processes import control
 from ranger_sim.tools.bench.command import machine
 from ranger_sim.tools.command_line.files import replace_file
@@ -204,13 +205,18 @@ def watch(seconds: float, every_s: float, seed: int, width: int, say) -> dict:
         while robot.poll() is None:
             if page.value("window.rangerPanel.span()[1]") > seconds - every_s / 2:
                 break
-            rows.append(row_of(name, robot, panel, page, process, rows[-1] if rows else None))
+            try:
+                rows.append(row_of(name, robot, panel, page, process, rows[-1] if rows else None))
+            except UserError:  # it has ended meanwhile
+                break
             if len(rows) > 1:
                 say(line_of(rows[-1]))
             next_s += every_s
             wallclock.sleep_s(max(0.0, next_s - wallclock.monotonic_s()))
         summary = json.loads(robot.communicate()[0])
         result["errors"] = page.errors
+    if len(rows) < 2:
+        raise RuntimeError("the robot ended before two rows were measured")
     result["digest"], result["time_s"] = summary["trace_digest"], summary["time_s"]
     result["alone"] = walked_alone(seconds, seed)
     result["figures"] = figures_of(rows)
@@ -245,7 +251,9 @@ def main(words: list[str] | None = None) -> int:
     chosen = options.parse_args(words)
     seconds = float(chosen.time.removesuffix("s"))
     if seconds < 2 * chosen.every:
-        options.error(f"--time {seconds:g}s: a row each {chosen.every:g} s (--every) needs {2 * chosen.every:g} s at least")
+        options.error(
+            f"--time {seconds:g}s: with a row each {chosen.every:g} s (--every) {2 * chosen.every:g} s at least"
+        )
     result = watch(
         seconds,
         chosen.every,
